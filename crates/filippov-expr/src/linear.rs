@@ -1,0 +1,166 @@
+//! Sums as linear forms `sum_k c_k a_k + c`, the normal form by which switching functions are recognised.
+
+use std::collections::BinaryHeap;
+
+use rustc_hash::FxHashMap;
+
+use crate::graph::Graph;
+use crate::node::{Node, NodeId};
+use crate::op::{BinaryOp, UnaryOp};
+
+/// An expression as `sum_k coefficient_k * atom_k + constant`; atoms are what is not a sum or a multiple.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct LinearForm {
+    /// Atoms in increasing order with their coefficients, none of them zero.
+    pub terms: Vec<(NodeId, f64)>,
+    /// The constant term.
+    pub constant: f64,
+}
+
+/// A linear form up to a factor, coefficients rounded so that different spellings coincide.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(crate) struct LinearKey {
+    terms: Vec<(NodeId, u64)>,
+    constant: u64,
+}
+
+/// A coefficient and the sum of the magnitudes that it was made of.
+#[derive(Clone, Copy, Default)]
+struct Accumulated {
+    value: f64,
+    magnitude: f64,
+}
+
+impl Accumulated {
+    fn add(&mut self, value: f64) {
+        self.value += value;
+        self.magnitude += value.abs();
+    }
+
+    /// The value, or 0 if nothing but rounding errors is left of it.
+    fn rounded(self) -> f64 {
+        if self.value.abs() <= 8.0 * f64::EPSILON * self.magnitude {
+            0.0
+        } else {
+            self.value
+        }
+    }
+}
+
+impl LinearForm {
+    /// The linear form of an expression, at a cost linear in its size (shared parts are visited once).
+    pub fn of(graph: &Graph, root: NodeId) -> Self {
+        let mut coefficients: FxHashMap<NodeId, Accumulated> = FxHashMap::default();
+        let mut pending = BinaryHeap::from([root]);
+        coefficients.entry(root).or_default().add(1.0);
+        let mut terms = Vec::new();
+        let mut constant = Accumulated::default();
+        // Largest number first: when a node is taken, everything that uses it has been taken.
+        while let Some(id) = pending.pop() {
+            let Some(sum) = coefficients.remove(&id) else {
+                continue;
+            };
+            let c = sum.rounded();
+            if c == 0.0 {
+                continue;
+            }
+            let mut push = |operand: NodeId, coefficient: f64| {
+                let entry = coefficients.entry(operand).or_insert_with(|| {
+                    pending.push(operand);
+                    Accumulated::default()
+                });
+                entry.add(coefficient);
+            };
+            match *graph.node(id) {
+                Node::Constant(value) => constant.add(c * value),
+                Node::Unary(UnaryOp::Neg, a) => push(a, -c),
+                Node::Binary(BinaryOp::Add, a, b) => {
+                    push(a, c);
+                    push(b, c);
+                }
+                Node::Binary(BinaryOp::Sub, a, b) => {
+                    push(a, c);
+                    push(b, -c);
+                }
+                Node::Binary(BinaryOp::Mul, a, b) => match graph.as_constant(a) {
+                    Some(factor) => push(b, c * factor),
+                    None => terms.push((id, c)),
+                },
+                Node::Binary(BinaryOp::Div, a, b) => match graph.as_constant(b) {
+                    Some(divisor) => push(a, c / divisor),
+                    None => terms.push((id, c)),
+                },
+                _ => terms.push((id, c)),
+            }
+        }
+        terms.reverse();
+        let form = LinearForm {
+            terms,
+            constant: constant.rounded(),
+        };
+        if form.is_finite() {
+            form
+        } else {
+            LinearForm {
+                terms: vec![(root, 1.0)],
+                constant: 0.0,
+            }
+        }
+    }
+
+    /// The coefficient of an atom, 0 if it does not occur.
+    pub fn coefficient(&self, atom: NodeId) -> f64 {
+        match self.terms.binary_search_by_key(&atom, |term| term.0) {
+            Ok(k) => self.terms[k].1,
+            Err(_) => 0.0,
+        }
+    }
+
+    /// The atom and its coefficient if the form is nothing else.
+    pub fn single_atom(&self) -> Option<(NodeId, f64)> {
+        match (self.terms.as_slice(), self.constant == 0.0) {
+            ([term], true) => Some(*term),
+            _ => None,
+        }
+    }
+
+    /// The magnitude that all coefficients and the constant share, if they do (to rounding).
+    pub fn common_magnitude(&self) -> Option<f64> {
+        let magnitude = self.terms.first()?.1.abs();
+        let is_same = |c: f64| (c.abs() - magnitude).abs() <= 8.0 * f64::EPSILON * magnitude;
+        let same = self.terms.iter().all(|term| is_same(term.1))
+            && (self.constant == 0.0 || is_same(self.constant));
+        same.then_some(magnitude)
+    }
+
+    /// The form up to a factor, and the sign of that factor. `None` without atoms.
+    ///
+    /// The coefficient of the first atom becomes 1, the others lose their last four bits: `c a - c b` with
+    /// a rounded c is `a - b`, while two thresholds that differ in the 15th digit stay two.
+    pub fn key(&self) -> Option<(LinearKey, f64)> {
+        let leading = self.terms.first()?.1;
+        let relative = |c: f64| {
+            let bits = (c / leading + 0.0).to_bits();
+            bits.wrapping_add(8) & !0xF
+        };
+        let terms = self
+            .terms
+            .iter()
+            .map(|&(atom, c)| (atom, relative(c)))
+            .collect();
+        Some((
+            LinearKey {
+                terms,
+                constant: relative(self.constant),
+            },
+            leading.signum(),
+        ))
+    }
+
+    fn is_finite(&self) -> bool {
+        self.constant.is_finite() && self.terms.iter().all(|term| term.1.is_finite())
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,483 @@
+//! Native code by Cranelift. The only file with `unsafe`: calling the code, and freeing it.
+//!
+//! One function per program, generic in the signs, with the C signature of [`CompiledFunction`]. What is
+//! not a machine instruction is a call of the same Rust function that the interpreter uses
+//! ([`UnaryOp::apply`], [`BinaryOp::apply`]), and Cranelift neither contracts nor reorders floating-point
+//! operations: both backends give the same bits.
+
+use std::sync::{Mutex, OnceLock};
+
+use cranelift_codegen::ir::condcodes::FloatCC;
+use cranelift_codegen::ir::{types, AbiParam, FuncRef, InstBuilder, MemFlagsData, Value};
+use cranelift_codegen::isa::OwnedTargetIsa;
+use cranelift_codegen::settings::{self, Configurable};
+use cranelift_frontend::{FunctionBuilder, FunctionBuilderContext};
+use cranelift_jit::{JITBuilder, JITModule};
+use cranelift_module::{default_libcall_names, FuncId, Linkage, Module};
+use rustc_hash::FxHashMap;
+
+use crate::error::ExprError;
+use crate::graph::Graph;
+use crate::node::{Node, NodeId};
+use crate::op::{BinaryOp, UnaryOp};
+use crate::schedule::Schedule;
+use crate::tape::{Arguments, Tape};
+
+/// From this many nodes the fast register allocator is used: the better one takes more than linear time
+/// (29 s for 10^5 nodes) and gains some ten per cent.
+const SINGLE_PASS_FROM: usize = 5_000;
+
+/// Beyond this many nodes compilation takes too long and the stack frame becomes too large.
+const TOO_LARGE_FROM: usize = 60_000;
+
+/// (t, x, s, p, v, out); the pointers are to as many numbers as the program's `Lengths` say.
+type CompiledFunction =
+    unsafe extern "C" fn(f64, *const f64, *const f64, *const f64, *const f64, *mut f64);
+
+/// A program in native code.
+pub(crate) struct NativeCode {
+    function: CompiledFunction,
+    /// Keeps the memory of `function`.
+    _module: OwnedModule,
+}
+
+impl NativeCode {
+    /// Compiles a scheduled program.
+    pub fn new(graph: &Graph, schedule: &Schedule) -> Result<Self, ExprError> {
+        if !passes_self_test() {
+            return unavailable("the self-test on this platform failed");
+        }
+        compile(graph, schedule)
+    }
+
+    /// Whether compiling is not worth while.
+    pub fn is_too_large(schedule: &Schedule) -> bool {
+        schedule.order.len() > TOO_LARGE_FROM
+    }
+
+    /// Runs the program; the caller has checked the lengths.
+    #[inline]
+    pub fn run(&self, arguments: Arguments<'_>, out: &mut [f64]) {
+        let Arguments { t, x, s, p, v } = arguments;
+        // SAFETY: the code was made by `compile` for this signature and lives as long as `_module`. It reads
+        // x, s, p, v below the program's `Lengths` and writes `out` below its number of outputs, which
+        // `Program::eval`, the only caller beside the self-test, has compared with the slices.
+        unsafe {
+            (self.function)(
+                t,
+                x.as_ptr(),
+                s.as_ptr(),
+                p.as_ptr(),
+                v.as_ptr(),
+                out.as_mut_ptr(),
+            )
+        }
+    }
+}
+
+impl std::fmt::Debug for NativeCode {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("NativeCode").finish_non_exhaustive()
+    }
+}
+
+/// The module with the code in memory, which would leak if it were only dropped. The mutex makes it
+/// shareable; it is never locked.
+struct OwnedModule(Mutex<Option<Box<JITModule>>>);
+
+impl Drop for OwnedModule {
+    fn drop(&mut self) {
+        let module = match self.0.get_mut() {
+            Ok(module) => module.take(),
+            Err(poisoned) => poisoned.into_inner().take(),
+        };
+        if let Some(module) = module {
+            // SAFETY: the function pointers into this memory are in the `NativeCode` that owns this module
+            // and are not handed out; being dropped, it is not running.
+            unsafe { module.free_memory() }
+        }
+    }
+}
+
+fn unavailable<T>(reason: impl ToString) -> Result<T, ExprError> {
+    Err(ExprError::NativeUnavailable {
+        reason: reason.to_string(),
+    })
+}
+
+/// The description of this machine, made once for each register allocator.
+fn target(single_pass: bool) -> Result<OwnedTargetIsa, ExprError> {
+    static TARGETS: [OnceLock<Result<OwnedTargetIsa, String>>; 2] =
+        [OnceLock::new(), OnceLock::new()];
+    let allocator = if single_pass {
+        "single_pass"
+    } else {
+        "backtracking"
+    };
+    let describe = || -> Result<OwnedTargetIsa, String> {
+        let mut flags = settings::builder();
+        for (name, value) in [
+            ("opt_level", "speed"),
+            ("regalloc_algorithm", allocator),
+            ("is_pic", "false"),
+            ("use_colocated_libcalls", "false"),
+            ("enable_verifier", "false"),
+            ("unwind_info", "false"), // nothing unwinds through the code: what it calls cannot panic
+            ("enable_probestack", "true"),
+            ("probestack_strategy", "inline"),
+        ] {
+            flags.set(name, value).map_err(|error| error.to_string())?;
+        }
+        let machine = cranelift_native::builder()?;
+        machine
+            .finish(settings::Flags::new(flags))
+            .map_err(|error| error.to_string())
+    };
+    match TARGETS[usize::from(single_pass)].get_or_init(describe) {
+        Ok(target) => Ok(target.clone()),
+        Err(reason) => unavailable(reason),
+    }
+}
+
+fn compile(graph: &Graph, schedule: &Schedule) -> Result<NativeCode, ExprError> {
+    let target = target(schedule.order.len() > SINGLE_PASS_FROM)?;
+    let mut builder = JITBuilder::with_isa(target, default_libcall_names());
+    let called = called_operations(graph, schedule);
+    builder.symbols(
+        called
+            .iter()
+            .map(|operation| (operation.symbol(), operation.address())),
+    );
+
+    let mut owner = OwnedModule(Mutex::new(Some(Box::new(JITModule::new(builder)))));
+    let Ok(Some(module)) = owner.0.get_mut() else {
+        return unavailable("the module is gone");
+    };
+    let id = match define(module, graph, schedule, &called) {
+        Ok(id) => id,
+        Err(error) => return unavailable(error),
+    };
+    let address = module.get_finalized_function(id);
+    // SAFETY: `define` gave the function exactly this signature, in the C convention of this machine.
+    let function = unsafe { std::mem::transmute::<*const u8, CompiledFunction>(address) };
+    Ok(NativeCode {
+        function,
+        _module: owner,
+    })
+}
+
+/// Translates the program into one function of the module and makes it executable.
+fn define(
+    module: &mut JITModule,
+    graph: &Graph,
+    schedule: &Schedule,
+    called: &[Operation],
+) -> Result<FuncId, Box<cranelift_module::ModuleError>> {
+    let pointer = module.target_config().pointer_type();
+    let mut context = module.make_context();
+    let signature = &mut context.func.signature;
+    signature.params.push(AbiParam::new(types::F64));
+    signature.params.extend([AbiParam::new(pointer); 5]);
+    let id = module
+        .declare_function("program", Linkage::Local, &context.func.signature)
+        .map_err(Box::new)?;
+
+    let mut imports = FxHashMap::default();
+    for &operation in called {
+        let mut signature = module.make_signature();
+        signature
+            .params
+            .extend(vec![AbiParam::new(types::F64); operation.n_operands()]);
+        signature.returns.push(AbiParam::new(types::F64));
+        let import = module
+            .declare_function(operation.symbol(), Linkage::Import, &signature)
+            .map_err(Box::new)?;
+        imports.insert(
+            operation,
+            module.declare_func_in_func(import, &mut context.func),
+        );
+    }
+
+    let mut function_context = FunctionBuilderContext::new();
+    let mut builder = FunctionBuilder::new(&mut context.func, &mut function_context);
+    let block = builder.create_block();
+    builder.append_block_params_for_function_params(block);
+    builder.switch_to_block(block);
+    builder.seal_block(block);
+    Translation::new(builder, imports)
+        .translate(graph, schedule)
+        .finalize(module.target_config());
+
+    module.define_function(id, &mut context).map_err(Box::new)?;
+    module.finalize_definitions().map_err(Box::new)?;
+    Ok(id)
+}
+
+/// An operation that is a call, not an instruction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+enum Operation {
+    Unary(UnaryOp),
+    Binary(BinaryOp),
+}
+
+impl Operation {
+    /// The operation of a node, if it takes a call.
+    fn of(node: &Node) -> Option<Self> {
+        match *node {
+            Node::Unary(UnaryOp::Neg | UnaryOp::Sqrt, _) => None,
+            Node::Unary(op, _) => Some(Operation::Unary(op)),
+            Node::Binary(op @ (BinaryOp::Pow | BinaryOp::Atan2 | BinaryOp::Hypot), ..) => {
+                Some(Operation::Binary(op))
+            }
+            _ => None,
+        }
+    }
+
+    fn n_operands(self) -> usize {
+        match self {
+            Operation::Unary(_) => 1,
+            Operation::Binary(_) => 2,
+        }
+    }
+
+    fn symbol(self) -> &'static str {
+        match self {
+            Operation::Unary(op) => op.name(),
+            Operation::Binary(op) => op.name(),
+        }
+    }
+
+    fn address(self) -> *const u8 {
+        match self {
+            Operation::Unary(op) => unary_function(op) as *const u8,
+            Operation::Binary(op) => binary_function(op) as *const u8,
+        }
+    }
+}
+
+/// Each operation that the program calls, once.
+fn called_operations(graph: &Graph, schedule: &Schedule) -> Vec<Operation> {
+    let mut called = Vec::new();
+    for operation in schedule
+        .order
+        .iter()
+        .filter_map(|&id| Operation::of(graph.node(id)))
+    {
+        if !called.contains(&operation) {
+            called.push(operation);
+        }
+    }
+    called
+}
+
+/// The C functions of the listed operations: `apply` with the operation fixed.
+macro_rules! c_functions {
+    ($op:expr, $kind:ident, $parameters:tt, $operands:tt, $type:ty, [$($name:ident),+]) => {
+        match $op {
+            $($kind::$name => {
+                extern "C" fn function $parameters -> f64 {
+                    $kind::$name.apply $operands
+                }
+                function as $type
+            })+
+        }
+    };
+}
+
+fn unary_function(op: UnaryOp) -> extern "C" fn(f64) -> f64 {
+    c_functions!(op, UnaryOp, (a: f64), (a), extern "C" fn(f64) -> f64, [
+        Neg, Sqrt, Cbrt, Exp, Expm1, Exp2, Log, Log1p, Log2, Log10, Sin, Cos, Tan, Asin, Acos, Atan, Sinh, Cosh,
+        Tanh, Asinh, Acosh, Atanh
+    ])
+}
+
+fn binary_function(op: BinaryOp) -> extern "C" fn(f64, f64) -> f64 {
+    c_functions!(op, BinaryOp, (a: f64, b: f64), (a, b), extern "C" fn(f64, f64) -> f64, [Add, Sub, Mul, Div, Pow, Atan2, Hypot])
+}
+
+/// The body of the function while it is written.
+struct Translation<'a> {
+    builder: FunctionBuilder<'a>,
+    imports: FxHashMap<Operation, FuncRef>,
+    /// t, x, s, p, v, out
+    parameters: [Value; 6],
+    values: FxHashMap<NodeId, Value>,
+    /// s_j > 0, by surface.
+    conditions: FxHashMap<u32, Value>,
+}
+
+impl<'a> Translation<'a> {
+    fn new(builder: FunctionBuilder<'a>, imports: FxHashMap<Operation, FuncRef>) -> Self {
+        let mut parameters = [Value::from_u32(0); 6];
+        if let Some(block) = builder.current_block() {
+            parameters.copy_from_slice(builder.block_params(block));
+        }
+        Translation {
+            builder,
+            imports,
+            parameters,
+            values: FxHashMap::default(),
+            conditions: FxHashMap::default(),
+        }
+    }
+
+    fn translate(mut self, graph: &Graph, schedule: &Schedule) -> FunctionBuilder<'a> {
+        let mut stores = schedule.stores.iter().peekable();
+        for (position, &id) in schedule.order.iter().enumerate() {
+            let value = self.value(graph.node(id));
+            self.values.insert(id, value);
+            // Stored at once: the value need not stay alive to the end.
+            while let Some(&&(_, output)) = stores.peek().filter(|store| store.0 == position) {
+                let [.., out] = self.parameters;
+                self.builder
+                    .ins()
+                    .store(MemFlagsData::trusted(), value, out, offset(output));
+                stores.next();
+            }
+        }
+        self.builder.ins().return_(&[]);
+        self.builder
+    }
+
+    fn value(&mut self, node: &Node) -> Value {
+        let [t, x, s, p, v, _] = self.parameters;
+        match *node {
+            Node::Constant(value) => self.builder.ins().f64const(value),
+            Node::Time => t,
+            Node::State(i) => self.load(x, i),
+            Node::Sign(j) => self.load(s, j),
+            Node::Parameter(i) => self.load(p, i),
+            Node::Input(i) => self.load(v, i),
+            Node::Unary(UnaryOp::Neg, a) => {
+                let a = self.values[&a];
+                self.builder.ins().fneg(a)
+            }
+            Node::Unary(UnaryOp::Sqrt, a) => {
+                let a = self.values[&a];
+                self.builder.ins().sqrt(a)
+            }
+            Node::Unary(op, a) => self.call(Operation::Unary(op), &[a]),
+            Node::Binary(op, a, b) => {
+                let (left, right) = (self.values[&a], self.values[&b]);
+                match op {
+                    BinaryOp::Add => self.builder.ins().fadd(left, right),
+                    BinaryOp::Sub => self.builder.ins().fsub(left, right),
+                    BinaryOp::Mul => self.builder.ins().fmul(left, right),
+                    BinaryOp::Div => self.builder.ins().fdiv(left, right),
+                    BinaryOp::Pow | BinaryOp::Atan2 | BinaryOp::Hypot => {
+                        self.call(Operation::Binary(op), &[a, b])
+                    }
+                }
+            }
+            Node::Select {
+                surface,
+                plus,
+                minus,
+            } => {
+                let condition = self.condition(surface);
+                let (plus, minus) = (self.values[&plus], self.values[&minus]);
+                self.builder.ins().select(condition, plus, minus)
+            }
+        }
+    }
+
+    fn condition(&mut self, surface: u32) -> Value {
+        if let Some(&condition) = self.conditions.get(&surface) {
+            return condition;
+        }
+        let [_, _, s, ..] = self.parameters;
+        let sign = self.load(s, surface);
+        let zero = self.builder.ins().f64const(0.0);
+        let condition = self.builder.ins().fcmp(FloatCC::GreaterThan, sign, zero);
+        self.conditions.insert(surface, condition);
+        condition
+    }
+
+    /// The arguments do not change during a call, so equal loads are one.
+    fn load(&mut self, array: Value, index: u32) -> Value {
+        let flags = MemFlagsData::trusted().with_readonly();
+        self.builder
+            .ins()
+            .load(types::F64, flags, array, offset(index))
+    }
+
+    fn call(&mut self, operation: Operation, operands: &[NodeId]) -> Value {
+        let operands: Vec<Value> = operands
+            .iter()
+            .map(|operand| self.values[operand])
+            .collect();
+        let call = self.builder.ins().call(self.imports[&operation], &operands);
+        self.builder.inst_results(call)[0]
+    }
+}
+
+/// Byte offset of a number in an array; the schedule has checked that it fits.
+fn offset(index: u32) -> i32 {
+    (index * 8) as i32
+}
+
+/// Whether native code gives what the interpreter gives, tried once per process on every operation.
+///
+/// Some platforms refuse executable memory, and on others a code generator may be wrong: then programs
+/// are interpreted.
+fn passes_self_test() -> bool {
+    static PASSED: OnceLock<bool> = OnceLock::new();
+    *PASSED.get_or_init(|| std::panic::catch_unwind(self_test).unwrap_or(false))
+}
+
+fn self_test() -> bool {
+    let mut graph = Graph::new();
+    let variables = [
+        graph.time(),
+        graph.state(1),
+        graph.parameter(0),
+        graph.sign_of(2),
+        graph.input(1),
+    ];
+    let mut outputs = variables.to_vec();
+    for (k, &op) in UnaryOp::ALL.iter().enumerate() {
+        outputs.push(graph.insert(Node::Unary(op, variables[k % variables.len()])));
+    }
+    for (k, &op) in BinaryOp::ALL.iter().enumerate() {
+        let (a, b) = (outputs[k], outputs[k + 5]);
+        outputs.push(graph.insert(Node::Binary(op, a, b)));
+    }
+    outputs.push(graph.select(2, 1.0, outputs[3], outputs[20]));
+    let half = graph.constant(0.5);
+    outputs.push(graph.select(0, 1.0, half, outputs[9]));
+
+    let Ok(schedule) = Schedule::new(&graph, &outputs) else {
+        return false;
+    };
+    let Ok(native) = compile(&graph, &schedule) else {
+        return false;
+    };
+    let tape = Tape::new(&graph, &schedule);
+    [(0.25, 0.5, 1.0), (0.75, 1.5, -1.0), (-0.5, f64::NAN, 1.0)]
+        .into_iter()
+        .all(|(t, value, sign)| {
+            let (x, s, p, v) = (
+                [0.0, value],
+                [-sign, 0.0, sign],
+                [value + 0.125],
+                [0.0, 0.25],
+            );
+            let arguments = Arguments {
+                t,
+                x: &x,
+                s: &s,
+                p: &p,
+                v: &v,
+            };
+            let (mut expected, mut found) = (vec![0.0; outputs.len()], vec![1.0; outputs.len()]);
+            tape.run(arguments, &mut expected);
+            native.run(arguments, &mut found);
+            expected
+                .iter()
+                .zip(&found)
+                .all(|(a, b)| a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()))
+        })
+}
+
+#[cfg(test)]
+mod tests;

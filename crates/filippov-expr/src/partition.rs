@@ -1,0 +1,117 @@
+//! What a value depends on: motion, signs, and the field of one sign pattern.
+
+use rustc_hash::FxHashMap;
+
+use crate::graph::Graph;
+use crate::node::{Node, NodeId};
+
+impl Graph {
+    /// Whether the value varies along a motion: it contains the time, a state, a sign or an input.
+    /// `false` means constants and parameters only.
+    pub fn depends_on_motion(&self, id: NodeId) -> bool {
+        self.facts(id).varies
+    }
+
+    /// Whether the value is affine in (t, x) with coefficients made of constants and parameters.
+    ///
+    /// This is read off the structure: `x*y - x*y` simplifies to 0 and is affine, `(x + 1)**2 - x**2` is not.
+    /// Nothing that contains a sign or an input is affine.
+    pub fn is_affine(&self, id: NodeId) -> bool {
+        self.facts(id).affine
+    }
+
+    /// The values with some signs fixed: `Sign(j)` becomes the number, and a select on it the branch taken,
+    /// where `signs[j]` is given. Signs beyond the end of `signs` stay free.
+    pub fn at_signs(&mut self, roots: &[NodeId], signs: &[Option<f64>]) -> Vec<NodeId> {
+        let fixed = |surface: u32| signs.get(surface as usize).copied().flatten();
+        let nodes = self.reachable_by(roots.iter().copied(), |id| self.followed(id, fixed));
+        let mut image: FxHashMap<NodeId, NodeId> = FxHashMap::default();
+        for id in nodes {
+            if !self.facts(id).has_sign {
+                continue;
+            }
+            let at = |operand: NodeId| image.get(&operand).copied().unwrap_or(operand);
+            let new = match *self.node(id) {
+                Node::Sign(j) => match fixed(j) {
+                    Some(sign) => self.constant(sign),
+                    None => id,
+                },
+                Node::Select {
+                    surface,
+                    plus,
+                    minus,
+                } => match fixed(surface) {
+                    Some(sign) => at(if sign > 0.0 { plus } else { minus }),
+                    None => {
+                        let (plus, minus) = (at(plus), at(minus));
+                        self.select(surface, 1.0, plus, minus)
+                    }
+                },
+                Node::Unary(op, a) => {
+                    let a = at(a);
+                    self.unary(op, a)
+                }
+                Node::Binary(op, a, b) => {
+                    let (a, b) = (at(a), at(b));
+                    self.binary(op, a, b)
+                }
+                _ => id,
+            };
+            image.insert(id, new);
+        }
+        roots
+            .iter()
+            .map(|root| image.get(root).copied().unwrap_or(*root))
+            .collect()
+    }
+
+    /// Which signs can change these values when the others are as given: one entry per surface.
+    ///
+    /// A select is followed only into the branch that its sign takes; it counts for its own sign. A sign
+    /// beyond the end of `signs` is unknown: both branches are followed. No nodes are made.
+    pub fn sign_dependencies(&self, roots: &[NodeId], signs: &[f64]) -> Vec<bool> {
+        let mut depends = vec![false; self.n_surfaces()];
+        let given = |surface: u32| signs.get(surface as usize).copied();
+        let relevant = |id: NodeId| {
+            let operands = self.followed(id, given);
+            operands
+                .into_iter()
+                .filter(|&operand| self.facts(operand).has_sign)
+                .collect::<Vec<_>>()
+        };
+        let signed = roots
+            .iter()
+            .copied()
+            .filter(|&root| self.facts(root).has_sign);
+        for id in self.reachable_by(signed, relevant) {
+            if let Node::Sign(j) | Node::Select { surface: j, .. } = *self.node(id) {
+                if let Some(entry) = depends.get_mut(j as usize) {
+                    *entry = true;
+                }
+            }
+        }
+        depends
+    }
+
+    /// The operands of a node, of a select with known sign only the one taken.
+    fn followed(
+        &self,
+        id: NodeId,
+        sign: impl Fn(u32) -> Option<f64>,
+    ) -> impl IntoIterator<Item = NodeId> {
+        let node = *self.node(id);
+        let taken = match node {
+            Node::Select {
+                surface,
+                plus,
+                minus,
+            } => sign(surface).map(|s| if s > 0.0 { plus } else { minus }),
+            _ => None,
+        };
+        node.operands()
+            .filter(move |&operand| taken.is_none_or(|taken| taken == operand))
+    }
+}
+
+#[cfg(test)]
+mod tests;

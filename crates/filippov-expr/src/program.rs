@@ -1,0 +1,150 @@
+//! A compiled function (t, x, s, p, v) -> out.
+
+use crate::error::ExprError;
+use crate::graph::Graph;
+#[cfg(feature = "native")]
+use crate::native::NativeCode;
+use crate::node::NodeId;
+use crate::schedule::{Lengths, Schedule};
+use crate::tape::{Arguments, Tape};
+
+/// How a program is run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Backend {
+    /// Native code if this build has it, the platform passes a self-test (once per process) and the
+    /// program is not too large for it; else the interpreter. Both give the same bits.
+    #[default]
+    Auto,
+    /// Native code, or an error.
+    Native,
+    /// The portable interpreter.
+    Interpreter,
+}
+
+/// A compiled function (t, x, s, p, v) -> out. Values shared by several outputs are computed once.
+///
+/// Immutable and free of locks: any number of threads may evaluate it at the same time.
+#[derive(Debug)]
+pub struct Program {
+    code: Code,
+    n_outputs: usize,
+    lengths: Lengths,
+}
+
+#[derive(Debug)]
+enum Code {
+    #[cfg(feature = "native")]
+    Native(NativeCode),
+    Interpreted(Tape),
+}
+
+impl Program {
+    /// Compiles the values of some nodes.
+    ///
+    /// # Errors
+    /// [`ExprError::UnknownNode`], [`ExprError::IndexTooLarge`]; with [`Backend::Native`] also
+    /// [`ExprError::NativeUnavailable`].
+    ///
+    /// # Example
+    /// ```
+    /// use filippov_expr::{Backend, Graph, Program};
+    /// let mut g = Graph::new();
+    /// let (x, t) = (g.state(0), g.time());
+    /// let sum = g.add(x, t);
+    /// let program = Program::compile(&g, &[sum], Backend::Auto)?;
+    /// let mut out = [0.0];
+    /// program.eval(1.0, &[2.0], &[], &[], &[], &mut out);
+    /// assert_eq!(out, [3.0]);
+    /// # Ok::<(), filippov_expr::ExprError>(())
+    /// ```
+    pub fn compile(
+        graph: &Graph,
+        outputs: &[NodeId],
+        backend: Backend,
+    ) -> Result<Program, ExprError> {
+        let schedule = Schedule::new(graph, outputs)?;
+        let code = Code::new(graph, &schedule, backend)?;
+        Ok(Program {
+            code,
+            n_outputs: outputs.len(),
+            lengths: schedule.lengths,
+        })
+    }
+
+    /// Whether this is native code.
+    pub fn is_native(&self) -> bool {
+        !matches!(self.code, Code::Interpreted(_))
+    }
+
+    /// How many values are computed.
+    pub fn n_outputs(&self) -> usize {
+        self.n_outputs
+    }
+
+    /// How long the arguments of [`Program::eval`] have to be at least.
+    pub fn lengths(&self) -> Lengths {
+        self.lengths
+    }
+
+    /// Evaluates at time `t`, states `x`, signs `s`, parameters `p`, extra vector `v`; writes the first
+    /// [`Program::n_outputs`] entries of `out`.
+    ///
+    /// If an argument is too short (see [`Program::lengths`]) `out` is filled with NaN instead, as much of
+    /// it as there is; in builds with debug assertions that panics.
+    #[inline]
+    pub fn eval(&self, t: f64, x: &[f64], s: &[f64], p: &[f64], v: &[f64], out: &mut [f64]) {
+        let needed = &self.lengths;
+        let long_enough = x.len() >= needed.states
+            && s.len() >= needed.signs
+            && p.len() >= needed.parameters
+            && v.len() >= needed.inputs
+            && out.len() >= self.n_outputs;
+        if !long_enough {
+            out.fill(f64::NAN);
+            debug_assert!(
+                long_enough,
+                "an argument is shorter than {needed:?}, {} outputs",
+                self.n_outputs
+            );
+            return;
+        }
+        let arguments = Arguments { t, x, s, p, v };
+        match &self.code {
+            #[cfg(feature = "native")]
+            Code::Native(code) => code.run(arguments, out),
+            Code::Interpreted(tape) => tape.run(arguments, out),
+        }
+    }
+}
+
+impl Code {
+    #[cfg(feature = "native")]
+    fn new(graph: &Graph, schedule: &Schedule, backend: Backend) -> Result<Self, ExprError> {
+        match backend {
+            Backend::Interpreter => Ok(Code::Interpreted(Tape::new(graph, schedule))),
+            Backend::Native => NativeCode::new(graph, schedule).map(Code::Native),
+            Backend::Auto if NativeCode::is_too_large(schedule) => {
+                Ok(Code::Interpreted(Tape::new(graph, schedule)))
+            }
+            Backend::Auto => Ok(match NativeCode::new(graph, schedule) {
+                Ok(code) => Code::Native(code),
+                Err(_) => Code::Interpreted(Tape::new(graph, schedule)),
+            }),
+        }
+    }
+
+    #[cfg(not(feature = "native"))]
+    fn new(graph: &Graph, schedule: &Schedule, backend: Backend) -> Result<Self, ExprError> {
+        match backend {
+            Backend::Native => Err(ExprError::NativeUnavailable {
+                reason: "this build is without the feature `native`".into(),
+            }),
+            Backend::Auto | Backend::Interpreter => {
+                Ok(Code::Interpreted(Tape::new(graph, schedule)))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,482 @@
+//! Switching functions: which sign an expression has, and which surface it switches on.
+//!
+//! `sign`, `abs`, `maximum`, `minimum` and comparisons all ask [`Graph::switch`]. It recognises one surface
+//! in many spellings, because two surfaces in the same place would make every crossing a degenerate
+//! intersection:
+//!
+//! - an expression is written as `sum c_k a_k + c` and compared up to a factor: `v`, `-v`, `2*v`, `v/3`,
+//!   `v + 0`, `a - b` and `b - a`, `c*a - c*b` are one surface;
+//! - functions with the sign of their argument are dropped: `tanh(v)`, `arctan(v)`, `v**3`, `1/v`, and factors that
+//!   are not negative: `exp(y)*v`, `y**2*v`;
+//! - what cannot be negative has no surface: `exp(v)`, `v**2`, `1 + abs(v)` give the constant sign +1. This
+//!   includes `abs(v)` itself: it is positive on both sides of v = 0, so its sign switches nowhere, and no
+//!   second surface is created in the place of v;
+//! - what is made of a sign switches where that one does: `sign(v)`, `1 + sign(v)`, `sign(v)*exp(y)`.
+//!
+//! Division by a parameter is not stripped, since its sign is not known.
+
+use rustc_hash::FxHashMap;
+
+use crate::graph::Graph;
+use crate::linear::{LinearForm, LinearKey};
+use crate::node::{Node, NodeId};
+use crate::op::{BinaryOp, UnaryOp};
+
+/// What the sign of an expression is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Switching {
+    /// The same everywhere: -1, 0 or 1. (At isolated zeros, as of `abs(v)`, it is the sign around them.)
+    Constant(f64),
+    /// `orientation * s_index`.
+    Surface {
+        /// The number of the surface.
+        index: u32,
+        /// +1.0 or -1.0.
+        orientation: f64,
+    },
+}
+
+/// The surfaces of a graph and the expressions known to switch on them.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct SurfaceTable {
+    /// The switching functions h_j.
+    pub functions: Vec<NodeId>,
+    /// Expressions whose sign is `orientation * s_j`: a cache, and the memory of what is an absolute value.
+    pub switches: FxHashMap<NodeId, (u32, f64)>,
+    /// Surface and orientation of a linear form.
+    keys: FxHashMap<LinearKey, (u32, f64)>,
+}
+
+impl SurfaceTable {
+    pub fn switch_of(&self, id: NodeId) -> Option<(u32, f64)> {
+        self.switches.get(&id).copied()
+    }
+}
+
+/// An expression reduced to what decides its sign.
+enum Reduced {
+    Known(Switching),
+    Form(NodeId, LinearForm, f64),
+}
+
+impl Graph {
+    /// The switching function h_`index`.
+    ///
+    /// # Panics
+    /// If there are not so many surfaces.
+    pub fn surface(&self, index: u32) -> NodeId {
+        self.surfaces.functions[index as usize]
+    }
+
+    /// How many surfaces there are.
+    pub fn n_surfaces(&self) -> usize {
+        self.surfaces.functions.len()
+    }
+
+    /// Declares a switching function that the user gives: it keeps its order and its sign.
+    ///
+    /// Later [`Graph::switch`] recognises other spellings of it. Declaring the same node again gives the
+    /// same index; another spelling of a known surface is a surface of its own, as asked.
+    pub fn declare_surface(&mut self, function: NodeId) -> u32 {
+        if let Some(index) = self
+            .surfaces
+            .functions
+            .iter()
+            .position(|&known| known == function)
+        {
+            return index as u32;
+        }
+        let index = self.surfaces.functions.len() as u32;
+        self.surfaces.functions.push(function);
+        self.register_surface(index);
+        index
+    }
+
+    /// The sign of an expression: constant, or that of a surface, which is created if it is a new one.
+    ///
+    /// The sign and the spelling of a new surface are those seen first, except that the leading state
+    /// variable is made positive: `0.2 - v` becomes `v - 0.2`. See the [module](crate::switching) for what
+    /// is recognised as the same.
+    pub fn switch(&mut self, id: NodeId) -> Switching {
+        if let Some((index, orientation)) = self.surfaces.switch_of(id) {
+            return Switching::Surface { index, orientation };
+        }
+        if self.as_constant(id).is_some_and(f64::is_nan) {
+            return Switching::Constant(0.0);
+        }
+        let (index, orientation) = match self.reduce(id) {
+            Reduced::Known(Switching::Surface { index, orientation }) => (index, orientation),
+            Reduced::Known(constant) => return constant,
+            Reduced::Form(spelling, form, side) => {
+                let Some((key, lead)) = form.key() else {
+                    return Switching::Constant(0.0);
+                };
+                let (index, orientation) = match self.surfaces.keys.get(&key) {
+                    Some(&known) => known,
+                    None => {
+                        let (function, flip) = self.spell(spelling, &form);
+                        let index = self.surfaces.functions.len() as u32;
+                        self.surfaces.functions.push(function);
+                        self.surfaces.switches.insert(function, (index, 1.0));
+                        self.surfaces.keys.insert(key, (index, lead * flip));
+                        (index, lead * flip)
+                    }
+                };
+                (index, side * lead * orientation)
+            }
+        };
+        self.surfaces.switches.insert(id, (index, orientation));
+        Switching::Surface { index, orientation }
+    }
+
+    /// The sign of `a` as an expression: a constant, or `+-s_j` (times other signs, for a product with them).
+    pub fn sign(&mut self, a: NodeId) -> NodeId {
+        if let Some(value) = self.as_constant(a) {
+            let sign = if value == 0.0 || value.is_nan() {
+                value
+            } else {
+                value.signum()
+            };
+            return self.constant(sign);
+        }
+        // sign(s_k * b) = s_k * sign(b): a new surface on s_k * b would jump where surface k is crossed.
+        let (signs, rest) = self.split_signs(a);
+        if !signs.is_empty() && !matches!(self.reduce(a), Reduced::Known(_)) {
+            let mut result = self.sign(rest);
+            for sign in signs {
+                result = self.mul(sign, result);
+            }
+            return result;
+        }
+        match self.switch(a) {
+            Switching::Constant(sign) => self.constant(sign),
+            Switching::Surface { index, orientation } => {
+                let sign = self.sign_of(index);
+                if orientation < 0.0 {
+                    self.neg(sign)
+                } else {
+                    sign
+                }
+            }
+        }
+    }
+
+    /// `|a|`, as `s_j * a` with the sign of a.
+    pub fn abs(&mut self, a: NodeId) -> NodeId {
+        if let Some(value) = self.as_constant(a) {
+            return self.constant(value.abs());
+        }
+        let (signs, rest) = self.split_signs(a);
+        if !signs.is_empty() && !matches!(self.reduce(a), Reduced::Known(_)) {
+            return self.abs(rest);
+        }
+        match self.switch(a) {
+            Switching::Constant(sign) if sign > 0.0 => a,
+            Switching::Constant(sign) if sign < 0.0 => self.neg(a),
+            Switching::Constant(_) => self.constant(0.0),
+            Switching::Surface { index, orientation } => {
+                let positive = if orientation < 0.0 { self.neg(a) } else { a };
+                self.surfaces.switches.insert(positive, (index, 1.0));
+                let sign = self.sign_of(index);
+                self.mul(sign, positive)
+            }
+        }
+    }
+
+    /// The larger of two values: a select on `a - b`.
+    pub fn maximum(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        self.extremum(a, b, a, b)
+    }
+
+    /// The smaller of two values: a select on `a - b`.
+    pub fn minimum(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        self.extremum(a, b, b, a)
+    }
+
+    fn extremum(&mut self, a: NodeId, b: NodeId, if_above: NodeId, if_below: NodeId) -> NodeId {
+        let difference = self.sub(a, b);
+        if let Some(value) = self.as_constant(difference) {
+            if value.is_nan() {
+                return difference;
+            }
+        }
+        match self.switch(difference) {
+            Switching::Constant(sign) if sign < 0.0 => if_below,
+            Switching::Constant(_) => if_above,
+            Switching::Surface { index, orientation } => {
+                self.select(index, orientation, if_above, if_below)
+            }
+        }
+    }
+
+    /// Makes a surface known to [`Graph::switch`]; of several in one place the first is kept.
+    pub(crate) fn register_surface(&mut self, index: u32) {
+        let function = self.surface(index);
+        if let Reduced::Form(_, form, side) = self.reduce(function) {
+            if let Some((key, lead)) = form.key() {
+                self.surfaces
+                    .keys
+                    .entry(key)
+                    .or_insert((index, side * lead));
+                self.surfaces
+                    .switches
+                    .entry(function)
+                    .or_insert((index, 1.0));
+            }
+        }
+    }
+
+    /// Strips what does not change the sign, until the sign is known or a linear form is left. The number is
+    /// the sign by which that form differs from the expression.
+    fn reduce(&self, id: NodeId) -> Reduced {
+        let mut current = id;
+        let mut side = 1.0;
+        loop {
+            let form = LinearForm::of(self, current);
+            if let Some(known) = self.known_sign(&form) {
+                return Reduced::Known(match known {
+                    Switching::Constant(sign) => Switching::Constant(side * sign + 0.0),
+                    Switching::Surface { index, orientation } => Switching::Surface {
+                        index,
+                        orientation: side * orientation,
+                    },
+                });
+            }
+            let Some((atom, coefficient)) = form.single_atom() else {
+                return Reduced::Form(current, form, side);
+            };
+            match self.sign_carrier(atom) {
+                Some((inner, flip)) => {
+                    side *= coefficient.signum() * flip;
+                    current = inner;
+                }
+                None => return Reduced::Form(current, form, side),
+            }
+        }
+    }
+
+    /// The sign of a linear form, where it follows from its terms.
+    fn known_sign(&self, form: &LinearForm) -> Option<Switching> {
+        let Some(&(first, c)) = form.terms.first() else {
+            let sign = if form.constant == 0.0 {
+                0.0
+            } else {
+                form.constant.signum()
+            };
+            return Some(Switching::Constant(sign));
+        };
+        if let ([_], Node::Sign(index)) = (form.terms.as_slice(), *self.node(first)) {
+            // c s + constant with s = +-1
+            return Some(if form.constant.abs() > c.abs() {
+                Switching::Constant(form.constant.signum())
+            } else {
+                Switching::Surface {
+                    index,
+                    orientation: c.signum(),
+                }
+            });
+        }
+        if form.constant == 0.0 && form.terms.len() == 1 {
+            if let Some((index, orientation)) = self.sign_data(first) {
+                return Some(Switching::Surface {
+                    index,
+                    orientation: orientation * c.signum(),
+                });
+            }
+        }
+        let common = self.definite_sign(first)? * c.signum();
+        let agree = form.terms[1..]
+            .iter()
+            .all(|&(atom, c)| self.definite_sign(atom) == Some(common * c.signum()));
+        (agree && form.constant * common >= 0.0).then_some(Switching::Constant(common))
+    }
+
+    /// The sign of an atom that is the same wherever it is defined (isolated zeros aside).
+    fn definite_sign(&self, atom: NodeId) -> Option<f64> {
+        if self.facts(atom).nonnegative {
+            return Some(1.0);
+        }
+        match *self.node(atom) {
+            Node::Constant(value) if value < 0.0 => Some(-1.0),
+            Node::Binary(BinaryOp::Mul, left, right) => match *self.node(left) {
+                Node::Sign(j) => match self.known_switch(right) {
+                    Some((index, orientation)) if index == j => Some(orientation),
+                    _ => None,
+                },
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+
+    /// The surface on which an expression switches, if it is known already. No new nodes, no recursion.
+    fn known_switch(&self, id: NodeId) -> Option<(u32, f64)> {
+        self.surfaces.switch_of(id).or_else(|| {
+            let (key, lead) = LinearForm::of(self, id).key()?;
+            let &(index, orientation) = self.surfaces.keys.get(&key)?;
+            Some((index, lead * orientation))
+        })
+    }
+
+    /// The surface whose sign alone decides that of an atom: `s_j * (something positive)`, or a select
+    /// between a positive and a negative value.
+    fn sign_data(&self, atom: NodeId) -> Option<(u32, f64)> {
+        match *self.node(atom) {
+            Node::Binary(BinaryOp::Mul, left, right) => match *self.node(left) {
+                Node::Sign(j) if self.facts(right).nonnegative => Some((j, 1.0)),
+                _ => None,
+            },
+            Node::Select {
+                surface,
+                plus,
+                minus,
+            } => {
+                let (above, below) = (self.definite_sign(plus)?, self.definite_sign(minus)?);
+                (above != below).then_some((surface, above))
+            }
+            _ => None,
+        }
+    }
+
+    /// The operand that has the same sign as an atom, or the opposite one (-1).
+    fn sign_carrier(&self, atom: NodeId) -> Option<(NodeId, f64)> {
+        match *self.node(atom) {
+            Node::Unary(op, a) => {
+                use UnaryOp::*;
+                matches!(
+                    op,
+                    Cbrt | Expm1 | Log1p | Sinh | Tanh | Asin | Atan | Asinh | Atanh
+                )
+                .then_some((a, 1.0))
+            }
+            Node::Binary(BinaryOp::Mul, a, b) => {
+                let is_square = |id, of| *self.node(id) == Node::Binary(BinaryOp::Mul, of, of);
+                if self.facts(a).nonnegative || is_square(a, b) {
+                    Some((b, 1.0))
+                } else if self.facts(b).nonnegative || is_square(b, a) {
+                    Some((a, 1.0))
+                } else {
+                    None
+                }
+            }
+            Node::Binary(BinaryOp::Div, a, b) => {
+                if self.facts(b).nonnegative {
+                    return Some((a, 1.0));
+                }
+                self.as_constant(a).map(|c| (b, c.signum()))
+            }
+            _ => None,
+        }
+    }
+
+    /// The signs in front of a product, and the rest of it.
+    fn split_signs(&self, id: NodeId) -> (Vec<NodeId>, NodeId) {
+        let mut signs = Vec::new();
+        let mut rest = id;
+        while let Node::Binary(BinaryOp::Mul, left, right) = *self.node(rest) {
+            if !matches!(*self.node(left), Node::Sign(_)) {
+                break;
+            }
+            signs.push(left);
+            rest = right;
+        }
+        (signs, rest)
+    }
+
+    /// The function that a new surface is printed and evaluated as, and its sign relative to the form.
+    fn spell(&mut self, spelling: NodeId, form: &LinearForm) -> (NodeId, f64) {
+        let leading = self.leading_atom(spelling, form);
+        let flip = form.coefficient(leading).signum();
+        let magnitude = form.common_magnitude();
+        // The user's own spelling, where it has neither the wrong sign nor a common factor.
+        if magnitude.is_none() || magnitude == Some(1.0) {
+            let own = if flip < 0.0 {
+                self.neg(spelling)
+            } else {
+                spelling
+            };
+            if !matches!(*self.node(own), Node::Unary(UnaryOp::Neg, _)) {
+                return (self.without_factor(own), flip);
+            }
+        }
+        let scale = flip / magnitude.unwrap_or(1.0);
+        let lead_first = std::iter::once((leading, form.coefficient(leading)));
+        let rest = form.terms.iter().copied().filter(|term| term.0 != leading);
+        let mut sum = self.constant(0.0);
+        for (atom, c) in lead_first.chain(rest) {
+            sum = self.add_multiple(sum, atom, self.rounded_factor(c * scale, magnitude));
+        }
+        let constant = self.constant(form.constant * scale);
+        (self.add(sum, constant), flip)
+    }
+
+    /// +-1 for coefficients that share their magnitude to rounding, else as they are.
+    fn rounded_factor(&self, c: f64, magnitude: Option<f64>) -> f64 {
+        if magnitude.is_some() {
+            c.signum()
+        } else {
+            c
+        }
+    }
+
+    /// `sum + c * atom`, spelled with a minus where c is negative.
+    fn add_multiple(&mut self, sum: NodeId, atom: NodeId, c: f64) -> NodeId {
+        let factor = self.constant(c.abs());
+        let term = self.mul(factor, atom);
+        if c < 0.0 {
+            self.sub(sum, term)
+        } else {
+            self.add(sum, term)
+        }
+    }
+
+    /// A node without positive constant factors in front of it or below it.
+    fn without_factor(&self, id: NodeId) -> NodeId {
+        let mut current = id;
+        loop {
+            current = match *self.node(current) {
+                Node::Binary(BinaryOp::Mul, c, a)
+                    if self.as_constant(c).is_some_and(|c| c > 0.0) =>
+                {
+                    a
+                }
+                Node::Binary(BinaryOp::Div, a, c)
+                    if self.as_constant(c).is_some_and(|c| c > 0.0) =>
+                {
+                    a
+                }
+                _ => return current,
+            }
+        }
+    }
+
+    /// The atom whose sign is made positive: the leftmost one with a state in the spelling, else the first.
+    fn leading_atom(&self, spelling: NodeId, form: &LinearForm) -> NodeId {
+        let mut current = spelling;
+        loop {
+            current = match *self.node(current) {
+                Node::Unary(UnaryOp::Neg, a) => a,
+                Node::Binary(BinaryOp::Add | BinaryOp::Sub, a, b) => {
+                    if self.facts(a).has_state {
+                        a
+                    } else {
+                        b
+                    }
+                }
+                Node::Binary(BinaryOp::Mul, c, a) if self.as_constant(c).is_some() => a,
+                Node::Binary(BinaryOp::Div, a, c) if self.as_constant(c).is_some() => a,
+                _ => break,
+            }
+        }
+        if self.facts(current).has_state && form.coefficient(current) != 0.0 {
+            return current;
+        }
+        let stateful = form.terms.iter().find(|term| self.facts(term.0).has_state);
+        stateful
+            .or(form.terms.first())
+            .map_or(spelling, |term| term.0)
+    }
+}
+
+#[cfg(test)]
+mod tests;

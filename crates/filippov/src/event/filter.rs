@@ -1,0 +1,42 @@
+//! The cheap filter: can a step contain a zero at all?
+
+use crate::tolerances::{CUBIC_REMAINDER, STAGE_SPREAD};
+
+/// May a function with these end values and end slopes (times the step) vanish inside of the step?
+///
+/// The cubic Hermite polynomial has Bernstein coefficients
+/// g0, g0 + g0'/3, g1 - g1'/3, g1; it is bounded by them, and its distance to the function is taken
+/// as at most a fixed part of their spread ([`CUBIC_REMAINDER`]). `g0 > 0` is the side of the mode.
+#[inline]
+pub fn may_vanish(g0: f64, slope0: f64, g1: f64, slope1: f64) -> bool {
+    let b1 = g0 + slope0 / 3.0;
+    let b2 = g1 - slope1 / 3.0;
+    let low = g0.min(g1).min(b1).min(b2);
+    let high = g0.max(g1).max(b1).max(b2);
+    // Written so that a NaN asks for the search.
+    let excluded = low > CUBIC_REMAINDER * (high - low) && (g0 + slope0 + g1 + slope1).is_finite();
+    !excluded
+}
+
+/// May an exit function with these values at the stages of the step vanish inside of the step?
+#[inline]
+pub fn may_vanish_between(stages: &[f64; 7]) -> bool {
+    let low = stages.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = stages.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let excluded = low > STAGE_SPREAD * (high - low) && stages.iter().all(|v| v.is_finite());
+    !excluded
+}
+
+/// As [`may_vanish`] for a function g with a simple zero at the start of the step divided out: its
+/// value at the start is `leading` (the slope of g there times the step).
+///
+/// The quotient q = g/theta has q(1) = g1 and q'(1) = g1' - g1; the quadratic through q(0), q(1), q'(1)
+/// is trusted half as far as the cubic.
+#[inline]
+pub fn may_vanish_deflated(leading: f64, g1: f64, slope1: f64) -> bool {
+    let middle = g1 - 0.5 * (slope1 - g1);
+    let low = leading.min(g1).min(middle);
+    let high = leading.max(g1).max(middle);
+    let excluded = low > 2.0 * CUBIC_REMAINDER * (high - low) && (leading + g1 + slope1).is_finite();
+    !excluded
+}

@@ -1,0 +1,89 @@
+//! What is monitored.
+
+use crate::error::FieldError;
+
+/// A function whose zeros end a piece of motion, or are reported.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EventFunction {
+    /// The switching function h_j.
+    Surface(usize),
+    /// The normal component of f- while sliding: positive until its zero.
+    ExitMinus,
+    /// Minus the normal component of f+ while sliding: positive until its zero.
+    ExitPlus,
+}
+
+/// A zero at the start of the motion that is divided out: near `t` the function is
+/// `leading * (time - t)^order`.
+///
+/// Dividing by (time - t)^order, instead of looking away for a moment, keeps every other zero,
+/// however close.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Deflation {
+    /// The time of the zero.
+    pub t: f64,
+    /// Its multiplicity.
+    pub order: i32,
+    /// The first coefficient that does not vanish, in the sense of the mode (positive).
+    pub leading: f64,
+}
+
+/// A monitored function with its state at the start of the step.
+#[derive(Clone, Copy, Debug)]
+pub struct Monitored {
+    /// The function.
+    pub function: EventFunction,
+    /// +1 or -1: the sign of the function inside of the mode. All values below are times this.
+    pub orientation: f64,
+    /// Value at the start of the step.
+    pub value: f64,
+    /// Rate at the start of the step (surfaces only).
+    pub rate: f64,
+    /// Is the function affine in (t, x), so that the filter may exclude zeros?
+    pub affine: bool,
+    /// The zero divided out.
+    pub deflation: Option<Deflation>,
+    /// Rounding of the function, as far as it was needed.
+    pub noise: f64,
+}
+
+impl Monitored {
+    /// The value at `time` after division by the zero at the start, in units of the step `dt`.
+    pub fn deflated(&self, value: f64, time: f64, dt: f64, noise: f64) -> f64 {
+        let Some(Deflation { t, order, leading }) = self.deflation else { return value };
+        let limit = leading * dt.powi(order);
+        let elapsed = (time - t) / dt;
+        let power = elapsed.powi(order);
+        // Closer to the zero than rounding can resolve, the limit is the better value.
+        if elapsed <= 0.0 || limit.abs() * power <= noise {
+            limit
+        } else {
+            value / power
+        }
+    }
+}
+
+/// A scalar function of a user, g(t, x).
+pub trait UserFunction {
+    /// The value of g.
+    ///
+    /// # Errors
+    /// If the function raises.
+    fn value(&self, t: f64, x: &[f64]) -> Result<f64, FieldError>;
+}
+
+impl<F: Fn(f64, &[f64]) -> f64> UserFunction for F {
+    fn value(&self, t: f64, x: &[f64]) -> Result<f64, FieldError> {
+        Ok(self(t, x))
+    }
+}
+
+/// A user's event: zeros of g are recorded, and may end the run.
+pub struct UserEvent<'a> {
+    /// The function.
+    pub function: &'a dyn UserFunction,
+    /// Only zeros where g rises (+1) or falls (-1); both if 0.
+    pub direction: f64,
+    /// End the run at that many zeros; never if 0.
+    pub terminal: u64,
+}

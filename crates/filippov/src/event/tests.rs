@@ -1,0 +1,62 @@
+//! Zeros found, not missed and not invented.
+
+use super::filter::may_vanish;
+use super::isolate::{first_zero, Zero};
+use super::locate::refine;
+use proptest::prelude::*;
+
+fn find(g: impl Fn(f64) -> f64) -> Option<Zero> {
+    first_zero(&mut |x| Ok(g(x)), 0.0, 1.0, 1e-15).unwrap().zero
+}
+
+#[test]
+fn a_double_crossing_inside_is_found() {
+    for gap in [1e-1, 1e-3, 1e-5, 1e-7] {
+        let Some(Zero::Crossing(lo, hi)) = find(|x| (x - 0.4) * (x - 0.4 - gap)) else {
+            panic!("gap {gap}: no crossing")
+        };
+        let zero = refine(&mut |x| Ok((x - 0.4) * (x - 0.4 - gap)), lo, hi, 0.0).unwrap();
+        assert!((zero - 0.4).abs() < 1e-9, "gap {gap}: {zero}");
+    }
+}
+
+#[test]
+fn an_exact_touch_is_a_touch() {
+    let Some(Zero::Touch(theta)) = find(|x| (x - 0.3_f64).powi(2)) else { panic!("no touch") };
+    assert!((theta - 0.3).abs() < 1e-6);
+}
+
+#[test]
+fn a_near_miss_is_none() {
+    assert_eq!(find(|x| (x - 0.3).powi(2) + 1e-12), None);
+    assert_eq!(find(|x| 1e-9 + x * (x - 0.5).powi(2)), None);
+}
+
+#[test]
+fn an_identically_vanishing_function_has_no_zero() {
+    assert_eq!(find(|_| 0.0), None);
+}
+
+#[test]
+fn many_oscillations_are_resolved() {
+    let g = |x: f64| (60.0 * x).cos() + 0.5;
+    let Some(Zero::Crossing(lo, hi)) = find(g) else { panic!("no crossing") };
+    let zero = refine(&mut |x| Ok(g(x)), lo, hi, 0.0).unwrap();
+    assert!((zero - (2.0 * std::f64::consts::PI / 3.0) / 60.0).abs() < 1e-15);
+}
+
+proptest! {
+    /// The first zero of a cubic with known zeros is the one found, and the filter let it pass.
+    #[test]
+    fn cubics(a in 0.05..0.95_f64, b in 0.05..1.5_f64, c in 1.1..3.0_f64) {
+        prop_assume!((a - b).abs() > 1e-6);
+        let g = |x: f64| -(x - a) * (x - b) * (x - c);
+        let sign = if g(0.0) > 0.0 { 1.0 } else { -1.0 };
+        let g = |x: f64| sign * g(x);
+        let slope = |x: f64| (g(x + 1e-6) - g(x - 1e-6)) / 2e-6;
+        prop_assert!(may_vanish(g(0.0), slope(0.0), g(1.0), slope(1.0)));
+        let Some(Zero::Crossing(lo, hi)) = find(g) else { return Err(TestCaseError::fail("missed")) };
+        let zero = refine(&mut |x| Ok(g(x)), lo, hi, 0.0).unwrap();
+        prop_assert!((zero - a.min(b)).abs() < 1e-9);
+    }
+}

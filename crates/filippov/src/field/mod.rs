@@ -1,0 +1,30 @@
+//! The smooth field of a mode: what a stepper integrates.
+
+mod project;
+mod region;
+mod sliding;
+
+pub use project::project;
+pub use region::{eval_on_side, RegionField};
+pub use sliding::{NormalComponents, SlidingField};
+
+use crate::error::FieldError;
+
+/// One smooth field. A stepper sees nothing else of the system.
+///
+/// Duties of an implementer:
+///
+/// 1. `eval` may move `x` onto the manifold that the motion stays on, by an amount of the order
+///    of the local error; it does so before it evaluates.
+/// 2. A point where the field does not exist gives NaN, not an error.
+/// 3. `n_evaluations` counts evaluations of the user's right-hand side.
+pub trait SmoothField {
+    /// Writes x' at (t, x), after moving x onto the manifold of the motion.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    fn eval(&mut self, t: f64, x: &mut [f64], dx: &mut [f64]) -> Result<(), FieldError>;
+
+    /// Evaluations of the right-hand side so far.
+    fn n_evaluations(&self) -> u64;
+}

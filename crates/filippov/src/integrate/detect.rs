@@ -1,0 +1,307 @@
+//! The event stage of a step: the earliest zero of what the mode monitors.
+
+use super::integrator::Integrator;
+use super::motion::{ModeField, Motion};
+use crate::error::FieldError;
+use crate::event::filter::{may_vanish, may_vanish_between, may_vanish_deflated};
+use crate::event::isolate::{first_zero, Zero};
+use crate::event::locate::refine;
+use crate::event::{EventFunction, Monitored};
+use crate::stepper::Interpolant;
+use crate::system::PiecewiseSystem;
+use crate::tolerances::{EPS, EXTRAPOLATION, RESOLVED_DEPTH, SURFACE_NOISE};
+
+/// Scratch space of the event stage, and values at the end of the step.
+pub(super) struct Detector {
+    /// Exit functions at the seven stages: of f-, and minus that of f+.
+    pub stages: [[f64; 7]; 2],
+    /// The step did not resolve a monitored function; it may not grow.
+    pub unresolved: bool,
+    h: Vec<f64>,
+    rate: Vec<f64>,
+    gradient: Vec<f64>,
+    x: Vec<f64>,
+    /// Value and rate at the end of the step, per monitored function.
+    right: Vec<(f64, f64)>,
+    /// Which monitored functions the filter could not clear.
+    suspects: Vec<usize>,
+}
+
+/// The earliest zero of a step.
+#[derive(Clone, Debug)]
+pub(super) struct Found {
+    /// Where, in steps.
+    pub theta: f64,
+    /// What vanishes there.
+    pub functions: Vec<EventFunction>,
+    /// The functions come within rounding of zero without a change of sign.
+    pub touch: bool,
+}
+
+impl Detector {
+    pub fn new(n: usize, d: usize) -> Self {
+        Detector {
+            stages: [[f64::NAN; 7]; 2],
+            unresolved: false,
+            h: vec![0.0; d],
+            rate: vec![0.0; d],
+            gradient: vec![0.0; n],
+            x: vec![0.0; n],
+            right: Vec::new(),
+            suspects: Vec::new(),
+        }
+    }
+
+    /// Values and rates of the monitored functions at (t, x) with velocity `v`, into `right`.
+    pub fn measure(
+        &mut self,
+        system: &dyn PiecewiseSystem,
+        motion: &Motion,
+        (t, x, v): (f64, &[f64], &[f64]),
+        stage: usize,
+    ) -> Result<(), FieldError> {
+        let with_surfaces = motion.monitored.iter().any(|m| matches!(m.function, EventFunction::Surface(_)));
+        if with_surfaces {
+            system.surface_rates(t, x, &motion.signs, v, &mut self.h, &mut self.rate)?;
+        }
+        self.right.clear();
+        for m in &motion.monitored {
+            self.right.push(match m.function {
+                EventFunction::Surface(j) => (m.orientation * self.h[j], m.orientation * self.rate[j]),
+                EventFunction::ExitMinus => (self.stages[0][stage], f64::NAN),
+                EventFunction::ExitPlus => (self.stages[1][stage], f64::NAN),
+            });
+        }
+        Ok(())
+    }
+
+    /// Makes the values at the end of the step those at the start of the next one.
+    pub fn accept(&mut self, monitored: &mut [Monitored]) {
+        for (m, &(value, rate)) in monitored.iter_mut().zip(&self.right) {
+            (m.value, m.rate) = (value, rate);
+            // A zero that rounding still blurs stays divided out.
+            if m.deflation.is_some() && value > 1e3 * m.noise {
+                m.deflation = None;
+            }
+        }
+        for stages in &mut self.stages {
+            stages[0] = stages[6];
+        }
+    }
+
+    /// Makes the values just measured those at the start of a motion.
+    pub fn accept_start(&mut self, monitored: &mut [Monitored]) {
+        for (m, &(value, rate)) in monitored.iter_mut().zip(&self.right) {
+            (m.value, m.rate) = (value, rate);
+        }
+    }
+
+    /// Rounding of a monitored function over the step.
+    fn noise(
+        &mut self,
+        system: &dyn PiecewiseSystem,
+        motion: &Motion,
+        function: EventFunction,
+        (t, start, end): (f64, &[f64], &[f64]),
+    ) -> Result<f64, FieldError> {
+        let EventFunction::Surface(j) = function else {
+            let largest = self.stages.iter().flatten().fold(0.0_f64, |m, v| m.max(v.abs()));
+            return Ok(4.0 * SURFACE_NOISE * largest);
+        };
+        let ht = system.gradient(j, t, end, &motion.signs, &mut self.gradient)?;
+        let states = start.iter().zip(end).map(|(a, b)| a.abs().max(b.abs()));
+        let size: f64 = self.gradient.iter().zip(states).map(|(g, x)| (g * x).abs()).sum();
+        Ok(SURFACE_NOISE * (size + (ht * t).abs()))
+    }
+}
+
+impl Integrator<'_> {
+    /// The earliest event of the step that was just computed.
+    pub(super) fn detect(&mut self, t1: f64, dt: f64) -> Result<Option<Found>, FieldError> {
+        let end = (t1, self.stepper.end(), self.stepper.end_derivative());
+        self.detector.unresolved = false;
+        if self.motion.monitored.is_empty() {
+            return Ok(None);
+        }
+        self.detector.measure(self.system, &self.motion, end, 6)?;
+        self.stats.n_surface_evaluations += 1;
+        self.collect_suspects(dt)?;
+        let mut found: Option<Found> = None;
+        if !self.detector.suspects.is_empty() {
+            self.extend(dt)?;
+            for k in 0..self.detector.suspects.len() {
+                let index = self.detector.suspects[k];
+                let zero = self.search(index, 0.0, 1.0, dt)?;
+                self.keep_earliest(&mut found, index, zero, dt);
+            }
+        }
+        if found.is_none() && self.is_one_sided() {
+            self.detect_beyond(dt, &mut found)?;
+        }
+        Ok(found)
+    }
+
+    /// The filter: which functions may vanish within the step?
+    fn collect_suspects(&mut self, dt: f64) -> Result<(), FieldError> {
+        let detector = &mut self.detector;
+        let motion = &mut self.motion;
+        detector.suspects.clear();
+        for index in 0..motion.monitored.len() {
+            let m = motion.monitored[index];
+            let (value, rate) = detector.right[index];
+            let suspect = match (m.function, m.deflation) {
+                (EventFunction::Surface(_), None) => {
+                    !m.affine || may_vanish(m.value, m.rate * dt, value, rate * dt)
+                }
+                (EventFunction::Surface(_), Some(deflation)) => {
+                    let step = (self.t, &self.x[..], self.stepper.end());
+                    motion.monitored[index].noise =
+                        detector.noise(self.system, motion, m.function, step)?;
+                    let at_start = deflation.order == 1 && deflation.t == self.t && m.affine;
+                    !at_start || may_vanish_deflated(deflation.leading * dt, value, rate * dt)
+                }
+                (EventFunction::ExitMinus, None) => may_vanish_between(&detector.stages[0]),
+                (EventFunction::ExitPlus, None) => may_vanish_between(&detector.stages[1]),
+                (_, Some(_)) => true,
+            };
+            if suspect {
+                detector.suspects.push(index);
+            }
+        }
+        Ok(())
+    }
+
+    /// Raises the continuous extension to order 5.
+    fn extend(&mut self, dt: f64) -> Result<(), FieldError> {
+        self.stats.n_extensions += 1;
+        self.stepper.extend_order5(&mut self.motion.field, self.t, &self.x, dt)?;
+        Ok(())
+    }
+
+    /// The first zero of one monitored function on [from, to], refined to rounding.
+    fn search(
+        &mut self,
+        index: usize,
+        from: f64,
+        to: f64,
+        dt: f64,
+    ) -> Result<Option<(f64, bool)>, FieldError> {
+        let m = self.motion.monitored[index];
+        let step = (self.t, &self.x[..], self.stepper.end());
+        let noise = self.detector.noise(self.system, &self.motion, m.function, step)?;
+        self.motion.monitored[index].noise = noise;
+        let width = 0.5 * EPS * (self.t.abs() / dt).max(to);
+        let mut curve = Curve {
+            system: self.system,
+            motion: &mut self.motion,
+            interpolant: self.stepper.interpolant(),
+            h: &mut self.detector.h,
+            x: &mut self.detector.x,
+            n_evaluations: &mut self.stats.n_surface_evaluations,
+        };
+        let (t, dt_step) = (self.t, dt);
+        let mut g = |theta: f64| {
+            let value = curve.value(&m, theta)?;
+            Ok(m.deflated(value, t + theta * dt_step, dt_step, noise))
+        };
+        let isolated = first_zero(&mut g, from, to, noise)?;
+        self.detector.unresolved |= isolated.depth > RESOLVED_DEPTH;
+        match isolated.zero {
+            None => Ok(None),
+            Some(Zero::Touch(theta)) if theta <= from => Ok(None),
+            Some(Zero::Touch(theta)) => Ok(Some((theta, true))),
+            Some(Zero::Crossing(lo, hi)) => {
+                let theta = refine(&mut g, lo, hi, width)?;
+                match grazes(&mut g, theta, from, to, noise)? {
+                    Some(vertex) => Ok(Some((vertex, true))),
+                    None => Ok(Some((theta, false))),
+                }
+            }
+        }
+    }
+
+    /// One-sided fields: the surface just beyond the end of the step, within reach of the continuous extension.
+    fn detect_beyond(&mut self, dt: f64, found: &mut Option<Found>) -> Result<(), FieldError> {
+        for index in 0..self.motion.monitored.len() {
+            let (value, rate) = self.detector.right[index];
+            let near = rate < 0.0 && value < -rate * dt * 1.5 * (EXTRAPOLATION - 1.0);
+            if near {
+                self.extend(dt)?;
+                let zero = self.search(index, 1.0, EXTRAPOLATION, dt)?;
+                let within = zero.filter(|(theta, _)| self.t + theta * dt <= self.t_end);
+                self.keep_earliest(found, index, within, dt);
+            }
+        }
+        Ok(())
+    }
+
+    fn keep_earliest(&self, found: &mut Option<Found>, index: usize, zero: Option<(f64, bool)>, dt: f64) {
+        let Some((theta, touch)) = zero else { return };
+        let function = self.motion.monitored[index].function;
+        let together = 4.0 * EPS * (1.0 + self.t.abs() / dt);
+        match found {
+            Some(event) if theta > event.theta + together => {}
+            Some(event) if theta >= event.theta - together => {
+                event.functions.push(function);
+                event.touch &= touch;
+            }
+            _ => *found = Some(Found { theta, functions: vec![function], touch }),
+        }
+    }
+}
+
+/// A monitored function along the continuous extension.
+struct Curve<'a, 'b> {
+    system: &'a dyn PiecewiseSystem,
+    motion: &'a mut Motion<'b>,
+    interpolant: &'a Interpolant,
+    h: &'a mut [f64],
+    x: &'a mut [f64],
+    n_evaluations: &'a mut u64,
+}
+
+impl Curve<'_, '_> {
+    /// The value in the sense of the mode: positive inside.
+    fn value(&mut self, m: &Monitored, theta: f64) -> Result<f64, FieldError> {
+        let t = self.interpolant.t0 + theta * self.interpolant.dt;
+        self.interpolant.at(theta, self.x);
+        match (m.function, &mut self.motion.field) {
+            (EventFunction::Surface(j), field) => {
+                if let ModeField::Sliding(field) = field {
+                    field.project(t, self.x)?;
+                }
+                *self.n_evaluations += 1;
+                self.system.surfaces(t, self.x, &self.motion.signs, self.h)?;
+                Ok(m.orientation * self.h[j])
+            }
+            (EventFunction::ExitMinus, ModeField::Sliding(field)) => {
+                Ok(field.normal_components(t, self.x)?.minus)
+            }
+            (EventFunction::ExitPlus, ModeField::Sliding(field)) => {
+                Ok(-field.normal_components(t, self.x)?.plus)
+            }
+            // Exit functions are monitored while sliding only.
+            (_, ModeField::Region(_)) => Ok(f64::NAN),
+        }
+    }
+}
+
+/// Does the function turn back within rounding of zero just beyond `theta`? Then it touches, and two
+/// crossings a rounding error deep would be invented. Returns the turning point.
+fn grazes(
+    g: &mut dyn FnMut(f64) -> Result<f64, FieldError>,
+    theta: f64,
+    from: f64,
+    to: f64,
+    noise: f64,
+) -> Result<Option<f64>, FieldError> {
+    let d = 1e-3;
+    if theta - d < from || theta + d > to {
+        return Ok(None);
+    }
+    let (below, above, here) = (g(theta - d)?, g(theta + d)?, g(theta)?);
+    let slope = (above - below) / (2.0 * d);
+    let curvature = (above - 2.0 * here + below) / (d * d);
+    let depth = slope * slope / (2.0 * curvature);
+    Ok((curvature > 0.0 && depth <= noise).then(|| (theta - slope / curvature).clamp(from, to)))
+}

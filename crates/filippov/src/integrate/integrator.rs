@@ -1,0 +1,300 @@
+//! The integrator.
+//!
+//! Specification, where several outcomes apply:
+//!
+//! 1. Time runs over half-open pieces: a switch at t belongs to the piece that starts there.
+//! 2. Within a step the earliest zero wins; functions that vanish at the same time, within the
+//!    rounding of the state, are one event with a set of surfaces.
+//! 3. User events up to and including the time of a switch are recorded before it; one that ends
+//!    the run does so before a switch at the same time.
+//! 4. A switch at the end of the time span is recorded.
+//! 5. A zero that the motion has just left is divided out until the next step end.
+
+use std::time::Instant;
+
+use super::detect::Detector;
+use super::motion::{ModeField, Motion};
+use super::user_events::UserEvents;
+use super::{Stats, Stop, Warning, WarningCode};
+use crate::error::{Error, FieldError};
+use crate::event::UserEvent;
+use crate::field::SmoothField;
+use crate::options::Options;
+use crate::solution::{Recorder, Solution};
+use crate::stepper::{Attempt, Controller, Dopri5, ErrorScale};
+use crate::system::PiecewiseSystem;
+use crate::tolerances::{JUMP_SHRINK, ONE_SIDED_AIM, SHORTEST_STEP};
+
+/// Steps between two looks at the clock and at the caller's wish to stop.
+const POLL_INTERVAL: u64 = 64;
+
+/// Integrates a piecewise-smooth system over `t_span` from `y0`.
+///
+/// # Errors
+/// If an argument is out of range. A failure during the run is no error: the solution up to there
+/// comes back with its [`Stop`].
+pub fn solve(
+    system: &dyn PiecewiseSystem,
+    t_span: (f64, f64),
+    y0: &[f64],
+    options: &Options,
+    events: &[UserEvent],
+) -> Result<Solution, Error> {
+    solve_interruptible(system, t_span, y0, options, events, &mut || false)
+}
+
+/// As [`solve`]; `interrupt` is asked every few steps, and the run stops where it says `true`.
+///
+/// # Errors
+/// As [`solve`].
+pub fn solve_interruptible(
+    system: &dyn PiecewiseSystem,
+    t_span: (f64, f64),
+    y0: &[f64],
+    options: &Options,
+    events: &[UserEvent],
+    interrupt: &mut dyn FnMut() -> bool,
+) -> Result<Solution, Error> {
+    let mut integrator = Integrator::new(system, t_span, y0, options, events)?;
+    let stop = match integrator.run(interrupt) {
+        Ok(stop) => stop,
+        Err(raised) => Stop::FieldRaised(raised),
+    };
+    let mut solution = integrator.finish(stop);
+    let resampled = options.t_eval.as_ref().map(|times| solution.resample(system, times));
+    if let Some(Err(raised)) = resampled {
+        solution.stop = Stop::FieldRaised(raised);
+    }
+    if !options.dense_output {
+        solution.forget_dense();
+    }
+    Ok(solution)
+}
+
+/// An integration in progress.
+pub struct Integrator<'a> {
+    pub(super) system: &'a dyn PiecewiseSystem,
+    pub(super) options: &'a Options,
+    pub(super) scale: ErrorScale,
+    pub(super) t: f64,
+    pub(super) t_end: f64,
+    pub(super) x: Vec<f64>,
+    pub(super) motion: Motion<'a>,
+    pub(super) stepper: Dopri5,
+    pub(super) controller: Controller,
+    /// Proposed step.
+    pub(super) dt: f64,
+    pub(super) detector: Detector,
+    pub(super) user_events: UserEvents<'a>,
+    pub(super) recorder: Recorder,
+    pub(super) stats: Stats,
+    pub(super) warnings: Vec<Warning>,
+    /// The last attempt met a point where the field does not exist.
+    one_sided: bool,
+    /// Largest recent step of this motion.
+    recent_dt: f64,
+}
+
+impl<'a> Integrator<'a> {
+    /// Checks the arguments and places the start in its mode on the first call of [`step`](Self::step).
+    ///
+    /// # Errors
+    /// If an argument is out of range.
+    pub fn new(
+        system: &'a dyn PiecewiseSystem,
+        t_span: (f64, f64),
+        y0: &[f64],
+        options: &'a Options,
+        events: &'a [UserEvent<'a>],
+    ) -> Result<Self, Error> {
+        super::start::check(system, t_span, y0, options)?;
+        let n = system.n_states();
+        let undecided = crate::Mode::new(vec![1; system.n_surfaces()]);
+        Ok(Integrator {
+            system,
+            options,
+            scale: ErrorScale::new(options.rtol, &options.atol, n),
+            t: t_span.0,
+            t_end: t_span.1,
+            x: y0.to_vec(),
+            motion: Motion::new(system, undecided, &[]),
+            stepper: Dopri5::new(n),
+            controller: Controller::default(),
+            dt: f64::NAN,
+            detector: Detector::new(n, system.n_surfaces()),
+            user_events: UserEvents::new(events),
+            recorder: Recorder::new(n, options),
+            stats: Stats::default(),
+            warnings: Vec::new(),
+            one_sided: false,
+            recent_dt: 0.0,
+        })
+    }
+
+    /// Runs to the end.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn run(&mut self, interrupt: &mut dyn FnMut() -> bool) -> Result<Stop, FieldError> {
+        let started = Instant::now();
+        if let Some(stop) = self.start()? {
+            return Ok(stop);
+        }
+        loop {
+            let attempts = self.stats.n_steps + self.stats.n_rejected;
+            if attempts >= self.options.max_steps {
+                return Ok(Stop::MaxSteps);
+            }
+            if self.stats.n_switches >= self.options.max_events {
+                return Ok(Stop::MaxEvents);
+            }
+            if attempts % POLL_INTERVAL == 0 {
+                if self.options.max_wall_time.is_some_and(|s| started.elapsed().as_secs_f64() > s) {
+                    return Ok(Stop::MaxWallTime);
+                }
+                if interrupt() {
+                    return Ok(Stop::Interrupted);
+                }
+            }
+            if let Some(stop) = self.step()? {
+                return Ok(stop);
+            }
+        }
+    }
+
+    /// Attempts one step: accepts it up to its end or to the first event, or shortens the next.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn step(&mut self) -> Result<Option<Stop>, FieldError> {
+        let remaining = self.t_end - self.t;
+        if remaining <= 0.0 {
+            return Ok(Some(Stop::End));
+        }
+        let mut dt = self.dt.min(self.options.max_step);
+        if dt >= remaining * 0.99 {
+            dt = remaining;
+        }
+        if dt < SHORTEST_STEP * self.t.abs() && dt < remaining {
+            return Ok(Some(if self.one_sided { Stop::NotFinite } else { Stop::StepTooSmall }));
+        }
+        let sliding = self.motion.sliding().is_some();
+        match self.attempt(dt)? {
+            Attempt::NotFinite => {
+                self.count_rejection(sliding);
+                self.shorten_to_surface(dt);
+                Ok(None)
+            }
+            Attempt::Error(error) if error > 1.0 => {
+                self.count_rejection(sliding);
+                self.dt = dt * self.controller.reject(error);
+                Ok(None)
+            }
+            Attempt::Error(error) => {
+                self.stats.n_steps += 1;
+                self.stats.n_steps_sliding += u64::from(sliding);
+                self.dt = dt * self.controller.accept(error);
+                self.note_jump(dt);
+                self.advance(dt)
+            }
+        }
+    }
+
+    fn attempt(&mut self, dt: f64) -> Result<Attempt, FieldError> {
+        let (t, x, scale) = (self.t, &self.x, &self.scale);
+        match &mut self.motion.field {
+            ModeField::Region(field) => self.stepper.attempt(field, |_, _| {}, t, x, dt, scale),
+            ModeField::Sliding(field) => {
+                let stages = &mut self.detector.stages;
+                let observe = |stage: usize, field: &crate::field::SlidingField| {
+                    let a = field.last();
+                    stages[0][stage] = a.minus;
+                    stages[1][stage] = -a.plus;
+                };
+                self.stepper.attempt(&mut **field, observe, t, x, dt, scale)
+            }
+        }
+    }
+
+    /// Accepts the step, or its part up to the first event.
+    fn advance(&mut self, dt: f64) -> Result<Option<Stop>, FieldError> {
+        let t1 = if dt == self.t_end - self.t { self.t_end } else { self.t + dt };
+        self.stepper.extend_order4(self.t, &self.x, dt);
+        let found = self.detect(t1, dt)?;
+        let theta = found.as_ref().map_or(1.0, |event| event.theta);
+        let t_stop = if theta == 1.0 { t1 } else { self.t + theta * dt };
+        if let Some(event) = self.user_zeros(theta, t_stop)? {
+            return Ok(Some(Stop::TerminalEvent(event)));
+        }
+        if self.detector.unresolved {
+            self.dt = self.dt.min(dt);
+        }
+        self.one_sided = false;
+        let Some(event) = found else {
+            self.recorder.step(self.stepper.interpolant(), t1, self.stepper.end());
+            self.stepper.accept(&mut self.x);
+            self.t = t1;
+            self.detector.accept(&mut self.motion.monitored);
+            return Ok(None);
+        };
+        self.stepper.interpolant().at(theta, &mut self.x);
+        self.motion.project(t_stop, &mut self.x)?;
+        self.recorder.step(self.stepper.interpolant(), t_stop, &self.x);
+        self.t = t_stop;
+        self.recent_dt = 0.0;
+        self.switch(&event)
+    }
+
+    fn count_rejection(&mut self, sliding: bool) {
+        self.stats.n_rejected += 1;
+        self.stats.n_rejected_sliding += u64::from(sliding);
+    }
+
+    /// After a step that was not finite: aims at a surface that the motion approaches, close enough
+    /// for the continuous extension to reach it, else shortens the step.
+    fn shorten_to_surface(&mut self, dt: f64) {
+        let nearest = self
+            .motion
+            .monitored
+            .iter()
+            .filter(|m| m.rate < 0.0 && m.value > 0.0)
+            .map(|m| m.value / -m.rate)
+            .fold(f64::INFINITY, f64::min);
+        let aim = ONE_SIDED_AIM * nearest;
+        self.dt = if !self.one_sided && aim < dt { aim } else { 0.5 * dt };
+        self.one_sided = true;
+        self.controller.not_finite();
+    }
+
+    pub(super) fn is_one_sided(&self) -> bool {
+        self.one_sided
+    }
+
+    /// Warns where the field jumps over a step far shorter than its predecessors.
+    fn note_jump(&mut self, dt: f64) {
+        if dt < JUMP_SHRINK * self.recent_dt {
+            let (a, b) = (self.stepper.start_derivative(), self.stepper.end_derivative());
+            let jumps = a.iter().zip(b).any(|(a, b)| (a - b).abs() > 0.3 * (a.abs() + b.abs()));
+            if jumps {
+                let t = self.t + dt;
+                self.warnings.push(Warning {
+                    t,
+                    code: WarningCode::UndeclaredJump,
+                    text: format!(
+                        "the right-hand side jumps near t = {t:.10} and no surface is declared there; \
+                         give its switching function in surfaces="
+                    ),
+                });
+                self.recent_dt = 0.0;
+            }
+        }
+        self.recent_dt = dt.max(0.9 * self.recent_dt);
+    }
+
+    /// Closes the books.
+    pub fn finish(mut self, stop: Stop) -> Solution {
+        self.stats.n_field_evaluations += self.motion.field.n_evaluations();
+        let (zeros, recorder) = (self.user_events.into_zeros(), self.recorder);
+        recorder.finish(self.t, self.motion.mode, stop, self.stats, self.warnings, zeros)
+    }
+}

@@ -1,0 +1,140 @@
+//! Where a run starts: arguments checked, the mode of the initial state found.
+
+use super::integrator::Integrator;
+use super::transition::Left;
+use super::{Stop, WarningCode};
+use crate::error::{Error, FieldError};
+use crate::mode::Mode;
+use crate::options::{NonUnique, Options};
+use crate::switching::{decide, decide_intersection, Arrival};
+use crate::system::PiecewiseSystem;
+use crate::tolerances::SURFACE_NOISE;
+
+/// Checks the arguments of a run.
+pub(super) fn check(
+    system: &dyn PiecewiseSystem,
+    (t0, t1): (f64, f64),
+    y0: &[f64],
+    options: &Options,
+) -> Result<(), Error> {
+    let n = system.n_states();
+    if y0.len() != n {
+        return Err(Error::WrongLength { name: "y0", found: y0.len(), expected: n });
+    }
+    if options.atol.len() != 1 && options.atol.len() != n {
+        return Err(Error::WrongLength { name: "atol", found: options.atol.len(), expected: n });
+    }
+    let require = |name, value: f64, holds: bool, requirement| {
+        if holds { Ok(()) } else { Err(Error::OutOfRange { name, value, requirement }) }
+    };
+    require("t_span[0]", t0, t0.is_finite(), "must be finite")?;
+    require("t_span[1]", t1, t1.is_finite() && t1 >= t0, "must be finite and not before t_span[0]")?;
+    for &y in y0 {
+        require("y0", y, y.is_finite(), "must be finite")?;
+    }
+    for &a in &options.atol {
+        require("atol", a, a >= 0.0 && a.is_finite(), "must not be negative")?;
+    }
+    require("rtol", options.rtol, options.rtol > 0.0 && options.rtol.is_finite(), "must be positive")?;
+    require("max_step", options.max_step, options.max_step > 0.0, "must be positive")?;
+    if let Some(first) = options.first_step {
+        require("first_step", first, first > 0.0 && first.is_finite(), "must be positive")?;
+    }
+    Ok(())
+}
+
+impl Integrator<'_> {
+    /// Finds the mode of the initial state and starts the motion.
+    pub(super) fn start(&mut self) -> Result<Option<Stop>, FieldError> {
+        self.recorder.start(self.t, &self.x);
+        let d = self.system.n_surfaces();
+        let mut mode = Mode::new(vec![1; d]);
+        // Switching functions may contain signs of others: repeat until nothing changes.
+        let mut on_surface = vec![false; d];
+        for _ in 0..=d {
+            let before = mode.clone();
+            let signs = mode.signs();
+            let h = self.surface_values(&signs)?;
+            if h.iter().any(|h| h.is_nan()) {
+                return Ok(Some(Stop::NotFinite));
+            }
+            for j in 0..d {
+                let noise = self.start_noise(j, &signs)?;
+                on_surface[j] = h[j].abs() <= noise;
+                let entry = if h[j] < 0.0 { -1 } else { 1 };
+                mode.set(j, entry);
+            }
+            if mode == before {
+                break;
+            }
+        }
+        let meeting = self.meeting_at_start(&mode, &on_surface)?;
+        let (mode, left) = match meeting.as_slice() {
+            [] => (mode, Vec::new()),
+            [j] => match self.start_on_surface(&mode, *j)? {
+                Ok(placed) => placed,
+                Err(stop) => return Ok(Some(stop)),
+            },
+            _ => {
+                let decision = decide_intersection(self.system, &meeting, &mode, self.t, &self.x)?;
+                match decision.unique() {
+                    Some((mode, left)) => {
+                        (mode.clone(), left.iter().map(|&(j, l)| Left::Surface(j, l)).collect())
+                    }
+                    None => {
+                        let candidates = decision.candidates;
+                        return Ok(Some(Stop::Intersection { surfaces: meeting, candidates }));
+                    }
+                }
+            }
+        };
+        self.begin(mode, &left)
+    }
+
+    /// Surfaces that vanish at the start and matter there. An inactive one gets the sign of the
+    /// side that it moves to.
+    fn meeting_at_start(&mut self, mode: &Mode, on_surface: &[bool]) -> Result<Vec<usize>, FieldError> {
+        let zeros: Vec<usize> = (0..on_surface.len()).filter(|&j| on_surface[j]).collect();
+        let mut matters = vec![false; on_surface.len()];
+        let mut active = matters.clone();
+        // Few surfaces: all patterns; many: each alone.
+        let patterns = if zeros.len() <= 6 { 1_usize << zeros.len() } else { zeros.len() + 1 };
+        for pattern in 0..patterns {
+            let mut tried = mode.clone();
+            for (bit, &j) in zeros.iter().enumerate() {
+                let up = if zeros.len() <= 6 { pattern >> bit & 1 == 1 } else { pattern == bit };
+                tried.set(j, if up { 1 } else { -1 });
+            }
+            self.system.active(&tried.signs(), None, &mut active);
+            matters.iter_mut().zip(&active).for_each(|(m, a)| *m |= a);
+        }
+        Ok(zeros.into_iter().filter(|&j| matters[j]).collect())
+    }
+
+    /// The mode of a start on one surface, or the reason to stop.
+    #[allow(clippy::type_complexity)]
+    fn start_on_surface(
+        &mut self,
+        mode: &Mode,
+        j: usize,
+    ) -> Result<Result<(Mode, Vec<Left>), Stop>, FieldError> {
+        let signs = mode.signs();
+        let decision = decide(self.system, j, Arrival::Start, self.t, &self.x, &signs)?;
+        let candidates: Vec<Mode> = decision.candidates.iter().map(|&e| mode.with(j, e)).collect();
+        let chosen = mode.with(j, decision.entry);
+        if candidates.len() > 1 {
+            if self.options.nonunique == NonUnique::Error {
+                return Ok(Err(Stop::NonUnique { surface: j, candidates }));
+            }
+            self.warn_non_unique(j, &chosen, &candidates, WarningCode::NonUnique);
+        }
+        Ok(Ok((chosen, Left::after(j, &decision))))
+    }
+
+    fn start_noise(&mut self, j: usize, signs: &[f64]) -> Result<f64, FieldError> {
+        let mut gradient = vec![0.0; self.x.len()];
+        let ht = self.system.gradient(j, self.t, &self.x, signs, &mut gradient)?;
+        let size: f64 = gradient.iter().zip(&self.x).map(|(g, x)| (g * x).abs()).sum();
+        Ok(SURFACE_NOISE * (size + (ht * self.t).abs()))
+    }
+}

@@ -1,0 +1,22 @@
+//! Counters of a run.
+
+/// What a run cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Stats {
+    /// Evaluations of the right-hand side; one of the sliding field counts two.
+    pub n_field_evaluations: u64,
+    /// Evaluations of the switching functions in the search for events.
+    pub n_surface_evaluations: u64,
+    /// Accepted steps.
+    pub n_steps: u64,
+    /// Rejected steps.
+    pub n_rejected: u64,
+    /// Accepted steps while sliding.
+    pub n_steps_sliding: u64,
+    /// Rejected steps while sliding.
+    pub n_rejected_sliding: u64,
+    /// Continuous extensions of order 5 that were computed.
+    pub n_extensions: u64,
+    /// Switches.
+    pub n_switches: u64,
+}

@@ -1,0 +1,145 @@
+//! How a run ends, and what it warns of.
+
+use crate::error::FieldError;
+use crate::mode::Mode;
+
+/// Why a run ended. Whatever the reason, the solution up to that time is kept.
+#[derive(Debug)]
+pub enum Stop {
+    /// The end of the time span was reached.
+    End,
+    /// A terminal event (its index) occurred.
+    TerminalEvent(usize),
+    /// `max_steps` was reached.
+    MaxSteps,
+    /// `max_events` was reached.
+    MaxEvents,
+    /// `max_wall_time` was reached.
+    MaxWallTime,
+    /// The caller asked to stop.
+    Interrupted,
+    /// The step would have to be shorter than the rounding of time.
+    StepTooSmall,
+    /// The field, or a switching function, is not finite.
+    NotFinite,
+    /// A function of the user raised.
+    FieldRaised(FieldError),
+    /// Several surfaces meet, and what follows is not a motion in a region or on one surface.
+    Intersection {
+        /// The surfaces.
+        surfaces: Vec<usize>,
+        /// The attracting modes of codimension 0 and 1.
+        candidates: Vec<Mode>,
+    },
+    /// The continuation is not unique, and `NonUnique::Error` was asked for.
+    NonUnique {
+        /// The surface.
+        surface: usize,
+        /// The modes that are Filippov continuations.
+        candidates: Vec<Mode>,
+    },
+}
+
+impl Stop {
+    /// Did the run do what was asked?
+    pub fn is_success(&self) -> bool {
+        matches!(self, Stop::End | Stop::TerminalEvent(_))
+    }
+
+    /// A stable name of the reason.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Stop::End => "end",
+            Stop::TerminalEvent(_) => "terminal_event",
+            Stop::MaxSteps => "max_steps",
+            Stop::MaxEvents => "max_events",
+            Stop::MaxWallTime => "max_wall_time",
+            Stop::Interrupted => "interrupted",
+            Stop::StepTooSmall => "step_too_small",
+            Stop::NotFinite => "field_not_finite",
+            Stop::FieldRaised(_) => "field_raised",
+            Stop::Intersection { .. } => "intersection",
+            Stop::NonUnique { .. } => "non_unique",
+        }
+    }
+
+    /// What happened, where, and what to try.
+    pub fn message(&self, t: f64, mode: &Mode, surface_name: impl Fn(usize) -> String) -> String {
+        let names = |surfaces: &[usize]| {
+            surfaces.iter().map(|&j| format!("{} = 0", surface_name(j))).collect::<Vec<_>>().join(", ")
+        };
+        let modes = |modes: &[Mode]| {
+            modes.iter().map(|m| format!("({m})")).collect::<Vec<_>>().join(", ")
+        };
+        match self {
+            Stop::End => "The solver successfully reached the end of the integration interval.".into(),
+            Stop::TerminalEvent(_) => "A termination event occurred.".into(),
+            Stop::MaxSteps => format!(
+                "Stopped at t = {t:.10} in mode ({mode}): max_steps was reached. Raise max_steps, or loosen rtol and atol."
+            ),
+            Stop::MaxEvents => format!(
+                "Stopped at t = {t:.10} in mode ({mode}): max_events was reached. The switches may accumulate; look at the last ones."
+            ),
+            Stop::MaxWallTime => {
+                format!("Stopped at t = {t:.10} in mode ({mode}): max_wall_time was reached.")
+            }
+            Stop::Interrupted => format!("Interrupted at t = {t:.10} in mode ({mode})."),
+            Stop::StepTooSmall => format!(
+                "Stopped at t = {t:.10} in mode ({mode}): the step became shorter than the rounding of time. \
+                 The field may be singular or stiff here, or jump without a declared surface."
+            ),
+            Stop::NotFinite => format!(
+                "Stopped at t = {t:.10} in mode ({mode}): the right-hand side is not finite (NaN or infinity) here."
+            ),
+            Stop::FieldRaised(_) => {
+                format!("Stopped at t = {t:.10} in mode ({mode}): the right-hand side raised an exception.")
+            }
+            Stop::Intersection { surfaces, candidates } => format!(
+                "Stopped at t = {t:.10}: the motion arrived at the intersection of {} from mode ({mode}). \
+                 Sliding on several surfaces at once is not available yet{}.",
+                names(surfaces),
+                if candidates.is_empty() {
+                    String::new()
+                } else {
+                    format!("; candidates of lower codimension: {}", modes(candidates))
+                }
+            ),
+            Stop::NonUnique { surface, candidates } => format!(
+                "Stopped at t = {t:.10}: the continuation at {} is not unique; candidates: {}. \
+                 nonunique=\"regularize\" chooses one.",
+                names(&[*surface]),
+                modes(candidates)
+            ),
+        }
+    }
+}
+
+/// The kinds of warning.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WarningCode {
+    /// Several continuations exist; one was chosen.
+    NonUnique,
+    /// The field seems to jump where no surface is declared.
+    UndeclaredJump,
+}
+
+impl WarningCode {
+    /// A stable name.
+    pub fn name(self) -> &'static str {
+        match self {
+            WarningCode::NonUnique => "non_unique",
+            WarningCode::UndeclaredJump => "undeclared_jump",
+        }
+    }
+}
+
+/// A warning of a run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Warning {
+    /// Its time.
+    pub t: f64,
+    /// Its kind.
+    pub code: WarningCode,
+    /// What happened.
+    pub text: String,
+}

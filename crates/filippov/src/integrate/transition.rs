@@ -1,0 +1,269 @@
+//! The switching stage: from a located event to the next motion.
+
+use super::detect::Found;
+use super::integrator::Integrator;
+use super::motion::{ModeField, Motion};
+use super::{Stop, Warning, WarningCode};
+use crate::error::FieldError;
+use crate::event::{Deflation, EventFunction};
+use crate::field::{eval_on_side, SmoothField};
+use crate::mode::Mode;
+use crate::options::NonUnique;
+use crate::solution::Switch;
+use crate::stepper::initial_step;
+use crate::switching::{decide, decide_intersection, first_nonzero, Arrival, Decision, Kind, Leading};
+use crate::tolerances::SURFACE_NOISE;
+
+/// A function that vanishes at the start of a motion, with its first non-vanishing derivative.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Left {
+    /// The surface is left with this derivative of h.
+    Surface(usize, Leading),
+    /// Sliding starts with a vanishing exit function; the derivative of the normal component.
+    Exit(EventFunction, Leading),
+}
+
+impl Left {
+    /// What vanishes after the decision at surface `j`.
+    pub fn after(j: usize, decision: &Decision) -> Vec<Left> {
+        match decision.entry {
+            -1 => vec![Left::Surface(j, decision.minus)],
+            1 => vec![Left::Surface(j, decision.plus)],
+            _ => [(EventFunction::ExitMinus, decision.minus), (EventFunction::ExitPlus, decision.plus)]
+                .into_iter()
+                .filter(|(_, leading)| leading.order > 1)
+                .map(|(function, leading)| {
+                    // The normal component is the derivative of h: one order less.
+                    Left::Exit(function, Leading { order: leading.order - 1, value: leading.value })
+                })
+                .collect(),
+        }
+    }
+
+    fn deflation(self, t: f64) -> Option<(EventFunction, Deflation)> {
+        let (function, leading) = match self {
+            Left::Surface(j, leading) => (EventFunction::Surface(j), leading),
+            Left::Exit(function, leading) => (function, leading),
+        };
+        (leading.order > 0).then(|| {
+            let order = i32::try_from(leading.order).unwrap_or(1);
+            // In the sense of the mode every monitored function starts out positive.
+            (function, Deflation { t, order, leading: leading.coefficient().abs() })
+        })
+    }
+}
+
+impl Integrator<'_> {
+    /// Values of all switching functions at the current point.
+    pub(super) fn surface_values(&mut self, signs: &[f64]) -> Result<Vec<f64>, FieldError> {
+        let mut h = vec![0.0; self.system.n_surfaces()];
+        self.system.surfaces(self.t, &self.x, signs, &mut h)?;
+        self.stats.n_surface_evaluations += 1;
+        Ok(h)
+    }
+
+    /// Decides what follows the event and starts it.
+    pub(super) fn switch(&mut self, event: &Found) -> Result<Option<Stop>, FieldError> {
+        self.stats.n_switches += 1;
+        let signs = self.motion.signs.clone();
+        let h = self.surface_values(&signs)?;
+        let mut mode = self.motion.mode.clone();
+        for (j, h) in h.iter().enumerate() {
+            if !self.motion.active[j] && *h != 0.0 {
+                mode.set(j, if *h < 0.0 { -1 } else { 1 });
+            }
+        }
+        let mut surfaces = self.vanishing_surfaces(event, &h)?;
+        if event.touch {
+            return self.graze(&mode, &surfaces);
+        }
+        let arrival = self.arrival(event, &surfaces);
+        if let Some(j) = self.motion.sliding() {
+            if !surfaces.contains(&j) {
+                surfaces.push(j);
+                surfaces.sort_unstable();
+            }
+        }
+        let (after, left) = match (surfaces.as_slice(), arrival) {
+            (&[j], Some(arrival)) => {
+                let decision = decide(self.system, j, arrival, self.t, &self.x, &mode.signs())?;
+                let after = mode.with(j, decision.entry);
+                let candidates: Vec<Mode> =
+                    decision.candidates.iter().map(|&entry| mode.with(j, entry)).collect();
+                if candidates.len() > 1 {
+                    if self.options.nonunique == NonUnique::Error {
+                        return Ok(Some(Stop::NonUnique { surface: j, candidates }));
+                    }
+                    self.warn_non_unique(j, &after, &candidates, WarningCode::NonUnique);
+                }
+                (after, Left::after(j, &decision))
+            }
+            _ => {
+                let decision = decide_intersection(self.system, &surfaces, &mode, self.t, &self.x)?;
+                match decision.unique() {
+                    Some((after, left)) => {
+                        (after.clone(), left.iter().map(|&(j, l)| Left::Surface(j, l)).collect())
+                    }
+                    None => {
+                        let candidates = decision.candidates;
+                        return Ok(Some(Stop::Intersection { surfaces, candidates }));
+                    }
+                }
+            }
+        };
+        let changed: Vec<usize> = surfaces
+            .iter()
+            .copied()
+            .filter(|&j| mode.entries()[j] != after.entries()[j] || surfaces.len() == 1)
+            .collect();
+        self.record(mode, after.clone(), changed);
+        self.begin(after, &left)
+    }
+
+    /// Surfaces that vanish at the event: those that were located, and all others that matter, are
+    /// approached and lie within rounding of zero.
+    fn vanishing_surfaces(&mut self, event: &Found, h: &[f64]) -> Result<Vec<usize>, FieldError> {
+        let mut surfaces: Vec<usize> = event
+            .functions
+            .iter()
+            .filter_map(|f| match f {
+                EventFunction::Surface(j) => Some(*j),
+                _ => None,
+            })
+            .collect();
+        let sliding = self.motion.sliding();
+        let mut gradient = vec![0.0; self.x.len()];
+        for j in 0..h.len() {
+            if !self.motion.active[j] || Some(j) == sliding || surfaces.contains(&j) {
+                continue;
+            }
+            let ht = self.system.gradient(j, self.t, &self.x, &self.motion.signs, &mut gradient)?;
+            let size: f64 = gradient.iter().zip(&self.x).map(|(g, x)| (g * x).abs()).sum();
+            let approached = self
+                .motion
+                .monitored
+                .iter()
+                .any(|m| m.function == EventFunction::Surface(j) && m.deflation.is_none());
+            if approached && h[j].abs() <= SURFACE_NOISE * (size + (ht * self.t).abs()) {
+                surfaces.push(j);
+            }
+        }
+        surfaces.sort_unstable();
+        Ok(surfaces)
+    }
+
+    /// How the motion arrived, if one surface decides.
+    fn arrival(&self, event: &Found, surfaces: &[usize]) -> Option<Arrival> {
+        match (self.motion.sliding(), surfaces, event.functions.as_slice()) {
+            (None, &[j], _) => Some(Arrival::Region(self.motion.mode.entries()[j])),
+            (Some(_), [], [EventFunction::ExitMinus, ..]) => Some(Arrival::ExitMinus),
+            (Some(_), [], [EventFunction::ExitPlus, ..]) => Some(Arrival::ExitPlus),
+            _ => None,
+        }
+    }
+
+    /// A touch: recorded, the mode stays.
+    fn graze(&mut self, mode: &Mode, surfaces: &[usize]) -> Result<Option<Stop>, FieldError> {
+        let mut left = Vec::new();
+        let signs = mode.signs();
+        for &j in surfaces {
+            let side = mode.entries()[j];
+            let leading = first_nonzero(self.system, j, side, 1, self.t, &self.x, &signs)?;
+            if leading.sign() == side {
+                left.push(Left::Surface(j, leading));
+            }
+        }
+        self.record(mode.clone(), mode.clone(), surfaces.to_vec());
+        self.begin(mode.clone(), &left)
+    }
+
+    fn record(&mut self, before: Mode, after: Mode, surfaces: Vec<usize>) {
+        let kind = Kind::between(&before, &after);
+        self.recorder.switch(Switch {
+            t: self.t,
+            y_before: self.x.clone(),
+            y_after: self.x.clone(),
+            kind,
+            surfaces,
+            mode_before: before,
+            mode_after: after,
+        });
+    }
+
+    /// Starts a motion at the current point; `left` are the functions that vanish there.
+    pub(super) fn begin(&mut self, mode: Mode, left: &[Left]) -> Result<Option<Stop>, FieldError> {
+        let deflations: Vec<_> = left.iter().filter_map(|l| l.deflation(self.t)).collect();
+        self.stats.n_field_evaluations += self.motion.field.n_evaluations();
+        self.motion = Motion::new(self.system, mode, &deflations);
+        self.motion.project(self.t, &mut self.x)?;
+        let mut derivative = vec![0.0; self.x.len()];
+        match &mut self.motion.field {
+            ModeField::Region(_) => {
+                let signs = &self.motion.signs;
+                self.stats.n_field_evaluations +=
+                    eval_on_side(self.system, self.t, &self.x, signs, &mut derivative)?;
+            }
+            ModeField::Sliding(field) => {
+                field.eval(self.t, &mut self.x, &mut derivative)?;
+                let a = field.last();
+                self.detector.stages = [[a.minus; 7], [-a.plus; 7]];
+            }
+        }
+        self.stepper.set_start_derivative(&derivative);
+        self.recorder.begin_segment(self.t, &self.motion.mode);
+        if derivative.iter().any(|v| !v.is_finite()) {
+            return Ok(Some(Stop::NotFinite));
+        }
+        let start = (self.t, &self.x[..], &derivative[..]);
+        self.detector.measure(self.system, &self.motion, start, 0)?;
+        self.detector.accept_start(&mut self.motion.monitored);
+        self.user_events.restart(self.t, &self.x)?;
+        self.controller.restart();
+        self.dt = self.restart_step(&derivative, left)?;
+        Ok(None)
+    }
+
+    /// The first step of a motion: the proposal of the motion before, as far as Hairer's guess for
+    /// this one supports it, and no longer than a short excursion from the surface.
+    fn restart_step(&mut self, derivative: &[f64], left: &[Left]) -> Result<f64, FieldError> {
+        let remaining = (self.t_end - self.t).max(f64::MIN_POSITIVE);
+        if let (Some(first), true) = (self.options.first_step, self.dt.is_nan()) {
+            return Ok(first.min(remaining));
+        }
+        let longest = remaining.min(self.options.max_step);
+        let guess =
+            initial_step(&mut self.motion.field, self.t, &self.x, derivative, &self.scale, longest)?;
+        // Hairer's guess aims at a hundredth of the tolerance, 10^(2/5) below what a step may take.
+        let mut dt = if self.dt.is_nan() { guess } else { self.dt.min(2.5 * guess) };
+        for l in left {
+            if let Left::Surface(j, leading) = l {
+                dt = dt.min(self.excursion(*j, *leading)?);
+            }
+        }
+        Ok(dt)
+    }
+
+    /// Predicted time of return to a surface that is left tangentially: the zero of
+    /// a τ^k/k! + b τ^(k+1)/(k+1)!, with a fifth to spare.
+    fn excursion(&self, j: usize, leading: Leading) -> Result<f64, FieldError> {
+        let order = leading.order + 1;
+        if leading.order < 2 || order > self.system.max_lie_order() {
+            return Ok(f64::INFINITY);
+        }
+        let side = self.motion.mode.entries()[j];
+        let signs = &self.motion.signs;
+        let next = self.system.lie_derivative(j, j, &vec![side; order], self.t, &self.x, signs)?;
+        let back = -(order as f64) * leading.value / next.value;
+        Ok(if back > 0.0 { 1.2 * back } else { f64::INFINITY })
+    }
+
+    pub(super) fn warn_non_unique(&mut self, j: usize, chosen: &Mode, all: &[Mode], code: WarningCode) {
+        let names: Vec<String> = all.iter().map(|m| format!("({m})")).collect();
+        let surface = self.system.surface_name(j);
+        let text = format!(
+            "the continuation at {surface} = 0 is not unique: {}; ({chosen}) was chosen",
+            names.join(", ")
+        );
+        self.warnings.push(Warning { t: self.t, code, text });
+    }
+}

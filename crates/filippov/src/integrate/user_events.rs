@@ -1,0 +1,138 @@
+//! Zeros of a user's own functions.
+
+use super::integrator::Integrator;
+use crate::error::FieldError;
+use crate::event::isolate::{first_zero, Zero};
+use crate::event::locate::refine;
+use crate::event::UserEvent;
+use crate::tolerances::EPS;
+
+/// A zero of a user's function.
+#[derive(Clone, Debug, PartialEq)]
+pub struct UserZero {
+    /// Its time.
+    pub t: f64,
+    /// The state there.
+    pub y: Vec<f64>,
+}
+
+/// The user's functions and their zeros so far.
+pub(super) struct UserEvents<'a> {
+    events: &'a [UserEvent<'a>],
+    /// Value at the start of the step, per event.
+    left: Vec<f64>,
+    /// Time of the last zero, per event: divided out while it is the start of the search.
+    last: Vec<f64>,
+    zeros: Vec<Vec<UserZero>>,
+}
+
+impl<'a> UserEvents<'a> {
+    pub fn new(events: &'a [UserEvent<'a>]) -> Self {
+        let d = events.len();
+        UserEvents {
+            events,
+            left: vec![f64::NAN; d],
+            last: vec![f64::NAN; d],
+            zeros: vec![Vec::new(); d],
+        }
+    }
+
+    /// Evaluates the functions at the start of a motion.
+    pub fn restart(&mut self, t: f64, x: &[f64]) -> Result<(), FieldError> {
+        for (event, left) in self.events.iter().zip(&mut self.left) {
+            *left = event.function.value(t, x)?;
+        }
+        Ok(())
+    }
+
+    pub fn into_zeros(self) -> Vec<Vec<UserZero>> {
+        self.zeros
+    }
+}
+
+impl Integrator<'_> {
+    /// Records the zeros of the user's functions up to `theta`; at one that ends the run, accepts
+    /// the step up to there and returns its index.
+    pub(super) fn user_zeros(&mut self, theta: f64, t_stop: f64) -> Result<Option<usize>, FieldError> {
+        if self.user_events.events.is_empty() {
+            return Ok(None);
+        }
+        let mut zeros = self.all_user_zeros(theta)?;
+        if !zeros.is_empty() {
+            let dt = self.stepper.interpolant().dt;
+            self.stepper.extend_order5(&mut self.motion.field, self.t, &self.x, dt)?;
+            zeros = self.all_user_zeros(theta)?;
+            zeros.sort_by(|a, b| a.0.total_cmp(&b.0));
+        }
+        let (t0, dt) = (self.stepper.interpolant().t0, self.stepper.interpolant().dt);
+        for (at, index) in zeros {
+            let t = if at == theta { t_stop } else { t0 + at * dt };
+            let mut y = vec![0.0; self.x.len()];
+            self.stepper.interpolant().at(at, &mut y);
+            self.motion.project(t, &mut y)?;
+            self.user_events.last[index] = t;
+            self.user_events.zeros[index].push(UserZero { t, y: y.clone() });
+            let terminal = self.user_events.events[index].terminal;
+            if terminal > 0 && self.user_events.zeros[index].len() as u64 >= terminal {
+                self.recorder.step(self.stepper.interpolant(), t, &y);
+                self.t = t;
+                self.x = y;
+                return Ok(Some(index));
+            }
+        }
+        for k in 0..self.user_events.events.len() {
+            self.user_events.left[k] = self.user_value(k, theta)?;
+        }
+        Ok(None)
+    }
+
+    fn user_value(&mut self, index: usize, theta: f64) -> Result<f64, FieldError> {
+        let interpolant = self.stepper.interpolant();
+        let t = interpolant.t0 + theta * interpolant.dt;
+        let mut y = vec![0.0; self.x.len()];
+        interpolant.at(theta, &mut y);
+        self.motion.project(t, &mut y)?;
+        self.user_events.events[index].function.value(t, &y)
+    }
+
+    /// All zeros (theta, index) of all functions in (0, theta], in no order.
+    fn all_user_zeros(&mut self, theta: f64) -> Result<Vec<(f64, usize)>, FieldError> {
+        let mut zeros = Vec::new();
+        for index in 0..self.user_events.events.len() {
+            let (t0, dt) = (self.stepper.interpolant().t0, self.stepper.interpolant().dt);
+            let start = self.user_events.left[index];
+            let mut from = 0.0;
+            let mut divided = self.user_events.last[index] == t0 || start == 0.0;
+            // Rounding of a function whose terms are not known: that of its values.
+            let noise = 4.0 * EPS * start.abs().max(self.user_value(index, theta)?.abs());
+            let mut sign = if divided { 0.0 } else { start.signum() };
+            loop {
+                if divided {
+                    let probe = from + 1e-7 * (theta - from);
+                    sign = self.user_value(index, probe)?.signum();
+                }
+                let limit = (theta - from) * 1e-7;
+                let mut g = |at: f64| {
+                    if !divided {
+                        return Ok(sign * self.user_value(index, at)?);
+                    }
+                    // The zero at the start is divided out; its limit is the difference quotient.
+                    let away = (at - from).max(limit);
+                    Ok(sign * self.user_value(index, from + away)? / away)
+                };
+                let Some(Zero::Crossing(lo, hi)) = first_zero(&mut g, from, theta, noise)?.zero else { break };
+                let width = 0.5 * EPS * (t0.abs() / dt).max(1.0);
+                let at = refine(&mut g, lo, hi, width)?;
+                let direction = self.user_events.events[index].direction;
+                if direction * sign <= 0.0 {
+                    zeros.push((at, index));
+                }
+                if at <= from || at >= theta {
+                    break;
+                }
+                (from, divided) = (at, true);
+            }
+        }
+        Ok(zeros)
+    }
+}

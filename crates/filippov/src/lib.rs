@@ -1,0 +1,53 @@
+//! Piecewise-smooth (Filippov) dynamical systems, simulated exactly: events located to rounding,
+//! sliding motion computed instead of chattered through.
+//!
+//! A system is x' = f(t, x, s) with s_j the sign of a switching function h_j(t, x). Between
+//! switches a smooth field is integrated; where a trajectory reaches h_j = 0 it crosses, or slides
+//! along the surface under Filippov's field until that field leaves it.
+//!
+//! # Example: a mass on a spring with dry friction
+//!
+//! ```
+//! use filippov::{solve, ClosureSystem, Kind, Options};
+//!
+//! // y'' = -y + sin(t/3) - 0.4 sign(y'), the oscillator of Piiroinen and Kuznetsov (2008).
+//! let oscillator = ClosureSystem::new(
+//!     2,
+//!     1,
+//!     |t, x, s, dx| {
+//!         dx[0] = x[1];
+//!         dx[1] = -x[0] + (t / 3.0).sin() - 0.4 * s[0];
+//!     },
+//!     |_t, x, h| h[0] = x[1],
+//! );
+//! let options = Options { rtol: 1e-9, atol: vec![1e-9], ..Options::default() };
+//! let t_end = 60.0 * std::f64::consts::PI;
+//! let solution = solve(&oscillator, (0.0, t_end), &[1.0, 2.0], &options, &[])?;
+//!
+//! assert!(solution.stop.is_success());
+//! assert_eq!(solution.switches.len(), 42);
+//! let sticks = solution.switches.iter().filter(|s| s.kind == Kind::EnterSliding).count();
+//! assert_eq!(sticks, 20);
+//! # Ok::<(), filippov::Error>(())
+//! ```
+
+mod error;
+pub mod event;
+pub mod field;
+mod integrate;
+mod mode;
+mod options;
+mod solution;
+pub mod stepper;
+pub mod switching;
+mod system;
+mod tolerances;
+
+pub use error::{Error, FieldError};
+pub use event::{UserEvent, UserFunction};
+pub use integrate::{solve, solve_interruptible, Integrator, Stats, Stop, Warning, WarningCode};
+pub use mode::Mode;
+pub use options::{NonUnique, Options};
+pub use solution::{Segment, Side, Solution, Switch, UserZero};
+pub use switching::Kind;
+pub use system::{ClosureSystem, LieValue, PiecewiseSystem, TracedSystem, Word};

@@ -1,0 +1,67 @@
+//! Modes: a region of smooth motion, or sliding on one surface.
+
+use std::fmt;
+
+/// A mode: one entry per surface, +1 where h > 0, -1 where h < 0, 0 while sliding on h = 0.
+#[derive(Clone, PartialEq, Eq, Hash)]
+pub struct Mode {
+    entries: Vec<i8>,
+}
+
+impl Mode {
+    /// A mode from its entries, each -1, 0 or +1.
+    pub fn new(entries: Vec<i8>) -> Self {
+        Mode { entries }
+    }
+
+    /// The entries.
+    pub fn entries(&self) -> &[i8] {
+        &self.entries
+    }
+
+    /// The surface slid on, if exactly one is.
+    pub fn sliding(&self) -> Option<usize> {
+        self.entries.iter().position(|&e| e == 0)
+    }
+
+    /// Number of surfaces slid on.
+    pub fn codimension(&self) -> usize {
+        self.entries.iter().filter(|&&e| e == 0).count()
+    }
+
+    /// The same mode with entry `j` replaced.
+    #[must_use]
+    pub fn with(&self, j: usize, entry: i8) -> Mode {
+        let mut entries = self.entries.clone();
+        entries[j] = entry;
+        Mode { entries }
+    }
+
+    /// The signs handed to the field: +1.0 or -1.0 per surface, a zero entry as +1.0.
+    pub fn signs(&self) -> Vec<f64> {
+        self.entries.iter().map(|&e| if e < 0 { -1.0 } else { 1.0 }).collect()
+    }
+
+    /// Sets entry `j`.
+    pub(crate) fn set(&mut self, j: usize, entry: i8) {
+        self.entries[j] = entry;
+    }
+}
+
+impl fmt::Display for Mode {
+    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
+        self.entries.iter().try_for_each(|e| {
+            out.write_str(match e {
+                1 => "+",
+                0 => "0",
+                _ => "-",
+            })
+        })
+    }
+}
+
+impl fmt::Debug for Mode {
+    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
+        write!(out, "Mode({self})")
+    }
+}

@@ -1,0 +1,53 @@
+//! The options of a run, with their defaults.
+
+/// What happens at a point where several continuations are Filippov solutions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NonUnique {
+    /// Keep to the continuation chosen by regularisation (the motion that arrived goes on) and
+    /// list the others in the warnings.
+    Regularize,
+    /// Stop with [`crate::Stop::NonUnique`].
+    Error,
+}
+
+/// Options of [`crate::solve`].
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Relative tolerance per component.
+    pub rtol: f64,
+    /// Absolute tolerance, one entry for all components or one per component.
+    pub atol: Vec<f64>,
+    /// First step size; chosen by Hairer's rule if `None`.
+    pub first_step: Option<f64>,
+    /// Largest step size.
+    pub max_step: f64,
+    /// Stop after that many accepted and rejected steps.
+    pub max_steps: u64,
+    /// Stop after that many switches.
+    pub max_events: u64,
+    /// Stop after that many seconds.
+    pub max_wall_time: Option<f64>,
+    /// Policy at non-unique points.
+    pub nonunique: NonUnique,
+    /// Times at which the state is wanted; every step end if `None`.
+    pub t_eval: Option<Vec<f64>>,
+    /// Keep the interpolants, so that the solution can be evaluated anywhere.
+    pub dense_output: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Options {
+            rtol: 1e-6,
+            atol: vec![1e-9],
+            first_step: None,
+            max_step: f64::INFINITY,
+            max_steps: 100_000_000,
+            max_events: 10_000_000,
+            max_wall_time: None,
+            nonunique: NonUnique::Regularize,
+            t_eval: None,
+            dense_output: true,
+        }
+    }
+}

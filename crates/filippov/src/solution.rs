@@ -1,0 +1,264 @@
+//! The record of a run: steps, segments, switches.
+
+use crate::error::FieldError;
+use crate::field::project;
+use crate::integrate::{Stats, Stop, Warning};
+use crate::mode::Mode;
+use crate::options::Options;
+use crate::stepper::Interpolant;
+use crate::switching::Kind;
+use crate::system::PiecewiseSystem;
+
+pub use crate::integrate::UserZero;
+
+/// A switch: the end of one motion and the start of the next.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Switch {
+    /// Its time.
+    pub t: f64,
+    /// State before.
+    pub y_before: Vec<f64>,
+    /// State after.
+    pub y_after: Vec<f64>,
+    /// What happened.
+    pub kind: Kind,
+    /// The surfaces that it happened on.
+    pub surfaces: Vec<usize>,
+    /// Mode before.
+    pub mode_before: Mode,
+    /// Mode after.
+    pub mode_after: Mode,
+}
+
+/// A piece of constant mode.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Segment {
+    /// Start.
+    pub t_start: f64,
+    /// End.
+    pub t_end: f64,
+    /// The mode.
+    pub mode: Mode,
+    /// Index of the first step, and one past the last.
+    pub steps: (usize, usize),
+}
+
+/// A step, or its part up to an event.
+#[derive(Clone, Copy, Debug)]
+struct Step {
+    t0: f64,
+    dt: f64,
+    t_stop: f64,
+}
+
+/// Which limit is meant at a switch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// From earlier times.
+    Left,
+    /// From later times.
+    Right,
+}
+
+/// What a run computed.
+#[derive(Debug)]
+pub struct Solution {
+    /// Number of states.
+    pub n_states: usize,
+    /// Times: step ends, or `t_eval`.
+    pub t: Vec<f64>,
+    /// States at `t`, one after the other.
+    pub y: Vec<f64>,
+    /// Switches in order of time.
+    pub switches: Vec<Switch>,
+    /// Pieces of constant mode; they tile the time span.
+    pub segments: Vec<Segment>,
+    /// Zeros of the user's events, per event.
+    pub user_zeros: Vec<Vec<UserZero>>,
+    /// Why the run ended.
+    pub stop: Stop,
+    /// The last time reached.
+    pub t_last: f64,
+    /// The mode at the end.
+    pub mode: Mode,
+    /// Counters.
+    pub stats: Stats,
+    /// Warnings.
+    pub warnings: Vec<Warning>,
+    steps: Vec<Step>,
+    coefficients: Vec<f64>,
+    y0: Vec<f64>,
+}
+
+impl Solution {
+    /// The state at the last time.
+    pub fn last_state(&self) -> &[f64] {
+        match self.t.len() {
+            0 => &self.y0,
+            points => &self.y[(points - 1) * self.n_states..],
+        }
+    }
+
+    /// Writes the state at `t` from the continuous extension; on the surface while sliding.
+    /// Returns the mode there, or `None` outside of the span or without dense output.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn evaluate(
+        &self,
+        system: &dyn PiecewiseSystem,
+        t: f64,
+        side: Side,
+        y: &mut [f64],
+    ) -> Result<Option<&Mode>, FieldError> {
+        let n = self.n_states;
+        let (Some(first), Some(last)) = (self.segments.first(), self.segments.last()) else {
+            return Ok(None);
+        };
+        if !(t >= first.t_start && t <= last.t_end) {
+            return Ok(None);
+        }
+        if self.steps.is_empty() {
+            y.copy_from_slice(&self.y0);
+            return Ok((t == first.t_start).then_some(&first.mode));
+        }
+        let index = match side {
+            Side::Right => self.steps.partition_point(|s| s.t0 <= t).max(1) - 1,
+            Side::Left => self.steps.partition_point(|s| s.t_stop < t).min(self.steps.len() - 1),
+        };
+        let step = self.steps[index];
+        let theta = (t - step.t0) / step.dt;
+        let Some(coefficients) = self.coefficients.get(6 * n * index..6 * n * (index + 1)) else {
+            return Ok(None);
+        };
+        crate::stepper::evaluate(coefficients, n, theta, y);
+        let segment = self.segments.partition_point(|s| s.steps.1 <= index).min(self.segments.len() - 1);
+        let mode = &self.segments[segment].mode;
+        if let Some(j) = mode.sliding() {
+            let mut h = vec![0.0; system.n_surfaces()];
+            let mut gradient = vec![0.0; n];
+            project(system, j, t, y, &mode.signs(), &mut h, &mut gradient)?;
+        }
+        Ok(Some(mode))
+    }
+}
+
+/// Keeps what a run produces.
+pub(crate) struct Recorder {
+    n: usize,
+    t: Vec<f64>,
+    y: Vec<f64>,
+    y0: Vec<f64>,
+    keep_dense: bool,
+    steps: Vec<Step>,
+    coefficients: Vec<f64>,
+    segments: Vec<Segment>,
+    switches: Vec<Switch>,
+}
+
+impl Recorder {
+    pub fn new(n: usize, options: &Options) -> Self {
+        Recorder {
+            n,
+            t: Vec::new(),
+            y: Vec::new(),
+            y0: vec![0.0; n],
+            keep_dense: options.dense_output || options.t_eval.is_some(),
+            steps: Vec::new(),
+            coefficients: Vec::new(),
+            segments: Vec::new(),
+            switches: Vec::new(),
+        }
+    }
+
+    pub fn start(&mut self, t: f64, y: &[f64]) {
+        self.y0.copy_from_slice(y);
+        self.t.push(t);
+        self.y.extend_from_slice(y);
+    }
+
+    pub fn begin_segment(&mut self, t: f64, mode: &Mode) {
+        let step = self.steps.len();
+        self.close_segment(t);
+        self.segments.push(Segment { t_start: t, t_end: t, mode: mode.clone(), steps: (step, step) });
+    }
+
+    fn close_segment(&mut self, t: f64) {
+        let n_steps = self.steps.len();
+        if let Some(segment) = self.segments.last_mut() {
+            segment.t_end = t;
+            segment.steps.1 = n_steps;
+        }
+    }
+
+    /// A step up to `t_stop`, where the state is `y`.
+    pub fn step(&mut self, interpolant: &Interpolant, t_stop: f64, y: &[f64]) {
+        let (t0, dt) = (interpolant.t0, interpolant.dt);
+        if t_stop <= t0 {
+            return;
+        }
+        if self.keep_dense {
+            self.steps.push(Step { t0, dt, t_stop });
+            self.coefficients.extend_from_slice(interpolant.coefficients());
+        }
+        self.t.push(t_stop);
+        self.y.extend_from_slice(y);
+    }
+
+    pub fn switch(&mut self, switch: Switch) {
+        self.switches.push(switch);
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    pub fn finish(
+        mut self,
+        t_last: f64,
+        mode: Mode,
+        stop: Stop,
+        stats: Stats,
+        warnings: Vec<Warning>,
+        user_zeros: Vec<Vec<UserZero>>,
+    ) -> Solution {
+        self.close_segment(t_last);
+        Solution {
+            n_states: self.n,
+            t: self.t,
+            y: self.y,
+            switches: self.switches,
+            segments: self.segments,
+            user_zeros,
+            stop,
+            t_last,
+            mode,
+            stats,
+            warnings,
+            steps: self.steps,
+            coefficients: self.coefficients,
+            y0: self.y0,
+        }
+    }
+}
+
+impl Solution {
+    /// Replaces the step ends by the wanted times, as far as the run came.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub(crate) fn resample(&mut self, system: &dyn PiecewiseSystem, times: &[f64]) -> Result<(), FieldError> {
+        let mut y = vec![0.0; self.n_states];
+        let (mut t_out, mut y_out) = (Vec::with_capacity(times.len()), Vec::new());
+        for &t in times.iter().filter(|&&t| t <= self.t_last) {
+            if self.evaluate(system, t, Side::Right, &mut y)?.is_some() {
+                t_out.push(t);
+                y_out.extend_from_slice(&y);
+            }
+        }
+        (self.t, self.y) = (t_out, y_out);
+        Ok(())
+    }
+
+    /// Forgets the continuous extensions.
+    pub(crate) fn forget_dense(&mut self) {
+        self.coefficients.clear();
+    }
+}

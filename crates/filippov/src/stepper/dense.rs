@@ -1,0 +1,71 @@
+//! The continuous extension of a step.
+
+/// A polynomial in theta = (t - t0) / dt over one step, in the nested form
+///
+///   y0 + theta (r1 + (1-theta) (r2 + theta (r3 + (1-theta) (r4 + theta r5)))),
+///
+/// with r5 = 0 for the free extension of order 4. The first three terms are the cubic Hermite
+/// polynomial of the step, so that the extension joins its neighbours with one derivative.
+#[derive(Clone, Debug)]
+pub struct Interpolant {
+    /// Start of the step.
+    pub t0: f64,
+    /// Length of the step.
+    pub dt: f64,
+    n: usize,
+    /// y0, r1, .., r5, each n long.
+    coefficients: Vec<f64>,
+}
+
+impl Interpolant {
+    pub(super) fn empty(n: usize) -> Self {
+        Interpolant { t0: 0.0, dt: 0.0, n, coefficients: vec![0.0; 6 * n] }
+    }
+
+    pub(super) fn rows(&mut self) -> [&mut [f64]; 6] {
+        let n = self.n;
+        let (y0, rest) = self.coefficients.split_at_mut(n);
+        let (r1, rest) = rest.split_at_mut(n);
+        let (r2, rest) = rest.split_at_mut(n);
+        let (r3, rest) = rest.split_at_mut(n);
+        let (r4, r5) = rest.split_at_mut(n);
+        [y0, r1, r2, r3, r4, r5]
+    }
+
+    /// The coefficients, six rows of n.
+    pub fn coefficients(&self) -> &[f64] {
+        &self.coefficients
+    }
+
+    /// Writes the state at theta.
+    pub fn at(&self, theta: f64, y: &mut [f64]) {
+        evaluate(&self.coefficients, self.n, theta, y);
+    }
+
+    /// Writes the derivative of the state in t at theta.
+    pub fn derivative(&self, theta: f64, dy: &mut [f64]) {
+        let n = self.n;
+        let r = |i: usize| &self.coefficients[i * n..(i + 1) * n];
+        let u = 1.0 - theta;
+        let (w, dw) = ((theta * u).powi(2), 2.0 * theta * u * (u - theta));
+        for (i, dy) in dy.iter_mut().enumerate() {
+            let cubic = r(1)[i] + (u - theta) * r(2)[i] + theta * (2.0 - 3.0 * theta) * r(3)[i];
+            *dy = (cubic + dw * (r(4)[i] + theta * r(5)[i]) + w * r(5)[i]) / self.dt;
+        }
+    }
+}
+
+/// Evaluates the nested form from its six rows.
+#[inline]
+pub(crate) fn evaluate(coefficients: &[f64], n: usize, theta: f64, y: &mut [f64]) {
+    let (y0, rest) = coefficients.split_at(n);
+    let (r1, rest) = rest.split_at(n);
+    let (r2, rest) = rest.split_at(n);
+    let (r3, rest) = rest.split_at(n);
+    let (r4, r5) = rest.split_at(n);
+    let u = 1.0 - theta;
+    for i in 0..n {
+        y[i] = y0[i]
+            + theta * (r1[i] + u * (r2[i] + theta * (r3[i] + u * (r4[i] + theta * r5[i]))));
+    }
+}

@@ -1,0 +1,208 @@
+//! DOPRI5(4): one step, its error estimate and its continuous extensions.
+
+use super::coefficients_dopri5::{A2, A3, A4, A5, A6, A8, A9, B, C, C8, C9, D, E};
+use super::{ErrorScale, Interpolant};
+use crate::error::FieldError;
+use crate::field::SmoothField;
+
+/// What came of an attempted step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Attempt {
+    /// The error in units of the tolerance; the step is acceptable up to 1.
+    Error(f64),
+    /// A stage or the end of the step was not finite.
+    NotFinite,
+}
+
+/// The Dormand-Prince pair of order 5(4) with seven stages, the last of which is the first of the
+/// next step.
+///
+/// Reference: Hairer, Norsett, Wanner, Solving ODEs I (1993), table II.5.2.
+pub struct Dopri5 {
+    /// Derivatives at the stages.
+    k: [Vec<f64>; 7],
+    /// Derivatives at the two extra stages.
+    extra: [Vec<f64>; 2],
+    stage: Vec<f64>,
+    /// End of the attempted step.
+    y1: Vec<f64>,
+    interpolant: Interpolant,
+    order5: bool,
+}
+
+impl Dopri5 {
+    /// A stepper for n states.
+    pub fn new(n: usize) -> Self {
+        let zeros = || vec![0.0; n];
+        Dopri5 {
+            k: std::array::from_fn(|_| zeros()),
+            extra: [zeros(), zeros()],
+            stage: zeros(),
+            y1: zeros(),
+            interpolant: Interpolant::empty(n),
+            order5: false,
+        }
+    }
+
+    /// Evaluates the field at the start; needed after every restart, not between steps.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn restart(&mut self, field: &mut dyn SmoothField, t: f64, y: &mut [f64]) -> Result<(), FieldError> {
+        field.eval(t, y, &mut self.k[0])
+    }
+
+    /// The derivative at the start of the step.
+    pub fn start_derivative(&self) -> &[f64] {
+        &self.k[0]
+    }
+
+    /// Replaces the derivative at the start of the step.
+    pub fn set_start_derivative(&mut self, dy: &[f64]) {
+        self.k[0].copy_from_slice(dy);
+    }
+
+    /// The derivative at the end of the attempted step.
+    pub fn end_derivative(&self) -> &[f64] {
+        &self.k[6]
+    }
+
+    /// The end of the attempted step.
+    pub fn end(&self) -> &[f64] {
+        &self.y1
+    }
+
+    /// Attempts a step of length `dt`; `observe(stage)` is called with the field after each
+    /// evaluation.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn attempt<F: SmoothField>(
+        &mut self,
+        field: &mut F,
+        mut observe: impl FnMut(usize, &F),
+        t: f64,
+        y: &[f64],
+        dt: f64,
+        scale: &ErrorScale,
+    ) -> Result<Attempt, FieldError> {
+        let n = y.len();
+        self.order5 = false;
+        let [k1, k2, k3, k4, k5, k6, k7] = &mut self.k;
+        let (k1, stage, y1) = (&k1[..n], &mut self.stage[..n], &mut self.y1[..n]);
+        let (k2, k3, k4) = (&mut k2[..n], &mut k3[..n], &mut k4[..n]);
+        let (k5, k6, k7) = (&mut k5[..n], &mut k6[..n], &mut k7[..n]);
+
+        for i in 0..n {
+            stage[i] = y[i] + dt * (A2[0] * k1[i]);
+        }
+        field.eval(t + C[1] * dt, stage, k2)?;
+        observe(1, field);
+        for i in 0..n {
+            stage[i] = y[i] + dt * (A3[0] * k1[i] + A3[1] * k2[i]);
+        }
+        field.eval(t + C[2] * dt, stage, k3)?;
+        observe(2, field);
+        for i in 0..n {
+            stage[i] = y[i] + dt * (A4[0] * k1[i] + A4[1] * k2[i] + A4[2] * k3[i]);
+        }
+        field.eval(t + C[3] * dt, stage, k4)?;
+        observe(3, field);
+        for i in 0..n {
+            stage[i] = y[i] + dt * (A5[0] * k1[i] + A5[1] * k2[i] + A5[2] * k3[i] + A5[3] * k4[i]);
+        }
+        field.eval(t + C[4] * dt, stage, k5)?;
+        observe(4, field);
+        for i in 0..n {
+            stage[i] = y[i]
+                + dt * (A6[0] * k1[i] + A6[1] * k2[i] + A6[2] * k3[i] + A6[3] * k4[i] + A6[4] * k5[i]);
+        }
+        field.eval(t + dt, stage, k6)?;
+        observe(5, field);
+        for i in 0..n {
+            y1[i] = y[i] + dt * (B[0] * k1[i] + B[2] * k3[i] + B[3] * k4[i] + B[4] * k5[i] + B[5] * k6[i]);
+        }
+        field.eval(t + dt, y1, k7)?;
+        observe(6, field);
+
+        let mut sum = 0.0;
+        for i in 0..n {
+            let e = E[0] * k1[i] + E[2] * k3[i] + E[3] * k4[i] + E[4] * k5[i] + E[5] * k6[i] + E[6] * k7[i];
+            let ratio = dt * e / scale.of(i, y[i], y1[i]);
+            sum += ratio * ratio;
+        }
+        let error = (sum / n as f64).sqrt();
+        // The second stage enters neither the weights nor the estimate: look at it separately.
+        let finite = error.is_finite() && k2.iter().all(|v| v.is_finite());
+        Ok(if finite { Attempt::Error(error) } else { Attempt::NotFinite })
+    }
+
+    /// The continuous extension of order 4 of the attempted step; costs no evaluation.
+    pub fn extend_order4(&mut self, t: f64, y: &[f64], dt: f64) -> &Interpolant {
+        let [k1, _, k3, k4, k5, k6, k7] = &self.k;
+        let n = y.len();
+        self.interpolant.t0 = t;
+        self.interpolant.dt = dt;
+        let [y0, r1, r2, r3, r4, r5] = self.interpolant.rows();
+        y0.copy_from_slice(y);
+        r5.fill(0.0);
+        for i in 0..n {
+            r1[i] = self.y1[i] - y[i];
+            r2[i] = dt * k1[i] - r1[i];
+            r3[i] = r1[i] - dt * k7[i] - r2[i];
+            r4[i] = dt
+                * (D[0] * k1[i] + D[2] * k3[i] + D[3] * k4[i] + D[4] * k5[i] + D[5] * k6[i] + D[6] * k7[i]);
+        }
+        &self.interpolant
+    }
+
+    /// Raises the continuous extension of the attempted step to order 5, with two evaluations.
+    ///
+    /// The polynomial takes y and y' at both ends and y' at 1/5 and 1/2 of the step.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn extend_order5(
+        &mut self,
+        field: &mut dyn SmoothField,
+        t: f64,
+        y: &[f64],
+        dt: f64,
+    ) -> Result<&Interpolant, FieldError> {
+        if self.order5 && self.interpolant.t0 == t && self.interpolant.dt == dt {
+            return Ok(&self.interpolant);
+        }
+        self.extend_order4(t, y, dt);
+        for ((row, c), out) in [(&A8, C8), (&A9, C9)].into_iter().zip(&mut self.extra) {
+            for (i, s) in self.stage.iter_mut().enumerate() {
+                let increment: f64 = row.iter().zip(&self.k).map(|(a, k)| a * k[i]).sum();
+                *s = y[i] + dt * increment;
+            }
+            field.eval(t + c * dt, &mut self.stage, out)?;
+        }
+        let [_, r1, r2, r3, r4, r5] = self.interpolant.rows();
+        for i in 0..y.len() {
+            let at_fifth = dt * self.extra[0][i] - (r1[i] + 0.6 * r2[i] + 0.28 * r3[i]);
+            let at_half = dt * self.extra[1][i] - (r1[i] + 0.25 * r3[i]);
+            let quintic = 16.0 * at_half;
+            let quartic = (at_fifth - 0.0256 * quintic) / 0.192 - 0.2 * quintic;
+            if quintic.is_finite() && quartic.is_finite() {
+                r5[i] = quintic;
+                r4[i] = quartic;
+            }
+        }
+        self.order5 = true;
+        Ok(&self.interpolant)
+    }
+
+    /// The extension computed last.
+    pub fn interpolant(&self) -> &Interpolant {
+        &self.interpolant
+    }
+
+    /// Makes the end of the attempted step the start of the next one.
+    pub fn accept(&mut self, y: &mut [f64]) {
+        y.copy_from_slice(&self.y1);
+        self.k.swap(0, 6);
+    }
+}

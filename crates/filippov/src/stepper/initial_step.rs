@@ -1,0 +1,36 @@
+//! The first step size.
+
+use super::ErrorScale;
+use crate::error::FieldError;
+use crate::field::SmoothField;
+
+/// Hairer's guess of the first step of a method of order 5, from two derivatives.
+///
+/// Costs one evaluation. Reference: Hairer, Norsett, Wanner (1993), section II.4.
+///
+/// # Errors
+/// If a function of the user raises.
+pub fn initial_step(
+    field: &mut dyn SmoothField,
+    t: f64,
+    y: &[f64],
+    dy: &[f64],
+    scale: &ErrorScale,
+    longest: f64,
+) -> Result<f64, FieldError> {
+    let d0 = scale.norm(y, y);
+    let d1 = scale.norm(dy, y);
+    let guess = if d0 < 1e-5 || d1 < 1e-5 { 1e-6 } else { 0.01 * d0 / d1 };
+    let guess = guess.min(longest);
+    let mut moved: Vec<f64> = y.iter().zip(dy).map(|(y, dy)| y + guess * dy).collect();
+    let mut dy_moved = vec![0.0; y.len()];
+    field.eval(t + guess, &mut moved, &mut dy_moved)?;
+    let change: Vec<f64> = dy_moved.iter().zip(dy).map(|(a, b)| a - b).collect();
+    let d2 = scale.norm(&change, y) / guess;
+    if !d2.is_finite() {
+        return Ok(guess);
+    }
+    let fastest = d1.max(d2);
+    let step = if fastest <= 1e-15 { (guess * 1e-3).max(1e-6) } else { (0.01 / fastest).powf(0.2) };
+    Ok(step.min(100.0 * guess).min(longest))
+}

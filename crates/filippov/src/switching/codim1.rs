@@ -1,0 +1,157 @@
+//! The decision at one surface.
+
+use super::lie::{first_nonzero, Leading};
+use crate::error::FieldError;
+use crate::system::PiecewiseSystem;
+
+/// How the motion came to the surface, and which normal components are known to vanish.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Arrival {
+    /// From the region with this sign (+1 or -1).
+    Region(i8),
+    /// Sliding, with the normal component of f- known to vanish.
+    ExitMinus,
+    /// Sliding, with the normal component of f+ known to vanish.
+    ExitPlus,
+    /// The run starts here.
+    Start,
+}
+
+/// The decision at one surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Decision {
+    /// The new entry of the mode: -1, 0 (sliding) or +1.
+    pub entry: i8,
+    /// All entries that are Filippov continuations; more than one where the point is not unique.
+    pub candidates: Vec<i8>,
+    /// First non-vanishing derivative of h along f-.
+    pub minus: Leading,
+    /// First non-vanishing derivative of h along f+.
+    pub plus: Leading,
+}
+
+/// Decides what follows at a point of h_j = 0.
+///
+/// Let s- and s+ be the signs of the first non-vanishing derivatives of h along f- and f+. A motion
+/// in R- leaves the surface if s- < 0, one in R+ if s+ > 0, and sliding is possible if s- > 0 > s+,
+/// because the normal component of f- along the sliding motion has the same first non-vanishing
+/// derivative as along f- as long as that of f+ does not vanish. So
+///
+/// | s-, s+ | continuation |
+/// |---|---|
+/// | +, + | R+ |
+/// | -, - | R- |
+/// | +, - | sliding |
+/// | -, + | R- or R+, not unique: the motion stays on its side |
+///
+/// which contains the cases I to III of Dieci and Lopez (2009), section 3. Where both normal
+/// components vanish (their case IV, a two-fold) the sliding motion has its own test, see
+/// `two_fold_slides`.
+///
+/// # Errors
+/// If a function of the user raises.
+pub fn decide(
+    system: &dyn PiecewiseSystem,
+    j: usize,
+    arrival: Arrival,
+    t: f64,
+    x: &[f64],
+    signs: &[f64],
+) -> Result<Decision, FieldError> {
+    let vanishing = |known: Arrival| usize::from(arrival == known);
+    let minus = first_nonzero(system, j, -1, vanishing(Arrival::ExitMinus), t, x, signs)?;
+    let plus = first_nonzero(system, j, 1, vanishing(Arrival::ExitPlus), t, x, signs)?;
+    let mut candidates = Vec::new();
+    if minus.sign() < 0 {
+        candidates.push(-1);
+    }
+    if slides(system, j, minus, plus, t, x, signs)? {
+        candidates.push(0);
+    }
+    if plus.sign() > 0 {
+        candidates.push(1);
+    }
+    let entry = choose(system, j, arrival, &candidates, t, x, signs)?;
+    if candidates.is_empty() {
+        candidates.push(entry);
+    }
+    Ok(Decision { entry, candidates, minus, plus })
+}
+
+fn slides(
+    system: &dyn PiecewiseSystem,
+    j: usize,
+    minus: Leading,
+    plus: Leading,
+    t: f64,
+    x: &[f64],
+    signs: &[f64],
+) -> Result<bool, FieldError> {
+    if minus.order == 1 || plus.order == 1 {
+        // A side whose derivatives all vanish keeps the motion on the surface: lambda = -1 or +1.
+        return Ok(minus.sign() >= 0 && plus.sign() <= 0);
+    }
+    two_fold_slides(system, j, t, x, signs)
+}
+
+/// Does sliding start at a two-fold, where both normal components vanish?
+///
+/// With the derivatives p = L-L-h, q = L+L-h, r = L-L+h, s = L+L+h the normal components grow
+/// along the sliding motion with weight w of f+ at the rates B- = p + w (q - p), B+ = r + w (s - r),
+/// and w = B- / (B- - B+) must hold: a quadratic in w. Sliding needs a root in (0, 1) with
+/// B- > 0 > B+ (Dieci, Lopez 2009, case IV).
+fn two_fold_slides(
+    system: &dyn PiecewiseSystem,
+    j: usize,
+    t: f64,
+    x: &[f64],
+    signs: &[f64],
+) -> Result<bool, FieldError> {
+    let lie = |word: [i8; 2]| -> Result<f64, FieldError> {
+        Ok(system.lie_derivative(j, j, &word, t, x, signs)?.value)
+    };
+    // Words are applied from the left: [-1, 1] is L+ L- h.
+    let (p, q, r, s) = (lie([-1, -1])?, lie([-1, 1])?, lie([1, -1])?, lie([1, 1])?);
+    // w (p - r + w (q - p - s + r)) = p + w (q - p)
+    let (a, b, c) = (q - p - s + r, p - r - (q - p), -p);
+    let roots = if a.abs() <= f64::EPSILON * (b.abs() + c.abs()) {
+        [-c / b, f64::NAN]
+    } else {
+        let d = (b * b - 4.0 * a * c).sqrt();
+        let k = -0.5 * (b + d.copysign(b));
+        [k / a, c / k]
+    };
+    Ok(roots.iter().any(|&w| w > 0.0 && w < 1.0 && p + w * (q - p) > 0.0 && r + w * (s - r) < 0.0))
+}
+
+/// Among several candidates: the side that the motion comes from; at a start the one that the
+/// regularised field moves to from the middle of the transition, lambda = 0.
+fn choose(
+    system: &dyn PiecewiseSystem,
+    j: usize,
+    arrival: Arrival,
+    candidates: &[i8],
+    t: f64,
+    x: &[f64],
+    signs: &[f64],
+) -> Result<i8, FieldError> {
+    if let [only] = candidates {
+        return Ok(*only);
+    }
+    let preferred = match arrival {
+        Arrival::Region(side) => side,
+        Arrival::ExitMinus => -1,
+        Arrival::ExitPlus => 1,
+        Arrival::Start => {
+            let minus = system.lie_derivative(j, j, &[-1], t, x, signs)?.value;
+            let plus = system.lie_derivative(j, j, &[1], t, x, signs)?.value;
+            if minus + plus < 0.0 { -1 } else { 1 }
+        }
+    };
+    Ok(match candidates {
+        [] if matches!(arrival, Arrival::Region(_)) => preferred,
+        [] => 0,
+        _ if candidates.contains(&preferred) => preferred,
+        _ => candidates[0],
+    })
+}

@@ -1,0 +1,112 @@
+//! A system given by Rust closures.
+
+use super::{dot, dot_magnitude, LieValue, PiecewiseSystem, Word};
+use crate::error::FieldError;
+use crate::tolerances::EPS;
+
+/// A system x' = f(t, x, s) given by closures; gradients and Lie derivatives by differences.
+///
+/// # Example
+///
+/// ```
+/// use filippov::{solve, ClosureSystem, Options};
+/// // x' = 0.3 - sign(x): reaches x = 0 at t = 1/0.7 and stays there with lambda = 0.3.
+/// let system = ClosureSystem::new(
+///     1,
+///     1,
+///     |_t, _x, s, dx| dx[0] = 0.3 - s[0],
+///     |_t, x, h| h[0] = x[0],
+/// );
+/// let solution = solve(&system, (0.0, 10.0), &[1.0], &Options::default(), &[])?;
+/// assert_eq!(solution.switches.len(), 1);
+/// assert!((solution.switches[0].t - 1.0 / 0.7).abs() < 1e-12);
+/// # Ok::<(), filippov::Error>(())
+/// ```
+pub struct ClosureSystem<F, H> {
+    n_states: usize,
+    n_surfaces: usize,
+    field: F,
+    surfaces: H,
+}
+
+impl<F, H> ClosureSystem<F, H>
+where
+    F: Fn(f64, &[f64], &[f64], &mut [f64]) + Sync,
+    H: Fn(f64, &[f64], &mut [f64]) + Sync,
+{
+    /// A system with `n_states` states and `n_surfaces` switching functions; `field(t, x, s, dx)`
+    /// writes the field for the signs `s`, `surfaces(t, x, h)` the switching functions.
+    pub fn new(n_states: usize, n_surfaces: usize, field: F, surfaces: H) -> Self {
+        ClosureSystem { n_states, n_surfaces, field, surfaces }
+    }
+}
+
+impl<F, H> PiecewiseSystem for ClosureSystem<F, H>
+where
+    F: Fn(f64, &[f64], &[f64], &mut [f64]) + Sync,
+    H: Fn(f64, &[f64], &mut [f64]) + Sync,
+{
+    fn n_states(&self) -> usize {
+        self.n_states
+    }
+
+    fn n_surfaces(&self) -> usize {
+        self.n_surfaces
+    }
+
+    fn field(&self, t: f64, x: &[f64], signs: &[f64], dx: &mut [f64]) -> Result<(), FieldError> {
+        (self.field)(t, x, signs, dx);
+        Ok(())
+    }
+
+    fn surfaces(&self, t: f64, x: &[f64], _signs: &[f64], h: &mut [f64]) -> Result<(), FieldError> {
+        (self.surfaces)(t, x, h);
+        Ok(())
+    }
+}
+
+/// Lie derivatives by differences: order one from the gradient, each further order by a difference
+/// of the previous one along the field, central where both sides are finite, else one-sided.
+pub(super) fn lie_by_differences<S: PiecewiseSystem + ?Sized>(
+    system: &S,
+    i: usize,
+    j: usize,
+    word: Word,
+    t: f64,
+    x: &[f64],
+    signs: &[f64],
+) -> Result<LieValue, FieldError> {
+    let Some((&last, rest)) = word.split_last() else {
+        let mut h = vec![0.0; system.n_surfaces()];
+        system.surfaces(t, x, signs, &mut h)?;
+        return Ok(LieValue { value: h[i], magnitude: h[i].abs() });
+    };
+    let n = system.n_states();
+    let mut f = vec![0.0; n];
+    let mut signs_here = signs.to_vec();
+    signs_here[j] = f64::from(last);
+    crate::field::eval_on_side(system, t, x, &signs_here, &mut f)?;
+    if rest.is_empty() {
+        let mut gradient = vec![0.0; n];
+        let ht = system.gradient(i, t, x, signs, &mut gradient)?;
+        return Ok(LieValue {
+            value: ht + dot(&gradient, &f),
+            magnitude: ht.abs() + dot_magnitude(&gradient, &f),
+        });
+    }
+    let size = x.iter().fold(1.0_f64, |m, v| m.max(v.abs()));
+    let speed = f.iter().fold(1.0_f64, |m, v| m.max(v.abs()));
+    let d = EPS.powf(1.0 / (word.len() as f64 + 2.0)) * size / speed;
+    let at = |shift: f64| {
+        let moved: Vec<f64> = x.iter().zip(&f).map(|(x, f)| x + shift * f).collect();
+        lie_by_differences(system, i, j, rest, t + shift, &moved, signs)
+    };
+    let (above, below, here) = (at(d)?, at(-d)?, at(0.0)?);
+    let value = match (above.value.is_finite(), below.value.is_finite()) {
+        (true, true) => (above.value - below.value) / (2.0 * d),
+        (true, false) => (above.value - here.value) / d,
+        _ => (here.value - below.value) / d,
+    };
+    let magnitude = value.abs().max(here.magnitude * speed / size);
+    Ok(LieValue { value, magnitude })
+}

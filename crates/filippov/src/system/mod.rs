@@ -1,0 +1,173 @@
+//! Piecewise-smooth systems: what the integrator needs to know of them.
+//!
+//! A system is x' = f(t, x, s), where the entry `s_j` of the sign vector is the sign of the
+//! switching function h_j(t, x). The signs are *data*: the caller says which smooth field it
+//! wants, also slightly beyond a surface, and the field never looks at the sign of h itself.
+
+mod closures;
+mod traced;
+
+pub use closures::ClosureSystem;
+pub use traced::TracedSystem;
+
+use crate::error::FieldError;
+use crate::tolerances::EPS;
+
+/// The value of a Lie derivative and the sum of the magnitudes that make it up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LieValue {
+    /// The derivative.
+    pub value: f64,
+    /// Sum of the absolute values of the terms; `value` counts as zero far below it.
+    pub magnitude: f64,
+}
+
+/// Which sides a step of differentiation takes: +1 for f+, -1 for f- of the surface concerned.
+pub type Word<'a> = &'a [i8];
+
+/// A piecewise-smooth system.
+///
+/// Duties of an implementer:
+///
+/// 1. [`field`](Self::field) depends on `signs` only through its entries -1.0 and +1.0, and is the
+///    smooth extension of the field of that region slightly beyond its boundary. Where it has no
+///    extension it returns NaN.
+/// 2. [`surfaces`](Self::surfaces) writes h_j for every j; `signs` is for switching functions that
+///    are themselves piecewise smooth (an `abs` inside of a `sign`).
+/// 3. [`gradient`](Self::gradient) is the gradient of h_j in x, and returns the partial derivative in t.
+/// 4. [`active`](Self::active) may say `true` too often, never `false` wrongly.
+/// 5. All functions are pure: the same arguments give the same bits.
+pub trait PiecewiseSystem: Sync {
+    /// Number of states.
+    fn n_states(&self) -> usize;
+
+    /// Number of switching functions.
+    fn n_surfaces(&self) -> usize;
+
+    /// Writes f(t, x, s).
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    fn field(&self, t: f64, x: &[f64], signs: &[f64], dx: &mut [f64]) -> Result<(), FieldError>;
+
+    /// Writes h_j(t, x), j = 0..n_surfaces.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    fn surfaces(&self, t: f64, x: &[f64], signs: &[f64], h: &mut [f64]) -> Result<(), FieldError>;
+
+    /// Writes h_j and its rate along the velocity `v`, dh_j/dt = d_t h_j + grad h_j . v.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    fn surface_rates(
+        &self,
+        t: f64,
+        x: &[f64],
+        signs: &[f64],
+        v: &[f64],
+        h: &mut [f64],
+        rate: &mut [f64],
+    ) -> Result<(), FieldError> {
+        self.surfaces(t, x, signs, h)?;
+        let mut gradient = vec![0.0; self.n_states()];
+        for (j, rate) in rate.iter_mut().enumerate() {
+            let ht = self.gradient(j, t, x, signs, &mut gradient)?;
+            *rate = ht + dot(&gradient, v);
+        }
+        Ok(())
+    }
+
+    /// Writes the gradient of h_j in x and returns its derivative in t; by central differences
+    /// unless overridden.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    fn gradient(
+        &self,
+        j: usize,
+        t: f64,
+        x: &[f64],
+        signs: &[f64],
+        gradient: &mut [f64],
+    ) -> Result<f64, FieldError> {
+        let mut h = vec![0.0; self.n_surfaces()];
+        let mut at = |t: f64, x: &[f64]| -> Result<f64, FieldError> {
+            self.surfaces(t, x, signs, &mut h)?;
+            Ok(h[j])
+        };
+        let mut moved = x.to_vec();
+        for i in 0..x.len() {
+            let d = EPS.cbrt() * (1.0 + x[i].abs());
+            let (up, down) = (x[i] + d, x[i] - d);
+            moved[i] = up;
+            let above = at(t, &moved)?;
+            moved[i] = down;
+            let below = at(t, &moved)?;
+            moved[i] = x[i];
+            gradient[i] = (above - below) / (up - down);
+        }
+        let d = EPS.cbrt() * (1.0 + t.abs());
+        let (up, down) = (t + d, t - d);
+        Ok((at(up, x)? - at(down, x)?) / (up - down))
+    }
+
+    /// Marks the surfaces whose sign matters for the motion with these signs (and with either
+    /// sign of the surface slid on).
+    fn active(&self, signs: &[f64], sliding: Option<usize>, active: &mut [bool]) {
+        let _ = (signs, sliding);
+        active.fill(true);
+    }
+
+    /// Is h_j affine in (t, x)? Then the filter on end values and slopes decides more steps.
+    fn is_affine(&self, j: usize) -> bool {
+        let _ = j;
+        false
+    }
+
+    /// The Lie derivative L_{f^w_k} ... L_{f^w_1} h_i, where f^w is the field with entry `j` of the
+    /// signs replaced by w; by differences along the field unless overridden.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    fn lie_derivative(
+        &self,
+        i: usize,
+        j: usize,
+        word: Word,
+        t: f64,
+        x: &[f64],
+        signs: &[f64],
+    ) -> Result<LieValue, FieldError> {
+        closures::lie_by_differences(self, i, j, word, t, x, signs)
+    }
+
+    /// Below this fraction of its magnitude a Lie derivative of this order counts as zero.
+    fn lie_tolerance(&self, order: usize) -> f64 {
+        match order {
+            0 | 1 => 1e-8,
+            2 => 1e-4,
+            _ => 1e-2,
+        }
+    }
+
+    /// Highest order of Lie derivative worth asking for.
+    fn max_lie_order(&self) -> usize {
+        3
+    }
+
+    /// A readable name of surface `j` for messages.
+    fn surface_name(&self, j: usize) -> String {
+        format!("h{j}")
+    }
+}
+
+/// Inner product.
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Sum of the magnitudes of the terms of an inner product.
+pub(crate) fn dot_magnitude(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a * b).abs()).sum()
+}

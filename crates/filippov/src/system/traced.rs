@@ -1,0 +1,323 @@
+//! A system given by a traced expression graph.
+
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use filippov_expr::{Backend, ExprError, Gradient, Graph, Names, NodeId, Program};
+use rustc_hash::FxHashMap;
+
+use super::{LieValue, PiecewiseSystem, Word};
+use crate::error::FieldError;
+use crate::tolerances::{MAX_LIE_ORDER, TANGENT};
+
+/// A system whose field and switching functions are expressions: compiled, with exact derivatives.
+///
+/// Field, surfaces and rates are compiled once for all modes, the signs being data. Gradients and
+/// Lie derivatives are built and compiled when they are first needed. Cloning is cheap and shares
+/// everything.
+#[derive(Clone)]
+pub struct TracedSystem {
+    model: Arc<Model>,
+    parameters: Vec<f64>,
+}
+
+struct Model {
+    graph: Graph,
+    field: Vec<NodeId>,
+    n_states: usize,
+    names: Names,
+    backend: Backend,
+    field_program: Program,
+    surfaces_program: Program,
+    rates_program: OnceLock<Program>,
+    affine: Vec<bool>,
+    gradients: Vec<OnceLock<CompiledGradient>>,
+    lie: Mutex<LieCache>,
+}
+
+/// The gradient of one switching function: outputs are the derivative in t, then the listed states.
+struct CompiledGradient {
+    states: Vec<usize>,
+    program: Program,
+}
+
+/// Lie derivatives built so far, by (surface, surface with the word, word).
+#[derive(Default)]
+struct LieCache {
+    graph: Option<Graph>,
+    programs: FxHashMap<(usize, usize, Vec<i8>), Arc<LieProgram>>,
+}
+
+/// Output 0 is the derivative, the others its terms.
+struct LieProgram {
+    node: NodeId,
+    program: Program,
+}
+
+impl TracedSystem {
+    /// A system with the given field; the switching functions are those of the graph.
+    ///
+    /// # Errors
+    /// If an expression cannot be compiled.
+    pub fn new(
+        graph: Graph,
+        field: Vec<NodeId>,
+        parameters: Vec<f64>,
+        names: Names,
+        backend: Backend,
+    ) -> Result<Self, ExprError> {
+        let surfaces: Vec<NodeId> = (0..graph.n_surfaces()).map(|j| graph.surface(j as u32)).collect();
+        let field_program = Program::compile(&graph, &field, backend)?;
+        let surfaces_program = Program::compile(&graph, &surfaces, backend)?;
+        let model = Model {
+            n_states: field.len(),
+            affine: surfaces.iter().map(|&h| graph.is_affine(h)).collect(),
+            gradients: surfaces.iter().map(|_| OnceLock::new()).collect(),
+            lie: Mutex::new(LieCache::default()),
+            rates_program: OnceLock::new(),
+            field_program,
+            surfaces_program,
+            graph,
+            field,
+            names,
+            backend,
+        };
+        Ok(TracedSystem { model: Arc::new(model), parameters })
+    }
+
+    /// The same system with other parameter values.
+    #[must_use]
+    pub fn with_parameters(&self, parameters: Vec<f64>) -> Self {
+        TracedSystem { model: Arc::clone(&self.model), parameters }
+    }
+
+    /// The parameter values.
+    pub fn parameters(&self) -> &[f64] {
+        &self.parameters
+    }
+
+    /// The expression graph.
+    pub fn graph(&self) -> &Graph {
+        &self.model.graph
+    }
+
+    /// The nodes of the field.
+    pub fn field_nodes(&self) -> &[NodeId] {
+        &self.model.field
+    }
+
+    /// The names of states and parameters.
+    pub fn names(&self) -> &Names {
+        &self.model.names
+    }
+
+    /// Is the field native code, or interpreted?
+    pub fn is_native(&self) -> bool {
+        self.model.field_program.is_native()
+    }
+}
+
+impl Model {
+    /// h_j, then their rates along the input vector.
+    fn rates(&self) -> &Program {
+        self.rates_program.get_or_init(|| {
+            let mut graph = self.graph.clone();
+            let velocity: Vec<NodeId> = (0..self.n_states).map(|i| graph.input(i as u32)).collect();
+            let surfaces: Vec<NodeId> = (0..graph.n_surfaces()).map(|j| graph.surface(j as u32)).collect();
+            let mut outputs = surfaces.clone();
+            outputs.extend(surfaces.iter().map(|&h| graph.directional(h, &velocity)));
+            compile(&graph, &outputs, self.backend)
+        })
+    }
+
+    fn gradient(&self, j: usize) -> &CompiledGradient {
+        self.gradients[j].get_or_init(|| {
+            let mut graph = self.graph.clone();
+            let Gradient { time, states } = graph.gradient(graph.surface(j as u32));
+            let mut outputs = vec![time];
+            outputs.extend(states.iter().map(|(_, node)| *node));
+            CompiledGradient {
+                states: states.iter().map(|(i, _)| *i as usize).collect(),
+                // Mostly a handful of constants: not worth native code.
+                program: compile(&graph, &outputs, Backend::Interpreter),
+            }
+        })
+    }
+
+    /// The Lie derivative of h_i for a word on the signs of surface j, built from that of the word
+    /// without its last letter.
+    fn lie(&self, cache: &mut LieCache, i: usize, j: usize, word: Word) -> Arc<LieProgram> {
+        let key = (i, j, word.to_vec());
+        if let Some(known) = cache.programs.get(&key) {
+            return Arc::clone(known);
+        }
+        let inner = match word.split_last() {
+            None => self.graph.surface(i as u32),
+            Some((_, rest)) => self.lie(cache, i, j, rest).node,
+        };
+        let graph = cache.graph.get_or_insert_with(|| self.graph.clone());
+        let (node, terms) = match word.split_last() {
+            None => (inner, vec![inner]),
+            Some((&side, _)) => {
+                let mut signs = vec![None; graph.n_surfaces()];
+                signs[j] = Some(f64::from(side));
+                let field = graph.at_signs(&self.field, &signs);
+                let Gradient { time, states } = graph.gradient(inner);
+                let mut terms = vec![time];
+                for (state, partial) in states {
+                    terms.push(graph.mul(partial, field[state as usize]));
+                }
+                let sum = terms.iter().skip(1).fold(time, |sum, &term| graph.add(sum, term));
+                (sum, terms)
+            }
+        };
+        let mut outputs = vec![node];
+        outputs.extend(terms);
+        let program = compile(graph, &outputs, Backend::Interpreter);
+        let lie = Arc::new(LieProgram { node, program });
+        cache.programs.insert(key, Arc::clone(&lie));
+        lie
+    }
+}
+
+/// Compiles nodes that were just made in this graph, falling back to the interpreter.
+fn compile(graph: &Graph, outputs: &[NodeId], backend: Backend) -> Program {
+    Program::compile(graph, outputs, backend)
+        .or_else(|_| Program::compile(graph, outputs, Backend::Interpreter))
+        .expect("the interpreter refuses only nodes of another graph")
+}
+
+impl PiecewiseSystem for TracedSystem {
+    fn n_states(&self) -> usize {
+        self.model.n_states
+    }
+
+    fn n_surfaces(&self) -> usize {
+        self.model.affine.len()
+    }
+
+    #[inline]
+    fn field(&self, t: f64, x: &[f64], signs: &[f64], dx: &mut [f64]) -> Result<(), FieldError> {
+        self.model.field_program.eval(t, x, signs, &self.parameters, &[], dx);
+        Ok(())
+    }
+
+    fn surfaces(&self, t: f64, x: &[f64], signs: &[f64], h: &mut [f64]) -> Result<(), FieldError> {
+        self.model.surfaces_program.eval(t, x, signs, &self.parameters, &[], h);
+        Ok(())
+    }
+
+    fn surface_rates(
+        &self,
+        t: f64,
+        x: &[f64],
+        signs: &[f64],
+        v: &[f64],
+        h: &mut [f64],
+        rate: &mut [f64],
+    ) -> Result<(), FieldError> {
+        let d = h.len();
+        let program = self.model.rates();
+        if d == 1 {
+            let mut out = [0.0; 2];
+            program.eval(t, x, signs, &self.parameters, v, &mut out);
+            (h[0], rate[0]) = (out[0], out[1]);
+        } else {
+            let mut out = vec![0.0; 2 * d];
+            program.eval(t, x, signs, &self.parameters, v, &mut out);
+            h.copy_from_slice(&out[..d]);
+            rate.copy_from_slice(&out[d..]);
+        }
+        Ok(())
+    }
+
+    fn gradient(
+        &self,
+        j: usize,
+        t: f64,
+        x: &[f64],
+        signs: &[f64],
+        gradient: &mut [f64],
+    ) -> Result<f64, FieldError> {
+        let compiled = self.model.gradient(j);
+        let mut small = [0.0; 8];
+        let mut large = Vec::new();
+        let count = compiled.states.len() + 1;
+        let out = if count <= small.len() {
+            &mut small[..count]
+        } else {
+            large.resize(count, 0.0);
+            &mut large[..]
+        };
+        compiled.program.eval(t, x, signs, &self.parameters, &[], out);
+        gradient.fill(0.0);
+        for (&state, &value) in compiled.states.iter().zip(&out[1..]) {
+            gradient[state] = value;
+        }
+        Ok(out[0])
+    }
+
+    fn active(&self, signs: &[f64], sliding: Option<usize>, active: &mut [bool]) {
+        let graph = &self.model.graph;
+        active.fill(false);
+        let sides: &[Option<f64>] = match sliding {
+            None => &[None],
+            Some(_) => &[Some(-1.0), Some(1.0)],
+        };
+        for side in sides {
+            let mut signs = signs.to_vec();
+            if let (Some(j), Some(side)) = (sliding, side) {
+                signs[j] = *side;
+            }
+            // Surfaces whose sign an active switching function contains are active too.
+            let mut outputs = self.model.field.clone();
+            loop {
+                let found = graph.sign_dependencies(&outputs, &signs);
+                let fresh: Vec<usize> = (0..found.len()).filter(|&j| found[j] && !active[j]).collect();
+                for &j in &fresh {
+                    active[j] = true;
+                    outputs.push(graph.surface(j as u32));
+                }
+                if fresh.is_empty() {
+                    break;
+                }
+            }
+        }
+        if let Some(j) = sliding {
+            active[j] = true;
+        }
+    }
+
+    fn is_affine(&self, j: usize) -> bool {
+        self.model.affine[j]
+    }
+
+    fn lie_derivative(
+        &self,
+        i: usize,
+        j: usize,
+        word: Word,
+        t: f64,
+        x: &[f64],
+        signs: &[f64],
+    ) -> Result<LieValue, FieldError> {
+        let lie = {
+            let mut cache = self.model.lie.lock().unwrap_or_else(PoisonError::into_inner);
+            self.model.lie(&mut cache, i, j, word)
+        };
+        let mut out = vec![0.0; lie.program.n_outputs()];
+        lie.program.eval(t, x, signs, &self.parameters, &[], &mut out);
+        Ok(LieValue { value: out[0], magnitude: out[1..].iter().map(|v| v.abs()).sum() })
+    }
+
+    fn lie_tolerance(&self, _order: usize) -> f64 {
+        TANGENT
+    }
+
+    fn max_lie_order(&self) -> usize {
+        MAX_LIE_ORDER
+    }
+
+    fn surface_name(&self, j: usize) -> String {
+        self.model.graph.text(self.model.graph.surface(j as u32), &self.model.names)
+    }
+}

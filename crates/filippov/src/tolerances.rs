@@ -1,0 +1,55 @@
+//! Numerical thresholds, each with its reason. No other file holds a small number of this kind.
+
+/// Unit roundoff times two.
+pub const EPS: f64 = f64::EPSILON;
+
+/// A switching function counts as zero below this multiple of `EPS` times the sum of the
+/// magnitudes it is made of: the rounding of the state plus that of a few operations.
+pub const SURFACE_NOISE: f64 = 16.0 * EPS;
+
+/// A Lie derivative counts as zero below this fraction of the sum of the magnitudes it is made of.
+/// Points handed in by a user or found as a root carry a few rounding errors, amplified by at most
+/// some thousands through the derivatives; a genuine value this small would be
+/// indistinguishable from a tangency in the sense of every later comparison.
+pub const TANGENT: f64 = 1e-11;
+
+/// Highest order of Lie derivative looked at before a point counts as undecided.
+pub const MAX_LIE_ORDER: usize = 6;
+
+/// The remainder of the cubic through end values and end slopes is taken as at most this fraction
+/// of the spread of its Bernstein coefficients. For a sinusoid stepped with two radians a step
+/// it is 3 %, and error control keeps steps below that.
+pub const CUBIC_REMAINDER: f64 = 0.25;
+
+/// The remainder of the quartic through five samples is taken as at most this multiple of the
+/// fourth difference; for a function whose fifth derivative is ten times its fourth, it is 0.08.
+pub const QUARTIC_REMAINDER: f64 = 0.25;
+
+/// The exit functions are searched only if their smallest stage value is below this multiple of
+/// their spread over the stages.
+pub const STAGE_SPREAD: f64 = 0.75;
+
+/// Bisections of a step in the search for zeros; 2^-48 of a step is below the rounding of time.
+pub const MAX_DEPTH: u32 = 48;
+
+/// A search that needed more bisections than this met a function that the step does not resolve;
+/// the step may not grow then.
+pub const RESOLVED_DEPTH: u32 = 3;
+
+/// Farthest extrapolation of the continuous extension, in steps (DISODE45, section 3).
+pub const EXTRAPOLATION: f64 = 1.3;
+
+/// A step towards the edge of a one-sided field aims to end at this fraction of the predicted
+/// time to the surface, so that the surface lies at 1.15 steps, well inside the extrapolation.
+pub const ONE_SIDED_AIM: f64 = 0.87;
+
+/// First offset into its own side for a field that is not finite on its surface, in units of
+/// `EPS` times the size of the state; grown by 16 up to five times.
+pub const SIDE_OFFSET: f64 = 8.0;
+
+/// Shortest step in units of the rounding of time.
+pub const SHORTEST_STEP: f64 = 16.0 * EPS;
+
+/// A step shorter than this fraction of its recent predecessors, across which the field still
+/// changes by a third of its size, is the mark of a jump that no surface declares.
+pub const JUMP_SHRINK: f64 = 1e-2;

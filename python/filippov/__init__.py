@@ -1,0 +1,76 @@
+"""Simulation of piecewise-smooth (Filippov) dynamical systems from ordinary right-hand sides.
+
+>>> import numpy as np, filippov as fl
+>>> def oscillator(t, x, F, omega):
+...     y, v = x
+...     return v, -y + np.sin(omega * t) - F * np.sign(v)
+>>> sol = fl.solve_ivp(oscillator, (0, 20), [1.0, 2.0], args=(0.4, 1 / 3))
+>>> sol.success
+True
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from filippov.errors import (
+    FilippovError,
+    InputError,
+    Interrupted,
+    IntersectionError,
+    ModelError,
+    NonUniqueError,
+    StepSizeError,
+    ToleranceError,
+    TraceError,
+)
+from filippov.events import Event
+from filippov.modes import Mode
+from filippov.solution import DenseSolution, Solution
+from filippov.solve import solve_ivp
+from filippov.switches import RunWarning, Segment, SegmentTable, Switch, SwitchTable
+from filippov.system import System, system
+
+if TYPE_CHECKING:
+    from filippov import plot, problems
+
+__all__ = [
+    "DenseSolution",
+    "Event",
+    "FilippovError",
+    "InputError",
+    "Interrupted",
+    "IntersectionError",
+    "Mode",
+    "ModelError",
+    "NonUniqueError",
+    "RunWarning",
+    "Segment",
+    "SegmentTable",
+    "Solution",
+    "StepSizeError",
+    "Switch",
+    "SwitchTable",
+    "System",
+    "ToleranceError",
+    "TraceError",
+    "plot",
+    "problems",
+    "solve_ivp",
+    "system",
+]
+
+_LAZY = ("plot", "problems")
+
+
+def __getattr__(name: str) -> Any:
+    # The plotting and example packages are imported when they are first used: the import stays light.
+    if name in _LAZY:
+        from importlib import import_module
+
+        return import_module(f"{__name__}.{name}")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_LAZY})

@@ -1,0 +1,117 @@
+"""Exceptions of the package.
+
+Every error says what happened, where (time, state, surface, mode, as far as known) and what to try.
+
+During a run nothing is raised for numerical reasons: the partial solution comes back with ``status``,
+``message`` and ``success = False``. The exceptions here report bad input, models that cannot be used, and
+the outcomes for which the caller asked to have an exception (`nonunique="error"`) or has pressed Ctrl-C.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+__all__ = [
+    "FilippovError",
+    "InputError",
+    "Interrupted",
+    "IntersectionError",
+    "ModelError",
+    "NonUniqueError",
+    "StepSizeError",
+    "ToleranceError",
+    "TraceError",
+]
+
+
+class FilippovError(Exception):
+    """Base class of every error of this package.
+
+    Parameters
+    ----------
+    message : str
+        What happened and what to try.
+    t : float, optional
+        Time of the event, in the units of the model.
+    state : array_like, shape (n,), optional
+        State at that time.
+    surface : str, optional
+        Printed switching function concerned.
+    mode : tuple of int, optional
+        Mode at that time, over {-1, 0, +1}.
+    partial : Solution, optional
+        What was computed before the error.
+    """
+
+    def __init__(
+        self,
+        message: str = "",
+        *,
+        t: float | None = None,
+        state: Any = None,
+        surface: str | None = None,
+        mode: tuple[int, ...] | None = None,
+        partial: Any = None,
+    ) -> None:
+        super().__init__(message)
+        self.message = message
+        self.t = t
+        self.state = state
+        self.surface = surface
+        self.mode = mode
+        self.partial = partial
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Keyword-only attributes would be lost by the default protocol; worker processes send errors back by pickle.
+        return type(self), (self.message,), self.__dict__.copy()
+
+
+class TraceError(FilippovError):
+    """A user's function cannot be turned into an expression.
+
+    Declare the surfaces (``surfaces=``) to run such a function as a black box, or write it with NumPy
+    functions.
+    """
+
+
+class ModelError(FilippovError):
+    """The functions of a model do not fit together (number of components, surfaces, signs)."""
+
+
+class InputError(FilippovError, ValueError):
+    """An argument has a wrong value or shape. The message starts with the name of the argument."""
+
+
+class ToleranceError(InputError):
+    """A tolerance is not a positive finite number, or has the wrong shape."""
+
+
+class StepSizeError(FilippovError):
+    """The step became smaller than the spacing of floating-point numbers at that time."""
+
+
+class NonUniqueError(FilippovError):
+    """The solution is not unique at a point, and ``nonunique="error"`` was asked for.
+
+    `partial` is the solution up to that point.
+    """
+
+
+class IntersectionError(FilippovError):
+    """The motion at an intersection of surfaces could not be determined."""
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C during a run. It is a `KeyboardInterrupt` with what was computed so far.
+
+    Parameters
+    ----------
+    message : str
+        Where the run was interrupted.
+    partial : Solution
+        The solution up to the last accepted step.
+    """
+
+    def __init__(self, message: str = "", partial: Any = None) -> None:
+        super().__init__(message)
+        self.partial = partial

@@ -1,0 +1,179 @@
+"""Events given by the user: zeros of a function of time and state that are located and recorded."""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from filippov.errors import InputError
+
+__all__ = ["Event", "EventSpec", "normalise_events"]
+
+_DIRECTIONS = {"up": 1.0, "down": -1.0, "both": 0.0}
+
+
+class Event:
+    """A function ``g(t, y)`` whose zeros are located; the run may stop there.
+
+    Parameters
+    ----------
+    g : callable
+        ``g(t, y, *args) -> float``, called with `y` of shape (n,) and the `args` of `solve_ivp`. Parameters
+        of the system that `g` names in its signature are handed over by name.
+    direction : {0, 1, -1, "both", "up", "down"}, optional
+        Which passages count: upwards (`g` from negative to positive), downwards, or both (default).
+        Any other number counts by its sign, as in SciPy.
+    terminal : bool or int, optional
+        ``True`` stops at the first, an integer k at the k-th passage. Default: never.
+    name : str, optional
+        Name in tables and messages. Default: the name of `g`.
+
+    Raises
+    ------
+    InputError
+        If an argument has another form.
+
+    Notes
+    -----
+    Functions with SciPy's attributes ``terminal`` and ``direction`` are accepted by `solve_ivp` as they are.
+
+    Examples
+    --------
+    >>> import filippov as fl
+    >>> fl.Event(lambda t, y: y[0], direction="down", terminal=True, name="ground")
+    Event(ground, direction=-1, terminal=1)
+    """
+
+    __slots__ = ("direction", "g", "name", "terminal")
+
+    def __init__(
+        self,
+        g: Callable[..., Any],
+        direction: float | str = 0,
+        terminal: bool | int = False,
+        name: str | None = None,
+    ) -> None:
+        if not callable(g):
+            raise InputError(f"events: an event is a function g(t, y), not {type(g).__name__}")
+        self.g = g
+        self.direction = _check_direction(direction)
+        self.terminal = _check_terminal(terminal)
+        self.name = name if name is not None else function_name(g, "event")
+
+    def __repr__(self) -> str:
+        return f"Event({self.name}, direction={self.direction:g}, terminal={self.terminal})"
+
+
+class EventSpec(NamedTuple):
+    """An event in the form that the core takes."""
+
+    g: Callable[..., Any]
+    direction: float
+    terminal: int
+    name: str
+
+
+def normalise_events(events: Any) -> list[EventSpec] | None:
+    """Turn the argument `events` of `solve_ivp` into a list; ``None`` stays ``None``.
+
+    Parameters
+    ----------
+    events : None, callable, Event, or a sequence of these
+
+    Returns
+    -------
+    list of EventSpec or None
+
+    Raises
+    ------
+    InputError
+        If an entry is not a function or has unusable attributes.
+    """
+    if events is None:
+        return None
+    entries: Sequence[Any] = [events] if callable(events) or isinstance(events, Event) else list(events)
+    specs: list[EventSpec] = []
+    for entry in entries:
+        if not isinstance(entry, Event):
+            if not callable(entry):
+                raise InputError(
+                    f"events: entry {len(specs)} is not a function g(t, y) but {type(entry).__name__}"
+                )
+            entry = Event(
+                entry, direction=getattr(entry, "direction", 0), terminal=getattr(entry, "terminal", False)
+            )
+        specs.append(EventSpec(entry.g, entry.direction, entry.terminal, entry.name))
+    return specs
+
+
+def bind_function(
+    g: Callable[..., Any], args: tuple[Any, ...], params: dict[str, float]
+) -> Callable[[float, Any], Any]:
+    """Return ``g(t, y)`` with `args` appended and those of `params` that `g` names handed over by name."""
+    named = {name: params[name] for name in accepted_names(g, params)} if params else {}
+    if not args and not named:
+        return g
+    return lambda t, y: g(t, y, *args, **named)
+
+
+def accepted_names(function: Callable[..., Any], names: Any) -> list[str]:
+    """Return those of `names` that can be handed to `function` by name."""
+    try:
+        parameters = inspect.signature(function).parameters.values()
+    except (TypeError, ValueError):  # builtins and C functions have no signature
+        return []
+    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters):
+        return list(names)
+    possible = {
+        parameter.name
+        for parameter in parameters
+        if parameter.kind in (parameter.POSITIONAL_OR_KEYWORD, parameter.KEYWORD_ONLY)
+    }
+    return [name for name in names if name in possible]
+
+
+def check_scalar_function(g: Callable[[float, Any], Any], t0: float, y0: Any, what: str) -> None:
+    """Call `g` once at the start and refuse what is not a single real number."""
+    value = np.asarray(g(t0, y0.copy()))
+    if value.size != 1 or value.dtype.kind not in "fiub":
+        raise InputError(
+            f"{what} must return one real number, it returned {value.dtype.name} of shape {value.shape}"
+        )
+
+
+def function_name(function: Any, default: str) -> str:
+    """Return a printable name of `function`; a lambda has none of its own."""
+    name = str(getattr(function, "__name__", default))
+    return default if name == "<lambda>" else name
+
+
+def _check_direction(direction: Any) -> float:
+    if isinstance(direction, str):
+        if direction not in _DIRECTIONS:
+            raise InputError(f'events: direction is a number, "up", "down" or "both", not {direction!r}')
+        return _DIRECTIONS[direction]
+    try:
+        number = float(direction)
+    except (TypeError, ValueError):
+        number = math.nan
+    if math.isnan(number):
+        raise InputError(f'events: direction is a number, "up", "down" or "both", not {direction!r}')
+    return float(np.sign(number))
+
+
+def _check_terminal(terminal: Any) -> int:
+    if terminal is None:
+        return 0
+    if isinstance(terminal, (bool, np.bool_)):
+        return int(terminal)
+    try:
+        count = int(terminal)
+    except (TypeError, ValueError):
+        count = -1
+    if count < 0 or count != terminal:
+        raise InputError(f"events: terminal is True, False or a number of passages, not {terminal!r}")
+    return count

@@ -1,0 +1,326 @@
+"""Checks of the arguments of `solve_ivp`, all before the first step, each naming the argument."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from filippov.errors import InputError, ToleranceError
+
+__all__ = ["Options", "check_options", "check_t_span", "check_y0"]
+
+Array = npt.NDArray[np.float64]
+
+_METHODS = {"DOPRI5": "DOPRI5", "RK45": "DOPRI5"}
+_PLANNED_METHODS = ("Taylor", "DOP853", "Midpoint", "Rodas5P")
+_STIFF_METHODS = ("Radau", "BDF", "LSODA")
+# name -> (available values, values that are planned)
+_POLICIES = {
+    "sliding": (("canopy",), ("moments", "dieci-lopez", "minimum-norm")),
+    "nonunique": (("regularize", "error"), ("branch",)),
+    "zeno": (("accumulate",), ()),
+}
+_SCIPY_ONLY = ("jac", "jac_sparsity", "lband", "uband", "min_step")
+_SMALLEST_RTOL = 100 * np.finfo(float).eps
+
+
+class Options(NamedTuple):
+    """Checked options of one run."""
+
+    method: str
+    rtol: float
+    atol: float | Array
+    first_step: float | None
+    max_step: float
+    max_steps: int
+    max_events: int
+    max_wall_time: float | None
+    sliding: str
+    nonunique: str
+    t_eval: Array | None
+    dense_output: bool
+    progress: Callable[..., Any] | None
+
+    def for_core(self) -> dict[str, Any]:
+        """Return the options as the core takes them."""
+        keep = "t_eval" if self.t_eval is not None and not self.dense_output else "steps"
+        return {**self._asdict(), "keep": keep}
+
+
+def check_options(given: Mapping[str, Any], t_span: tuple[float, float], n: int) -> Options:
+    """Check the keyword options of `solve_ivp`.
+
+    Parameters
+    ----------
+    given : mapping
+        Every option by name, as given by the caller.
+    t_span : tuple of float
+        Checked interval of integration.
+    n : int
+        Number of states.
+
+    Returns
+    -------
+    Options
+
+    Raises
+    ------
+    InputError
+        If an option has a wrong type, value or shape; `ToleranceError` for `rtol` and `atol`.
+    """
+    for policy, (available, planned) in _POLICIES.items():
+        _check_choice(policy, given[policy], available, planned)
+    if given["resets"] is not None:
+        raise InputError("resets: not available yet; stop with a terminal event, map the state, and go on")
+    max_step = given["max_step"]
+    max_wall_time = given["max_wall_time"]
+    return Options(
+        method=check_method(given["method"]),
+        rtol=_check_rtol(given["rtol"]),
+        atol=_check_atol(given["atol"], n),
+        first_step=_check_first_step(given["first_step"], t_span),
+        max_step=math.inf if max_step is None else _positive("max_step", max_step, infinite=True),
+        max_steps=_count("max_steps", given["max_steps"]),
+        max_events=_count("max_events", given["max_events"]),
+        max_wall_time=None if max_wall_time is None else _positive("max_wall_time", max_wall_time),
+        sliding=given["sliding"],
+        nonunique=given["nonunique"],
+        t_eval=_check_t_eval(given["t_eval"], t_span),
+        dense_output=bool(given["dense_output"]),
+        progress=_check_progress(given["progress"], t_span),
+    )
+
+
+def check_method(method: Any) -> str:
+    """Return the core's name of a method, or refuse it with the name to use instead."""
+    if isinstance(method, str):
+        if method in _METHODS:
+            return _METHODS[method]
+        if method in _PLANNED_METHODS:
+            raise InputError(f'method: "{method}" is not available yet; use "DOPRI5"')
+        if method in _STIFF_METHODS:
+            raise InputError(
+                f'method: "{method}" is not offered; the method for stiff systems is "Rodas5P" '
+                '(not available yet; "DOPRI5" is correct on stiff systems too, only slower)'
+            )
+        hint = did_you_mean(method, [*_METHODS, *_PLANNED_METHODS])
+        raise InputError(f'method: unknown method {method!r}{hint}; use "DOPRI5"')
+    raise InputError(f'method: a name such as "DOPRI5" is needed, not {type(method).__name__}')
+
+
+def check_t_span(t_span: Any) -> tuple[float, float]:
+    """Return the two ends of the interval of integration as floats.
+
+    Raises
+    ------
+    InputError
+        If `t_span` is not two finite real numbers.
+    """
+    try:
+        ends = [_real(end) for end in t_span]
+    except (TypeError, ValueError):
+        ends = []
+    if len(ends) != 2 or not all(math.isfinite(end) for end in ends):
+        raise InputError(f"t_span: two finite real numbers (t0, t1) are needed, not {t_span!r}")
+    return ends[0], ends[1]
+
+
+def check_y0(y0: Any) -> Array:
+    """Return the initial state as a new array of floats, shape (n,).
+
+    Raises
+    ------
+    InputError
+        If `y0` is not one-dimensional, empty, complex, or not finite.
+    """
+    try:
+        state = np.asarray(y0)
+    except ValueError as error:
+        raise InputError(f"y0: a sequence of n real numbers is needed ({error})") from None
+    if state.dtype.kind == "c":
+        raise InputError("y0: complex states are not supported; split them into real and imaginary parts")
+    if state.dtype.kind not in "fiub":
+        try:
+            state = state.astype(float)
+        except (TypeError, ValueError):
+            raise InputError(f"y0: a sequence of n real numbers is needed, not {y0!r}") from None
+    if state.ndim != 1:
+        hint = "; use [y0]" if state.ndim == 0 else ""
+        raise InputError(f"y0: must be one-dimensional, it has shape {state.shape}{hint}")
+    if state.size == 0:
+        raise InputError("y0: must have at least one component")
+    state = np.array(state, dtype=np.float64)
+    if not np.isfinite(state).all():
+        index = int(np.flatnonzero(~np.isfinite(state))[0])
+        raise InputError(f"y0: must be finite, but y0[{index}] is {state[index]}", state=state)
+    return state
+
+
+def check_args(args: Any) -> tuple[Any, ...]:
+    """Return `args` as a tuple; a single value that is not a sequence is wrapped."""
+    if args is None:
+        return ()
+    if isinstance(args, tuple):
+        return args
+    if isinstance(args, (str, bytes, Mapping)):
+        raise InputError(f"args: a tuple is needed, not {type(args).__name__}; named values go to params=")
+    try:
+        return tuple(args)
+    except TypeError:
+        return (args,)
+
+
+def check_params(params: Any) -> dict[str, float]:
+    """Return named parameters as a dict of finite floats."""
+    if params is None:
+        return {}
+    if not isinstance(params, Mapping):
+        raise InputError(f"params: a dict of names and values is needed, not {type(params).__name__}")
+    checked: dict[str, float] = {}
+    for name, value in params.items():
+        if not isinstance(name, str) or not name.isidentifier():
+            raise InputError(f"params: {name!r} is not a name")
+        try:
+            checked[name] = _real(value)
+        except (TypeError, ValueError):
+            raise InputError(f"params: {name!r} must be a real number, not {value!r}") from None
+        if not math.isfinite(checked[name]):
+            raise InputError(f"params: {name!r} must be finite, it is {value!r}")
+    return checked
+
+
+def check_unknown(unknown: Mapping[str, Any], known: Iterable[str], function: str) -> None:
+    """Refuse unknown keywords with a suggestion, and ignore SciPy's that mean nothing here, with a warning."""
+    for name in unknown:
+        if name == "vectorized":  # SciPy's promise that columns may be handed over; no change of the result
+            continue
+        if name not in _SCIPY_ONLY:
+            hint = did_you_mean(name, known)
+            raise TypeError(f"{function}() got an unexpected keyword argument {name!r}{hint}")
+        warnings.warn(f"{name}: has no effect with an explicit method", UserWarning, stacklevel=4)
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Return ``"; did you mean 'rtol'?"`` for the nearest known name, or an empty text."""
+    from difflib import get_close_matches  # only needed for a message
+
+    nearest = get_close_matches(name, list(known), n=1)
+    return f"; did you mean {nearest[0]!r}?" if nearest else ""
+
+
+def _check_choice(name: str, value: Any, available: tuple[str, ...], planned: tuple[str, ...]) -> None:
+    if isinstance(value, str) and value in available:
+        return
+    use = " or ".join(f'"{choice}"' for choice in available)
+    if isinstance(value, str) and value in planned:
+        raise InputError(f'{name}: "{value}" is not available yet; use {use}')
+    raise InputError(f"{name}: unknown value {value!r}; use {use}")
+
+
+def _check_rtol(rtol: Any) -> float:
+    if np.ndim(rtol) != 0:
+        raise ToleranceError("rtol: a single number is needed; use atol for a tolerance per component")
+    try:
+        value = _real(rtol)
+    except (TypeError, ValueError):
+        value = math.nan
+    if not (math.isfinite(value) and value > 0.0):
+        raise ToleranceError(f"rtol: must be positive and finite, it is {rtol!r}")
+    if value < _SMALLEST_RTOL:
+        warnings.warn(
+            f"rtol: {value:g} is below what double precision allows; {_SMALLEST_RTOL:.3g} is used",
+            UserWarning,
+            stacklevel=4,
+        )
+        value = float(_SMALLEST_RTOL)
+    return value
+
+
+def _check_atol(atol: Any, n: int) -> float | Array:
+    try:
+        values = np.asarray(atol)
+        values = values.astype(np.float64) if values.dtype.kind in "fiu" else None
+    except (TypeError, ValueError):
+        values = None
+    if values is None:
+        raise ToleranceError(f"atol: a number, or one per component, is needed, not {atol!r}")
+    if values.ndim > 1 or (values.ndim == 1 and values.size != n):
+        raise ToleranceError(f"atol: must be a number or have shape ({n},), it has shape {values.shape}")
+    if not (np.isfinite(values).all() and (values >= 0.0).all()):
+        raise ToleranceError(f"atol: must be finite and not negative, it is {atol!r}")
+    return float(values) if values.ndim == 0 else values
+
+
+def _check_first_step(first_step: Any, t_span: tuple[float, float]) -> float | None:
+    if first_step is None:
+        return None
+    value = _positive("first_step", first_step)
+    length = abs(t_span[1] - t_span[0])
+    if value > length > 0.0:
+        raise InputError(f"first_step: {value:g} is longer than the interval of integration, {length:g}")
+    return value
+
+
+def _check_t_eval(t_eval: Any, t_span: tuple[float, float]) -> Array | None:
+    if t_eval is None:
+        return None
+    try:
+        times = np.array(t_eval, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError("t_eval: a sequence of real numbers is needed") from None
+    if times.ndim != 1:
+        raise InputError(f"t_eval: must be one-dimensional, it has shape {times.shape}")
+    if not np.isfinite(times).all():
+        raise InputError("t_eval: must be finite")
+    first, last = min(t_span), max(t_span)
+    if times.size and (times.min() < first or times.max() > last):
+        outside = times[(times < first) | (times > last)][0]
+        raise InputError(f"t_eval: {outside:g} is not within t_span = ({t_span[0]:g}, {t_span[1]:g})")
+    steps = np.diff(times)
+    if (steps <= 0.0).any() if t_span[1] >= t_span[0] else (steps >= 0.0).any():
+        raise InputError("t_eval: must be strictly sorted in the direction of integration")
+    return times
+
+
+def _check_progress(progress: Any, t_span: tuple[float, float]) -> Callable[..., Any] | None:
+    if progress is None or progress is False:
+        return None
+    if progress is True:
+        from filippov.progress import print_progress
+
+        return print_progress(t_span)
+    if callable(progress):
+        return progress  # type: ignore[no-any-return]
+    raise InputError("progress: True, False, or a function of the time reached, is needed")
+
+
+def _count(name: str, value: Any) -> int:
+    try:
+        number = _real(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    if not (math.isfinite(number) and number > 0 and number == int(number)):
+        raise InputError(f"{name}: a positive whole number is needed, not {value!r}")
+    return int(number)
+
+
+def _positive(name: str, value: Any, infinite: bool = False) -> float:
+    try:
+        number = _real(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    if not number > 0.0 or (math.isinf(number) and not infinite):
+        raise InputError(f"{name}: a positive number is needed, not {value!r}")
+    return number
+
+
+def _real(value: Any) -> float:
+    """Convert a real number; text, truth values and complex numbers are refused with TypeError."""
+    if isinstance(value, (str, bytes, bool, np.bool_, complex)) or np.iscomplexobj(value) or np.ndim(value) != 0:
+        raise TypeError
+    return float(value)

@@ -1,0 +1,174 @@
+"""From the user's functions to a system of the core: traced if possible, else a black box with declared surfaces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from filippov._core import OpaqueSystem, SignedSystem, TracedSystem
+from filippov.errors import InputError, ModelError, TraceError
+from filippov.events import accepted_names, check_scalar_function, function_name
+from filippov.forms import Source
+from filippov.trace import Trace, trace
+
+__all__ = ["Prepared", "prepare"]
+
+Array = npt.NDArray[np.float64]
+CoreSystem = TracedSystem | OpaqueSystem | SignedSystem
+
+
+class Prepared(NamedTuple):
+    """A system ready to run.
+
+    Attributes
+    ----------
+    core : TracedSystem, OpaqueSystem or SignedSystem
+        The system of the core.
+    trace : Trace or None
+        The record of tracing; ``None`` for a black box, and after unpickling.
+    surfaces : tuple of str
+        Printed switching functions.
+    pinned : dict of str to float, or None
+        Values of the parameters that this form is valid for; ``None`` if it is valid for all.
+    why_opaque : str
+        Why the function could not be traced; empty if it was.
+    """
+
+    core: CoreSystem
+    trace: Trace | None
+    surfaces: tuple[str, ...]
+    pinned: dict[str, float] | None
+    why_opaque: str
+
+    @property
+    def backend(self) -> str:
+        """How the field is evaluated: ``"native"``, ``"interpreter"`` or ``"black box"``."""
+        if not isinstance(self.core, TracedSystem):
+            return "black box"
+        return "native" if self.core.is_native() else "interpreter"
+
+    def is_valid_for(self, n: int, values: dict[str, float]) -> bool:
+        """Whether this form holds for `n` states and these parameter values."""
+        return self.core.n_states == n and (self.pinned is None or self.pinned == values)
+
+
+def prepare(
+    source: Source,
+    n: int,
+    values: dict[str, float],
+    states: Sequence[str] | None,
+    t0: float,
+    y0: Array | None,
+) -> Prepared:
+    """Trace a source, or wrap it as a black box if it cannot be traced and its surfaces are declared.
+
+    Parameters
+    ----------
+    source : Source
+        The user's functions.
+    n : int
+        Number of states.
+    values : dict
+        Parameters by name with their values.
+    states : sequence of str or None
+        Names of the states, for printing.
+    t0, y0 : float, ndarray of shape (n,) or None
+        A point at which the functions may be called.
+
+    Returns
+    -------
+    Prepared
+
+    Raises
+    ------
+    TraceError
+        If the function cannot be traced and no surfaces are declared.
+    ModelError
+        If the functions return the wrong number of components.
+    """
+    try:
+        traced = _trace(source, source.fun, n, values, t0, y0)
+    except TraceError as error:
+        if source.branching is not None:
+            try:
+                traced = _trace(source, source.branching, n, values, t0, y0)
+            except TraceError:
+                return _prepare_opaque(source, n, values, t0, y0, error)
+        elif source.surfaces:
+            return _prepare_opaque(source, n, values, t0, y0, error)
+        else:
+            raise
+    names = list(states) if states is not None else None
+    core = TracedSystem(traced.builder, traced.field, n, list(traced.parameters), names)
+    pinned = dict(values) if traced.guards else None
+    return Prepared(core, traced, tuple(core.surfaces()), pinned, "")
+
+
+def _trace(
+    source: Source, fun: Callable[..., Any], n: int, values: dict[str, float], t0: float, y0: Array | None
+) -> Trace:
+    return trace(
+        fun,
+        n,
+        args=source.args,
+        parameters=values or None,
+        surfaces=list(source.surfaces) or None,
+        t0=t0,
+        y0=y0,
+    )
+
+
+def _prepare_opaque(
+    source: Source, n: int, values: dict[str, float], t0: float, y0: Array | None, reason: TraceError
+) -> Prepared:
+    surfaces = [_bind(surface, source.args, values) for surface in source.surfaces]
+    names = [function_name(surface, f"h{j + 1}") for j, surface in enumerate(source.surfaces)]
+    core: CoreSystem
+    if source.signed is not None:
+        signed = source.signed
+        core = SignedSystem(lambda t, x, s: signed(t, x, s, **values), surfaces, n, names)
+    else:
+        fun = _bind(source.fun, source.args, values)
+        core = OpaqueSystem(fun, surfaces, n, names)
+        if y0 is not None:
+            check_components(fun(t0, y0.copy()), n)
+    if y0 is not None:
+        for j, surface in enumerate(surfaces):
+            check_scalar_function(surface, t0, y0, f"surfaces: entry {j}")
+    return Prepared(core, None, tuple(names), dict(values), str(reason))
+
+
+def check_components(value: Any, n: int) -> None:
+    """Refuse a field whose value is not `n` real numbers."""
+    try:
+        components = np.asarray(value)
+    except ValueError:
+        raise ModelError("fun: must return a sequence of numbers, one per state") from None
+    if components.shape not in ((n,), (n, 1)):
+        raise ModelError(f"fun: must return {n} components, as many as y0 has; it returned shape {components.shape}")
+    if components.dtype.kind == "c":
+        raise ModelError("fun: returned complex numbers; split the states into real and imaginary parts")
+
+
+def _bind(function: Callable[..., Any], args: tuple[Any, ...], values: dict[str, float]) -> Callable[..., Any]:
+    named = {name: values[name] for name in accepted_names(function, values)} if values else {}
+    if not args and not named:
+        return function
+    return lambda t, x: function(t, x, *args, **named)
+
+
+def parameter_vector(values: dict[str, float]) -> Array:
+    """Return the parameter values in the order in which they were declared."""
+    return np.array(list(values.values()), dtype=np.float64)
+
+
+def check_n(n: Any) -> int | None:
+    """Return the number of states as an int; ``None`` stays ``None``."""
+    if n is None:
+        return None
+    if isinstance(n, bool) or int(n) != n or n < 1:
+        raise InputError(f"n: a positive whole number of states is needed, not {n!r}")
+    return int(n)

@@ -1,0 +1,56 @@
+"""The reference problems by name."""
+
+from __future__ import annotations
+
+from filippov.problems import (
+    biased_relay,
+    dieci_lopez,
+    disode_planar,
+    drill_string,
+    dry_friction,
+    ifdiff_canonical,
+    relay_feedback,
+    structural_pounding,
+    two_masses,
+)
+from filippov.problems.problem import Problem
+
+__all__ = ["get", "names"]
+
+_MODULES = (
+    biased_relay,
+    dieci_lopez,
+    disode_planar,
+    drill_string,
+    dry_friction,
+    ifdiff_canonical,
+    relay_feedback,
+    structural_pounding,
+    two_masses,
+)
+_PROBLEMS: dict[str, Problem] = {problem.name: problem for module in _MODULES for problem in module.PROBLEMS}
+
+
+def names() -> list[str]:
+    """Return the names of all reference problems, sorted."""
+    return sorted(_PROBLEMS)
+
+
+def get(name: str) -> Problem:
+    """Return the reference problem of that name.
+
+    Raises
+    ------
+    KeyError
+        If there is none; the message lists the names.
+
+    Examples
+    --------
+    >>> import filippov as fl
+    >>> fl.problems.get("biased_relay").y0
+    (1.0,)
+    """
+    try:
+        return _PROBLEMS[name]
+    except KeyError:
+        raise KeyError(f"no problem {name!r}; the names are {', '.join(names())}") from None

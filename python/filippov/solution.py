@@ -1,0 +1,346 @@
+"""The result of a run: SciPy's fields, and what happened at the surfaces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, KeysView
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from filippov.modes import Mode
+from filippov.switches import RunWarning, SegmentTable, SwitchTable, import_pandas
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from filippov._core import Run
+
+__all__ = ["DenseSolution", "Solution"]
+
+Array = npt.NDArray[np.float64]
+
+
+class DenseSolution:
+    """The solution as a function of time.
+
+    Parameters
+    ----------
+    run : Run
+        What the core computed.
+
+    Attributes
+    ----------
+    t_min, t_max : float
+        Interval on which the solution is known.
+
+    Notes
+    -----
+    Within a step it is the continuous extension of the method; in sliding it is projected onto the surfaces.
+    """
+
+    __slots__ = ("_run", "t_max", "t_min")
+
+    def __init__(self, run: Run, t_first: float, t_last: float) -> None:
+        self._run = run
+        self.t_min = min(t_first, t_last)
+        self.t_max = max(t_first, t_last)
+
+    def __call__(self, t: npt.ArrayLike, side: str = "right") -> Array:
+        """Evaluate the solution.
+
+        Parameters
+        ----------
+        t : float or array_like, shape (k,)
+            Times within ``[t_min, t_max]``, in any order.
+        side : {"right", "left"}, optional
+            Which limit is meant at a time at which the state jumps.
+
+        Returns
+        -------
+        ndarray, shape (n,) or (n, k)
+
+        Raises
+        ------
+        ValueError
+            If a time is outside of the interval, or `side` is unknown.
+        """
+        times = np.asarray(t, dtype=np.float64)
+        if times.ndim > 1:
+            raise ValueError(f"t: a number or a one-dimensional array is needed, not shape {times.shape}")
+        if side not in ("right", "left"):
+            raise ValueError(f'side: "right" or "left" is needed, not {side!r}')
+        flat = np.atleast_1d(times)
+        self._check_range(flat)
+        values = self._run.evaluate(np.ascontiguousarray(flat), side == "left")
+        return values[:, 0] if times.ndim == 0 else values
+
+    def multipliers(self, t: npt.ArrayLike) -> Array:
+        """Return the multipliers lambda in [-1, 1] of the sliding surfaces, NaN for the others.
+
+        Parameters
+        ----------
+        t : float or array_like, shape (k,)
+            Times within ``[t_min, t_max]``.
+
+        Returns
+        -------
+        ndarray, shape (n_surfaces,) or (n_surfaces, k)
+
+        Raises
+        ------
+        ValueError
+            If a time is outside of the interval.
+        """
+        times = np.asarray(t, dtype=np.float64)
+        flat = np.atleast_1d(times)
+        self._check_range(flat)
+        values = self._run.multipliers(np.ascontiguousarray(flat))
+        return values[:, 0] if times.ndim == 0 else values
+
+    def __repr__(self) -> str:
+        return f"DenseSolution on [{self.t_min:.10g}, {self.t_max:.10g}]"
+
+    def _check_range(self, times: Array) -> None:
+        inside = (times >= self.t_min) & (times <= self.t_max)
+        if not inside.all():
+            outside = times[~inside][0]
+            raise ValueError(
+                f"t: the solution is known on [{self.t_min:.17g}, {self.t_max:.17g}], {outside:.17g} is outside"
+            )
+
+
+class Solution:
+    """The result of `solve_ivp`: fields by attribute and by key.
+
+    Attributes
+    ----------
+    t : ndarray, shape (n_points,)
+        Times: `t_eval` if given, else the ends of the steps.
+    y : ndarray, shape (n, n_points)
+        States at `t`.
+    sol : DenseSolution or None
+        The solution as a function, ``sol.sol(t, side="right")``; ``None`` if ``dense_output=False``.
+    t_events, y_events : list of ndarray or None
+        Times, shape (k,), and states, shape (k, n), of every event given; ``None`` if none was given.
+    nfev, njev, nlu : int
+        Numbers of evaluations of the field, of Jacobians, and of factorisations.
+    status : int
+        0: the end was reached; 1: a terminal event; negative: the run failed and what is here is a part.
+    message : str
+        The reason, in words.
+    success : bool
+        ``status >= 0``.
+    switches : SwitchTable
+        Every change of mode.
+    segments : SegmentTable
+        Pieces of constant mode.
+    stats : dict
+        Counters of the run and how the field was evaluated (``stats["backend"]``).
+    warnings : list of RunWarning
+        What deserves a look.
+    error : BaseException or None
+        The exception that a function of the user raised during the run.
+    surfaces : tuple of str
+        Printed switching functions ``h_j``, in the order of the entries of a mode.
+    states : tuple of str
+        Names of the states.
+    """
+
+    t: Array
+    y: Array
+    sol: DenseSolution | None
+    t_events: list[Array] | None
+    y_events: list[Array] | None
+    nfev: int
+    njev: int
+    nlu: int
+    status: int
+    message: str
+    success: bool
+    switches: SwitchTable
+    segments: SegmentTable
+    stats: dict[str, int | float | str]
+    warnings: list[RunWarning]
+    error: BaseException | None
+    surfaces: tuple[str, ...]
+    states: tuple[str, ...]
+
+    def __init__(self, **fields: Any) -> None:
+        self.__dict__.update(fields)
+
+    @classmethod
+    def from_run(
+        cls,
+        run: Run,
+        *,
+        t0: float,
+        y0: Array,
+        surfaces: tuple[str, ...],
+        states: tuple[str, ...],
+        has_events: bool,
+        dense_output: bool,
+        backend: str,
+    ) -> Solution:
+        """Collect what the core computed.
+
+        Parameters
+        ----------
+        run : Run
+            The record of the core.
+        t0, y0 : float, ndarray of shape (n,)
+            Initial point.
+        surfaces, states : tuple of str
+            Printed switching functions and names of the states.
+        has_events : bool
+            Whether the caller gave events (else `t_events` is ``None``).
+        dense_output : bool
+            Whether `sol` is kept.
+        backend : str
+            How the field was evaluated.
+
+        Returns
+        -------
+        Solution
+        """
+        stats = {**run.stats, "backend": backend}
+        segments = run.segments
+        t_last = float(segments[-1][1]) if segments else (float(run.t[-1]) if len(run.t) else t0)
+        return cls(
+            t=run.t,
+            y=run.y,
+            sol=DenseSolution(run, t0, t_last) if dense_output else None,
+            t_events=list(run.t_events) if has_events else None,
+            y_events=list(run.y_events) if has_events else None,
+            nfev=int(stats.get("nfev", 0)),
+            njev=int(stats.get("njev", 0)),
+            nlu=int(stats.get("nlu", 0)),
+            status=run.status,
+            message=run.message,
+            success=run.status >= 0,
+            switches=SwitchTable(run.switches, surfaces, states),
+            segments=SegmentTable(segments),
+            stats=stats,
+            warnings=[RunWarning(*warning) for warning in run.warnings],
+            error=run.error,
+            surfaces=surfaces,
+            states=states,
+        )
+
+    def __getitem__(self, key: str) -> Any:
+        try:
+            return self.__dict__[key]
+        except KeyError:
+            raise KeyError(f"{key!r}; the fields are {', '.join(self.__dict__)}") from None
+
+    def __contains__(self, key: object) -> bool:
+        return key in self.__dict__
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.__dict__)
+
+    def __len__(self) -> int:
+        return len(self.__dict__)
+
+    def keys(self) -> KeysView[str]:
+        """Names of the fields."""
+        return self.__dict__.keys()
+
+    def get(self, key: str, default: Any = None) -> Any:
+        """Return a field, or `default` if there is none of that name."""
+        return self.__dict__.get(key, default)
+
+    def mode_at(self, t: float) -> Mode:
+        """Return the mode in force at time `t` (at a switch: just after it).
+
+        Raises
+        ------
+        ValueError
+            If `t` is outside of the interval that was computed.
+        """
+        starts, ends = self.segments.t_start, self.segments.t_end
+        if not len(starts) or not min(starts[0], ends[-1]) <= t <= max(starts[0], ends[-1]):
+            raise ValueError(f"t: {t!r} is outside of the interval that was computed")
+        backward = ends[-1] < starts[0]
+        index = int(np.searchsorted(-starts if backward else starts, -t if backward else t, side="right")) - 1
+        return self.segments[index].mode
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return a `pandas.DataFrame`, indexed by time, with one column per state and the mode as text.
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+        """
+        pandas = import_pandas()
+        columns: dict[str, Any] = {name: self.y[i] for i, name in enumerate(self.states)}
+        if self.surfaces and len(self.segments):
+            columns["mode"] = [str(self.mode_at(t)) for t in self.t]
+        return pandas.DataFrame(columns, index=pandas.Index(self.t, name="t"))
+
+    def to_xarray(self) -> Any:
+        """Return an `xarray.Dataset` with one variable per state over the dimension ``t``.
+
+        Raises
+        ------
+        ImportError
+            If xarray is not installed.
+        """
+        try:
+            import xarray
+        except ImportError as error:
+            raise ImportError("to_xarray() needs xarray: pip install xarray") from error
+        variables: dict[str, Any] = {name: ("t", self.y[i]) for i, name in enumerate(self.states)}
+        if self.surfaces and len(self.segments):
+            variables["mode"] = ("t", np.array([str(self.mode_at(t)) for t in self.t]))
+        attributes = {"message": self.message, "status": self.status, "surfaces": list(self.surfaces)}
+        return xarray.Dataset(variables, coords={"t": self.t}, attrs=attributes)
+
+    def plot(self, ax: Any = None, states: Any = None, dark: bool = False) -> Any:
+        """Draw the states over time, coloured by mode; see `filippov.plot.time_series`.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; a new figure by default.
+        states : sequence of int or str, optional
+            Which states; all by default.
+        dark : bool, optional
+            Light lines on a dark ground.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Raises
+        ------
+        ImportError
+            If Matplotlib is not installed.
+        """
+        from filippov.plot import time_series
+
+        return time_series(self, ax=ax, states=states, dark=dark)
+
+    def __repr__(self) -> str:
+        n_sliding = sum(mode.is_sliding for mode in self.segments.mode)
+        lines = [
+            f"message:  {self.message}",
+            f"success:  {self.success} (status {self.status})",
+            f"t:        {len(self.t)} points" + (f", {self.t[0]:.10g} ... {self.t[-1]:.10g}" if len(self.t) else ""),
+            f"y:        shape {self.y.shape}" + (f", last {_short(self.y[:, -1])}" if self.y.size else ""),
+            f"surfaces: {', '.join(self.surfaces) if self.surfaces else 'none'}",
+            f"switches: {len(self.switches)}; segments: {len(self.segments)}, {n_sliding} of them sliding",
+            f"nfev:     {self.nfev} ({self.stats.get('backend', '')})",
+        ]
+        if self.t_events is not None:
+            lines.append(f"events:   {', '.join(str(len(times)) for times in self.t_events)}")
+        lines += [f"warning:  {warning}" for warning in self.warnings[:5]]
+        if len(self.warnings) > 5:
+            lines.append(f"          ... and {len(self.warnings) - 5} more in .warnings")
+        return "\n".join(lines)
+
+
+def _short(values: Array) -> str:
+    shown = ", ".join(f"{value:.6g}" for value in values[:6])
+    return f"[{shown}{', ...' if len(values) > 6 else ''}]"

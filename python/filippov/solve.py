@@ -1,0 +1,262 @@
+"""`solve_ivp`: check, trace, run, collect."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from filippov._core import Run, TracedSystem
+from filippov._core import solve as run_core
+from filippov.errors import InputError, Interrupted, NonUniqueError, TraceError
+from filippov.events import (
+    EventSpec,
+    bind_function,
+    check_scalar_function,
+    normalise_events,
+)
+from filippov.options import (
+    Options,
+    check_args,
+    check_options,
+    check_params,
+    check_t_span,
+    check_unknown,
+    check_y0,
+)
+from filippov.prepare import Prepared, parameter_vector
+from filippov.solution import Solution
+from filippov.start import StandingRun
+from filippov.system import System
+from filippov.trace import trace_event
+
+__all__ = ["solve_ivp"]
+
+Array = npt.NDArray[np.float64]
+CoreEvent = tuple[Callable[[float, Array], float] | int, float, int, str]
+
+_KEYWORDS = (
+    "fun t_span y0 method t_eval dense_output events args params surfaces resets rtol atol first_step max_step "
+    "sliding nonunique zeno max_events max_steps max_wall_time progress"
+).split()
+
+
+def solve_ivp(
+    fun: Callable[..., Any] | System,
+    t_span: Any,
+    y0: npt.ArrayLike,
+    method: str = "DOPRI5",
+    t_eval: npt.ArrayLike | None = None,
+    dense_output: bool = True,
+    events: Any = None,
+    args: Any = None,
+    *,
+    params: Mapping[str, float] | None = None,
+    surfaces: Any = None,
+    resets: Any = None,
+    rtol: float = 1e-6,
+    atol: npt.ArrayLike = 1e-9,
+    first_step: float | None = None,
+    max_step: float = np.inf,
+    sliding: str = "canopy",
+    nonunique: str = "regularize",
+    zeno: str = "accumulate",
+    max_events: int = 10**7,
+    max_steps: int = 10**8,
+    max_wall_time: float | None = None,
+    progress: bool | Callable[..., Any] = False,
+    **unknown: Any,
+) -> Solution:
+    """Solve an initial value problem of a piecewise-smooth system.
+
+    ``x' = fun(t, x)`` with `fun` written as for `scipy.integrate.solve_ivp`. The `sign`, `abs`, `where`,
+    `maximum` and `if` in it become switching functions ``h_j``; motion on the surfaces ``h_j = 0`` (sliding,
+    sticking) is computed in the sense of Filippov.
+
+    Parameters
+    ----------
+    fun : callable or System
+        ``fun(t, y, *args, **params) -> dy`` with `y` and `dy` of shape (n,).
+    t_span : (float, float)
+        Interval of integration ``(t0, t1)``.
+    y0 : array_like, shape (n,)
+        Initial state, real and finite.
+    method : str, optional
+        ``"DOPRI5"`` (default; ``"RK45"`` is the same): the explicit Runge-Kutta pair of Dormand and Prince.
+    t_eval : array_like, shape (k,), optional
+        Times at which `y` is given, strictly sorted. It does not influence the steps. Default: the ends of
+        the steps.
+    dense_output : bool, optional
+        Keep the solution as a function, ``sol.sol`` (default True).
+    events : callable, Event, or a sequence of these, optional
+        Functions ``g(t, y, *args)`` whose zeros are located; SciPy's attributes ``terminal`` and
+        ``direction`` are read.
+    args : tuple, optional
+        Constants handed to `fun`, `surfaces` and `events` after `y`.
+    params : dict, optional
+        Parameters by name, handed to `fun` by name. For a `System`: values other than the defaults.
+    surfaces : callable or sequence of callable, optional
+        Switching functions ``h_j(t, y, *args)``. Needed only for functions that cannot be traced (a black
+        box); otherwise they fix the order and the sign of the surfaces.
+    resets : None
+        Not available yet.
+    rtol : float, optional
+        Relative tolerance; the local error is kept below ``atol + rtol * abs(y)``. Default 1e-6.
+    atol : float or array_like, shape (n,), optional
+        Absolute tolerance, in the units of the states. Default 1e-9.
+    first_step : float, optional
+        Length of the first step. Default: chosen by the method.
+    max_step : float, optional
+        Longest step allowed. Default: no limit.
+    sliding : {"canopy"}, optional
+        Which combination of the neighbouring fields is taken where several surfaces meet.
+    nonunique : {"regularize", "error"}, optional
+        What to do where the solution is not unique: follow the limit of the regularised system and note the
+        alternatives in `warnings`, or raise `NonUniqueError`.
+    zeno : {"accumulate"}, optional
+        What to do where switches accumulate: go on from the limit point.
+    max_events, max_steps : int, optional
+        Largest numbers of switches and of steps.
+    max_wall_time : float, optional
+        Longest time that the run may take, in seconds.
+    progress : bool or callable, optional
+        Print how far the run is, or call a function of the time reached.
+
+    Returns
+    -------
+    Solution
+        SciPy's fields (``t, y, sol, t_events, y_events, nfev, njev, nlu, status, message, success``) and
+        ``switches, segments, stats, warnings``. If the run fails half-way, ``success`` is False and the
+        solution up to there is returned; an exception that `fun` raised during the run is in ``error``.
+
+    Raises
+    ------
+    InputError
+        If an argument is wrong; before the first step, with its name. It is a `ValueError`.
+    TraceError
+        If `fun` cannot be traced and no `surfaces` are given.
+    NonUniqueError
+        With ``nonunique="error"``; `partial` is the solution up to there.
+    KeyboardInterrupt
+        On Ctrl-C; `partial` is the solution up to there.
+
+    Notes
+    -----
+    Backward time, ``t1 < t0``, is allowed only without surfaces: Filippov flow is not reversible.
+
+    References
+    ----------
+    Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, section II.5.
+    Filippov, Differential Equations with Discontinuous Righthand Sides (1988).
+
+    Examples
+    --------
+    >>> import numpy as np, filippov as fl
+    >>> def oscillator(t, x, F, omega):
+    ...     y, v = x
+    ...     return v, -y + np.sin(omega * t) - F * np.sign(v)
+    >>> sol = fl.solve_ivp(oscillator, (0, 20), [1.0, 2.0], args=(0.4, 1 / 3))
+    >>> sol.success, sol.surfaces
+    (True, ('x[1]',))
+    """
+    check_unknown(unknown, _KEYWORDS, "solve_ivp")
+    t0, t1 = check_t_span(t_span)
+    state = check_y0(y0)
+    n = len(state)
+    given = {
+        "method": method, "t_eval": t_eval, "dense_output": dense_output, "resets": resets, "rtol": rtol, "atol": atol,
+        "first_step": first_step, "max_step": max_step, "sliding": sliding, "nonunique": nonunique, "zeno": zeno,
+        "max_events": max_events, "max_steps": max_steps, "max_wall_time": max_wall_time, "progress": progress,
+    }  # fmt: skip
+    options = check_options(given, (t0, t1), n)
+    constants = check_args(args)
+    specs = normalise_events(events)
+    system, values = _as_system(fun, n, constants, params, surfaces)
+    prepared = system.prepare(n, t0, state, values)
+    if t1 < t0 and prepared.surfaces:
+        raise InputError(
+            "t_span: t1 < t0 is refused for a system with surfaces: Filippov flow is not reversible "
+            f"(surfaces: {', '.join(prepared.surfaces)})"
+        )
+    core_events = _core_events(specs or [], prepared, t0, state, constants, values)
+    run: Run | StandingRun
+    if t1 == t0:
+        run = StandingRun(t0, state, len(prepared.surfaces), len(core_events), options.t_eval)
+    else:
+        run = run_core(prepared.core, t0, t1, state, parameter_vector(values), options.for_core(), core_events)
+    solution = Solution.from_run(
+        run,
+        t0=t0,
+        y0=state,
+        surfaces=prepared.surfaces,
+        states=system.state_names(n),
+        has_events=specs is not None,
+        dense_output=options.dense_output,
+        backend=prepared.backend,
+    )
+    if prepared.why_opaque:
+        solution.stats["black_box_reason"] = prepared.why_opaque
+    _raise_if_asked(run, solution, options)
+    return solution
+
+
+def _as_system(
+    fun: Any,
+    n: int,
+    args: tuple[Any, ...],
+    params: Mapping[str, float] | None,
+    surfaces: Any,
+) -> tuple[System, dict[str, float]]:
+    """Return the system to run and the values of all its parameters."""
+    if isinstance(fun, System):
+        if surfaces is not None:
+            raise InputError("surfaces: they belong to the System; give them to it")
+        if args:
+            raise InputError("args: they belong to the System; give them to it, or use params=")
+        return fun, fun.parameter_values(params)
+    if not callable(fun):
+        raise InputError(f"fun: a function fun(t, y) or a System is needed, not {type(fun).__name__}")
+    return System(fun, n=n, params=params, surfaces=surfaces, args=args), check_params(params)
+
+
+def _core_events(
+    specs: list[EventSpec],
+    prepared: Prepared,
+    t0: float,
+    y0: Array,
+    args: tuple[Any, ...],
+    values: dict[str, float],
+) -> list[CoreEvent]:
+    """Turn events into nodes of the traced system where possible, else keep them as functions."""
+    events: list[CoreEvent] = []
+    for index, spec in enumerate(specs):
+        g = bind_function(spec.g, args, values)
+        check_scalar_function(g, t0, y0, f"events: entry {index} ({spec.name})")
+        node = _event_node(prepared, spec, args)
+        events.append((g if node is None else node, spec.direction, spec.terminal, spec.name))
+    return events
+
+
+def _event_node(prepared: Prepared, spec: EventSpec, args: tuple[Any, ...]) -> int | None:
+    if prepared.trace is None or not isinstance(prepared.core, TracedSystem):
+        return None
+    try:
+        return prepared.core.event(trace_event(prepared.trace, spec.g, args=args))
+    except TraceError:
+        return None
+
+
+def _raise_if_asked(run: Run | StandingRun, solution: Solution, options: Options) -> None:
+    if run.reason == "interrupted" or isinstance(run.error, KeyboardInterrupt):
+        raise Interrupted(run.message or "interrupted", partial=solution)
+    if run.reason == "non_unique" and options.nonunique == "error":
+        last = solution.switches[-1] if len(solution.switches) else None
+        raise NonUniqueError(
+            run.message,
+            t=float(solution.t[-1]) if len(solution.t) else None,
+            state=solution.y[:, -1] if solution.y.size else None,
+            mode=last.mode_after if last else None,
+            partial=solution,
+        )

@@ -1,0 +1,304 @@
+"""The record of a run: switches, segments of constant mode, and warnings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from filippov.modes import Mode
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["RunWarning", "Segment", "SegmentTable", "Switch", "SwitchTable"]
+
+Array = npt.NDArray[np.float64]
+
+_ROWS_SHOWN = 20
+
+
+class Switch(NamedTuple):
+    """One change of mode, reset, or other event that ends a segment.
+
+    Attributes
+    ----------
+    t : float
+        Time, in the units of the model.
+    y_before, y_after : ndarray, shape (n,)
+        State just before and just after; equal unless the state is reset.
+    kind : str
+        One of ``crossing, enter_sliding, exit_sliding, switch_sliding, grazing, reset, accumulation, clock, user,
+        terminal``. Entering means that the codimension rises, leaving that it falls.
+    surfaces : tuple of int
+        Indices into ``system.surfaces``, several if several surfaces are met at the same instant.
+    mode_before, mode_after : Mode
+        Modes on both sides.
+    note : str
+        Further information, usually empty.
+    """
+
+    t: float
+    y_before: Array
+    y_after: Array
+    kind: str
+    surfaces: tuple[int, ...]
+    mode_before: Mode
+    mode_after: Mode
+    note: str
+
+
+class Segment(NamedTuple):
+    """A piece of the solution with constant mode.
+
+    Attributes
+    ----------
+    t_start, t_end : float
+        Interval of the segment; segments tile the interval of integration.
+    mode : Mode
+        The mode in force.
+    multipliers_start, multipliers_end : ndarray, shape (n_surfaces,)
+        Multipliers lambda in [-1, 1] of the sliding surfaces at both ends, NaN for the other surfaces.
+    """
+
+    t_start: float
+    t_end: float
+    mode: Mode
+    multipliers_start: Array
+    multipliers_end: Array
+
+    @property
+    def duration(self) -> float:
+        """Length of the interval."""
+        return self.t_end - self.t_start
+
+    @property
+    def sliding(self) -> tuple[int, ...]:
+        """Indices of the surfaces that the motion slides on."""
+        return self.mode.sliding
+
+
+class RunWarning(NamedTuple):
+    """Something that the run met and that deserves a look.
+
+    Attributes
+    ----------
+    t : float
+        Time at which it was noticed.
+    code : str
+        Short name, for example ``"non_unique"``, ``"grazing"``, ``"undeclared_jump"``.
+    message : str
+        What was found, in words.
+    """
+
+    t: float
+    code: str
+    message: str
+
+    def __str__(self) -> str:
+        return f"t = {self.t:.10g}: {self.message} [{self.code}]"
+
+
+class SwitchTable(Sequence[Switch]):
+    """The switches of a run in order of time: a sequence of `Switch` and a table with columns.
+
+    Every attribute of `Switch` is also a column: ``table.t`` is an array of shape (k,), ``table.y_before`` one of
+    shape (k, n), ``table.kind`` an array of str, the others are lists. A slice is a table again.
+
+    Examples
+    --------
+    >>> import filippov as fl, numpy as np
+    >>> sol = fl.solve_ivp(lambda t, x: -np.sign(x), (0, 2), [1.0])
+    >>> [switch.kind for switch in sol.switches]
+    ['enter_sliding']
+    """
+
+    __slots__ = ("_rows", "_states", "_surfaces")
+
+    def __init__(self, rows: Sequence[tuple[Any, ...]], surfaces: Sequence[str], states: Sequence[str]) -> None:
+        self._rows = rows
+        self._surfaces = tuple(surfaces)
+        self._states = tuple(states)
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    @overload
+    def __getitem__(self, index: int) -> Switch: ...
+    @overload
+    def __getitem__(self, index: slice) -> SwitchTable: ...
+    def __getitem__(self, index: int | slice) -> Switch | SwitchTable:
+        if isinstance(index, slice):
+            return SwitchTable(self._rows[index], self._surfaces, self._states)
+        return _switch(self._rows[index])
+
+    def __iter__(self) -> Iterator[Switch]:
+        return map(_switch, self._rows)
+
+    @property
+    def t(self) -> Array:
+        """Times, shape (k,)."""
+        return np.array([row[0] for row in self._rows], dtype=np.float64)
+
+    @property
+    def y_before(self) -> Array:
+        """States just before, shape (k, n)."""
+        return self._state_column(1)
+
+    @property
+    def y_after(self) -> Array:
+        """States just after, shape (k, n)."""
+        return self._state_column(2)
+
+    @property
+    def kind(self) -> npt.NDArray[np.str_]:
+        """Kinds, shape (k,); ``table.t[table.kind == "crossing"]`` are the times of the crossings."""
+        return np.array([row[3] for row in self._rows], dtype=np.str_)
+
+    @property
+    def surfaces(self) -> list[tuple[int, ...]]:
+        """Indices of the surfaces met."""
+        return [tuple(row[4]) for row in self._rows]
+
+    @property
+    def mode_before(self) -> list[Mode]:
+        """Modes just before."""
+        return [Mode(row[5]) for row in self._rows]
+
+    @property
+    def mode_after(self) -> list[Mode]:
+        """Modes just after."""
+        return [Mode(row[6]) for row in self._rows]
+
+    @property
+    def note(self) -> list[str]:
+        """Further information, usually empty."""
+        return [row[7] for row in self._rows]
+
+    def surface_text(self, switch: Switch) -> str:
+        """Return the printed switching functions that a switch concerns, separated by commas."""
+        return ", ".join(
+            self._surfaces[index] if 0 <= index < len(self._surfaces) else str(index) for index in switch.surfaces
+        )
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return a `pandas.DataFrame` with one row per switch; states are split into one column per component.
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+        """
+        pandas = import_pandas()
+        columns: dict[str, Any] = {
+            "t": self.t,
+            "kind": self.kind.astype(object),
+            "surfaces": [self.surface_text(switch) for switch in self],
+            "mode_before": [str(mode) for mode in self.mode_before],
+            "mode_after": [str(mode) for mode in self.mode_after],
+        }
+        for label, values in (("before", self.y_before), ("after", self.y_after)):
+            columns.update({f"{name}_{label}": values[:, i] for i, name in enumerate(self._states)})
+        columns["note"] = self.note
+        return pandas.DataFrame(columns)
+
+    def __repr__(self) -> str:
+        count = len(self)
+        if count == 0:
+            return "no switches"
+        head = count if count <= _ROWS_SHOWN else _ROWS_SHOWN - 5
+        cells = [("", "t", "kind", "modes", "surfaces", "note")]
+        shown = [*range(head), *range(max(head, count - 4), count)]
+        for index in shown:
+            switch = self[index]
+            change = f"{switch.mode_before} -> {switch.mode_after}"
+            cells.append(
+                (str(index), f"{switch.t:.10g}", switch.kind, change, self.surface_text(switch), switch.note)
+            )
+        lines = _aligned(cells)
+        if head < count:
+            lines.insert(head + 1, f"... {count - head - 4} more ...")
+        return "\n".join([f"{count} switch{'es' if count > 1 else ''}", *lines])
+
+    def _state_column(self, position: int) -> Array:
+        if not self._rows:
+            return np.empty((0, len(self._states)))
+        return np.array([row[position] for row in self._rows], dtype=np.float64)
+
+
+class SegmentTable(Sequence[Segment]):
+    """The segments of a run in order of time: a sequence of `Segment` with columns ``t_start, t_end, mode``."""
+
+    __slots__ = ("_rows",)
+
+    def __init__(self, rows: Sequence[tuple[Any, ...]]) -> None:
+        self._rows = rows
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    @overload
+    def __getitem__(self, index: int) -> Segment: ...
+    @overload
+    def __getitem__(self, index: slice) -> SegmentTable: ...
+    def __getitem__(self, index: int | slice) -> Segment | SegmentTable:
+        if isinstance(index, slice):
+            return SegmentTable(self._rows[index])
+        return _segment(self._rows[index])
+
+    def __iter__(self) -> Iterator[Segment]:
+        return map(_segment, self._rows)
+
+    @property
+    def t_start(self) -> Array:
+        """Times at which the segments begin, shape (k,)."""
+        return np.array([row[0] for row in self._rows], dtype=np.float64)
+
+    @property
+    def t_end(self) -> Array:
+        """Times at which the segments end, shape (k,)."""
+        return np.array([row[1] for row in self._rows], dtype=np.float64)
+
+    @property
+    def mode(self) -> list[Mode]:
+        """Modes."""
+        return [Mode(row[2]) for row in self._rows]
+
+    def __repr__(self) -> str:
+        count = len(self)
+        cells = [("", "t_start", "t_end", "mode")]
+        head = count if count <= _ROWS_SHOWN else _ROWS_SHOWN - 5
+        for index in [*range(head), *range(max(head, count - 4), count)]:
+            segment = self[index]
+            cells.append((str(index), f"{segment.t_start:.10g}", f"{segment.t_end:.10g}", str(segment.mode)))
+        lines = _aligned(cells)
+        if head < count:
+            lines.insert(head + 1, f"... {count - head - 4} more ...")
+        return "\n".join([f"{count} segment{'' if count == 1 else 's'}", *lines])
+
+
+def import_pandas() -> Any:
+    """Import pandas, or say how to install it."""
+    try:
+        import pandas
+    except ImportError as error:
+        raise ImportError("to_pandas() needs pandas: pip install filippov[pandas]") from error
+    return pandas
+
+
+def _switch(row: tuple[Any, ...]) -> Switch:
+    t, y_before, y_after, kind, surfaces, mode_before, mode_after, note = row
+    return Switch(t, y_before, y_after, kind, tuple(surfaces), Mode(mode_before), Mode(mode_after), note)
+
+
+def _segment(row: tuple[Any, ...]) -> Segment:
+    t_start, t_end, mode, _, _, multipliers_start, multipliers_end = row
+    return Segment(t_start, t_end, Mode(mode), multipliers_start, multipliers_end)
+
+
+def _aligned(cells: Sequence[tuple[str, ...]]) -> list[str]:
+    """Lay out rows of text in columns; the first row is the heading."""
+    widths = [max(len(row[column]) for row in cells) for column in range(len(cells[0]))]
+    return ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in cells]

@@ -1,0 +1,501 @@
+"""Systems: a right-hand side with its parameters, traced once and solved many times."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from filippov.errors import InputError, ModelError
+from filippov.events import accepted_names
+from filippov.forms import Source, base_source, check_surfaces, fields_source, relay_source
+from filippov.modes import Mode
+from filippov.options import check_args, check_params, check_y0, did_you_mean
+from filippov.prepare import Prepared, TracedSystem, check_n, parameter_vector, prepare
+from filippov.sliding import sliding_field
+from filippov.solution import Solution
+
+__all__ = ["System", "system"]
+
+Array = npt.NDArray[np.float64]
+
+
+class System:
+    """A piecewise-smooth system ``x' = f_sigma(t, x, p)`` with ``sigma_j = sign h_j(t, x, p)``.
+
+    The function is traced once, at the first use; solving again with other parameter values or
+    initial states costs no tracing.
+
+    Parameters
+    ----------
+    fun : callable
+        ``fun(t, x, *args, **params) -> dx``, as for SciPy; `x` and `dx` have shape (n,).
+    n : int, optional
+        Number of states; by default known from `y0` at the first run.
+    params : dict, optional
+        Names and default values of the parameters that may be changed at every run. They are handed to `fun` by
+        name.
+    states : sequence of str, optional
+        Names of the states for tables and plots; ``x[0], x[1], ...`` by default.
+    surfaces : callable or sequence of callable, optional
+        Switching functions ``h_j(t, x, *args, **params)``. Needed only for functions that cannot be
+        traced; otherwise they fix the order and the sign of the surfaces.
+    args : tuple, optional
+        Constants handed to `fun` and `surfaces` after `x`.
+
+    Raises
+    ------
+    InputError
+        If an argument has a wrong type or value.
+
+    Notes
+    -----
+    A system is picklable: the traced expression travels, not the Python function.
+
+    Examples
+    --------
+    >>> import numpy as np, filippov as fl
+    >>> def oscillator(t, x, F, omega):
+    ...     y, v = x
+    ...     return v, -y + np.sin(omega * t) - F * np.sign(v)
+    >>> friction = fl.System(oscillator, n=2, params={"F": 0.4, "omega": 1 / 3}, states=("y", "v"))
+    >>> friction.surfaces
+    ['v']
+    >>> friction.solve((0, 1), [1.0, 2.0], F=0.5).success
+    True
+    """
+
+    def __init__(
+        self,
+        fun: Callable[..., Any],
+        n: int | None = None,
+        params: Mapping[str, float] | None = None,
+        states: Sequence[str] | None = None,
+        surfaces: Any = None,
+        args: Any = (),
+    ) -> None:
+        if not callable(fun):
+            raise InputError(f"fun: a function fun(t, x) is needed, not {type(fun).__name__}")
+        source = Source(fun, check_surfaces(surfaces), check_args(args))
+        self._setup(source, n, params, states)
+        refused = set(self._params).difference(accepted_names(fun, self._params))
+        if refused:
+            raise InputError(f"params: {name_of(fun)}() has no parameter {', '.join(map(repr, sorted(refused)))}")
+
+    @classmethod
+    def from_fields(
+        cls,
+        fields: Any,
+        surfaces: Any,
+        n: int | None = None,
+        params: Mapping[str, float] | None = None,
+        states: Sequence[str] | None = None,
+    ) -> System:
+        """Return the system with one field per sign vector of the surfaces.
+
+        Parameters
+        ----------
+        fields : dict or callable
+            ``{(+1, -1): f, ...}`` with an entry for each of the 2**d sign vectors, every `f` a function ``f(t, x)`` or
+            a constant vector; a field is never called outside of its own region and its border. Or one function
+            ``f(t, x, s)`` with the sign vector `s`.
+        surfaces : callable or sequence of callable
+            The switching functions ``h_j(t, x)``; the order is that of the signs.
+        n : int, optional
+            Number of states.
+        params : dict, optional
+            Names and default values of parameters, handed by name to those functions that name them.
+        states : sequence of str, optional
+            Names of the states.
+
+        Returns
+        -------
+        System
+
+        Raises
+        ------
+        ModelError
+            If sign vectors are missing or have the wrong length.
+
+        Examples
+        --------
+        >>> import filippov as fl
+        >>> relay = fl.System.from_fields({+1: [-1.0, 1.0], -1: [2.0, 0.0]}, lambda t, x: x[0], n=2)
+        >>> relay.surfaces, relay.field(0.0, [0.0, 0.0], "0")
+        (['x[0]'], array([0.        , 0.66666667]))
+        """
+        return cls._from_source(fields_source(fields, surfaces), n, params, states)
+
+    @classmethod
+    def from_base(
+        cls,
+        base: Any,
+        deltas: Any,
+        surfaces: Any,
+        n: int | None = None,
+        params: Mapping[str, float] | None = None,
+        states: Sequence[str] | None = None,
+    ) -> System:
+        """Return the system ``x' = F + sum_j mu_j Delta_j`` with ``mu_j = 1`` for ``h_j < 0`` and 0 for ``h_j > 0``.
+
+        Parameters
+        ----------
+        base : callable or sequence of float
+            The field F of the region in which every ``h_j > 0``: a function ``F(t, x)`` or a constant vector.
+        deltas : sequence of callable
+            The changes ``Delta_j(t, x)`` on the negative side of surface j. They must be finite on both sides.
+        surfaces : sequence of callable
+            The switching functions ``h_j(t, x)``.
+        n, params, states
+            As for `from_fields`.
+
+        Returns
+        -------
+        System
+
+        Raises
+        ------
+        ModelError
+            If the numbers of `deltas` and `surfaces` differ.
+
+        References
+        ----------
+        Piiroinen and Kuznetsov, An event-driven method to simulate Filippov systems with accurate computing of
+        sliding motions, ACM Trans. Math. Softw. 34 (2008) 13.
+        """
+        return cls._from_source(base_source(base, deltas, surfaces), n, params, states)
+
+    @classmethod
+    def relay(cls, A: Any, B: Any, C: Any, states: Sequence[str] | None = None) -> System:
+        """Return the relay system ``x' = A x - B sign(C x)``.
+
+        Parameters
+        ----------
+        A : array_like, shape (n, n)
+        B : array_like, shape (n, m) or (n,)
+        C : array_like, shape (m, n) or (n,)
+        states : sequence of str, optional
+            Names of the states.
+
+        Returns
+        -------
+        System
+
+        Raises
+        ------
+        ModelError
+            If the shapes do not fit.
+
+        Examples
+        --------
+        >>> import filippov as fl
+        >>> fl.System.relay([[0, 1], [-1, 0]], [0, 0.5], [0, 1]).surfaces
+        ['x[1]']
+        """
+        source, n = relay_source(A, B, C)
+        return cls._from_source(source, n, None, states)
+
+    @classmethod
+    def _from_source(
+        cls,
+        source: Source,
+        n: int | None,
+        params: Mapping[str, float] | None,
+        states: Sequence[str] | None,
+    ) -> System:
+        new = cls.__new__(cls)
+        new._setup(source, n, params, states)
+        return new
+
+    def _setup(
+        self,
+        source: Source,
+        n: int | None,
+        params: Mapping[str, float] | None,
+        states: Sequence[str] | None,
+    ) -> None:
+        self._source: Source | None = source
+        self._params = check_params(params)
+        self._states = tuple(str(name) for name in states) if states is not None else None
+        self._n = check_n(n)
+        self._prepared: Prepared | None = None
+        if self._states is not None:
+            if self._n is None:
+                self._n = len(self._states)
+            elif self._n != len(self._states):
+                raise InputError(f"states: {self._n} names are needed, {len(self._states)} are given")
+
+    @property
+    def n(self) -> int | None:
+        """Number of states; ``None`` until it is known."""
+        return self._n
+
+    @property
+    def params(self) -> dict[str, float]:
+        """Names and default values of the parameters (a copy)."""
+        return dict(self._params)
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states."""
+        return self.state_names(self._known_n())
+
+    @property
+    def surfaces(self) -> list[str]:
+        """Printed switching functions ``h_j``, in the order of the entries of a mode.
+
+        Raises
+        ------
+        ModelError
+            If the number of states is not known yet.
+        """
+        return list(self._prepared_now().surfaces)
+
+    @property
+    def n_surfaces(self) -> int:
+        """Number of surfaces, the length of a mode."""
+        return len(self._prepared_now().surfaces)
+
+    @property
+    def backend(self) -> str:
+        """How the field is evaluated: ``"native"``, ``"interpreter"`` or ``"black box"``."""
+        return self._prepared_now().backend
+
+    def field(self, t: float, x: npt.ArrayLike, mode: Any, **params: float) -> Array:
+        """Return the field of a mode.
+
+        The mode selects the field, whatever the signs of ``h_j`` at the point are. With one entry 0 it is the sliding
+        field ``(1 + lam)/2 f_plus + (1 - lam)/2 f_minus``, with `lam` from ``dh/dt = 0``.
+
+        Parameters
+        ----------
+        t : float
+            Time.
+        x : array_like, shape (n,)
+            State.
+        mode : Mode, tuple of int, or str
+            Entries over {-1, 0, +1}, one per surface; at most one 0.
+        **params : float
+            Parameter values other than the defaults.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+
+        Raises
+        ------
+        InputError
+            If `x`, `mode` or a parameter name does not fit.
+        ModelError
+            If there is no sliding motion at the point.
+
+        Examples
+        --------
+        >>> import numpy as np, filippov as fl
+        >>> system = fl.System(lambda t, x: [-np.sign(x[0]) + 0.3], n=1)
+        >>> [system.field(0.0, [0.0], mode).tolist() for mode in "+-0"]
+        [[-0.7], [1.3], [0.0]]
+        """
+        state = check_y0(x)
+        values = self.parameter_values(params)
+        prepared = self.prepare(len(state), float(t), state, values)
+        entries = Mode((mode,) if isinstance(mode, (int, np.integer)) else mode)
+        if len(entries) != len(prepared.surfaces):
+            raise InputError(
+                f"mode: one entry per surface is needed: {len(prepared.surfaces)}, it has {len(entries)}"
+            )
+        return sliding_field(prepared, float(t), state, entries, parameter_vector(values))
+
+    def solve(
+        self, t_span: Any, y0: npt.ArrayLike, params: Mapping[str, float] | None = None, **options: Any
+    ) -> Solution:
+        """Solve an initial value problem; see `solve_ivp`.
+
+        Parameters
+        ----------
+        t_span : (float, float)
+            Interval of integration.
+        y0 : array_like, shape (n,)
+            Initial state.
+        params : dict, optional
+            Parameter values other than the defaults. They may also be given as keywords of their own.
+        **options
+            Options of `solve_ivp`, and parameter values by name.
+
+        Returns
+        -------
+        Solution
+        """
+        from filippov.solve import solve_ivp
+
+        named = {name: options.pop(name) for name in list(options) if name in self._params}
+        return solve_ivp(self, t_span, y0, params={**(params or {}), **named}, **options)
+
+    def parameter_values(self, given: Mapping[str, float] | None) -> dict[str, float]:
+        """Return the values of all parameters, the defaults overridden by `given`.
+
+        Raises
+        ------
+        InputError
+            If a name is unknown or a value is not a finite number.
+        """
+        changes = check_params(given)
+        for name in changes:
+            if name not in self._params:
+                known = f"the parameters are {', '.join(self._params)}" if self._params else "it has none"
+                hint = did_you_mean(name, self._params)
+                raise InputError(f"params: the system has no parameter {name!r}{hint}; {known}")
+        return {**self._params, **changes}
+
+    def prepare(self, n: int, t0: float, y0: Array | None, values: dict[str, float]) -> Prepared:
+        """Return the system of the core, traced now if it was not yet.
+
+        Parameters
+        ----------
+        n : int
+            Number of states.
+        t0, y0 : float, ndarray of shape (n,) or None
+            A point at which the functions may be called.
+        values : dict
+            Values of all parameters.
+
+        Raises
+        ------
+        InputError
+            If `n` is not the number of states of the system.
+        TraceError
+            If the function cannot be traced and no surfaces are declared.
+        """
+        if self._n is not None and n != self._n:
+            raise InputError(f"y0: the system has {self._n} states, y0 has {n}")
+        if self._prepared is not None and self._prepared.is_valid_for(n, values):
+            return self._prepared
+        if self._source is None:
+            raise ModelError(
+                "the function branches on parameter values, and it did not travel with the pickled system; "
+                f"this copy is valid for {self._prepared.pinned if self._prepared else {}} only"
+            )
+        self._prepared = prepare(self._source, n, values, self._states, t0, y0)
+        if self._n is None:
+            self._n = n
+        return self._prepared
+
+    def state_names(self, n: int) -> tuple[str, ...]:
+        """Return the names of `n` states."""
+        return self._states if self._states is not None else tuple(f"x[{i}]" for i in range(n))
+
+    def __getstate__(self) -> dict[str, Any]:
+        state = self.__dict__.copy()
+        if self._prepared is None and self._n is not None:
+            self._prepared_now()
+        prepared = self._prepared
+        state["_prepared"] = None
+        if prepared is not None and isinstance(prepared.core, TracedSystem):
+            state["_source"] = None
+            state["_traced"] = (prepared.core.to_bytes(), prepared.surfaces, prepared.pinned)
+        return state
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        traced = state.pop("_traced", None)
+        self.__dict__.update(state)
+        if traced is not None:
+            data, surfaces, pinned = traced
+            self._prepared = Prepared(TracedSystem.from_bytes(data), None, surfaces, pinned, "")
+
+    def __repr__(self) -> str:
+        parts = [f"n={self._n}"] if self._n is not None else []
+        parts += [f"{name}={value:g}" for name, value in self._params.items()]
+        if self._prepared is not None:
+            parts.append(f"surfaces=[{', '.join(self._prepared.surfaces)}]")
+        return f"System({', '.join(parts)})"
+
+    def _known_n(self) -> int:
+        if self._n is None:
+            raise ModelError("the number of states is not known yet: give n= to System, or solve first")
+        return self._n
+
+    def _prepared_now(self) -> Prepared:
+        n = self._known_n()
+        if self._prepared is not None and self._prepared.core.n_states == n:
+            return self._prepared
+        return self.prepare(n, 0.0, None, self.parameter_values(None))
+
+
+@overload
+def system(fun: Callable[..., Any]) -> System: ...
+@overload
+def system(
+    fun: None = None,
+    *,
+    n: int | None = None,
+    params: Mapping[str, float] | None = None,
+    states: Sequence[str] | None = None,
+    surfaces: Any = None,
+) -> Callable[[Callable[..., Any]], System]: ...
+def system(
+    fun: Callable[..., Any] | None = None,
+    *,
+    n: int | None = None,
+    params: Mapping[str, float] | None = None,
+    states: Sequence[str] | None = None,
+    surfaces: Any = None,
+) -> System | Callable[[Callable[..., Any]], System]:
+    """Turn a function ``f(t, x, a=1.0, b=2.0)`` into a `System` with the parameters `a` and `b`.
+
+    Parameters
+    ----------
+    fun : callable
+        The right-hand side. What follows ``(t, x)`` and has a number as default is a parameter.
+    n, states, surfaces
+        As for `System`.
+    params : dict, optional
+        Default values that replace or complete those of the function.
+
+    Returns
+    -------
+    System, or a decorator if `fun` is not given
+
+    Raises
+    ------
+    ModelError
+        If an argument of `fun` has no default value.
+
+    Examples
+    --------
+    >>> import numpy as np, filippov as fl
+    >>> @fl.system(states=("y", "v"))
+    ... def oscillator(t, x, F=0.4, omega=1 / 3):
+    ...     y, v = x
+    ...     return v, -y + np.sin(omega * t) - F * np.sign(v)
+    >>> oscillator.params["F"], oscillator.surfaces
+    (0.4, ['v'])
+    """
+
+    def build(function: Callable[..., Any]) -> System:
+        defaults = _default_parameters(function, params or {})
+        return System(function, n=n, params=defaults, states=states, surfaces=surfaces)
+
+    return build if fun is None else build(fun)
+
+
+def _default_parameters(function: Callable[..., Any], given: Mapping[str, float]) -> dict[str, float]:
+    defaults: dict[str, float] = {}
+    for parameter in list(inspect.signature(function).parameters.values())[2:]:
+        if parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
+            continue
+        value = given.get(parameter.name, parameter.default)
+        if value is parameter.empty:
+            raise ModelError(
+                f"{name_of(function)}(): {parameter.name!r} needs a default value, in the signature or in params="
+            )
+        if isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool):
+            defaults[parameter.name] = float(value)
+    return {**defaults, **given}
+
+
+def name_of(function: Any) -> str:
+    """Return the name of a function for a message."""
+    return str(getattr(function, "__name__", type(function).__name__))

@@ -1,0 +1,185 @@
+"""The array of traced numbers, and NumPy's ufuncs on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from filippov.trace.condition import Condition
+from filippov.trace.explain import ZEROS, NotTraceable
+from filippov.trace.scalar import Scalar
+from filippov.trace.ufuncs import ELEMENTS, NATIVE, choose, is_traced, refuse
+
+__all__ = ["TracedArray", "apply_ufunc", "plain", "where", "wrap"]
+
+_OBJECT = np.dtype(object)
+
+# Elementwise functions as ufuncs over arrays of objects, made at first use.
+_LOOPS: dict[str, np.ufunc] = {}
+_IDENTITIES: dict[str, Any] = {
+    "logical_and": True,
+    "logical_or": False,
+    "logical_xor": False,
+    "bitwise_or": False,
+}
+
+
+class TracedArray(np.ndarray):  # type: ignore[type-arg]
+    """A NumPy array (of objects) whose elements are traced numbers, conditions or plain numbers.
+
+    Indexing, slicing, reshaping and iteration are NumPy's own. Elementwise functions go to the traced elements;
+    NumPy's other functions run as they are on the array, except those that would look at the values.
+    """
+
+    __array_priority__ = 100.0
+
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **kwargs: Any) -> Any:
+        return apply_ufunc(ufunc, method, inputs, kwargs)
+
+    def __array_function__(
+        self, func: Callable[..., Any], types: Any, args: tuple[Any, ...], kwargs: dict[str, Any]
+    ) -> Any:
+        # Imported here because the table of functions needs this module.
+        from filippov.trace.array_functions import apply_function
+
+        return apply_function(func, args, kwargs)
+
+    def __setitem__(self, key: Any, value: Any) -> None:
+        if isinstance(key, Condition) or (
+            isinstance(key, np.ndarray) and key.dtype == _OBJECT and _holds_conditions(key)
+        ):
+            # a[mask] = value: only where `value` does not depend on how many elements the mask selects.
+            if np.ndim(value) != 0:
+                raise IndexError("arrays used as indices must be of integer (or boolean) type")
+            value = where(key, value, self)
+            key = ...
+        super().__setitem__(key, value)
+
+    def astype(self, dtype: Any, *args: Any, **kwargs: Any) -> Any:
+        """Return a copy with conditions turned into the numbers 1 and 0; traced values have no other type."""
+        if np.dtype(dtype).kind not in "fiuO":
+            return super().astype(dtype, *args, **kwargs)
+        return wrap(_loop("positive")(plain(self)))
+
+    def round(self, *args: Any, **kwargs: Any) -> Any:
+        """Refuse: rounding has no traced form."""
+        raise refuse("round")
+
+
+def wrap(result: Any) -> Any:
+    """Return arrays of objects as traced arrays, anything else as it is."""
+    if type(result) is np.ndarray and result.dtype == _OBJECT:
+        return result.view(TracedArray)
+    if type(result) is tuple:
+        return tuple(wrap(part) for part in result)
+    return result
+
+
+def plain(value: Any) -> Any:
+    """Return a traced array, number or condition as an ordinary array of objects."""
+    if isinstance(value, np.ndarray):
+        return value.view(np.ndarray) if type(value) is not np.ndarray else value
+    if is_traced(value):
+        boxed: NDArray[Any] = np.empty((), dtype=object)
+        boxed[()] = value
+        return boxed
+    if isinstance(value, (list, tuple)):
+        return np.array(value, dtype=object) if _holds_traced(value) else np.asarray(value)
+    return value
+
+
+def apply_ufunc(ufunc: np.ufunc, method: str, inputs: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
+    """Apply a ufunc (or its ``reduce``, ``accumulate``, ``outer``, ...) to traced operands."""
+    name = ufunc.__name__
+    if method == "__call__" and not kwargs and name in ELEMENTS:
+        for value in inputs:
+            if isinstance(value, (np.ndarray, list, tuple)):
+                break
+        else:
+            return ELEMENTS[name](*inputs)
+    if name == "matmul" and method == "__call__" and "out" not in kwargs:
+        return multiply_matrices(*inputs)
+    out = kwargs.pop("out", None)
+    if out is not None:
+        if any(array is not None and array.dtype != _OBJECT for array in out):
+            raise NotTraceable("an array of plain numbers as the place for traced values", ZEROS)
+        kwargs["out"] = tuple(plain(array) for array in out)
+    for option in ("dtype", "casting", "subok"):
+        kwargs.pop(option, None)
+    if name in NATIVE or name in ("matmul", "vecdot", "matvec", "vecmat"):
+        loop = ufunc
+    elif name in ELEMENTS:
+        loop = _loop(name)
+    else:
+        raise refuse(name)
+    result = getattr(loop, method)(*[plain(value) for value in inputs], **kwargs)
+    if out is not None:
+        return out[0] if len(out) == 1 else out
+    return wrap(result)
+
+
+def where(condition: Any, plus: Any, minus: Any) -> Any:
+    """Choose element by element; the operands are broadcast against each other."""
+    if not any(isinstance(value, (np.ndarray, list, tuple)) for value in (condition, plus, minus)):
+        return choose(condition, plus, minus)
+    return wrap(_CHOOSE(plain(condition), plain(plus), plain(minus)))
+
+
+def multiply_matrices(a: Any, b: Any) -> Any:
+    """Return ``a @ b``; the zeros of a constant factor give no terms."""
+    a, b = plain(a), plain(b)
+    if not (isinstance(a, np.ndarray) and isinstance(b, np.ndarray)):
+        raise TypeError("matmul: both operands must be arrays")
+    if 1 <= a.ndim <= 2 and 1 <= b.ndim <= 2 and a.shape[-1] == b.shape[0]:
+        if a.ndim == 2 and a.dtype != _OBJECT:
+            return wrap(_constant_times(a, b))
+        if b.ndim == 2 and b.dtype != _OBJECT:
+            return wrap(_constant_times(b.T, a.T).T)
+    return wrap(np.matmul(a, b))
+
+
+def _constant_times(matrix: NDArray[Any], operand: NDArray[Any]) -> NDArray[Any]:
+    """Return ``matrix @ operand`` for a matrix of numbers and an operand of objects, shape (n,) or (n, k)."""
+    columns = operand.reshape(operand.shape[0], -1)
+    result = np.empty((matrix.shape[0], columns.shape[1]), dtype=object)
+    for row, coefficients in enumerate(matrix):
+        terms = [(idx, float(coefficients[idx])) for idx in np.flatnonzero(coefficients)]
+        for column in range(columns.shape[1]):
+            total: Any = 0.0
+            for position, (idx, coefficient) in enumerate(terms):
+                value = columns[idx, column]
+                term = value if coefficient == 1.0 else coefficient * value
+                total = total + term if position else term
+            result[row, column] = total
+    return result.reshape((matrix.shape[0], *operand.shape[1:]))
+
+
+def _loop(name: str) -> np.ufunc:
+    """Return the elementwise function as a ufunc over arrays of objects."""
+    loop = _LOOPS.get(name)
+    if loop is None:
+        n_inputs = 3 if name == "clip" else getattr(np, name).nin
+        options = {"identity": _IDENTITIES[name]} if name in _IDENTITIES else {}
+        loop = _LOOPS[name] = np.frompyfunc(ELEMENTS[name], n_inputs, 1, **options)
+    return loop
+
+
+_CHOOSE = np.frompyfunc(choose, 3, 1)
+
+
+def _holds_conditions(array: NDArray[Any]) -> bool:
+    return any(isinstance(element, Condition) for element in array.flat)
+
+
+def _holds_traced(values: Any) -> bool:
+    for value in values:
+        if isinstance(value, (Scalar, Condition, TracedArray)):
+            return True
+        if isinstance(value, (list, tuple)) and _holds_traced(value):
+            return True
+        if isinstance(value, np.ndarray) and value.dtype == _OBJECT:
+            return True
+    return False

@@ -1,0 +1,254 @@
+"""NumPy's array functions on traced values, by the function itself.
+
+A function that is not listed runs as NumPy wrote it: it is made of ufuncs, which are traced. Listed are
+those that look at values, that make arrays of plain numbers, or that would multiply by the zeros of a matrix.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from filippov.trace.array import TracedArray, multiply_matrices, plain, where, wrap
+from filippov.trace.explain import CLOCKS, MASK, TABLE, NotTraceable
+from filippov.trace.scalar import Scalar
+from filippov.trace.ufuncs import ELEMENTS, choose, is_traced
+
+__all__ = ["apply_function"]
+
+
+def apply_function(func: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
+    """Apply an array function of NumPy to traced operands."""
+    own = _FUNCTIONS.get(func)
+    if own is not None:
+        return own(*args, **kwargs)
+    remedy = _REFUSED.get(func)
+    if remedy is not None:
+        name = f"{func.__module__}.{func.__name__}".replace("numpy", "np", 1)
+        raise NotTraceable(f"`{name}` of traced values", remedy)
+    implementation: Callable[..., Any] = func._implementation  # type: ignore[attr-defined]
+    return wrap(implementation(*args, **kwargs))
+
+
+def _where(condition: Any, x: Any = None, y: Any = None, /) -> Any:
+    if x is None and y is None:
+        raise NotTraceable("the positions where a condition holds", MASK)
+    return where(condition, x, y)
+
+
+def _clip(a: Any, a_min: Any = None, a_max: Any = None, out: Any = None, **kwargs: Any) -> Any:
+    low = kwargs.pop("min", a_min)
+    high = kwargs.pop("max", a_max)
+    result = a
+    if low is not None:
+        result = np.maximum(result, low) if high is None or out is None else np.maximum(result, low, out=out)
+    if high is not None:
+        result = np.minimum(result, high) if out is None else np.minimum(result, high, out=out)
+    return result
+
+
+def _select(condlist: Sequence[Any], choicelist: Sequence[Any], default: Any = 0) -> Any:
+    if len(condlist) != len(choicelist):
+        raise ValueError("list of cases must be same length as list of conditions")
+    result = default
+    for condition, choice in zip(reversed(condlist), reversed(choicelist), strict=True):
+        result = where(condition, choice, result)
+    return result
+
+
+def _piecewise(x: Any, condlist: Any, funclist: Sequence[Any], *args: Any, **kwargs: Any) -> Any:
+    if not isinstance(condlist, (list, tuple)) and not (isinstance(condlist, np.ndarray) and condlist.ndim > np.ndim(x)):
+        condlist = [condlist]
+    n_pieces, n_conditions = len(funclist), len(condlist)
+    if n_pieces not in (n_conditions, n_conditions + 1):
+        raise ValueError(f"with {n_conditions} condition(s), either {n_conditions} or {n_conditions + 1} functions are expected")
+
+    def piece(function: Any) -> Any:
+        return function(x, *args, **kwargs) if callable(function) else function
+
+    default = piece(funclist[-1]) if n_pieces > n_conditions else 0.0
+    result = np.full_like(x, default) if isinstance(x, np.ndarray) and np.ndim(default) == 0 else default
+    # NumPy assigns piece after piece, so that the last condition that holds wins.
+    for condition, function in zip(condlist, funclist, strict=False):
+        result = where(condition, piece(function), result)
+    return result
+
+
+def _empty_like(prototype: Any, dtype: Any = None, order: str = "C", subok: bool = True, shape: Any = None, **_: Any) -> Any:
+    return _full_like(prototype, None, shape=shape)
+
+
+def _zeros_like(a: Any, dtype: Any = None, order: str = "C", subok: bool = True, shape: Any = None, **_: Any) -> Any:
+    return _full_like(a, 0.0, shape=shape)
+
+
+def _ones_like(a: Any, dtype: Any = None, order: str = "C", subok: bool = True, shape: Any = None, **_: Any) -> Any:
+    return _full_like(a, 1.0, shape=shape)
+
+
+def _full_like(
+    a: Any, fill_value: Any, dtype: Any = None, order: str = "C", subok: bool = True, shape: Any = None, **_: Any
+) -> Any:
+    # Whatever dtype is asked for: the array will receive traced values.
+    result = np.empty(np.shape(plain(a)) if shape is None else shape, dtype=object).view(TracedArray)
+    result[...] = plain(fill_value) if isinstance(fill_value, (list, tuple)) else fill_value
+    return result
+
+
+def _dot(a: Any, b: Any, out: Any = None) -> Any:
+    first, second = plain(a), plain(b)
+    if np.ndim(first) == 0 or np.ndim(second) == 0:
+        result = np.multiply(a, b)
+    elif first.ndim <= 2 and second.ndim <= 2:
+        result = multiply_matrices(first, second)
+    else:
+        result = wrap(np.dot(first, second))
+    if out is None:
+        return result
+    out[...] = result
+    return out
+
+
+def _norm(x: Any, ord: Any = None, axis: Any = None, keepdims: bool = False) -> Any:
+    values = plain(x)
+    vector = values.ndim == 1 or isinstance(axis, int)
+    if axis is None and not vector and ord is None:
+        values, vector = values.ravel(), True
+    if vector and ord not in (0, -np.inf):
+        where_ = {"axis": axis, "keepdims": keepdims}
+        values = wrap(values)
+        if ord is None or ord == 2:
+            return np.sqrt(np.sum(np.square(values), **where_))
+        if ord == np.inf:
+            return np.max(np.abs(values), **where_)
+        if ord == 1:
+            return np.sum(np.abs(values), **where_)
+        return np.sum(np.abs(values) ** ord, **where_) ** (1.0 / ord)
+    if vector and ord == -np.inf:
+        return np.min(np.abs(wrap(values)), axis=axis, keepdims=keepdims)
+    if ord in (None, "fro"):
+        return np.sqrt(np.sum(np.square(wrap(values)), axis=axis, keepdims=keepdims))
+    raise NotTraceable(f"np.linalg.norm with ord={ord!r}", "write the norm out with np.abs, np.sum and np.max")
+
+
+def _solve(a: Any, b: Any) -> Any:
+    matrix = plain(a)
+    if matrix.dtype != object:
+        return multiply_matrices(np.linalg.inv(matrix), b)
+    if matrix.shape not in ((1, 1), (2, 2), (3, 3)):
+        raise NotTraceable(
+            "np.linalg.solve with a traced matrix of more than 3 rows", "write the solution out, element by element"
+        )
+    adjugate, determinant = _adjugate(wrap(matrix))
+    return multiply_matrices(adjugate, b) / determinant
+
+
+def _inverse(a: Any) -> Any:
+    matrix = plain(a)
+    if matrix.shape not in ((1, 1), (2, 2), (3, 3)):
+        raise NotTraceable("np.linalg.inv of a traced matrix of more than 3 rows", "write the inverse out")
+    adjugate, determinant = _adjugate(wrap(matrix))
+    return adjugate / determinant
+
+
+def _determinant(a: Any) -> Any:
+    matrix = plain(a)
+    if matrix.shape not in ((1, 1), (2, 2), (3, 3)):
+        raise NotTraceable("np.linalg.det of a traced matrix of more than 3 rows", "write the determinant out")
+    return _adjugate(wrap(matrix))[1]
+
+
+def _adjugate(matrix: NDArray[Any]) -> tuple[NDArray[Any], Any]:
+    """Return the adjugate and the determinant (Cramer's rule: no pivot to choose)."""
+    n = matrix.shape[0]
+    adjugate = np.zeros_like(matrix)
+    if n == 1:
+        adjugate[0, 0] = 1.0
+    for row in range(n if n > 1 else 0):
+        for column in range(n):
+            rest = np.delete(np.delete(matrix, row, axis=0), column, axis=1)
+            minor = rest[0, 0] if n == 2 else rest[0, 0] * rest[1, 1] - rest[0, 1] * rest[1, 0]
+            adjugate[column, row] = minor if (row + column) % 2 == 0 else -minor
+    return adjugate, np.dot(matrix[0], adjugate[:, 0])
+
+
+def _isclose(*args: Any, **kwargs: Any) -> Any:
+    raise NotTraceable(
+        "np.isclose or np.allclose of traced values (equality has measure zero)",
+        "leave the special case out, or write `np.abs(a - b) < tolerance`",
+    )
+
+
+def _scalar_or_array(name: str) -> Callable[..., Any]:
+    """Return the reduction `name`, which for a single traced number is the number itself."""
+
+    def reduce(a: Any, *args: Any, **kwargs: Any) -> Any:
+        if is_traced(a):
+            return ELEMENTS["positive"](a)
+        if isinstance(a, (list, tuple)):
+            a = wrap(plain(a))
+        return wrap(getattr(np, name)._implementation(a, *args, **kwargs))
+
+    return reduce
+
+
+def _any(a: Any, *args: Any, **kwargs: Any) -> Any:
+    return np.logical_or.reduce(wrap(plain(a)), *args, **{"axis": None, **kwargs} if not args else kwargs)
+
+
+def _all(a: Any, *args: Any, **kwargs: Any) -> Any:
+    return np.logical_and.reduce(wrap(plain(a)), *args, **{"axis": None, **kwargs} if not args else kwargs)
+
+
+def _count_nonzero(a: Any, axis: Any = None, **kwargs: Any) -> Any:
+    loop = np.frompyfunc(lambda c: choose(c, 1.0, 0.0), 1, 1)
+    return np.sum(wrap(np.asarray(loop(plain(a)), dtype=object)), axis=axis, **kwargs)
+
+
+def _sinc(x: Any) -> Any:
+    if isinstance(x, Scalar):
+        return np.sin(np.pi * x) / (np.pi * x)
+    return np.sin(np.pi * wrap(plain(x))) / (np.pi * wrap(plain(x)))
+
+
+_FUNCTIONS: dict[Any, Callable[..., Any]] = {
+    np.where: _where,
+    np.clip: _clip,
+    np.select: _select,
+    np.piecewise: _piecewise,
+    np.empty_like: _empty_like,
+    np.zeros_like: _zeros_like,
+    np.ones_like: _ones_like,
+    np.full_like: _full_like,
+    np.dot: _dot,
+    np.linalg.norm: _norm,
+    np.linalg.solve: _solve,
+    np.linalg.inv: _inverse,
+    np.linalg.det: _determinant,
+    np.isclose: _isclose,
+    np.allclose: _isclose,
+    np.any: _any,
+    np.all: _all,
+    np.count_nonzero: _count_nonzero,
+    np.sinc: _sinc,
+    **{getattr(np, name): _scalar_or_array(name) for name in "sum prod mean max min amax amin".split()},
+}
+
+_REFUSED: dict[Any, str] = {
+    np.interp: TABLE,
+    np.round: CLOCKS,
+    np.around: CLOCKS,
+    np.nonzero: MASK,
+    np.flatnonzero: MASK,
+    np.extract: MASK,
+    np.compress: MASK,
+    np.digitize: TABLE,
+    np.searchsorted: TABLE,
+    np.array_equal: "leave the comparison out: equality has measure zero",
+    np.unwrap: "leave the angle as it is",
+    np.nan_to_num: "leave it out: a traced value stands for a finite number",
+    np.angle: "write np.arctan2(y, x)",
+}
