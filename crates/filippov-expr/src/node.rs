@@ -156,7 +156,9 @@ impl Facts {
                     };
                 facts.nonnegative = match op {
                     BinaryOp::Add | BinaryOp::Div => a.nonnegative && b.nonnegative,
-                    BinaryOp::Mul => (left == right && a.varies) || (a.nonnegative && b.nonnegative),
+                    BinaryOp::Mul => {
+                        (left == right && a.varies) || (a.nonnegative && b.nonnegative)
+                    }
                     BinaryOp::Pow => a.nonnegative,
                     BinaryOp::Hypot => !constant || a.nonnegative || b.nonnegative,
                     BinaryOp::Sub | BinaryOp::Atan2 => false,

@@ -13,6 +13,9 @@ use crate::op::{BinaryOp, UnaryOp};
 /// that the error stays at a few ulp, as NumPy's own for such powers.
 const LARGEST_PRODUCT_POWER: f64 = 8.0;
 
+/// In products of more signs than this they stay where they are: moving one past n others makes n nodes.
+const MOST_MOVED_SIGNS: usize = 6;
+
 impl Graph {
     /// `op(a)`, simplified.
     pub fn unary(&mut self, op: UnaryOp, a: NodeId) -> NodeId {
@@ -201,11 +204,13 @@ impl Graph {
             let product = self.product(a, b);
             return self.negative(product);
         }
-        if let Some(moved) = self
-            .product_with_sign(a, b)
-            .or_else(|| self.product_with_sign(b, a))
-        {
-            return moved;
+        if self.have_few_signs(a, b) {
+            let moved = self
+                .product_with_sign(a, b)
+                .or_else(|| self.product_with_sign(b, a));
+            if let Some(moved) = moved {
+                return moved;
+            }
         }
         let (a, b) = (a.min(b), a.max(b));
         for (factor, quotient) in [(a, b), (b, a)] {
@@ -299,6 +304,22 @@ impl Graph {
         }
     }
 
+    /// Whether the signs in front of two factors are few enough to move them.
+    fn have_few_signs(&self, a: NodeId, b: NodeId) -> bool {
+        let mut count = 0;
+        for factor in [a, b] {
+            let mut rest = factor;
+            while let Node::Binary(BinaryOp::Mul, left, right) = *self.node(rest) {
+                count += usize::from(matches!(*self.node(left), Node::Sign(_)));
+                if count > MOST_MOVED_SIGNS || !matches!(*self.node(left), Node::Sign(_)) {
+                    break;
+                }
+                rest = right;
+            }
+        }
+        count <= MOST_MOVED_SIGNS
+    }
+
     fn surface_before(&self, a: NodeId, b: NodeId) -> bool {
         matches!((*self.node(a), *self.node(b)), (Node::Sign(j), Node::Sign(k)) if j < k)
     }
@@ -324,6 +345,9 @@ impl Graph {
             return self.negative(quotient);
         }
         // A sign is its own reciprocal: it leaves the quotient to the front.
+        if !self.have_few_signs(a, b) {
+            return self.insert(Node::Binary(BinaryOp::Div, a, b));
+        }
         for (operand, is_divisor) in [(a, false), (b, true)] {
             let (sign, rest) = match *self.node(operand) {
                 Node::Sign(_) => (operand, None),

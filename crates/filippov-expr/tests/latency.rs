@@ -20,8 +20,13 @@ fn dry(g: &mut Graph) -> Vec<NodeId> {
 
 /// Masses on a belt coupled by linear and cubic springs, each with velocity-dependent friction.
 fn chain(g: &mut Graph, n: u32) -> Vec<NodeId> {
-    let (belt, stiffness, cubic, force, decay) =
-        (g.constant(0.2), g.parameter(0), g.parameter(1), g.parameter(2), g.constant(0.3));
+    let (belt, stiffness, cubic, force, decay) = (
+        g.constant(0.2),
+        g.parameter(0),
+        g.parameter(1),
+        g.parameter(2),
+        g.constant(0.3),
+    );
     let x: Vec<NodeId> = (0..n).map(|i| g.state(i)).collect();
     let v: Vec<NodeId> = (0..n).map(|i| g.state(n + i)).collect();
     let zero = g.constant(0.0);
@@ -101,13 +106,25 @@ fn report(name: &str, build: impl Fn(&mut Graph) -> Vec<NodeId>) {
             g.directional(first, &field)
         })
         .collect();
-    println!("{name}: second Lie derivatives {:?} ({} nodes)", start.elapsed(), g.len());
+    println!(
+        "{name}: second Lie derivatives {:?} ({} nodes)",
+        start.elapsed(),
+        g.len()
+    );
     let start = Instant::now();
     let gradients: usize = field.iter().map(|&f| g.gradient(f).states.len()).sum();
-    println!("{name}: Jacobian {:?} ({gradients} entries, {} nodes)", start.elapsed(), g.len());
+    println!(
+        "{name}: Jacobian {:?} ({gradients} entries, {} nodes)",
+        start.elapsed(),
+        g.len()
+    );
     let start = Instant::now();
     let program = Program::compile(&g, &rates, Backend::Auto).unwrap();
-    println!("{name}: compile second Lie derivatives {:?}, native {}", start.elapsed(), program.is_native());
+    println!(
+        "{name}: compile second Lie derivatives {:?}, native {}",
+        start.elapsed(),
+        program.is_native()
+    );
 }
 
 #[test]

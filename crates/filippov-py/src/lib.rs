@@ -1,1 +1,23 @@
-//! Binding.
+//! The Python binding: converts arguments, calls the core, converts results. No mathematics.
+
+mod builder;
+mod callbacks;
+mod conversion;
+mod run;
+mod solve;
+mod systems;
+
+use pyo3::prelude::*;
+
+/// The compiled core of `filippov`.
+#[pymodule]
+mod _core {
+    #[pymodule_export]
+    use super::builder::Builder;
+    #[pymodule_export]
+    use super::run::Run;
+    #[pymodule_export]
+    use super::solve::solve;
+    #[pymodule_export]
+    use super::systems::{OpaqueSystem, SignedSystem, TracedSystem};
+}

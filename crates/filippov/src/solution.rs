@@ -1,7 +1,7 @@
 //! The record of a run: steps, segments, switches.
 
 use crate::error::FieldError;
-use crate::field::project;
+use crate::field::{project, SlidingField};
 use crate::integrate::{Stats, Stop, Warning};
 use crate::mode::Mode;
 use crate::options::Options;
@@ -240,6 +240,23 @@ impl Recorder {
 }
 
 impl Solution {
+    /// The surface slid on at `t` and its multiplier, if the motion slides there.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn multiplier(
+        &self,
+        system: &dyn PiecewiseSystem,
+        t: f64,
+        side: Side,
+    ) -> Result<Option<(usize, f64)>, FieldError> {
+        let mut y = vec![0.0; self.n_states];
+        let Some(mode) = self.evaluate(system, t, side, &mut y)? else { return Ok(None) };
+        let Some(j) = mode.sliding() else { return Ok(None) };
+        let mut field = SlidingField::new(system, j, &mode.signs());
+        Ok(Some((j, field.normal_components(t, &mut y)?.multiplier())))
+    }
+
     /// Replaces the step ends by the wanted times, as far as the run came.
     ///
     /// # Errors

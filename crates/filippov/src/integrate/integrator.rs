@@ -40,10 +40,11 @@ pub fn solve(
     options: &Options,
     events: &[UserEvent],
 ) -> Result<Solution, Error> {
-    solve_interruptible(system, t_span, y0, options, events, &mut || false)
+    solve_interruptible(system, t_span, y0, options, events, &mut |_| false)
 }
 
-/// As [`solve`]; `interrupt` is asked every few steps, and the run stops where it says `true`.
+/// As [`solve`]; `interrupt` is asked every few steps with the time reached, and the run stops
+/// where it says `true`.
 ///
 /// # Errors
 /// As [`solve`].
@@ -53,7 +54,7 @@ pub fn solve_interruptible(
     y0: &[f64],
     options: &Options,
     events: &[UserEvent],
-    interrupt: &mut dyn FnMut() -> bool,
+    interrupt: &mut dyn FnMut(f64) -> bool,
 ) -> Result<Solution, Error> {
     let mut integrator = Integrator::new(system, t_span, y0, options, events)?;
     let stop = match integrator.run(interrupt) {
@@ -135,7 +136,7 @@ impl<'a> Integrator<'a> {
     ///
     /// # Errors
     /// If a function of the user raises.
-    pub fn run(&mut self, interrupt: &mut dyn FnMut() -> bool) -> Result<Stop, FieldError> {
+    pub fn run(&mut self, interrupt: &mut dyn FnMut(f64) -> bool) -> Result<Stop, FieldError> {
         let started = Instant::now();
         if let Some(stop) = self.start()? {
             return Ok(stop);
@@ -152,7 +153,7 @@ impl<'a> Integrator<'a> {
                 if self.options.max_wall_time.is_some_and(|s| started.elapsed().as_secs_f64() > s) {
                     return Ok(Stop::MaxWallTime);
                 }
-                if interrupt() {
+                if interrupt(self.t) {
                     return Ok(Stop::Interrupted);
                 }
             }

@@ -1,0 +1,141 @@
+//! The expression graph under construction.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use filippov_expr::{BinaryOp, Graph, Names, NodeId, Switching, UnaryOp};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+/// An expression graph under construction; nodes are handed out as integers.
+#[pyclass(frozen, module = "filippov._core")]
+pub struct Builder {
+    graph: Mutex<Graph>,
+}
+
+impl Builder {
+    pub fn graph(&self) -> MutexGuard<'_, Graph> {
+        self.graph.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The node with this number, if the graph has it.
+    pub fn node(graph: &Graph, id: u32) -> PyResult<NodeId> {
+        let node = NodeId(id);
+        if graph.contains(node) {
+            Ok(node)
+        } else {
+            Err(PyValueError::new_err(format!("no node {id} in this graph")))
+        }
+    }
+}
+
+#[pymethods]
+impl Builder {
+    #[new]
+    fn new() -> Self {
+        Builder { graph: Mutex::new(Graph::new()) }
+    }
+
+    fn constant(&self, value: f64) -> u32 {
+        self.graph().constant(value).0
+    }
+
+    fn time(&self) -> u32 {
+        self.graph().time().0
+    }
+
+    fn state(&self, index: u32) -> u32 {
+        self.graph().state(index).0
+    }
+
+    fn parameter(&self, index: u32) -> u32 {
+        self.graph().parameter(index).0
+    }
+
+    fn unary(&self, op: &str, a: u32) -> PyResult<u32> {
+        let op = UnaryOp::from_name(op).ok_or_else(|| unknown(op))?;
+        let mut graph = self.graph();
+        let a = Self::node(&graph, a)?;
+        Ok(graph.unary(op, a).0)
+    }
+
+    fn binary(&self, op: &str, a: u32, b: u32) -> PyResult<u32> {
+        let op = BinaryOp::from_name(op).ok_or_else(|| unknown(op))?;
+        let mut graph = self.graph();
+        let (a, b) = (Self::node(&graph, a)?, Self::node(&graph, b)?);
+        Ok(graph.binary(op, a, b).0)
+    }
+
+    fn sign(&self, a: u32) -> PyResult<u32> {
+        let mut graph = self.graph();
+        let a = Self::node(&graph, a)?;
+        Ok(graph.sign(a).0)
+    }
+
+    fn abs(&self, a: u32) -> PyResult<u32> {
+        let mut graph = self.graph();
+        let a = Self::node(&graph, a)?;
+        Ok(graph.abs(a).0)
+    }
+
+    fn maximum(&self, a: u32, b: u32) -> PyResult<u32> {
+        let mut graph = self.graph();
+        let (a, b) = (Self::node(&graph, a)?, Self::node(&graph, b)?);
+        Ok(graph.maximum(a, b).0)
+    }
+
+    fn minimum(&self, a: u32, b: u32) -> PyResult<u32> {
+        let mut graph = self.graph();
+        let (a, b) = (Self::node(&graph, a)?, Self::node(&graph, b)?);
+        Ok(graph.minimum(a, b).0)
+    }
+
+    fn declare_surface(&self, a: u32) -> PyResult<u32> {
+        let mut graph = self.graph();
+        let a = Self::node(&graph, a)?;
+        Ok(graph.declare_surface(a))
+    }
+
+    fn switch(&self, a: u32) -> PyResult<(i64, f64)> {
+        let mut graph = self.graph();
+        let a = Self::node(&graph, a)?;
+        Ok(match graph.switch(a) {
+            Switching::Constant(sign) => (-1, sign),
+            Switching::Surface { index, orientation } => (i64::from(index), orientation),
+        })
+    }
+
+    fn select(&self, surface: u32, orientation: f64, plus: u32, minus: u32) -> PyResult<u32> {
+        let mut graph = self.graph();
+        if surface as usize >= graph.n_surfaces() {
+            return Err(PyValueError::new_err(format!("no surface {surface} in this graph")));
+        }
+        let (plus, minus) = (Self::node(&graph, plus)?, Self::node(&graph, minus)?);
+        Ok(graph.select(surface, orientation, plus, minus).0)
+    }
+
+    fn as_constant(&self, a: u32) -> PyResult<Option<f64>> {
+        let graph = self.graph();
+        Ok(graph.as_constant(Self::node(&graph, a)?))
+    }
+
+    fn depends_on_motion(&self, a: u32) -> PyResult<bool> {
+        let graph = self.graph();
+        Ok(graph.depends_on_motion(Self::node(&graph, a)?))
+    }
+
+    fn n_surfaces(&self) -> usize {
+        self.graph().n_surfaces()
+    }
+
+    #[pyo3(signature = (a, states=None, parameters=None))]
+    fn text(&self, a: u32, states: Option<Vec<String>>, parameters: Option<Vec<String>>) -> PyResult<String> {
+        let graph = self.graph();
+        let names =
+            Names { states: states.unwrap_or_default(), parameters: parameters.unwrap_or_default() };
+        Ok(graph.text(Self::node(&graph, a)?, &names))
+    }
+}
+
+fn unknown(op: &str) -> PyErr {
+    PyValueError::new_err(format!("unknown operation {op:?}"))
+}

@@ -1,0 +1,125 @@
+//! Systems and events whose functions are Python callables.
+
+use filippov::{FieldError, PiecewiseSystem, UserFunction};
+use filippov_expr::Program;
+use numpy::PyArray1;
+use pyo3::prelude::*;
+
+use crate::conversion::{read_scalar, read_vector};
+
+/// Python switching functions h_j(t, x).
+pub struct Surfaces {
+    pub functions: Vec<Py<PyAny>>,
+    pub names: Vec<String>,
+}
+
+impl Surfaces {
+    fn value(&self, py: Python<'_>, j: usize, t: f64, x: &[f64]) -> PyResult<f64> {
+        read_scalar(&self.functions[j].bind(py).call1((t, PyArray1::from_slice(py, x)))?)
+    }
+
+    fn write(&self, t: f64, x: &[f64], h: &mut [f64]) -> Result<(), FieldError> {
+        Python::attach(|py| {
+            h.iter_mut().enumerate().try_for_each(|(j, h)| self.value(py, j, t, x).map(|v| *h = v))
+        })
+        .map_err(|e: PyErr| FieldError::new(e))
+    }
+}
+
+/// A black box: f(t, x) looks at the signs of the switching functions itself, so that it exists in
+/// each region only; beyond a surface it is NaN.
+pub struct Opaque {
+    pub fun: Py<PyAny>,
+    pub surfaces: Surfaces,
+    pub n_states: usize,
+}
+
+impl PiecewiseSystem for Opaque {
+    fn n_states(&self) -> usize {
+        self.n_states
+    }
+
+    fn n_surfaces(&self) -> usize {
+        self.surfaces.functions.len()
+    }
+
+    fn field(&self, t: f64, x: &[f64], signs: &[f64], dx: &mut [f64]) -> Result<(), FieldError> {
+        Python::attach(|py| {
+            for (j, sign) in signs.iter().enumerate() {
+                if self.surfaces.value(py, j, t, x)? * sign <= 0.0 {
+                    dx.fill(f64::NAN);
+                    return Ok(());
+                }
+            }
+            let value = self.fun.bind(py).call1((t, PyArray1::from_slice(py, x)))?;
+            read_vector(&value, dx, "fun")
+        })
+        .map_err(|e: PyErr| FieldError::new(e))
+    }
+
+    fn surfaces(&self, t: f64, x: &[f64], _signs: &[f64], h: &mut [f64]) -> Result<(), FieldError> {
+        self.surfaces.write(t, x, h)
+    }
+
+    fn surface_name(&self, j: usize) -> String {
+        self.surfaces.names[j].clone()
+    }
+}
+
+/// A callable f(t, x, s) that takes the sign vector as data.
+pub struct Signed {
+    pub fun: Py<PyAny>,
+    pub surfaces: Surfaces,
+    pub n_states: usize,
+}
+
+impl PiecewiseSystem for Signed {
+    fn n_states(&self) -> usize {
+        self.n_states
+    }
+
+    fn n_surfaces(&self) -> usize {
+        self.surfaces.functions.len()
+    }
+
+    fn field(&self, t: f64, x: &[f64], signs: &[f64], dx: &mut [f64]) -> Result<(), FieldError> {
+        Python::attach(|py| {
+            let arguments = (t, PyArray1::from_slice(py, x), PyArray1::from_slice(py, signs));
+            read_vector(&self.fun.bind(py).call1(arguments)?, dx, "fun")
+        })
+        .map_err(|e: PyErr| FieldError::new(e))
+    }
+
+    fn surfaces(&self, t: f64, x: &[f64], _signs: &[f64], h: &mut [f64]) -> Result<(), FieldError> {
+        self.surfaces.write(t, x, h)
+    }
+
+    fn surface_name(&self, j: usize) -> String {
+        self.surfaces.names[j].clone()
+    }
+}
+
+/// A user's event g(t, x) as a Python callable.
+pub struct CalledEvent(pub Py<PyAny>);
+
+impl UserFunction for CalledEvent {
+    fn value(&self, t: f64, x: &[f64]) -> Result<f64, FieldError> {
+        Python::attach(|py| read_scalar(&self.0.bind(py).call1((t, PyArray1::from_slice(py, x)))?))
+            .map_err(|e: PyErr| FieldError::new(e))
+    }
+}
+
+/// A user's event as a compiled expression.
+pub struct CompiledEvent {
+    pub program: std::sync::Arc<Program>,
+    pub parameters: Vec<f64>,
+}
+
+impl UserFunction for CompiledEvent {
+    fn value(&self, t: f64, x: &[f64]) -> Result<f64, FieldError> {
+        let mut out = [0.0];
+        // Expressions with switches of their own are not compiled as events, so no signs are needed.
+        self.program.eval(t, x, &[], &self.parameters, &[], &mut out);
+        Ok(out[0])
+    }
+}

@@ -1,0 +1,226 @@
+//! What a run computed, as a Python object.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use filippov::{PiecewiseSystem, Side, Solution, Stop};
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
+
+use crate::conversion::columns;
+use crate::systems::raised;
+
+type Vector<'py> = Bound<'py, PyArray1<f64>>;
+type SwitchRow<'py> = (
+    f64,
+    Vector<'py>,
+    Vector<'py>,
+    &'static str,
+    Bound<'py, PyTuple>,
+    Bound<'py, PyTuple>,
+    Bound<'py, PyTuple>,
+    String,
+);
+type SegmentRow<'py> = (f64, f64, Bound<'py, PyTuple>, usize, usize, Vector<'py>, Vector<'py>);
+
+/// What a run computed.
+#[pyclass(frozen, module = "filippov._core")]
+pub struct Run {
+    system: Arc<dyn PiecewiseSystem + Send + Sync>,
+    solution: Mutex<Solution>,
+    error: Option<PyErr>,
+    is_native: bool,
+}
+
+impl Run {
+    pub fn new(
+        system: Arc<dyn PiecewiseSystem + Send + Sync>,
+        mut solution: Solution,
+        is_native: bool,
+    ) -> Self {
+        let mut error = None;
+        if let Stop::FieldRaised(payload) = &mut solution.stop {
+            let taken = std::mem::replace(payload, filippov::FieldError::new(()));
+            error = Some(raised(taken));
+        }
+        Run { system, solution: Mutex::new(solution), error, is_native }
+    }
+
+    fn solution(&self) -> std::sync::MutexGuard<'_, Solution> {
+        self.solution.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The multiplier vector at a time; NaN for surfaces not slid on.
+    fn multiplier_vector(&self, solution: &Solution, t: f64, side: Side) -> PyResult<Vec<f64>> {
+        let mut out = vec![f64::NAN; self.system.n_surfaces()];
+        if let Some((j, value)) = solution.multiplier(&*self.system, t, side).map_err(raised)? {
+            out[j] = value;
+        }
+        Ok(out)
+    }
+}
+
+#[pymethods]
+impl Run {
+    #[getter]
+    fn t<'py>(&self, py: Python<'py>) -> Vector<'py> {
+        PyArray1::from_slice(py, &self.solution().t)
+    }
+
+    #[getter]
+    fn y<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        let solution = self.solution();
+        columns(py, &solution.y, solution.n_states)
+    }
+
+    #[getter]
+    fn switches<'py>(&self, py: Python<'py>) -> PyResult<Vec<SwitchRow<'py>>> {
+        self.solution()
+            .switches
+            .iter()
+            .map(|s| {
+                Ok((
+                    s.t,
+                    PyArray1::from_slice(py, &s.y_before),
+                    PyArray1::from_slice(py, &s.y_after),
+                    s.kind.name(),
+                    PyTuple::new(py, &s.surfaces)?,
+                    PyTuple::new(py, s.mode_before.entries())?,
+                    PyTuple::new(py, s.mode_after.entries())?,
+                    String::new(),
+                ))
+            })
+            .collect()
+    }
+
+    #[getter]
+    fn segments<'py>(&self, py: Python<'py>) -> PyResult<Vec<SegmentRow<'py>>> {
+        let solution = self.solution();
+        solution
+            .segments
+            .iter()
+            .map(|s| {
+                let start = self.multiplier_vector(&solution, s.t_start, Side::Right)?;
+                let end = self.multiplier_vector(&solution, s.t_end, Side::Left)?;
+                Ok((
+                    s.t_start,
+                    s.t_end,
+                    PyTuple::new(py, s.mode.entries())?,
+                    s.steps.0,
+                    s.steps.1,
+                    PyArray1::from_vec(py, start),
+                    PyArray1::from_vec(py, end),
+                ))
+            })
+            .collect()
+    }
+
+    #[getter]
+    fn t_events<'py>(&self, py: Python<'py>) -> Vec<Vector<'py>> {
+        let times = |zeros: &Vec<filippov::UserZero>| zeros.iter().map(|z| z.t).collect();
+        self.solution().user_zeros.iter().map(|z| PyArray1::from_vec(py, times(z))).collect()
+    }
+
+    #[getter]
+    fn y_events<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
+        let solution = self.solution();
+        solution
+            .user_zeros
+            .iter()
+            .map(|zeros| {
+                if zeros.is_empty() {
+                    return Ok(PyArray2::zeros(py, [0, solution.n_states], false));
+                }
+                let rows: Vec<Vec<f64>> = zeros.iter().map(|z| z.y.clone()).collect();
+                PyArray2::from_vec2(py, &rows).map_err(|e| PyValueError::new_err(e.to_string()))
+            })
+            .collect()
+    }
+
+    #[getter]
+    fn status(&self) -> i32 {
+        match self.solution().stop {
+            Stop::End => 0,
+            Stop::TerminalEvent(_) => 1,
+            _ => -1,
+        }
+    }
+
+    #[getter]
+    fn reason(&self) -> &'static str {
+        self.solution().stop.name()
+    }
+
+    #[getter]
+    fn message(&self) -> String {
+        let solution = self.solution();
+        solution.stop.message(solution.t_last, &solution.mode, |j| self.system.surface_name(j))
+    }
+
+    #[getter]
+    fn error(&self, py: Python<'_>) -> Option<Py<PyAny>> {
+        self.error.as_ref().map(|e| e.clone_ref(py).into_value(py).into_any())
+    }
+
+    #[getter]
+    fn stats<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let stats = self.solution().stats;
+        let dict = PyDict::new(py);
+        dict.set_item("method", "DOPRI5")?;
+        dict.set_item("native", self.is_native)?;
+        dict.set_item("nfev", stats.n_field_evaluations)?;
+        dict.set_item("n_surface_evaluations", stats.n_surface_evaluations)?;
+        dict.set_item("n_steps", stats.n_steps)?;
+        dict.set_item("n_rejected", stats.n_rejected)?;
+        dict.set_item("n_steps_sliding", stats.n_steps_sliding)?;
+        dict.set_item("n_rejected_sliding", stats.n_rejected_sliding)?;
+        dict.set_item("n_extensions", stats.n_extensions)?;
+        dict.set_item("n_events", stats.n_switches)?;
+        Ok(dict)
+    }
+
+    #[getter]
+    fn warnings(&self) -> Vec<(f64, &'static str, String)> {
+        self.solution().warnings.iter().map(|w| (w.t, w.code.name(), w.text.clone())).collect()
+    }
+
+    /// States at the times `t`, shape (n_states, len(t)).
+    #[pyo3(signature = (t, left=false))]
+    fn evaluate<'py>(
+        &self,
+        py: Python<'py>,
+        t: PyReadonlyArray1<'py, f64>,
+        left: bool,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let solution = self.solution();
+        let n = solution.n_states;
+        let times = t.as_slice()?;
+        let mut out = vec![0.0; n * times.len()];
+        for (&t, y) in times.iter().zip(out.chunks_exact_mut(n)) {
+            let side = if left { Side::Left } else { Side::Right };
+            if solution.evaluate(&*self.system, t, side, y).map_err(raised)?.is_none() {
+                let first = solution.segments.first().map_or(f64::NAN, |s| s.t_start);
+                return Err(PyValueError::new_err(format!(
+                    "t = {t} is outside of the solution, which covers [{first}, {}], or dense_output was off",
+                    solution.t_last
+                )));
+            }
+        }
+        Ok(columns(py, &out, n))
+    }
+
+    /// Multipliers at the times `t`, shape (n_surfaces, len(t)); NaN for surfaces not slid on.
+    fn multipliers<'py>(
+        &self,
+        py: Python<'py>,
+        t: PyReadonlyArray1<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let solution = self.solution();
+        let mut out = Vec::new();
+        for &t in t.as_slice()? {
+            out.extend(self.multiplier_vector(&solution, t, Side::Right)?);
+        }
+        Ok(columns(py, &out, self.system.n_surfaces()))
+    }
+}

@@ -1,0 +1,122 @@
+//! The call of the integrator.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use filippov::{solve_interruptible, NonUnique, Options, PiecewiseSystem, UserEvent, UserFunction};
+use numpy::PyReadonlyArray1;
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::callbacks::{CalledEvent, CompiledEvent};
+use crate::run::Run;
+use crate::systems::{OpaqueSystem, SignedSystem, TracedSystem};
+
+/// How often the interpreter is asked for signals and told the progress.
+const POLL_EVERY: Duration = Duration::from_millis(20);
+
+/// Integrates a system; `filippov.solve_ivp` checks the arguments before.
+#[pyfunction]
+#[pyo3(signature = (system, t0, t1, y0, p, options, events))]
+#[allow(clippy::too_many_arguments)]
+pub fn solve(
+    py: Python<'_>,
+    system: Bound<'_, PyAny>,
+    t0: f64,
+    t1: f64,
+    y0: PyReadonlyArray1<'_, f64>,
+    p: PyReadonlyArray1<'_, f64>,
+    options: &Bound<'_, PyDict>,
+    events: Vec<(Py<PyAny>, f64, u64, String)>,
+) -> PyResult<Run> {
+    let parameters = p.as_slice()?.to_vec();
+    let traced = system.cast::<TracedSystem>().ok();
+    let core: Arc<dyn PiecewiseSystem + Send + Sync> = if let Some(traced) = traced {
+        Arc::new(traced.get().system.with_parameters(parameters.clone()))
+    } else if let Ok(opaque) = system.cast::<OpaqueSystem>() {
+        Arc::clone(&opaque.get().system) as _
+    } else if let Ok(signed) = system.cast::<SignedSystem>() {
+        Arc::clone(&signed.get().system) as _
+    } else {
+        return Err(PyTypeError::new_err("system: a TracedSystem, OpaqueSystem or SignedSystem is needed"));
+    };
+    let mut functions: Vec<(Box<dyn UserFunction + Send + Sync>, f64, u64)> = Vec::new();
+    for (g, direction, terminal, _name) in events {
+        let handle: Option<usize> = g.extract(py).ok();
+        let function: Box<dyn UserFunction + Send + Sync> = match (handle, traced) {
+            (Some(handle), Some(traced)) => {
+                let program = traced
+                    .get()
+                    .event_program(handle)
+                    .ok_or_else(|| PyValueError::new_err(format!("no event {handle}")))?;
+                Box::new(CompiledEvent { program, parameters: parameters.clone() })
+            }
+            _ => Box::new(CalledEvent(g)),
+        };
+        functions.push((function, direction, terminal));
+    }
+    let y0 = y0.as_slice()?.to_vec();
+    let (options, progress) = read_options(options)?;
+    let is_native = traced.is_some_and(|t| t.get().system.is_native());
+    let solution = py
+        .detach(|| {
+            let events: Vec<UserEvent> = functions
+                .iter()
+                .map(|(function, direction, terminal)| UserEvent {
+                    function: &**function,
+                    direction: *direction,
+                    terminal: *terminal,
+                })
+                .collect();
+            let mut asked = Instant::now();
+            let mut interrupt = |t: f64| {
+                if asked.elapsed() < POLL_EVERY {
+                    return false;
+                }
+                asked = Instant::now();
+                Python::attach(|py| {
+                    let reported = progress.as_ref().map(|report| report.call1(py, (t,)));
+                    py.check_signals().is_err() || matches!(reported, Some(Err(_)))
+                })
+            };
+            solve_interruptible(&*core, (t0, t1), &y0, &options, &events, &mut interrupt)
+        })
+        .map_err(|e| PyValueError::new_err(e.to_string()))?;
+    Ok(Run::new(core, solution, is_native))
+}
+
+fn read_options(given: &Bound<'_, PyDict>) -> PyResult<(Options, Option<Py<PyAny>>)> {
+    let mut options = Options::default();
+    let mut progress = None;
+    for (key, value) in given {
+        let key: String = key.extract()?;
+        match key.as_str() {
+            "rtol" => options.rtol = value.extract()?,
+            "atol" => {
+                options.atol = match value.extract::<f64>() {
+                    Ok(single) => vec![single],
+                    Err(_) => value.extract()?,
+                }
+            }
+            "first_step" => options.first_step = value.extract()?,
+            "max_step" => options.max_step = value.extract()?,
+            "max_steps" => options.max_steps = value.extract()?,
+            "max_events" => options.max_events = value.extract()?,
+            "max_wall_time" => options.max_wall_time = value.extract()?,
+            "nonunique" => {
+                options.nonunique = match value.extract::<String>()?.as_str() {
+                    "regularize" => NonUnique::Regularize,
+                    "error" => NonUnique::Error,
+                    other => return Err(PyValueError::new_err(format!("nonunique: unknown policy {other:?}"))),
+                }
+            }
+            "t_eval" => options.t_eval = value.extract()?,
+            "dense_output" => options.dense_output = value.extract()?,
+            "progress" if !value.is_none() => progress = Some(value.unbind()),
+            "progress" | "method" | "sliding" | "keep" => {}
+            other => return Err(PyValueError::new_err(format!("options: unknown key {other:?}"))),
+        }
+    }
+    Ok((options, progress))
+}
