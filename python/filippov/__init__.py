@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from filippov.decorator import system
 from filippov.errors import (
     FilippovError,
     InputError,
@@ -29,7 +30,7 @@ from filippov.modes import Mode
 from filippov.solution import DenseSolution, Solution
 from filippov.solve import solve_ivp
 from filippov.switches import RunWarning, Segment, SegmentTable, Switch, SwitchTable
-from filippov.system import System, system
+from filippov.system import System
 
 if TYPE_CHECKING:
     from filippov import plot, problems

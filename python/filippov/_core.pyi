@@ -7,7 +7,6 @@ import numpy as np
 import numpy.typing as npt
 
 _Array = npt.NDArray[np.float64]
-_Core = TracedSystem | OpaqueSystem | SignedSystem
 
 class Builder:
     def __init__(self) -> None: ...
@@ -31,7 +30,12 @@ class Builder:
 
 class TracedSystem:
     def __init__(
-        self, builder: Builder, field: list[int], n_states: int, parameters: list[str], states: list[str] | None
+        self,
+        builder: Builder,
+        field: list[int],
+        n_states: int,
+        parameters: list[str],
+        states: list[str] | None,
     ) -> None: ...
     @property
     def n_states(self) -> int: ...
@@ -114,7 +118,7 @@ class Run:
     def multipliers(self, t: _Array) -> _Array: ...
 
 def solve(
-    system: _Core,
+    system: TracedSystem | OpaqueSystem | SignedSystem,
     t0: float,
     t1: float,
     y0: _Array,

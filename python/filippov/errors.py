@@ -62,7 +62,7 @@ class FilippovError(Exception):
         self.partial = partial
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # Keyword-only attributes would be lost by the default protocol; worker processes send errors back by pickle.
+        # The default protocol loses keyword-only attributes; worker processes send errors back by pickle.
         return type(self), (self.message,), self.__dict__.copy()
 
 

@@ -88,7 +88,9 @@ def fields_source(fields: Any, surfaces: Any) -> Source:
 
 
 def base_source(base: Any, deltas: Any, surfaces: Any) -> Source:
-    """Return the source of ``x' = F(t, x) + sum_j mu_j Delta_j(t, x)``, ``mu_j = 1`` for ``h_j < 0``, 0 for ``h_j > 0``.
+    """Return the source of ``x' = F(t, x) + sum_j mu_j Delta_j(t, x)``.
+
+    ``mu_j = 1`` for ``h_j < 0`` and 0 for ``h_j > 0``.
 
     Parameters
     ----------
@@ -103,7 +105,9 @@ def base_source(base: Any, deltas: Any, surfaces: Any) -> Source:
     if callable(deltas):
         deltas = [deltas]
     if len(deltas) != len(functions):
-        raise ModelError(f"deltas: one per surface is needed: {len(deltas)} deltas, {len(functions)} surfaces")
+        raise ModelError(
+            f"deltas: one per surface is needed: {len(deltas)} deltas, {len(functions)} surfaces"
+        )
     base_call = _as_field(base, "base")
     delta_calls = [_as_field(delta, f"deltas[{j}]") for j, delta in enumerate(deltas)]
 
@@ -139,7 +143,8 @@ def relay_source(A: Any, B: Any, C: Any) -> tuple[Source, int]:
     c = c.reshape(1, -1) if c.ndim == 1 else c
     if a.shape != (n, n) or b.shape != (n, c.shape[0]) or c.shape[1] != n:
         raise ModelError(
-            f"relay: the shapes must be A (n, n), B (n, m), C (m, n); they are {a.shape}, {b.shape}, {c.shape}"
+            "relay: the shapes must be A (n, n), B (n, m), C (m, n); "
+            f"they are {a.shape}, {b.shape}, {c.shape}"
         )
     functions = tuple(_linear_form(row) for row in c)
 
@@ -172,9 +177,7 @@ def _table_source(table: dict[tuple[int, ...], Any], functions: tuple[Surface, .
     return Source(fun, functions, signed=signed)
 
 
-def _numeric_signs(
-    functions: Sequence[Surface], t: Any, x: Any, params: Mapping[str, Any]
-) -> list[int]:
+def _numeric_signs(functions: Sequence[Surface], t: Any, x: Any, params: Mapping[str, Any]) -> list[int]:
     signs = []
     for surface in functions:
         if _call_surface(surface, t, x, params) > 0:
@@ -187,7 +190,8 @@ def _numeric_signs(
 def _check_table(fields: Mapping[Any, Any], n_surfaces: int) -> dict[tuple[int, ...], Any]:
     if n_surfaces > _LARGEST_TABLE:
         raise ModelError(
-            f"fields: a dict for {n_surfaces} surfaces needs 2**{n_surfaces} entries; give one function f(t, x, s)"
+            f"fields: a dict for {n_surfaces} surfaces needs 2**{n_surfaces} entries; "
+            "give one function f(t, x, s)"
         )
     table: dict[tuple[int, ...], Any] = {}
     for key, field in fields.items():

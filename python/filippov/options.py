@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import warnings
 from collections.abc import Callable, Iterable, Mapping
@@ -194,15 +195,15 @@ def check_params(params: Any) -> dict[str, float]:
     return checked
 
 
-def check_unknown(unknown: Mapping[str, Any], known: Iterable[str], function: str) -> None:
-    """Refuse unknown keywords with a suggestion, and ignore SciPy's that mean nothing here, with a warning."""
+def check_unknown(unknown: Mapping[str, Any], function: Callable[..., Any]) -> None:
+    """Refuse unknown keywords of `function` with a suggestion; what SciPy alone has is ignored with a warning."""
     for name in unknown:
         if name == "vectorized":  # SciPy's promise that columns may be handed over; no change of the result
             continue
         if name not in _SCIPY_ONLY:
-            hint = did_you_mean(name, known)
-            raise TypeError(f"{function}() got an unexpected keyword argument {name!r}{hint}")
-        warnings.warn(f"{name}: has no effect with an explicit method", UserWarning, stacklevel=4)
+            hint = did_you_mean(name, inspect.signature(function).parameters)
+            raise TypeError(f"{function.__name__}() got an unexpected keyword argument {name!r}{hint}")
+        warnings.warn(f"{name}: has no effect with an explicit method", UserWarning, stacklevel=3)
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
@@ -243,12 +244,12 @@ def _check_rtol(rtol: Any) -> float:
 
 def _check_atol(atol: Any, n: int) -> float | Array:
     try:
-        values = np.asarray(atol)
-        values = values.astype(np.float64) if values.dtype.kind in "fiu" else None
-    except (TypeError, ValueError):
-        values = None
-    if values is None:
+        raw = np.asarray(atol)
+    except ValueError:
+        raw = np.empty(0, dtype=object)
+    if raw.dtype.kind not in "fiu":
         raise ToleranceError(f"atol: a number, or one per component, is needed, not {atol!r}")
+    values = raw.astype(np.float64)
     if values.ndim > 1 or (values.ndim == 1 and values.size != n):
         raise ToleranceError(f"atol: must be a number or have shape ({n},), it has shape {values.shape}")
     if not (np.isfinite(values).all() and (values >= 0.0).all()):
@@ -321,6 +322,10 @@ def _positive(name: str, value: Any, infinite: bool = False) -> float:
 
 def _real(value: Any) -> float:
     """Convert a real number; text, truth values and complex numbers are refused with TypeError."""
-    if isinstance(value, (str, bytes, bool, np.bool_, complex)) or np.iscomplexobj(value) or np.ndim(value) != 0:
+    if (
+        isinstance(value, (str, bytes, bool, np.bool_, complex))
+        or np.iscomplexobj(value)
+        or np.ndim(value) != 0
+    ):
         raise TypeError
     return float(value)

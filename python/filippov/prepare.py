@@ -1,4 +1,4 @@
-"""From the user's functions to a system of the core: traced if possible, else a black box with declared surfaces."""
+"""From the user's functions to a system of the core: traced if possible, else a black box."""
 
 from __future__ import annotations
 
@@ -90,34 +90,39 @@ def prepare(
         If the functions return the wrong number of components.
     """
     try:
-        traced = _trace(source, source.fun, n, values, t0, y0)
+        traced = _trace(source, source.fun, n, values, states, t0, y0)
     except TraceError as error:
         if source.branching is not None:
             try:
-                traced = _trace(source, source.branching, n, values, t0, y0)
+                traced = _trace(source, source.branching, n, values, states, t0, y0)
             except TraceError:
                 return _prepare_opaque(source, n, values, t0, y0, error)
         elif source.surfaces:
             return _prepare_opaque(source, n, values, t0, y0, error)
         else:
             raise
-    names = list(states) if states is not None else None
-    core = TracedSystem(traced.builder, traced.field, n, list(traced.parameters), names)
     pinned = dict(values) if traced.guards else None
-    return Prepared(core, traced, tuple(core.surfaces()), pinned, "")
+    return Prepared(traced.system, traced, tuple(traced.system.surfaces()), pinned, "")
 
 
 def _trace(
-    source: Source, fun: Callable[..., Any], n: int, values: dict[str, float], t0: float, y0: Array | None
+    source: Source,
+    fun: Callable[..., Any],
+    n: int,
+    values: dict[str, float],
+    states: Sequence[str] | None,
+    t0: float,
+    y0: Array | None,
 ) -> Trace:
     return trace(
         fun,
         n,
         args=source.args,
         parameters=values or None,
-        surfaces=list(source.surfaces) or None,
+        surfaces=[_selective(surface, values) for surface in source.surfaces] or None,
         t0=t0,
-        y0=y0,
+        y0=np.linspace(0.3, 0.7, n) if y0 is None else y0,  # any point off the coordinate planes
+        states=states,
     )
 
 
@@ -148,12 +153,24 @@ def check_components(value: Any, n: int) -> None:
     except ValueError:
         raise ModelError("fun: must return a sequence of numbers, one per state") from None
     if components.shape not in ((n,), (n, 1)):
-        raise ModelError(f"fun: must return {n} components, as many as y0 has; it returned shape {components.shape}")
+        raise ModelError(
+            f"fun: must return {n} components, as many as y0 has; it returned shape {components.shape}"
+        )
     if components.dtype.kind == "c":
         raise ModelError("fun: returned complex numbers; split the states into real and imaginary parts")
 
 
-def _bind(function: Callable[..., Any], args: tuple[Any, ...], values: dict[str, float]) -> Callable[..., Any]:
+def _selective(function: Callable[..., Any], values: dict[str, float]) -> Callable[..., Any]:
+    """Return `function` so that it ignores the parameters that it does not name."""
+    named = accepted_names(function, values)
+    if len(named) == len(values):
+        return function
+    return lambda t, x, *args, **params: function(t, x, *args, **{name: params[name] for name in named})
+
+
+def _bind(
+    function: Callable[..., Any], args: tuple[Any, ...], values: dict[str, float]
+) -> Callable[..., Any]:
     named = {name: values[name] for name in accepted_names(function, values)} if values else {}
     if not args and not named:
         return function

@@ -57,7 +57,9 @@ def sliding_field(prepared: Prepared, t: float, x: Array, mode: Mode, p: Array) 
     if mode.codimension == 0:
         return core.field(t, x, signs, p)
     if mode.codimension > 1:
-        raise InputError("mode: the field of sliding on several surfaces is not offered here; at most one entry 0")
+        raise InputError(
+            "mode: the field of sliding on several surfaces is not offered here; at most one entry 0"
+        )
     (j,) = mode.sliding
     sides = []
     for side in (1.0, -1.0):
@@ -69,8 +71,8 @@ def sliding_field(prepared: Prepared, t: float, x: Array, mode: Mode, p: Array) 
     if not abs(lam) <= 1.0 + _MARGIN:
         name = prepared.surfaces[j]
         raise ModelError(
-            f"there is no sliding motion on {name} = 0 here: its derivative is {a:g} on the positive side and "
-            f"{b:g} on the negative side",
+            f"there is no sliding motion on {name} = 0 here: its derivative is {a:g} on the positive side "
+            f"and {b:g} on the negative side",
             t=t,
             state=x,
             surface=name,
@@ -91,4 +93,4 @@ def _derivative_along(
         shift = multiple * step
         return float(prepared.core.surface_values(t + shift, x + shift * direction, signs, p)[j])
 
-    return (8.0 * (value(1) - value(-1)) - (value(2) - value(-2))) / (12.0 * step)
+    return float((8.0 * (value(1) - value(-1)) - (value(2) - value(-2))) / (12.0 * step))

@@ -12,9 +12,8 @@ from filippov.modes import Mode
 from filippov.switches import RunWarning, SegmentTable, SwitchTable, import_pandas
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from filippov._core import Run
+    from filippov.start import StandingRun
 
 __all__ = ["DenseSolution", "Solution"]
 
@@ -41,7 +40,7 @@ class DenseSolution:
 
     __slots__ = ("_run", "t_max", "t_min")
 
-    def __init__(self, run: Run, t_first: float, t_last: float) -> None:
+    def __init__(self, run: Run | StandingRun, t_first: float, t_last: float) -> None:
         self._run = run
         self.t_min = min(t_first, t_last)
         self.t_max = max(t_first, t_last)
@@ -106,7 +105,7 @@ class DenseSolution:
         if not inside.all():
             outside = times[~inside][0]
             raise ValueError(
-                f"t: the solution is known on [{self.t_min:.17g}, {self.t_max:.17g}], {outside:.17g} is outside"
+                f"t: {outside:.17g} is outside of [{self.t_min:.17g}, {self.t_max:.17g}], where the solution is known"
             )
 
 
@@ -172,7 +171,7 @@ class Solution:
     @classmethod
     def from_run(
         cls,
-        run: Run,
+        run: Run | StandingRun,
         *,
         t0: float,
         y0: Array,
@@ -265,7 +264,7 @@ class Solution:
         index = int(np.searchsorted(-starts if backward else starts, -t if backward else t, side="right")) - 1
         return self.segments[index].mode
 
-    def to_pandas(self) -> pd.DataFrame:
+    def to_pandas(self) -> Any:
         """Return a `pandas.DataFrame`, indexed by time, with one column per state and the mode as text.
 
         Raises
@@ -327,7 +326,8 @@ class Solution:
         lines = [
             f"message:  {self.message}",
             f"success:  {self.success} (status {self.status})",
-            f"t:        {len(self.t)} points" + (f", {self.t[0]:.10g} ... {self.t[-1]:.10g}" if len(self.t) else ""),
+            f"t:        {len(self.t)} points"
+            + (f", {self.t[0]:.10g} ... {self.t[-1]:.10g}" if len(self.t) else ""),
             f"y:        shape {self.y.shape}" + (f", last {_short(self.y[:, -1])}" if self.y.size else ""),
             f"surfaces: {', '.join(self.surfaces) if self.surfaces else 'none'}",
             f"switches: {len(self.switches)}; segments: {len(self.segments)}, {n_sliding} of them sliding",

@@ -37,11 +37,6 @@ __all__ = ["solve_ivp"]
 Array = npt.NDArray[np.float64]
 CoreEvent = tuple[Callable[[float, Array], float] | int, float, int, str]
 
-_KEYWORDS = (
-    "fun t_span y0 method t_eval dense_output events args params surfaces resets rtol atol first_step max_step "
-    "sliding nonunique zeno max_events max_steps max_wall_time progress"
-).split()
-
 
 def solve_ivp(
     fun: Callable[..., Any] | System,
@@ -161,15 +156,27 @@ def solve_ivp(
     >>> sol.success, sol.surfaces
     (True, ('x[1]',))
     """
-    check_unknown(unknown, _KEYWORDS, "solve_ivp")
+    check_unknown(unknown, solve_ivp)
     t0, t1 = check_t_span(t_span)
     state = check_y0(y0)
     n = len(state)
-    given = {
-        "method": method, "t_eval": t_eval, "dense_output": dense_output, "resets": resets, "rtol": rtol, "atol": atol,
-        "first_step": first_step, "max_step": max_step, "sliding": sliding, "nonunique": nonunique, "zeno": zeno,
-        "max_events": max_events, "max_steps": max_steps, "max_wall_time": max_wall_time, "progress": progress,
-    }  # fmt: skip
+    given: dict[str, Any] = {
+        "method": method,
+        "t_eval": t_eval,
+        "dense_output": dense_output,
+        "resets": resets,
+        "rtol": rtol,
+        "atol": atol,
+        "first_step": first_step,
+        "max_step": max_step,
+        "sliding": sliding,
+        "nonunique": nonunique,
+        "zeno": zeno,
+        "max_events": max_events,
+        "max_steps": max_steps,
+        "max_wall_time": max_wall_time,
+        "progress": progress,
+    }
     options = check_options(given, (t0, t1), n)
     constants = check_args(args)
     specs = normalise_events(events)
@@ -185,7 +192,9 @@ def solve_ivp(
     if t1 == t0:
         run = StandingRun(t0, state, len(prepared.surfaces), len(core_events), options.t_eval)
     else:
-        run = run_core(prepared.core, t0, t1, state, parameter_vector(values), options.for_core(), core_events)
+        run = run_core(
+            prepared.core, t0, t1, state, parameter_vector(values), options.for_core(), core_events
+        )
     solution = Solution.from_run(
         run,
         t0=t0,

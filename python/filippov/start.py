@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
@@ -35,8 +37,8 @@ class StandingRun:
         self._n_surfaces = n_surfaces
         self.t = np.array([t0]) if t_eval is None else t_eval
         self.y = np.repeat(y0[:, None], len(self.t), axis=1)
-        self.switches: list[tuple[float, Array, Array, str, tuple[int, ...], tuple[int, ...], tuple[int, ...], str]] = []
-        self.segments: list[tuple[float, float, tuple[int, ...], int, int, Array, Array]] = []
+        self.switches: list[tuple[Any, ...]] = []
+        self.segments: list[tuple[Any, ...]] = []
         self.t_events: list[Array] = [np.empty(0) for _ in range(n_events)]
         self.y_events: list[Array] = [np.empty((0, len(y0))) for _ in range(n_events)]
         self.stats: dict[str, int | float | str] = {"nfev": 0, "n_steps": 0, "n_rejected": 0, "n_events": 0}

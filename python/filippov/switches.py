@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, overload
+from typing import Any, NamedTuple, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from filippov.modes import Mode
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 __all__ = ["RunWarning", "Segment", "SegmentTable", "Switch", "SwitchTable"]
 
@@ -30,8 +27,9 @@ class Switch(NamedTuple):
     y_before, y_after : ndarray, shape (n,)
         State just before and just after; equal unless the state is reset.
     kind : str
-        One of ``crossing, enter_sliding, exit_sliding, switch_sliding, grazing, reset, accumulation, clock, user,
-        terminal``. Entering means that the codimension rises, leaving that it falls.
+        ``crossing``, ``enter_sliding``, ``exit_sliding``, ``switch_sliding``, ``grazing``, ``reset``,
+        ``accumulation``, ``clock``, ``user`` or ``terminal``. Entering means that the codimension rises, leaving
+        that it falls.
     surfaces : tuple of int
         Indices into ``system.surfaces``, several if several surfaces are met at the same instant.
     mode_before, mode_after : Mode
@@ -104,8 +102,8 @@ class RunWarning(NamedTuple):
 class SwitchTable(Sequence[Switch]):
     """The switches of a run in order of time: a sequence of `Switch` and a table with columns.
 
-    Every attribute of `Switch` is also a column: ``table.t`` is an array of shape (k,), ``table.y_before`` one of
-    shape (k, n), ``table.kind`` an array of str, the others are lists. A slice is a table again.
+    Every attribute of `Switch` is also a column: ``table.t`` is an array of shape (k,), ``table.y_before``
+    one of shape (k, n), ``table.kind`` an array of str, the others are lists. A slice is a table again.
 
     Examples
     --------
@@ -117,7 +115,9 @@ class SwitchTable(Sequence[Switch]):
 
     __slots__ = ("_rows", "_states", "_surfaces")
 
-    def __init__(self, rows: Sequence[tuple[Any, ...]], surfaces: Sequence[str], states: Sequence[str]) -> None:
+    def __init__(
+        self, rows: Sequence[tuple[Any, ...]], surfaces: Sequence[str], states: Sequence[str]
+    ) -> None:
         self._rows = rows
         self._surfaces = tuple(surfaces)
         self._states = tuple(states)
@@ -180,11 +180,12 @@ class SwitchTable(Sequence[Switch]):
     def surface_text(self, switch: Switch) -> str:
         """Return the printed switching functions that a switch concerns, separated by commas."""
         return ", ".join(
-            self._surfaces[index] if 0 <= index < len(self._surfaces) else str(index) for index in switch.surfaces
+            self._surfaces[index] if 0 <= index < len(self._surfaces) else str(index)
+            for index in switch.surfaces
         )
 
-    def to_pandas(self) -> pd.DataFrame:
-        """Return a `pandas.DataFrame` with one row per switch; states are split into one column per component.
+    def to_pandas(self) -> Any:
+        """Return a `pandas.DataFrame` with one row per switch and one column per component of the state.
 
         Raises
         ------
@@ -229,7 +230,7 @@ class SwitchTable(Sequence[Switch]):
 
 
 class SegmentTable(Sequence[Segment]):
-    """The segments of a run in order of time: a sequence of `Segment` with columns ``t_start, t_end, mode``."""
+    """The segments of a run in order of time: a sequence of `Segment`, with columns as attributes."""
 
     __slots__ = ("_rows",)
 
@@ -301,4 +302,7 @@ def _segment(row: tuple[Any, ...]) -> Segment:
 def _aligned(cells: Sequence[tuple[str, ...]]) -> list[str]:
     """Lay out rows of text in columns; the first row is the heading."""
     widths = [max(len(row[column]) for row in cells) for column in range(len(cells[0]))]
-    return ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in cells]
+    return [
+        "  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip()
+        for row in cells
+    ]

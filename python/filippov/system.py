@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from filippov._core import TracedSystem
 from filippov.errors import InputError, ModelError
-from filippov.events import accepted_names
+from filippov.events import accepted_names, function_name
 from filippov.forms import Source, base_source, check_surfaces, fields_source, relay_source
 from filippov.modes import Mode
 from filippov.options import check_args, check_params, check_y0, did_you_mean
-from filippov.prepare import Prepared, TracedSystem, check_n, parameter_vector, prepare
+from filippov.prepare import Prepared, check_n, parameter_vector, prepare
 from filippov.sliding import sliding_field
 from filippov.solution import Solution
 
-__all__ = ["System", "system"]
+__all__ = ["System"]
 
 Array = npt.NDArray[np.float64]
 
@@ -36,8 +36,8 @@ class System:
     n : int, optional
         Number of states; by default known from `y0` at the first run.
     params : dict, optional
-        Names and default values of the parameters that may be changed at every run. They are handed to `fun` by
-        name.
+        Names and default values of the parameters that may be changed at every run. They are handed to `fun`
+        by name.
     states : sequence of str, optional
         Names of the states for tables and plots; ``x[0], x[1], ...`` by default.
     surfaces : callable or sequence of callable, optional
@@ -83,7 +83,8 @@ class System:
         self._setup(source, n, params, states)
         refused = set(self._params).difference(accepted_names(fun, self._params))
         if refused:
-            raise InputError(f"params: {name_of(fun)}() has no parameter {', '.join(map(repr, sorted(refused)))}")
+            names = ", ".join(map(repr, sorted(refused)))
+            raise InputError(f"params: {function_name(fun, 'fun')}() has no parameter {names}")
 
     @classmethod
     def from_fields(
@@ -99,9 +100,9 @@ class System:
         Parameters
         ----------
         fields : dict or callable
-            ``{(+1, -1): f, ...}`` with an entry for each of the 2**d sign vectors, every `f` a function ``f(t, x)`` or
-            a constant vector; a field is never called outside of its own region and its border. Or one function
-            ``f(t, x, s)`` with the sign vector `s`.
+            ``{(+1, -1): f, ...}`` with an entry for each of the 2**d sign vectors, every `f` a function
+            ``f(t, x)`` or a constant vector; a field is never called outside of its own region and its
+            border. Or one function ``f(t, x, s)`` with the sign vector `s`.
         surfaces : callable or sequence of callable
             The switching functions ``h_j(t, x)``; the order is that of the signs.
         n : int, optional
@@ -139,14 +140,15 @@ class System:
         params: Mapping[str, float] | None = None,
         states: Sequence[str] | None = None,
     ) -> System:
-        """Return the system ``x' = F + sum_j mu_j Delta_j`` with ``mu_j = 1`` for ``h_j < 0`` and 0 for ``h_j > 0``.
+        """Return the system ``x' = F + sum_j mu_j Delta_j``, ``mu_j = 1`` for ``h_j < 0`` and 0 else.
 
         Parameters
         ----------
         base : callable or sequence of float
             The field F of the region in which every ``h_j > 0``: a function ``F(t, x)`` or a constant vector.
         deltas : sequence of callable
-            The changes ``Delta_j(t, x)`` on the negative side of surface j. They must be finite on both sides.
+            The changes ``Delta_j(t, x)`` on the negative side of surface j. They must be finite on both
+            sides.
         surfaces : sequence of callable
             The switching functions ``h_j(t, x)``.
         n, params, states
@@ -163,8 +165,8 @@ class System:
 
         References
         ----------
-        Piiroinen and Kuznetsov, An event-driven method to simulate Filippov systems with accurate computing of
-        sliding motions, ACM Trans. Math. Softw. 34 (2008) 13.
+        Piiroinen and Kuznetsov, An event-driven method to simulate Filippov systems with accurate computing
+        of sliding motions, ACM Trans. Math. Softw. 34 (2008) 13.
         """
         return cls._from_source(base_source(base, deltas, surfaces), n, params, states)
 
@@ -267,8 +269,8 @@ class System:
     def field(self, t: float, x: npt.ArrayLike, mode: Any, **params: float) -> Array:
         """Return the field of a mode.
 
-        The mode selects the field, whatever the signs of ``h_j`` at the point are. With one entry 0 it is the sliding
-        field ``(1 + lam)/2 f_plus + (1 - lam)/2 f_minus``, with `lam` from ``dh/dt = 0``.
+        The mode selects the field, whatever the signs of ``h_j`` at the point are. With one entry 0 it is the
+        sliding field ``(1 + lam)/2 f_plus + (1 - lam)/2 f_minus``, with `lam` from ``dh/dt = 0``.
 
         Parameters
         ----------
@@ -302,7 +304,7 @@ class System:
         state = check_y0(x)
         values = self.parameter_values(params)
         prepared = self.prepare(len(state), float(t), state, values)
-        entries = Mode((mode,) if isinstance(mode, (int, np.integer)) else mode)
+        entries = Mode([int(mode)] if isinstance(mode, (int, np.integer)) else mode)
         if len(entries) != len(prepared.surfaces):
             raise InputError(
                 f"mode: one entry per surface is needed: {len(prepared.surfaces)}, it has {len(entries)}"
@@ -422,80 +424,3 @@ class System:
         if self._prepared is not None and self._prepared.core.n_states == n:
             return self._prepared
         return self.prepare(n, 0.0, None, self.parameter_values(None))
-
-
-@overload
-def system(fun: Callable[..., Any]) -> System: ...
-@overload
-def system(
-    fun: None = None,
-    *,
-    n: int | None = None,
-    params: Mapping[str, float] | None = None,
-    states: Sequence[str] | None = None,
-    surfaces: Any = None,
-) -> Callable[[Callable[..., Any]], System]: ...
-def system(
-    fun: Callable[..., Any] | None = None,
-    *,
-    n: int | None = None,
-    params: Mapping[str, float] | None = None,
-    states: Sequence[str] | None = None,
-    surfaces: Any = None,
-) -> System | Callable[[Callable[..., Any]], System]:
-    """Turn a function ``f(t, x, a=1.0, b=2.0)`` into a `System` with the parameters `a` and `b`.
-
-    Parameters
-    ----------
-    fun : callable
-        The right-hand side. What follows ``(t, x)`` and has a number as default is a parameter.
-    n, states, surfaces
-        As for `System`.
-    params : dict, optional
-        Default values that replace or complete those of the function.
-
-    Returns
-    -------
-    System, or a decorator if `fun` is not given
-
-    Raises
-    ------
-    ModelError
-        If an argument of `fun` has no default value.
-
-    Examples
-    --------
-    >>> import numpy as np, filippov as fl
-    >>> @fl.system(states=("y", "v"))
-    ... def oscillator(t, x, F=0.4, omega=1 / 3):
-    ...     y, v = x
-    ...     return v, -y + np.sin(omega * t) - F * np.sign(v)
-    >>> oscillator.params["F"], oscillator.surfaces
-    (0.4, ['v'])
-    """
-
-    def build(function: Callable[..., Any]) -> System:
-        defaults = _default_parameters(function, params or {})
-        return System(function, n=n, params=defaults, states=states, surfaces=surfaces)
-
-    return build if fun is None else build(fun)
-
-
-def _default_parameters(function: Callable[..., Any], given: Mapping[str, float]) -> dict[str, float]:
-    defaults: dict[str, float] = {}
-    for parameter in list(inspect.signature(function).parameters.values())[2:]:
-        if parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
-            continue
-        value = given.get(parameter.name, parameter.default)
-        if value is parameter.empty:
-            raise ModelError(
-                f"{name_of(function)}(): {parameter.name!r} needs a default value, in the signature or in params="
-            )
-        if isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool):
-            defaults[parameter.name] = float(value)
-    return {**defaults, **given}
-
-
-def name_of(function: Any) -> str:
-    """Return the name of a function for a message."""
-    return str(getattr(function, "__name__", type(function).__name__))

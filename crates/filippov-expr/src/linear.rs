@@ -39,7 +39,7 @@ impl Accumulated {
 
     /// The value, or 0 if nothing but rounding errors is left of it.
     fn rounded(self) -> f64 {
-        if self.value.abs() <= 8.0 * f64::EPSILON * self.magnitude {
+        if self.magnitude.is_finite() && self.value.abs() <= 8.0 * f64::EPSILON * self.magnitude {
             0.0
         } else {
             self.value

@@ -478,6 +478,3 @@ fn self_test() -> bool {
                 .all(|(a, b)| a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()))
         })
 }
-
-#[cfg(test)]
-mod tests;

@@ -33,6 +33,14 @@ impl Graph {
         if let (Some(x), Some(y)) = (self.as_constant(a), self.as_constant(b)) {
             return self.constant(op.apply(x, y));
         }
+        let is_nan = |graph: &Self, id| graph.as_constant(id).is_some_and(f64::is_nan);
+        let is_arithmetic = matches!(
+            op,
+            BinaryOp::Add | BinaryOp::Sub | BinaryOp::Mul | BinaryOp::Div
+        );
+        if is_arithmetic && (is_nan(self, a) || is_nan(self, b)) {
+            return self.constant(f64::NAN);
+        }
         match op {
             BinaryOp::Add => self.sum(a, b),
             BinaryOp::Sub => self.difference(a, b),

@@ -16,7 +16,7 @@ fn numbers() -> impl Strategy<Value = f64> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(300))]
+    #![proptest_config(support::config(300))]
 
     #[test]
     fn backends_agree_to_the_bit(

@@ -25,7 +25,7 @@ fn agrees(derivative: f64, f: impl Fn(f64) -> f64) -> Result<(), TestCaseError> 
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(600))]
+    #![proptest_config(support::config(600))]
 
     #[test]
     fn partial_agrees_with_differences(recipe in recipes(14), at in points()) {

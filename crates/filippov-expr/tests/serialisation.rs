@@ -41,7 +41,7 @@ fn exercise(mut g: Graph) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(400))]
+    #![proptest_config(support::config(400))]
 
     #[test]
     fn round_trip(recipe in recipes(60)) {

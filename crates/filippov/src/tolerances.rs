@@ -47,9 +47,15 @@ pub const ONE_SIDED_AIM: f64 = 0.87;
 /// `EPS` times the size of the state; grown by 16 up to five times.
 pub const SIDE_OFFSET: f64 = 8.0;
 
+/// A point counts as on a surface up to rounding within this multiple of the offset.
+pub const SIDE_REACH: f64 = 1e3;
+
 /// Shortest step in units of the rounding of time.
 pub const SHORTEST_STEP: f64 = 16.0 * EPS;
 
 /// A step shorter than this fraction of its recent predecessors, across which the field still
 /// changes by a third of its size, is the mark of a jump that no surface declares.
 pub const JUMP_SHRINK: f64 = 1e-2;
+
+/// That many switches without any progress of time end a run.
+pub const MOST_SWITCHES_AT_ONE_TIME: u32 = 64;

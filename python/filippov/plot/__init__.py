@@ -1,4 +1,7 @@
-"""Figures of solutions. Plotting draws and never computes. Needs Matplotlib: ``pip install filippov[plot]``."""
+"""Figures of solutions. Plotting draws and never computes.
+
+Needs Matplotlib: ``pip install filippov[plot]``.
+"""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ __all__ = ["pieces", "state_indices"]
 
 Array = npt.NDArray[np.float64]
 
-# Points over the whole interval; a step of the method is much longer than a pixel, so straight lines would show.
+# Points over the whole interval; a step is much longer than a pixel, so straight lines would show.
 _POINTS = 2000
 _FEWEST = 8
 

@@ -8,18 +8,26 @@ import numpy as np
 
 from filippov.modes import Mode
 from filippov.plot.pieces import pieces, state_indices
-from filippov.plot.style import SLIDING_WIDTH, SMOOTH_WIDTH, Theme, apply_theme, import_pyplot, mode_colours, theme
+from filippov.plot.style import (
+    SLIDING_WIDTH,
+    SMOOTH_WIDTH,
+    Theme,
+    apply_theme,
+    import_pyplot,
+    mode_colours,
+    theme,
+)
 from filippov.solution import Solution
 
 __all__ = ["time_series"]
 
-_LINE_STYLES = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1, 1, 1)))
+_LINE_STYLES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1, 1, 1)))
 _MOST_TICKS = 200
 _MOST_MODES_NAMED = 8
 
 
 def time_series(solution: Solution, ax: Any = None, states: Any = None, dark: bool = False) -> Any:
-    """Draw states over time: colour is the mode, a heavy line is sliding, the line style tells the states apart.
+    """Draw states over time: colour is the mode, a heavy line is sliding, line styles tell states apart.
 
     Parameters
     ----------
@@ -95,7 +103,13 @@ def _draw_ticks(ax: Any, solution: Solution, chosen: Theme) -> None:
     times = solution.switches.t
     if 0 < len(times) <= _MOST_TICKS:
         ax.vlines(
-            times, 0.97, 1.0, transform=ax.get_xaxis_transform(), color=chosen.ink, linewidth=0.8, clip_on=False
+            times,
+            0.97,
+            1.0,
+            transform=ax.get_xaxis_transform(),
+            color=chosen.ink,
+            linewidth=0.8,
+            clip_on=False,
         )
 
 
@@ -104,7 +118,13 @@ def _draw_strip(ax: Any, parts: list[tuple[Mode, Any, Any]], colours: dict[Mode,
     for mode, times, _ in parts:
         if len(times) > 1:
             ax.axvspan(
-                times[0], times[-1], 0.0, 0.03 if mode.is_sliding else 0.015, color=colours[mode], linewidth=0, zorder=0
+                times[0],
+                times[-1],
+                0.0,
+                0.03 if mode.is_sliding else 0.015,
+                color=colours[mode],
+                linewidth=0,
+                zorder=0,
             )
 
 
@@ -117,7 +137,9 @@ def _draw_legend(ax: Any, colours: dict[Mode, str], names: list[str], chosen: Th
         label = f"mode {mode}" + (" (sliding)" if mode.is_sliding else "")
         handles.append(Line2D([], [], color=colour, linewidth=width, label=label))
     if len(colours) > _MOST_MODES_NAMED:
-        handles.append(Line2D([], [], color="none", label=f"... {len(colours) - _MOST_MODES_NAMED} more modes"))
+        handles.append(
+            Line2D([], [], color="none", label=f"... {len(colours) - _MOST_MODES_NAMED} more modes")
+        )
     if len(names) > 1:
         palette = list(mode_colours([Mode((1,) * k) for k in range(7)], dark).values())
         for order, name in enumerate(names):

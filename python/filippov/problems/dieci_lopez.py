@@ -19,7 +19,7 @@ BETA = 0.2
 
 
 def example_4_4(t: float, x: Any, a: float = 0.0) -> list[Any]:
-    """Two relays and their product; the line ``x1 = x2 = 0`` is reached through either surface or both at once."""
+    """Two relays and their product; ``x1 = x2 = 0`` is reached through either surface or both at once."""
     u1, u2 = -np.sign(x[0]), -np.sign(x[1])
     return [u1, u2, u1 * u2 + a]
 
@@ -68,17 +68,32 @@ def example_6_4(t: float, x: Any, case: str = "i") -> Any:
 
 PROBLEMS = (
     Problem("dieci_lopez_4_4", example_4_4, (1.0, 0.4, 0.3), (0.0, 3.0), (0.0,), "x2 = 0 first, then x1 = 0"),
-    Problem("dieci_lopez_4_4_mp", example_4_4, (-0.25, 0.75, 0.0), (0.0, 3.0), (0.0,), "x1 = 0 first, then x2 = 0"),
-    Problem("dieci_lopez_4_4_plus1", example_4_4, (-0.5, 1.25, -1.0), (0.0, 3.0), (1.0,), "a = 1"),
-    Problem("dieci_lopez_4_4_simultaneous", example_4_4, (-0.5, -0.5, 0.25), (0.0, 2.0), (0.0,), "both at t = 1/2"),
-    Problem("dieci_lopez_6_1", example_6_1, (-2.0, 1.5), (0.0, 25.0), (), "transient to the stick-slip cycle"),
-    Problem("dieci_lopez_6_1_far", example_6_1, (3.0, 2.0), (0.0, 30.0), (), "transient to the stick-slip cycle"),
     Problem(
-        "dieci_lopez_6_1_cycle", example_6_1, (1.0, 0.2), (0.0, 9.230770458082978872880010083680645974847), (), "cycle"
+        "dieci_lopez_4_4_mp", example_4_4, (-0.25, 0.75, 0.0), (0.0, 3.0), (0.0,), "x1 = 0 first, then x2 = 0"
+    ),
+    Problem("dieci_lopez_4_4_plus1", example_4_4, (-0.5, 1.25, -1.0), (0.0, 3.0), (1.0,), "a = 1"),
+    Problem(
+        "dieci_lopez_4_4_simultaneous", example_4_4, (-0.5, -0.5, 0.25), (0.0, 2.0), (0.0,), "both at t = 1/2"
+    ),
+    Problem(
+        "dieci_lopez_6_1", example_6_1, (-2.0, 1.5), (0.0, 25.0), (), "transient to the stick-slip cycle"
+    ),
+    Problem(
+        "dieci_lopez_6_1_far", example_6_1, (3.0, 2.0), (0.0, 30.0), (), "transient to the stick-slip cycle"
+    ),
+    Problem(
+        "dieci_lopez_6_1_cycle",
+        example_6_1,
+        (1.0, 0.2),
+        (0.0, 9.230770458082978872880010083680645974847),
+        (),
+        "cycle",
     ),
     Problem("dieci_lopez_6_2", example_6_2, (0.5, 2.0, 0.75), (0.0, 4.0), (), "the quadric first"),
     Problem("dieci_lopez_6_2_plane_first", example_6_2, (1.5, 1.5, -1.5), (0.0, 4.0), (), "the plane first"),
-    Problem("dieci_lopez_6_4_i", example_6_4, (0.5, 0.0, 0.2, 0.1), (0.0, 60.0), ("i",), "sliding limit cycle"),
+    Problem(
+        "dieci_lopez_6_4_i", example_6_4, (0.5, 0.0, 0.2, 0.1), (0.0, 60.0), ("i",), "sliding limit cycle"
+    ),
     Problem(
         "dieci_lopez_6_4_i_cycle",
         example_6_4,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -27,11 +27,11 @@ _IDENTITIES: dict[str, Any] = {
 }
 
 
-class TracedArray(np.ndarray):  # type: ignore[type-arg]
+class TracedArray(np.ndarray):
     """A NumPy array (of objects) whose elements are traced numbers, conditions or plain numbers.
 
-    Indexing, slicing, reshaping and iteration are NumPy's own. Elementwise functions go to the traced elements;
-    NumPy's other functions run as they are on the array, except those that would look at the values.
+    Indexing, slicing, reshaping and iteration are NumPy's own. Elementwise functions go to the elements; NumPy's
+    other functions run as they are on the array, except those that would look at the values.
     """
 
     __array_priority__ = 100.0
@@ -40,12 +40,12 @@ class TracedArray(np.ndarray):  # type: ignore[type-arg]
         return apply_ufunc(ufunc, method, inputs, kwargs)
 
     def __array_function__(
-        self, func: Callable[..., Any], types: Any, args: tuple[Any, ...], kwargs: dict[str, Any]
+        self, func: Callable[..., Any], types: Any, args: Iterable[Any], kwargs: Mapping[str, Any]
     ) -> Any:
         # Imported here because the table of functions needs this module.
         from filippov.trace.array_functions import apply_function
 
-        return apply_function(func, args, kwargs)
+        return apply_function(func, tuple(args), dict(kwargs))
 
     def __setitem__(self, key: Any, value: Any) -> None:
         if isinstance(key, Condition) or (

@@ -60,11 +60,11 @@ def _select(condlist: Sequence[Any], choicelist: Sequence[Any], default: Any = 0
 
 
 def _piecewise(x: Any, condlist: Any, funclist: Sequence[Any], *args: Any, **kwargs: Any) -> Any:
-    if not isinstance(condlist, (list, tuple)) and not (isinstance(condlist, np.ndarray) and condlist.ndim > np.ndim(x)):
+    if not isinstance(condlist, (list, tuple)) and np.ndim(plain(condlist)) <= np.ndim(plain(x)):
         condlist = [condlist]
     n_pieces, n_conditions = len(funclist), len(condlist)
     if n_pieces not in (n_conditions, n_conditions + 1):
-        raise ValueError(f"with {n_conditions} condition(s), either {n_conditions} or {n_conditions + 1} functions are expected")
+        raise ValueError(f"np.piecewise: {n_conditions} conditions need as many functions, or one more")
 
     def piece(function: Any) -> Any:
         return function(x, *args, **kwargs) if callable(function) else function
@@ -77,20 +77,22 @@ def _piecewise(x: Any, condlist: Any, funclist: Sequence[Any], *args: Any, **kwa
     return result
 
 
-def _empty_like(prototype: Any, dtype: Any = None, order: str = "C", subok: bool = True, shape: Any = None, **_: Any) -> Any:
+def _empty_like(
+    prototype: Any, dtype: Any = None, order: str = "C", *_: Any, shape: Any = None, **__: Any
+) -> Any:
     return _full_like(prototype, None, shape=shape)
 
 
-def _zeros_like(a: Any, dtype: Any = None, order: str = "C", subok: bool = True, shape: Any = None, **_: Any) -> Any:
+def _zeros_like(a: Any, dtype: Any = None, order: str = "C", *_: Any, shape: Any = None, **__: Any) -> Any:
     return _full_like(a, 0.0, shape=shape)
 
 
-def _ones_like(a: Any, dtype: Any = None, order: str = "C", subok: bool = True, shape: Any = None, **_: Any) -> Any:
+def _ones_like(a: Any, dtype: Any = None, order: str = "C", *_: Any, shape: Any = None, **__: Any) -> Any:
     return _full_like(a, 1.0, shape=shape)
 
 
 def _full_like(
-    a: Any, fill_value: Any, dtype: Any = None, order: str = "C", subok: bool = True, shape: Any = None, **_: Any
+    a: Any, fill_value: Any, dtype: Any = None, order: str = "C", *_: Any, shape: Any = None, **__: Any
 ) -> Any:
     # Whatever dtype is asked for: the array will receive traced values.
     result = np.empty(np.shape(plain(a)) if shape is None else shape, dtype=object).view(TracedArray)
@@ -117,21 +119,21 @@ def _norm(x: Any, ord: Any = None, axis: Any = None, keepdims: bool = False) -> 
     vector = values.ndim == 1 or isinstance(axis, int)
     if axis is None and not vector and ord is None:
         values, vector = values.ravel(), True
-    if vector and ord not in (0, -np.inf):
-        where_ = {"axis": axis, "keepdims": keepdims}
-        values = wrap(values)
-        if ord is None or ord == 2:
-            return np.sqrt(np.sum(np.square(values), **where_))
-        if ord == np.inf:
-            return np.max(np.abs(values), **where_)
-        if ord == 1:
-            return np.sum(np.abs(values), **where_)
-        return np.sum(np.abs(values) ** ord, **where_) ** (1.0 / ord)
+    values = wrap(values)
+    options = {"axis": axis, "keepdims": keepdims}
+    if ord in (None, "fro") or (vector and ord == 2):
+        return np.sqrt(np.sum(np.square(values), **options))
+    if vector and ord == np.inf:
+        return np.max(np.abs(values), **options)
     if vector and ord == -np.inf:
-        return np.min(np.abs(wrap(values)), axis=axis, keepdims=keepdims)
-    if ord in (None, "fro"):
-        return np.sqrt(np.sum(np.square(wrap(values)), axis=axis, keepdims=keepdims))
-    raise NotTraceable(f"np.linalg.norm with ord={ord!r}", "write the norm out with np.abs, np.sum and np.max")
+        return np.min(np.abs(values), **options)
+    if vector and ord == 1:
+        return np.sum(np.abs(values), **options)
+    if vector and ord != 0:
+        return np.sum(np.abs(values) ** ord, **options) ** (1.0 / ord)
+    raise NotTraceable(
+        f"np.linalg.norm with ord={ord!r}", "write the norm out with np.abs, np.sum and np.max"
+    )
 
 
 def _solve(a: Any, b: Any) -> Any:
@@ -140,7 +142,8 @@ def _solve(a: Any, b: Any) -> Any:
         return multiply_matrices(np.linalg.inv(matrix), b)
     if matrix.shape not in ((1, 1), (2, 2), (3, 3)):
         raise NotTraceable(
-            "np.linalg.solve with a traced matrix of more than 3 rows", "write the solution out, element by element"
+            "np.linalg.solve with a traced matrix of more than 3 rows",
+            "write the solution out, element by element",
         )
     adjugate, determinant = _adjugate(wrap(matrix))
     return multiply_matrices(adjugate, b) / determinant
@@ -157,7 +160,9 @@ def _inverse(a: Any) -> Any:
 def _determinant(a: Any) -> Any:
     matrix = plain(a)
     if matrix.shape not in ((1, 1), (2, 2), (3, 3)):
-        raise NotTraceable("np.linalg.det of a traced matrix of more than 3 rows", "write the determinant out")
+        raise NotTraceable(
+            "np.linalg.det of a traced matrix of more than 3 rows", "write the determinant out"
+        )
     return _adjugate(wrap(matrix))[1]
 
 
@@ -234,7 +239,10 @@ _FUNCTIONS: dict[Any, Callable[..., Any]] = {
     np.all: _all,
     np.count_nonzero: _count_nonzero,
     np.sinc: _sinc,
-    **{getattr(np, name): _scalar_or_array(name) for name in "sum prod mean max min amax amin".split()},
+    **{
+        getattr(np, name): _scalar_or_array(name)
+        for name in ["sum", "prod", "mean", "max", "min", "amax", "amin"]
+    },
 }
 
 _REFUSED: dict[Any, str] = {

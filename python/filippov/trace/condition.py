@@ -20,8 +20,8 @@ class Condition:
     """A traced truth value, such as ``x[1] > 0``.
 
     ``np.where(condition, a, b)`` turns it into a choice by the sign of its switching function. In ``if``,
-    ``and``, ``or``, ``not`` it answers by forced branching: the tracer runs the function once for each answer.
-    In arithmetic it counts as 1 or 0, as NumPy's booleans do.
+    ``and``, ``or``, ``not`` it answers by forced branching: the tracer runs the function once for each
+    answer. In arithmetic it counts as 1 or 0, as NumPy's booleans do.
     """
 
     __slots__ = ("tracer",)

@@ -17,11 +17,19 @@ import numpy as np
 
 from filippov.errors import ModelError, TraceError
 
-__all__ = ["CLOCKS", "NotTraceable", "UserLine", "calling_line", "explain_failure", "explain_raise", "signature_of"]
+__all__ = [
+    "BLACK_BOX",
+    "CLOCKS",
+    "NotTraceable",
+    "UserLine",
+    "calling_line",
+    "explain_failure",
+    "explain_raise",
+]
 
 BLACK_BOX = (
-    "declare the switching functions yourself, surfaces=[h1, h2, ...] with h(t, x, *args): the function is then "
-    "called as it is, as a black box (slower)"
+    "declare the switching functions yourself, surfaces=[h1, h2, ...] with h(t, x, *args): the function is "
+    "then called as it is, as a black box (slower)"
 )
 CLOCKS = (
     "rounding and remainders jump infinitely often; for a clock in time declare its switching function, for "
@@ -32,15 +40,39 @@ ZEROS = (
     "np.zeros(n) and np.empty(n) hold only plain numbers"
 )
 MASK = "write np.where(mask, a, b) instead of selecting elements by a condition"
-TABLE = (
-    "a table lookup cannot be traced: write the pieces with np.where, np.select or np.piecewise"
-)
-SPELLING = "write it with NumPy functions (np.sin, np.where, ...) or their twins in filippov (fl.sin, fl.where, ...)"
+TABLE = "a table lookup cannot be traced: write the pieces with np.where, np.select or np.piecewise"
+SPELLING = "write it with NumPy functions (np.sin, np.where, ...)"
 
 _NUMPY_NAMES = {
-    **{name: f"np.{name}" for name in "sin cos tan sinh cosh tanh exp expm1 exp2 log log1p log2 log10 sqrt cbrt".split()},
-    **{name: f"np.{name}" for name in "hypot copysign fabs degrees radians isnan isinf isfinite".split()},
-    **{f"a{name}": f"np.arc{name}" for name in "sin cos tan sinh cosh tanh".split()},
+    **{
+        name: f"np.{name}"
+        for name in [
+            "sin",
+            "cos",
+            "tan",
+            "sinh",
+            "cosh",
+            "tanh",
+            "exp",
+            "expm1",
+            "exp2",
+            "log",
+            "log1p",
+            "log2",
+            "log10",
+            "sqrt",
+            "cbrt",
+            "hypot",
+            "copysign",
+            "fabs",
+            "degrees",
+            "radians",
+            "isnan",
+            "isinf",
+            "isfinite",
+        ]
+    },
+    **{f"a{name}": f"np.arc{name}" for name in ["sin", "cos", "tan", "sinh", "cosh", "tanh"]},
     "atan2": "np.arctan2",
     "pow": "np.power",
     "dist": "np.linalg.norm",
@@ -151,7 +183,7 @@ def _frames(traceback: TracebackType | None) -> Iterable[tuple[FrameType, int]]:
 
 
 def _deepest_user_line(traceback: TracebackType | None) -> UserLine | None:
-    own = [(frame, number) for frame, number in _frames(traceback) if not _is_foreign(frame.f_code.co_filename)]
+    own = [place for place in _frames(traceback) if not _is_foreign(place[0].f_code.co_filename)]
     return _line(*own[-1]) if own else None
 
 
@@ -165,12 +197,14 @@ def _line(frame: FrameType, number: int) -> UserLine:
 
 def _is_foreign(path: str) -> bool:
     """Whether a file belongs to the tracer, NumPy, SciPy or the standard library rather than to the user."""
-    here = os.path.dirname(os.path.abspath(__file__))
-    own = (here, os.path.join(os.path.dirname(here), "functions.py"), os.path.dirname(np.__file__))
+    package = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
     library = os.path.dirname(os.__file__)
+    if path.startswith(os.path.join(package, "problems") + os.sep):
+        return False
     if path.startswith(library + os.sep) and "site-packages" not in path and "dist-packages" not in path:
         return True
-    return path.startswith(own) or "<frozen" in path or _is_scipy(path) or "<__array_function__" in path
+    own = (package + os.sep, os.path.dirname(np.__file__) + os.sep)
+    return path.startswith((*own, "<frozen", "<__array_function__")) or _is_scipy(path)
 
 
 def _is_scipy(path: str) -> bool:
@@ -209,7 +243,8 @@ def _remedies(error: Exception, line: UserLine | None, on_branch: bool) -> list[
 def _remedy(error: Exception, line: UserLine | None) -> str:
     """Guess from the error and the user's line what was meant."""
     reason, text = str(error), line.text if line is not None else ""
-    scipy = [frame.f_code.co_filename for frame, _ in _frames(error.__traceback__) if _is_scipy(frame.f_code.co_filename)]
+    files = [frame.f_code.co_filename for frame, _ in _frames(error.__traceback__)]
+    scipy = [path for path in files if _is_scipy(path)]
     if any(f"{os.sep}sparse{os.sep}" in path for path in scipy):
         return "use a dense matrix: A.toarray() @ x (zeros cost nothing in the traced expression)"
     if scipy:
@@ -225,8 +260,8 @@ def _remedy(error: Exception, line: UserLine | None) -> str:
             return TABLE
     if "has no callable" in reason:
         return (
-            "NumPy cannot see traced values in np.array([...]) that also holds plain numbers: use np.stack([...]) or the "
-            "twin in filippov (fl.sin, ...)"
+            "NumPy cannot see the traced values in np.array([...]) that also holds plain numbers: "
+            "use np.stack([...])"
         )
     if re.search(r"dtype\s*=|asarray\(|np\.array\(|np\.float64\(|astype\(", text):
         return "leave out dtype=float: np.asarray(x) and np.array([...]) keep traced values"
@@ -236,7 +271,7 @@ def _remedy(error: Exception, line: UserLine | None) -> str:
 
 
 def _of_math(line: UserLine) -> str:
-    """Advice for a function of the module `math` (or `cmath`) in the user's line, imported in whatever way."""
+    """Advice for a function of the module `math` or `cmath` in the user's line, however it was imported."""
     names: dict[str, str] = {}
     for name in re.findall(r"\b(?:c?math|m)\.(\w+)\s*\(", line.text):
         names[f"math.{name}"] = name

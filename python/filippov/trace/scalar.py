@@ -279,10 +279,37 @@ def _method(name: str) -> Callable[[Scalar], Any]:
 
 
 # NumPy's loops over plain object arrays (np.array([v0, v1])) call a method of the same name on each element.
-for _name in (
-    "arccos arccosh arcsin arcsinh arctan arctanh cbrt cos cosh deg2rad degrees exp exp2 expm1 fabs log log10 "
-    "log1p log2 rad2deg radians rint sin sinh sqrt tan tanh square reciprocal"
-).split():
+for _name in [
+    "arccos",
+    "arccosh",
+    "arcsin",
+    "arcsinh",
+    "arctan",
+    "arctanh",
+    "cbrt",
+    "cos",
+    "cosh",
+    "deg2rad",
+    "degrees",
+    "exp",
+    "exp2",
+    "expm1",
+    "fabs",
+    "log",
+    "log10",
+    "log1p",
+    "log2",
+    "rad2deg",
+    "radians",
+    "rint",
+    "sin",
+    "sinh",
+    "sqrt",
+    "tan",
+    "tanh",
+    "square",
+    "reciprocal",
+]:
     setattr(Scalar, _name, _method(_name))
 
 

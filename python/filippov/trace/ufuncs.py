@@ -158,10 +158,29 @@ NATIVE = frozenset({"add", "subtract", "multiply", "divide", "true_divide", "neg
 ELEMENTS: dict[str, Element] = {
     **{
         name: _unary(name)
-        for name in (
-            "sqrt cbrt exp expm1 exp2 log log1p log2 log10 sin cos tan arcsin arccos arctan "
-            "sinh cosh tanh arcsinh arccosh arctanh"
-        ).split()
+        for name in [
+            "sqrt",
+            "cbrt",
+            "exp",
+            "expm1",
+            "exp2",
+            "log",
+            "log1p",
+            "log2",
+            "log10",
+            "sin",
+            "cos",
+            "tan",
+            "arcsin",
+            "arccos",
+            "arctan",
+            "sinh",
+            "cosh",
+            "tanh",
+            "arcsinh",
+            "arccosh",
+            "arctanh",
+        ]
     },
     **{name: _binary(name) for name in ("power", "arctan2", "hypot")},
     "float_power": _binary("power"),
@@ -211,7 +230,8 @@ ELEMENTS: dict[str, Element] = {
 }
 
 REFUSED: dict[str, str] = dict.fromkeys(
-    "floor ceil trunc rint round floor_divide remainder mod fmod divmod modf".split(), CLOCKS
+    ["floor", "ceil", "trunc", "rint", "round", "floor_divide", "remainder", "mod", "fmod", "divmod", "modf"],
+    CLOCKS,
 )
 
 

@@ -4,6 +4,24 @@
 use filippov_expr::{Backend, BinaryOp, Graph, NodeId, Program, UnaryOp};
 use proptest::prelude::*;
 
+/// How many times more cases to try than usual: the environment variable `EXPR_TEST_FACTOR`.
+fn factor() -> u32 {
+    std::env::var("EXPR_TEST_FACTOR")
+        .ok()
+        .and_then(|text| text.parse().ok())
+        .unwrap_or(1)
+}
+
+/// That many cases; failures become tests of their own, not files.
+pub fn config(cases: u32) -> ProptestConfig {
+    ProptestConfig {
+        cases: cases * factor(),
+        failure_persistence: None,
+        max_global_rejects: u32::MAX,
+        ..ProptestConfig::default()
+    }
+}
+
 pub const N_STATES: usize = 3;
 
 /// A point of evaluation.

@@ -3,19 +3,26 @@
 use super::SmoothField;
 use crate::error::FieldError;
 use crate::system::PiecewiseSystem;
-use crate::tolerances::{EPS, SIDE_OFFSET};
+use crate::tolerances::{EPS, SIDE_OFFSET, SIDE_REACH};
 
 /// The smooth field of one region: f(t, x, s) with fixed signs.
 pub struct RegionField<'a> {
     system: &'a dyn PiecewiseSystem,
     signs: Vec<f64>,
     n_evaluations: u64,
+    departing: bool,
 }
 
 impl<'a> RegionField<'a> {
     /// The field of the region with these signs.
     pub fn new(system: &'a dyn PiecewiseSystem, signs: Vec<f64>) -> Self {
-        RegionField { system, signs, n_evaluations: 0 }
+        RegionField { system, signs, n_evaluations: 0, departing: false }
+    }
+
+    /// While the motion departs tangentially from a surface, stages may lie beyond it however short
+    /// the step: a field that is not finite there is continued by its value on the surface.
+    pub fn set_departing(&mut self, departing: bool) {
+        self.departing = departing;
     }
 }
 
@@ -23,7 +30,18 @@ impl SmoothField for RegionField<'_> {
     #[inline]
     fn eval(&mut self, t: f64, x: &mut [f64], dx: &mut [f64]) -> Result<(), FieldError> {
         self.n_evaluations += 1;
-        self.system.field(t, x, &self.signs, dx)
+        self.system.field(t, x, &self.signs, dx)?;
+        if self.departing && dx.iter().any(|v| !v.is_finite()) {
+            for offset in side_offsets(x) {
+                let inside = move_inside(self.system, t, x, &self.signs, offset, f64::INFINITY)?;
+                self.system.field(t, &inside, &self.signs, dx)?;
+                self.n_evaluations += 1;
+                if dx.iter().all(|v| v.is_finite()) {
+                    break;
+                }
+            }
+        }
+        Ok(())
     }
 
     fn n_evaluations(&self) -> u64 {
@@ -31,11 +49,46 @@ impl SmoothField for RegionField<'_> {
     }
 }
 
+/// Moves a point that lies on surfaces up to rounding into the region of `signs`: off every surface
+/// that is nearer than the distance `offset`, or up to `reach` on the wrong side.
+///
+/// # Errors
+/// If a function of the user raises.
+pub fn move_inside<S: PiecewiseSystem + ?Sized>(
+    system: &S,
+    t: f64,
+    x: &[f64],
+    signs: &[f64],
+    offset: f64,
+    reach: f64,
+) -> Result<Vec<f64>, FieldError> {
+    let mut moved = x.to_vec();
+    let mut h = vec![0.0; system.n_surfaces()];
+    let mut gradient = vec![0.0; x.len()];
+    system.surfaces(t, x, signs, &mut h)?;
+    for (j, h) in h.iter().enumerate() {
+        system.gradient(j, t, x, signs, &mut gradient)?;
+        let norm2: f64 = gradient.iter().map(|g| g * g).sum();
+        let wanted = offset * norm2.sqrt();
+        if norm2 > 0.0 && signs[j] * h < wanted && h.abs() <= reach * norm2.sqrt() {
+            let shift = (signs[j] * wanted - h) / norm2;
+            moved.iter_mut().zip(&gradient).for_each(|(x, g)| *x += shift * g);
+        }
+    }
+    Ok(moved)
+}
+
+/// The offsets to try, from a few units of rounding of the state upwards.
+pub fn side_offsets(x: &[f64]) -> impl Iterator<Item = f64> {
+    let size = x.iter().fold(1.0_f64, |m, v| m.max(v.abs()));
+    (0..6).map(move |k| SIDE_OFFSET * EPS * size * 16_f64.powi(k))
+}
+
 /// Evaluates the field of one side at a point that lies on a surface up to rounding.
 ///
 /// If the field is not finite there (a power 3/2 of the distance, a black box that looks at the
-/// sign of h itself), the point is moved off the surfaces into the region of `signs` by some
-/// units of rounding, just far enough. Returns the number of evaluations.
+/// sign of h itself), the point is moved into the region of `signs`, just far enough. Returns the
+/// number of evaluations.
 ///
 /// # Errors
 /// If a function of the user raises.
@@ -47,34 +100,13 @@ pub fn eval_on_side<S: PiecewiseSystem + ?Sized>(
     dx: &mut [f64],
 ) -> Result<u64, FieldError> {
     system.field(t, x, signs, dx)?;
-    if dx.iter().all(|v| v.is_finite()) {
-        return Ok(1);
-    }
-    let n = x.len();
-    let d = system.n_surfaces();
-    let mut h = vec![0.0; d];
-    let mut gradient = vec![0.0; n];
-    let size = x.iter().fold(1.0_f64, |m, v| m.max(v.abs()));
-    let mut offset = SIDE_OFFSET * EPS * size;
     let mut evaluations = 1;
-    for _ in 0..6 {
-        let mut moved = x.to_vec();
-        system.surfaces(t, x, signs, &mut h)?;
-        for j in 0..d {
-            system.gradient(j, t, x, signs, &mut gradient)?;
-            let norm2: f64 = gradient.iter().map(|g| g * g).sum();
-            let wanted = offset * norm2.sqrt();
-            if norm2 > 0.0 && signs[j] * h[j] < wanted && h[j].abs() <= 1e3 * wanted {
-                let shift = (signs[j] * wanted - h[j]) / norm2;
-                moved.iter_mut().zip(&gradient).for_each(|(x, g)| *x += shift * g);
-            }
-        }
-        system.field(t, &moved, signs, dx)?;
-        evaluations += 1;
+    for offset in side_offsets(x) {
         if dx.iter().all(|v| v.is_finite()) {
             break;
         }
-        offset *= 16.0;
+        system.field(t, &move_inside(system, t, x, signs, offset, SIDE_REACH * offset)?, signs, dx)?;
+        evaluations += 1;
     }
     Ok(evaluations)
 }

@@ -75,18 +75,22 @@ impl Detector {
         Ok(())
     }
 
-    /// Makes the values at the end of the step those at the start of the next one.
-    pub fn accept(&mut self, monitored: &mut [Monitored]) {
+    /// Makes the values at the end of the step those at the start of the next one. Returns whether a
+    /// surface that the motion departed from is now clear.
+    pub fn accept(&mut self, monitored: &mut [Monitored]) -> bool {
+        let mut cleared = false;
         for (m, &(value, rate)) in monitored.iter_mut().zip(&self.right) {
             (m.value, m.rate) = (value, rate);
             // A zero that rounding still blurs stays divided out.
             if m.deflation.is_some() && value > 1e3 * m.noise {
                 m.deflation = None;
+                cleared = true;
             }
         }
         for stages in &mut self.stages {
             stages[0] = stages[6];
         }
+        cleared
     }
 
     /// Makes the values just measured those at the start of a motion.

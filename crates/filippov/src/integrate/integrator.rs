@@ -94,6 +94,8 @@ pub struct Integrator<'a> {
     one_sided: bool,
     /// Largest recent step of this motion.
     recent_dt: f64,
+    /// Time of the last switch, and how many came at that time.
+    pub(super) last_switch: (f64, u32),
 }
 
 impl<'a> Integrator<'a> {
@@ -129,6 +131,7 @@ impl<'a> Integrator<'a> {
             warnings: Vec::new(),
             one_sided: false,
             recent_dt: 0.0,
+            last_switch: (f64::NAN, 0),
         })
     }
 
@@ -191,13 +194,7 @@ impl<'a> Integrator<'a> {
                 self.dt = dt * self.controller.reject(error);
                 Ok(None)
             }
-            Attempt::Error(error) => {
-                self.stats.n_steps += 1;
-                self.stats.n_steps_sliding += u64::from(sliding);
-                self.dt = dt * self.controller.accept(error);
-                self.note_jump(dt);
-                self.advance(dt)
-            }
+            Attempt::Error(error) => self.advance(dt, error),
         }
     }
 
@@ -218,10 +215,15 @@ impl<'a> Integrator<'a> {
     }
 
     /// Accepts the step, or its part up to the first event.
-    fn advance(&mut self, dt: f64) -> Result<Option<Stop>, FieldError> {
+    fn advance(&mut self, dt: f64, error: f64) -> Result<Option<Stop>, FieldError> {
+        let sliding = self.motion.sliding().is_some();
         let t1 = if dt == self.t_end - self.t { self.t_end } else { self.t + dt };
         self.stepper.extend_order4(self.t, &self.x, dt);
         let found = self.detect(t1, dt)?;
+        self.stats.n_steps += 1;
+        self.stats.n_steps_sliding += u64::from(sliding);
+        self.dt = dt * self.controller.accept(error);
+        self.note_jump(dt);
         let theta = found.as_ref().map_or(1.0, |event| event.theta);
         let t_stop = if theta == 1.0 { t1 } else { self.t + theta * dt };
         if let Some(event) = self.user_zeros(theta, t_stop)? {
@@ -235,7 +237,9 @@ impl<'a> Integrator<'a> {
             self.recorder.step(self.stepper.interpolant(), t1, self.stepper.end());
             self.stepper.accept(&mut self.x);
             self.t = t1;
-            self.detector.accept(&mut self.motion.monitored);
+            if self.detector.accept(&mut self.motion.monitored) {
+                self.motion.note_departure();
+            }
             return Ok(None);
         };
         self.stepper.interpolant().at(theta, &mut self.x);

@@ -12,7 +12,7 @@ use crate::options::NonUnique;
 use crate::solution::Switch;
 use crate::stepper::initial_step;
 use crate::switching::{decide, decide_intersection, first_nonzero, Arrival, Decision, Kind, Leading};
-use crate::tolerances::SURFACE_NOISE;
+use crate::tolerances::{MOST_SWITCHES_AT_ONE_TIME, SURFACE_NOISE};
 
 /// A function that vanishes at the start of a motion, with its first non-vanishing derivative.
 #[derive(Clone, Copy, Debug)]
@@ -65,6 +65,11 @@ impl Integrator<'_> {
     /// Decides what follows the event and starts it.
     pub(super) fn switch(&mut self, event: &Found) -> Result<Option<Stop>, FieldError> {
         self.stats.n_switches += 1;
+        let repeated = if self.last_switch.0 == self.t { self.last_switch.1 + 1 } else { 0 };
+        self.last_switch = (self.t, repeated);
+        if repeated > MOST_SWITCHES_AT_ONE_TIME {
+            return Ok(Some(Stop::NoProgress));
+        }
         let signs = self.motion.signs.clone();
         let h = self.surface_values(&signs)?;
         let mut mode = self.motion.mode.clone();

@@ -7,7 +7,8 @@ use rustc_hash::FxHashMap;
 
 use super::{LieValue, PiecewiseSystem, Word};
 use crate::error::FieldError;
-use crate::tolerances::{MAX_LIE_ORDER, TANGENT};
+use crate::field::{move_inside, side_offsets};
+use crate::tolerances::{MAX_LIE_ORDER, SIDE_REACH, TANGENT};
 
 /// A system whose field and switching functions are expressions: compiled, with exact derivatives.
 ///
@@ -306,6 +307,18 @@ impl PiecewiseSystem for TracedSystem {
         };
         let mut out = vec![0.0; lie.program.n_outputs()];
         lie.program.eval(t, x, signs, &self.parameters, &[], &mut out);
+        if !out[0].is_finite() {
+            // The derivative of a one-sided field: taken just inside of its region.
+            let mut side = signs.to_vec();
+            side[j] = word.last().map_or(side[j], |&w| f64::from(w));
+            for offset in side_offsets(x) {
+                let inside = move_inside(self, t, x, &side, offset, SIDE_REACH * offset)?;
+                lie.program.eval(t, &inside, signs, &self.parameters, &[], &mut out);
+                if out[0].is_finite() {
+                    break;
+                }
+            }
+        }
         Ok(LieValue { value: out[0], magnitude: out[1..].iter().map(|v| v.abs()).sum() })
     }
 

@@ -1,0 +1,88 @@
+"""`@system`: a function with named parameters becomes a system."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, overload
+
+import numpy as np
+
+from filippov.errors import ModelError
+from filippov.events import function_name
+from filippov.system import System
+
+__all__ = ["system"]
+
+
+@overload
+def system(fun: Callable[..., Any]) -> System: ...
+@overload
+def system(
+    fun: None = None,
+    *,
+    n: int | None = None,
+    params: Mapping[str, float] | None = None,
+    states: Sequence[str] | None = None,
+    surfaces: Any = None,
+) -> Callable[[Callable[..., Any]], System]: ...
+def system(
+    fun: Callable[..., Any] | None = None,
+    *,
+    n: int | None = None,
+    params: Mapping[str, float] | None = None,
+    states: Sequence[str] | None = None,
+    surfaces: Any = None,
+) -> System | Callable[[Callable[..., Any]], System]:
+    """Turn a function ``f(t, x, a=1.0, b=2.0)`` into a `System` with the parameters `a` and `b`.
+
+    Parameters
+    ----------
+    fun : callable
+        The right-hand side. What follows ``(t, x)`` and has a number as default is a parameter.
+    n, states, surfaces
+        As for `System`.
+    params : dict, optional
+        Default values that replace or complete those of the function.
+
+    Returns
+    -------
+    System, or a decorator if `fun` is not given
+
+    Raises
+    ------
+    ModelError
+        If an argument of `fun` has no default value.
+
+    Examples
+    --------
+    >>> import numpy as np, filippov as fl
+    >>> @fl.system(states=("y", "v"))
+    ... def oscillator(t, x, F=0.4, omega=1 / 3):
+    ...     y, v = x
+    ...     return v, -y + np.sin(omega * t) - F * np.sign(v)
+    >>> oscillator.params["F"], oscillator.surfaces
+    (0.4, ['v'])
+    """
+
+    def build(function: Callable[..., Any]) -> System:
+        defaults = _default_parameters(function, params or {})
+        return System(function, n=n, params=defaults, states=states, surfaces=surfaces)
+
+    return build if fun is None else build(fun)
+
+
+def _default_parameters(function: Callable[..., Any], given: Mapping[str, float]) -> dict[str, float]:
+    defaults: dict[str, float] = {}
+    for parameter in list(inspect.signature(function).parameters.values())[2:]:
+        if parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
+            continue
+        value = given.get(parameter.name, parameter.default)
+        if value is parameter.empty:
+            raise ModelError(
+                f"{function_name(function, 'fun')}(): {parameter.name!r} needs a default value, "
+                "in the signature or in params="
+            )
+        if isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool):
+            defaults[parameter.name] = float(value)
+    return {**defaults, **given}

@@ -1,0 +1,326 @@
+"""Forced branching: a function with ``if`` is run once for every combination of answers it can meet.
+
+A comparison of traced values has no truth value of its own. When Python asks for one, the tracer answers, and
+remembers the answer with the switching function that was asked about: the *path*. The function is run again
+with the deepest answer flipped until every branch was reached (depth first). The outcomes of the paths are
+merged into choices by the sign of the switching functions, from the deepest upwards; equal branches collapse.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from filippov.errors import TraceError
+from filippov.trace.array import TracedArray, apply_ufunc
+from filippov.trace.array_functions import apply_function
+from filippov.trace.condition import Comparison, Condition
+from filippov.trace.explain import BLACK_BOX, NotTraceable, UserLine, calling_line
+from filippov.trace.scalar import Scalar
+
+if TYPE_CHECKING:
+    from filippov._core import Builder
+
+__all__ = ["MAX_DECISIONS", "Guard", "Tracer"]
+
+# A path this long comes from a loop whose length depends on the state.
+MAX_DECISIONS = 10_000
+
+
+@dataclass(frozen=True)
+class Guard:
+    """A condition on parameters alone that was decided with the values given.
+
+    The trace is valid for other values of the parameters as long as every guard keeps its sign.
+
+    Parameters
+    ----------
+    text : str
+        The expression whose sign was used.
+    sign : float
+        Its sign, over {-1, 0, +1}.
+    """
+
+    text: str
+    sign: float
+
+
+class Tracer:
+    """What one trace shares: the builder, the parameters, and the path of decisions.
+
+    Each trace has a tracer of its own and every traced value knows its tracer, so that several threads may
+    trace at once.
+
+    Parameters
+    ----------
+    builder : Builder
+        Receives the expressions.
+    t0 : float
+        Initial time.
+    y0 : ndarray, shape (n,)
+        Initial state; its length is the number of states.
+    parameters : dict of str to float
+        Parameters that stay symbolic, with the values that decide conditions on parameters alone.
+    states : sequence of str, optional
+        Names of the states in messages.
+    max_paths : int
+        Largest number of combinations of answers.
+    """
+
+    apply_ufunc = staticmethod(apply_ufunc)
+    apply_function = staticmethod(apply_function)
+
+    def __init__(
+        self,
+        builder: Builder,
+        t0: float,
+        y0: NDArray[np.float64],
+        *,
+        parameters: dict[str, float],
+        states: Sequence[str] | None,
+        max_paths: int,
+    ) -> None:
+        self.builder = builder
+        self.t0 = t0
+        self.y0 = y0
+        self.n_states = len(y0)
+        self.parameters = list(parameters)
+        self.values = np.array(list(parameters.values()), dtype=float)
+        self.states = None if states is None else list(states)
+        self.max_paths = max_paths
+        self.n_paths = 0
+        self.guards: dict[int, Guard] = {}
+        self._path: list[tuple[int, float]] = []
+        self._flipped: list[bool] = []
+        self._answers: dict[int, float] = {}
+        self._reached: dict[int, int] = {}
+        self._lines: list[UserLine | None] | None = None
+
+    # ------------------------------------------------------------- the inputs
+
+    def time(self) -> Scalar:
+        """Return the traced time."""
+        return Scalar(self, self.builder.time())
+
+    def state(self) -> TracedArray:
+        """Return a new traced state vector, shape (n,); the user's function may write into it."""
+        x = np.empty(self.n_states, dtype=object)
+        for idx in range(self.n_states):
+            x[idx] = Scalar(self, self.builder.state(idx))
+        return x.view(TracedArray)
+
+    def keywords(self) -> dict[str, Scalar]:
+        """Return the traced parameters by name."""
+        return {name: Scalar(self, self.builder.parameter(idx)) for idx, name in enumerate(self.parameters)}
+
+    # ------------------------------------------------------------ expressions
+
+    def scalar(self, node: int) -> Scalar:
+        """Return the traced number of a node."""
+        return Scalar(self, node)
+
+    def text(self, node: int) -> str:
+        """Return the printed expression of a node."""
+        return self.builder.text(node, self.states, self.parameters or None)
+
+    def operand(self, value: Any) -> int | None:
+        """Return the node of a number, traced or not; None if `value` is no number."""
+        if isinstance(value, Scalar):
+            if value.tracer is not self:
+                raise NotTraceable(
+                    "a traced value kept from an earlier call of the function",
+                    "a function must not store values of t and x for later calls",
+                )
+            return value.node
+        if isinstance(value, (float, int, np.floating, np.integer, np.bool_)):
+            return self.builder.constant(float(value))
+        if isinstance(value, Condition):
+            return value.number().node
+        if isinstance(value, np.ndarray) and value.ndim == 0:
+            return self.operand(value[()])
+        if isinstance(value, (complex, np.complexfloating)):
+            raise NotTraceable("a complex number", "split the equation into its real and imaginary parts")
+        if hasattr(value, "__float__"):
+            return self.builder.constant(float(value))
+        return None
+
+    def node(self, value: Any) -> int:
+        """Return the node of a number, traced or not.
+
+        Raises
+        ------
+        TypeError
+            If `value` is no number.
+        """
+        node = self.operand(value)
+        if node is None:
+            raise TypeError(f"{value!r} is not a number")
+        return node
+
+    def sign(self, node: int) -> int:
+        """Return the node of the sign of an expression."""
+        known = self.known_sign(node) if self.parameters else None
+        return self.builder.sign(node) if known is None else self.builder.constant(known)
+
+    def absolute(self, node: int) -> int:
+        """Return the node of the absolute value of an expression."""
+        known = self.known_sign(node) if self.parameters else None
+        if known is None:
+            return self.builder.abs(node)
+        return node if known >= 0.0 else self.builder.unary("negative", node)
+
+    def extreme(self, first: int, second: int, *, largest: bool) -> int:
+        """Return the node of the maximum or the minimum of two expressions."""
+        if self.parameters:
+            known = self.known_sign(self.builder.binary("subtract", first, second))
+            if known is not None:
+                return first if (known >= 0.0) == largest else second
+        return self.builder.maximum(first, second) if largest else self.builder.minimum(first, second)
+
+    def compare(self, node: int, *, strict: bool) -> Condition | bool:
+        """Return the condition ``expression > 0`` (``>= 0`` unless strict); its answer if it is known."""
+        known = self.known_sign(node) if self.parameters else None
+        if known is None:
+            surface, orientation = self.builder.switch(node)
+            if surface >= 0:
+                return Comparison(self, surface, orientation)
+            known = orientation
+        return known > 0.0 or (not strict and known == 0.0)
+
+    def known_sign(self, node: int) -> float | None:
+        """Return the sign of an expression of constants and parameters; None if it depends on the motion."""
+        value = self._known_value(node)
+        if value is None:
+            return None
+        sign = float(np.sign(value))
+        if self.builder.as_constant(node) is None:
+            self.guards.setdefault(node, Guard(self.text(node), sign))
+        return sign
+
+    def known_integer(self, node: int) -> int | None:
+        """Return the value of an expression of constants and parameters that is an integer, else None."""
+        value = self._known_value(node)
+        if value is None or value != np.rint(value):
+            return None
+        self.known_sign(self.builder.binary("subtract", node, self.builder.constant(value)))
+        return int(value)
+
+    def _known_value(self, node: int) -> float | None:
+        constant = self.builder.as_constant(node)
+        if constant is not None or self.builder.depends_on_motion(node):
+            return constant
+        from filippov._core import TracedSystem
+
+        system = TracedSystem(
+            self.builder, [node] * self.n_states, self.n_states, self.parameters, self.states
+        )
+        signs = np.ones(self.builder.n_surfaces())
+        return float(system.field(self.t0, self.y0, signs, self.values)[0])
+
+    # -------------------------------------------------------------- branching
+
+    def decide(self, surface: int, orientation: float) -> bool:
+        """Answer ``orientation * h_surface > 0`` on the present path; a new question gets yes first."""
+        sign = self._answers.get(surface)
+        if sign is None:
+            depth = len(self._answers)
+            if depth < len(self._path):
+                expected, sign = self._path[depth]
+                if expected != surface:
+                    raise NotTraceable(
+                        "a function that takes other decisions when it is called again",
+                        "the result must depend on t, x and the arguments alone: no random numbers, no counters",
+                    )
+            else:
+                sign = orientation
+                self._ask(surface, sign)
+            self._answers[surface] = sign
+        return orientation * sign > 0.0
+
+    def _ask(self, surface: int, sign: float) -> None:
+        if len(self._path) >= MAX_DECISIONS:
+            raise NotTraceable(
+                f"a loop whose length depends on the state (more than {MAX_DECISIONS} decisions in one call)",
+                "a loop must end after a number of turns that does not depend on t and x",
+            )
+        if self._lines is not None:
+            self._lines.append(calling_line())
+        self._path.append((surface, sign))
+        self._flipped.append(False)
+
+    def explore(self, call: Callable[[], list[int]]) -> list[int]:
+        """Run `call` on every path and return its nodes, merged into choices.
+
+        Raises
+        ------
+        TraceError
+            If there are more than `max_paths` paths, or the paths return different numbers of values.
+        """
+        self._path.clear()
+        self._flipped.clear()
+        waiting: list[list[int]] = []
+        n_paths = 0
+        while True:
+            self._answers = {}
+            outcome = call()
+            n_paths += 1
+            if n_paths + self._flipped.count(False) > self.max_paths:
+                raise self._too_many_paths(call)
+            while self._flipped and self._flipped[-1]:
+                self._flipped.pop()
+                surface, sign = self._path.pop()
+                outcome = self._merge(surface, -sign, waiting.pop(), outcome)
+            if not self._path:
+                self.n_paths = n_paths
+                return outcome
+            waiting.append(outcome)
+            surface, sign = self._path[-1]
+            self._path[-1] = (surface, -sign)
+            self._flipped[-1] = True
+
+    def _merge(self, surface: int, orientation: float, first: list[int], second: list[int]) -> list[int]:
+        if len(first) != len(second):
+            raise TraceError(f"the branches of an `if` return {len(first)} and {len(second)} values")
+        select = self.builder.select
+        return [select(surface, orientation, a, b) for a, b in zip(first, second, strict=True)]
+
+    def path_text(self) -> str:
+        """Return the decisions of the present path in words; empty if there were none."""
+        decisions = [self._decision_text(surface, sign) for surface, sign in list(self._answers.items())[:5]]
+        return " and ".join(decisions) + (" and ..." if len(self._answers) > 5 else "")
+
+    def _decision_text(self, surface: int, sign: float) -> str:
+        relation = ">" if sign > 0.0 else "<"
+        # The builder prints nodes, not surfaces; a choice is printed with its surface inside.
+        node = self.builder.select(surface, 1.0, self.builder.constant(2.0), self.builder.constant(3.0))
+        text = self.text(node)
+        end = text.rfind(" > 0, 2, 3)")
+        return f"{text[len('where(') : end]} {relation} 0" if end > 0 else f"surface {surface} {relation} 0"
+
+    def _too_many_paths(self, call: Callable[[], list[int]]) -> TraceError:
+        """Run the first path once more to learn the lines of the decisions."""
+        self._path.clear()
+        self._flipped.clear()
+        self._answers = {}
+        self._lines = []
+        call()
+        lines, self._lines = self._lines, None
+        counts: dict[str, int] = {}
+        for line in lines:
+            counts[str(line)] = counts.get(str(line), 0) + 1
+        places = "\n".join(
+            f"{line}\n    ({count} decisions)" if count > 1 else line
+            for line, count in list(counts.items())[:5]
+        )
+        return TraceError(
+            f"one call takes {len(lines)} decisions by `if` (or `and`, `or`, `not`, min, max, or by NumPy inside "
+            f"of np.array([...])): they multiply to more than {self.max_paths} paths\n{places}\nWhat to do:\n"
+            "  - write np.where(condition, a, b), np.minimum, np.maximum, np.abs or np.sign on x and its "
+            "slices: they make no paths; instead of np.array([...]) use np.stack([...])\n"
+            f"  - {BLACK_BOX}\n"
+            "  - raise max_paths, if the number of combinations is really small"
+        )

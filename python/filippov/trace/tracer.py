@@ -1,0 +1,279 @@
+"""The entry of the tracing stage: from a Python function to expressions in a builder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from filippov.errors import ModelError, TraceError
+from filippov.events import accepted_names
+from filippov.trace.branching import Guard, Tracer
+from filippov.trace.condition import Condition
+from filippov.trace.explain import explain_failure, explain_raise
+from filippov.trace.scalar import Scalar
+from filippov.trace.verify import verify
+
+if TYPE_CHECKING:
+    from filippov._core import Builder, TracedSystem
+
+__all__ = ["Trace", "trace", "trace_event"]
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Trace:
+    """A function turned into expressions.
+
+    Attributes
+    ----------
+    builder : Builder
+        Holds the expressions and the switching functions.
+    field : list of int
+        Node of each component of the field.
+    n_states : int
+        Number of states.
+    parameters : list of str
+        Names of the symbolic parameters, in the order of the vector of their values.
+    n_paths : int
+        Number of combinations of answers to ``if`` that were run; 1 without any.
+    guards : tuple of Guard
+        Conditions on parameters alone that were decided with the values given. The trace is good for other
+        values as long as they keep their signs: trace again for other values if the tuple is not empty.
+    system : TracedSystem
+        The field, compiled.
+    declared : tuple of int
+        Index of each surface that was given, in their order.
+    tracer : Tracer
+        What `trace_event` needs of the trace.
+    """
+
+    builder: Builder
+    field: list[int]
+    n_states: int
+    parameters: list[str]
+    n_paths: int
+    guards: tuple[Guard, ...]
+    system: TracedSystem
+    declared: tuple[int, ...]
+    tracer: Tracer
+
+
+def trace(
+    fun: Callable[..., Any],
+    n: int,
+    *,
+    args: tuple[Any, ...] = (),
+    parameters: Mapping[str, float] | None = None,
+    surfaces: Sequence[Callable[..., Any]] | None = None,
+    t0: float,
+    y0: NDArray[Any] | None,
+    max_paths: int = 256,
+    states: Sequence[str] | None = None,
+) -> Trace:
+    """Turn a right-hand side into expressions by calling it with traced values.
+
+    Parameters
+    ----------
+    fun : callable
+        ``fun(t, x, *args, **parameters)`` returning `n` values.
+    n : int
+        Number of states.
+    args : tuple, optional
+        Further arguments, handed over as they are; numbers among them become constants of the expression.
+    parameters : mapping of str to float, optional
+        Arguments that stay symbolic, handed over by name, with the values that decide conditions on
+        parameters alone.
+    surfaces : sequence of callables, optional
+        Switching functions ``h(t, x, *args)``, with the parameters that their signature names. They come
+        first, in this order and with their sign.
+    t0 : float
+        Initial time.
+    y0 : ndarray, shape (n,), or None
+        Initial state. The expression is compared with the function there and at points around it;
+        around the origin if None.
+    max_paths : int, optional
+        Largest number of combinations of answers to the function's ``if``.
+    states : sequence of str, optional
+        Names of the states.
+
+    Returns
+    -------
+    Trace
+
+    Raises
+    ------
+    TraceError
+        If the function cannot be traced; the message names the line and the ways out.
+    ModelError
+        If the function fails on plain numbers as well, or returns something else than `n` values.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from filippov.trace import trace
+    >>> result = trace(lambda t, x: (x[1], -x[0] - np.sign(x[1])), 2, t0=0.0, y0=np.array([1.0, 2.0]))
+    >>> result.system.surfaces()
+    ['x[1]']
+    """
+    from filippov._core import Builder, TracedSystem
+
+    start = np.zeros(n) if y0 is None else np.array(y0, dtype=float)
+    tracer = Tracer(
+        Builder(), float(t0), start, parameters=dict(parameters or {}), states=states, max_paths=max_paths
+    )
+    declared = tuple(
+        _declare(tracer, surface, args, f"surfaces[{idx}]") for idx, surface in enumerate(surfaces or ())
+    )
+    field = _explore(tracer, fun, args, "fun", n)
+    system = TracedSystem(tracer.builder, field, n, tracer.parameters, tracer.states)
+    keywords = dict(parameters or {})
+    verify(system, lambda t, x: fun(t, x, *args, **keywords), tracer.t0, start, tracer.values)
+    return Trace(
+        builder=tracer.builder,
+        field=field,
+        n_states=n,
+        parameters=tracer.parameters,
+        n_paths=tracer.n_paths,
+        guards=tuple(tracer.guards.values()),
+        system=system,
+        declared=declared,
+        tracer=tracer,
+    )
+
+
+def trace_event(traced: Trace, g: Callable[..., Any], args: tuple[Any, ...] = ()) -> int | None:
+    """Turn an event function into an expression of an existing trace.
+
+    Parameters
+    ----------
+    traced : Trace
+        The trace of the field; its builder receives the expression.
+    g : callable
+        ``g(t, x, *args) -> float``; parameters of the trace that its signature names are handed over by name.
+    args : tuple, optional
+        Further arguments of `g`.
+
+    Returns
+    -------
+    int or None
+        Node of ``g`` in ``traced.builder``. None if `g` cannot be traced, or uses a switching function that the
+        field has not: it must then be called as a Python function.
+    """
+    from filippov._core import Builder, TracedSystem
+
+    own = traced.tracer
+    scratch = _like(own, Builder())
+    n = traced.n_states
+    try:
+        node = _explore(scratch, g, args, "event", None)[0]
+        system = TracedSystem(scratch.builder, [node] * n, n, scratch.parameters, scratch.states)
+        # Traced apart first: a switching function of its own must not enter the builder of the field.
+        if not set(system.surfaces()) <= set(traced.system.surfaces()):
+            return None
+        keywords = _named(g, dict(zip(own.parameters, own.values.tolist(), strict=True)), "event")
+        repeated = lambda t, x: [g(t, x, *args, **keywords)] * n  # noqa: E731
+        verify(system, repeated, own.t0, own.y0, own.values, role="event")
+        tracer = _like(own, traced.builder)
+        tracer.guards.update(own.guards)
+        return _explore(tracer, g, args, "event", None)[0]
+    except (TraceError, ModelError):
+        return None
+
+
+def _like(tracer: Tracer, builder: Builder) -> Tracer:
+    """Return a tracer with the same inputs that writes into another builder."""
+    parameters = dict(zip(tracer.parameters, tracer.values.tolist(), strict=True))
+    return Tracer(
+        builder,
+        tracer.t0,
+        tracer.y0,
+        parameters=parameters,
+        states=tracer.states,
+        max_paths=tracer.max_paths,
+    )
+
+
+def _declare(tracer: Tracer, surface: Callable[..., Any], args: tuple[Any, ...], role: str) -> int:
+    node = _explore(tracer, surface, args, role, None)[0]
+    if tracer.builder.as_constant(node) is not None:
+        raise ModelError(f"{role} is constant: a switching function must depend on t or x")
+    return tracer.builder.declare_surface(node)
+
+
+def _explore(
+    tracer: Tracer, fun: Callable[..., Any], args: tuple[Any, ...], role: str, n: int | None
+) -> list[int]:
+    """Trace one function on all of its paths; `n` values are expected, or one number if `n` is None."""
+
+    def call() -> list[int]:
+        try:
+            result = fun(tracer.time(), tracer.state(), *args, **_named(fun, tracer.keywords(), role))
+            return _nodes(tracer, result, role, n)
+        except ModelError:
+            raise
+        except Exception as error:
+            _raise_own_failure(tracer, fun, args, role)
+            raise explain_failure(error, fun, role, tracer.path_text()) from error
+
+    return tracer.explore(call)
+
+
+def _named(fun: Callable[..., Any], keywords: dict[str, Any], role: str) -> dict[str, Any]:
+    """Return the parameters that a function takes: all for the field, those in its signature for others."""
+    if not keywords or role == "fun":
+        return keywords
+    return {name: keywords[name] for name in accepted_names(fun, keywords)}
+
+
+def _raise_own_failure(tracer: Tracer, fun: Callable[..., Any], args: tuple[Any, ...], role: str) -> None:
+    keywords = _named(fun, dict(zip(tracer.parameters, tracer.values.tolist(), strict=True)), role)
+    try:
+        with np.errstate(all="ignore"):
+            fun(tracer.t0, tracer.y0.copy(), *args, **keywords)
+    except Exception as error:
+        arguments = ["t", "x", *(repr(value)[:20] for value in args), *(f"{name}=..." for name in keywords)]
+        raise explain_raise(error, fun, role, f"{role}({', '.join(arguments)})") from error
+
+
+def _nodes(tracer: Tracer, result: Any, role: str, n: int | None) -> list[int]:
+    """Return the nodes of what a function returned, refusing other shapes than the one expected."""
+    if result is None:
+        raise ModelError(f"{role} returned None: is a `return` missing?")
+    if n is None:
+        if isinstance(result, np.ndarray) and result.size == 1:
+            result = result.reshape(())[()]
+        if isinstance(result, (list, tuple, np.ndarray)):
+            raise ModelError(f"{role} must return one number, not {len(result)}")
+        return [_node(tracer, result, role)]
+    if isinstance(result, (Scalar, Condition)) or np.isscalar(result):
+        if n == 1:
+            return [_node(tracer, result, role)]
+        raise ModelError(f"{role} returned one number for a state of {n}")
+    if isinstance(result, np.ndarray) and result.ndim != 1:
+        if result.ndim == 0:
+            return _nodes(tracer, result[()], role, n)
+        raise ModelError(
+            f"{role} returned an array of shape {result.shape} for a state of {n}: return shape ({n},), "
+            "for example with .ravel()"
+        )
+    values = list(result)
+    if len(values) != n:
+        raise ModelError(f"{role} returned {len(values)} value{'s' * (len(values) != 1)} for a state of {n}")
+    return [_node(tracer, value, role, idx) for idx, value in enumerate(values)]
+
+
+def _node(tracer: Tracer, value: Any, role: str, idx: int | None = None) -> int:
+    place = role if idx is None else f"component {idx} of {role}"
+    if isinstance(value, np.ndarray) and value.ndim > 0:
+        raise ModelError(f"{place} is an array of shape {value.shape}, not a number")
+    node = None if isinstance(value, (str, bytes)) else tracer.operand(value)
+    if node is None:
+        if value is None:
+            raise ModelError(f"{place} is None: was every element of the array filled?")
+        raise ModelError(f"{place} is {value!r:.60}, not a number")
+    return node

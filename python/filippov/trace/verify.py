@@ -1,0 +1,142 @@
+"""The check of a trace against the user's own function.
+
+A random number, a global variable or a counter is recorded as the constant that it was while tracing; nothing in
+the trace shows it. So the function is called with plain numbers at a few points and must agree there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from filippov.errors import TraceError
+from filippov.trace.explain import BLACK_BOX
+
+if TYPE_CHECKING:
+    from filippov._core import TracedSystem
+
+__all__ = ["N_POINTS", "consistent_signs", "verify"]
+
+# Points compared, the initial point included.
+N_POINTS = 5
+
+# Rewriting the expression changes its rounding errors only; a baked value differs by far more.
+_TOLERANCE = 1e-9
+
+Vector = NDArray[np.float64]
+
+
+def verify(
+    system: TracedSystem,
+    fun: Callable[[float, Vector], Any],
+    t0: float,
+    y0: Vector,
+    values: Vector,
+    *,
+    role: str = "fun",
+) -> None:
+    """Compare the traced field with the function it came from, at `y0` and at points around it.
+
+    Points on a surface, where the function raises, and where either result is not finite are skipped.
+
+    Parameters
+    ----------
+    system : TracedSystem
+        The traced field.
+    fun : callable
+        ``fun(t, x) -> sequence of n floats``, the user's function with its arguments filled in.
+    t0 : float
+        Initial time.
+    y0 : ndarray, shape (n,)
+        Initial state.
+    values : ndarray
+        Values of the parameters.
+    role : str
+        What the function is to the user.
+
+    Raises
+    ------
+    TraceError
+        If they differ by more than 1e-9 of the size of the field.
+    """
+    for idx in range(N_POINTS):
+        t, x = _point(t0, y0, idx)
+        with np.errstate(all="ignore"):
+            signs = consistent_signs(system, t, x, values)
+            if signs is None:
+                continue
+            traced = np.asarray(system.field(t, x, signs, values))
+            own = _evaluate(fun, t, x)
+        if own is None or own.shape != traced.shape or not np.isfinite(own + traced).all():
+            continue
+        difference = np.abs(own - traced)
+        scale = 1.0 + max(float(np.max(np.abs(own))), float(np.max(np.abs(traced))))
+        component = int(np.argmax(difference))
+        if difference[component] > _TOLERANCE * scale:
+            raise _disagreement(fun, role, t, x, component, own, traced)
+
+
+def consistent_signs(system: TracedSystem, t: float, x: Vector, values: Vector) -> Vector | None:
+    """Return the signs of the surfaces at a point; None if the point lies on a surface.
+
+    Surfaces may contain the signs of others, so that the signs are found by iteration.
+    """
+    signs = np.ones(system.n_surfaces)
+    if system.n_surfaces == 0:
+        return signs
+    for _ in range(system.n_surfaces + 1):
+        h = np.asarray(system.surface_values(t, x, signs, values))
+        # NaN beyond the domain of an inactive surface: either sign will do.
+        new = np.where(h < 0.0, -1.0, 1.0)
+        if np.array_equal(new, signs):
+            tiny = 1e-13 * (1.0 + float(np.max(np.abs(x), initial=0.0)))
+            return None if bool(np.any(np.abs(h) <= tiny)) else signs
+        signs = new
+    return None
+
+
+def _point(t0: float, y0: Vector, idx: int) -> tuple[float, Vector]:
+    """Return the point to compare at: the initial one, then deterministic irregular ones around it."""
+    if idx == 0:
+        return t0, y0.copy()
+    numbers = np.sin(12.9898 * np.arange(1, y0.size + 2) + 78.233 * idx) * 43758.5453
+    numbers = 2.0 * (numbers - np.floor(numbers)) - 1.0
+    t = t0 + 0.5 * (1.0 + float(numbers[-1])) * (1.0 + 0.1 * abs(t0))
+    return t, y0 + numbers[:-1] * (1.0 + np.abs(y0))
+
+
+def _evaluate(fun: Callable[[float, Vector], Any], t: float, x: Vector) -> Vector | None:
+    try:
+        return np.asarray(fun(t, x.copy()), dtype=float).reshape(-1)
+    except Exception:
+        # Outside of the function's domain there is nothing to compare.
+        return None
+
+
+def _disagreement(
+    fun: Callable[[float, Vector], Any],
+    role: str,
+    t: float,
+    x: Vector,
+    component: int,
+    own: Vector,
+    traced: Vector,
+) -> TraceError:
+    again = _evaluate(fun, t, x)
+    where = f"at t = {t:.6g}, x = {np.array2string(x, precision=6, threshold=8)}, component {component}"
+    if again is not None and again.shape == own.shape and not np.array_equal(again, own):
+        return TraceError(
+            f"{role} does not return the same value for the same arguments: {own[component]:.16g} and "
+            f"{again[component]:.16g} {where}. It uses a random number, a counter, or a variable that it "
+            "changes itself.\nWhat to do:\n  - draw random numbers before the run and pass them in `args`"
+        )
+    return TraceError(
+        f"{role} differs from its traced expression: {own[component]:.16g} by the function, "
+        f"{traced[component]:.16g} by the expression, {where}. It uses something that tracing cannot see: a "
+        "random number, a global or a stored value that changed between the calls, or a test of the type of "
+        "its arguments.\n"
+        f"What to do:\n  - compute the result from t, x and the arguments alone\n  - {BLACK_BOX}"
+    )
