@@ -120,6 +120,14 @@ def bind_function(
     return lambda t, y: g(t, y, *args, **named)
 
 
+def selective(function: Callable[..., Any], values: dict[str, float]) -> Callable[..., Any]:
+    """Return `function` so that it ignores the parameters that it does not name."""
+    named = accepted_names(function, values)
+    if len(named) == len(values):
+        return function
+    return lambda t, x, *args, **params: function(t, x, *args, **{name: params[name] for name in named})
+
+
 def accepted_names(function: Callable[..., Any], names: Any) -> list[str]:
     """Return those of `names` that can be handed to `function` by name."""
     try:

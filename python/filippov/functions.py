@@ -1,8 +1,8 @@
 """Elementary functions that work on numbers, arrays and traced values alike.
 
-They are NumPy's functions with one difference: they see traced values inside of ``np.array([...])`` and nested
-lists too, where NumPy would compare the elements one by one. In a right-hand side ``np.sin(x)`` and ``fl.sin(x)``
-are the same.
+They are NumPy's functions with one difference: they see traced values inside of ``np.array([...])`` and of
+lists too, where NumPy would compare the elements one by one. In a right-hand side ``np.sin(x)`` and
+``fl.sin(x)`` are the same.
 """
 
 from __future__ import annotations

@@ -196,7 +196,7 @@ def check_params(params: Any) -> dict[str, float]:
 
 
 def check_unknown(unknown: Mapping[str, Any], function: Callable[..., Any]) -> None:
-    """Refuse unknown keywords of `function` with a suggestion; what SciPy alone has is ignored with a warning."""
+    """Refuse unknown keywords of `function` with a suggestion; those of SciPy alone are ignored."""
     for name in unknown:
         if name == "vectorized":  # SciPy's promise that columns may be handed over; no change of the result
             continue

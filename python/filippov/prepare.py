@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from filippov._core import OpaqueSystem, SignedSystem, TracedSystem
 from filippov.errors import InputError, ModelError, TraceError
-from filippov.events import accepted_names, check_scalar_function, function_name
+from filippov.events import bind_function, check_scalar_function, function_name, selective
 from filippov.forms import Source
 from filippov.trace import Trace, trace
 
@@ -119,7 +119,7 @@ def _trace(
         n,
         args=source.args,
         parameters=values or None,
-        surfaces=[_selective(surface, values) for surface in source.surfaces] or None,
+        surfaces=[selective(surface, values) for surface in source.surfaces] or None,
         t0=t0,
         y0=np.linspace(0.3, 0.7, n) if y0 is None else y0,  # any point off the coordinate planes
         states=states,
@@ -129,14 +129,14 @@ def _trace(
 def _prepare_opaque(
     source: Source, n: int, values: dict[str, float], t0: float, y0: Array | None, reason: TraceError
 ) -> Prepared:
-    surfaces = [_bind(surface, source.args, values) for surface in source.surfaces]
+    surfaces = [bind_function(surface, source.args, values) for surface in source.surfaces]
     names = [function_name(surface, f"h{j + 1}") for j, surface in enumerate(source.surfaces)]
     core: CoreSystem
     if source.signed is not None:
         signed = source.signed
         core = SignedSystem(lambda t, x, s: signed(t, x, s, **values), surfaces, n, names)
     else:
-        fun = _bind(source.fun, source.args, values)
+        fun = bind_function(source.fun, source.args, values)
         core = OpaqueSystem(fun, surfaces, n, names)
         if y0 is not None:
             check_components(fun(t0, y0.copy()), n)
@@ -158,23 +158,6 @@ def check_components(value: Any, n: int) -> None:
         )
     if components.dtype.kind == "c":
         raise ModelError("fun: returned complex numbers; split the states into real and imaginary parts")
-
-
-def _selective(function: Callable[..., Any], values: dict[str, float]) -> Callable[..., Any]:
-    """Return `function` so that it ignores the parameters that it does not name."""
-    named = accepted_names(function, values)
-    if len(named) == len(values):
-        return function
-    return lambda t, x, *args, **params: function(t, x, *args, **{name: params[name] for name in named})
-
-
-def _bind(
-    function: Callable[..., Any], args: tuple[Any, ...], values: dict[str, float]
-) -> Callable[..., Any]:
-    named = {name: values[name] for name in accepted_names(function, values)} if values else {}
-    if not args and not named:
-        return function
-    return lambda t, x: function(t, x, *args, **named)
 
 
 def parameter_vector(values: dict[str, float]) -> Array:

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, KeysView
-from typing import TYPE_CHECKING, Any
+from importlib import import_module
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from filippov._core import Run
+from filippov.backward import ReversedRun
 from filippov.modes import Mode
+from filippov.start import StandingRun
 from filippov.switches import RunWarning, SegmentTable, SwitchTable, import_pandas
-
-if TYPE_CHECKING:
-    from filippov._core import Run
-    from filippov.start import StandingRun
 
 __all__ = ["DenseSolution", "Solution"]
 
 Array = npt.NDArray[np.float64]
+AnyRun = Run | StandingRun | ReversedRun
 
 
 class DenseSolution:
@@ -40,7 +41,7 @@ class DenseSolution:
 
     __slots__ = ("_run", "t_max", "t_min")
 
-    def __init__(self, run: Run | StandingRun, t_first: float, t_last: float) -> None:
+    def __init__(self, run: AnyRun, t_first: float, t_last: float) -> None:
         self._run = run
         self.t_min = min(t_first, t_last)
         self.t_max = max(t_first, t_last)
@@ -105,7 +106,8 @@ class DenseSolution:
         if not inside.all():
             outside = times[~inside][0]
             raise ValueError(
-                f"t: {outside:.17g} is outside of [{self.t_min:.17g}, {self.t_max:.17g}], where the solution is known"
+                f"t: {outside:.17g} is outside of [{self.t_min:.17g}, {self.t_max:.17g}], "
+                "where the solution is known"
             )
 
 
@@ -171,7 +173,7 @@ class Solution:
     @classmethod
     def from_run(
         cls,
-        run: Run | StandingRun,
+        run: AnyRun,
         *,
         t0: float,
         y0: Array,
@@ -257,12 +259,19 @@ class Solution:
         ValueError
             If `t` is outside of the interval that was computed.
         """
-        starts, ends = self.segments.t_start, self.segments.t_end
-        if not len(starts) or not min(starts[0], ends[-1]) <= t <= max(starts[0], ends[-1]):
-            raise ValueError(f"t: {t!r} is outside of the interval that was computed")
-        backward = ends[-1] < starts[0]
-        index = int(np.searchsorted(-starts if backward else starts, -t if backward else t, side="right")) - 1
-        return self.segments[index].mode
+        return self._modes_at(np.array([t], dtype=np.float64))[0]
+
+    def _modes_at(self, times: Array) -> list[Mode]:
+        starts, modes = self.segments.t_start, self.segments.mode
+        if not len(starts):
+            raise ValueError("the solution has no segments: nothing was integrated")
+        last = self.segments[-1].t_end
+        outside = (times < min(starts[0], last)) | (times > max(starts[0], last)) | np.isnan(times)
+        if outside.any():
+            raise ValueError(f"t: {times[outside][0]!r} is outside of the interval that was computed")
+        forward = 1.0 if last >= starts[0] else -1.0
+        indices = np.searchsorted(forward * starts, forward * times, side="right") - 1
+        return [modes[index] for index in indices]
 
     def to_pandas(self) -> Any:
         """Return a `pandas.DataFrame`, indexed by time, with one column per state and the mode as text.
@@ -275,7 +284,7 @@ class Solution:
         pandas = import_pandas()
         columns: dict[str, Any] = {name: self.y[i] for i, name in enumerate(self.states)}
         if self.surfaces and len(self.segments):
-            columns["mode"] = [str(self.mode_at(t)) for t in self.t]
+            columns["mode"] = [str(mode) for mode in self._modes_at(self.t)]
         return pandas.DataFrame(columns, index=pandas.Index(self.t, name="t"))
 
     def to_xarray(self) -> Any:
@@ -287,12 +296,12 @@ class Solution:
             If xarray is not installed.
         """
         try:
-            import xarray
+            xarray = import_module("xarray")
         except ImportError as error:
             raise ImportError("to_xarray() needs xarray: pip install xarray") from error
         variables: dict[str, Any] = {name: ("t", self.y[i]) for i, name in enumerate(self.states)}
         if self.surfaces and len(self.segments):
-            variables["mode"] = ("t", np.array([str(self.mode_at(t)) for t in self.t]))
+            variables["mode"] = ("t", np.array([str(mode) for mode in self._modes_at(self.t)]))
         attributes = {"message": self.message, "status": self.status, "surfaces": list(self.surfaces)}
         return xarray.Dataset(variables, coords={"t": self.t}, attrs=attributes)
 

@@ -8,14 +8,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from filippov._core import Run, TracedSystem
+from filippov._core import TracedSystem
 from filippov._core import solve as run_core
-from filippov.errors import InputError, Interrupted, NonUniqueError, TraceError
+from filippov.backward import ReversedRun, reversed_function
+from filippov.errors import InputError, Interrupted, NonUniqueError
 from filippov.events import (
     EventSpec,
     bind_function,
     check_scalar_function,
     normalise_events,
+    selective,
 )
 from filippov.options import (
     Options,
@@ -27,7 +29,7 @@ from filippov.options import (
     check_y0,
 )
 from filippov.prepare import Prepared, parameter_vector
-from filippov.solution import Solution
+from filippov.solution import AnyRun, Solution
 from filippov.start import StandingRun
 from filippov.system import System
 from filippov.trace import trace_event
@@ -182,19 +184,10 @@ def solve_ivp(
     specs = normalise_events(events)
     system, values = _as_system(fun, n, constants, params, surfaces)
     prepared = system.prepare(n, t0, state, values)
-    if t1 < t0 and prepared.surfaces:
-        raise InputError(
-            "t_span: t1 < t0 is refused for a system with surfaces: Filippov flow is not reversible "
-            f"(surfaces: {', '.join(prepared.surfaces)})"
-        )
-    core_events = _core_events(specs or [], prepared, t0, state, constants, values)
-    run: Run | StandingRun
-    if t1 == t0:
-        run = StandingRun(t0, state, len(prepared.surfaces), len(core_events), options.t_eval)
-    else:
-        run = run_core(
-            prepared.core, t0, t1, state, parameter_vector(values), options.for_core(), core_events
-        )
+    if t1 < t0:
+        prepared, specs = _backward(system, prepared, specs, state, values, t0)
+    core_events = _core_events(specs or [], prepared, t0 if t1 >= t0 else -t0, state, constants, values)
+    run = _run(prepared, t0, t1, state, values, options, core_events)
     solution = Solution.from_run(
         run,
         t0=t0,
@@ -230,6 +223,44 @@ def _as_system(
     return System(fun, n=n, params=params, surfaces=surfaces, args=args), check_params(params)
 
 
+def _backward(
+    system: System,
+    prepared: Prepared,
+    specs: list[EventSpec] | None,
+    y0: Array,
+    values: dict[str, float],
+    t0: float,
+) -> tuple[Prepared, list[EventSpec] | None]:
+    """Return the system and the events with time reversed; refuse if there are surfaces."""
+    if prepared.surfaces:
+        raise InputError(
+            "t_span: t1 < t0 is refused for a system with surfaces: Filippov flow is not reversible "
+            f"(surfaces: {', '.join(prepared.surfaces)})"
+        )
+    if specs is not None:
+        specs = [spec._replace(g=reversed_function(spec.g)) for spec in specs]
+    return system.prepare_backward(len(y0), -t0, y0, values), specs
+
+
+def _run(
+    prepared: Prepared,
+    t0: float,
+    t1: float,
+    y0: Array,
+    values: dict[str, float],
+    options: Options,
+    events: list[CoreEvent],
+) -> AnyRun:
+    p = parameter_vector(values)
+    if t1 == t0:
+        return StandingRun(t0, y0, len(prepared.surfaces), len(events), options.t_eval)
+    if t1 > t0:
+        return run_core(prepared.core, t0, t1, y0, p, options.for_core(), events)
+    if options.t_eval is not None:
+        options = options._replace(t_eval=-options.t_eval)
+    return ReversedRun(run_core(prepared.core, -t0, -t1, y0, p, options.for_core(), events))
+
+
 def _core_events(
     specs: list[EventSpec],
     prepared: Prepared,
@@ -243,21 +274,22 @@ def _core_events(
     for index, spec in enumerate(specs):
         g = bind_function(spec.g, args, values)
         check_scalar_function(g, t0, y0, f"events: entry {index} ({spec.name})")
-        node = _event_node(prepared, spec, args)
+        node = _event_node(prepared, spec, args, values)
         events.append((g if node is None else node, spec.direction, spec.terminal, spec.name))
     return events
 
 
-def _event_node(prepared: Prepared, spec: EventSpec, args: tuple[Any, ...]) -> int | None:
+def _event_node(
+    prepared: Prepared, spec: EventSpec, args: tuple[Any, ...], values: dict[str, float]
+) -> int | None:
+    """Return the handle of an event that could be traced; then no Python is called during the run."""
     if prepared.trace is None or not isinstance(prepared.core, TracedSystem):
         return None
-    try:
-        return prepared.core.event(trace_event(prepared.trace, spec.g, args=args))
-    except TraceError:
-        return None
+    node = trace_event(prepared.trace, selective(spec.g, values), args)
+    return None if node is None else prepared.core.event(node)
 
 
-def _raise_if_asked(run: Run | StandingRun, solution: Solution, options: Options) -> None:
+def _raise_if_asked(run: AnyRun, solution: Solution, options: Options) -> None:
     if run.reason == "interrupted" or isinstance(run.error, KeyboardInterrupt):
         raise Interrupted(run.message or "interrupted", partial=solution)
     if run.reason == "non_unique" and options.nonunique == "error":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from importlib import import_module
 from typing import Any, NamedTuple, overload
 
 import numpy as np
@@ -28,8 +29,8 @@ class Switch(NamedTuple):
         State just before and just after; equal unless the state is reset.
     kind : str
         ``crossing``, ``enter_sliding``, ``exit_sliding``, ``switch_sliding``, ``grazing``, ``reset``,
-        ``accumulation``, ``clock``, ``user`` or ``terminal``. Entering means that the codimension rises, leaving
-        that it falls.
+        ``accumulation``, ``clock``, ``user`` or ``terminal``. Entering means that the codimension rises,
+        leaving that it falls.
     surfaces : tuple of int
         Indices into ``system.surfaces``, several if several surfaces are met at the same instant.
     mode_before, mode_after : Mode
@@ -283,10 +284,9 @@ class SegmentTable(Sequence[Segment]):
 def import_pandas() -> Any:
     """Import pandas, or say how to install it."""
     try:
-        import pandas
+        return import_module("pandas")
     except ImportError as error:
         raise ImportError("to_pandas() needs pandas: pip install filippov[pandas]") from error
-    return pandas
 
 
 def _switch(row: tuple[Any, ...]) -> Switch:

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from filippov._core import TracedSystem
+from filippov.backward import reversed_source
 from filippov.errors import InputError, ModelError
 from filippov.events import accepted_names, function_name
 from filippov.forms import Source, base_source, check_surfaces, fields_source, relay_source
@@ -384,6 +385,20 @@ class System:
         if self._n is None:
             self._n = n
         return self._prepared
+
+    def prepare_backward(self, n: int, s0: float, y0: Array, values: dict[str, float]) -> Prepared:
+        """Return the system with time reversed, ``s = -t``; only for systems without surfaces.
+
+        Raises
+        ------
+        ModelError
+            If the Python function is not at hand, after unpickling.
+        """
+        if self._source is None:
+            raise ModelError(
+                "backward time needs the Python function, which did not travel with the pickled system"
+            )
+        return prepare(reversed_source(self._source), n, values, self._states, s0, y0)
 
     def state_names(self, n: int) -> tuple[str, ...]:
         """Return the names of `n` states."""

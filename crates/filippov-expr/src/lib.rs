@@ -32,7 +32,7 @@
 //! ```
 //!
 //! The crate knows nothing of time stepping. Modules: [`graph`] (construction, with `simplify`),
-//! [`switching`] (surfaces found and merged), [`partition`] (what depends on which sign), [`derivative`],
+//! [`switching`] (surfaces found and merged), `partition` (what depends on which sign), [`derivative`],
 //! `print`, `serial`, and [`program`] (native code by Cranelift, or a portable interpreter).
 
 pub mod derivative;
@@ -43,12 +43,13 @@ mod linear;
 mod native;
 mod node;
 mod op;
-pub mod partition;
+mod partition;
 mod print;
 pub mod program;
 mod schedule;
 mod serial;
 mod simplify;
+mod spelling;
 pub mod switching;
 mod tape;
 

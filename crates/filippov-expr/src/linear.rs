@@ -17,11 +17,30 @@ pub(crate) struct LinearForm {
     pub constant: f64,
 }
 
-/// A linear form up to a factor, coefficients rounded so that different spellings coincide.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+/// Coefficients that differ by less than this relative amount are meant to be the same: rounding errors
+/// of a few operations, while thresholds that differ in the 14th digit stay two.
+const SAME_COEFFICIENT: f64 = 32.0 * f64::EPSILON;
+
+/// A linear form up to a factor.
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct LinearKey {
-    terms: Vec<(NodeId, u64)>,
-    constant: u64,
+    /// The atoms in increasing order.
+    pub atoms: Vec<NodeId>,
+    /// Their coefficients and then the constant, divided by the first coefficient.
+    pub ratios: Vec<f64>,
+}
+
+impl LinearKey {
+    /// Whether two forms are the same up to a factor and rounding errors.
+    pub fn matches(&self, other: &LinearKey) -> bool {
+        let same = |a: f64, b: f64| (a - b).abs() <= SAME_COEFFICIENT * a.abs().max(b.abs());
+        self.atoms == other.atoms
+            && self
+                .ratios
+                .iter()
+                .zip(&other.ratios)
+                .all(|(&a, &b)| same(a, b))
+    }
 }
 
 /// A coefficient and the sum of the magnitudes that it was made of.
@@ -127,34 +146,22 @@ impl LinearForm {
     /// The magnitude that all coefficients and the constant share, if they do (to rounding).
     pub fn common_magnitude(&self) -> Option<f64> {
         let magnitude = self.terms.first()?.1.abs();
-        let is_same = |c: f64| (c.abs() - magnitude).abs() <= 8.0 * f64::EPSILON * magnitude;
+        let is_same = |c: f64| (c.abs() - magnitude).abs() <= SAME_COEFFICIENT * magnitude;
         let same = self.terms.iter().all(|term| is_same(term.1))
             && (self.constant == 0.0 || is_same(self.constant));
         same.then_some(magnitude)
     }
 
     /// The form up to a factor, and the sign of that factor. `None` without atoms.
-    ///
-    /// The coefficient of the first atom becomes 1, the others lose their last four bits: `c a - c b` with
-    /// a rounded c is `a - b`, while two thresholds that differ in the 15th digit stay two.
     pub fn key(&self) -> Option<(LinearKey, f64)> {
         let leading = self.terms.first()?.1;
-        let relative = |c: f64| {
-            let bits = (c / leading + 0.0).to_bits();
-            bits.wrapping_add(8) & !0xF
-        };
-        let terms = self
-            .terms
-            .iter()
-            .map(|&(atom, c)| (atom, relative(c)))
+        let coefficients = self.terms.iter().map(|term| term.1);
+        let ratios = coefficients
+            .chain([self.constant])
+            .map(|c| c / leading)
             .collect();
-        Some((
-            LinearKey {
-                terms,
-                constant: relative(self.constant),
-            },
-            leading.signum(),
-        ))
+        let atoms = self.terms.iter().map(|term| term.0).collect();
+        Some((LinearKey { atoms, ratios }, leading.signum()))
     }
 
     fn is_finite(&self) -> bool {

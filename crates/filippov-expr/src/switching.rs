@@ -36,20 +36,39 @@ pub enum Switching {
     },
 }
 
+/// A surface and the orientation by which its sign is multiplied.
+type Side = (u32, f64);
+
 /// The surfaces of a graph and the expressions known to switch on them.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct SurfaceTable {
     /// The switching functions h_j.
     pub functions: Vec<NodeId>,
     /// Expressions whose sign is `orientation * s_j`: a cache, and the memory of what is an absolute value.
-    pub switches: FxHashMap<NodeId, (u32, f64)>,
-    /// Surface and orientation of a linear form.
-    keys: FxHashMap<LinearKey, (u32, f64)>,
+    pub switches: FxHashMap<NodeId, Side>,
+    /// Linear forms with surface and orientation, by their atoms.
+    forms: FxHashMap<Vec<NodeId>, Vec<(LinearKey, Side)>>,
 }
 
 impl SurfaceTable {
-    pub fn switch_of(&self, id: NodeId) -> Option<(u32, f64)> {
+    pub fn switch_of(&self, id: NodeId) -> Option<Side> {
         self.switches.get(&id).copied()
+    }
+
+    /// Surface and orientation of a linear form that is known up to a factor.
+    fn switch_of_form(&self, key: &LinearKey) -> Option<Side> {
+        let candidates = self.forms.get(&key.atoms)?;
+        candidates
+            .iter()
+            .find(|known| known.0.matches(key))
+            .map(|known| known.1)
+    }
+
+    fn insert_form(&mut self, key: LinearKey, side: Side) {
+        self.forms
+            .entry(key.atoms.clone())
+            .or_default()
+            .push((key, side));
     }
 }
 
@@ -111,14 +130,14 @@ impl Graph {
                 let Some((key, lead)) = form.key() else {
                     return Switching::Constant(0.0);
                 };
-                let (index, orientation) = match self.surfaces.keys.get(&key) {
-                    Some(&known) => known,
+                let (index, orientation) = match self.surfaces.switch_of_form(&key) {
+                    Some(known) => known,
                     None => {
                         let (function, flip) = self.spell(spelling, &form);
                         let index = self.surfaces.functions.len() as u32;
                         self.surfaces.functions.push(function);
                         self.surfaces.switches.insert(function, (index, 1.0));
-                        self.surfaces.keys.insert(key, (index, lead * flip));
+                        self.surfaces.insert_form(key, (index, lead * flip));
                         (index, lead * flip)
                     }
                 };
@@ -214,10 +233,9 @@ impl Graph {
         let function = self.surface(index);
         if let Reduced::Form(_, form, side) = self.reduce(function) {
             if let Some((key, lead)) = form.key() {
-                self.surfaces
-                    .keys
-                    .entry(key)
-                    .or_insert((index, side * lead));
+                if self.surfaces.switch_of_form(&key).is_none() {
+                    self.surfaces.insert_form(key, (index, side * lead));
+                }
                 self.surfaces
                     .switches
                     .entry(function)
@@ -310,17 +328,17 @@ impl Graph {
     }
 
     /// The surface on which an expression switches, if it is known already. No new nodes, no recursion.
-    fn known_switch(&self, id: NodeId) -> Option<(u32, f64)> {
+    fn known_switch(&self, id: NodeId) -> Option<Side> {
         self.surfaces.switch_of(id).or_else(|| {
             let (key, lead) = LinearForm::of(self, id).key()?;
-            let &(index, orientation) = self.surfaces.keys.get(&key)?;
+            let (index, orientation) = self.surfaces.switch_of_form(&key)?;
             Some((index, lead * orientation))
         })
     }
 
     /// The surface whose sign alone decides that of an atom: `s_j * (something positive)`, or a select
     /// between a positive and a negative value.
-    fn sign_data(&self, atom: NodeId) -> Option<(u32, f64)> {
+    fn sign_data(&self, atom: NodeId) -> Option<Side> {
         match *self.node(atom) {
             Node::Binary(BinaryOp::Mul, left, right) => match *self.node(left) {
                 Node::Sign(j) if self.facts(right).nonnegative => Some((j, 1.0)),
@@ -381,100 +399,6 @@ impl Graph {
             rest = right;
         }
         (signs, rest)
-    }
-
-    /// The function that a new surface is printed and evaluated as, and its sign relative to the form.
-    fn spell(&mut self, spelling: NodeId, form: &LinearForm) -> (NodeId, f64) {
-        let leading = self.leading_atom(spelling, form);
-        let flip = form.coefficient(leading).signum();
-        let magnitude = form.common_magnitude();
-        // The user's own spelling, where it has neither the wrong sign nor a common factor.
-        if magnitude.is_none() || magnitude == Some(1.0) {
-            let own = if flip < 0.0 {
-                self.neg(spelling)
-            } else {
-                spelling
-            };
-            if !matches!(*self.node(own), Node::Unary(UnaryOp::Neg, _)) {
-                return (self.without_factor(own), flip);
-            }
-        }
-        let scale = flip / magnitude.unwrap_or(1.0);
-        let lead_first = std::iter::once((leading, form.coefficient(leading)));
-        let rest = form.terms.iter().copied().filter(|term| term.0 != leading);
-        let mut sum = self.constant(0.0);
-        for (atom, c) in lead_first.chain(rest) {
-            sum = self.add_multiple(sum, atom, self.rounded_factor(c * scale, magnitude));
-        }
-        let constant = self.constant(form.constant * scale);
-        (self.add(sum, constant), flip)
-    }
-
-    /// +-1 for coefficients that share their magnitude to rounding, else as they are.
-    fn rounded_factor(&self, c: f64, magnitude: Option<f64>) -> f64 {
-        if magnitude.is_some() {
-            c.signum()
-        } else {
-            c
-        }
-    }
-
-    /// `sum + c * atom`, spelled with a minus where c is negative.
-    fn add_multiple(&mut self, sum: NodeId, atom: NodeId, c: f64) -> NodeId {
-        let factor = self.constant(c.abs());
-        let term = self.mul(factor, atom);
-        if c < 0.0 {
-            self.sub(sum, term)
-        } else {
-            self.add(sum, term)
-        }
-    }
-
-    /// A node without positive constant factors in front of it or below it.
-    fn without_factor(&self, id: NodeId) -> NodeId {
-        let mut current = id;
-        loop {
-            current = match *self.node(current) {
-                Node::Binary(BinaryOp::Mul, c, a)
-                    if self.as_constant(c).is_some_and(|c| c > 0.0) =>
-                {
-                    a
-                }
-                Node::Binary(BinaryOp::Div, a, c)
-                    if self.as_constant(c).is_some_and(|c| c > 0.0) =>
-                {
-                    a
-                }
-                _ => return current,
-            }
-        }
-    }
-
-    /// The atom whose sign is made positive: the leftmost one with a state in the spelling, else the first.
-    fn leading_atom(&self, spelling: NodeId, form: &LinearForm) -> NodeId {
-        let mut current = spelling;
-        loop {
-            current = match *self.node(current) {
-                Node::Unary(UnaryOp::Neg, a) => a,
-                Node::Binary(BinaryOp::Add | BinaryOp::Sub, a, b) => {
-                    if self.facts(a).has_state {
-                        a
-                    } else {
-                        b
-                    }
-                }
-                Node::Binary(BinaryOp::Mul, c, a) if self.as_constant(c).is_some() => a,
-                Node::Binary(BinaryOp::Div, a, c) if self.as_constant(c).is_some() => a,
-                _ => break,
-            }
-        }
-        if self.facts(current).has_state && form.coefficient(current) != 0.0 {
-            return current;
-        }
-        let stateful = form.terms.iter().find(|term| self.facts(term.0).has_state);
-        stateful
-            .or(form.terms.first())
-            .map_or(spelling, |term| term.0)
     }
 }
 

@@ -1,4 +1,5 @@
 //! Native code and interpreter give the same bits, also where values are not finite.
+#![cfg(feature = "native")]
 #![allow(clippy::unwrap_used)]
 
 mod support;

@@ -1,4 +1,5 @@
 //! Compile time and evaluation time; run with `cargo test --release --test latency -- --ignored --nocapture`.
+#![cfg(feature = "native")]
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::time::Instant;

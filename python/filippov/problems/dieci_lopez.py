@@ -44,13 +44,13 @@ def example_6_2(
 ) -> list[Any]:
     """A plane and a quadric; sliding on their intersection rotates with angular speed `alpha`."""
     x1, x2, x3 = x
-    s1 = 1 if 2 * x1**2 + 2 * (x2 - x3) ** 2 > R else 0
-    s2 = 1 if x1 + x2 + x3 < Z else 0
-    q = gamma1 - k1 * s1
+    supply = k2 if x1 + x2 + x3 < Z else 0.0
+    damped = 2 * x1**2 + 2 * (x2 - x3) ** 2 > R
+    q = gamma1 - k1 if damped else gamma1
     return [
         (2 * q * x1 + 2 * alpha * x2 - 2 * alpha * x3) / 2,
-        ((-alpha - q - gamma2) * x1 + (-alpha + q - gamma2) * x2 + (alpha - q - gamma2) * x3 + k2 * s2) / 2,
-        ((alpha - q - gamma2) * x1 + (-alpha - q - gamma2) * x2 + (alpha + q - gamma2) * x3 + k2 * s2) / 2,
+        ((-alpha - q - gamma2) * x1 + (-alpha + q - gamma2) * x2 + (alpha - q - gamma2) * x3 + supply) / 2,
+        ((alpha - q - gamma2) * x1 + (-alpha - q - gamma2) * x2 + (alpha + q - gamma2) * x3 + supply) / 2,
     ]
 
 

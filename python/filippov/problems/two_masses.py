@@ -17,9 +17,9 @@ __all__ = ["PROBLEMS", "rhs"]
 def rhs(t: float, x: Any) -> Any:
     """Right-hand side; friction is 0.6 or 1 for the first mass and 0.5 or 0.2 for the second."""
     y1, y2, v1, v2 = x
-    friction1 = np.where(y1 < 0, 0.6, 1.0) * np.sign(v1)
-    friction2 = np.where(y2 < 0, 0.5, 0.2) * np.sign(v2)
-    return np.array([v1, v2, -(y1 - y2) - friction1, -(y2 - y1) - friction2])
+    roughness1 = np.where(y1 < 0, 0.6, 1.0)
+    roughness2 = np.where(y2 < 0, 0.5, 0.2)
+    return np.array([v1, v2, -(y1 - y2) - roughness1 * np.sign(v1), -(y2 - y1) - roughness2 * np.sign(v2)])
 
 
 PROBLEMS = (

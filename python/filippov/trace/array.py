@@ -30,8 +30,8 @@ _IDENTITIES: dict[str, Any] = {
 class TracedArray(np.ndarray):
     """A NumPy array (of objects) whose elements are traced numbers, conditions or plain numbers.
 
-    Indexing, slicing, reshaping and iteration are NumPy's own. Elementwise functions go to the elements; NumPy's
-    other functions run as they are on the array, except those that would look at the values.
+    Indexing, slicing, reshaping and iteration are NumPy's own. Elementwise functions go to the elements;
+    NumPy's other functions run as they are on the array, except those that would look at the values.
     """
 
     __array_priority__ = 100.0

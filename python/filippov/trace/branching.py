@@ -233,7 +233,7 @@ class Tracer:
                 if expected != surface:
                     raise NotTraceable(
                         "a function that takes other decisions when it is called again",
-                        "the result must depend on t, x and the arguments alone: no random numbers, no counters",
+                        "the result must depend on t, x and the arguments alone (no random numbers)",
                     )
             else:
                 sign = orientation
@@ -317,8 +317,9 @@ class Tracer:
             for line, count in list(counts.items())[:5]
         )
         return TraceError(
-            f"one call takes {len(lines)} decisions by `if` (or `and`, `or`, `not`, min, max, or by NumPy inside "
-            f"of np.array([...])): they multiply to more than {self.max_paths} paths\n{places}\nWhat to do:\n"
+            f"one call takes {len(lines)} decisions by `if` (or `and`, `or`, `not`, min, max, or by NumPy "
+            f"inside of np.array([...])): they multiply to more than {self.max_paths} paths\n{places}\n"
+            "What to do:\n"
             "  - write np.where(condition, a, b), np.minimum, np.maximum, np.abs or np.sign on x and its "
             "slices: they make no paths; instead of np.array([...]) use np.stack([...])\n"
             f"  - {BLACK_BOX}\n"

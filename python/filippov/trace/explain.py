@@ -258,10 +258,10 @@ def _remedy(error: Exception, line: UserLine | None) -> str:
             return MASK
         if "only integers" in reason:
             return TABLE
-    if "has no callable" in reason:
+    if "has no callable" in reason or "Cannot cast ufunc" in reason:
         return (
-            "NumPy cannot see the traced values in np.array([...]) that also holds plain numbers: "
-            "use np.stack([...])"
+            "NumPy does not hand the traced values in np.array([...]) on: put the array together with "
+            "np.stack([...]), row by row for a matrix"
         )
     if re.search(r"dtype\s*=|asarray\(|np\.array\(|np\.float64\(|astype\(", text):
         return "leave out dtype=float: np.asarray(x) and np.array([...]) keep traced values"

@@ -201,7 +201,10 @@ class Scalar:
         return constant
 
     def __int__(self) -> int:
-        return self.integer("the conversion of a traced value to an integer", CLOCKS)
+        return self.integer(
+            "the conversion of a traced value to an integer",
+            "it jumps at every integer: write the pieces with np.where, np.select or np.piecewise",
+        )
 
     def __index__(self) -> int:
         return self.integer(

@@ -161,8 +161,8 @@ def trace_event(traced: Trace, g: Callable[..., Any], args: tuple[Any, ...] = ()
     Returns
     -------
     int or None
-        Node of ``g`` in ``traced.builder``. None if `g` cannot be traced, or uses a switching function that the
-        field has not: it must then be called as a Python function.
+        Node of ``g`` in ``traced.builder``. None if `g` cannot be traced, or uses a switching function that
+        the field has not: it must then be called as a Python function.
     """
     from filippov._core import Builder, TracedSystem
 

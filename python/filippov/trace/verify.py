@@ -1,7 +1,8 @@
 """The check of a trace against the user's own function.
 
-A random number, a global variable or a counter is recorded as the constant that it was while tracing; nothing in
-the trace shows it. So the function is called with plain numbers at a few points and must agree there.
+A random number, a global variable or a counter is recorded as the constant that it was while tracing;
+nothing in the trace shows it. So the function is called with plain numbers at a few points and must agree
+there.
 """
 
 from __future__ import annotations

@@ -120,6 +120,27 @@ fn thresholds_are_shared_but_not_confused() {
     assert_eq!(surfaces(&g)[0], "v - 0.2");
 }
 
+/// The factor is rounded in both terms, differently for each factor.
+#[test]
+fn rounded_factors_are_recognised() {
+    let (mut g, _, x, v, ..) = variables();
+    let threshold = plus(&mut g, v, -0.2);
+    assert_eq!(g.switch(threshold), PLUS);
+    let difference = times(&mut g, 0.7, x);
+    let difference = g.sub(v, difference);
+    let on_difference = g.switch(difference);
+    for k in 1..2000 {
+        let c = -0.013 * f64::from(k);
+        let scaled = times(&mut g, c, v);
+        let shifted = plus(&mut g, scaled, -0.2 * c);
+        assert_eq!(g.switch(shifted), MINUS, "factor {c}");
+        let other = times(&mut g, 0.7 * c, x);
+        let scaled_difference = g.sub(other, scaled);
+        assert_eq!(g.switch(scaled_difference), on_difference, "factor {c}");
+    }
+    assert_eq!(g.n_surfaces(), 2);
+}
+
 #[test]
 fn new_surfaces_are_spelled_readably() {
     for (make, expected) in [

@@ -18,6 +18,15 @@ pub fn may_vanish(g0: f64, slope0: f64, g1: f64, slope1: f64) -> bool {
     !excluded
 }
 
+/// As [`may_vanish`], for a function that is not a polynomial of low degree along the step: the
+/// distance of its value in the middle to the cubic, four times, is added to the remainder.
+#[inline]
+pub fn may_vanish_bent(g0: f64, slope0: f64, g1: f64, slope1: f64, middle: f64) -> bool {
+    let bend = (middle - (0.5 * (g0 + g1) + 0.125 * (slope0 - slope1))).abs();
+    let shift = 4.0 * bend;
+    may_vanish(g0 - shift, slope0, g1 - shift, slope1) || !shift.is_finite()
+}
+
 /// May an exit function with these values at the stages of the step vanish inside of the step?
 #[inline]
 pub fn may_vanish_between(stages: &[f64; 7]) -> bool {

@@ -39,6 +39,8 @@ pub struct Monitored {
     pub value: f64,
     /// Rate at the start of the step (surfaces only).
     pub rate: f64,
+    /// Rate of change of the rate over the last step (surfaces only).
+    pub curvature: f64,
     /// Is the function affine in (t, x), so that the filter may exclude zeros?
     pub affine: bool,
     /// The zero divided out.
@@ -48,6 +50,17 @@ pub struct Monitored {
 }
 
 impl Monitored {
+    /// Predicted time to the next zero, from value, rate and curvature; infinite if none is ahead.
+    pub fn time_to_zero(&self) -> f64 {
+        let (value, rate, curvature) = (self.value, self.rate, self.curvature);
+        if !(rate < 0.0 && value > 0.0) {
+            return f64::INFINITY;
+        }
+        let discriminant = rate * rate - 2.0 * curvature * value;
+        // No zero of the parabola: its lowest point is the nearest approach.
+        if discriminant < 0.0 { -rate / curvature } else { 2.0 * value / (-rate + discriminant.sqrt()) }
+    }
+
     /// The value at `time` after division by the zero at the start, in units of the step `dt`.
     pub fn deflated(&self, value: f64, time: f64, dt: f64, noise: f64) -> f64 {
         let Some(Deflation { t, order, leading }) = self.deflation else { return value };

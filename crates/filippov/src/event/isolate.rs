@@ -9,10 +9,25 @@ pub type Sampled<'a> = &'a mut dyn FnMut(f64) -> Result<f64, FieldError>;
 /// The first zero, as far as it is known before it is refined.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Zero {
-    /// The function changes from positive to not positive between the two.
-    Crossing(f64, f64),
+    /// The function changes from positive to not positive in the bracket.
+    Crossing(Bracket),
     /// The function comes within rounding of zero at theta and does not change sign.
     Touch(f64),
+}
+
+/// An interval with one change of sign, from positive to not positive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bracket {
+    /// Left end.
+    pub lo: f64,
+    /// Right end.
+    pub hi: f64,
+    /// Value at the left end.
+    pub g_lo: f64,
+    /// Value at the right end.
+    pub g_hi: f64,
+    /// Where the interpolating polynomial vanishes.
+    pub guess: f64,
 }
 
 /// The result of a search, with the number of bisections it took.
@@ -56,7 +71,8 @@ pub fn first_zero_sampled(
         return Ok(Isolated { zero: None, depth: 0 });
     }
     if values[0] < -noise {
-        return Ok(Isolated { zero: Some(Zero::Crossing(a, a)), depth: 0 });
+        let here = Bracket { lo: a, hi: a, g_lo: values[0], g_hi: values[0], guess: a };
+        return Ok(Isolated { zero: Some(Zero::Crossing(here)), depth: 0 });
     }
     let mut deepest = 0;
     let zero = search(g, a, b, values, noise, 0, &mut deepest)?;
@@ -80,12 +96,9 @@ fn search(
     }
     let falls = coefficients.windows(2).all(|w| w[0] - w[1] > 2.0 * remainder);
     let unresolved = depth >= MAX_DEPTH || v.iter().all(|v| v.abs() <= noise);
-    if falls && v[0] > 0.0 && v[4] <= 0.0 || unresolved {
-        return Ok(bracket(a, b, &v, noise));
-    }
     let m = 0.5 * (a + b);
-    if m <= a || m >= b {
-        return Ok(bracket(a, b, &v, noise));
+    if falls && v[0] > 0.0 && v[4] <= 0.0 || unresolved || m <= a || m >= b {
+        return Ok(bracket(a, b, &v, &coefficients, noise));
     }
     let quarter = 0.125 * (b - a);
     let left = [v[0], g(a + quarter)?, v[1], g(a + 3.0 * quarter)?, v[2]];
@@ -97,13 +110,34 @@ fn search(
 }
 
 /// The first change of sign among the samples, else a touch if the smallest is within the noise.
-fn bracket(a: f64, b: f64, v: &[f64; 5], noise: f64) -> Option<Zero> {
+fn bracket(a: f64, b: f64, v: &[f64; 5], coefficients: &[f64; 5], noise: f64) -> Option<Zero> {
     let at = |i: usize| if i == 4 { b } else { a + (b - a) * 0.25 * i as f64 };
     if let Some(i) = (0..4).find(|&i| v[i] > 0.0 && v[i + 1] <= 0.0) {
-        return Some(Zero::Crossing(at(i), at(i + 1)));
+        let (mut low, mut high) = (0.25 * i as f64, 0.25 * (i + 1) as f64);
+        for _ in 0..40 {
+            let middle = 0.5 * (low + high);
+            if casteljau(*coefficients, middle) > 0.0 {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        let guess = a + (b - a) * low;
+        let crossing = Bracket { lo: at(i), hi: at(i + 1), g_lo: v[i], g_hi: v[i + 1], guess };
+        return Some(Zero::Crossing(crossing));
     }
     let smallest = (0..5).min_by(|&i, &j| v[i].abs().total_cmp(&v[j].abs()))?;
     (v[smallest].abs() <= noise).then(|| Zero::Touch(at(smallest)))
+}
+
+/// The polynomial with these Bernstein coefficients.
+fn casteljau(mut c: [f64; 5], x: f64) -> f64 {
+    for n in (1..5).rev() {
+        for i in 0..n {
+            c[i] += x * (c[i + 1] - c[i]);
+        }
+    }
+    c[0]
 }
 
 /// Bernstein coefficients of the quartic through values at 0, 1/4, 1/2, 3/4, 1.

@@ -1,52 +1,45 @@
 //! Location of an isolated zero to rounding.
 
-use super::isolate::Sampled;
+use super::isolate::{Bracket, Sampled};
 use crate::error::FieldError;
 use crate::tolerances::EPS;
 
-/// The zero of `g` in [lo, hi], where g(lo) and g(hi) have different signs, within `width`.
+/// The zero of `g` in the bracket, within `width` or to rounding.
 ///
-/// Regula falsi with halved retained value (Illinois), and a bisection whenever three steps did not
-/// halve the bracket. Returns the end of the final bracket with the smaller |g|.
+/// Secant steps from the guess of the isolation (a zero of a quartic, often good to five digits),
+/// kept in the bracket; a bisection whenever a step does not halve the one before. Returns the
+/// evaluated point with the smallest |g|, or the last secant step if it is shorter than `width`.
 ///
 /// # Errors
 /// If `g` raises.
-pub fn refine(g: Sampled, lo: f64, hi: f64, width: f64) -> Result<f64, FieldError> {
-    let (mut a, mut b) = (lo, hi);
-    let (mut ga, mut gb) = (g(a)?, g(b)?);
-    // Weighted values for the secant; true ones decide at the end.
-    let (mut wa, mut wb) = (ga, gb);
-    let mut retained_a = 0_i32;
-    let mut checkpoint = (b - a, 0);
-    while (b - a).abs() > width.max(2.0 * EPS * b.abs()) && ga != 0.0 && gb != 0.0 {
-        checkpoint.1 += 1;
-        let mut c = (a * wb - b * wa) / (wb - wa);
-        if checkpoint.1 > 3 {
-            if b - a > 0.5 * checkpoint.0 {
-                c = 0.5 * (a + b);
-            }
-            checkpoint = (b - a, 0);
+pub fn refine(g: Sampled, bracket: Bracket, width: f64) -> Result<f64, FieldError> {
+    let Bracket { mut lo, mut hi, g_lo, g_hi, guess } = bracket;
+    let (mut best, mut previous) = match g_lo.abs() < g_hi.abs() {
+        true => ((lo, g_lo), (lo, g_lo)),
+        false => ((hi, g_hi), (hi, g_hi)),
+    };
+    let mut at = guess.clamp(lo, hi);
+    let mut last_move = hi - lo;
+    while best.1 != 0.0 && hi - lo > width.max(EPS * hi.abs()) && at > lo && at < hi {
+        let value = g(at)?;
+        if value.abs() < best.1.abs() {
+            best = (at, value);
         }
-        if !(c > a && c < b) {
-            c = 0.5 * (a + b);
-            if c <= a || c >= b {
-                break;
-            }
-        }
-        let gc = g(c)?;
-        if (gc > 0.0) == (ga > 0.0) && gc != 0.0 {
-            (a, ga, wa) = (c, gc, gc);
-            retained_a = retained_a.min(0) - 1;
-            if retained_a < -1 {
-                wb *= 0.5;
-            }
+        // The function falls through zero: positive to the left.
+        if value > 0.0 {
+            lo = at;
         } else {
-            (b, gb, wb) = (c, gc, gc);
-            retained_a = retained_a.max(0) + 1;
-            if retained_a > 1 {
-                wa *= 0.5;
-            }
+            hi = at;
         }
+        let secant = at - value * (at - previous.0) / (value - previous.1);
+        let inside = secant > lo && secant < hi;
+        if inside && (secant - at).abs() <= 0.5 * width.max(EPS * hi.abs()) {
+            return Ok(secant);
+        }
+        let next = if inside && (secant - at).abs() <= 0.5 * last_move { secant } else { 0.5 * (lo + hi) };
+        last_move = (next - at).abs();
+        previous = (at, value);
+        at = next;
     }
-    Ok(if ga.abs() < gb.abs() { a } else { b })
+    Ok(best.0)
 }

@@ -12,10 +12,10 @@ fn find(g: impl Fn(f64) -> f64) -> Option<Zero> {
 #[test]
 fn a_double_crossing_inside_is_found() {
     for gap in [1e-1, 1e-3, 1e-5, 1e-7] {
-        let Some(Zero::Crossing(lo, hi)) = find(|x| (x - 0.4) * (x - 0.4 - gap)) else {
+        let Some(Zero::Crossing(bracket)) = find(|x| (x - 0.4) * (x - 0.4 - gap)) else {
             panic!("gap {gap}: no crossing")
         };
-        let zero = refine(&mut |x| Ok((x - 0.4) * (x - 0.4 - gap)), lo, hi, 0.0).unwrap();
+        let zero = refine(&mut |x| Ok((x - 0.4) * (x - 0.4 - gap)), bracket, 0.0).unwrap();
         assert!((zero - 0.4).abs() < 1e-9, "gap {gap}: {zero}");
     }
 }
@@ -40,8 +40,8 @@ fn an_identically_vanishing_function_has_no_zero() {
 #[test]
 fn many_oscillations_are_resolved() {
     let g = |x: f64| (60.0 * x).cos() + 0.5;
-    let Some(Zero::Crossing(lo, hi)) = find(g) else { panic!("no crossing") };
-    let zero = refine(&mut |x| Ok(g(x)), lo, hi, 0.0).unwrap();
+    let Some(Zero::Crossing(bracket)) = find(g) else { panic!("no crossing") };
+    let zero = refine(&mut |x| Ok(g(x)), bracket, 0.0).unwrap();
     assert!((zero - (2.0 * std::f64::consts::PI / 3.0) / 60.0).abs() < 1e-15);
 }
 
@@ -55,8 +55,8 @@ proptest! {
         let g = |x: f64| sign * g(x);
         let slope = |x: f64| (g(x + 1e-6) - g(x - 1e-6)) / 2e-6;
         prop_assert!(may_vanish(g(0.0), slope(0.0), g(1.0), slope(1.0)));
-        let Some(Zero::Crossing(lo, hi)) = find(g) else { return Err(TestCaseError::fail("missed")) };
-        let zero = refine(&mut |x| Ok(g(x)), lo, hi, 0.0).unwrap();
+        let Some(Zero::Crossing(bracket)) = find(g) else { return Err(TestCaseError::fail("missed")) };
+        let zero = refine(&mut |x| Ok(g(x)), bracket, 0.0).unwrap();
         prop_assert!((zero - a.min(b)).abs() < 1e-9);
     }
 }

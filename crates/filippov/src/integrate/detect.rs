@@ -3,13 +3,14 @@
 use super::integrator::Integrator;
 use super::motion::{ModeField, Motion};
 use crate::error::FieldError;
-use crate::event::filter::{may_vanish, may_vanish_between, may_vanish_deflated};
-use crate::event::isolate::{first_zero, Zero};
+use crate::event::filter::{may_vanish, may_vanish_bent, may_vanish_between, may_vanish_deflated};
+use crate::event::isolate::{first_zero_sampled, Zero};
 use crate::event::locate::refine;
 use crate::event::{EventFunction, Monitored};
+use crate::field::NormalComponents;
 use crate::stepper::Interpolant;
 use crate::system::PiecewiseSystem;
-use crate::tolerances::{EPS, EXTRAPOLATION, RESOLVED_DEPTH, SURFACE_NOISE};
+use crate::tolerances::{EPS, EXTRAPOLATION, ONE_SIDED_AIM, RESOLVED_DEPTH, SURFACE_NOISE};
 
 /// Scratch space of the event stage, and values at the end of the step.
 pub(super) struct Detector {
@@ -17,6 +18,10 @@ pub(super) struct Detector {
     pub stages: [[f64; 7]; 2],
     /// The step did not resolve a monitored function; it may not grow.
     pub unresolved: bool,
+    /// Length of the next step, if the event stage knows better than the error control.
+    pub next_dt: Option<f64>,
+    /// Normal components computed in the search of this step, by theta.
+    exits: Vec<(f64, NormalComponents)>,
     h: Vec<f64>,
     rate: Vec<f64>,
     gradient: Vec<f64>,
@@ -43,6 +48,8 @@ impl Detector {
         Detector {
             stages: [[f64::NAN; 7]; 2],
             unresolved: false,
+            next_dt: None,
+            exits: Vec::new(),
             h: vec![0.0; d],
             rate: vec![0.0; d],
             gradient: vec![0.0; n],
@@ -77,9 +84,10 @@ impl Detector {
 
     /// Makes the values at the end of the step those at the start of the next one. Returns whether a
     /// surface that the motion departed from is now clear.
-    pub fn accept(&mut self, monitored: &mut [Monitored]) -> bool {
+    pub fn accept(&mut self, monitored: &mut [Monitored], dt: f64) -> bool {
         let mut cleared = false;
         for (m, &(value, rate)) in monitored.iter_mut().zip(&self.right) {
+            m.curvature = (rate - m.rate) / dt;
             (m.value, m.rate) = (value, rate);
             // A zero that rounding still blurs stays divided out.
             if m.deflation.is_some() && value > 1e3 * m.noise {
@@ -124,6 +132,8 @@ impl Integrator<'_> {
     pub(super) fn detect(&mut self, t1: f64, dt: f64) -> Result<Option<Found>, FieldError> {
         let end = (t1, self.stepper.end(), self.stepper.end_derivative());
         self.detector.unresolved = false;
+        self.detector.exits.clear();
+        self.detector.next_dt = None;
         if self.motion.monitored.is_empty() {
             return Ok(None);
         }
@@ -150,12 +160,22 @@ impl Integrator<'_> {
         let detector = &mut self.detector;
         let motion = &mut self.motion;
         detector.suspects.clear();
+        if motion.monitored.iter().any(|m| !m.affine && matches!(m.function, EventFunction::Surface(_))) {
+            self.stepper.interpolant().at(0.5, &mut detector.x);
+            let t = self.t + 0.5 * dt;
+            self.system.surfaces(t, &detector.x, &motion.signs, &mut detector.h)?;
+            self.stats.n_surface_evaluations += 1;
+        }
         for index in 0..motion.monitored.len() {
             let m = motion.monitored[index];
             let (value, rate) = detector.right[index];
             let suspect = match (m.function, m.deflation) {
-                (EventFunction::Surface(_), None) => {
-                    !m.affine || may_vanish(m.value, m.rate * dt, value, rate * dt)
+                (EventFunction::Surface(_), None) if m.affine => {
+                    may_vanish(m.value, m.rate * dt, value, rate * dt)
+                }
+                (EventFunction::Surface(j), None) => {
+                    let middle = m.orientation * detector.h[j];
+                    may_vanish_bent(m.value, m.rate * dt, value, rate * dt, middle)
                 }
                 (EventFunction::Surface(_), Some(deflation)) => {
                     let step = (self.t, &self.x[..], self.stepper.end());
@@ -201,6 +221,7 @@ impl Integrator<'_> {
             interpolant: self.stepper.interpolant(),
             h: &mut self.detector.h,
             x: &mut self.detector.x,
+            exits: &mut self.detector.exits,
             n_evaluations: &mut self.stats.n_surface_evaluations,
         };
         let (t, dt_step) = (self.t, dt);
@@ -208,14 +229,24 @@ impl Integrator<'_> {
             let value = curve.value(&m, theta)?;
             Ok(m.deflated(value, t + theta * dt_step, dt_step, noise))
         };
-        let isolated = first_zero(&mut g, from, to, noise)?;
+        let mut values = [f64::NAN; 5];
+        for (i, value) in values.iter_mut().enumerate() {
+            let theta = from + (to - from) * 0.25 * i as f64;
+            let (start, end) = (m.value, self.detector.right[index].0);
+            *value = match theta {
+                0.0 => m.deflated(start, t, dt, noise),
+                1.0 => m.deflated(end, t + dt, dt, noise),
+                _ => g(theta)?,
+            };
+        }
+        let isolated = first_zero_sampled(&mut g, from, to, values, noise)?;
         self.detector.unresolved |= isolated.depth > RESOLVED_DEPTH;
         match isolated.zero {
             None => Ok(None),
             Some(Zero::Touch(theta)) if theta <= from => Ok(None),
             Some(Zero::Touch(theta)) => Ok(Some((theta, true))),
-            Some(Zero::Crossing(lo, hi)) => {
-                let theta = refine(&mut g, lo, hi, width)?;
+            Some(Zero::Crossing(bracket)) => {
+                let theta = refine(&mut g, bracket, width)?;
                 match grazes(&mut g, theta, from, to, noise)? {
                     Some(vertex) => Ok(Some((vertex, true))),
                     None => Ok(Some((theta, false))),
@@ -232,8 +263,17 @@ impl Integrator<'_> {
             if near {
                 self.extend(dt)?;
                 let zero = self.search(index, 1.0, EXTRAPOLATION, dt)?;
-                let within = zero.filter(|(theta, _)| self.t + theta * dt <= self.t_end);
-                self.keep_earliest(found, index, within, dt);
+                let Some((theta, _)) = zero else { continue };
+                if self.t + theta * dt > self.t_end {
+                    continue;
+                }
+                // An extrapolation that is not accurate enough still says how far to go.
+                if self.stepper.extension_defect(theta, &self.scale) > 1.0 {
+                    let gap = ONE_SIDED_AIM * (theta - 1.0) * dt;
+                    self.detector.next_dt = Some(self.detector.next_dt.map_or(gap, |d| d.min(gap)));
+                } else {
+                    self.keep_earliest(found, index, zero, dt);
+                }
             }
         }
         Ok(())
@@ -261,6 +301,8 @@ struct Curve<'a, 'b> {
     interpolant: &'a Interpolant,
     h: &'a mut [f64],
     x: &'a mut [f64],
+    /// Normal components already known along this step, by theta.
+    exits: &'a mut Vec<(f64, NormalComponents)>,
     n_evaluations: &'a mut u64,
 }
 
@@ -278,11 +320,16 @@ impl Curve<'_, '_> {
                 self.system.surfaces(t, self.x, &self.motion.signs, self.h)?;
                 Ok(m.orientation * self.h[j])
             }
-            (EventFunction::ExitMinus, ModeField::Sliding(field)) => {
-                Ok(field.normal_components(t, self.x)?.minus)
-            }
-            (EventFunction::ExitPlus, ModeField::Sliding(field)) => {
-                Ok(-field.normal_components(t, self.x)?.plus)
+            (exit, ModeField::Sliding(field)) => {
+                let known = self.exits.iter().find(|(at, _)| *at == theta).map(|(_, a)| *a);
+                let a = match known {
+                    Some(a) => a,
+                    None => field.normal_components(t, self.x)?,
+                };
+                if known.is_none() {
+                    self.exits.push((theta, a));
+                }
+                Ok(if exit == EventFunction::ExitMinus { a.minus } else { -a.plus })
             }
             // Exit functions are monitored while sliding only.
             (_, ModeField::Region(_)) => Ok(f64::NAN),

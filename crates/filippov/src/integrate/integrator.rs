@@ -17,7 +17,7 @@ use super::motion::{ModeField, Motion};
 use super::user_events::UserEvents;
 use super::{Stats, Stop, Warning, WarningCode};
 use crate::error::{Error, FieldError};
-use crate::event::UserEvent;
+use crate::event::{Monitored, UserEvent};
 use crate::field::SmoothField;
 use crate::options::Options;
 use crate::solution::{Recorder, Solution};
@@ -232,12 +232,13 @@ impl<'a> Integrator<'a> {
         if self.detector.unresolved {
             self.dt = self.dt.min(dt);
         }
-        self.one_sided = false;
+        self.one_sided = self.detector.next_dt.is_some();
+        self.dt = self.dt.min(self.detector.next_dt.unwrap_or(f64::INFINITY));
         let Some(event) = found else {
             self.recorder.step(self.stepper.interpolant(), t1, self.stepper.end());
             self.stepper.accept(&mut self.x);
             self.t = t1;
-            if self.detector.accept(&mut self.motion.monitored) {
+            if self.detector.accept(&mut self.motion.monitored, dt) {
                 self.motion.note_departure();
             }
             return Ok(None);
@@ -262,8 +263,7 @@ impl<'a> Integrator<'a> {
             .motion
             .monitored
             .iter()
-            .filter(|m| m.rate < 0.0 && m.value > 0.0)
-            .map(|m| m.value / -m.rate)
+            .map(Monitored::time_to_zero)
             .fold(f64::INFINITY, f64::min);
         let aim = ONE_SIDED_AIM * nearest;
         self.dt = if !self.one_sided && aim < dt { aim } else { 0.5 * dt };

@@ -59,6 +59,7 @@ impl<'a> Motion<'a> {
             orientation,
             value: f64::NAN,
             rate: f64::NAN,
+            curvature: 0.0,
             affine,
             deflation: deflations.iter().find(|(f, _)| *f == function).map(|(_, d)| *d),
             noise: 0.0,

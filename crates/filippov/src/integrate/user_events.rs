@@ -120,9 +120,9 @@ impl Integrator<'_> {
                     let away = (at - from).max(limit);
                     Ok(sign * self.user_value(index, from + away)? / away)
                 };
-                let Some(Zero::Crossing(lo, hi)) = first_zero(&mut g, from, theta, noise)?.zero else { break };
+                let Some(Zero::Crossing(bracket)) = first_zero(&mut g, from, theta, noise)?.zero else { break };
                 let width = 0.5 * EPS * (t0.abs() / dt).max(1.0);
-                let at = refine(&mut g, lo, hi, width)?;
+                let at = refine(&mut g, bracket, width)?;
                 let direction = self.user_events.events[index].direction;
                 if direction * sign <= 0.0 {
                     zeros.push((at, index));

@@ -27,6 +27,8 @@ pub struct Dopri5 {
     /// End of the attempted step.
     y1: Vec<f64>,
     interpolant: Interpolant,
+    /// Quartic coefficient of the free extension, kept when the extension is raised to order 5.
+    free_quartic: Vec<f64>,
     order5: bool,
 }
 
@@ -40,6 +42,7 @@ impl Dopri5 {
             stage: zeros(),
             y1: zeros(),
             interpolant: Interpolant::empty(n),
+            free_quartic: zeros(),
             order5: false,
         }
     }
@@ -186,6 +189,7 @@ impl Dopri5 {
             let at_half = dt * self.extra[1][i] - (r1[i] + 0.25 * r3[i]);
             let quintic = 16.0 * at_half;
             let quartic = (at_fifth - 0.0256 * quintic) / 0.192 - 0.2 * quintic;
+            self.free_quartic[i] = r4[i];
             if quintic.is_finite() && quartic.is_finite() {
                 r5[i] = quintic;
                 r4[i] = quartic;
@@ -193,6 +197,17 @@ impl Dopri5 {
         }
         self.order5 = true;
         Ok(&self.interpolant)
+    }
+
+    /// Distance of the extensions of order 4 and 5 at theta, in units of the tolerance: an estimate of
+    /// the error of an extrapolation. Needs the extension of order 5.
+    pub fn extension_defect(&self, theta: f64, scale: &ErrorScale) -> f64 {
+        let weight = (theta * (1.0 - theta)).powi(2);
+        let rows: Vec<&[f64]> = self.interpolant.coefficients().chunks_exact(self.y1.len()).collect();
+        let defect: Vec<f64> = (0..self.y1.len())
+            .map(|i| weight * (rows[4][i] - self.free_quartic[i] + theta * rows[5][i]))
+            .collect();
+        scale.norm(&defect, &self.y1)
     }
 
     /// The extension computed last.

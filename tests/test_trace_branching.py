@@ -1,0 +1,308 @@
+"""Forced branching of `if`, the switching functions found, parameters, declared surfaces, events."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from filippov.errors import ModelError, TraceError
+from filippov.trace import Trace, trace, trace_event
+from filippov.trace.verify import consistent_signs
+
+Y0 = np.array([0.7, -0.4])
+
+
+def trace_two(fun: Callable[..., Any], **options: Any) -> Trace:
+    return trace(fun, 2, t0=0.3, y0=Y0, **options)
+
+
+def assert_same(traced: Trace, fun: Callable[..., Any], **keywords: float) -> None:
+    """Compare the traced field with the function at random points in all regions."""
+    rng = np.random.default_rng(11)
+    values = np.array(list(keywords.values()))
+    n_compared = 0
+    for _ in range(60):
+        t, x = rng.uniform(-2.0, 2.0), rng.uniform(-2.5, 2.5, 2)
+        signs = consistent_signs(traced.system, t, x, values)
+        if signs is None:
+            continue
+        n_compared += 1
+        # Equal up to the order of the operations.
+        np.testing.assert_allclose(
+            traced.system.field(t, x, signs, values), fun(t, x.copy(), **keywords), rtol=1e-12, atol=1e-12
+        )
+    assert n_compared > 50
+
+
+def nested(t: Any, x: Any) -> Any:
+    y, v = x
+    if v > 0:
+        force = -1.0
+    elif y > 1:
+        force = 2.0
+    else:
+        force = y
+    return v, force
+
+
+def chained(t: Any, x: Any) -> Any:
+    return x[1], 1.0 if 0 < x[0] < 2 else -x[0]
+
+
+def with_logic(t: Any, x: Any) -> Any:
+    y, v = x
+    if (y > 0 and v > 0) or not (y < 1 or v < -1):
+        return v, 1.0
+    return v, -1.0
+
+
+def inside_abs(t: Any, x: Any) -> Any:
+    if abs(x[1]) > 1:
+        return x[1], -x[0]
+    return x[1], 0.0
+
+
+def by_max(t: Any, x: Any) -> Any:
+    return max(x[0], 0.5), min(x[0], x[1], 1.0)
+
+
+def early_return(t: Any, x: Any) -> Any:
+    dx = np.zeros_like(x)
+    dx[0] = x[1]
+    if t < 1:
+        return dx
+    if np.any(x > 1):
+        dx[1] = -1
+    return dx
+
+
+def by_table(t: Any, x: Any) -> Any:
+    return x[1], [2.0, -3.0][int(x[1] > 0)] + int(x[0] > 0) + float(x[0] > 1)
+
+
+def array_in_if(t: Any, x: Any) -> Any:
+    if (x > 0).all():
+        x[0] = 2 * x[0]
+    return x
+
+
+@pytest.mark.parametrize(
+    ("fun", "n_paths", "n_surfaces"),
+    [
+        (nested, 3, 2),
+        (chained, 3, 2),
+        (with_logic, 7, 4),
+        (inside_abs, 2, 2),
+        (by_max, 8, 4),
+        (early_return, 4, 3),
+        (by_table, 8, 3),
+        (array_in_if, 3, 2),
+    ],
+)
+def test_if_is_explored(fun: Callable[..., Any], n_paths: int, n_surfaces: int) -> None:
+    traced = trace_two(fun)
+    assert traced.n_paths == n_paths
+    assert traced.system.n_surfaces == n_surfaces
+    assert_same(traced, fun)
+
+
+def text_of(traced: Trace, component: int = 1) -> str:
+    return traced.builder.text(traced.field[component], None, traced.parameters or None)
+
+
+@pytest.mark.parametrize(
+    "fun",
+    [
+        lambda t, x: (x[1], np.sign(x[1]) + np.sign(-x[1]) * 3 + np.sign(2 * x[1])),
+        lambda t, x: (x[1], abs(x[1]) + abs(-x[1] / 3) + np.heaviside(x[1], 0.5)),
+        lambda t, x: (x[1], np.where(x[1] > 0, 1, 2) + np.where(0 > x[1], 1, 2) + np.where(x[1] <= 0, 5, 2)),
+        lambda t, x: (x[1], np.maximum(x[1], 0) + np.minimum(0, x[1])),
+        lambda t, x: (1 if x[1] > 0 else 2, (1 if not x[1] > 0 else 2) + (1 if -x[1] <= 0 else 7)),
+    ],
+)
+def test_spellings_of_one_switching_function_are_one_surface(fun: Callable[..., Any]) -> None:
+    traced = trace_two(fun)
+    assert traced.system.surfaces() == ["x[1]"]
+    assert traced.n_paths <= 2
+    assert_same(traced, fun)
+
+
+def test_differences_are_one_surface() -> None:
+    traced = trace_two(lambda t, x: (np.sign(x[0] - x[1]), np.maximum(x[1], x[0])))
+    assert traced.system.n_surfaces == 1
+
+
+def test_the_condition_of_the_first_minute() -> None:
+    traced = trace_two(
+        lambda t, x, F, omega: (x[1], -x[0] + np.sin(omega * t) - F * np.sign(x[1])),
+        args=(0.5, 2.0),
+        states=("y", "v"),
+    )
+    assert traced.system.surfaces() == ["v"]
+    assert (traced.n_states, traced.n_paths, traced.guards, traced.declared) == (2, 1, (), ())
+
+
+def test_equal_branches_collapse() -> None:
+    traced = trace_two(lambda t, x: (x[1], -x[0]) if x[1] > 0 else (x[1], -x[0]))
+    assert text_of(traced) == "-x[0]"
+
+
+def test_a_condition_on_constants_makes_no_surface() -> None:
+    def fun(t: Any, x: Any) -> Any:
+        zero = x[0] - x[0]
+        return x[1], 1.0 if zero >= 0 and not zero > 0 and zero == 0 else 2.0
+
+    traced = trace_two(fun)
+    assert traced.system.n_surfaces == 0
+    assert text_of(traced) == "1"
+
+
+def test_the_middle_of_sign_vanishes() -> None:
+    # On the surface the multiplier decides: there is no third region.
+    traced = trace_two(lambda t, x: (x[1], np.sign(x[1]) * np.heaviside(x[1], 0.25)))
+    at_zero = [traced.system.field(0.0, np.zeros(2), np.array([s]), np.zeros(0))[1] for s in (1.0, -1.0)]
+    assert at_zero == [1.0, 0.0]
+
+
+# ------------------------------------------------------------------ parameters
+
+
+def with_parameters(t: Any, x: Any, *, mu: Any, v0: Any) -> Any:
+    return x[1], -x[0] - mu * np.sign(x[1] - v0)
+
+
+def test_parameters_stay_symbolic() -> None:
+    traced = trace_two(with_parameters, parameters={"mu": 0.3, "v0": 0.5})
+    assert traced.parameters == ["mu", "v0"]
+    assert traced.system.surfaces() == ["x[1] - v0"]
+    assert traced.guards == ()
+    assert_same(traced, with_parameters, mu=0.7, v0=-0.2)
+
+
+def test_a_condition_on_parameters_is_decided_and_recorded() -> None:
+    def fun(t: Any, x: Any, mu: Any, n: Any) -> Any:
+        total = sum(x[0] for _ in range(n))
+        factor = abs(mu) + np.maximum(mu, 2.0) + np.sign(mu - 3)
+        if mu > 1:
+            return x[1], total * factor
+        return x[1], 0.0
+
+    traced = trace_two(fun, parameters={"mu": -1.5, "n": 3})
+    assert traced.system.n_surfaces == 0
+    assert text_of(traced) == "0"
+    assert {(guard.text, guard.sign) for guard in traced.guards} >= {("mu", -1.0), ("mu - 3", -1.0)}
+    assert any("n" in guard.text and guard.sign == 0.0 for guard in traced.guards)
+    other = trace_two(fun, parameters={"mu": 2.5, "n": 3})
+    assert_same(other, fun, mu=2.5, n=3)
+
+
+def test_equality_of_parameters_is_decided() -> None:
+    def fun(t: Any, x: Any, law: Any) -> Any:
+        return x[1], 5.0 if law == 2 else 6.0 if law else 7.0
+
+    assert [text_of(trace_two(fun, parameters={"law": law})) for law in (2, 1, 0)] == ["5", "6", "7"]
+
+
+# ------------------------------------------------------------ declared surfaces
+
+
+def test_declared_surfaces_come_first_and_keep_their_sign() -> None:
+    traced = trace_two(
+        lambda t, x, c: (np.sign(x[0] - c), np.sign(x[1])),
+        args=(0.25,),
+        surfaces=[lambda t, x, c: -x[1], lambda t, x, c: c - x[0]],
+    )
+    assert traced.declared == (0, 1)
+    h = traced.system.surface_values(0.0, np.array([2.0, 3.0]), np.ones(2), np.zeros(0))
+    np.testing.assert_array_equal(h, [-3.0, -1.75])
+    assert traced.system.n_surfaces == 2
+
+
+def test_declared_surfaces_take_the_parameters_that_they_name() -> None:
+    traced = trace_two(
+        with_parameters,
+        parameters={"mu": 0.3, "v0": 0.5},
+        surfaces=[lambda t, x, v0: v0 - x[1], lambda t, x: x[0]],
+    )
+    assert traced.system.surfaces() == ["v0 - x[1]", "x[0]"]
+
+
+def test_a_constant_surface_is_refused() -> None:
+    with pytest.raises(ModelError, match=r"surfaces\[1\] is constant"):
+        trace_two(lambda t, x: x, surfaces=[lambda t, x: x[0], lambda t, x: 1.0])
+
+
+def test_a_surface_that_cannot_be_traced_is_named() -> None:
+    with pytest.raises(TraceError, match=r"surfaces\[0\] could not be traced"):
+        trace_two(lambda t, x: x, surfaces=[lambda t, x: float(x[0])])
+
+
+# ----------------------------------------------------------------------- events
+
+
+def test_event_becomes_a_node_of_the_same_builder() -> None:
+    traced = trace_two(lambda t, x: (x[1], -np.sign(x[0])))
+    node = trace_event(traced, lambda t, x, level: abs(x[0]) - level, args=(0.5,))
+    assert node is not None
+    assert traced.builder.text(node, None, None) == "abs(x[0]) - 0.5"
+
+
+def test_event_takes_the_parameters_that_it_names() -> None:
+    traced = trace_two(with_parameters, parameters={"mu": 0.3, "v0": 0.5})
+    node = trace_event(traced, lambda t, x, v0: x[0] - v0)
+    assert node is not None
+    assert traced.builder.text(node, None, traced.parameters) == "x[0] - v0"
+
+
+@pytest.mark.parametrize(
+    "event",
+    [
+        lambda t, x: abs(x[1]),
+        lambda t, x: 1.0 if x[1] > 0 else -1.0,
+        lambda t, x: float(x[0]),
+        lambda t, x: x,
+        lambda t, x: None,
+        lambda t: t,
+    ],
+)
+def test_event_that_needs_python_leaves_the_builder_as_it_was(event: Callable[..., Any]) -> None:
+    traced = trace_two(lambda t, x: (x[1], -np.sign(x[0])))
+    assert trace_event(traced, event) is None
+    assert traced.builder.n_surfaces() == 1
+
+
+# ---------------------------------------------------------------------- threads
+
+
+def test_threads_trace_at_once() -> None:
+    barrier = threading.Barrier(4)
+    results: dict[int, Any] = {}
+
+    def work(idx: int) -> None:
+        barrier.wait(timeout=10.0)
+        for _ in range(5):
+            traced = trace_two(with_logic if idx % 2 else nested)
+            results.setdefault(idx, set()).add((traced.n_paths, text_of(traced)))
+
+    threads = [threading.Thread(target=work, args=(idx,)) for idx in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert [{paths for paths, _ in results[idx]} for idx in range(4)] == [{3}, {7}, {3}, {7}]
+    assert all(len(result) == 1 for result in results.values())
+
+
+def test_the_size_of_a_chain_does_not_multiply_paths() -> None:
+    n = 50
+
+    def chain(t: Any, x: Any) -> Any:
+        q, v = x[:n], x[n:]
+        spring = np.diff(np.concatenate([[0.0], q, [0.0]]), 2)
+        return np.concatenate([v, spring - 0.3 * np.sign(v - 1.0)])
+
+    traced = trace(chain, 2 * n, t0=0.0, y0=np.linspace(0.0, 1.0, 2 * n))
+    assert (traced.n_paths, traced.system.n_surfaces) == (1, n)
