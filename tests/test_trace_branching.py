@@ -118,7 +118,7 @@ def text_of(traced: Trace, component: int = 1) -> str:
     [
         lambda t, x: (x[1], np.sign(x[1]) + np.sign(-x[1]) * 3 + np.sign(2 * x[1])),
         lambda t, x: (x[1], abs(x[1]) + abs(-x[1] / 3) + np.heaviside(x[1], 0.5)),
-        lambda t, x: (x[1], np.where(x[1] > 0, 1, 2) + np.where(0 > x[1], 1, 2) + np.where(x[1] <= 0, 5, 2)),
+        lambda t, x: (x[1], np.where(x[1] > 0, 1, 2) + np.where(x[1] < 0, 1, 2) + np.where(x[1] <= 0, 5, 2)),
         lambda t, x: (x[1], np.maximum(x[1], 0) + np.minimum(0, x[1])),
         lambda t, x: (1 if x[1] > 0 else 2, (1 if not x[1] > 0 else 2) + (1 if -x[1] <= 0 else 7)),
     ],
@@ -146,7 +146,7 @@ def test_the_condition_of_the_first_minute() -> None:
 
 
 def test_equal_branches_collapse() -> None:
-    traced = trace_two(lambda t, x: (x[1], -x[0]) if x[1] > 0 else (x[1], -x[0]))
+    traced = trace_two(lambda t, x: (x[1], -x[0]) if x[1] > 0 else (x[1], 0.0 - x[0]))
     assert text_of(traced) == "-x[0]"
 
 

@@ -267,6 +267,14 @@ def test_too_many_paths_names_the_lines() -> None:
     assert "surfaces=[" in message
 
 
+def test_a_function_without_source_is_explained_by_its_names() -> None:
+    names: dict[str, Any] = {}
+    exec("import math\ndef typed(t, x):\n    return x[1], math.acos(x[0])", names)
+    message = refuse(names["typed"])
+    assert 'File "<string>", line 3, in typed' in message
+    assert "write np.arccos instead of math.acos" in message
+
+
 def test_raise_on_a_forced_branch() -> None:
     def guarded(t: Any, x: Any) -> Any:
         if x[0] < -5:

@@ -97,8 +97,10 @@ def test_operators_with_numbers_of_every_kind() -> None:
 FORMS: dict[str, Callable[..., Any]] = {
     "where": lambda t, x: np.where(x > 0.5, x**2, -x),
     "where of a number": lambda t, x: [np.where(x[0] > x[1], 1.0, 2.0), np.where(t < 0, x[0], 3), x[2]],
-    "where of both": lambda t, x: np.where((x > 0) & (x < 1), 1.0, np.where((x < -1) | (x > 2), x, ~(x > 1) * 2)),
-    "logical": lambda t, x: np.where(np.logical_or(x > 1, np.logical_not(np.logical_and(x > 0, t > 0))), 1, x),
+    "where of both": lambda t, x: np.where((x > 0) & (x < 1), 1.0, np.where((x < -1) | (x > 2), x, 2.0)),
+    "not": lambda t, x: ~(x > 1) * 2.0 + np.where(~(x < 0), x, 1.0),
+    "logical": lambda t, x: np.where(np.logical_or(x > 1, ~np.logical_and(x > 0, t > 0)), 1, x),
+    "logical not": lambda t, x: np.where(np.logical_not(x > 1), 1, x),
     "exclusive or": lambda t, x: np.where((x > 0) ^ (x[::-1] > 1), x, 2 * x),
     "xor of scalars": lambda t, x: [np.where(np.logical_xor(x[0] > 0, x[1] > 0), 1, 2), x[1], x[2]],
     "clip": lambda t, x: np.clip(x, -1, 1),
@@ -155,7 +157,7 @@ FORMS: dict[str, Callable[..., Any]] = {
     "determinant": lambda t, x: np.linalg.det(MASS * x[0]) * x,
     "cross": lambda t, x: np.cross(x, [1.0, 2.0, 3.0]),
     "gradient": lambda t, x: np.gradient(x),
-    "trapezoid": lambda t, x: [np.sum(np.diff(x) * x[:2]), x.ptp() if hasattr(x, "ptp") else np.ptp(x), x.var()],
+    "spread": lambda t, x: [np.sum(np.diff(x) * x[:2]), np.ptp(x), x.var()],
     "zeros_like": lambda t, x: filled(np.zeros_like(x), x),
     "empty_like": lambda t, x: filled(np.empty_like(x), x),
     "ones_like": lambda t, x: filled(np.ones_like(x, dtype=float), x),
@@ -177,6 +179,8 @@ FORMS: dict[str, Callable[..., Any]] = {
     "outer ufunc": lambda t, x: np.subtract.outer(x, x)[1],
     "out": lambda t, x: np.multiply(x, 2.0, out=np.empty_like(x)),
     "sinc": lambda t, x: np.sinc(x),
+    "vectorize": lambda t, x: np.vectorize(lambda v: v**2 if v > 0 else -v)(x),
+    "printed": lambda t, x: [x[0] if f"{x[0]:.3f}" else 0, x[1], x[2] if f"{t:g}" else 0],
     "item": lambda t, x: [x[0].item(), x[1].real + x[1].imag, x[2].copy()],
 }  # fmt: skip
 

@@ -17,7 +17,7 @@ Array = npt.NDArray[np.float64]
 
 
 def reversed_source(source: Source) -> Source:
-    """Return the source of ``dx/ds = -f(-s, x)``, whose solution at ``s = -t`` is that of ``dx/dt = f(t, x)``."""
+    """Return the source of ``dx/ds = -f(-s, x)``; with ``s = -t`` it solves ``dx/dt = f(t, x)``."""
 
     def fun(s: Any, x: Any, *args: Any, **params: Any) -> Any:
         value = source.fun(-s, x, *args, **params)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -95,9 +95,12 @@ def normalise_events(events: Any) -> list[EventSpec] | None:
     """
     if events is None:
         return None
-    entries: Sequence[Any] = [events] if callable(events) or isinstance(events, Event) else list(events)
+    if callable(events) or isinstance(events, Event):
+        events = [events]
+    if not isinstance(events, Iterable):
+        raise InputError(f"events: functions g(t, y) are needed, not {type(events).__name__}")
     specs: list[EventSpec] = []
-    for entry in entries:
+    for entry in events:
         if not isinstance(entry, Event):
             if not callable(entry):
                 raise InputError(

@@ -6,7 +6,7 @@ cannot be traced, the same field with the sign vector as data.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -159,6 +159,8 @@ def check_surfaces(surfaces: Any) -> tuple[Surface, ...]:
     """Return `surfaces` as a tuple of functions; a single function is wrapped."""
     if surfaces is None:
         return ()
+    if not callable(surfaces) and not isinstance(surfaces, Iterable):
+        raise InputError(f"surfaces: functions h(t, y) are needed, not {type(surfaces).__name__}")
     functions = (surfaces,) if callable(surfaces) else tuple(surfaces)
     for j, surface in enumerate(functions):
         if not callable(surface):

@@ -146,6 +146,10 @@ class Solution:
         Printed switching functions ``h_j``, in the order of the entries of a mode.
     states : tuple of str
         Names of the states.
+
+    Notes
+    -----
+    A copy by `pickle` has everything but `sol`, which is ``None`` there: ask for the times with `t_eval`.
     """
 
     t: Array
@@ -217,7 +221,7 @@ class Solution:
             njev=int(stats.get("njev", 0)),
             nlu=int(stats.get("nlu", 0)),
             status=run.status,
-            message=run.message,
+            message=_message(run),
             success=run.status >= 0,
             switches=SwitchTable(run.switches, surfaces, states),
             segments=SegmentTable(segments),
@@ -227,6 +231,10 @@ class Solution:
             surfaces=surfaces,
             states=states,
         )
+
+    def __getstate__(self) -> dict[str, Any]:
+        # The function holds the record of the core, which stays in its process.
+        return {**self.__dict__, "sol": None}
 
     def __getitem__(self, key: str) -> Any:
         try:
@@ -348,6 +356,13 @@ class Solution:
         if len(self.warnings) > 5:
             lines.append(f"          ... and {len(self.warnings) - 5} more in .warnings")
         return "\n".join(lines)
+
+
+def _message(run: AnyRun) -> str:
+    """Return the reason in words, with the exception of the user's function if there was one."""
+    if run.error is None or isinstance(run.error, KeyboardInterrupt):
+        return run.message
+    return f"{run.message} {type(run.error).__name__}: {run.error}"
 
 
 def _short(values: Array) -> str:

@@ -188,6 +188,8 @@ def solve_ivp(
         prepared, specs = _backward(system, prepared, specs, state, values, t0)
     core_events = _core_events(specs or [], prepared, t0 if t1 >= t0 else -t0, state, constants, values)
     run = _run(prepared, t0, t1, state, values, options, core_events)
+    if options.progress is not None and len(run.t):
+        options.progress(float(run.t[-1]))
     solution = Solution.from_run(
         run,
         t0=t0,

@@ -126,8 +126,8 @@ class System:
         --------
         >>> import filippov as fl
         >>> relay = fl.System.from_fields({+1: [-1.0, 1.0], -1: [2.0, 0.0]}, lambda t, x: x[0], n=2)
-        >>> relay.surfaces, relay.field(0.0, [0.0, 0.0], "0")
-        (['x[0]'], array([0.        , 0.66666667]))
+        >>> relay.surfaces, relay.field(0.0, [0.0, 0.0], "0").round(6).tolist()
+        (['x[0]'], [0.0, 0.666667])
         """
         return cls._from_source(fields_source(fields, surfaces), n, params, states)
 
@@ -299,8 +299,10 @@ class System:
         --------
         >>> import numpy as np, filippov as fl
         >>> system = fl.System(lambda t, x: [-np.sign(x[0]) + 0.3], n=1)
-        >>> [system.field(0.0, [0.0], mode).tolist() for mode in "+-0"]
-        [[-0.7], [1.3], [0.0]]
+        >>> [round(float(system.field(0.0, [0.0], mode)[0]), 12) for mode in "+-"]
+        [-0.7, 1.3]
+        >>> bool(abs(system.field(0.0, [0.0], "0")[0]) < 1e-12)
+        True
         """
         state = check_y0(x)
         values = self.parameter_values(params)
@@ -395,9 +397,7 @@ class System:
             If the Python function is not at hand, after unpickling.
         """
         if self._source is None:
-            raise ModelError(
-                "backward time needs the Python function, which did not travel with the pickled system"
-            )
+            raise ModelError("backward time needs the Python function, which did not travel with the system")
         return prepare(reversed_source(self._source), n, values, self._states, s0, y0)
 
     def state_names(self, n: int) -> tuple[str, ...]:

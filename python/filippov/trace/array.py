@@ -113,6 +113,9 @@ def apply_ufunc(ufunc: np.ufunc, method: str, inputs: tuple[Any, ...], kwargs: d
         loop = ufunc
     elif name in ELEMENTS:
         loop = _loop(name)
+    elif ufunc.types == ["O" * ufunc.nin + "->" + "O" * ufunc.nout]:
+        # Made by np.frompyfunc or np.vectorize: it calls a function of the user on each element.
+        loop = ufunc
     else:
         raise refuse(name)
     result = getattr(loop, method)(*[plain(value) for value in inputs], **kwargs)

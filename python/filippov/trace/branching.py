@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 __all__ = ["MAX_DECISIONS", "Guard", "Tracer"]
 
 # A path this long comes from a loop whose length depends on the state.
-MAX_DECISIONS = 10_000
+MAX_DECISIONS = 2_000
 
 
 @dataclass(frozen=True)
@@ -245,7 +245,8 @@ class Tracer:
         if len(self._path) >= MAX_DECISIONS:
             raise NotTraceable(
                 f"a loop whose length depends on the state (more than {MAX_DECISIONS} decisions in one call)",
-                "a loop must end after a number of turns that does not depend on t and x",
+                "a loop must end after a number of turns that does not depend on t and x; one decision for "
+                "each element of a long array belongs in np.where",
             )
         if self._lines is not None:
             self._lines.append(calling_line())

@@ -273,7 +273,11 @@ def _remedy(error: Exception, line: UserLine | None) -> str:
 def _of_math(line: UserLine) -> str:
     """Advice for a function of the module `math` or `cmath` in the user's line, however it was imported."""
     names: dict[str, str] = {}
-    for name in re.findall(r"\b(?:c?math|m)\.(\w+)\s*\(", line.text):
+    text = line.text
+    if not text and "math" in line.frame.f_code.co_names + line.frame.f_code.co_varnames:
+        # A function typed at the prompt has no source: its names have to do.
+        text = " ".join(f"math.{name}(" for name in line.frame.f_code.co_names if name in _NUMPY_NAMES)
+    for name in re.findall(r"\b(?:c?math|m)\.(\w+)\s*\(", text):
         names[f"math.{name}"] = name
     for name in re.findall(r"(?<![\w.])(\w+)\s*\(", line.text):
         value = line.frame.f_locals.get(name, line.frame.f_globals.get(name))

@@ -43,6 +43,9 @@ class Scalar:
     def __repr__(self) -> str:
         return f"<traced {self.tracer.text(self.node)}>"
 
+    def __format__(self, specification: str) -> str:
+        return repr(self)
+
     def __hash__(self) -> int:
         return hash((id(self.tracer), self.node))
 

@@ -10,7 +10,7 @@ use crate::field::{eval_on_side, SmoothField};
 use crate::mode::Mode;
 use crate::options::NonUnique;
 use crate::solution::Switch;
-use crate::stepper::initial_step;
+use crate::stepper::{initial_step, restart_step};
 use crate::switching::{decide, decide_intersection, first_nonzero, Arrival, Decision, Kind, Leading};
 use crate::tolerances::{MOST_SWITCHES_AT_ONE_TIME, SURFACE_NOISE};
 
@@ -224,22 +224,24 @@ impl Integrator<'_> {
         self.detector.accept_start(&mut self.motion.monitored);
         self.user_events.restart(self.t, &self.x)?;
         self.controller.restart();
-        self.dt = self.restart_step(&derivative, left)?;
+        self.dt = self.first_step(&derivative, left)?;
         Ok(None)
     }
 
     /// The first step of a motion: the proposal of the motion before, as far as Hairer's guess for
     /// this one supports it, and no longer than a short excursion from the surface.
-    fn restart_step(&mut self, derivative: &[f64], left: &[Left]) -> Result<f64, FieldError> {
+    fn first_step(&mut self, derivative: &[f64], left: &[Left]) -> Result<f64, FieldError> {
         let remaining = (self.t_end - self.t).max(f64::MIN_POSITIVE);
         if let (Some(first), true) = (self.options.first_step, self.dt.is_nan()) {
             return Ok(first.min(remaining));
         }
         let longest = remaining.min(self.options.max_step);
-        let guess =
-            initial_step(&mut self.motion.field, self.t, &self.x, derivative, &self.scale, longest)?;
-        // Hairer's guess aims at a hundredth of the tolerance, 10^(2/5) below what a step may take.
-        let mut dt = if self.dt.is_nan() { guess } else { self.dt.min(2.5 * guess) };
+        let (t, x, scale, field) = (self.t, &self.x, &self.scale, &mut self.motion.field);
+        let mut dt = if self.dt.is_nan() {
+            initial_step(field, t, x, derivative, scale, longest)?
+        } else {
+            restart_step(field, t, x, derivative, scale, self.dt.min(longest))?
+        };
         for l in left {
             if let Left::Surface(j, leading) = l {
                 dt = dt.min(self.excursion(*j, *leading)?);

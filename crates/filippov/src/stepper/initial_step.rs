@@ -34,3 +34,33 @@ pub fn initial_step(
     let step = if fastest <= 1e-15 { (guess * 1e-3).max(1e-6) } else { (0.01 / fastest).powf(0.2) };
     Ok(step.min(100.0 * guess).min(longest))
 }
+
+/// The first step after a restart: at most `proposal`, the step of the motion before, and at most what
+/// two derivatives of the new field support.
+///
+/// Hairer's rule aims at a hundredth of the tolerance; a restart may go 10^(2/5) further, because the
+/// proposal comes from error control. Costs one evaluation.
+///
+/// # Errors
+/// If a function of the user raises.
+pub fn restart_step(
+    field: &mut dyn SmoothField,
+    t: f64,
+    y: &[f64],
+    dy: &[f64],
+    scale: &ErrorScale,
+    proposal: f64,
+) -> Result<f64, FieldError> {
+    let d0 = scale.norm(y, y);
+    let d1 = scale.norm(dy, y);
+    let probe = if d0 < 1e-5 || d1 < 1e-5 { 0.01 * proposal } else { (0.01 * d0 / d1).min(proposal) };
+    let mut moved: Vec<f64> = y.iter().zip(dy).map(|(y, dy)| y + probe * dy).collect();
+    let mut dy_moved = vec![0.0; y.len()];
+    field.eval(t + probe, &mut moved, &mut dy_moved)?;
+    let change: Vec<f64> = dy_moved.iter().zip(dy).map(|(a, b)| a - b).collect();
+    let fastest = d1.max(scale.norm(&change, y) / probe);
+    if !fastest.is_finite() || fastest <= 1e-15 {
+        return Ok(proposal);
+    }
+    Ok(proposal.min((0.1 / fastest).powf(0.2)))
+}

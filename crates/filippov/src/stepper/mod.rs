@@ -10,7 +10,7 @@ pub use controller::{Controller, ErrorScale};
 pub(crate) use dense::evaluate;
 pub use dense::Interpolant;
 pub use dopri5::{Attempt, Dopri5};
-pub use initial_step::initial_step;
+pub use initial_step::{initial_step, restart_step};
 
 #[cfg(test)]
 mod tests;

@@ -33,19 +33,27 @@ struct Model {
     affine: Vec<bool>,
     gradients: Vec<OnceLock<CompiledGradient>>,
     lie: Mutex<LieCache>,
+    /// Active surfaces of the modes met so far; a zero entry is the surface slid on.
+    activity: Mutex<FxHashMap<Vec<i8>, Vec<bool>>>,
 }
 
 /// The gradient of one switching function: outputs are the derivative in t, then the listed states.
 struct CompiledGradient {
     states: Vec<usize>,
-    program: Program,
+    values: GradientValues,
+}
+
+/// Constant for an affine surface, else a program.
+enum GradientValues {
+    Constant(Vec<f64>),
+    Computed(Program),
 }
 
 /// Lie derivatives built so far, by (surface, surface with the word, word).
 #[derive(Default)]
 struct LieCache {
     graph: Option<Graph>,
-    programs: FxHashMap<(usize, usize, Vec<i8>), Arc<LieProgram>>,
+    programs: FxHashMap<(usize, usize, u32), Arc<LieProgram>>,
 }
 
 /// Output 0 is the derivative, the others its terms.
@@ -74,6 +82,7 @@ impl TracedSystem {
             affine: surfaces.iter().map(|&h| graph.is_affine(h)).collect(),
             gradients: surfaces.iter().map(|_| OnceLock::new()).collect(),
             lie: Mutex::new(LieCache::default()),
+            activity: Mutex::default(),
             rates_program: OnceLock::new(),
             field_program,
             surfaces_program,
@@ -136,18 +145,54 @@ impl Model {
             let Gradient { time, states } = graph.gradient(graph.surface(j as u32));
             let mut outputs = vec![time];
             outputs.extend(states.iter().map(|(_, node)| *node));
+            let constants: Option<Vec<f64>> = outputs.iter().map(|&node| graph.as_constant(node)).collect();
             CompiledGradient {
                 states: states.iter().map(|(i, _)| *i as usize).collect(),
-                // Mostly a handful of constants: not worth native code.
-                program: compile(&graph, &outputs, Backend::Interpreter),
+                values: match constants {
+                    Some(values) => GradientValues::Constant(values),
+                    None => GradientValues::Computed(compile(&graph, &outputs, self.backend)),
+                },
             }
         })
+    }
+
+    /// Surfaces whose sign the field, or an active switching function, depends on in this mode.
+    fn find_active(&self, signs: &[f64], sliding: Option<usize>) -> Vec<bool> {
+        let mut active = vec![false; signs.len()];
+        let sides: &[Option<f64>] = match sliding {
+            None => &[None],
+            Some(_) => &[Some(-1.0), Some(1.0)],
+        };
+        for side in sides {
+            let mut signs = signs.to_vec();
+            if let (Some(j), Some(side)) = (sliding, side) {
+                signs[j] = *side;
+            }
+            let mut outputs = self.field.clone();
+            loop {
+                let found = self.graph.sign_dependencies(&outputs, &signs);
+                let fresh: Vec<usize> = (0..found.len()).filter(|&j| found[j] && !active[j]).collect();
+                for &j in &fresh {
+                    active[j] = true;
+                    outputs.push(self.graph.surface(j as u32));
+                }
+                if fresh.is_empty() {
+                    break;
+                }
+            }
+        }
+        if let Some(j) = sliding {
+            active[j] = true;
+        }
+        active
     }
 
     /// The Lie derivative of h_i for a word on the signs of surface j, built from that of the word
     /// without its last letter.
     fn lie(&self, cache: &mut LieCache, i: usize, j: usize, word: Word) -> Arc<LieProgram> {
-        let key = (i, j, word.to_vec());
+        // The letters as bits behind a leading one.
+        let bits = word.iter().fold(1_u32, |bits, &w| bits << 1 | u32::from(w > 0));
+        let key = (i, j, bits);
         if let Some(known) = cache.programs.get(&key) {
             return Arc::clone(known);
         }
@@ -240,52 +285,31 @@ impl PiecewiseSystem for TracedSystem {
         gradient: &mut [f64],
     ) -> Result<f64, FieldError> {
         let compiled = self.model.gradient(j);
-        let mut small = [0.0; 8];
-        let mut large = Vec::new();
-        let count = compiled.states.len() + 1;
-        let out = if count <= small.len() {
-            &mut small[..count]
-        } else {
-            large.resize(count, 0.0);
-            &mut large[..]
+        let mut computed = Vec::new();
+        let values = match &compiled.values {
+            GradientValues::Constant(values) => values,
+            GradientValues::Computed(program) => {
+                computed.resize(program.n_outputs(), 0.0);
+                program.eval(t, x, signs, &self.parameters, &[], &mut computed);
+                &computed
+            }
         };
-        compiled.program.eval(t, x, signs, &self.parameters, &[], out);
         gradient.fill(0.0);
-        for (&state, &value) in compiled.states.iter().zip(&out[1..]) {
+        for (&state, &value) in compiled.states.iter().zip(&values[1..]) {
             gradient[state] = value;
         }
-        Ok(out[0])
+        Ok(values[0])
     }
 
     fn active(&self, signs: &[f64], sliding: Option<usize>, active: &mut [bool]) {
-        let graph = &self.model.graph;
-        active.fill(false);
-        let sides: &[Option<f64>] = match sliding {
-            None => &[None],
-            Some(_) => &[Some(-1.0), Some(1.0)],
-        };
-        for side in sides {
-            let mut signs = signs.to_vec();
-            if let (Some(j), Some(side)) = (sliding, side) {
-                signs[j] = *side;
-            }
-            // Surfaces whose sign an active switching function contains are active too.
-            let mut outputs = self.model.field.clone();
-            loop {
-                let found = graph.sign_dependencies(&outputs, &signs);
-                let fresh: Vec<usize> = (0..found.len()).filter(|&j| found[j] && !active[j]).collect();
-                for &j in &fresh {
-                    active[j] = true;
-                    outputs.push(graph.surface(j as u32));
-                }
-                if fresh.is_empty() {
-                    break;
-                }
-            }
-        }
-        if let Some(j) = sliding {
-            active[j] = true;
-        }
+        let key: Vec<i8> = signs
+            .iter()
+            .enumerate()
+            .map(|(j, &s)| if Some(j) == sliding { 0 } else { s as i8 })
+            .collect();
+        let mut known = self.model.activity.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = known.entry(key).or_insert_with(|| self.model.find_active(signs, sliding));
+        active.copy_from_slice(found);
     }
 
     fn is_affine(&self, j: usize) -> bool {
