@@ -50,4 +50,4 @@ pub use mode::Mode;
 pub use options::{NonUnique, Options};
 pub use solution::{Segment, Side, Solution, Switch, UserZero};
 pub use switching::Kind;
-pub use system::{ClosureSystem, LieValue, PiecewiseSystem, TracedSystem, Word};
+pub use system::{BothSides, ClosureSystem, LieValue, PiecewiseSystem, TracedSystem, Word};

@@ -1,7 +1,7 @@
 //! The record of a run: steps, segments, switches.
 
 use crate::error::FieldError;
-use crate::field::{project, SlidingField};
+use crate::field::{Projector, SlidingField};
 use crate::integrate::{Stats, Stop, Warning};
 use crate::mode::Mode;
 use crate::options::Options;
@@ -135,9 +135,7 @@ impl Solution {
         let segment = self.segments.partition_point(|s| s.steps.1 <= index).min(self.segments.len() - 1);
         let mode = &self.segments[segment].mode;
         if let Some(j) = mode.sliding() {
-            let mut h = vec![0.0; system.n_surfaces()];
-            let mut gradient = vec![0.0; n];
-            project(system, j, t, y, &mode.signs(), &mut h, &mut gradient)?;
+            Projector::default().project(system, j, t, y, &mode.signs())?;
         }
         Ok(Some(mode))
     }

@@ -46,7 +46,9 @@ def phase(solution: Solution, i: int | str = 0, j: int | str = 1, ax: Any = None
     colours = mode_colours([mode for mode, _, _ in parts], dark)
     named: set[Any] = set()
     for mode, _, values in parts:
-        label = None if mode in named or not solution.surfaces else f"mode {mode}"
+        label = None
+        if solution.surfaces and mode not in named:
+            label = f"mode {mode}" + (" (sliding)" if mode.is_sliding else "")
         named.add(mode)
         width = SLIDING_WIDTH if mode.is_sliding else SMOOTH_WIDTH
         ax.plot(values[first], values[second], color=colours[mode], linewidth=width, label=label)

@@ -70,12 +70,14 @@ def time_series(solution: Solution, ax: Any = None, states: Any = None, dark: bo
     else:
         for mode, times, values in parts:
             for order, index in enumerate(indices):
+                width = SLIDING_WIDTH if mode.is_sliding else SMOOTH_WIDTH
+                style = _line_style(order, width)
                 ax.plot(
                     times,
                     values[index],
                     color=colours[mode],
-                    linewidth=SLIDING_WIDTH if mode.is_sliding else SMOOTH_WIDTH,
-                    linestyle=_LINE_STYLES[order % len(_LINE_STYLES)],
+                    linewidth=width,
+                    linestyle=style,
                     solid_capstyle="butt",
                 )
         _draw_ticks(ax, solution, chosen)
@@ -87,6 +89,15 @@ def time_series(solution: Solution, ax: Any = None, states: Any = None, dark: bo
         ax.set_ylabel(names[0])
     ax.margins(x=0)
     return ax
+
+
+def _line_style(order: int, width: float) -> Any:
+    """Return the style of the state drawn as number `order`, with dashes as long on a heavy line."""
+    style = _LINE_STYLES[order % len(_LINE_STYLES)]
+    if isinstance(style, str):
+        return style
+    offset, dashes = style  # Matplotlib measures them in units of the line width
+    return offset, tuple(length * SMOOTH_WIDTH / width for length in dashes)
 
 
 def _draw_smooth(ax: Any, parts: list[tuple[Mode, Any, Any]], indices: list[int], dark: bool) -> None:

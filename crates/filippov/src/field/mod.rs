@@ -4,7 +4,7 @@ mod project;
 mod region;
 mod sliding;
 
-pub use project::project;
+pub use project::Projector;
 pub use region::{eval_on_side, move_inside, side_offsets, RegionField};
 pub use sliding::{NormalComponents, SlidingField};
 

@@ -1,8 +1,8 @@
 //! The sliding field on one surface.
 
-use super::{eval_on_side, project, SmoothField};
+use super::{Projector, SmoothField};
 use crate::error::FieldError;
-use crate::system::{dot, PiecewiseSystem};
+use crate::system::{BothSides, PiecewiseSystem};
 
 /// The normal components on both sides of the surface slid on.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,12 +31,9 @@ impl NormalComponents {
 pub struct SlidingField<'a> {
     system: &'a dyn PiecewiseSystem,
     surface: usize,
-    signs_minus: Vec<f64>,
-    signs_plus: Vec<f64>,
-    f_minus: Vec<f64>,
-    f_plus: Vec<f64>,
-    h: Vec<f64>,
-    gradient: Vec<f64>,
+    signs: Vec<f64>,
+    sides: BothSides,
+    projector: Projector,
     n_evaluations: u64,
     last: NormalComponents,
 }
@@ -44,21 +41,12 @@ pub struct SlidingField<'a> {
 impl<'a> SlidingField<'a> {
     /// Sliding on surface `j`, the other surfaces with the given signs.
     pub fn new(system: &'a dyn PiecewiseSystem, j: usize, signs: &[f64]) -> Self {
-        let n = system.n_states();
-        let with = |s: f64| {
-            let mut signs = signs.to_vec();
-            signs[j] = s;
-            signs
-        };
         SlidingField {
             system,
             surface: j,
-            signs_minus: with(-1.0),
-            signs_plus: with(1.0),
-            f_minus: vec![0.0; n],
-            f_plus: vec![0.0; n],
-            h: vec![0.0; system.n_surfaces()],
-            gradient: vec![0.0; n],
+            signs: signs.to_vec(),
+            sides: BothSides::new(system.n_states(), system.n_surfaces()),
+            projector: Projector::default(),
             n_evaluations: 0,
             last: NormalComponents { minus: f64::NAN, plus: f64::NAN },
         }
@@ -78,8 +66,8 @@ impl<'a> SlidingField<'a> {
     ///
     /// # Errors
     /// If a function of the user raises.
-    pub fn project(&mut self, t: f64, x: &mut [f64]) -> Result<f64, FieldError> {
-        project(self.system, self.surface, t, x, &self.signs_plus, &mut self.h, &mut self.gradient)
+    pub fn project(&mut self, t: f64, x: &mut [f64]) -> Result<(), FieldError> {
+        self.projector.project(self.system, self.surface, t, x, &self.signs)
     }
 
     /// The normal components at (t, x), after projection.
@@ -87,13 +75,10 @@ impl<'a> SlidingField<'a> {
     /// # Errors
     /// If a function of the user raises.
     pub fn normal_components(&mut self, t: f64, x: &mut [f64]) -> Result<NormalComponents, FieldError> {
-        let ht = self.project(t, x)?;
-        self.n_evaluations += eval_on_side(self.system, t, x, &self.signs_minus, &mut self.f_minus)?;
-        self.n_evaluations += eval_on_side(self.system, t, x, &self.signs_plus, &mut self.f_plus)?;
-        self.last = NormalComponents {
-            minus: ht + dot(&self.gradient, &self.f_minus),
-            plus: ht + dot(&self.gradient, &self.f_plus),
-        };
+        self.project(t, x)?;
+        let sides = &mut self.sides;
+        self.n_evaluations += self.system.both_sides(self.surface, t, x, &self.signs, sides)?;
+        self.last = NormalComponents { minus: sides.normal_minus, plus: sides.normal_plus };
         Ok(self.last)
     }
 }
@@ -102,7 +87,7 @@ impl SmoothField for SlidingField<'_> {
     fn eval(&mut self, t: f64, x: &mut [f64], dx: &mut [f64]) -> Result<(), FieldError> {
         let a = self.normal_components(t, x)?;
         let weight_plus = a.minus / (a.minus - a.plus);
-        let sides = self.f_minus.iter().zip(&self.f_plus);
+        let sides = self.sides.f_minus.iter().zip(&self.sides.f_plus);
         for (dx, (minus, plus)) in dx.iter_mut().zip(sides) {
             *dx = minus + weight_plus * (plus - minus);
         }

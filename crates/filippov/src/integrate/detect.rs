@@ -8,8 +8,8 @@ use crate::event::isolate::{first_zero_sampled, Zero};
 use crate::event::locate::refine;
 use crate::event::{EventFunction, Monitored};
 use crate::field::NormalComponents;
-use crate::stepper::Interpolant;
-use crate::system::PiecewiseSystem;
+use crate::stepper::{nested, Interpolant};
+use crate::system::{dot, PiecewiseSystem};
 use crate::tolerances::{EPS, EXTRAPOLATION, ONE_SIDED_AIM, RESOLVED_DEPTH, SURFACE_NOISE};
 
 /// Scratch space of the event stage, and values at the end of the step.
@@ -215,6 +215,12 @@ impl Integrator<'_> {
         let noise = self.detector.noise(self.system, &self.motion, m.function, step)?;
         self.motion.monitored[index].noise = noise;
         let width = 0.5 * EPS * (self.t.abs() / dt).max(to);
+        let polynomial = match (m.function, &self.motion.field) {
+            (EventFunction::Surface(j), ModeField::Region(_)) if m.affine => {
+                Some(self.affine_polynomial(j, m.orientation, dt)?)
+            }
+            _ => None,
+        };
         let mut curve = Curve {
             system: self.system,
             motion: &mut self.motion,
@@ -226,7 +232,10 @@ impl Integrator<'_> {
         };
         let (t, dt_step) = (self.t, dt);
         let mut g = |theta: f64| {
-            let value = curve.value(&m, theta)?;
+            let value = match &polynomial {
+                Some(rows) => nested(rows, theta),
+                None => curve.value(&m, theta)?,
+            };
             Ok(m.deflated(value, t + theta * dt_step, dt_step, noise))
         };
         let mut values = [f64::NAN; 5];
@@ -247,12 +256,31 @@ impl Integrator<'_> {
             Some(Zero::Touch(theta)) => Ok(Some((theta, true))),
             Some(Zero::Crossing(bracket)) => {
                 let theta = refine(&mut g, bracket, width)?;
+                if bracket.is_steep(noise) {
+                    return Ok(Some((theta, false)));
+                }
                 match grazes(&mut g, theta, from, to, noise)? {
                     Some(vertex) => Ok(Some((vertex, true))),
                     None => Ok(Some((theta, false))),
                 }
             }
         }
+    }
+
+    /// The rows of an affine h along the continuous extension, in the nested form of the extension.
+    fn affine_polynomial(&mut self, j: usize, orientation: f64, dt: f64) -> Result<[f64; 6], FieldError> {
+        let (gradient, h) = (&mut self.detector.gradient, &mut self.detector.h);
+        let ht = self.system.gradient(j, self.t, &self.x, &self.motion.signs, gradient)?;
+        self.system.surfaces(self.t, &self.x, &self.motion.signs, h)?;
+        self.stats.n_surface_evaluations += 1;
+        let mut rows = [0.0; 6];
+        let extension = self.stepper.interpolant().coefficients();
+        for (row, values) in rows.iter_mut().zip(extension.chunks_exact(gradient.len())).skip(1) {
+            *row = orientation * dot(gradient, values);
+        }
+        rows[0] = orientation * h[j];
+        rows[1] += orientation * ht * dt;
+        Ok(rows)
     }
 
     /// One-sided fields: the surface just beyond the end of the step, within reach of the continuous extension.

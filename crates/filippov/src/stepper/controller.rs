@@ -37,30 +37,33 @@ impl ErrorScale {
 /// kept within [0.2, 5], without growth right after a rejection.
 #[derive(Clone, Debug)]
 pub struct Controller {
-    old_error: f64,
+    /// Binary logarithm of the error of the last accepted step.
+    old_log: f64,
     rejected: bool,
 }
 
 const SAFETY: f64 = 0.9;
 const BETA: f64 = 0.04;
 const ALPHA: f64 = 0.2 - 0.75 * BETA;
+/// Binary logarithm of 1e-4, the smallest error that counts as that of the step before.
+const SMALLEST_OLD_LOG: f64 = -13.287_7;
 const SHRINK: f64 = 0.2;
 const GROW: f64 = 5.0;
 
 impl Default for Controller {
     fn default() -> Self {
-        Controller { old_error: 1e-4, rejected: false }
+        Controller { old_log: SMALLEST_OLD_LOG, rejected: false }
     }
 }
 
 impl Controller {
     /// The factor for the next step after one with this error was accepted.
     pub fn accept(&mut self, error: f64) -> f64 {
-        // err^-alpha err_old^beta in one exponential.
-        let error = error.max(1e-10);
-        let factor = SAFETY * (BETA * self.old_error.ln() - ALPHA * error.ln()).exp();
+        // err^-alpha err_old^beta by logarithms; a step size needs no more than three digits.
+        let log = rough_log2(error.max(1e-10));
+        let factor = SAFETY * rough_exp2(BETA * self.old_log - ALPHA * log);
         let limit = if self.rejected { 1.0 } else { GROW };
-        self.old_error = error.max(1e-4);
+        self.old_log = log.max(SMALLEST_OLD_LOG);
         self.rejected = false;
         factor.clamp(SHRINK, limit)
     }
@@ -79,5 +82,36 @@ impl Controller {
     /// Forgets the history, at a restart.
     pub fn restart(&mut self) {
         *self = Controller::default();
+    }
+}
+
+/// log2 of a positive normal number to about 1e-3: exponent, and a cubic in the mantissa.
+fn rough_log2(x: f64) -> f64 {
+    let bits = x.to_bits();
+    let exponent = (bits >> 52) as i64 - 1023;
+    let mantissa = f64::from_bits(bits & 0x000f_ffff_ffff_ffff | 0x3ff0_0000_0000_0000);
+    let m = mantissa - 1.0;
+    exponent as f64 + m * (1.4199 + m * (-0.5777 + m * 0.1578))
+}
+
+/// 2^x for |x| < 1000 to about 1e-3: the integer part as exponent, a cubic for the rest.
+fn rough_exp2(x: f64) -> f64 {
+    let whole = x.floor();
+    let f = x - whole;
+    let power = f64::from_bits(((whole as i64 + 1023) as u64) << 52);
+    power * (1.0 + f * (0.6951 + f * (0.2276 + f * 0.0773)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{rough_exp2, rough_log2};
+
+    #[test]
+    fn rough_functions_have_three_digits() {
+        for k in -3000..3000 {
+            let x = f64::from(k) * 0.01;
+            assert!((rough_exp2(x) / x.exp2() - 1.0).abs() < 3e-3);
+            assert!((rough_log2(x.exp2()) - x).abs() < 3e-3);
+        }
     }
 }

@@ -63,9 +63,15 @@ pub(crate) fn evaluate(coefficients: &[f64], n: usize, theta: f64, y: &mut [f64]
     let (r2, rest) = rest.split_at(n);
     let (r3, rest) = rest.split_at(n);
     let (r4, r5) = rest.split_at(n);
-    let u = 1.0 - theta;
+    let (r5, y) = (&r5[..n], &mut y[..n]);
     for i in 0..n {
-        y[i] = y0[i]
-            + theta * (r1[i] + u * (r2[i] + theta * (r3[i] + u * (r4[i] + theta * r5[i]))));
+        y[i] = nested(&[y0[i], r1[i], r2[i], r3[i], r4[i], r5[i]], theta);
     }
+}
+
+/// The nested form of one component.
+#[inline]
+pub(crate) fn nested(r: &[f64; 6], theta: f64) -> f64 {
+    let u = 1.0 - theta;
+    r[0] + theta * (r[1] + u * (r[2] + theta * (r[3] + u * (r[4] + theta * r[5]))))
 }

@@ -142,15 +142,16 @@ impl Dopri5 {
 
     /// The continuous extension of order 4 of the attempted step; costs no evaluation.
     pub fn extend_order4(&mut self, t: f64, y: &[f64], dt: f64) -> &Interpolant {
-        let [k1, _, k3, k4, k5, k6, k7] = &self.k;
         let n = y.len();
+        let [k1, k3, k4, k5, k6, k7] = [0, 2, 3, 4, 5, 6].map(|stage: usize| &self.k[stage][..n]);
+        let y1 = &self.y1[..n];
         self.interpolant.t0 = t;
         self.interpolant.dt = dt;
-        let [y0, r1, r2, r3, r4, r5] = self.interpolant.rows();
-        y0.copy_from_slice(y);
-        r5.fill(0.0);
+        let [y0, r1, r2, r3, r4, r5] = self.interpolant.rows().map(|row| &mut row[..n]);
         for i in 0..n {
-            r1[i] = self.y1[i] - y[i];
+            y0[i] = y[i];
+            r5[i] = 0.0;
+            r1[i] = y1[i] - y[i];
             r2[i] = dt * k1[i] - r1[i];
             r3[i] = r1[i] - dt * k7[i] - r2[i];
             r4[i] = dt

@@ -46,7 +46,7 @@ pub fn first_nonzero(
     signs: &[f64],
 ) -> Result<Leading, FieldError> {
     let highest = system.max_lie_order().min(MAX_LIE_ORDER);
-    let word = vec![side; highest];
+    let word = [side; MAX_LIE_ORDER];
     let signs_side: Vec<f64> =
         signs.iter().enumerate().map(|(i, s)| if i == j { f64::from(side) } else { *s }).collect();
     for order in vanishing + 1..=highest {

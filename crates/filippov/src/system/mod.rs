@@ -4,9 +4,11 @@
 //! switching function h_j(t, x). The signs are *data*: the caller says which smooth field it
 //! wants, also slightly beyond a surface, and the field never looks at the sign of h itself.
 
+mod both_sides;
 mod closures;
 mod traced;
 
+pub use both_sides::BothSides;
 pub use closures::ClosureSystem;
 pub use traced::TracedSystem;
 
@@ -110,6 +112,22 @@ pub trait PiecewiseSystem: Sync {
         let d = EPS.cbrt() * (1.0 + t.abs());
         let (up, down) = (t + d, t - d);
         Ok((at(up, x)? - at(down, x)?) / (up - down))
+    }
+
+    /// Everything that sliding on h_j needs at a point of the surface: fields and normal components of
+    /// both sides. `signs[j]` is ignored. Returns the number of evaluations of the right-hand side.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    fn both_sides(
+        &self,
+        j: usize,
+        t: f64,
+        x: &[f64],
+        signs: &[f64],
+        out: &mut BothSides,
+    ) -> Result<u64, FieldError> {
+        out.both_sides_by_parts(self, j, t, x, signs)
     }
 
     /// Marks the surfaces whose sign matters for the motion with these signs (and with either

@@ -5,10 +5,14 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use filippov_expr::{Backend, ExprError, Gradient, Graph, Names, NodeId, Program};
 use rustc_hash::FxHashMap;
 
-use super::{LieValue, PiecewiseSystem, Word};
+use super::{BothSides, LieValue, PiecewiseSystem, Word};
 use crate::error::FieldError;
 use crate::field::{move_inside, side_offsets};
 use crate::tolerances::{MAX_LIE_ORDER, SIDE_REACH, TANGENT};
+
+/// Up to that many states both sides of a surface are compiled into one program; the programs of
+/// larger systems would take longer to compile than they save.
+const FUSED_STATES: usize = 12;
 
 /// A system whose field and switching functions are expressions: compiled, with exact derivatives.
 ///
@@ -32,6 +36,7 @@ struct Model {
     rates_program: OnceLock<Program>,
     affine: Vec<bool>,
     gradients: Vec<OnceLock<CompiledGradient>>,
+    both_sides: Vec<OnceLock<Program>>,
     lie: Mutex<LieCache>,
     /// Active surfaces of the modes met so far; a zero entry is the surface slid on.
     activity: Mutex<FxHashMap<Vec<i8>, Vec<bool>>>,
@@ -81,6 +86,7 @@ impl TracedSystem {
             n_states: field.len(),
             affine: surfaces.iter().map(|&h| graph.is_affine(h)).collect(),
             gradients: surfaces.iter().map(|_| OnceLock::new()).collect(),
+            both_sides: surfaces.iter().map(|_| OnceLock::new()).collect(),
             lie: Mutex::new(LieCache::default()),
             activity: Mutex::default(),
             rates_program: OnceLock::new(),
@@ -135,6 +141,26 @@ impl Model {
             let surfaces: Vec<NodeId> = (0..graph.n_surfaces()).map(|j| graph.surface(j as u32)).collect();
             let mut outputs = surfaces.clone();
             outputs.extend(surfaces.iter().map(|&h| graph.directional(h, &velocity)));
+            compile(&graph, &outputs, self.backend)
+        })
+    }
+
+    /// The normal components and the fields of both sides, as one program that shares what they have
+    /// in common.
+    fn both_sides(&self, j: usize) -> &Program {
+        self.both_sides[j].get_or_init(|| {
+            let mut graph = self.graph.clone();
+            let h = graph.surface(j as u32);
+            let mut outputs = Vec::with_capacity(2 + 2 * self.n_states);
+            let mut fields = Vec::with_capacity(2 * self.n_states);
+            for side in [-1.0, 1.0] {
+                let mut signs = vec![None; graph.n_surfaces()];
+                signs[j] = Some(side);
+                let field = graph.at_signs(&self.field, &signs);
+                outputs.push(graph.directional(h, &field));
+                fields.extend(field);
+            }
+            outputs.extend(fields);
             compile(&graph, &outputs, self.backend)
         })
     }
@@ -301,6 +327,29 @@ impl PiecewiseSystem for TracedSystem {
         Ok(values[0])
     }
 
+    fn both_sides(
+        &self,
+        j: usize,
+        t: f64,
+        x: &[f64],
+        signs: &[f64],
+        out: &mut BothSides,
+    ) -> Result<u64, FieldError> {
+        let n = self.model.n_states;
+        if n > FUSED_STATES {
+            return out.both_sides_by_parts(self, j, t, x, signs);
+        }
+        let program = self.model.both_sides(j);
+        program.eval(t, x, signs, &self.parameters, &[], &mut out.outputs);
+        let (head, rest) = out.outputs.split_at(2);
+        (out.normal_minus, out.normal_plus) = (head[0], head[1]);
+        out.f_minus.copy_from_slice(&rest[..n]);
+        out.f_plus.copy_from_slice(&rest[n..]);
+        // A field that is not finite on its surface is taken just inside of its region.
+        let finite = rest.iter().all(|v| v.is_finite()) && out.is_finite();
+        if finite { Ok(2) } else { out.both_sides_by_parts(self, j, t, x, signs) }
+    }
+
     fn active(&self, signs: &[f64], sliding: Option<usize>, active: &mut [bool]) {
         let key: Vec<i8> = signs
             .iter()
@@ -329,15 +378,23 @@ impl PiecewiseSystem for TracedSystem {
             let mut cache = self.model.lie.lock().unwrap_or_else(PoisonError::into_inner);
             self.model.lie(&mut cache, i, j, word)
         };
-        let mut out = vec![0.0; lie.program.n_outputs()];
-        lie.program.eval(t, x, signs, &self.parameters, &[], &mut out);
+        let mut small = [0.0; 16];
+        let mut large = Vec::new();
+        let count = lie.program.n_outputs();
+        let out = if count <= small.len() {
+            &mut small[..count]
+        } else {
+            large.resize(count, 0.0);
+            &mut large[..]
+        };
+        lie.program.eval(t, x, signs, &self.parameters, &[], out);
         if !out[0].is_finite() {
             // The derivative of a one-sided field: taken just inside of its region.
             let mut side = signs.to_vec();
             side[j] = word.last().map_or(side[j], |&w| f64::from(w));
             for offset in side_offsets(x) {
                 let inside = move_inside(self, t, x, &side, offset, SIDE_REACH * offset)?;
-                lie.program.eval(t, &inside, signs, &self.parameters, &[], &mut out);
+                lie.program.eval(t, &inside, signs, &self.parameters, &[], out);
                 if out[0].is_finite() {
                     break;
                 }

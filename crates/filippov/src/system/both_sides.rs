@@ -1,0 +1,63 @@
+//! Fields and normal components of both sides of a surface.
+
+use super::{dot, PiecewiseSystem};
+use crate::error::FieldError;
+use crate::field::eval_on_side;
+
+/// What sliding on one surface needs at a point: the fields of both sides with
+/// their normal components. Also the scratch space for it.
+#[derive(Clone, Debug)]
+pub struct BothSides {
+    /// dh_j/dt along the field of the side h < 0.
+    pub normal_minus: f64,
+    /// dh_j/dt along the field of the side h > 0.
+    pub normal_plus: f64,
+    /// The field of the side h < 0.
+    pub f_minus: Vec<f64>,
+    /// The field of the side h > 0.
+    pub f_plus: Vec<f64>,
+    gradient: Vec<f64>,
+    signs: Vec<f64>,
+    /// For a system that computes all at once.
+    pub(super) outputs: Vec<f64>,
+}
+
+impl BothSides {
+    /// Space for a system with n states and d surfaces.
+    pub fn new(n: usize, d: usize) -> Self {
+        BothSides {
+            normal_minus: f64::NAN,
+            normal_plus: f64::NAN,
+            f_minus: vec![0.0; n],
+            f_plus: vec![0.0; n],
+            gradient: vec![0.0; n],
+            signs: vec![0.0; d],
+            outputs: vec![0.0; 2 + 2 * n],
+        }
+    }
+
+    /// Fills everything from the field, the surfaces and the gradient of the system.
+    pub(super) fn both_sides_by_parts<S: PiecewiseSystem + ?Sized>(
+        &mut self,
+        system: &S,
+        j: usize,
+        t: f64,
+        x: &[f64],
+        signs: &[f64],
+    ) -> Result<u64, FieldError> {
+        self.signs.copy_from_slice(signs);
+        self.signs[j] = 1.0;
+        let ht = system.gradient(j, t, x, &self.signs, &mut self.gradient)?;
+        let mut evaluations = eval_on_side(system, t, x, &self.signs, &mut self.f_plus)?;
+        self.signs[j] = -1.0;
+        evaluations += eval_on_side(system, t, x, &self.signs, &mut self.f_minus)?;
+        self.normal_minus = ht + dot(&self.gradient, &self.f_minus);
+        self.normal_plus = ht + dot(&self.gradient, &self.f_plus);
+        Ok(evaluations)
+    }
+
+    /// Are both normal components finite?
+    pub fn is_finite(&self) -> bool {
+        self.normal_minus.is_finite() && self.normal_plus.is_finite()
+    }
+}
