@@ -18,13 +18,17 @@ pub fn may_vanish(g0: f64, slope0: f64, g1: f64, slope1: f64) -> bool {
     !excluded
 }
 
-/// As [`may_vanish`], for a function that is not a polynomial of low degree along the step: the
-/// distance of its value in the middle to the cubic, four times, is added to the remainder.
+/// As [`may_vanish`], for a function that is not a polynomial of low degree along the step: four times
+/// its largest distance to the cubic, among the `probes` (theta, value), is added to the remainder.
 #[inline]
-pub fn may_vanish_bent(g0: f64, slope0: f64, g1: f64, slope1: f64, middle: f64) -> bool {
-    let bend = (middle - (0.5 * (g0 + g1) + 0.125 * (slope0 - slope1))).abs();
-    let shift = 4.0 * bend;
-    may_vanish(g0 - shift, slope0, g1 - shift, slope1) || !shift.is_finite()
+pub fn may_vanish_bent(g0: f64, slope0: f64, g1: f64, slope1: f64, probes: &[(f64, f64)]) -> bool {
+    let distance = |&(theta, value): &(f64, f64)| {
+        let u = 1.0 - theta;
+        let ends = u * u * (g0 * (1.0 + 2.0 * theta) + slope0 * theta);
+        (value - ends - theta * theta * (g1 * (3.0 - 2.0 * theta) - slope1 * u)).abs()
+    };
+    let shift = 4.0 * probes.iter().map(distance).fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a });
+    may_vanish(g0 - shift, slope0, g1 - shift, slope1)
 }
 
 /// May an exit function with these values at the stages of the step vanish inside of the step?

@@ -63,10 +63,12 @@ pub fn first_zero(g: Sampled, a: f64, b: f64, noise: f64) -> Result<Isolated, Fi
     for (i, value) in values.iter_mut().enumerate() {
         *value = g(a + (b - a) * 0.25 * i as f64)?;
     }
-    first_zero_sampled(g, a, b, values, noise)
+    first_zero_sampled(g, a, b, values, noise, &PROBES)
 }
 
-/// As [`first_zero`], with the values at the quarters of [a, b] already known.
+/// As [`first_zero`], with the values at the quarters of [a, b] already known; the quartic is
+/// believed only where it also agrees with g at the `probes` (in [0, 1]). A polynomial of low degree
+/// needs none.
 ///
 /// # Errors
 /// If `g` raises.
@@ -76,6 +78,7 @@ pub fn first_zero_sampled(
     b: f64,
     values: [f64; 5],
     noise: f64,
+    probes: &[f64],
 ) -> Result<Isolated, FieldError> {
     if values.iter().all(|v| v.abs() <= noise) {
         return Ok(Isolated { zero: None, depth: 0 });
@@ -84,39 +87,63 @@ pub fn first_zero_sampled(
         let here = Bracket { lo: a, hi: a, g_lo: values[0], g_hi: values[0], guess: a };
         return Ok(Isolated { zero: Some(Zero::Crossing(here)), depth: 0 });
     }
-    let mut deepest = 0;
-    let zero = search(g, a, b, values, noise, 0, &mut deepest)?;
+    let mut search = Search { g, noise, probes, deepest: 0 };
+    let zero = search.first(a, b, values, 0)?;
+    let deepest = search.deepest;
     Ok(Isolated { zero, depth: deepest })
 }
 
-fn search(
-    g: Sampled,
-    a: f64,
-    b: f64,
-    v: [f64; 5],
+/// Points off the regular grid, so that an oscillation in step with the samples is noticed.
+pub const PROBES: [f64; 2] = [0.39, 0.815];
+
+struct Search<'a, 'b> {
+    g: Sampled<'a>,
     noise: f64,
-    depth: u32,
-    deepest: &mut u32,
-) -> Result<Option<Zero>, FieldError> {
-    *deepest = depth.max(*deepest);
-    let coefficients = bernstein(&v);
-    let remainder = QUARTIC_REMAINDER * (v[0] - 4.0 * v[1] + 6.0 * v[2] - 4.0 * v[3] + v[4]).abs();
-    if coefficients.iter().all(|&c| c > remainder) {
-        return Ok(None);
+    probes: &'b [f64],
+    deepest: u32,
+}
+
+impl Search<'_, '_> {
+    /// The first zero on [a, b], given the values at its quarters.
+    fn first(&mut self, a: f64, b: f64, v: [f64; 5], depth: u32) -> Result<Option<Zero>, FieldError> {
+        self.deepest = depth.max(self.deepest);
+        let coefficients = bernstein(&v);
+        let remainder =
+            QUARTIC_REMAINDER * (v[0] - 4.0 * v[1] + 6.0 * v[2] - 4.0 * v[3] + v[4]).abs();
+        let lowest = coefficients.iter().copied().fold(f64::INFINITY, f64::min);
+        if lowest > remainder && self.agrees(a, b, &coefficients, lowest)? {
+            return Ok(None);
+        }
+        let m = 0.5 * (a + b);
+        let unresolved = depth >= MAX_DEPTH
+            || v.iter().all(|v| v.abs() <= self.noise)
+            || m <= a
+            || m >= b;
+        let steepness = coefficients.windows(2).map(|w| w[0] - w[1]).fold(f64::INFINITY, f64::min);
+        let single = steepness > 2.0 * remainder && v[0] > 0.0 && v[4] <= 0.0;
+        if unresolved || single && self.agrees(a, b, &coefficients, steepness)? {
+            return Ok(bracket(a, b, &v, &coefficients, self.noise));
+        }
+        let quarter = 0.125 * (b - a);
+        let left = [v[0], (self.g)(a + quarter)?, v[1], (self.g)(a + 3.0 * quarter)?, v[2]];
+        if let Some(zero) = self.first(a, m, left, depth + 1)? {
+            return Ok(Some(zero));
+        }
+        let right = [v[2], (self.g)(m + quarter)?, v[3], (self.g)(m + 3.0 * quarter)?, v[4]];
+        self.first(m, b, right, depth + 1)
     }
-    let falls = coefficients.windows(2).all(|w| w[0] - w[1] > 2.0 * remainder);
-    let unresolved = depth >= MAX_DEPTH || v.iter().all(|v| v.abs() <= noise);
-    let m = 0.5 * (a + b);
-    if falls && v[0] > 0.0 && v[4] <= 0.0 || unresolved || m <= a || m >= b {
-        return Ok(bracket(a, b, &v, &coefficients, noise));
+
+    /// Does the quartic agree with g at the probes, to half the margin?
+    fn agrees(&mut self, a: f64, b: f64, coefficients: &[f64; 5], margin: f64) -> Result<bool, FieldError> {
+        for &probe in self.probes {
+            let value = (self.g)(a + (b - a) * probe)?;
+            let close = (value - casteljau(*coefficients, probe)).abs() <= 0.5 * margin;
+            if !close {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
-    let quarter = 0.125 * (b - a);
-    let left = [v[0], g(a + quarter)?, v[1], g(a + 3.0 * quarter)?, v[2]];
-    if let Some(zero) = search(g, a, m, left, noise, depth + 1, deepest)? {
-        return Ok(Some(zero));
-    }
-    let right = [v[2], g(m + quarter)?, v[3], g(m + 3.0 * quarter)?, v[4]];
-    search(g, m, b, right, noise, depth + 1, deepest)
 }
 
 /// The first change of sign among the samples, else a touch if the smallest is within the noise.

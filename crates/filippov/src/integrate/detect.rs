@@ -4,7 +4,7 @@ use super::integrator::Integrator;
 use super::motion::{ModeField, Motion};
 use crate::error::FieldError;
 use crate::event::filter::{may_vanish, may_vanish_bent, may_vanish_between, may_vanish_deflated};
-use crate::event::isolate::{first_zero_sampled, Zero};
+use crate::event::isolate::{first_zero_sampled, Zero, PROBES};
 use crate::event::locate::refine;
 use crate::event::{EventFunction, Monitored};
 use crate::field::NormalComponents;
@@ -23,6 +23,8 @@ pub(super) struct Detector {
     /// Normal components computed in the search of this step, by theta.
     exits: Vec<(f64, NormalComponents)>,
     h: Vec<f64>,
+    /// Switching functions at the probes of the step.
+    probed: [Vec<f64>; 2],
     rate: Vec<f64>,
     gradient: Vec<f64>,
     x: Vec<f64>,
@@ -51,6 +53,7 @@ impl Detector {
             next_dt: None,
             exits: Vec::new(),
             h: vec![0.0; d],
+            probed: [vec![0.0; d], vec![0.0; d]],
             rate: vec![0.0; d],
             gradient: vec![0.0; n],
             x: vec![0.0; n],
@@ -161,10 +164,12 @@ impl Integrator<'_> {
         let motion = &mut self.motion;
         detector.suspects.clear();
         if motion.monitored.iter().any(|m| !m.affine && matches!(m.function, EventFunction::Surface(_))) {
-            self.stepper.interpolant().at(0.5, &mut detector.x);
-            let t = self.t + 0.5 * dt;
-            self.system.surfaces(t, &detector.x, &motion.signs, &mut detector.h)?;
-            self.stats.n_surface_evaluations += 1;
+            for (theta, h) in PROBES.into_iter().zip(&mut detector.probed) {
+                self.stepper.interpolant().at(theta, &mut detector.x);
+                let t = self.t + theta * dt;
+                self.system.surfaces(t, &detector.x, &motion.signs, h)?;
+                self.stats.n_surface_evaluations += 1;
+            }
         }
         for index in 0..motion.monitored.len() {
             let m = motion.monitored[index];
@@ -174,8 +179,8 @@ impl Integrator<'_> {
                     may_vanish(m.value, m.rate * dt, value, rate * dt)
                 }
                 (EventFunction::Surface(j), None) => {
-                    let middle = m.orientation * detector.h[j];
-                    may_vanish_bent(m.value, m.rate * dt, value, rate * dt, middle)
+                    let probes = [0, 1].map(|k| (PROBES[k], m.orientation * detector.probed[k][j]));
+                    may_vanish_bent(m.value, m.rate * dt, value, rate * dt, &probes)
                 }
                 (EventFunction::Surface(_), Some(deflation)) => {
                     let step = (self.t, &self.x[..], self.stepper.end());
@@ -248,7 +253,13 @@ impl Integrator<'_> {
                 _ => g(theta)?,
             };
         }
-        let isolated = first_zero_sampled(&mut g, from, to, values, noise)?;
+        // Along the step an affine surface is a quintic; the quartic and its remainder describe it.
+        let probes = match (m.function, m.affine) {
+            (EventFunction::Surface(_), true) => &PROBES[..0],
+            (EventFunction::Surface(_), false) => &PROBES[..],
+            _ => &PROBES[..1],
+        };
+        let isolated = first_zero_sampled(&mut g, from, to, values, noise, probes)?;
         self.detector.unresolved |= isolated.depth > RESOLVED_DEPTH;
         match isolated.zero {
             None => Ok(None),
