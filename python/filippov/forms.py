@@ -40,6 +40,8 @@ class Source(NamedTuple):
         The same field as ``signed(t, x, s, **params)`` with the sign vector `s` as data.
     branching : callable or None
         `fun` with the signs turned into numbers by `if`, tried if `fun` cannot be traced.
+    black_box : bool
+        Whether surfaces were declared, even none at all (``surfaces=[]``): `fun` may then be a black box.
     """
 
     fun: Callable[..., Any]
@@ -47,6 +49,7 @@ class Source(NamedTuple):
     args: tuple[Any, ...] = ()
     signed: SignedField | None = None
     branching: Callable[..., Any] | None = None
+    black_box: bool = False
 
 
 def fields_source(fields: Any, surfaces: Any) -> Source:

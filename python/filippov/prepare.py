@@ -97,7 +97,7 @@ def prepare(
                 traced = _trace(source, source.branching, n, values, states, t0, y0)
             except TraceError:
                 return _prepare_opaque(source, n, values, t0, y0, error)
-        elif source.surfaces:
+        elif source.surfaces or source.black_box:
             return _prepare_opaque(source, n, values, t0, y0, error)
         else:
             raise

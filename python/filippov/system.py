@@ -80,7 +80,8 @@ class System:
     ) -> None:
         if not callable(fun):
             raise InputError(f"fun: a function fun(t, x) is needed, not {type(fun).__name__}")
-        source = Source(fun, check_surfaces(surfaces), check_args(args))
+        declared = surfaces is not None
+        source = Source(fun, check_surfaces(surfaces), check_args(args), black_box=declared)
         self._setup(source, n, params, states)
         refused = set(self._params).difference(accepted_names(fun, self._params))
         if refused:

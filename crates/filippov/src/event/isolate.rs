@@ -31,12 +31,12 @@ pub struct Bracket {
 }
 
 impl Bracket {
-    /// Does the function fall too steeply to turn back within the noise? With a slope c and second
-    /// differences of at most 1e4 times the values, the lowest depth is far above it.
-    pub fn is_steep(&self, noise: f64) -> bool {
-        let size = self.g_lo.abs().max(self.g_hi.abs());
+    /// Does the function fall too steeply to turn back within the noise? With the slope c in the
+    /// bracket and second derivatives of at most 1e3 times the `scale` of its values, the lowest
+    /// point ahead is c^2 / (2e3 scale) below zero.
+    pub fn is_steep(&self, scale: f64, noise: f64) -> bool {
         let slope = (self.g_lo - self.g_hi) / (self.hi - self.lo);
-        slope * slope > 2e4 * size * noise
+        slope * slope > 2e3 * scale * noise
     }
 }
 

@@ -267,7 +267,8 @@ impl Integrator<'_> {
             Some(Zero::Touch(theta)) => Ok(Some((theta, true))),
             Some(Zero::Crossing(bracket)) => {
                 let theta = refine(&mut g, bracket, width)?;
-                if bracket.is_steep(noise) {
+                let scale = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+                if bracket.is_steep(scale, noise) {
                     return Ok(Some((theta, false)));
                 }
                 match grazes(&mut g, theta, from, to, noise)? {
