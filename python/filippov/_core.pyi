@@ -1,15 +1,19 @@
 """Types of the compiled core."""
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, final
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import Self
+
+__all__ = ["Builder", "OpaqueSystem", "Run", "SignedSystem", "TracedSystem", "solve"]
 
 _Array = npt.NDArray[np.float64]
 
+@final
 class Builder:
-    def __init__(self) -> None: ...
+    def __new__(cls) -> Self: ...
     def constant(self, value: float) -> int: ...
     def time(self) -> int: ...
     def state(self, index: int) -> int: ...
@@ -26,17 +30,18 @@ class Builder:
     def as_constant(self, a: int) -> float | None: ...
     def depends_on_motion(self, a: int) -> bool: ...
     def n_surfaces(self) -> int: ...
-    def text(self, a: int, states: list[str] | None, parameters: list[str] | None) -> str: ...
+    def text(self, a: int, states: list[str] | None = None, parameters: list[str] | None = None) -> str: ...
 
+@final
 class TracedSystem:
-    def __init__(
-        self,
+    def __new__(
+        cls,
         builder: Builder,
         field: list[int],
         n_states: int,
         parameters: list[str],
-        states: list[str] | None,
-    ) -> None: ...
+        states: list[str] | None = None,
+    ) -> Self: ...
     @property
     def n_states(self) -> int: ...
     @property
@@ -51,14 +56,15 @@ class TracedSystem:
     @staticmethod
     def from_bytes(data: bytes) -> TracedSystem: ...
 
+@final
 class OpaqueSystem:
-    def __init__(
-        self,
+    def __new__(
+        cls,
         fun: Callable[[float, _Array], Sequence[float]],
         surfaces: list[Callable[[float, _Array], float]],
         n_states: int,
         names: list[str],
-    ) -> None: ...
+    ) -> Self: ...
     @property
     def n_states(self) -> int: ...
     @property
@@ -69,14 +75,15 @@ class OpaqueSystem:
     def active(self, signs: _Array) -> list[bool]: ...
     def is_native(self) -> bool: ...
 
+@final
 class SignedSystem:
-    def __init__(
-        self,
+    def __new__(
+        cls,
         fun: Callable[[float, _Array, _Array], Sequence[float]],
         surfaces: list[Callable[[float, _Array], float]],
         n_states: int,
         names: list[str],
-    ) -> None: ...
+    ) -> Self: ...
     @property
     def n_states(self) -> int: ...
     @property
@@ -87,11 +94,14 @@ class SignedSystem:
     def active(self, signs: _Array) -> list[bool]: ...
     def is_native(self) -> bool: ...
 
+@final
 class Run:
     @property
     def t(self) -> _Array: ...
     @property
     def y(self) -> _Array: ...
+    @property
+    def t_last(self) -> float: ...
     @property
     def switches(
         self,
@@ -114,7 +124,7 @@ class Run:
     def stats(self) -> dict[str, int | float | str]: ...
     @property
     def warnings(self) -> list[tuple[float, str, str]]: ...
-    def evaluate(self, t: _Array, left: bool) -> _Array: ...
+    def evaluate(self, t: _Array, left: bool = False) -> _Array: ...
     def multipliers(self, t: _Array) -> _Array: ...
 
 def solve(

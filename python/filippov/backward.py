@@ -46,6 +46,7 @@ class ReversedRun:
         self._run = run
         self.t = 0.0 - run.t  # not -run.t: the origin of time shall not read -0
         self.y = run.y
+        self.t_last = 0.0 - run.t_last
         self.switches = [(0.0 - row[0], *row[1:]) for row in run.switches]
         self.segments = [(0.0 - row[0], 0.0 - row[1], *row[2:]) for row in run.segments]
         self.t_events = [0.0 - times for times in run.t_events]

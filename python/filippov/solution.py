@@ -171,6 +171,9 @@ class Solution:
     surfaces: tuple[str, ...]
     states: tuple[str, ...]
 
+    __slots__ = ("__dict__", "_run")
+    _run: AnyRun
+
     def __init__(self, **fields: Any) -> None:
         self.__dict__.update(fields)
 
@@ -209,12 +212,10 @@ class Solution:
         Solution
         """
         stats = {**run.stats, "backend": backend}
-        segments = run.segments
-        t_last = float(segments[-1][1]) if segments else (float(run.t[-1]) if len(run.t) else t0)
-        return cls(
+        solution = cls(
             t=run.t,
             y=run.y,
-            sol=DenseSolution(run, t0, t_last) if dense_output else None,
+            sol=DenseSolution(run, t0, run.t_last) if dense_output else None,
             t_events=list(run.t_events) if has_events else None,
             y_events=list(run.y_events) if has_events else None,
             nfev=int(stats.get("nfev", 0)),
@@ -223,41 +224,60 @@ class Solution:
             status=run.status,
             message=_message(run),
             success=run.status >= 0,
-            switches=SwitchTable(run.switches, surfaces, states),
-            segments=SegmentTable(segments),
             stats=stats,
             warnings=[RunWarning(*warning) for warning in run.warnings],
             error=run.error,
             surfaces=surfaces,
             states=states,
         )
+        solution._run = run
+        return solution
+
+    def __getattr__(self, name: str) -> Any:
+        # The tables are made when they are first asked for: in a short run they are most of the work.
+        if name == "switches":
+            made: Any = SwitchTable(self._run.switches, self.surfaces, self.states)
+        elif name == "segments":
+            made = SegmentTable(self._run.segments)
+        else:
+            raise AttributeError(f"{name!r}; the fields are {', '.join(self)}")
+        self.__dict__[name] = made
+        return made
+
+    def _fields(self) -> dict[str, Any]:
+        """Return all fields by name, the tables made."""
+        _ = self.switches, self.segments
+        return self.__dict__
 
     def __getstate__(self) -> dict[str, Any]:
         # The function holds the record of the core, which stays in its process.
-        return {**self.__dict__, "sol": None}
+        return {**self._fields(), "sol": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
 
     def __getitem__(self, key: str) -> Any:
         try:
-            return self.__dict__[key]
+            return self._fields()[key]
         except KeyError:
-            raise KeyError(f"{key!r}; the fields are {', '.join(self.__dict__)}") from None
+            raise KeyError(f"{key!r}; the fields are {', '.join(self)}") from None
 
     def __contains__(self, key: object) -> bool:
-        return key in self.__dict__
+        return key in self._fields()
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self.__dict__)
+        return iter(self._fields())
 
     def __len__(self) -> int:
-        return len(self.__dict__)
+        return len(self._fields())
 
     def keys(self) -> KeysView[str]:
         """Names of the fields."""
-        return self.__dict__.keys()
+        return self._fields().keys()
 
     def get(self, key: str, default: Any = None) -> Any:
         """Return a field, or `default` if there is none of that name."""
-        return self.__dict__.get(key, default)
+        return self._fields().get(key, default)
 
     def mode_at(self, t: float) -> Mode:
         """Return the mode in force at time `t` (at a switch: just after it).

@@ -34,6 +34,7 @@ class StandingRun:
 
     def __init__(self, t0: float, y0: Array, n_surfaces: int, n_events: int, t_eval: Array | None) -> None:
         self._y0 = y0
+        self.t_last = t0
         self._n_surfaces = n_surfaces
         self.t = np.array([t0]) if t_eval is None else t_eval
         self.y = np.repeat(y0[:, None], len(self.t), axis=1)

@@ -74,6 +74,12 @@ impl Run {
         columns(py, &solution.y, solution.n_states)
     }
 
+    /// The last time reached.
+    #[getter]
+    fn t_last(&self) -> f64 {
+        self.solution().t_last
+    }
+
     #[getter]
     fn switches<'py>(&self, py: Python<'py>) -> PyResult<Vec<SwitchRow<'py>>> {
         self.solution()

@@ -6,6 +6,7 @@
 
 mod both_sides;
 mod closures;
+mod tiered;
 mod traced;
 
 pub use both_sides::BothSides;

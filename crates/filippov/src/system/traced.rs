@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use filippov_expr::{Backend, ExprError, Gradient, Graph, Names, NodeId, Program};
 use rustc_hash::FxHashMap;
 
+use super::tiered::{compile, TieredProgram};
 use super::{BothSides, LieValue, PiecewiseSystem, Word};
 use crate::error::FieldError;
 use crate::field::{move_inside, side_offsets};
@@ -32,11 +33,11 @@ struct Model {
     names: Names,
     backend: Backend,
     field_program: Program,
-    surfaces_program: Program,
-    rates_program: OnceLock<Program>,
+    surfaces_program: TieredProgram,
+    rates_program: OnceLock<TieredProgram>,
     affine: Vec<bool>,
     gradients: Vec<OnceLock<CompiledGradient>>,
-    both_sides: Vec<OnceLock<Program>>,
+    both_sides: Vec<OnceLock<TieredProgram>>,
     lie: Mutex<LieCache>,
     /// Active surfaces of the modes met so far; a zero entry is the surface slid on.
     activity: Mutex<FxHashMap<Vec<i8>, Vec<bool>>>,
@@ -51,7 +52,7 @@ struct CompiledGradient {
 /// Constant for an affine surface, else a program.
 enum GradientValues {
     Constant(Vec<f64>),
-    Computed(Program),
+    Computed(TieredProgram),
 }
 
 /// Lie derivatives built so far, by (surface, surface with the word, word).
@@ -81,7 +82,7 @@ impl TracedSystem {
     ) -> Result<Self, ExprError> {
         let surfaces: Vec<NodeId> = (0..graph.n_surfaces()).map(|j| graph.surface(j as u32)).collect();
         let field_program = Program::compile(&graph, &field, backend)?;
-        let surfaces_program = Program::compile(&graph, &surfaces, backend)?;
+        let surfaces_program = TieredProgram::new(graph.clone(), surfaces.clone(), backend);
         let model = Model {
             n_states: field.len(),
             affine: surfaces.iter().map(|&h| graph.is_affine(h)).collect(),
@@ -135,20 +136,21 @@ impl TracedSystem {
 impl Model {
     /// h_j, then their rates along the input vector.
     fn rates(&self) -> &Program {
-        self.rates_program.get_or_init(|| {
+        let rates = self.rates_program.get_or_init(|| {
             let mut graph = self.graph.clone();
             let velocity: Vec<NodeId> = (0..self.n_states).map(|i| graph.input(i as u32)).collect();
             let surfaces: Vec<NodeId> = (0..graph.n_surfaces()).map(|j| graph.surface(j as u32)).collect();
             let mut outputs = surfaces.clone();
             outputs.extend(surfaces.iter().map(|&h| graph.directional(h, &velocity)));
-            compile(&graph, &outputs, self.backend)
-        })
+            TieredProgram::new(graph, outputs, self.backend)
+        });
+        rates.program()
     }
 
     /// The normal components and the fields of both sides, as one program that shares what they have
     /// in common.
     fn both_sides(&self, j: usize) -> &Program {
-        self.both_sides[j].get_or_init(|| {
+        let both = self.both_sides[j].get_or_init(|| {
             let mut graph = self.graph.clone();
             let h = graph.surface(j as u32);
             let mut outputs = Vec::with_capacity(2 + 2 * self.n_states);
@@ -161,8 +163,9 @@ impl Model {
                 fields.extend(field);
             }
             outputs.extend(fields);
-            compile(&graph, &outputs, self.backend)
-        })
+            TieredProgram::new(graph, outputs, self.backend)
+        });
+        both.program()
     }
 
     fn gradient(&self, j: usize) -> &CompiledGradient {
@@ -176,7 +179,7 @@ impl Model {
                 states: states.iter().map(|(i, _)| *i as usize).collect(),
                 values: match constants {
                     Some(values) => GradientValues::Constant(values),
-                    None => GradientValues::Computed(compile(&graph, &outputs, self.backend)),
+                    None => GradientValues::Computed(TieredProgram::new(graph, outputs, self.backend)),
                 },
             }
         })
@@ -251,13 +254,6 @@ impl Model {
     }
 }
 
-/// Compiles nodes that were just made in this graph, falling back to the interpreter.
-fn compile(graph: &Graph, outputs: &[NodeId], backend: Backend) -> Program {
-    Program::compile(graph, outputs, backend)
-        .or_else(|_| Program::compile(graph, outputs, Backend::Interpreter))
-        .expect("the interpreter refuses only nodes of another graph")
-}
-
 impl PiecewiseSystem for TracedSystem {
     fn n_states(&self) -> usize {
         self.model.n_states
@@ -274,7 +270,7 @@ impl PiecewiseSystem for TracedSystem {
     }
 
     fn surfaces(&self, t: f64, x: &[f64], signs: &[f64], h: &mut [f64]) -> Result<(), FieldError> {
-        self.model.surfaces_program.eval(t, x, signs, &self.parameters, &[], h);
+        self.model.surfaces_program.program().eval(t, x, signs, &self.parameters, &[], h);
         Ok(())
     }
 
@@ -314,7 +310,8 @@ impl PiecewiseSystem for TracedSystem {
         let mut computed = Vec::new();
         let values = match &compiled.values {
             GradientValues::Constant(values) => values,
-            GradientValues::Computed(program) => {
+            GradientValues::Computed(tiered) => {
+                let program = tiered.program();
                 computed.resize(program.n_outputs(), 0.0);
                 program.eval(t, x, signs, &self.parameters, &[], &mut computed);
                 &computed
