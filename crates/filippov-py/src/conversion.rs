@@ -41,15 +41,16 @@ pub fn read_scalar(value: &Bound<'_, PyAny>) -> PyResult<f64> {
 
 /// A (rows, columns) array from columns stored one after the other.
 pub fn columns<'py>(py: Python<'py>, data: &[f64], n_rows: usize) -> Bound<'py, PyArray2<f64>> {
-    let n_columns = if n_rows == 0 { 0 } else { data.len() / n_rows };
+    let n_columns = data.len().checked_div(n_rows).unwrap_or(0);
     let array = PyArray2::zeros(py, [n_rows, n_columns], false);
-    let mut view = array.readwrite();
-    let mut view = view.as_array_mut();
-    for (c, column) in data.chunks_exact(n_rows.max(1)).enumerate() {
-        for (r, value) in column.iter().enumerate() {
-            view[[r, c]] = *value;
+    {
+        let mut guard = array.readwrite();
+        let mut view = guard.as_array_mut();
+        for (c, column) in data.chunks_exact(n_rows.max(1)).enumerate() {
+            for (r, value) in column.iter().enumerate() {
+                view[[r, c]] = *value;
+            }
         }
     }
-    drop(view);
     array
 }

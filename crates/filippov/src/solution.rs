@@ -207,6 +207,15 @@ impl Recorder {
         self.switches.push(switch);
     }
 
+    /// The surfaces of the switches recorded at this time.
+    pub fn surfaces_switched_at(&self, t: f64) -> Vec<usize> {
+        let latest = self.switches.iter().rev().take_while(|s| s.t == t);
+        let mut surfaces: Vec<usize> = latest.flat_map(|s| s.surfaces.iter().copied()).collect();
+        surfaces.sort_unstable();
+        surfaces.dedup();
+        surfaces
+    }
+
     #[allow(clippy::too_many_arguments)]
     pub fn finish(
         mut self,

@@ -152,7 +152,7 @@ impl<'a> Integrator<'a> {
             if self.stats.n_switches >= self.options.max_events {
                 return Ok(Stop::MaxEvents);
             }
-            if attempts % POLL_INTERVAL == 0 {
+            if attempts.is_multiple_of(POLL_INTERVAL) {
                 if self.options.max_wall_time.is_some_and(|s| started.elapsed().as_secs_f64() > s) {
                     return Ok(Stop::MaxWallTime);
                 }

@@ -21,7 +21,10 @@ pub enum Stop {
     /// The step would have to be shorter than the rounding of time.
     StepTooSmall,
     /// Switches follow one another without any progress of time.
-    NoProgress,
+    NoProgress {
+        /// The surfaces they happen on.
+        surfaces: Vec<usize>,
+    },
     /// The field, or a switching function, is not finite.
     NotFinite,
     /// A function of the user raised.
@@ -58,7 +61,7 @@ impl Stop {
             Stop::MaxWallTime => "max_wall_time",
             Stop::Interrupted => "interrupted",
             Stop::StepTooSmall => "step_too_small",
-            Stop::NoProgress => "no_progress",
+            Stop::NoProgress { .. } => "no_progress",
             Stop::NotFinite => "field_not_finite",
             Stop::FieldRaised(_) => "field_raised",
             Stop::Intersection { .. } => "intersection",
@@ -91,9 +94,10 @@ impl Stop {
                 "Stopped at t = {t:.10} in mode ({mode}): the step became shorter than the rounding of time. \
                  The field may be singular or stiff here, or jump without a declared surface."
             ),
-            Stop::NoProgress => format!(
-                "Stopped at t = {t:.10} in mode ({mode}): switches follow one another without any progress of time. \
-                 The field on one side may not be defined up to its surface."
+            Stop::NoProgress { surfaces } => format!(
+                "Stopped at t = {t:.10} in mode ({mode}): switches at {} follow one another without any progress of \
+                 time. They accumulate here, or the field on one side is not defined up to its surface.",
+                names(surfaces)
             ),
             Stop::NotFinite => format!(
                 "Stopped at t = {t:.10} in mode ({mode}): the right-hand side is not finite (NaN or infinity) here."

@@ -68,7 +68,7 @@ impl Integrator<'_> {
         let repeated = if self.last_switch.0 == self.t { self.last_switch.1 + 1 } else { 0 };
         self.last_switch = (self.t, repeated);
         if repeated > MOST_SWITCHES_AT_ONE_TIME {
-            return Ok(Some(Stop::NoProgress));
+            return Ok(Some(Stop::NoProgress { surfaces: self.recorder.surfaces_switched_at(self.t) }));
         }
         let signs = self.motion.signs.clone();
         let h = self.surface_values(&signs)?;
@@ -138,7 +138,7 @@ impl Integrator<'_> {
             .collect();
         let sliding = self.motion.sliding();
         let mut gradient = vec![0.0; self.x.len()];
-        for j in 0..h.len() {
+        for (j, h) in h.iter().enumerate() {
             if !self.motion.active[j] || Some(j) == sliding || surfaces.contains(&j) {
                 continue;
             }
@@ -149,7 +149,7 @@ impl Integrator<'_> {
                 .monitored
                 .iter()
                 .any(|m| m.function == EventFunction::Surface(j) && m.deflation.is_none());
-            if approached && h[j].abs() <= SURFACE_NOISE * (size + (ht * self.t).abs()) {
+            if approached && h.abs() <= SURFACE_NOISE * (size + (ht * self.t).abs()) {
                 surfaces.push(j);
             }
         }

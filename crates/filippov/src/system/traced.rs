@@ -52,7 +52,7 @@ struct CompiledGradient {
 /// Constant for an affine surface, else a program.
 enum GradientValues {
     Constant(Vec<f64>),
-    Computed(TieredProgram),
+    Computed(Box<TieredProgram>),
 }
 
 /// Lie derivatives built so far, by (surface, surface with the word, word).
@@ -179,7 +179,7 @@ impl Model {
                 states: states.iter().map(|(i, _)| *i as usize).collect(),
                 values: match constants {
                     Some(values) => GradientValues::Constant(values),
-                    None => GradientValues::Computed(TieredProgram::new(graph, outputs, self.backend)),
+                    None => GradientValues::Computed(Box::new(TieredProgram::new(graph, outputs, self.backend))),
                 },
             }
         })

@@ -1,0 +1,106 @@
+# The commands of the project. `make help` lists them; pre-commit and .ci/run call the same ones.
+
+SHELL := /bin/sh
+PYTHON ?= python3
+CARGO ?= cargo
+VENV ?= .venv
+BIN := $(VENV)/bin
+PY := $(BIN)/python
+
+# Stamp files: an up-to-date environment and extension are not built again.
+STAMPS := $(VENV)/stamps
+ENV_STAMP := $(STAMPS)/env
+BENCH_STAMP := $(STAMPS)/bench
+BUILD_STAMP := $(STAMPS)/build
+
+RUST_SOURCES := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
+# maturin installs into the environment named here; a Conda environment around must not interfere.
+MATURIN := env -u CONDA_PREFIX VIRTUAL_ENV="$(abspath $(VENV))" $(BIN)/maturin
+# The binding has no Rust tests of its own: tests/ exercises it from Python.
+RUST_TESTED := --workspace --exclude filippov-py
+
+export MPLBACKEND ?= Agg
+
+.DEFAULT_GOAL := help
+.PHONY: help tools setup build build-release fmt lint types test test-rs test-py test-slow bench demo \
+	pictures docs check all clean
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  %-14s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+tools: ## check that Python and Rust are there; says how to install what is missing
+	@PYTHON="$(PYTHON)" CARGO="$(CARGO)" sh scripts/check_tools.sh
+
+setup: $(ENV_STAMP) ## create the environment in .venv
+
+build: $(BUILD_STAMP) ## compile the extension, optimised, into the environment
+
+build-release: $(ENV_STAMP) ## build a wheel into dist/
+	$(MATURIN) build --release --out dist
+
+fmt: $(ENV_STAMP) ## format the Rust and the Python sources
+	$(CARGO) fmt --all
+	$(BIN)/ruff check --fix --quiet .
+	$(BIN)/ruff format .
+
+lint: $(ENV_STAMP) ## formatting, clippy, ruff, file lengths, map; changes nothing
+	@sh scripts/check_tools.sh lint
+	$(CARGO) fmt --all --check
+	$(CARGO) clippy --release --workspace --all-targets -- -D warnings
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(PY) scripts/check_lengths.py
+	$(PY) scripts/check_map.py
+
+types: $(BUILD_STAMP) ## type check (strict) and comparison of the stub with the extension
+	$(BIN)/mypy
+	$(BIN)/stubtest filippov._core
+
+test: test-rs test-py ## all tests but the slow ones
+
+test-rs: tools ## Rust tests
+	$(CARGO) test --release $(RUST_TESTED)
+
+test-py: $(BUILD_STAMP) ## Python tests and the examples in the docstrings
+	$(BIN)/pytest -m "not slow"
+	$(BIN)/pytest --doctest-modules python/filippov
+
+test-slow: $(BUILD_STAMP) ## the slow tests
+	$(CARGO) test --release $(RUST_TESTED) -- --ignored
+	$(BIN)/pytest -m slow
+
+bench: $(BENCH_STAMP) ## run the benchmarks
+	$(PY) benchmarks/disode_tables.py
+	$(PY) benchmarks/speed.py
+
+demo: $(BUILD_STAMP) ## simulate and plot a stick-slip oscillator
+	$(PY) examples/01_stick_slip/stick_slip.py
+
+pictures: $(BUILD_STAMP) ## draw the pictures of the README again
+	$(PY) scripts/readme_blocks.py README.md docs/images
+
+docs: tools ## pages of the Rust crates, into target/doc
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --no-deps $(RUST_TESTED)
+
+check: lint types test ## what must hold before a change is complete; changes nothing
+
+all: fmt check ## format, then check
+
+clean: ## remove the environment and everything built
+	rm -rf $(VENV) target dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -f python/filippov/_core*.so
+
+$(ENV_STAMP): pyproject.toml
+	@PYTHON="$(PYTHON)" CARGO="$(CARGO)" sh scripts/check_tools.sh
+	test -x $(PY) || $(PYTHON) -m venv $(VENV)
+	$(PY) -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
+	$(PY) -m pip install --quiet --group dev
+	@mkdir -p $(STAMPS) && touch $@
+
+$(BENCH_STAMP): $(BUILD_STAMP)
+	$(MATURIN) develop --release --extras bench
+	@touch $@
+
+$(BUILD_STAMP): $(ENV_STAMP) $(RUST_SOURCES)
+	$(MATURIN) develop --release
+	@touch $@

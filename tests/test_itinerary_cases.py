@@ -1,0 +1,112 @@
+"""The constant and affine cases of Guglielmi and Hairer (problem I) up to codimension 1."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import filippov as fl
+import numpy as np
+import pytest
+import reference
+from reference import Reference, load
+
+FILE = "I_gh_cases"
+UNIQUE = [
+    "crossing",
+    "enter_codim1",
+    "exit_codim1_plus",
+    "exit_codim1_minus",
+    "codim1_crossing_surface2",
+    "codim1_to_other_codim1",
+    "codim1_to_classical",
+    "spiral_outward",
+]
+# Several Filippov solutions leave the intersection: codimension 1 does not say which one follows.
+NOT_UNIQUE = [
+    "entry_nonunique_to_classical",
+    "entry_nonunique_to_codim1",
+    "entry_nonunique_to_classical_b",
+    "entry_nonunique_to_codim1_b",
+    "entry_nonunique_to_codim2_a",
+    "entry_nonunique_to_codim2_b",
+]
+TO_CODIMENSION_2 = ["codim1_to_codim2", "spiral_inward"]
+
+
+def test_every_case_without_a_start_in_codimension_2_is_here() -> None:
+    later = {name for name in reference.run_ids(FILE) if load(FILE, name).mode == (0, 0)}
+    assert set(UNIQUE) | set(NOT_UNIQUE) | set(TO_CODIMENSION_2) == set(reference.run_ids(FILE)) - later
+
+
+def system_of(run: Reference) -> fl.System:
+    names = run.statement["state"]
+
+    def function(text: str) -> Any:
+        return lambda t, x: eval(text, {}, dict(zip(names, x, strict=True)))
+
+    def field(texts: list[str]) -> Any:
+        parts = [function(text) for text in texts]
+        return lambda t, x: [part(t, x) for part in parts]
+
+    fields = {
+        tuple(int(sign) for sign in key.split(",")): field(texts)
+        for key, texts in run.statement["fields"].items()
+    }
+    return fl.System.from_fields(fields, [function(text) for text in run.statement["surfaces"]], n=len(names))
+
+
+def solve(name: str, rtol: float = 1e-10) -> tuple[Reference, fl.Solution]:
+    run = load(FILE, name)
+    return run, system_of(run).solve((0.0, run.t_end), run.y0, rtol=rtol, atol=rtol)
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-10, 1e-12])
+@pytest.mark.parametrize("name", UNIQUE)
+def test_itinerary(name: str, rtol: float) -> None:
+    run, sol = solve(name, rtol)
+    assert sol.success
+    assert sol.segments[0].mode == run.mode
+    assert [s.kind for s in sol.switches] == [
+        reference.kind_between(e.mode_before, e.mode_after) for e in run.events
+    ]
+    assert [(s.surfaces, s.mode_before, s.mode_after) for s in sol.switches] == [
+        (e.surfaces, e.mode_before, e.mode_after) for e in run.events
+    ]
+
+
+@pytest.mark.parametrize("name", UNIQUE)
+def test_times_states_and_multipliers(name: str) -> None:
+    run, sol = solve(name)
+    assert sol.sol is not None
+    # Constant and affine fields: the method is exact up to rounding, or nearly so.
+    np.testing.assert_allclose(sol.switches.t, [e.t for e in run.events], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(sol.switches.y_before, [e.y for e in run.events], rtol=0, atol=1e-9)
+    for sample in run.samples:
+        np.testing.assert_allclose(sol.sol(sample.t), sample.y, rtol=0, atol=1e-9)
+        multipliers = sol.sol.multipliers(sample.t)
+        np.testing.assert_allclose(multipliers[~np.isnan(multipliers)], sample.multipliers, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(sol.y[:, -1], run.y_end, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", [*NOT_UNIQUE, "codim1_to_codim2"])
+def test_run_stops_at_an_intersection_that_it_cannot_decide(name: str) -> None:
+    run, sol = solve(name)
+    entry = run.events[-1]
+    assert not sol.success
+    assert sol.status < 0
+    assert "x[0] = 0" in sol.message
+    assert "x[1] = 0" in sol.message
+    assert sol.t[-1] == pytest.approx(entry.t, abs=1e-9)
+    np.testing.assert_allclose(sol.y[:, -1], entry.y, rtol=0, atol=1e-9)
+    assert sol.segments[-1].mode == entry.mode_before
+    assert len(sol.switches) == len(run.events) - 1
+
+
+def test_accumulating_crossings_before_their_limit() -> None:
+    """The 80 listed crossings, 20 turns that shrink by 2 each; `regressions/` has the limit itself."""
+    run = load(FILE, "spiral_inward")
+    crossings = [event for event in run.events if event.kind == "crossing"]
+    assert len(crossings) == 80
+    sol = system_of(run).solve((0.0, 4.99999523162841796875 + 1e-8), run.y0, rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(sol.switches.t, [event.t for event in crossings], rtol=0, atol=1e-12)
+    assert [s.mode_after for s in sol.switches] == [event.mode_after for event in crossings]

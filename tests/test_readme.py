@@ -1,0 +1,64 @@
+"""The README: its Python blocks run, its numbers are true, and its Rust example is the compiled one."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+README = ROOT / "README.md"
+PNG_SIGNATURE = b"\x89PNG"
+
+
+@pytest.fixture(scope="module")
+def names(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """Everything that the blocks of the README define; they run once."""
+    matplotlib = pytest.importorskip("matplotlib")
+    pytest.importorskip("scipy")
+    matplotlib.use("Agg")
+    sys.path.insert(0, str(ROOT / "scripts"))
+    from readme_blocks import run_blocks
+
+    folder = tmp_path_factory.mktemp("readme")
+    found = run_blocks(README, folder)
+    found["folder"] = folder
+    return found
+
+
+def test_the_picture_is_drawn_and_kept(names: dict[str, Any]) -> None:
+    assert (names["folder"] / "stick_slip.png").read_bytes().startswith(PNG_SIGNATURE)
+    for link in re.findall(r"!\[[^]]*\]\(([^)]*)\)", README.read_text(encoding="utf-8")):
+        assert (ROOT / link).read_bytes().startswith(PNG_SIGNATURE)
+
+
+def test_the_comparison_with_scipy_is_true(names: dict[str, Any]) -> None:
+    assert names["ordinary"].success
+    assert names["ordinary"].y[:, -1] == pytest.approx([27.666666667, 0.0], abs=1e-8)
+    assert names["exact"].y[:, -1] == pytest.approx([49.255067419, 1.348824242], abs=1e-8)
+    assert names["exact"].switches.t == pytest.approx([11.000275475, 11.270040324], abs=1e-8)
+
+
+def test_the_numbers_in_the_text_are_true(names: dict[str, Any]) -> None:
+    assert names["rest"].nfev < 100
+    assert names["rest"].switches.t == pytest.approx([1 / 0.7])
+    assert names["rest"].sol.multipliers(5.0) == pytest.approx([0.3])
+    assert names["box"].stats["backend"] == "black box"
+    assert not names["part"].success
+
+
+def test_links_lead_somewhere() -> None:
+    links = re.findall(r"\]\((?!https?:)([^)#]+)\)", README.read_text(encoding="utf-8"))
+    assert links
+    assert [link for link in links if not (ROOT / link).exists()] == []
+
+
+def test_the_rust_example_is_the_one_that_is_compiled() -> None:
+    shown = re.search(r"^```rust\n(.*?)^```$", README.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    assert shown
+    compiled = (ROOT / "crates/filippov/examples/dry_friction.rs").read_text(encoding="utf-8")
+    code = compiled.split("\n\n", maxsplit=1)[1].replace("#![allow(clippy::print_stdout)]\n\n", "")
+    assert code == shown[1]
