@@ -32,7 +32,9 @@ impl Builder {
 impl Builder {
     #[new]
     fn new() -> Self {
-        Builder { graph: Mutex::new(Graph::new()) }
+        Builder {
+            graph: Mutex::new(Graph::new()),
+        }
     }
 
     fn constant(&self, value: f64) -> u32 {
@@ -107,7 +109,9 @@ impl Builder {
     fn select(&self, surface: u32, orientation: f64, plus: u32, minus: u32) -> PyResult<u32> {
         let mut graph = self.graph();
         if surface as usize >= graph.n_surfaces() {
-            return Err(PyValueError::new_err(format!("no surface {surface} in this graph")));
+            return Err(PyValueError::new_err(format!(
+                "no surface {surface} in this graph"
+            )));
         }
         let (plus, minus) = (Self::node(&graph, plus)?, Self::node(&graph, minus)?);
         Ok(graph.select(surface, orientation, plus, minus).0)
@@ -128,10 +132,17 @@ impl Builder {
     }
 
     #[pyo3(signature = (a, states=None, parameters=None))]
-    fn text(&self, a: u32, states: Option<Vec<String>>, parameters: Option<Vec<String>>) -> PyResult<String> {
+    fn text(
+        &self,
+        a: u32,
+        states: Option<Vec<String>>,
+        parameters: Option<Vec<String>>,
+    ) -> PyResult<String> {
         let graph = self.graph();
-        let names =
-            Names { states: states.unwrap_or_default(), parameters: parameters.unwrap_or_default() };
+        let names = Names {
+            states: states.unwrap_or_default(),
+            parameters: parameters.unwrap_or_default(),
+        };
         Ok(graph.text(Self::node(&graph, a)?, &names))
     }
 }

@@ -15,12 +15,18 @@ pub struct Surfaces {
 
 impl Surfaces {
     fn value(&self, py: Python<'_>, j: usize, t: f64, x: &[f64]) -> PyResult<f64> {
-        read_scalar(&self.functions[j].bind(py).call1((t, PyArray1::from_slice(py, x)))?)
+        read_scalar(
+            &self.functions[j]
+                .bind(py)
+                .call1((t, PyArray1::from_slice(py, x)))?,
+        )
     }
 
     fn write(&self, t: f64, x: &[f64], h: &mut [f64]) -> Result<(), FieldError> {
         Python::attach(|py| {
-            h.iter_mut().enumerate().try_for_each(|(j, h)| self.value(py, j, t, x).map(|v| *h = v))
+            h.iter_mut()
+                .enumerate()
+                .try_for_each(|(j, h)| self.value(py, j, t, x).map(|v| *h = v))
         })
         .map_err(|e: PyErr| FieldError::new(e))
     }
@@ -84,7 +90,11 @@ impl PiecewiseSystem for Signed {
 
     fn field(&self, t: f64, x: &[f64], signs: &[f64], dx: &mut [f64]) -> Result<(), FieldError> {
         Python::attach(|py| {
-            let arguments = (t, PyArray1::from_slice(py, x), PyArray1::from_slice(py, signs));
+            let arguments = (
+                t,
+                PyArray1::from_slice(py, x),
+                PyArray1::from_slice(py, signs),
+            );
             read_vector(&self.fun.bind(py).call1(arguments)?, dx, "fun")
         })
         .map_err(|e: PyErr| FieldError::new(e))
@@ -119,7 +129,8 @@ impl UserFunction for CompiledEvent {
     fn value(&self, t: f64, x: &[f64]) -> Result<f64, FieldError> {
         let mut out = [0.0];
         // Expressions with switches of their own are not compiled as events, so no signs are needed.
-        self.program.eval(t, x, &[], &self.parameters, &[], &mut out);
+        self.program
+            .eval(t, x, &[], &self.parameters, &[], &mut out);
         Ok(out[0])
     }
 }

@@ -17,7 +17,11 @@ pub fn read_vector(value: &Bound<'_, PyAny>, out: &mut [f64], what: &str) -> PyR
     }
     if let Ok(array) = value.cast::<PyArray1<f64>>() {
         let array = array.readonly();
-        if let Some(values) = array.as_slice().ok().filter(|values| values.len() == out.len()) {
+        if let Some(values) = array
+            .as_slice()
+            .ok()
+            .filter(|values| values.len() == out.len())
+        {
             out.copy_from_slice(values);
             return Ok(());
         }
@@ -36,7 +40,9 @@ pub fn read_vector(value: &Bound<'_, PyAny>, out: &mut [f64], what: &str) -> PyR
 
 /// Reads one number, also from an array with one element.
 pub fn read_scalar(value: &Bound<'_, PyAny>) -> PyResult<f64> {
-    value.extract().or_else(|_| value.call_method0("item")?.extract())
+    value
+        .extract()
+        .or_else(|_| value.call_method0("item")?.extract())
 }
 
 /// A (rows, columns) array from columns stored one after the other.

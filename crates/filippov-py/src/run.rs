@@ -22,7 +22,15 @@ type SwitchRow<'py> = (
     Bound<'py, PyTuple>,
     String,
 );
-type SegmentRow<'py> = (f64, f64, Bound<'py, PyTuple>, usize, usize, Vector<'py>, Vector<'py>);
+type SegmentRow<'py> = (
+    f64,
+    f64,
+    Bound<'py, PyTuple>,
+    usize,
+    usize,
+    Vector<'py>,
+    Vector<'py>,
+);
 
 /// What a run computed.
 #[pyclass(frozen, module = "filippov._core")]
@@ -44,7 +52,12 @@ impl Run {
             let taken = std::mem::replace(payload, filippov::FieldError::new(()));
             error = Some(raised(taken));
         }
-        Run { system, solution: Mutex::new(solution), error, is_native }
+        Run {
+            system,
+            solution: Mutex::new(solution),
+            error,
+            is_native,
+        }
     }
 
     fn solution(&self) -> std::sync::MutexGuard<'_, Solution> {
@@ -54,7 +67,10 @@ impl Run {
     /// The multiplier vector at a time; NaN for surfaces not slid on.
     fn multiplier_vector(&self, solution: &Solution, t: f64, side: Side) -> PyResult<Vec<f64>> {
         let mut out = vec![f64::NAN; self.system.n_surfaces()];
-        if let Some((j, value)) = solution.multiplier(&*self.system, t, side).map_err(raised)? {
+        if let Some((j, value)) = solution
+            .multiplier(&*self.system, t, side)
+            .map_err(raised)?
+        {
             out[j] = value;
         }
         Ok(out)
@@ -125,7 +141,11 @@ impl Run {
     #[getter]
     fn t_events<'py>(&self, py: Python<'py>) -> Vec<Vector<'py>> {
         let times = |zeros: &Vec<filippov::UserZero>| zeros.iter().map(|z| z.t).collect();
-        self.solution().user_zeros.iter().map(|z| PyArray1::from_vec(py, times(z))).collect()
+        self.solution()
+            .user_zeros
+            .iter()
+            .map(|z| PyArray1::from_vec(py, times(z)))
+            .collect()
     }
 
     #[getter]
@@ -161,12 +181,16 @@ impl Run {
     #[getter]
     fn message(&self) -> String {
         let solution = self.solution();
-        solution.stop.message(solution.t_last, &solution.mode, |j| self.system.surface_name(j))
+        solution.stop.message(solution.t_last, &solution.mode, |j| {
+            self.system.surface_name(j)
+        })
     }
 
     #[getter]
     fn error(&self, py: Python<'_>) -> Option<Py<PyAny>> {
-        self.error.as_ref().map(|e| e.clone_ref(py).into_value(py).into_any())
+        self.error
+            .as_ref()
+            .map(|e| e.clone_ref(py).into_value(py).into_any())
     }
 
     #[getter]
@@ -188,7 +212,11 @@ impl Run {
 
     #[getter]
     fn warnings(&self) -> Vec<(f64, &'static str, String)> {
-        self.solution().warnings.iter().map(|w| (w.t, w.code.name(), w.text.clone())).collect()
+        self.solution()
+            .warnings
+            .iter()
+            .map(|w| (w.t, w.code.name(), w.text.clone()))
+            .collect()
     }
 
     /// States at the times `t`, shape (n_states, len(t)).
@@ -205,7 +233,11 @@ impl Run {
         let mut out = vec![0.0; n * times.len()];
         for (&t, y) in times.iter().zip(out.chunks_exact_mut(n)) {
             let side = if left { Side::Left } else { Side::Right };
-            if solution.evaluate(&*self.system, t, side, y).map_err(raised)?.is_none() {
+            if solution
+                .evaluate(&*self.system, t, side, y)
+                .map_err(raised)?
+                .is_none()
+            {
                 let first = solution.segments.first().map_or(f64::NAN, |s| s.t_start);
                 return Err(PyValueError::new_err(format!(
                     "t = {t} is outside of the solution, which covers [{first}, {}], or dense_output was off",

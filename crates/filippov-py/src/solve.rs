@@ -39,7 +39,9 @@ pub fn solve(
     } else if let Ok(signed) = system.cast::<SignedSystem>() {
         Arc::clone(&signed.get().system) as _
     } else {
-        return Err(PyTypeError::new_err("system: a TracedSystem, OpaqueSystem or SignedSystem is needed"));
+        return Err(PyTypeError::new_err(
+            "system: a TracedSystem, OpaqueSystem or SignedSystem is needed",
+        ));
     };
     let mut functions: Vec<(Box<dyn UserFunction + Send + Sync>, f64, u64)> = Vec::new();
     for (g, direction, terminal, _name) in events {
@@ -50,7 +52,10 @@ pub fn solve(
                     .get()
                     .event_program(handle)
                     .ok_or_else(|| PyValueError::new_err(format!("no event {handle}")))?;
-                Box::new(CompiledEvent { program, parameters: parameters.clone() })
+                Box::new(CompiledEvent {
+                    program,
+                    parameters: parameters.clone(),
+                })
             }
             _ => Box::new(CalledEvent(g)),
         };
@@ -108,14 +113,22 @@ fn read_options(given: &Bound<'_, PyDict>) -> PyResult<(Options, Option<Py<PyAny
                 options.nonunique = match value.extract::<String>()?.as_str() {
                     "regularize" => NonUnique::Regularize,
                     "error" => NonUnique::Error,
-                    other => return Err(PyValueError::new_err(format!("nonunique: unknown policy {other:?}"))),
+                    other => {
+                        return Err(PyValueError::new_err(format!(
+                            "nonunique: unknown policy {other:?}"
+                        )))
+                    }
                 }
             }
             "t_eval" => options.t_eval = value.extract()?,
             "dense_output" => options.dense_output = value.extract()?,
             "progress" if !value.is_none() => progress = Some(value.unbind()),
             "progress" | "method" | "sliding" | "keep" => {}
-            other => return Err(PyValueError::new_err(format!("options: unknown key {other:?}"))),
+            other => {
+                return Err(PyValueError::new_err(format!(
+                    "options: unknown key {other:?}"
+                )))
+            }
         }
     }
     Ok((options, progress))

@@ -56,12 +56,19 @@ fn checked<'a>(
 ) -> PyResult<(&'a [f64], &'a [f64])> {
     let (x, signs) = (x.as_slice()?, signs.as_slice()?);
     if x.len() != system.n_states() {
-        let text = format!("x has length {}, but the system has {} states", x.len(), system.n_states());
+        let text = format!(
+            "x has length {}, but the system has {} states",
+            x.len(),
+            system.n_states()
+        );
         return Err(PyValueError::new_err(text));
     }
     if signs.len() != system.n_surfaces() {
-        let text =
-            format!("signs has length {}, but the system has {} surfaces", signs.len(), system.n_surfaces());
+        let text = format!(
+            "signs has length {}, but the system has {} surfaces",
+            signs.len(),
+            system.n_surfaces()
+        );
         return Err(PyValueError::new_err(text));
     }
     Ok((x, signs))
@@ -86,12 +93,20 @@ impl TracedSystem {
         let zeros = vec![0.0; names.parameters.len()];
         let system = filippov::TracedSystem::new(graph, field, zeros, names, Backend::Auto)
             .map_err(|e| PyValueError::new_err(e.to_string()))?;
-        Ok(TracedSystem { system, builder, events: Mutex::default() })
+        Ok(TracedSystem {
+            system,
+            builder,
+            events: Mutex::default(),
+        })
     }
 
     /// The event with this handle.
     pub fn event_program(&self, handle: usize) -> Option<Arc<Program>> {
-        self.events.lock().unwrap_or_else(PoisonError::into_inner).get(handle).map(Arc::clone)
+        self.events
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .get(handle)
+            .map(Arc::clone)
     }
 
     fn with(&self, p: &Array<'_>) -> PyResult<filippov::TracedSystem> {
@@ -116,9 +131,14 @@ impl TracedSystem {
             return Err(PyValueError::new_err(text));
         }
         let graph = builder.borrow(py).graph().clone();
-        let field =
-            field.into_iter().map(|id| Builder::node(&graph, id)).collect::<PyResult<Vec<_>>>()?;
-        let names = Names { states: states.unwrap_or_default(), parameters };
+        let field = field
+            .into_iter()
+            .map(|id| Builder::node(&graph, id))
+            .collect::<PyResult<Vec<_>>>()?;
+        let names = Names {
+            states: states.unwrap_or_default(),
+            parameters,
+        };
         Self::build(graph, field, names, Some(builder))
     }
 
@@ -133,7 +153,9 @@ impl TracedSystem {
     }
 
     fn surfaces(&self) -> Vec<String> {
-        (0..self.system.n_surfaces()).map(|j| self.system.surface_name(j)).collect()
+        (0..self.system.n_surfaces())
+            .map(|j| self.system.surface_name(j))
+            .collect()
     }
 
     fn field<'py>(
@@ -161,7 +183,9 @@ impl TracedSystem {
     fn active(&self, signs: Array<'_>) -> PyResult<Vec<bool>> {
         let mut active = vec![true; self.system.n_surfaces()];
         if signs.as_slice()?.len() != active.len() {
-            return Err(PyValueError::new_err("signs: one entry per surface is needed"));
+            return Err(PyValueError::new_err(
+                "signs: one entry per surface is needed",
+            ));
         }
         self.system.active(signs.as_slice()?, None, &mut active);
         Ok(active)
@@ -176,7 +200,9 @@ impl TracedSystem {
         let builder = self
             .builder
             .as_ref()
-            .ok_or_else(|| PyValueError::new_err("events cannot be traced for a system that was unpickled"))?
+            .ok_or_else(|| {
+                PyValueError::new_err("events cannot be traced for a system that was unpickled")
+            })?
             .borrow(py);
         let graph = builder.graph();
         let program = Program::compile(&graph, &[Builder::node(&graph, node)?], Backend::Auto)
@@ -221,8 +247,10 @@ impl TracedSystem {
         }
         let graph = Graph::from_bytes(read_block(&mut rest).ok_or_else(damaged)?)
             .map_err(|e| PyValueError::new_err(e.to_string()))?;
-        let field =
-            field.into_iter().map(|id| Builder::node(&graph, id)).collect::<PyResult<Vec<_>>>()?;
+        let field = field
+            .into_iter()
+            .map(|id| Builder::node(&graph, id))
+            .collect::<PyResult<Vec<_>>>()?;
         let [states, parameters] = lists;
         Self::build(graph, field, Names { states, parameters }, None)
     }

@@ -17,17 +17,11 @@ fn main() -> Result<(), filippov::Error> {
         },
         |_t, x, h| h[0] = x[1],
     );
-    let options = Options {
-        rtol: 1e-9,
-        atol: vec![1e-9],
-        ..Options::default()
-    };
+    let options = Options::default();
     let solution = solve(&oscillator, (0.0, 60.0), &[1.0, 2.0], &options, &[])?;
     for switch in &solution.switches {
-        println!(
-            "{:.9}  ({}) -> ({})",
-            switch.t, switch.mode_before, switch.mode_after
-        );
+        let (kind, mode) = (switch.kind.name(), &switch.mode_after);
+        println!("{:.6}  {kind}  ({mode})", switch.t);
     }
     Ok(())
 }

@@ -19,14 +19,26 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let friction = g.mul(force, sign);
     let pull = g.sub(drive, y);
     let acceleration = g.sub(pull, friction);
-    let system = TracedSystem::new(g, vec![v, acceleration], vec![], Names::default(), Backend::Auto)?;
+    let system = TracedSystem::new(
+        g,
+        vec![v, acceleration],
+        vec![],
+        Names::default(),
+        Backend::Auto,
+    )?;
 
-    let options =
-        Options { rtol: tolerance, atol: vec![tolerance], dense_output: false, ..Options::default() };
+    let options = Options {
+        rtol: tolerance,
+        atol: vec![tolerance],
+        dense_output: false,
+        ..Options::default()
+    };
     let t_end = 60.0 * std::f64::consts::PI;
     let mut steps = 0;
     for _ in 0..repeats {
-        steps += solve(&system, (0.0, t_end), &[1.0, 2.0], &options, &[])?.stats.n_steps;
+        steps += solve(&system, (0.0, t_end), &[1.0, 2.0], &options, &[])?
+            .stats
+            .n_steps;
     }
     assert!(steps > 0);
     Ok(())

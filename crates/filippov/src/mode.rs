@@ -39,7 +39,10 @@ impl Mode {
 
     /// The signs handed to the field: +1.0 or -1.0 per surface, a zero entry as +1.0.
     pub fn signs(&self) -> Vec<f64> {
-        self.entries.iter().map(|&e| if e < 0 { -1.0 } else { 1.0 }).collect()
+        self.entries
+            .iter()
+            .map(|&e| if e < 0 { -1.0 } else { 1.0 })
+            .collect()
     }
 
     /// Sets entry `j`.

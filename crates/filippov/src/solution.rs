@@ -124,7 +124,10 @@ impl Solution {
         }
         let index = match side {
             Side::Right => self.steps.partition_point(|s| s.t0 <= t).max(1) - 1,
-            Side::Left => self.steps.partition_point(|s| s.t_stop < t).min(self.steps.len() - 1),
+            Side::Left => self
+                .steps
+                .partition_point(|s| s.t_stop < t)
+                .min(self.steps.len() - 1),
         };
         let step = self.steps[index];
         let theta = (t - step.t0) / step.dt;
@@ -132,7 +135,10 @@ impl Solution {
             return Ok(None);
         };
         crate::stepper::evaluate(coefficients, n, theta, y);
-        let segment = self.segments.partition_point(|s| s.steps.1 <= index).min(self.segments.len() - 1);
+        let segment = self
+            .segments
+            .partition_point(|s| s.steps.1 <= index)
+            .min(self.segments.len() - 1);
         let mode = &self.segments[segment].mode;
         if let Some(j) = mode.sliding() {
             Projector::default().project(system, j, t, y, &mode.signs())?;
@@ -178,7 +184,12 @@ impl Recorder {
     pub fn begin_segment(&mut self, t: f64, mode: &Mode) {
         let step = self.steps.len();
         self.close_segment(t);
-        self.segments.push(Segment { t_start: t, t_end: t, mode: mode.clone(), steps: (step, step) });
+        self.segments.push(Segment {
+            t_start: t,
+            t_end: t,
+            mode: mode.clone(),
+            steps: (step, step),
+        });
     }
 
     fn close_segment(&mut self, t: f64) {
@@ -197,7 +208,8 @@ impl Recorder {
         }
         if self.keep_dense {
             self.steps.push(Step { t0, dt, t_stop });
-            self.coefficients.extend_from_slice(interpolant.coefficients());
+            self.coefficients
+                .extend_from_slice(interpolant.coefficients());
         }
         self.t.push(t_stop);
         self.y.extend_from_slice(y);
@@ -258,8 +270,12 @@ impl Solution {
         side: Side,
     ) -> Result<Option<(usize, f64)>, FieldError> {
         let mut y = vec![0.0; self.n_states];
-        let Some(mode) = self.evaluate(system, t, side, &mut y)? else { return Ok(None) };
-        let Some(j) = mode.sliding() else { return Ok(None) };
+        let Some(mode) = self.evaluate(system, t, side, &mut y)? else {
+            return Ok(None);
+        };
+        let Some(j) = mode.sliding() else {
+            return Ok(None);
+        };
         let mut field = SlidingField::new(system, j, &mode.signs());
         Ok(Some((j, field.normal_components(t, &mut y)?.multiplier())))
     }
@@ -268,7 +284,11 @@ impl Solution {
     ///
     /// # Errors
     /// If a function of the user raises.
-    pub(crate) fn resample(&mut self, system: &dyn PiecewiseSystem, times: &[f64]) -> Result<(), FieldError> {
+    pub(crate) fn resample(
+        &mut self,
+        system: &dyn PiecewiseSystem,
+        times: &[f64],
+    ) -> Result<(), FieldError> {
         let mut y = vec![0.0; self.n_states];
         let (mut t_out, mut y_out) = (Vec::with_capacity(times.len()), Vec::new());
         for &t in times.iter().filter(|&&t| t <= self.t_last) {

@@ -27,7 +27,11 @@ pub fn may_vanish_bent(g0: f64, slope0: f64, g1: f64, slope1: f64, probes: &[(f6
         let ends = u * u * (g0 * (1.0 + 2.0 * theta) + slope0 * theta);
         (value - ends - theta * theta * (g1 * (3.0 - 2.0 * theta) - slope1 * u)).abs()
     };
-    let shift = 4.0 * probes.iter().map(distance).fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a });
+    let shift = 4.0
+        * probes
+            .iter()
+            .map(distance)
+            .fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a });
     may_vanish(g0 - shift, slope0, g1 - shift, slope1)
 }
 
@@ -50,6 +54,7 @@ pub fn may_vanish_deflated(leading: f64, g1: f64, slope1: f64) -> bool {
     let middle = g1 - 0.5 * (slope1 - g1);
     let low = leading.min(g1).min(middle);
     let high = leading.max(g1).max(middle);
-    let excluded = low > 2.0 * CUBIC_REMAINDER * (high - low) && (leading + g1 + slope1).is_finite();
+    let excluded =
+        low > 2.0 * CUBIC_REMAINDER * (high - low) && (leading + g1 + slope1).is_finite();
     !excluded
 }

@@ -58,12 +58,18 @@ impl Monitored {
         }
         let discriminant = rate * rate - 2.0 * curvature * value;
         // No zero of the parabola: its lowest point is the nearest approach.
-        if discriminant < 0.0 { -rate / curvature } else { 2.0 * value / (-rate + discriminant.sqrt()) }
+        if discriminant < 0.0 {
+            -rate / curvature
+        } else {
+            2.0 * value / (-rate + discriminant.sqrt())
+        }
     }
 
     /// The value at `time` after division by the zero at the start, in units of the step `dt`.
     pub fn deflated(&self, value: f64, time: f64, dt: f64, noise: f64) -> f64 {
-        let Some(Deflation { t, order, leading }) = self.deflation else { return value };
+        let Some(Deflation { t, order, leading }) = self.deflation else {
+            return value;
+        };
         let limit = leading * dt.powi(order);
         let elapsed = (time - t) / dt;
         let power = elapsed.powi(order);

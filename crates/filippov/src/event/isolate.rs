@@ -81,16 +81,36 @@ pub fn first_zero_sampled(
     probes: &[f64],
 ) -> Result<Isolated, FieldError> {
     if values.iter().all(|v| v.abs() <= noise) {
-        return Ok(Isolated { zero: None, depth: 0 });
+        return Ok(Isolated {
+            zero: None,
+            depth: 0,
+        });
     }
     if values[0] < -noise {
-        let here = Bracket { lo: a, hi: a, g_lo: values[0], g_hi: values[0], guess: a };
-        return Ok(Isolated { zero: Some(Zero::Crossing(here)), depth: 0 });
+        let here = Bracket {
+            lo: a,
+            hi: a,
+            g_lo: values[0],
+            g_hi: values[0],
+            guess: a,
+        };
+        return Ok(Isolated {
+            zero: Some(Zero::Crossing(here)),
+            depth: 0,
+        });
     }
-    let mut search = Search { g, noise, probes, deepest: 0 };
+    let mut search = Search {
+        g,
+        noise,
+        probes,
+        deepest: 0,
+    };
     let zero = search.first(a, b, values, 0)?;
     let deepest = search.deepest;
-    Ok(Isolated { zero, depth: deepest })
+    Ok(Isolated {
+        zero,
+        depth: deepest,
+    })
 }
 
 /// Points off the regular grid, so that an oscillation in step with the samples is noticed.
@@ -105,7 +125,13 @@ struct Search<'a, 'b> {
 
 impl Search<'_, '_> {
     /// The first zero on [a, b], given the values at its quarters.
-    fn first(&mut self, a: f64, b: f64, v: [f64; 5], depth: u32) -> Result<Option<Zero>, FieldError> {
+    fn first(
+        &mut self,
+        a: f64,
+        b: f64,
+        v: [f64; 5],
+        depth: u32,
+    ) -> Result<Option<Zero>, FieldError> {
         self.deepest = depth.max(self.deepest);
         let coefficients = bernstein(&v);
         let remainder =
@@ -115,26 +141,45 @@ impl Search<'_, '_> {
             return Ok(None);
         }
         let m = 0.5 * (a + b);
-        let unresolved = depth >= MAX_DEPTH
-            || v.iter().all(|v| v.abs() <= self.noise)
-            || m <= a
-            || m >= b;
-        let steepness = coefficients.windows(2).map(|w| w[0] - w[1]).fold(f64::INFINITY, f64::min);
+        let unresolved =
+            depth >= MAX_DEPTH || v.iter().all(|v| v.abs() <= self.noise) || m <= a || m >= b;
+        let steepness = coefficients
+            .windows(2)
+            .map(|w| w[0] - w[1])
+            .fold(f64::INFINITY, f64::min);
         let single = steepness > 2.0 * remainder && v[0] > 0.0 && v[4] <= 0.0;
         if unresolved || single && self.agrees(a, b, &coefficients, steepness)? {
             return Ok(bracket(a, b, &v, &coefficients, self.noise));
         }
         let quarter = 0.125 * (b - a);
-        let left = [v[0], (self.g)(a + quarter)?, v[1], (self.g)(a + 3.0 * quarter)?, v[2]];
+        let left = [
+            v[0],
+            (self.g)(a + quarter)?,
+            v[1],
+            (self.g)(a + 3.0 * quarter)?,
+            v[2],
+        ];
         if let Some(zero) = self.first(a, m, left, depth + 1)? {
             return Ok(Some(zero));
         }
-        let right = [v[2], (self.g)(m + quarter)?, v[3], (self.g)(m + 3.0 * quarter)?, v[4]];
+        let right = [
+            v[2],
+            (self.g)(m + quarter)?,
+            v[3],
+            (self.g)(m + 3.0 * quarter)?,
+            v[4],
+        ];
         self.first(m, b, right, depth + 1)
     }
 
     /// Does the quartic agree with g at the probes, to half the margin?
-    fn agrees(&mut self, a: f64, b: f64, coefficients: &[f64; 5], margin: f64) -> Result<bool, FieldError> {
+    fn agrees(
+        &mut self,
+        a: f64,
+        b: f64,
+        coefficients: &[f64; 5],
+        margin: f64,
+    ) -> Result<bool, FieldError> {
         for &probe in self.probes {
             let value = (self.g)(a + (b - a) * probe)?;
             let close = (value - casteljau(*coefficients, probe)).abs() <= 0.5 * margin;
@@ -148,7 +193,13 @@ impl Search<'_, '_> {
 
 /// The first change of sign among the samples, else a touch if the smallest is within the noise.
 fn bracket(a: f64, b: f64, v: &[f64; 5], coefficients: &[f64; 5], noise: f64) -> Option<Zero> {
-    let at = |i: usize| if i == 4 { b } else { a + (b - a) * 0.25 * i as f64 };
+    let at = |i: usize| {
+        if i == 4 {
+            b
+        } else {
+            a + (b - a) * 0.25 * i as f64
+        }
+    };
     if let Some(i) = (0..4).find(|&i| v[i] > 0.0 && v[i + 1] <= 0.0) {
         let (mut low, mut high) = (0.25 * i as f64, 0.25 * (i + 1) as f64);
         let (mut p_low, mut p_high) = (v[i], v[i + 1]);
@@ -166,7 +217,13 @@ fn bracket(a: f64, b: f64, v: &[f64; 5], coefficients: &[f64; 5], noise: f64) ->
             }
         }
         let guess = a + (b - a) * x;
-        let crossing = Bracket { lo: at(i), hi: at(i + 1), g_lo: v[i], g_hi: v[i + 1], guess };
+        let crossing = Bracket {
+            lo: at(i),
+            hi: at(i + 1),
+            g_lo: v[i],
+            g_hi: v[i + 1],
+            guess,
+        };
         return Some(Zero::Crossing(crossing));
     }
     let smallest = (0..5).min_by(|&i, &j| v[i].abs().total_cmp(&v[j].abs()))?;

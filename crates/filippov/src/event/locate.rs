@@ -13,7 +13,13 @@ use crate::tolerances::EPS;
 /// # Errors
 /// If `g` raises.
 pub fn refine(g: Sampled, bracket: Bracket, width: f64) -> Result<f64, FieldError> {
-    let Bracket { mut lo, mut hi, g_lo, g_hi, guess } = bracket;
+    let Bracket {
+        mut lo,
+        mut hi,
+        g_lo,
+        g_hi,
+        guess,
+    } = bracket;
     let (mut best, mut previous) = match g_lo.abs() < g_hi.abs() {
         true => ((lo, g_lo), (lo, g_lo)),
         false => ((hi, g_hi), (hi, g_hi)),
@@ -36,7 +42,11 @@ pub fn refine(g: Sampled, bracket: Bracket, width: f64) -> Result<f64, FieldErro
         if inside && (secant - at).abs() <= 0.5 * width.max(EPS * hi.abs()) {
             return Ok(secant);
         }
-        let next = if inside && (secant - at).abs() <= 0.5 * last_move { secant } else { 0.5 * (lo + hi) };
+        let next = if inside && (secant - at).abs() <= 0.5 * last_move {
+            secant
+        } else {
+            0.5 * (lo + hi)
+        };
         last_move = (next - at).abs();
         previous = (at, value);
         at = next;

@@ -22,7 +22,9 @@ fn a_double_crossing_inside_is_found() {
 
 #[test]
 fn an_exact_touch_is_a_touch() {
-    let Some(Zero::Touch(theta)) = find(|x| (x - 0.3_f64).powi(2)) else { panic!("no touch") };
+    let Some(Zero::Touch(theta)) = find(|x| (x - 0.3_f64).powi(2)) else {
+        panic!("no touch")
+    };
     assert!((theta - 0.3).abs() < 1e-6);
 }
 
@@ -40,7 +42,9 @@ fn an_identically_vanishing_function_has_no_zero() {
 #[test]
 fn many_oscillations_are_resolved() {
     let g = |x: f64| (60.0 * x).cos() + 0.5;
-    let Some(Zero::Crossing(bracket)) = find(g) else { panic!("no crossing") };
+    let Some(Zero::Crossing(bracket)) = find(g) else {
+        panic!("no crossing")
+    };
     let zero = refine(&mut |x| Ok(g(x)), bracket, 0.0).unwrap();
     assert!((zero - (2.0 * std::f64::consts::PI / 3.0) / 60.0).abs() < 1e-15);
 }

@@ -35,12 +35,19 @@ impl Projector {
             }
             system.gradient(j, t, x, signs, &mut self.gradient)?;
             let norm2: f64 = self.gradient.iter().map(|g| g * g).sum();
-            let size: f64 = self.gradient.iter().zip(&*x).map(|(g, x)| (g * x).abs()).sum();
+            let size: f64 = self
+                .gradient
+                .iter()
+                .zip(&*x)
+                .map(|(g, x)| (g * x).abs())
+                .sum();
             if norm2 == 0.0 || h.abs() <= 0.25 * SURFACE_NOISE * size {
                 break;
             }
             let shift = h / norm2;
-            x.iter_mut().zip(&self.gradient).for_each(|(x, g)| *x -= shift * g);
+            x.iter_mut()
+                .zip(&self.gradient)
+                .for_each(|(x, g)| *x -= shift * g);
         }
         Ok(())
     }

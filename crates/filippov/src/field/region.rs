@@ -16,7 +16,12 @@ pub struct RegionField<'a> {
 impl<'a> RegionField<'a> {
     /// The field of the region with these signs.
     pub fn new(system: &'a dyn PiecewiseSystem, signs: Vec<f64>) -> Self {
-        RegionField { system, signs, n_evaluations: 0, departing: false }
+        RegionField {
+            system,
+            signs,
+            n_evaluations: 0,
+            departing: false,
+        }
     }
 
     /// While the motion departs tangentially from a surface, stages may lie beyond it however short
@@ -72,7 +77,10 @@ pub fn move_inside<S: PiecewiseSystem + ?Sized>(
         let wanted = offset * norm2.sqrt();
         if norm2 > 0.0 && signs[j] * h < wanted && h.abs() <= reach * norm2.sqrt() {
             let shift = (signs[j] * wanted - h) / norm2;
-            moved.iter_mut().zip(&gradient).for_each(|(x, g)| *x += shift * g);
+            moved
+                .iter_mut()
+                .zip(&gradient)
+                .for_each(|(x, g)| *x += shift * g);
         }
     }
     Ok(moved)
@@ -105,7 +113,12 @@ pub fn eval_on_side<S: PiecewiseSystem + ?Sized>(
         if dx.iter().all(|v| v.is_finite()) {
             break;
         }
-        system.field(t, &move_inside(system, t, x, signs, offset, SIDE_REACH * offset)?, signs, dx)?;
+        system.field(
+            t,
+            &move_inside(system, t, x, signs, offset, SIDE_REACH * offset)?,
+            signs,
+            dx,
+        )?;
         evaluations += 1;
     }
     Ok(evaluations)

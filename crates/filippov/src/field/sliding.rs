@@ -48,7 +48,10 @@ impl<'a> SlidingField<'a> {
             sides: BothSides::new(system.n_states(), system.n_surfaces()),
             projector: Projector::default(),
             n_evaluations: 0,
-            last: NormalComponents { minus: f64::NAN, plus: f64::NAN },
+            last: NormalComponents {
+                minus: f64::NAN,
+                plus: f64::NAN,
+            },
         }
     }
 
@@ -67,18 +70,28 @@ impl<'a> SlidingField<'a> {
     /// # Errors
     /// If a function of the user raises.
     pub fn project(&mut self, t: f64, x: &mut [f64]) -> Result<(), FieldError> {
-        self.projector.project(self.system, self.surface, t, x, &self.signs)
+        self.projector
+            .project(self.system, self.surface, t, x, &self.signs)
     }
 
     /// The normal components at (t, x), after projection.
     ///
     /// # Errors
     /// If a function of the user raises.
-    pub fn normal_components(&mut self, t: f64, x: &mut [f64]) -> Result<NormalComponents, FieldError> {
+    pub fn normal_components(
+        &mut self,
+        t: f64,
+        x: &mut [f64],
+    ) -> Result<NormalComponents, FieldError> {
         self.project(t, x)?;
         let sides = &mut self.sides;
-        self.n_evaluations += self.system.both_sides(self.surface, t, x, &self.signs, sides)?;
-        self.last = NormalComponents { minus: sides.normal_minus, plus: sides.normal_plus };
+        self.n_evaluations += self
+            .system
+            .both_sides(self.surface, t, x, &self.signs, sides)?;
+        self.last = NormalComponents {
+            minus: sides.normal_minus,
+            plus: sides.normal_plus,
+        };
         Ok(self.last)
     }
 }

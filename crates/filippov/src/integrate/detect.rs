@@ -70,14 +70,19 @@ impl Detector {
         (t, x, v): (f64, &[f64], &[f64]),
         stage: usize,
     ) -> Result<(), FieldError> {
-        let with_surfaces = motion.monitored.iter().any(|m| matches!(m.function, EventFunction::Surface(_)));
+        let with_surfaces = motion
+            .monitored
+            .iter()
+            .any(|m| matches!(m.function, EventFunction::Surface(_)));
         if with_surfaces {
             system.surface_rates(t, x, &motion.signs, v, &mut self.h, &mut self.rate)?;
         }
         self.right.clear();
         for m in &motion.monitored {
             self.right.push(match m.function {
-                EventFunction::Surface(j) => (m.orientation * self.h[j], m.orientation * self.rate[j]),
+                EventFunction::Surface(j) => {
+                    (m.orientation * self.h[j], m.orientation * self.rate[j])
+                }
                 EventFunction::ExitMinus => (self.stages[0][stage], f64::NAN),
                 EventFunction::ExitPlus => (self.stages[1][stage], f64::NAN),
             });
@@ -120,12 +125,21 @@ impl Detector {
         (t, start, end): (f64, &[f64], &[f64]),
     ) -> Result<f64, FieldError> {
         let EventFunction::Surface(j) = function else {
-            let largest = self.stages.iter().flatten().fold(0.0_f64, |m, v| m.max(v.abs()));
+            let largest = self
+                .stages
+                .iter()
+                .flatten()
+                .fold(0.0_f64, |m, v| m.max(v.abs()));
             return Ok(4.0 * SURFACE_NOISE * largest);
         };
         let ht = system.gradient(j, t, end, &motion.signs, &mut self.gradient)?;
         let states = start.iter().zip(end).map(|(a, b)| a.abs().max(b.abs()));
-        let size: f64 = self.gradient.iter().zip(states).map(|(g, x)| (g * x).abs()).sum();
+        let size: f64 = self
+            .gradient
+            .iter()
+            .zip(states)
+            .map(|(g, x)| (g * x).abs())
+            .sum();
         Ok(SURFACE_NOISE * (size + (ht * t).abs()))
     }
 }
@@ -163,7 +177,11 @@ impl Integrator<'_> {
         let detector = &mut self.detector;
         let motion = &mut self.motion;
         detector.suspects.clear();
-        if motion.monitored.iter().any(|m| !m.affine && matches!(m.function, EventFunction::Surface(_))) {
+        if motion
+            .monitored
+            .iter()
+            .any(|m| !m.affine && matches!(m.function, EventFunction::Surface(_)))
+        {
             for (theta, h) in PROBES.into_iter().zip(&mut detector.probed) {
                 self.stepper.interpolant().at(theta, &mut detector.x);
                 let t = self.t + theta * dt;
@@ -203,7 +221,8 @@ impl Integrator<'_> {
     /// Raises the continuous extension to order 5.
     fn extend(&mut self, dt: f64) -> Result<(), FieldError> {
         self.stats.n_extensions += 1;
-        self.stepper.extend_order5(&mut self.motion.field, self.t, &self.x, dt)?;
+        self.stepper
+            .extend_order5(&mut self.motion.field, self.t, &self.x, dt)?;
         Ok(())
     }
 
@@ -217,7 +236,9 @@ impl Integrator<'_> {
     ) -> Result<Option<(f64, bool)>, FieldError> {
         let m = self.motion.monitored[index];
         let step = (self.t, &self.x[..], self.stepper.end());
-        let noise = self.detector.noise(self.system, &self.motion, m.function, step)?;
+        let noise = self
+            .detector
+            .noise(self.system, &self.motion, m.function, step)?;
         self.motion.monitored[index].noise = noise;
         let width = 0.5 * EPS * (self.t.abs() / dt).max(to);
         let polynomial = match (m.function, &self.motion.field) {
@@ -280,14 +301,26 @@ impl Integrator<'_> {
     }
 
     /// The rows of an affine h along the continuous extension, in the nested form of the extension.
-    fn affine_polynomial(&mut self, j: usize, orientation: f64, dt: f64) -> Result<[f64; 6], FieldError> {
+    fn affine_polynomial(
+        &mut self,
+        j: usize,
+        orientation: f64,
+        dt: f64,
+    ) -> Result<[f64; 6], FieldError> {
         let (gradient, h) = (&mut self.detector.gradient, &mut self.detector.h);
-        let ht = self.system.gradient(j, self.t, &self.x, &self.motion.signs, gradient)?;
-        self.system.surfaces(self.t, &self.x, &self.motion.signs, h)?;
+        let ht = self
+            .system
+            .gradient(j, self.t, &self.x, &self.motion.signs, gradient)?;
+        self.system
+            .surfaces(self.t, &self.x, &self.motion.signs, h)?;
         self.stats.n_surface_evaluations += 1;
         let mut rows = [0.0; 6];
         let extension = self.stepper.interpolant().coefficients();
-        for (row, values) in rows.iter_mut().zip(extension.chunks_exact(gradient.len())).skip(1) {
+        for (row, values) in rows
+            .iter_mut()
+            .zip(extension.chunks_exact(gradient.len()))
+            .skip(1)
+        {
             *row = orientation * dot(gradient, values);
         }
         rows[0] = orientation * h[j];
@@ -319,7 +352,13 @@ impl Integrator<'_> {
         Ok(())
     }
 
-    fn keep_earliest(&self, found: &mut Option<Found>, index: usize, zero: Option<(f64, bool)>, dt: f64) {
+    fn keep_earliest(
+        &self,
+        found: &mut Option<Found>,
+        index: usize,
+        zero: Option<(f64, bool)>,
+        dt: f64,
+    ) {
         let Some((theta, touch)) = zero else { return };
         let function = self.motion.monitored[index].function;
         let together = 4.0 * EPS * (1.0 + self.t.abs() / dt);
@@ -329,7 +368,13 @@ impl Integrator<'_> {
                 event.functions.push(function);
                 event.touch &= touch;
             }
-            _ => *found = Some(Found { theta, functions: vec![function], touch }),
+            _ => {
+                *found = Some(Found {
+                    theta,
+                    functions: vec![function],
+                    touch,
+                })
+            }
         }
     }
 }
@@ -357,11 +402,16 @@ impl Curve<'_, '_> {
                     field.project(t, self.x)?;
                 }
                 *self.n_evaluations += 1;
-                self.system.surfaces(t, self.x, &self.motion.signs, self.h)?;
+                self.system
+                    .surfaces(t, self.x, &self.motion.signs, self.h)?;
                 Ok(m.orientation * self.h[j])
             }
             (exit, ModeField::Sliding(field)) => {
-                let known = self.exits.iter().find(|(at, _)| *at == theta).map(|(_, a)| *a);
+                let known = self
+                    .exits
+                    .iter()
+                    .find(|(at, _)| *at == theta)
+                    .map(|(_, a)| *a);
                 let a = match known {
                     Some(a) => a,
                     None => field.normal_components(t, self.x)?,
@@ -369,7 +419,11 @@ impl Curve<'_, '_> {
                 if known.is_none() {
                     self.exits.push((theta, a));
                 }
-                Ok(if exit == EventFunction::ExitMinus { a.minus } else { -a.plus })
+                Ok(if exit == EventFunction::ExitMinus {
+                    a.minus
+                } else {
+                    -a.plus
+                })
             }
             // Exit functions are monitored while sliding only.
             (_, ModeField::Region(_)) => Ok(f64::NAN),

@@ -62,7 +62,10 @@ pub fn solve_interruptible(
         Err(raised) => Stop::FieldRaised(raised),
     };
     let mut solution = integrator.finish(stop);
-    let resampled = options.t_eval.as_ref().map(|times| solution.resample(system, times));
+    let resampled = options
+        .t_eval
+        .as_ref()
+        .map(|times| solution.resample(system, times));
     if let Some(Err(raised)) = resampled {
         solution.stop = Stop::FieldRaised(raised);
     }
@@ -153,7 +156,11 @@ impl<'a> Integrator<'a> {
                 return Ok(Stop::MaxEvents);
             }
             if attempts.is_multiple_of(POLL_INTERVAL) {
-                if self.options.max_wall_time.is_some_and(|s| started.elapsed().as_secs_f64() > s) {
+                if self
+                    .options
+                    .max_wall_time
+                    .is_some_and(|s| started.elapsed().as_secs_f64() > s)
+                {
                     return Ok(Stop::MaxWallTime);
                 }
                 if interrupt(self.t) {
@@ -180,7 +187,11 @@ impl<'a> Integrator<'a> {
             dt = remaining;
         }
         if dt < SHORTEST_STEP * self.t.abs() && dt < remaining {
-            return Ok(Some(if self.one_sided { Stop::NotFinite } else { Stop::StepTooSmall }));
+            return Ok(Some(if self.one_sided {
+                Stop::NotFinite
+            } else {
+                Stop::StepTooSmall
+            }));
         }
         let sliding = self.motion.sliding().is_some();
         match self.attempt(dt)? {
@@ -217,7 +228,11 @@ impl<'a> Integrator<'a> {
     /// Accepts the step, or its part up to the first event.
     fn advance(&mut self, dt: f64, error: f64) -> Result<Option<Stop>, FieldError> {
         let sliding = self.motion.sliding().is_some();
-        let t1 = if dt == self.t_end - self.t { self.t_end } else { self.t + dt };
+        let t1 = if dt == self.t_end - self.t {
+            self.t_end
+        } else {
+            self.t + dt
+        };
         self.stepper.extend_order4(self.t, &self.x, dt);
         let found = self.detect(t1, dt)?;
         self.stats.n_steps += 1;
@@ -225,7 +240,11 @@ impl<'a> Integrator<'a> {
         self.dt = dt * self.controller.accept(error);
         self.note_jump(dt);
         let theta = found.as_ref().map_or(1.0, |event| event.theta);
-        let t_stop = if theta == 1.0 { t1 } else { self.t + theta * dt };
+        let t_stop = if theta == 1.0 {
+            t1
+        } else {
+            self.t + theta * dt
+        };
         if let Some(event) = self.user_zeros(theta, t_stop)? {
             return Ok(Some(Stop::TerminalEvent(event)));
         }
@@ -235,7 +254,8 @@ impl<'a> Integrator<'a> {
         self.one_sided = self.detector.next_dt.is_some();
         self.dt = self.dt.min(self.detector.next_dt.unwrap_or(f64::INFINITY));
         let Some(event) = found else {
-            self.recorder.step(self.stepper.interpolant(), t1, self.stepper.end());
+            self.recorder
+                .step(self.stepper.interpolant(), t1, self.stepper.end());
             self.stepper.accept(&mut self.x);
             self.t = t1;
             if self.detector.accept(&mut self.motion.monitored, dt) {
@@ -245,7 +265,8 @@ impl<'a> Integrator<'a> {
         };
         self.stepper.interpolant().at(theta, &mut self.x);
         self.motion.project(t_stop, &mut self.x)?;
-        self.recorder.step(self.stepper.interpolant(), t_stop, &self.x);
+        self.recorder
+            .step(self.stepper.interpolant(), t_stop, &self.x);
         self.t = t_stop;
         self.recent_dt = 0.0;
         self.switch(&event)
@@ -266,7 +287,11 @@ impl<'a> Integrator<'a> {
             .map(Monitored::time_to_zero)
             .fold(f64::INFINITY, f64::min);
         let aim = ONE_SIDED_AIM * nearest;
-        self.dt = if !self.one_sided && aim < dt { aim } else { 0.5 * dt };
+        self.dt = if !self.one_sided && aim < dt {
+            aim
+        } else {
+            0.5 * dt
+        };
         self.one_sided = true;
         self.controller.not_finite();
     }
@@ -278,8 +303,14 @@ impl<'a> Integrator<'a> {
     /// Warns where the field jumps over a step far shorter than its predecessors.
     fn note_jump(&mut self, dt: f64) {
         if dt < JUMP_SHRINK * self.recent_dt {
-            let (a, b) = (self.stepper.start_derivative(), self.stepper.end_derivative());
-            let jumps = a.iter().zip(b).any(|(a, b)| (a - b).abs() > 0.3 * (a.abs() + b.abs()));
+            let (a, b) = (
+                self.stepper.start_derivative(),
+                self.stepper.end_derivative(),
+            );
+            let jumps = a
+                .iter()
+                .zip(b)
+                .any(|(a, b)| (a - b).abs() > 0.3 * (a.abs() + b.abs()));
             if jumps {
                 let t = self.t + dt;
                 self.warnings.push(Warning {
@@ -300,6 +331,13 @@ impl<'a> Integrator<'a> {
     pub fn finish(mut self, stop: Stop) -> Solution {
         self.stats.n_field_evaluations += self.motion.field.n_evaluations();
         let (zeros, recorder) = (self.user_events.into_zeros(), self.recorder);
-        recorder.finish(self.t, self.motion.mode, stop, self.stats, self.warnings, zeros)
+        recorder.finish(
+            self.t,
+            self.motion.mode,
+            stop,
+            self.stats,
+            self.warnings,
+            zeros,
+        )
     }
 }

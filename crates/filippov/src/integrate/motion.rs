@@ -61,7 +61,10 @@ impl<'a> Motion<'a> {
             rate: f64::NAN,
             curvature: 0.0,
             affine,
-            deflation: deflations.iter().find(|(f, _)| *f == function).map(|(_, d)| *d),
+            deflation: deflations
+                .iter()
+                .find(|(f, _)| *f == function)
+                .map(|(_, d)| *d),
             noise: 0.0,
         };
         let mut monitored: Vec<Monitored> = (0..signs.len())
@@ -72,14 +75,23 @@ impl<'a> Motion<'a> {
             monitored.push(monitor(EventFunction::ExitMinus, 1.0, false));
             monitored.push(monitor(EventFunction::ExitPlus, 1.0, false));
         }
-        let mut motion = Motion { mode, signs, active, field, monitored };
+        let mut motion = Motion {
+            mode,
+            signs,
+            active,
+            field,
+            monitored,
+        };
         motion.note_departure();
         motion
     }
 
     /// Tells the field of a region whether the motion still departs from a surface.
     pub fn note_departure(&mut self) {
-        let departing = self.monitored.iter().any(|m| m.deflation.is_some_and(|d| d.order > 1));
+        let departing = self
+            .monitored
+            .iter()
+            .any(|m| m.deflation.is_some_and(|d| d.order > 1));
         if let ModeField::Region(field) = &mut self.field {
             field.set_departing(departing);
         }

@@ -19,26 +19,62 @@ pub(super) fn check(
 ) -> Result<(), Error> {
     let n = system.n_states();
     if y0.len() != n {
-        return Err(Error::WrongLength { name: "y0", found: y0.len(), expected: n });
+        return Err(Error::WrongLength {
+            name: "y0",
+            found: y0.len(),
+            expected: n,
+        });
     }
     if options.atol.len() != 1 && options.atol.len() != n {
-        return Err(Error::WrongLength { name: "atol", found: options.atol.len(), expected: n });
+        return Err(Error::WrongLength {
+            name: "atol",
+            found: options.atol.len(),
+            expected: n,
+        });
     }
     let require = |name, value: f64, holds: bool, requirement| {
-        if holds { Ok(()) } else { Err(Error::OutOfRange { name, value, requirement }) }
+        if holds {
+            Ok(())
+        } else {
+            Err(Error::OutOfRange {
+                name,
+                value,
+                requirement,
+            })
+        }
     };
     require("t_span[0]", t0, t0.is_finite(), "must be finite")?;
-    require("t_span[1]", t1, t1.is_finite() && t1 >= t0, "must be finite and not before t_span[0]")?;
+    require(
+        "t_span[1]",
+        t1,
+        t1.is_finite() && t1 >= t0,
+        "must be finite and not before t_span[0]",
+    )?;
     for &y in y0 {
         require("y0", y, y.is_finite(), "must be finite")?;
     }
     for &a in &options.atol {
         require("atol", a, a >= 0.0 && a.is_finite(), "must not be negative")?;
     }
-    require("rtol", options.rtol, options.rtol > 0.0 && options.rtol.is_finite(), "must be positive")?;
-    require("max_step", options.max_step, options.max_step > 0.0, "must be positive")?;
+    require(
+        "rtol",
+        options.rtol,
+        options.rtol > 0.0 && options.rtol.is_finite(),
+        "must be positive",
+    )?;
+    require(
+        "max_step",
+        options.max_step,
+        options.max_step > 0.0,
+        "must be positive",
+    )?;
     if let Some(first) = options.first_step {
-        require("first_step", first, first > 0.0 && first.is_finite(), "must be positive")?;
+        require(
+            "first_step",
+            first,
+            first > 0.0 && first.is_finite(),
+            "must be positive",
+        )?;
     }
     Ok(())
 }
@@ -78,12 +114,16 @@ impl Integrator<'_> {
             _ => {
                 let decision = decide_intersection(self.system, &meeting, &mode, self.t, &self.x)?;
                 match decision.unique() {
-                    Some((mode, left)) => {
-                        (mode.clone(), left.iter().map(|&(j, l)| Left::Surface(j, l)).collect())
-                    }
+                    Some((mode, left)) => (
+                        mode.clone(),
+                        left.iter().map(|&(j, l)| Left::Surface(j, l)).collect(),
+                    ),
                     None => {
                         let candidates = decision.candidates;
-                        return Ok(Some(Stop::Intersection { surfaces: meeting, candidates }));
+                        return Ok(Some(Stop::Intersection {
+                            surfaces: meeting,
+                            candidates,
+                        }));
                     }
                 }
             }
@@ -93,16 +133,28 @@ impl Integrator<'_> {
 
     /// Surfaces that vanish at the start and matter there. An inactive one gets the sign of the
     /// side that it moves to.
-    fn meeting_at_start(&mut self, mode: &Mode, on_surface: &[bool]) -> Result<Vec<usize>, FieldError> {
+    fn meeting_at_start(
+        &mut self,
+        mode: &Mode,
+        on_surface: &[bool],
+    ) -> Result<Vec<usize>, FieldError> {
         let zeros: Vec<usize> = (0..on_surface.len()).filter(|&j| on_surface[j]).collect();
         let mut matters = vec![false; on_surface.len()];
         let mut active = matters.clone();
         // Few surfaces: all patterns; many: each alone.
-        let patterns = if zeros.len() <= 6 { 1_usize << zeros.len() } else { zeros.len() + 1 };
+        let patterns = if zeros.len() <= 6 {
+            1_usize << zeros.len()
+        } else {
+            zeros.len() + 1
+        };
         for pattern in 0..patterns {
             let mut tried = mode.clone();
             for (bit, &j) in zeros.iter().enumerate() {
-                let up = if zeros.len() <= 6 { pattern >> bit & 1 == 1 } else { pattern == bit };
+                let up = if zeros.len() <= 6 {
+                    pattern >> bit & 1 == 1
+                } else {
+                    pattern == bit
+                };
                 tried.set(j, if up { 1 } else { -1 });
             }
             self.system.active(&tried.signs(), None, &mut active);
@@ -120,11 +172,18 @@ impl Integrator<'_> {
     ) -> Result<Result<(Mode, Vec<Left>), Stop>, FieldError> {
         let signs = mode.signs();
         let decision = decide(self.system, j, Arrival::Start, self.t, &self.x, &signs)?;
-        let candidates: Vec<Mode> = decision.candidates.iter().map(|&e| mode.with(j, e)).collect();
+        let candidates: Vec<Mode> = decision
+            .candidates
+            .iter()
+            .map(|&e| mode.with(j, e))
+            .collect();
         let chosen = mode.with(j, decision.entry);
         if candidates.len() > 1 {
             if self.options.nonunique == NonUnique::Error {
-                return Ok(Err(Stop::NonUnique { surface: j, candidates }));
+                return Ok(Err(Stop::NonUnique {
+                    surface: j,
+                    candidates,
+                }));
             }
             self.warn_non_unique(j, &chosen, &candidates, WarningCode::NonUnique);
         }
@@ -133,8 +192,14 @@ impl Integrator<'_> {
 
     fn start_noise(&mut self, j: usize, signs: &[f64]) -> Result<f64, FieldError> {
         let mut gradient = vec![0.0; self.x.len()];
-        let ht = self.system.gradient(j, self.t, &self.x, signs, &mut gradient)?;
-        let size: f64 = gradient.iter().zip(&self.x).map(|(g, x)| (g * x).abs()).sum();
+        let ht = self
+            .system
+            .gradient(j, self.t, &self.x, signs, &mut gradient)?;
+        let size: f64 = gradient
+            .iter()
+            .zip(&self.x)
+            .map(|(g, x)| (g * x).abs())
+            .sum();
         Ok(SURFACE_NOISE * (size + (ht * self.t).abs()))
     }
 }

@@ -72,10 +72,18 @@ impl Stop {
     /// What happened, where, and what to try.
     pub fn message(&self, t: f64, mode: &Mode, surface_name: impl Fn(usize) -> String) -> String {
         let names = |surfaces: &[usize]| {
-            surfaces.iter().map(|&j| format!("{} = 0", surface_name(j))).collect::<Vec<_>>().join(", ")
+            surfaces
+                .iter()
+                .map(|&j| format!("{} = 0", surface_name(j)))
+                .collect::<Vec<_>>()
+                .join(", ")
         };
         let modes = |modes: &[Mode]| {
-            modes.iter().map(|m| format!("({m})")).collect::<Vec<_>>().join(", ")
+            modes
+                .iter()
+                .map(|m| format!("({m})"))
+                .collect::<Vec<_>>()
+                .join(", ")
         };
         match self {
             Stop::End => "The solver successfully reached the end of the integration interval.".into(),

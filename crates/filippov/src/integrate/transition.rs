@@ -11,7 +11,9 @@ use crate::mode::Mode;
 use crate::options::NonUnique;
 use crate::solution::Switch;
 use crate::stepper::{initial_step, restart_step};
-use crate::switching::{decide, decide_intersection, first_nonzero, Arrival, Decision, Kind, Leading};
+use crate::switching::{
+    decide, decide_intersection, first_nonzero, Arrival, Decision, Kind, Leading,
+};
 use crate::tolerances::{MOST_SWITCHES_AT_ONE_TIME, SURFACE_NOISE};
 
 /// A function that vanishes at the start of a motion, with its first non-vanishing derivative.
@@ -29,14 +31,23 @@ impl Left {
         match decision.entry {
             -1 => vec![Left::Surface(j, decision.minus)],
             1 => vec![Left::Surface(j, decision.plus)],
-            _ => [(EventFunction::ExitMinus, decision.minus), (EventFunction::ExitPlus, decision.plus)]
-                .into_iter()
-                .filter(|(_, leading)| leading.order > 1)
-                .map(|(function, leading)| {
-                    // The normal component is the derivative of h: one order less.
-                    Left::Exit(function, Leading { order: leading.order - 1, value: leading.value })
-                })
-                .collect(),
+            _ => [
+                (EventFunction::ExitMinus, decision.minus),
+                (EventFunction::ExitPlus, decision.plus),
+            ]
+            .into_iter()
+            .filter(|(_, leading)| leading.order > 1)
+            .map(|(function, leading)| {
+                // The normal component is the derivative of h: one order less.
+                Left::Exit(
+                    function,
+                    Leading {
+                        order: leading.order - 1,
+                        value: leading.value,
+                    },
+                )
+            })
+            .collect(),
         }
     }
 
@@ -48,7 +59,14 @@ impl Left {
         (leading.order > 0).then(|| {
             let order = i32::try_from(leading.order).unwrap_or(1);
             // In the sense of the mode every monitored function starts out positive.
-            (function, Deflation { t, order, leading: leading.coefficient().abs() })
+            (
+                function,
+                Deflation {
+                    t,
+                    order,
+                    leading: leading.coefficient().abs(),
+                },
+            )
         })
     }
 }
@@ -65,10 +83,16 @@ impl Integrator<'_> {
     /// Decides what follows the event and starts it.
     pub(super) fn switch(&mut self, event: &Found) -> Result<Option<Stop>, FieldError> {
         self.stats.n_switches += 1;
-        let repeated = if self.last_switch.0 == self.t { self.last_switch.1 + 1 } else { 0 };
+        let repeated = if self.last_switch.0 == self.t {
+            self.last_switch.1 + 1
+        } else {
+            0
+        };
         self.last_switch = (self.t, repeated);
         if repeated > MOST_SWITCHES_AT_ONE_TIME {
-            return Ok(Some(Stop::NoProgress { surfaces: self.recorder.surfaces_switched_at(self.t) }));
+            return Ok(Some(Stop::NoProgress {
+                surfaces: self.recorder.surfaces_switched_at(self.t),
+            }));
         }
         let signs = self.motion.signs.clone();
         let h = self.surface_values(&signs)?;
@@ -93,11 +117,17 @@ impl Integrator<'_> {
             (&[j], Some(arrival)) => {
                 let decision = decide(self.system, j, arrival, self.t, &self.x, &mode.signs())?;
                 let after = mode.with(j, decision.entry);
-                let candidates: Vec<Mode> =
-                    decision.candidates.iter().map(|&entry| mode.with(j, entry)).collect();
+                let candidates: Vec<Mode> = decision
+                    .candidates
+                    .iter()
+                    .map(|&entry| mode.with(j, entry))
+                    .collect();
                 if candidates.len() > 1 {
                     if self.options.nonunique == NonUnique::Error {
-                        return Ok(Some(Stop::NonUnique { surface: j, candidates }));
+                        return Ok(Some(Stop::NonUnique {
+                            surface: j,
+                            candidates,
+                        }));
                     }
                     self.warn_non_unique(j, &after, &candidates, WarningCode::NonUnique);
                 }
@@ -106,12 +136,16 @@ impl Integrator<'_> {
             _ => {
                 let decision = decide_intersection(self.system, &surfaces, &mode, self.t, &self.x)?;
                 match decision.unique() {
-                    Some((after, left)) => {
-                        (after.clone(), left.iter().map(|&(j, l)| Left::Surface(j, l)).collect())
-                    }
+                    Some((after, left)) => (
+                        after.clone(),
+                        left.iter().map(|&(j, l)| Left::Surface(j, l)).collect(),
+                    ),
                     None => {
                         let candidates = decision.candidates;
-                        return Ok(Some(Stop::Intersection { surfaces, candidates }));
+                        return Ok(Some(Stop::Intersection {
+                            surfaces,
+                            candidates,
+                        }));
                     }
                 }
             }
@@ -142,8 +176,14 @@ impl Integrator<'_> {
             if !self.motion.active[j] || Some(j) == sliding || surfaces.contains(&j) {
                 continue;
             }
-            let ht = self.system.gradient(j, self.t, &self.x, &self.motion.signs, &mut gradient)?;
-            let size: f64 = gradient.iter().zip(&self.x).map(|(g, x)| (g * x).abs()).sum();
+            let ht = self
+                .system
+                .gradient(j, self.t, &self.x, &self.motion.signs, &mut gradient)?;
+            let size: f64 = gradient
+                .iter()
+                .zip(&self.x)
+                .map(|(g, x)| (g * x).abs())
+                .sum();
             let approached = self
                 .motion
                 .monitored
@@ -259,18 +299,34 @@ impl Integrator<'_> {
         }
         let side = self.motion.mode.entries()[j];
         let signs = &self.motion.signs;
-        let next = self.system.lie_derivative(j, j, &vec![side; order], self.t, &self.x, signs)?;
+        let next = self
+            .system
+            .lie_derivative(j, j, &vec![side; order], self.t, &self.x, signs)?;
         let back = -(order as f64) * leading.value / next.value;
-        Ok(if back > 0.0 { 1.2 * back } else { f64::INFINITY })
+        Ok(if back > 0.0 {
+            1.2 * back
+        } else {
+            f64::INFINITY
+        })
     }
 
-    pub(super) fn warn_non_unique(&mut self, j: usize, chosen: &Mode, all: &[Mode], code: WarningCode) {
+    pub(super) fn warn_non_unique(
+        &mut self,
+        j: usize,
+        chosen: &Mode,
+        all: &[Mode],
+        code: WarningCode,
+    ) {
         let names: Vec<String> = all.iter().map(|m| format!("({m})")).collect();
         let surface = self.system.surface_name(j);
         let text = format!(
             "the continuation at {surface} = 0 is not unique: {}; ({chosen}) was chosen",
             names.join(", ")
         );
-        self.warnings.push(Warning { t: self.t, code, text });
+        self.warnings.push(Warning {
+            t: self.t,
+            code,
+            text,
+        });
     }
 }

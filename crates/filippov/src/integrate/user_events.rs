@@ -53,14 +53,19 @@ impl<'a> UserEvents<'a> {
 impl Integrator<'_> {
     /// Records the zeros of the user's functions up to `theta`; at one that ends the run, accepts
     /// the step up to there and returns its index.
-    pub(super) fn user_zeros(&mut self, theta: f64, t_stop: f64) -> Result<Option<usize>, FieldError> {
+    pub(super) fn user_zeros(
+        &mut self,
+        theta: f64,
+        t_stop: f64,
+    ) -> Result<Option<usize>, FieldError> {
         if self.user_events.events.is_empty() {
             return Ok(None);
         }
         let mut zeros = self.all_user_zeros(theta)?;
         if !zeros.is_empty() {
             let dt = self.stepper.interpolant().dt;
-            self.stepper.extend_order5(&mut self.motion.field, self.t, &self.x, dt)?;
+            self.stepper
+                .extend_order5(&mut self.motion.field, self.t, &self.x, dt)?;
             zeros = self.all_user_zeros(theta)?;
             zeros.sort_by(|a, b| a.0.total_cmp(&b.0));
         }
@@ -120,7 +125,10 @@ impl Integrator<'_> {
                     let away = (at - from).max(limit);
                     Ok(sign * self.user_value(index, from + away)? / away)
                 };
-                let Some(Zero::Crossing(bracket)) = first_zero(&mut g, from, theta, noise)?.zero else { break };
+                let Some(Zero::Crossing(bracket)) = first_zero(&mut g, from, theta, noise)?.zero
+                else {
+                    break;
+                };
                 let width = 0.5 * EPS * (t0.abs() / dt).max(1.0);
                 let at = refine(&mut g, bracket, width)?;
                 let direction = self.user_events.events[index].direction;

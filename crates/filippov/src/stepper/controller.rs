@@ -10,7 +10,11 @@ pub struct ErrorScale {
 impl ErrorScale {
     /// Tolerances for n components; `atol` holds one entry or n.
     pub fn new(rtol: f64, atol: &[f64], n: usize) -> Self {
-        let atol = if atol.len() == 1 { vec![atol[0]; n] } else { atol.to_vec() };
+        let atol = if atol.len() == 1 {
+            vec![atol[0]; n]
+        } else {
+            atol.to_vec()
+        };
         ErrorScale { rtol, atol }
     }
 
@@ -24,8 +28,12 @@ impl ErrorScale {
 
     /// Root mean square of `v` in units of the scale at `y`.
     pub fn norm(&self, v: &[f64], y: &[f64]) -> f64 {
-        let sum: f64 =
-            v.iter().zip(y).enumerate().map(|(i, (v, y))| (v / self.of(i, *y, *y)).powi(2)).sum();
+        let sum: f64 = v
+            .iter()
+            .zip(y)
+            .enumerate()
+            .map(|(i, (v, y))| (v / self.of(i, *y, *y)).powi(2))
+            .sum();
         (sum / v.len() as f64).sqrt()
     }
 }
@@ -52,7 +60,10 @@ const GROW: f64 = 5.0;
 
 impl Default for Controller {
     fn default() -> Self {
-        Controller { old_log: SMALLEST_OLD_LOG, rejected: false }
+        Controller {
+            old_log: SMALLEST_OLD_LOG,
+            rejected: false,
+        }
     }
 }
 

@@ -19,7 +19,12 @@ pub struct Interpolant {
 
 impl Interpolant {
     pub(super) fn empty(n: usize) -> Self {
-        Interpolant { t0: 0.0, dt: 0.0, n, coefficients: vec![0.0; 6 * n] }
+        Interpolant {
+            t0: 0.0,
+            dt: 0.0,
+            n,
+            coefficients: vec![0.0; 6 * n],
+        }
     }
 
     pub(super) fn rows(&mut self) -> [&mut [f64]; 6] {

@@ -51,7 +51,12 @@ impl Dopri5 {
     ///
     /// # Errors
     /// If a function of the user raises.
-    pub fn restart(&mut self, field: &mut dyn SmoothField, t: f64, y: &mut [f64]) -> Result<(), FieldError> {
+    pub fn restart(
+        &mut self,
+        field: &mut dyn SmoothField,
+        t: f64,
+        y: &mut [f64],
+    ) -> Result<(), FieldError> {
         field.eval(t, y, &mut self.k[0])
     }
 
@@ -118,26 +123,40 @@ impl Dopri5 {
         observe(4, field);
         for i in 0..n {
             stage[i] = y[i]
-                + dt * (A6[0] * k1[i] + A6[1] * k2[i] + A6[2] * k3[i] + A6[3] * k4[i] + A6[4] * k5[i]);
+                + dt * (A6[0] * k1[i]
+                    + A6[1] * k2[i]
+                    + A6[2] * k3[i]
+                    + A6[3] * k4[i]
+                    + A6[4] * k5[i]);
         }
         field.eval(t + dt, stage, k6)?;
         observe(5, field);
         for i in 0..n {
-            y1[i] = y[i] + dt * (B[0] * k1[i] + B[2] * k3[i] + B[3] * k4[i] + B[4] * k5[i] + B[5] * k6[i]);
+            y1[i] = y[i]
+                + dt * (B[0] * k1[i] + B[2] * k3[i] + B[3] * k4[i] + B[4] * k5[i] + B[5] * k6[i]);
         }
         field.eval(t + dt, y1, k7)?;
         observe(6, field);
 
         let mut sum = 0.0;
         for i in 0..n {
-            let e = E[0] * k1[i] + E[2] * k3[i] + E[3] * k4[i] + E[4] * k5[i] + E[5] * k6[i] + E[6] * k7[i];
+            let e = E[0] * k1[i]
+                + E[2] * k3[i]
+                + E[3] * k4[i]
+                + E[4] * k5[i]
+                + E[5] * k6[i]
+                + E[6] * k7[i];
             let ratio = dt * e / scale.of(i, y[i], y1[i]);
             sum += ratio * ratio;
         }
         let error = (sum / n as f64).sqrt();
         // The second stage enters neither the weights nor the estimate: look at it separately.
         let finite = error.is_finite() && k2.iter().all(|v| v.is_finite());
-        Ok(if finite { Attempt::Error(error) } else { Attempt::NotFinite })
+        Ok(if finite {
+            Attempt::Error(error)
+        } else {
+            Attempt::NotFinite
+        })
     }
 
     /// The continuous extension of order 4 of the attempted step; costs no evaluation.
@@ -155,7 +174,12 @@ impl Dopri5 {
             r2[i] = dt * k1[i] - r1[i];
             r3[i] = r1[i] - dt * k7[i] - r2[i];
             r4[i] = dt
-                * (D[0] * k1[i] + D[2] * k3[i] + D[3] * k4[i] + D[4] * k5[i] + D[5] * k6[i] + D[6] * k7[i]);
+                * (D[0] * k1[i]
+                    + D[2] * k3[i]
+                    + D[3] * k4[i]
+                    + D[4] * k5[i]
+                    + D[5] * k6[i]
+                    + D[6] * k7[i]);
         }
         &self.interpolant
     }
@@ -204,7 +228,11 @@ impl Dopri5 {
     /// the error of an extrapolation. Needs the extension of order 5.
     pub fn extension_defect(&self, theta: f64, scale: &ErrorScale) -> f64 {
         let weight = (theta * (1.0 - theta)).powi(2);
-        let rows: Vec<&[f64]> = self.interpolant.coefficients().chunks_exact(self.y1.len()).collect();
+        let rows: Vec<&[f64]> = self
+            .interpolant
+            .coefficients()
+            .chunks_exact(self.y1.len())
+            .collect();
         let defect: Vec<f64> = (0..self.y1.len())
             .map(|i| weight * (rows[4][i] - self.free_quartic[i] + theta * rows[5][i]))
             .collect();

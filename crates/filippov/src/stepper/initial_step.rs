@@ -20,7 +20,11 @@ pub fn initial_step(
 ) -> Result<f64, FieldError> {
     let d0 = scale.norm(y, y);
     let d1 = scale.norm(dy, y);
-    let guess = if d0 < 1e-5 || d1 < 1e-5 { 1e-6 } else { 0.01 * d0 / d1 };
+    let guess = if d0 < 1e-5 || d1 < 1e-5 {
+        1e-6
+    } else {
+        0.01 * d0 / d1
+    };
     let guess = guess.min(longest);
     let mut moved: Vec<f64> = y.iter().zip(dy).map(|(y, dy)| y + guess * dy).collect();
     let mut dy_moved = vec![0.0; y.len()];
@@ -31,7 +35,11 @@ pub fn initial_step(
         return Ok(guess);
     }
     let fastest = d1.max(d2);
-    let step = if fastest <= 1e-15 { (guess * 1e-3).max(1e-6) } else { (0.01 / fastest).powf(0.2) };
+    let step = if fastest <= 1e-15 {
+        (guess * 1e-3).max(1e-6)
+    } else {
+        (0.01 / fastest).powf(0.2)
+    };
     Ok(step.min(100.0 * guess).min(longest))
 }
 
@@ -53,7 +61,11 @@ pub fn restart_step(
 ) -> Result<f64, FieldError> {
     let d0 = scale.norm(y, y);
     let d1 = scale.norm(dy, y);
-    let probe = if d0 < 1e-5 || d1 < 1e-5 { 0.01 * proposal } else { (0.01 * d0 / d1).min(proposal) };
+    let probe = if d0 < 1e-5 || d1 < 1e-5 {
+        0.01 * proposal
+    } else {
+        (0.01 * d0 / d1).min(proposal)
+    };
     let mut moved: Vec<f64> = y.iter().zip(dy).map(|(y, dy)| y + probe * dy).collect();
     let mut dy_moved = vec![0.0; y.len()];
     field.eval(t + probe, &mut moved, &mut dy_moved)?;

@@ -7,8 +7,8 @@ mod dopri5;
 mod initial_step;
 
 pub use controller::{Controller, ErrorScale};
-pub(crate) use dense::{evaluate, nested};
 pub use dense::Interpolant;
+pub(crate) use dense::{evaluate, nested};
 pub use dopri5::{Attempt, Dopri5};
 pub use initial_step::{initial_step, restart_step};
 

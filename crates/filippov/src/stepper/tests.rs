@@ -65,7 +65,9 @@ fn weights_have_order_five_and_the_embedded_ones_order_four() {
         }
     }
     // Order five is not reached by the embedded weights, or the estimate would be empty.
-    assert!(trees().iter().any(|(phi, order, _)| *order == 5 && weigh(&e, phi).abs() > 1e-5));
+    assert!(trees()
+        .iter()
+        .any(|(phi, order, _)| *order == 5 && weigh(&e, phi).abs() > 1e-5));
 }
 
 /// Weights b_i(theta) of an extension whose unit derivatives are the stages.
@@ -118,10 +120,15 @@ fn local_errors(theta: f64) -> [f64; 2] {
         let (t, mut y) = (0.3, [1.0]);
         stepper.restart(&mut Decay, t, &mut y).unwrap();
         let scale = ErrorScale::new(1e-6, &[1e-6], 1);
-        let attempt = stepper.attempt(&mut Decay, |_, _| {}, t, &y, dt, &scale).unwrap();
+        let attempt = stepper
+            .attempt(&mut Decay, |_, _| {}, t, &y, dt, &scale)
+            .unwrap();
         assert!(matches!(attempt, Attempt::Error(_)));
         let mut out = [0.0];
-        stepper.extend_order5(&mut Decay, t, &y, dt).unwrap().at(theta, &mut out);
+        stepper
+            .extend_order5(&mut Decay, t, &y, dt)
+            .unwrap()
+            .at(theta, &mut out);
         let end = t + theta * dt;
         (out[0] - (-(end * end - t * t) / 2.0).exp()).abs()
     })

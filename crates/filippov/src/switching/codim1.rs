@@ -75,7 +75,12 @@ pub fn decide(
     if candidates.is_empty() {
         candidates.push(entry);
     }
-    Ok(Decision { entry, candidates, minus, plus })
+    Ok(Decision {
+        entry,
+        candidates,
+        minus,
+        plus,
+    })
 }
 
 fn slides(
@@ -121,7 +126,9 @@ fn two_fold_slides(
         let k = -0.5 * (b + d.copysign(b));
         [k / a, c / k]
     };
-    Ok(roots.iter().any(|&w| w > 0.0 && w < 1.0 && p + w * (q - p) > 0.0 && r + w * (s - r) < 0.0))
+    Ok(roots
+        .iter()
+        .any(|&w| w > 0.0 && w < 1.0 && p + w * (q - p) > 0.0 && r + w * (s - r) < 0.0))
 }
 
 /// Among several candidates: the side that the motion comes from; at a start the one that the
@@ -145,7 +152,11 @@ fn choose(
         Arrival::Start => {
             let minus = system.lie_derivative(j, j, &[-1], t, x, signs)?.value;
             let plus = system.lie_derivative(j, j, &[1], t, x, signs)?.value;
-            if minus + plus < 0.0 { -1 } else { 1 }
+            if minus + plus < 0.0 {
+                -1
+            } else {
+                1
+            }
         }
     };
     Ok(match candidates {

@@ -44,8 +44,11 @@ pub fn decide_intersection(
     t: f64,
     x: &[f64],
 ) -> Result<IntersectionDecision, FieldError> {
-    let mut decision =
-        IntersectionDecision { candidates: Vec::new(), left: Vec::new(), may_stay: true };
+    let mut decision = IntersectionDecision {
+        candidates: Vec::new(),
+        left: Vec::new(),
+        may_stay: true,
+    };
     let m = meeting.len();
     if m > MOST_SURFACES {
         return Ok(decision);
@@ -164,8 +167,16 @@ fn stable_root(g: [[f64; 4]; 2]) -> Option<(f64, f64)> {
     if !r.is_finite() {
         return None;
     }
-    let x = if q1 > 0.0 { (-q1 - r) / (2.0 * q2) } else { 2.0 * q0 / (-q1 + r) };
-    let y = if s1 > 0.0 { -2.0 * s0 / (s1 + r) } else { (-s1 + r) / (2.0 * s2) };
+    let x = if q1 > 0.0 {
+        (-q1 - r) / (2.0 * q2)
+    } else {
+        2.0 * q0 / (-q1 + r)
+    };
+    let y = if s1 > 0.0 {
+        -2.0 * s0 / (s1 + r)
+    } else {
+        (-s1 + r) / (2.0 * s2)
+    };
     let g11 = b1 + d1 * y;
     let g22 = c2 + d2 * x;
     (x.abs() < 1.0 && y.abs() < 1.0 && g11.min(g22) < 0.0).then_some((x, y))

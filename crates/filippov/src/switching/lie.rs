@@ -47,16 +47,25 @@ pub fn first_nonzero(
 ) -> Result<Leading, FieldError> {
     let highest = system.max_lie_order().min(MAX_LIE_ORDER);
     let word = [side; MAX_LIE_ORDER];
-    let signs_side: Vec<f64> =
-        signs.iter().enumerate().map(|(i, s)| if i == j { f64::from(side) } else { *s }).collect();
+    let signs_side: Vec<f64> = signs
+        .iter()
+        .enumerate()
+        .map(|(i, s)| if i == j { f64::from(side) } else { *s })
+        .collect();
     for order in vanishing + 1..=highest {
         let lie = system.lie_derivative(j, j, &word[..order], t, x, &signs_side)?;
         if !lie.value.is_finite() {
             break;
         }
         if lie.value.abs() > system.lie_tolerance(order) * lie.magnitude {
-            return Ok(Leading { order, value: lie.value });
+            return Ok(Leading {
+                order,
+                value: lie.value,
+            });
         }
     }
-    Ok(Leading { order: 0, value: 0.0 })
+    Ok(Leading {
+        order: 0,
+        value: 0.0,
+    })
 }

@@ -37,7 +37,12 @@ where
     /// A system with `n_states` states and `n_surfaces` switching functions; `field(t, x, s, dx)`
     /// writes the field for the signs `s`, `surfaces(t, x, h)` the switching functions.
     pub fn new(n_states: usize, n_surfaces: usize, field: F, surfaces: H) -> Self {
-        ClosureSystem { n_states, n_surfaces, field, surfaces }
+        ClosureSystem {
+            n_states,
+            n_surfaces,
+            field,
+            surfaces,
+        }
     }
 }
 
@@ -79,7 +84,10 @@ pub(super) fn lie_by_differences<S: PiecewiseSystem + ?Sized>(
     let Some((&last, rest)) = word.split_last() else {
         let mut h = vec![0.0; system.n_surfaces()];
         system.surfaces(t, x, signs, &mut h)?;
-        return Ok(LieValue { value: h[i], magnitude: h[i].abs() });
+        return Ok(LieValue {
+            value: h[i],
+            magnitude: h[i].abs(),
+        });
     };
     let n = system.n_states();
     let mut f = vec![0.0; n];

@@ -41,7 +41,8 @@ impl TieredProgram {
         if self.calls.fetch_add(1, Ordering::Relaxed) < CALLS_BEFORE_NATIVE {
             return &self.interpreted;
         }
-        self.native.get_or_init(|| compile(&self.graph, &self.outputs, self.backend))
+        self.native
+            .get_or_init(|| compile(&self.graph, &self.outputs, self.backend))
     }
 }
 

@@ -80,7 +80,9 @@ impl TracedSystem {
         names: Names,
         backend: Backend,
     ) -> Result<Self, ExprError> {
-        let surfaces: Vec<NodeId> = (0..graph.n_surfaces()).map(|j| graph.surface(j as u32)).collect();
+        let surfaces: Vec<NodeId> = (0..graph.n_surfaces())
+            .map(|j| graph.surface(j as u32))
+            .collect();
         let field_program = Program::compile(&graph, &field, backend)?;
         let surfaces_program = TieredProgram::new(graph.clone(), surfaces.clone(), backend);
         let model = Model {
@@ -98,13 +100,19 @@ impl TracedSystem {
             names,
             backend,
         };
-        Ok(TracedSystem { model: Arc::new(model), parameters })
+        Ok(TracedSystem {
+            model: Arc::new(model),
+            parameters,
+        })
     }
 
     /// The same system with other parameter values.
     #[must_use]
     pub fn with_parameters(&self, parameters: Vec<f64>) -> Self {
-        TracedSystem { model: Arc::clone(&self.model), parameters }
+        TracedSystem {
+            model: Arc::clone(&self.model),
+            parameters,
+        }
     }
 
     /// The parameter values.
@@ -139,7 +147,9 @@ impl Model {
         let rates = self.rates_program.get_or_init(|| {
             let mut graph = self.graph.clone();
             let velocity: Vec<NodeId> = (0..self.n_states).map(|i| graph.input(i as u32)).collect();
-            let surfaces: Vec<NodeId> = (0..graph.n_surfaces()).map(|j| graph.surface(j as u32)).collect();
+            let surfaces: Vec<NodeId> = (0..graph.n_surfaces())
+                .map(|j| graph.surface(j as u32))
+                .collect();
             let mut outputs = surfaces.clone();
             outputs.extend(surfaces.iter().map(|&h| graph.directional(h, &velocity)));
             TieredProgram::new(graph, outputs, self.backend)
@@ -174,12 +184,19 @@ impl Model {
             let Gradient { time, states } = graph.gradient(graph.surface(j as u32));
             let mut outputs = vec![time];
             outputs.extend(states.iter().map(|(_, node)| *node));
-            let constants: Option<Vec<f64>> = outputs.iter().map(|&node| graph.as_constant(node)).collect();
+            let constants: Option<Vec<f64>> = outputs
+                .iter()
+                .map(|&node| graph.as_constant(node))
+                .collect();
             CompiledGradient {
                 states: states.iter().map(|(i, _)| *i as usize).collect(),
                 values: match constants {
                     Some(values) => GradientValues::Constant(values),
-                    None => GradientValues::Computed(Box::new(TieredProgram::new(graph, outputs, self.backend))),
+                    None => GradientValues::Computed(Box::new(TieredProgram::new(
+                        graph,
+                        outputs,
+                        self.backend,
+                    ))),
                 },
             }
         })
@@ -200,7 +217,9 @@ impl Model {
             let mut outputs = self.field.clone();
             loop {
                 let found = self.graph.sign_dependencies(&outputs, &signs);
-                let fresh: Vec<usize> = (0..found.len()).filter(|&j| found[j] && !active[j]).collect();
+                let fresh: Vec<usize> = (0..found.len())
+                    .filter(|&j| found[j] && !active[j])
+                    .collect();
                 for &j in &fresh {
                     active[j] = true;
                     outputs.push(self.graph.surface(j as u32));
@@ -220,7 +239,9 @@ impl Model {
     /// without its last letter.
     fn lie(&self, cache: &mut LieCache, i: usize, j: usize, word: Word) -> Arc<LieProgram> {
         // The letters as bits behind a leading one.
-        let bits = word.iter().fold(1_u32, |bits, &w| bits << 1 | u32::from(w > 0));
+        let bits = word
+            .iter()
+            .fold(1_u32, |bits, &w| bits << 1 | u32::from(w > 0));
         let key = (i, j, bits);
         if let Some(known) = cache.programs.get(&key) {
             return Arc::clone(known);
@@ -241,7 +262,10 @@ impl Model {
                 for (state, partial) in states {
                     terms.push(graph.mul(partial, field[state as usize]));
                 }
-                let sum = terms.iter().skip(1).fold(time, |sum, &term| graph.add(sum, term));
+                let sum = terms
+                    .iter()
+                    .skip(1)
+                    .fold(time, |sum, &term| graph.add(sum, term));
                 (sum, terms)
             }
         };
@@ -265,12 +289,17 @@ impl PiecewiseSystem for TracedSystem {
 
     #[inline]
     fn field(&self, t: f64, x: &[f64], signs: &[f64], dx: &mut [f64]) -> Result<(), FieldError> {
-        self.model.field_program.eval(t, x, signs, &self.parameters, &[], dx);
+        self.model
+            .field_program
+            .eval(t, x, signs, &self.parameters, &[], dx);
         Ok(())
     }
 
     fn surfaces(&self, t: f64, x: &[f64], signs: &[f64], h: &mut [f64]) -> Result<(), FieldError> {
-        self.model.surfaces_program.program().eval(t, x, signs, &self.parameters, &[], h);
+        self.model
+            .surfaces_program
+            .program()
+            .eval(t, x, signs, &self.parameters, &[], h);
         Ok(())
     }
 
@@ -344,7 +373,11 @@ impl PiecewiseSystem for TracedSystem {
         out.f_plus.copy_from_slice(&rest[n..]);
         // A field that is not finite on its surface is taken just inside of its region.
         let finite = rest.iter().all(|v| v.is_finite()) && out.is_finite();
-        if finite { Ok(2) } else { out.both_sides_by_parts(self, j, t, x, signs) }
+        if finite {
+            Ok(2)
+        } else {
+            out.both_sides_by_parts(self, j, t, x, signs)
+        }
     }
 
     fn active(&self, signs: &[f64], sliding: Option<usize>, active: &mut [bool]) {
@@ -353,8 +386,14 @@ impl PiecewiseSystem for TracedSystem {
             .enumerate()
             .map(|(j, &s)| if Some(j) == sliding { 0 } else { s as i8 })
             .collect();
-        let mut known = self.model.activity.lock().unwrap_or_else(PoisonError::into_inner);
-        let found = known.entry(key).or_insert_with(|| self.model.find_active(signs, sliding));
+        let mut known = self
+            .model
+            .activity
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        let found = known
+            .entry(key)
+            .or_insert_with(|| self.model.find_active(signs, sliding));
         active.copy_from_slice(found);
     }
 
@@ -372,7 +411,11 @@ impl PiecewiseSystem for TracedSystem {
         signs: &[f64],
     ) -> Result<LieValue, FieldError> {
         let lie = {
-            let mut cache = self.model.lie.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut cache = self
+                .model
+                .lie
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner);
             self.model.lie(&mut cache, i, j, word)
         };
         let mut small = [0.0; 16];
@@ -391,13 +434,17 @@ impl PiecewiseSystem for TracedSystem {
             side[j] = word.last().map_or(side[j], |&w| f64::from(w));
             for offset in side_offsets(x) {
                 let inside = move_inside(self, t, x, &side, offset, SIDE_REACH * offset)?;
-                lie.program.eval(t, &inside, signs, &self.parameters, &[], out);
+                lie.program
+                    .eval(t, &inside, signs, &self.parameters, &[], out);
                 if out[0].is_finite() {
                     break;
                 }
             }
         }
-        Ok(LieValue { value: out[0], magnitude: out[1..].iter().map(|v| v.abs()).sum() })
+        Ok(LieValue {
+            value: out[0],
+            magnitude: out[1..].iter().map(|v| v.abs()).sum(),
+        })
     }
 
     fn lie_tolerance(&self, _order: usize) -> f64 {
@@ -409,6 +456,8 @@ impl PiecewiseSystem for TracedSystem {
     }
 
     fn surface_name(&self, j: usize) -> String {
-        self.model.graph.text(self.model.graph.surface(j as u32), &self.model.names)
+        self.model
+            .graph
+            .text(self.model.graph.surface(j as u32), &self.model.names)
     }
 }
