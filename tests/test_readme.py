@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -48,6 +49,25 @@ def test_the_numbers_in_the_text_are_true(names: dict[str, Any]) -> None:
     assert names["rest"].sol.multipliers(5.0) == pytest.approx([0.3])
     assert names["box"].stats["backend"] == "black box"
     assert not names["part"].success
+
+
+@pytest.mark.slow
+def test_scipy_is_stuck_where_the_text_says_so() -> None:
+    integrate = pytest.importorskip("scipy.integrate")
+    reached = [0.0]
+
+    class Enough(Exception):
+        pass
+
+    def rest(t: float, x: Any) -> list[float]:
+        reached.append(t)
+        if len(reached) > 200_000:
+            raise Enough
+        return [0.3 - float(np.sign(x[0]))]
+
+    with pytest.raises(Enough):
+        integrate.solve_ivp(rest, (0, 10), [1.0], rtol=1e-6, atol=1e-9)
+    assert max(reached) < 10.0
 
 
 def test_links_lead_somewhere() -> None:

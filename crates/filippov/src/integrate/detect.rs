@@ -1,5 +1,6 @@
 //! The event stage of a step: the earliest zero of what the mode monitors.
 
+use super::curve::{grazes, Curve};
 use super::integrator::Integrator;
 use super::motion::{ModeField, Motion};
 use crate::error::FieldError;
@@ -377,76 +378,4 @@ impl Integrator<'_> {
             }
         }
     }
-}
-
-/// A monitored function along the continuous extension.
-struct Curve<'a, 'b> {
-    system: &'a dyn PiecewiseSystem,
-    motion: &'a mut Motion<'b>,
-    interpolant: &'a Interpolant,
-    h: &'a mut [f64],
-    x: &'a mut [f64],
-    /// Normal components already known along this step, by theta.
-    exits: &'a mut Vec<(f64, NormalComponents)>,
-    n_evaluations: &'a mut u64,
-}
-
-impl Curve<'_, '_> {
-    /// The value in the sense of the mode: positive inside.
-    fn value(&mut self, m: &Monitored, theta: f64) -> Result<f64, FieldError> {
-        let t = self.interpolant.t0 + theta * self.interpolant.dt;
-        self.interpolant.at(theta, self.x);
-        match (m.function, &mut self.motion.field) {
-            (EventFunction::Surface(j), field) => {
-                if let ModeField::Sliding(field) = field {
-                    field.project(t, self.x)?;
-                }
-                *self.n_evaluations += 1;
-                self.system
-                    .surfaces(t, self.x, &self.motion.signs, self.h)?;
-                Ok(m.orientation * self.h[j])
-            }
-            (exit, ModeField::Sliding(field)) => {
-                let known = self
-                    .exits
-                    .iter()
-                    .find(|(at, _)| *at == theta)
-                    .map(|(_, a)| *a);
-                let a = match known {
-                    Some(a) => a,
-                    None => field.normal_components(t, self.x)?,
-                };
-                if known.is_none() {
-                    self.exits.push((theta, a));
-                }
-                Ok(if exit == EventFunction::ExitMinus {
-                    a.minus
-                } else {
-                    -a.plus
-                })
-            }
-            // Exit functions are monitored while sliding only.
-            (_, ModeField::Region(_)) => Ok(f64::NAN),
-        }
-    }
-}
-
-/// Does the function turn back within rounding of zero just beyond `theta`? Then it touches, and two
-/// crossings a rounding error deep would be invented. Returns the turning point.
-fn grazes(
-    g: &mut dyn FnMut(f64) -> Result<f64, FieldError>,
-    theta: f64,
-    from: f64,
-    to: f64,
-    noise: f64,
-) -> Result<Option<f64>, FieldError> {
-    let d = 1e-3;
-    if theta - d < from || theta + d > to {
-        return Ok(None);
-    }
-    let (below, above, here) = (g(theta - d)?, g(theta + d)?, g(theta)?);
-    let slope = (above - below) / (2.0 * d);
-    let curvature = (above - 2.0 * here + below) / (d * d);
-    let depth = slope * slope / (2.0 * curvature);
-    Ok((curvature > 0.0 && depth <= noise).then(|| (theta - slope / curvature).clamp(from, to)))
 }

@@ -6,6 +6,7 @@
 
 mod both_sides;
 mod closures;
+mod compiled;
 mod tiered;
 mod traced;
 

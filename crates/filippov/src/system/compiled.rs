@@ -1,0 +1,241 @@
+//! What is compiled of a traced system: field, surfaces, rates, gradients, Lie derivatives.
+
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use filippov_expr::{Backend, ExprError, Gradient, Graph, Names, NodeId, Program};
+use rustc_hash::FxHashMap;
+
+use super::tiered::{compile, TieredProgram};
+use super::Word;
+
+/// A traced system with everything that was compiled of it so far.
+pub(super) struct Model {
+    pub graph: Graph,
+    pub field: Vec<NodeId>,
+    pub n_states: usize,
+    pub names: Names,
+    backend: Backend,
+    pub field_program: Program,
+    pub surfaces_program: TieredProgram,
+    rates_program: OnceLock<TieredProgram>,
+    pub affine: Vec<bool>,
+    gradients: Vec<OnceLock<CompiledGradient>>,
+    both_sides: Vec<OnceLock<TieredProgram>>,
+    lie: Mutex<LieCache>,
+    /// Active surfaces of the modes met so far; a zero entry is the surface slid on.
+    activity: Mutex<FxHashMap<Vec<i8>, Vec<bool>>>,
+}
+
+/// The gradient of one switching function: outputs are the derivative in t, then the listed states.
+pub(super) struct CompiledGradient {
+    pub states: Vec<usize>,
+    pub values: GradientValues,
+}
+
+/// Constant for an affine surface, else a program.
+pub(super) enum GradientValues {
+    Constant(Vec<f64>),
+    Computed(Box<TieredProgram>),
+}
+
+/// Lie derivatives built so far, by (surface, surface with the word, word).
+#[derive(Default)]
+struct LieCache {
+    graph: Option<Graph>,
+    programs: FxHashMap<(usize, usize, u32), Arc<LieProgram>>,
+}
+
+/// Output 0 is the derivative, the others its terms.
+pub(super) struct LieProgram {
+    node: NodeId,
+    pub program: Program,
+}
+
+impl Model {
+    /// Compiles field and surfaces; the rest follows when it is needed.
+    ///
+    /// # Errors
+    /// If an expression cannot be compiled.
+    pub fn new(
+        graph: Graph,
+        field: Vec<NodeId>,
+        names: Names,
+        backend: Backend,
+    ) -> Result<Self, ExprError> {
+        let surfaces: Vec<NodeId> = (0..graph.n_surfaces())
+            .map(|j| graph.surface(j as u32))
+            .collect();
+        let field_program = Program::compile(&graph, &field, backend)?;
+        let surfaces_program = TieredProgram::new(graph.clone(), surfaces.clone(), backend);
+        Ok(Model {
+            n_states: field.len(),
+            affine: surfaces.iter().map(|&h| graph.is_affine(h)).collect(),
+            gradients: surfaces.iter().map(|_| OnceLock::new()).collect(),
+            both_sides: surfaces.iter().map(|_| OnceLock::new()).collect(),
+            lie: Mutex::new(LieCache::default()),
+            activity: Mutex::default(),
+            rates_program: OnceLock::new(),
+            field_program,
+            surfaces_program,
+            graph,
+            field,
+            names,
+            backend,
+        })
+    }
+
+    /// h_j, then their rates along the input vector.
+    pub fn rates(&self) -> &Program {
+        let rates = self.rates_program.get_or_init(|| {
+            let mut graph = self.graph.clone();
+            let velocity: Vec<NodeId> = (0..self.n_states).map(|i| graph.input(i as u32)).collect();
+            let surfaces: Vec<NodeId> = (0..graph.n_surfaces())
+                .map(|j| graph.surface(j as u32))
+                .collect();
+            let mut outputs = surfaces.clone();
+            outputs.extend(surfaces.iter().map(|&h| graph.directional(h, &velocity)));
+            TieredProgram::new(graph, outputs, self.backend)
+        });
+        rates.program()
+    }
+
+    /// The normal components and the fields of both sides, as one program that shares what they have
+    /// in common.
+    pub fn both_sides(&self, j: usize) -> &Program {
+        let both = self.both_sides[j].get_or_init(|| {
+            let mut graph = self.graph.clone();
+            let h = graph.surface(j as u32);
+            let mut outputs = Vec::with_capacity(2 + 2 * self.n_states);
+            let mut fields = Vec::with_capacity(2 * self.n_states);
+            for side in [-1.0, 1.0] {
+                let mut signs = vec![None; graph.n_surfaces()];
+                signs[j] = Some(side);
+                let field = graph.at_signs(&self.field, &signs);
+                outputs.push(graph.directional(h, &field));
+                fields.extend(field);
+            }
+            outputs.extend(fields);
+            TieredProgram::new(graph, outputs, self.backend)
+        });
+        both.program()
+    }
+
+    pub fn gradient(&self, j: usize) -> &CompiledGradient {
+        self.gradients[j].get_or_init(|| {
+            let mut graph = self.graph.clone();
+            let Gradient { time, states } = graph.gradient(graph.surface(j as u32));
+            let mut outputs = vec![time];
+            outputs.extend(states.iter().map(|(_, node)| *node));
+            let constants: Option<Vec<f64>> = outputs
+                .iter()
+                .map(|&node| graph.as_constant(node))
+                .collect();
+            CompiledGradient {
+                states: states.iter().map(|(i, _)| *i as usize).collect(),
+                values: match constants {
+                    Some(values) => GradientValues::Constant(values),
+                    None => GradientValues::Computed(Box::new(TieredProgram::new(
+                        graph,
+                        outputs,
+                        self.backend,
+                    ))),
+                },
+            }
+        })
+    }
+
+    /// Marks the surfaces whose sign matters in a mode.
+    pub fn active(&self, signs: &[f64], sliding: Option<usize>, active: &mut [bool]) {
+        let key: Vec<i8> = signs
+            .iter()
+            .enumerate()
+            .map(|(j, &s)| if Some(j) == sliding { 0 } else { s as i8 })
+            .collect();
+        let mut known = self.activity.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = known
+            .entry(key)
+            .or_insert_with(|| self.find_active(signs, sliding));
+        active.copy_from_slice(found);
+    }
+
+    /// Surfaces whose sign the field, or an active switching function, depends on in this mode.
+    fn find_active(&self, signs: &[f64], sliding: Option<usize>) -> Vec<bool> {
+        let mut active = vec![false; signs.len()];
+        let sides: &[Option<f64>] = match sliding {
+            None => &[None],
+            Some(_) => &[Some(-1.0), Some(1.0)],
+        };
+        for side in sides {
+            let mut signs = signs.to_vec();
+            if let (Some(j), Some(side)) = (sliding, side) {
+                signs[j] = *side;
+            }
+            let mut outputs = self.field.clone();
+            loop {
+                let found = self.graph.sign_dependencies(&outputs, &signs);
+                let fresh: Vec<usize> = (0..found.len())
+                    .filter(|&j| found[j] && !active[j])
+                    .collect();
+                for &j in &fresh {
+                    active[j] = true;
+                    outputs.push(self.graph.surface(j as u32));
+                }
+                if fresh.is_empty() {
+                    break;
+                }
+            }
+        }
+        if let Some(j) = sliding {
+            active[j] = true;
+        }
+        active
+    }
+
+    /// The program of a Lie derivative, made when it is first needed.
+    pub fn lie_derivative(&self, i: usize, j: usize, word: Word) -> Arc<LieProgram> {
+        let mut cache = self.lie.lock().unwrap_or_else(PoisonError::into_inner);
+        self.lie(&mut cache, i, j, word)
+    }
+
+    /// The Lie derivative of h_i for a word on the signs of surface j, built from that of the word
+    /// without its last letter.
+    fn lie(&self, cache: &mut LieCache, i: usize, j: usize, word: Word) -> Arc<LieProgram> {
+        // The letters as bits behind a leading one.
+        let bits = word
+            .iter()
+            .fold(1_u32, |bits, &w| bits << 1 | u32::from(w > 0));
+        let key = (i, j, bits);
+        if let Some(known) = cache.programs.get(&key) {
+            return Arc::clone(known);
+        }
+        let inner = match word.split_last() {
+            None => self.graph.surface(i as u32),
+            Some((_, rest)) => self.lie(cache, i, j, rest).node,
+        };
+        let graph = cache.graph.get_or_insert_with(|| self.graph.clone());
+        let (node, terms) = match word.split_last() {
+            None => (inner, vec![inner]),
+            Some((&side, _)) => {
+                let mut signs = vec![None; graph.n_surfaces()];
+                signs[j] = Some(f64::from(side));
+                let field = graph.at_signs(&self.field, &signs);
+                let Gradient { time, states } = graph.gradient(inner);
+                let mut terms = vec![time];
+                for (state, partial) in states {
+                    terms.push(graph.mul(partial, field[state as usize]));
+                }
+                let sum = terms
+                    .iter()
+                    .skip(1)
+                    .fold(time, |sum, &term| graph.add(sum, term));
+                (sum, terms)
+            }
+        };
+        let mut outputs = vec![node];
+        outputs.extend(terms);
+        let program = compile(graph, &outputs, Backend::Interpreter);
+        let lie = Arc::new(LieProgram { node, program });
+        cache.programs.insert(key, Arc::clone(&lie));
+        lie
+    }
+}
