@@ -52,7 +52,7 @@ def test_the_numbers_in_the_text_are_true(names: dict[str, Any]) -> None:
 
 
 @pytest.mark.slow
-def test_scipy_is_stuck_where_the_text_says_so() -> None:
+def test_scipy_is_as_slow_as_the_text_says() -> None:
     integrate = pytest.importorskip("scipy.integrate")
     reached = [0.0]
 
@@ -67,7 +67,8 @@ def test_scipy_is_stuck_where_the_text_says_so() -> None:
 
     with pytest.raises(Enough):
         integrate.solve_ivp(rest, (0, 10), [1.0], rtol=1e-6, atol=1e-9)
-    assert max(reached) < 10.0
+    # The chatter depends on the last bits; 6.77 here.
+    assert max(reached) == pytest.approx(6.8, abs=0.5)
 
 
 def test_links_lead_somewhere() -> None:

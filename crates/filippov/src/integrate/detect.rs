@@ -9,7 +9,7 @@ use crate::event::isolate::{first_zero_sampled, Zero, PROBES};
 use crate::event::locate::refine;
 use crate::event::{EventFunction, Monitored};
 use crate::field::NormalComponents;
-use crate::stepper::{nested, Interpolant};
+use crate::stepper::nested;
 use crate::system::{dot, PiecewiseSystem};
 use crate::tolerances::{EPS, EXTRAPOLATION, ONE_SIDED_AIM, RESOLVED_DEPTH, SURFACE_NOISE};
 
@@ -167,7 +167,7 @@ impl Integrator<'_> {
                 self.keep_earliest(&mut found, index, zero, dt);
             }
         }
-        if found.is_none() && self.is_one_sided() {
+        if found.is_none() && self.one_sided {
             self.detect_beyond(dt, &mut found)?;
         }
         Ok(found)

@@ -15,65 +15,18 @@ use std::time::Instant;
 use super::detect::Detector;
 use super::motion::{ModeField, Motion};
 use super::user_events::UserEvents;
-use super::{Stats, Stop, Warning, WarningCode};
+use super::{Stats, Stop, Warning};
 use crate::error::{Error, FieldError};
-use crate::event::{Monitored, UserEvent};
+use crate::event::UserEvent;
 use crate::field::SmoothField;
 use crate::options::Options;
 use crate::solution::{Recorder, Solution};
 use crate::stepper::{Attempt, Controller, Dopri5, ErrorScale};
 use crate::system::PiecewiseSystem;
-use crate::tolerances::{JUMP_SHRINK, ONE_SIDED_AIM, SHORTEST_STEP};
+use crate::tolerances::SHORTEST_STEP;
 
 /// Steps between two looks at the clock and at the caller's wish to stop.
 const POLL_INTERVAL: u64 = 64;
-
-/// Integrates a piecewise-smooth system over `t_span` from `y0`.
-///
-/// # Errors
-/// If an argument is out of range. A failure during the run is no error: the solution up to there
-/// comes back with its [`Stop`].
-pub fn solve(
-    system: &dyn PiecewiseSystem,
-    t_span: (f64, f64),
-    y0: &[f64],
-    options: &Options,
-    events: &[UserEvent],
-) -> Result<Solution, Error> {
-    solve_interruptible(system, t_span, y0, options, events, &mut |_| false)
-}
-
-/// As [`solve`]; `interrupt` is asked every few steps with the time reached, and the run stops
-/// where it says `true`.
-///
-/// # Errors
-/// As [`solve`].
-pub fn solve_interruptible(
-    system: &dyn PiecewiseSystem,
-    t_span: (f64, f64),
-    y0: &[f64],
-    options: &Options,
-    events: &[UserEvent],
-    interrupt: &mut dyn FnMut(f64) -> bool,
-) -> Result<Solution, Error> {
-    let mut integrator = Integrator::new(system, t_span, y0, options, events)?;
-    let stop = match integrator.run(interrupt) {
-        Ok(stop) => stop,
-        Err(raised) => Stop::FieldRaised(raised),
-    };
-    let mut solution = integrator.finish(stop);
-    let resampled = options
-        .t_eval
-        .as_ref()
-        .map(|times| solution.resample(system, times));
-    if let Some(Err(raised)) = resampled {
-        solution.stop = Stop::FieldRaised(raised);
-    }
-    if !options.dense_output {
-        solution.forget_dense();
-    }
-    Ok(solution)
-}
 
 /// An integration in progress.
 pub struct Integrator<'a> {
@@ -94,9 +47,9 @@ pub struct Integrator<'a> {
     pub(super) stats: Stats,
     pub(super) warnings: Vec<Warning>,
     /// The last attempt met a point where the field does not exist.
-    one_sided: bool,
+    pub(super) one_sided: bool,
     /// Largest recent step of this motion.
-    recent_dt: f64,
+    pub(super) recent_dt: f64,
     /// Time of the last switch, and how many came at that time.
     pub(super) last_switch: (f64, u32),
 }
@@ -275,56 +228,6 @@ impl<'a> Integrator<'a> {
     fn count_rejection(&mut self, sliding: bool) {
         self.stats.n_rejected += 1;
         self.stats.n_rejected_sliding += u64::from(sliding);
-    }
-
-    /// After a step that was not finite: aims at a surface that the motion approaches, close enough
-    /// for the continuous extension to reach it, else shortens the step.
-    fn shorten_to_surface(&mut self, dt: f64) {
-        let nearest = self
-            .motion
-            .monitored
-            .iter()
-            .map(Monitored::time_to_zero)
-            .fold(f64::INFINITY, f64::min);
-        let aim = ONE_SIDED_AIM * nearest;
-        self.dt = if !self.one_sided && aim < dt {
-            aim
-        } else {
-            0.5 * dt
-        };
-        self.one_sided = true;
-        self.controller.not_finite();
-    }
-
-    pub(super) fn is_one_sided(&self) -> bool {
-        self.one_sided
-    }
-
-    /// Warns where the field jumps over a step far shorter than its predecessors.
-    fn note_jump(&mut self, dt: f64) {
-        if dt < JUMP_SHRINK * self.recent_dt {
-            let (a, b) = (
-                self.stepper.start_derivative(),
-                self.stepper.end_derivative(),
-            );
-            let jumps = a
-                .iter()
-                .zip(b)
-                .any(|(a, b)| (a - b).abs() > 0.3 * (a.abs() + b.abs()));
-            if jumps {
-                let t = self.t + dt;
-                self.warnings.push(Warning {
-                    t,
-                    code: WarningCode::UndeclaredJump,
-                    text: format!(
-                        "the right-hand side jumps near t = {t:.10} and no surface is declared there; \
-                         give its switching function in surfaces="
-                    ),
-                });
-                self.recent_dt = 0.0;
-            }
-        }
-        self.recent_dt = dt.max(0.9 * self.recent_dt);
     }
 
     /// Closes the books.

@@ -3,14 +3,17 @@
 mod curve;
 mod detect;
 mod integrator;
+mod irregular;
 mod motion;
+mod solve;
 mod start;
 mod stats;
 mod status;
 mod transition;
 mod user_events;
 
-pub use integrator::{solve, solve_interruptible, Integrator};
+pub use integrator::Integrator;
+pub use solve::{solve, solve_interruptible};
 pub use stats::Stats;
 pub use status::{Stop, Warning, WarningCode};
 pub use user_events::UserZero;
