@@ -48,6 +48,8 @@ pub struct Integrator<'a> {
     pub(super) warnings: Vec<Warning>,
     /// The last attempt met a point where the field does not exist.
     pub(super) one_sided: bool,
+    /// Some attempt of this run met such a point.
+    pub(super) meets_edges: bool,
     /// Largest recent step of this motion.
     pub(super) recent_dt: f64,
     /// Time of the last switch, and how many came at that time.
@@ -86,6 +88,7 @@ impl<'a> Integrator<'a> {
             stats: Stats::default(),
             warnings: Vec::new(),
             one_sided: false,
+            meets_edges: false,
             recent_dt: 0.0,
             last_switch: (f64::NAN, 0),
         })
@@ -136,6 +139,7 @@ impl<'a> Integrator<'a> {
             return Ok(Some(Stop::End));
         }
         let mut dt = self.dt.min(self.options.max_step);
+        dt = self.aim_at_surface(dt);
         if dt >= remaining * 0.99 {
             dt = remaining;
         }

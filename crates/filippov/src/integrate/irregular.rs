@@ -6,23 +6,32 @@ use crate::event::Monitored;
 use crate::tolerances::{JUMP_SHRINK, ONE_SIDED_AIM};
 
 impl Integrator<'_> {
-    /// After a step that was not finite: aims at a surface that the motion approaches, close enough
-    /// for the continuous extension to reach it, else shortens the step.
-    pub(super) fn shorten_to_surface(&mut self, dt: f64) {
-        let nearest = self
-            .motion
-            .monitored
-            .iter()
-            .map(Monitored::time_to_zero)
-            .fold(f64::INFINITY, f64::min);
-        let aim = ONE_SIDED_AIM * nearest;
-        self.dt = if !self.one_sided && aim < dt {
-            aim
-        } else {
-            0.5 * dt
-        };
+    /// Where a field was found to end at its surfaces, a step that would pass the next one aims at it
+    /// from the start, close enough for the continuous extension to reach it.
+    pub(super) fn aim_at_surface(&mut self, dt: f64) -> f64 {
+        let nearest = self.nearest_surface();
+        if !self.meets_edges || self.one_sided || nearest > dt {
+            return dt;
+        }
         self.one_sided = true;
+        ONE_SIDED_AIM * nearest
+    }
+
+    /// After a step that was not finite: aims at the surface that the motion approaches, or shortens
+    /// the step if it did so already.
+    pub(super) fn shorten_to_surface(&mut self, dt: f64) {
+        let aim = ONE_SIDED_AIM * self.nearest_surface();
+        let aims = !self.one_sided && aim < dt;
+        self.dt = if aims { aim } else { 0.5 * dt };
+        self.one_sided = true;
+        self.meets_edges = true;
         self.controller.not_finite();
+    }
+
+    /// Predicted time to the next zero of what is monitored.
+    fn nearest_surface(&self) -> f64 {
+        let times = self.motion.monitored.iter().map(Monitored::time_to_zero);
+        times.fold(f64::INFINITY, f64::min)
     }
 
     /// Warns where the field jumps over a step far shorter than its predecessors.
