@@ -1,5 +1,7 @@
 """Check that ARCHITECTURE.md names every source file of the crates and of the package, and no other.
 
+A heading such as ``## `crates/filippov/` `` says to which folder the files named below it belong.
+
 Usage: ``python scripts/check_map.py``; it lists what is missing and fails if anything is.
 """
 
@@ -15,23 +17,35 @@ MAP = ROOT / "ARCHITECTURE.md"
 UNNAMED = {"__init__.py", "lib.rs", "mod.rs", "tests.rs"}
 
 
-def main() -> int:
-    """Print the files that the map does not name, and the names without a file; return 1 if there are any."""
-    text = MAP.read_text(encoding="utf-8")
-    named = {Path(name).name for name in re.findall(r"`([\w/.]+\.(?:rs|pyi?|sh))`", text)}
+def named_files() -> set[Path]:
+    """Return the files that the map names, each with the folder of its heading."""
+    files: set[Path] = set()
+    for section in re.split(r"^## ", MAP.read_text(encoding="utf-8"), flags=re.MULTILINE):
+        heading = re.match(r"`([\w/-]+/)`", section)
+        if heading:
+            names = re.findall(r"`([\w/]+\.(?:rs|pyi?))`", section)
+            files |= {ROOT / heading[1] / name for name in names}
+    return files
+
+
+def source_files() -> set[Path]:
+    """Return the source files of the crates and of the package that have to be named."""
     folders = [*ROOT.glob("crates/*/src"), ROOT / "python"]
     files = (path for folder in folders for path in folder.rglob("*"))
-    sources = {path for path in files if path.suffix in {".rs", ".py", ".pyi"}}
-    unnamed = sorted(path for path in sources if path.name not in named | UNNAMED)
-    others = [*ROOT.glob("crates/*/tests/**/*"), *ROOT.glob("crates/*/examples/*"), *ROOT.glob("scripts/*")]
-    existing = {path.name for path in [*sources, *others]}
-    gone = sorted(named - existing)
+    return {path for path in files if path.suffix in {".rs", ".py", ".pyi"} and path.name not in UNNAMED}
+
+
+def main() -> int:
+    """Print the files that the map does not name, and the names without a file; return 1 if there are any."""
+    named = named_files()
+    unnamed = sorted(source_files() - named)
+    gone = sorted(path for path in named if not path.exists())
     for path in unnamed:
         print(f"{path.relative_to(ROOT)} is not in ARCHITECTURE.md: add a line that says what it holds")
-    for name in gone:
-        print(f"ARCHITECTURE.md names {name}, and there is no such file")
+    for path in gone:
+        print(f"ARCHITECTURE.md names {path.relative_to(ROOT)}, and there is no such file")
     if not unnamed and not gone:
-        print(f"ARCHITECTURE.md names all {len(sources)} source files")
+        print(f"ARCHITECTURE.md names all {len(named)} source files")
     return 1 if unnamed or gone else 0
 
 

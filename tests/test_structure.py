@@ -108,12 +108,9 @@ def test_signs_agree_with_the_mode(case: Any) -> None:
     sol, _ = get(case)
     assert sol.sol is not None
     if isinstance(case, int):
-        rng.normal(size=(3, 3)), rng.normal(size=(3, 2))
-        rows = rng.normal(size=(2, 3))
-        functions = [lambda x, row=row: row @ x for row in rows]
-        # The printed surface is the canonical one, of either sign: take the sign from the first segment.
-        names = sol.surfaces
-        assert len(names) == 2
+        # The canonical surface may have either sign: the first segment tells which.
+        functions = [lambda x, row=row: row @ x for row in random_matrices(case)[2]]
+        assert len(sol.surfaces) == 2
     else:
         if any(name not in SURFACES for name in sol.surfaces):
             pytest.skip("surfaces that are not states are looked at in test_itinerary")

@@ -5,7 +5,7 @@ mod region;
 mod sliding;
 
 pub use project::Projector;
-pub use region::{eval_on_side, move_inside, side_offsets, RegionField};
+pub use region::{eval_off_surface, eval_on_side, move_inside, side_offsets, RegionField};
 pub use sliding::{NormalComponents, SlidingField};
 
 use crate::error::FieldError;

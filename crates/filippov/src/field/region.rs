@@ -108,18 +108,31 @@ pub fn eval_on_side<S: PiecewiseSystem + ?Sized>(
     dx: &mut [f64],
 ) -> Result<u64, FieldError> {
     system.field(t, x, signs, dx)?;
-    let mut evaluations = 1;
+    if dx.iter().all(|v| v.is_finite()) {
+        return Ok(1);
+    }
+    Ok(1 + eval_off_surface(system, t, x, signs, dx)?)
+}
+
+/// As [`eval_on_side`], for a field known not to exist on its surface: moves the point first.
+///
+/// # Errors
+/// If a function of the user raises.
+pub fn eval_off_surface<S: PiecewiseSystem + ?Sized>(
+    system: &S,
+    t: f64,
+    x: &[f64],
+    signs: &[f64],
+    dx: &mut [f64],
+) -> Result<u64, FieldError> {
+    let mut evaluations = 0;
     for offset in side_offsets(x) {
+        let inside = move_inside(system, t, x, signs, offset, SIDE_REACH * offset)?;
+        system.field(t, &inside, signs, dx)?;
+        evaluations += 1;
         if dx.iter().all(|v| v.is_finite()) {
             break;
         }
-        system.field(
-            t,
-            &move_inside(system, t, x, signs, offset, SIDE_REACH * offset)?,
-            signs,
-            dx,
-        )?;
-        evaluations += 1;
     }
     Ok(evaluations)
 }

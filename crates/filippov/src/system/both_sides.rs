@@ -2,7 +2,7 @@
 
 use super::{dot, PiecewiseSystem};
 use crate::error::FieldError;
-use crate::field::eval_on_side;
+use crate::field::{eval_off_surface, eval_on_side};
 
 /// What sliding on one surface needs at a point: the fields of both sides with
 /// their normal components. Also the scratch space for it.
@@ -18,6 +18,8 @@ pub struct BothSides {
     pub f_plus: Vec<f64>,
     gradient: Vec<f64>,
     signs: Vec<f64>,
+    /// A field was not finite on its surface: from then on it is taken just inside at once.
+    pub(super) meets_edges: bool,
     /// For a system that computes all at once.
     pub(super) outputs: Vec<f64>,
 }
@@ -32,6 +34,7 @@ impl BothSides {
             f_plus: vec![0.0; n],
             gradient: vec![0.0; n],
             signs: vec![0.0; d],
+            meets_edges: false,
             outputs: vec![0.0; 2 + 2 * n],
         }
     }
@@ -48,9 +51,15 @@ impl BothSides {
         self.signs.copy_from_slice(signs);
         self.signs[j] = 1.0;
         let ht = system.gradient(j, t, x, &self.signs, &mut self.gradient)?;
-        let mut evaluations = eval_on_side(system, t, x, &self.signs, &mut self.f_plus)?;
+        let eval = if self.meets_edges {
+            eval_off_surface
+        } else {
+            eval_on_side
+        };
+        let mut evaluations = eval(system, t, x, &self.signs, &mut self.f_plus)?;
         self.signs[j] = -1.0;
-        evaluations += eval_on_side(system, t, x, &self.signs, &mut self.f_minus)?;
+        evaluations += eval(system, t, x, &self.signs, &mut self.f_minus)?;
+        self.meets_edges |= evaluations > 2;
         self.normal_minus = ht + dot(&self.gradient, &self.f_minus);
         self.normal_plus = ht + dot(&self.gradient, &self.f_plus);
         Ok(evaluations)

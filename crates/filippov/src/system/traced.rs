@@ -163,7 +163,7 @@ impl PiecewiseSystem for TracedSystem {
         out: &mut BothSides,
     ) -> Result<u64, FieldError> {
         let n = self.model.n_states;
-        if n > FUSED_STATES {
+        if n > FUSED_STATES || out.meets_edges {
             return out.both_sides_by_parts(self, j, t, x, signs);
         }
         let program = self.model.both_sides(j);
