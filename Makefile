@@ -80,7 +80,7 @@ pictures: $(BUILD_STAMP) ## draw the pictures of the README again
 	$(PY) scripts/readme_blocks.py README.md docs/images
 
 docs: tools ## pages of the Rust crates, into target/doc
-	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --no-deps $(RUST_TESTED)
+	RUSTDOCFLAGS="-D warnings -A rustdoc::private_intra_doc_links" $(CARGO) doc --no-deps $(RUST_TESTED)
 
 check: lint types test ## what must hold before a change is complete; changes nothing
 

@@ -1,4 +1,4 @@
-"""The field of a mode at a point, for inspection; the core has its own, faster and exact."""
+"""The field of a mode at a point, for inspection."""
 
 from __future__ import annotations
 
@@ -13,9 +13,7 @@ __all__ = ["sliding_field"]
 
 Array = npt.NDArray[np.float64]
 
-# A fourth-order central difference has its best step near eps**(1/5) of the scale.
-_STEP = float(np.finfo(float).eps) ** 0.2
-# Rounding in the finite differences; a multiplier within it counts as admissible.
+# Rounding of the normal components; a multiplier within it counts as admissible.
 _MARGIN = 1e-9
 
 
@@ -47,10 +45,6 @@ def sliding_field(prepared: Prepared, t: float, x: Array, mode: Mode, p: Array) 
         If the mode slides on several surfaces.
     ModelError
         If no combination of the two fields is tangent.
-
-    Notes
-    -----
-    The derivatives of `h` are differences of fourth order, good to about 11 digits.
     """
     core = prepared.core
     signs = np.array(mode, dtype=np.float64)
@@ -61,13 +55,9 @@ def sliding_field(prepared: Prepared, t: float, x: Array, mode: Mode, p: Array) 
             "mode: the field of sliding on several surfaces is not offered here; at most one entry 0"
         )
     (j,) = mode.sliding
-    sides = []
-    for side in (1.0, -1.0):
-        signs[j] = side
-        value = core.field(t, x, signs, p)
-        sides.append((value, _derivative_along(prepared, t, x, signs, p, value, j)))
-    (plus, a), (minus, b) = sides
-    lam = (a + b) / (b - a) if b != a else np.nan
+    signs[j] = 1.0
+    field, b, a = core.sliding_field(t, x, signs, p, j)
+    lam = (a + b) / (b - a) if b != a else 0.0
     if not abs(lam) <= 1.0 + _MARGIN:
         name = prepared.surfaces[j]
         raise ModelError(
@@ -78,19 +68,4 @@ def sliding_field(prepared: Prepared, t: float, x: Array, mode: Mode, p: Array) 
             surface=name,
             mode=mode,
         )
-    lam = min(max(lam, -1.0), 1.0)
-    return np.asarray(0.5 * (1.0 + lam) * plus + 0.5 * (1.0 - lam) * minus)
-
-
-def _derivative_along(
-    prepared: Prepared, t: float, x: Array, signs: Array, p: Array, direction: Array, j: int
-) -> float:
-    """Return ``h_t + grad h . direction`` of surface j."""
-    scale = max(1.0, float(np.abs(x).max()))
-    step = _STEP * scale / max(1.0, float(np.abs(direction).max()))
-
-    def value(multiple: int) -> float:
-        shift = multiple * step
-        return float(prepared.core.surface_values(t + shift, x + shift * direction, signs, p)[j])
-
-    return float((8.0 * (value(1) - value(-1)) - (value(2) - value(-2))) / (12.0 * step))
+    return field

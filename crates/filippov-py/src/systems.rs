@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use filippov::field::{SlidingField, SmoothField};
 use filippov::{FieldError, PiecewiseSystem};
 use filippov_expr::{Backend, Graph, Names, NodeId, Program};
 use numpy::{PyArray1, PyReadonlyArray1};
@@ -34,6 +35,26 @@ fn field_of<'py>(
     let mut dx = vec![0.0; system.n_states()];
     system.field(t, x, signs, &mut dx).map_err(raised)?;
     Ok(PyArray1::from_vec(py, dx))
+}
+
+/// The sliding field on one surface, and the normal components of both sides.
+fn sliding_field_of<'py>(
+    py: Python<'py>,
+    system: &dyn PiecewiseSystem,
+    t: f64,
+    x: &Array<'py>,
+    signs: &Array<'py>,
+    surface: usize,
+) -> PyResult<(Output<'py>, f64, f64)> {
+    let (x, signs) = checked(system, x, signs)?;
+    if surface >= signs.len() {
+        return Err(PyValueError::new_err(format!("no surface {surface}")));
+    }
+    let mut field = SlidingField::new(system, surface, signs);
+    let mut dx = vec![0.0; x.len()];
+    field.eval(t, &mut x.to_vec(), &mut dx).map_err(raised)?;
+    let a = field.last();
+    Ok((PyArray1::from_vec(py, dx), a.minus, a.plus))
 }
 
 fn surface_values_of<'py>(
@@ -180,6 +201,19 @@ impl TracedSystem {
         surface_values_of(py, &self.with(&p)?, t, &x, &signs)
     }
 
+    #[allow(clippy::too_many_arguments)]
+    fn sliding_field<'py>(
+        &self,
+        py: Python<'py>,
+        t: f64,
+        x: Array<'py>,
+        signs: Array<'py>,
+        p: Array<'py>,
+        surface: usize,
+    ) -> PyResult<(Output<'py>, f64, f64)> {
+        sliding_field_of(py, &self.with(&p)?, t, &x, &signs, surface)
+    }
+
     fn active(&self, signs: Array<'_>) -> PyResult<Vec<bool>> {
         let mut active = vec![true; self.system.n_surfaces()];
         if signs.as_slice()?.len() != active.len() {
@@ -320,6 +354,12 @@ macro_rules! callable_system {
             fn surface_values<'py>(&self, py: Python<'py>, t: f64, x: Array<'py>, signs: Array<'py>, p: Array<'py>) -> PyResult<Output<'py>> {
                 let _ = p;
                 surface_values_of(py, &*self.system, t, &x, &signs)
+            }
+
+            #[allow(clippy::too_many_arguments)]
+            fn sliding_field<'py>(&self, py: Python<'py>, t: f64, x: Array<'py>, signs: Array<'py>, p: Array<'py>, surface: usize) -> PyResult<(Output<'py>, f64, f64)> {
+                let _ = p;
+                sliding_field_of(py, &*self.system, t, &x, &signs, surface)
             }
 
             fn active(&self, signs: Array<'_>) -> PyResult<Vec<bool>> {

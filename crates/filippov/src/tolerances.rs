@@ -32,6 +32,12 @@ pub const STAGE_SPREAD: f64 = 0.75;
 /// Bisections of a step in the search for zeros; 2^-48 of a step is below the rounding of time.
 pub const MAX_DEPTH: u32 = 48;
 
+/// Samples that one search may take; bisecting to one zero takes about four per level of depth.
+pub const MOST_SAMPLES: u32 = 1000;
+
+/// Zeros of the user's functions in one step; with more the step is too long for them.
+pub const MOST_ZEROS: usize = 64;
+
 /// A search that needed more bisections than this met a function that the step does not resolve;
 /// the step may not grow then.
 pub const RESOLVED_DEPTH: u32 = 3;

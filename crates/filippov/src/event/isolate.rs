@@ -1,7 +1,7 @@
 //! Isolation of the first zero of a function of theta.
 
 use crate::error::FieldError;
-use crate::tolerances::{MAX_DEPTH, QUARTIC_REMAINDER};
+use crate::tolerances::{MAX_DEPTH, MOST_SAMPLES, QUARTIC_REMAINDER};
 
 /// A scalar function of theta.
 pub type Sampled<'a> = &'a mut dyn FnMut(f64) -> Result<f64, FieldError>;
@@ -41,12 +41,17 @@ impl Bracket {
 }
 
 /// The result of a search, with the number of bisections it took.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Isolated {
     /// The first zero, if there is one.
     pub zero: Option<Zero>,
     /// The deepest bisection; a large number means that the step does not resolve the function.
     pub depth: u32,
+    /// The function was not finite at a sample: there is no certificate.
+    pub not_finite: bool,
+    /// The search took more evaluations than it may: there is no certificate, and a shorter step is
+    /// needed.
+    pub exhausted: bool,
 }
 
 /// The first zero of `g` on [a, b], where `g(a) > 0`; `noise` is the rounding of g.
@@ -81,10 +86,7 @@ pub fn first_zero_sampled(
     probes: &[f64],
 ) -> Result<Isolated, FieldError> {
     if values.iter().all(|v| v.abs() <= noise) {
-        return Ok(Isolated {
-            zero: None,
-            depth: 0,
-        });
+        return Ok(Isolated::default());
     }
     if values[0] < -noise {
         let here = Bracket {
@@ -96,20 +98,23 @@ pub fn first_zero_sampled(
         };
         return Ok(Isolated {
             zero: Some(Zero::Crossing(here)),
-            depth: 0,
+            ..Isolated::default()
         });
     }
     let mut search = Search {
         g,
         noise,
         probes,
-        deepest: 0,
+        budget: MOST_SAMPLES,
+        result: Isolated {
+            not_finite: !values.iter().all(|v| v.is_finite()),
+            ..Isolated::default()
+        },
     };
     let zero = search.first(a, b, values, 0)?;
-    let deepest = search.deepest;
     Ok(Isolated {
-        zero,
-        depth: deepest,
+        zero: zero.filter(|_| search.is_certain()),
+        ..search.result
     })
 }
 
@@ -120,10 +125,23 @@ struct Search<'a, 'b> {
     g: Sampled<'a>,
     noise: f64,
     probes: &'b [f64],
-    deepest: u32,
+    budget: u32,
+    result: Isolated,
 }
 
 impl Search<'_, '_> {
+    fn is_certain(&self) -> bool {
+        !self.result.not_finite && !self.result.exhausted
+    }
+
+    fn sample(&mut self, at: f64) -> Result<f64, FieldError> {
+        let value = (self.g)(at)?;
+        self.budget = self.budget.saturating_sub(1);
+        self.result.exhausted |= self.budget == 0;
+        self.result.not_finite |= !value.is_finite();
+        Ok(value)
+    }
+
     /// The first zero on [a, b], given the values at its quarters.
     fn first(
         &mut self,
@@ -132,7 +150,10 @@ impl Search<'_, '_> {
         v: [f64; 5],
         depth: u32,
     ) -> Result<Option<Zero>, FieldError> {
-        self.deepest = depth.max(self.deepest);
+        self.result.depth = depth.max(self.result.depth);
+        if !self.is_certain() {
+            return Ok(None);
+        }
         let coefficients = bernstein(&v);
         let remainder =
             QUARTIC_REMAINDER * (v[0] - 4.0 * v[1] + 6.0 * v[2] - 4.0 * v[3] + v[4]).abs();
@@ -154,9 +175,9 @@ impl Search<'_, '_> {
         let quarter = 0.125 * (b - a);
         let left = [
             v[0],
-            (self.g)(a + quarter)?,
+            self.sample(a + quarter)?,
             v[1],
-            (self.g)(a + 3.0 * quarter)?,
+            self.sample(a + 3.0 * quarter)?,
             v[2],
         ];
         if let Some(zero) = self.first(a, m, left, depth + 1)? {
@@ -164,9 +185,9 @@ impl Search<'_, '_> {
         }
         let right = [
             v[2],
-            (self.g)(m + quarter)?,
+            self.sample(m + quarter)?,
             v[3],
-            (self.g)(m + 3.0 * quarter)?,
+            self.sample(m + 3.0 * quarter)?,
             v[4],
         ];
         self.first(m, b, right, depth + 1)
@@ -181,7 +202,7 @@ impl Search<'_, '_> {
         margin: f64,
     ) -> Result<bool, FieldError> {
         for &probe in self.probes {
-            let value = (self.g)(a + (b - a) * probe)?;
+            let value = self.sample(a + (b - a) * probe)?;
             let close = (value - casteljau(*coefficients, probe)).abs() <= 0.5 * margin;
             if !close {
                 return Ok(false);

@@ -14,10 +14,20 @@ pub struct NormalComponents {
 }
 
 impl NormalComponents {
+    /// The share of f+ in the sliding field, minus / (minus - plus). Where both components vanish
+    /// every share is tangent, and the middle is taken.
+    pub fn weight_plus(&self) -> f64 {
+        if self.minus == 0.0 && self.plus == 0.0 {
+            0.5
+        } else {
+            self.minus / (self.minus - self.plus)
+        }
+    }
+
     /// The multiplier lambda in [-1, 1]: +1 is the field of the side h > 0,
     /// lambda = (minus + plus) / (minus - plus).
     pub fn multiplier(&self) -> f64 {
-        (self.minus + self.plus) / (self.minus - self.plus)
+        2.0 * self.weight_plus() - 1.0
     }
 }
 
@@ -99,7 +109,7 @@ impl<'a> SlidingField<'a> {
 impl SmoothField for SlidingField<'_> {
     fn eval(&mut self, t: f64, x: &mut [f64], dx: &mut [f64]) -> Result<(), FieldError> {
         let a = self.normal_components(t, x)?;
-        let weight_plus = a.minus / (a.minus - a.plus);
+        let weight_plus = a.weight_plus();
         let sides = self.sides.f_minus.iter().zip(&self.sides.f_plus);
         for (dx, (minus, plus)) in dx.iter_mut().zip(sides) {
             *dx = minus + weight_plus * (plus - minus);

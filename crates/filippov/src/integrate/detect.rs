@@ -19,6 +19,8 @@ pub(super) struct Detector {
     pub stages: [[f64; 7]; 2],
     /// The step did not resolve a monitored function; it may not grow.
     pub unresolved: bool,
+    /// A monitored function could not be searched; the step has to be shortened.
+    pub uncertain: bool,
     /// Length of the next step, if the event stage knows better than the error control.
     pub next_dt: Option<f64>,
     /// Normal components computed in the search of this step, by theta.
@@ -51,6 +53,7 @@ impl Detector {
         Detector {
             stages: [[f64::NAN; 7]; 2],
             unresolved: false,
+            uncertain: false,
             next_dt: None,
             exits: Vec::new(),
             h: vec![0.0; d],
@@ -150,6 +153,7 @@ impl Integrator<'_> {
     pub(super) fn detect(&mut self, t1: f64, dt: f64) -> Result<Option<Found>, FieldError> {
         let end = (t1, self.stepper.end(), self.stepper.end_derivative());
         self.detector.unresolved = false;
+        self.detector.uncertain = false;
         self.detector.exits.clear();
         self.detector.next_dt = None;
         if self.motion.monitored.is_empty() {
@@ -157,6 +161,10 @@ impl Integrator<'_> {
         }
         self.detector.measure(self.system, &self.motion, end, 6)?;
         self.stats.n_surface_evaluations += 1;
+        if self.detector.right.iter().any(|(value, _)| value.is_nan()) {
+            self.detector.uncertain = true;
+            return Ok(None);
+        }
         self.collect_suspects(dt)?;
         let mut found: Option<Found> = None;
         if !self.detector.suspects.is_empty() {
@@ -283,6 +291,7 @@ impl Integrator<'_> {
         };
         let isolated = first_zero_sampled(&mut g, from, to, values, noise, probes)?;
         self.detector.unresolved |= isolated.depth > RESOLVED_DEPTH;
+        self.detector.uncertain |= isolated.exhausted || isolated.not_finite;
         match isolated.zero {
             None => Ok(None),
             Some(Zero::Touch(theta)) if theta <= from => Ok(None),
@@ -337,6 +346,8 @@ impl Integrator<'_> {
             if near {
                 self.extend(dt)?;
                 let zero = self.search(index, 1.0, EXTRAPOLATION, dt)?;
+                // What lies beyond the end of the step may not exist; that is no reason to shorten it.
+                self.detector.uncertain = false;
                 let Some((theta, _)) = zero else { continue };
                 if self.t + theta * dt > self.t_end {
                     continue;

@@ -25,8 +25,10 @@ use crate::stepper::{Attempt, Controller, Dopri5, ErrorScale};
 use crate::system::PiecewiseSystem;
 use crate::tolerances::SHORTEST_STEP;
 
-/// Steps between two looks at the clock and at the caller's wish to stop.
-const POLL_INTERVAL: u64 = 64;
+/// Most steps between two looks at the clock and at the caller's wish to stop.
+const LONGEST_POLL: u64 = 64;
+/// Seconds between two looks from which on they come at every step, for slow functions.
+const SLOW_POLL: f64 = 0.002;
 
 /// An integration in progress.
 pub struct Integrator<'a> {
@@ -100,6 +102,7 @@ impl<'a> Integrator<'a> {
     /// If a function of the user raises.
     pub fn run(&mut self, interrupt: &mut dyn FnMut(f64) -> bool) -> Result<Stop, FieldError> {
         let started = Instant::now();
+        let (mut polled, mut interval, mut next_poll) = (started, 1, 0);
         if let Some(stop) = self.start()? {
             return Ok(stop);
         }
@@ -111,11 +114,20 @@ impl<'a> Integrator<'a> {
             if self.stats.n_switches >= self.options.max_events {
                 return Ok(Stop::MaxEvents);
             }
-            if attempts.is_multiple_of(POLL_INTERVAL) {
+            if attempts >= next_poll {
+                let now = Instant::now();
+                let is_slow = (now - polled).as_secs_f64() > SLOW_POLL;
+                interval = if is_slow {
+                    1
+                } else {
+                    (2 * interval).min(LONGEST_POLL)
+                };
+                (polled, next_poll) = (now, attempts + interval);
+                let elapsed = (now - started).as_secs_f64();
                 if self
                     .options
                     .max_wall_time
-                    .is_some_and(|s| started.elapsed().as_secs_f64() > s)
+                    .is_some_and(|most| elapsed > most)
                 {
                     return Ok(Stop::MaxWallTime);
                 }
@@ -192,17 +204,27 @@ impl<'a> Integrator<'a> {
         };
         self.stepper.extend_order4(self.t, &self.x, dt);
         let found = self.detect(t1, dt)?;
-        self.stats.n_steps += 1;
-        self.stats.n_steps_sliding += u64::from(sliding);
-        self.dt = dt * self.controller.accept(error);
-        self.note_jump(dt);
+        if self.detector.uncertain {
+            self.count_rejection(sliding);
+            self.halve_step(dt);
+            return Ok(None);
+        }
         let theta = found.as_ref().map_or(1.0, |event| event.theta);
         let t_stop = if theta == 1.0 {
             t1
         } else {
             self.t + theta * dt
         };
-        if let Some(event) = self.user_zeros(theta, t_stop)? {
+        let Some(zeros) = self.find_user_zeros(theta)? else {
+            self.count_rejection(sliding);
+            self.halve_step(dt);
+            return Ok(None);
+        };
+        self.stats.n_steps += 1;
+        self.stats.n_steps_sliding += u64::from(sliding);
+        self.dt = dt * self.controller.accept(error);
+        self.note_jump(dt);
+        if let Some(event) = self.record_user_zeros(zeros, theta, t_stop)? {
             return Ok(Some(Stop::TerminalEvent(event)));
         }
         if self.detector.unresolved {

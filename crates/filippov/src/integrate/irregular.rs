@@ -28,6 +28,13 @@ impl Integrator<'_> {
         self.controller.not_finite();
     }
 
+    /// After a step whose events could not be decided.
+    pub(super) fn halve_step(&mut self, dt: f64) {
+        self.dt = 0.5 * dt;
+        self.one_sided = true;
+        self.controller.not_finite();
+    }
+
     /// Predicted time to the next zero of what is monitored.
     fn nearest_surface(&self) -> f64 {
         let times = self.motion.monitored.iter().map(Monitored::time_to_zero);

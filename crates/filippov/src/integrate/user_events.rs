@@ -5,7 +5,7 @@ use crate::error::FieldError;
 use crate::event::isolate::{first_zero, Zero};
 use crate::event::locate::refine;
 use crate::event::UserEvent;
-use crate::tolerances::EPS;
+use crate::tolerances::{EPS, MOST_ZEROS};
 
 /// A zero of a user's function.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,23 +51,35 @@ impl<'a> UserEvents<'a> {
 }
 
 impl Integrator<'_> {
-    /// Records the zeros of the user's functions up to `theta`; at one that ends the run, accepts
-    /// the step up to there and returns its index.
-    pub(super) fn user_zeros(
+    /// The zeros (theta, index) of the user's functions up to `theta`, in order; `None` if a shorter step
+    /// is needed to tell them apart.
+    pub(super) fn find_user_zeros(
         &mut self,
+        theta: f64,
+    ) -> Result<Option<Vec<(f64, usize)>>, FieldError> {
+        let found = self.search_user_zeros(theta)?;
+        if found.as_ref().is_none_or(|zeros| zeros.is_empty()) {
+            return Ok(found);
+        }
+        let dt = self.stepper.interpolant().dt;
+        self.stepper
+            .extend_order5(&mut self.motion.field, self.t, &self.x, dt)?;
+        let mut found = self.search_user_zeros(theta)?;
+        if let Some(zeros) = &mut found {
+            zeros.sort_by(|a, b| a.0.total_cmp(&b.0));
+        }
+        Ok(found)
+    }
+
+    /// Records zeros; at one that ends the run, accepts the step up to there and returns its index.
+    pub(super) fn record_user_zeros(
+        &mut self,
+        zeros: Vec<(f64, usize)>,
         theta: f64,
         t_stop: f64,
     ) -> Result<Option<usize>, FieldError> {
         if self.user_events.events.is_empty() {
             return Ok(None);
-        }
-        let mut zeros = self.all_user_zeros(theta)?;
-        if !zeros.is_empty() {
-            let dt = self.stepper.interpolant().dt;
-            self.stepper
-                .extend_order5(&mut self.motion.field, self.t, &self.x, dt)?;
-            zeros = self.all_user_zeros(theta)?;
-            zeros.sort_by(|a, b| a.0.total_cmp(&b.0));
         }
         let (t0, dt) = (self.stepper.interpolant().t0, self.stepper.interpolant().dt);
         for (at, index) in zeros {
@@ -100,8 +112,8 @@ impl Integrator<'_> {
         self.user_events.events[index].function.value(t, &y)
     }
 
-    /// All zeros (theta, index) of all functions in (0, theta], in no order.
-    fn all_user_zeros(&mut self, theta: f64) -> Result<Vec<(f64, usize)>, FieldError> {
+    /// All zeros in (0, theta], in no order. A function that is not finite has none in this step.
+    fn search_user_zeros(&mut self, theta: f64) -> Result<Option<Vec<(f64, usize)>>, FieldError> {
         let mut zeros = Vec::new();
         for index in 0..self.user_events.events.len() {
             let (t0, dt) = (self.stepper.interpolant().t0, self.stepper.interpolant().dt);
@@ -125,8 +137,11 @@ impl Integrator<'_> {
                     let away = (at - from).max(limit);
                     Ok(sign * self.user_value(index, from + away)? / away)
                 };
-                let Some(Zero::Crossing(bracket)) = first_zero(&mut g, from, theta, noise)?.zero
-                else {
+                let isolated = first_zero(&mut g, from, theta, noise)?;
+                if isolated.exhausted && !isolated.not_finite {
+                    return Ok(None);
+                }
+                let Some(Zero::Crossing(bracket)) = isolated.zero else {
                     break;
                 };
                 let width = 0.5 * EPS * (t0.abs() / dt).max(1.0);
@@ -135,12 +150,15 @@ impl Integrator<'_> {
                 if direction * sign <= 0.0 {
                     zeros.push((at, index));
                 }
+                if zeros.len() > MOST_ZEROS {
+                    return Ok(None);
+                }
                 if at <= from || at >= theta {
                     break;
                 }
                 (from, divided) = (at, true);
             }
         }
-        Ok(zeros)
+        Ok(Some(zeros))
     }
 }

@@ -1,8 +1,10 @@
 //! The decision at one surface.
 
-use super::lie::{first_nonzero, Leading};
+use super::lie::{first_nonzero, normal_component, Leading};
 use crate::error::FieldError;
+use crate::field::eval_on_side;
 use crate::system::PiecewiseSystem;
+use crate::tolerances::TANGENT;
 
 /// How the motion came to the surface, and which normal components are known to vanish.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,6 +73,12 @@ pub fn decide(
     if plus.sign() > 0 {
         candidates.push(1);
     }
+    if minus.order == 0 && plus.order == 0 {
+        // Neither field leaves the surface: the motion stays on it, and if they differ, any combination
+        // of them is a Filippov solution.
+        let agree = fields_agree(system, j, t, x, signs)?;
+        candidates = if agree { Vec::new() } else { vec![-1, 1] };
+    }
     let entry = choose(system, j, arrival, &candidates, t, x, signs)?;
     if candidates.is_empty() {
         candidates.push(entry);
@@ -83,6 +91,32 @@ pub fn decide(
     })
 }
 
+/// Do both sides have the same field here, up to rounding?
+fn fields_agree(
+    system: &dyn PiecewiseSystem,
+    j: usize,
+    t: f64,
+    x: &[f64],
+    signs: &[f64],
+) -> Result<bool, FieldError> {
+    let side = |s: f64| -> Result<Vec<f64>, FieldError> {
+        let mut signs = signs.to_vec();
+        signs[j] = s;
+        let mut f = vec![0.0; x.len()];
+        eval_on_side(system, t, x, &signs, &mut f)?;
+        Ok(f)
+    };
+    let (minus, plus) = (side(-1.0)?, side(1.0)?);
+    let size = minus
+        .iter()
+        .chain(&plus)
+        .fold(0.0_f64, |m, v| m.max(v.abs()));
+    Ok(minus
+        .iter()
+        .zip(&plus)
+        .all(|(a, b)| (a - b).abs() <= TANGENT * size))
+}
+
 fn slides(
     system: &dyn PiecewiseSystem,
     j: usize,
@@ -92,7 +126,10 @@ fn slides(
     x: &[f64],
     signs: &[f64],
 ) -> Result<bool, FieldError> {
-    if minus.order == 1 || plus.order == 1 {
+    if minus.order == 0 && plus.order == 0 {
+        return Ok(false);
+    }
+    if minus.order <= 1 || plus.order <= 1 {
         // A side whose derivatives all vanish keeps the motion on the surface: lambda = -1 or +1.
         return Ok(minus.sign() >= 0 && plus.sign() <= 0);
     }
@@ -150,8 +187,8 @@ fn choose(
         Arrival::ExitMinus => -1,
         Arrival::ExitPlus => 1,
         Arrival::Start => {
-            let minus = system.lie_derivative(j, j, &[-1], t, x, signs)?.value;
-            let plus = system.lie_derivative(j, j, &[1], t, x, signs)?.value;
+            let minus = normal_component(system, j, j, -1, t, x, signs)?.value;
+            let plus = normal_component(system, j, j, 1, t, x, signs)?.value;
             if minus + plus < 0.0 {
                 -1
             } else {
@@ -160,8 +197,7 @@ fn choose(
         }
     };
     Ok(match candidates {
-        [] if matches!(arrival, Arrival::Region(_)) => preferred,
-        [] => 0,
+        [] => preferred,
         _ if candidates.contains(&preferred) => preferred,
         _ => candidates[0],
     })

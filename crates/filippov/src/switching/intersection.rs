@@ -1,6 +1,6 @@
 //! The decision where several surfaces meet, as far as codimension 1 answers it.
 
-use super::lie::{first_nonzero, Leading};
+use super::lie::{first_nonzero, normal_component, Leading};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::system::PiecewiseSystem;
@@ -105,7 +105,7 @@ fn sliding_attracts(
     x: &[f64],
 ) -> Result<Option<Vec<(usize, Leading)>>, FieldError> {
     let signs = region.signs();
-    let along = |i: usize, side: i8| system.lie_derivative(i, j, &[side], t, x, &signs);
+    let along = |i: usize, side: i8| normal_component(system, i, j, side, t, x, &signs);
     let (minus, plus) = (along(j, -1)?, along(j, 1)?);
     let tolerance = system.lie_tolerance(1);
     if minus.value <= tolerance * minus.magnitude || plus.value >= -tolerance * plus.magnitude {
@@ -140,7 +140,7 @@ fn may_stay(
         let signs = mode.with(i, si).with(j, sj).signs();
         let (p, q) = (f64::from(si), f64::from(sj));
         for (row, k) in g.iter_mut().zip([i, j]) {
-            let value = system.lie_derivative(k, j, &[sj], t, x, &signs)?.value / 4.0;
+            let value = normal_component(system, k, j, sj, t, x, &signs)?.value / 4.0;
             for (entry, factor) in row.iter_mut().zip([1.0, p, q, p * q]) {
                 *entry += factor * value;
             }

@@ -1,8 +1,9 @@
 //! The first Lie derivative that does not vanish.
 
 use crate::error::FieldError;
-use crate::system::PiecewiseSystem;
-use crate::tolerances::MAX_LIE_ORDER;
+use crate::field::{move_inside, side_offsets};
+use crate::system::{LieValue, PiecewiseSystem};
+use crate::tolerances::{MAX_LIE_ORDER, SIDE_REACH};
 
 /// The first non-vanishing derivative of h along a field: h(t) = value (t - t0)^order / order! + ...
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,7 +33,8 @@ impl Leading {
 /// The first non-vanishing Lie derivative of h_j along f with entry `j` of the signs set to `side`.
 ///
 /// `vanishing` is the number of orders known to be zero (1 where an exit function was just found to
-/// vanish): they are skipped.
+/// vanish): they are skipped. Where a derivative does not exist on the surface (a power of the distance),
+/// all orders are looked at just inside of the region.
 ///
 /// # Errors
 /// If a function of the user raises.
@@ -45,27 +47,74 @@ pub fn first_nonzero(
     x: &[f64],
     signs: &[f64],
 ) -> Result<Leading, FieldError> {
-    let highest = system.max_lie_order().min(MAX_LIE_ORDER);
-    let word = [side; MAX_LIE_ORDER];
-    let signs_side: Vec<f64> = signs
-        .iter()
-        .enumerate()
-        .map(|(i, s)| if i == j { f64::from(side) } else { *s })
-        .collect();
-    for order in vanishing + 1..=highest {
-        let lie = system.lie_derivative(j, j, &word[..order], t, x, &signs_side)?;
-        if !lie.value.is_finite() {
-            break;
-        }
-        if lie.value.abs() > system.lie_tolerance(order) * lie.magnitude {
-            return Ok(Leading {
-                order,
-                value: lie.value,
-            });
+    let mut signs_side = signs.to_vec();
+    signs_side[j] = f64::from(side);
+    if let Some(leading) = scan(system, j, side, vanishing, t, x, &signs_side)? {
+        return Ok(leading);
+    }
+    for offset in side_offsets(x) {
+        let inside = move_inside(system, t, x, &signs_side, offset, SIDE_REACH * offset)?;
+        if let Some(leading) = scan(system, j, side, 0, t, &inside, &signs_side)? {
+            return Ok(leading);
         }
     }
     Ok(Leading {
         order: 0,
         value: 0.0,
     })
+}
+
+/// As [`first_nonzero`] at this very point; `None` where a derivative is not finite.
+fn scan(
+    system: &dyn PiecewiseSystem,
+    j: usize,
+    side: i8,
+    vanishing: usize,
+    t: f64,
+    x: &[f64],
+    signs: &[f64],
+) -> Result<Option<Leading>, FieldError> {
+    let highest = system.max_lie_order().min(MAX_LIE_ORDER);
+    let word = [side; MAX_LIE_ORDER];
+    for order in vanishing + 1..=highest {
+        let LieValue { value, magnitude } =
+            system.lie_derivative(j, j, &word[..order], t, x, signs)?;
+        if !value.is_finite() {
+            return Ok(None);
+        }
+        if value.abs() > system.lie_tolerance(order) * magnitude {
+            return Ok(Some(Leading { order, value }));
+        }
+    }
+    Ok(Some(Leading {
+        order: 0,
+        value: 0.0,
+    }))
+}
+
+/// The normal component dh_i/dt along f with entry `j` of the signs set to `side`, taken just inside of
+/// the region where it does not exist on the surface.
+///
+/// # Errors
+/// If a function of the user raises.
+pub fn normal_component(
+    system: &dyn PiecewiseSystem,
+    i: usize,
+    j: usize,
+    side: i8,
+    t: f64,
+    x: &[f64],
+    signs: &[f64],
+) -> Result<LieValue, FieldError> {
+    let mut signs_side = signs.to_vec();
+    signs_side[j] = f64::from(side);
+    let mut lie = system.lie_derivative(i, j, &[side], t, x, &signs_side)?;
+    for offset in side_offsets(x) {
+        if lie.value.is_finite() {
+            break;
+        }
+        let inside = move_inside(system, t, x, &signs_side, offset, SIDE_REACH * offset)?;
+        lie = system.lie_derivative(i, j, &[side], t, &inside, &signs_side)?;
+    }
+    Ok(lie)
 }

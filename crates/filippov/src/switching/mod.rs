@@ -10,7 +10,7 @@ mod lie;
 
 pub use codim1::{decide, Arrival, Decision};
 pub use intersection::{decide_intersection, IntersectionDecision};
-pub use lie::{first_nonzero, Leading};
+pub use lie::{first_nonzero, normal_component, Leading};
 
 /// The word for what happened, as the field uses it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

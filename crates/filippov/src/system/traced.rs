@@ -7,8 +7,7 @@ use filippov_expr::{Backend, ExprError, Graph, Names, NodeId};
 use super::compiled::{GradientValues, Model};
 use super::{BothSides, LieValue, PiecewiseSystem, Word};
 use crate::error::FieldError;
-use crate::field::{move_inside, side_offsets};
-use crate::tolerances::{MAX_LIE_ORDER, SIDE_REACH, TANGENT};
+use crate::tolerances::{MAX_LIE_ORDER, TANGENT};
 
 /// Up to that many states both sides of a surface are compiled into one program; the programs of
 /// larger systems would take longer to compile than they save.
@@ -209,19 +208,6 @@ impl PiecewiseSystem for TracedSystem {
             &mut large[..]
         };
         lie.program.eval(t, x, signs, &self.parameters, &[], out);
-        if !out[0].is_finite() {
-            // The derivative of a one-sided field: taken just inside of its region.
-            let mut side = signs.to_vec();
-            side[j] = word.last().map_or(side[j], |&w| f64::from(w));
-            for offset in side_offsets(x) {
-                let inside = move_inside(self, t, x, &side, offset, SIDE_REACH * offset)?;
-                lie.program
-                    .eval(t, &inside, signs, &self.parameters, &[], out);
-                if out[0].is_finite() {
-                    break;
-                }
-            }
-        }
         Ok(LieValue {
             value: out[0],
             magnitude: out[1..].iter().map(|v| v.abs()).sum(),

@@ -1,0 +1,155 @@
+"""Functions that cannot be traced: correct with their surfaces declared, and noticed where one is missing."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import filippov as fl
+import numpy as np
+import pytest
+
+
+def friction_in_math(t: float, x: Any) -> Any:
+    y, v = float(x[0]), float(x[1])
+    return [v, -y + math.sin(t / 3) - (0.4 if v > 0 else -0.4)]
+
+
+def velocity(t: float, x: Any) -> Any:
+    return x[1]
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-9])
+def test_same_itinerary_as_traced(rtol: float) -> None:
+    problem = fl.problems.get("dry_friction")
+    options: dict[str, Any] = {"rtol": rtol, "atol": rtol}
+    traced = fl.solve_ivp(problem.fun, problem.t_span, problem.y0, args=problem.args, **options)
+    called = fl.solve_ivp(friction_in_math, problem.t_span, problem.y0, surfaces=velocity, **options)
+    assert called.stats["backend"] == "black box"
+    assert traced.stats["backend"] in ("native", "interpreter")
+    assert len(called.switches) == 42
+    assert called.switches.kind.tolist() == traced.switches.kind.tolist()
+    assert called.switches.mode_after == traced.switches.mode_after
+    # A black box is one-sided at its surfaces, so the steps differ, and with them the errors.
+    near = max(1e-6, rtol)
+    np.testing.assert_allclose(called.switches.t, traced.switches.t, rtol=0, atol=near)
+    np.testing.assert_allclose(called.y[:, -1], traced.y[:, -1], rtol=0, atol=near)
+    assert called.warnings == []
+
+
+def test_sliding_stays_on_a_curved_surface() -> None:
+    def field(t: float, z: Any) -> Any:
+        x, y = float(z[0]), float(z[1])
+        return [1.0, -1.0] if x * x + y * y > 2 else [x, y]
+
+    sol = fl.solve_ivp(
+        field, (0, 2), [-1.0, 0.1], surfaces=lambda t, z: z[0] ** 2 + z[1] ** 2 - 2, rtol=1e-9, atol=1e-9
+    )
+    assert [s.kind for s in sol.switches] == ["enter_sliding", "exit_sliding"]
+    arrival = math.log(2 / 1.01) / 2
+    psi = math.atan2(0.1, -1.0) + math.pi / 4
+    departure = arrival + 2 * math.log(math.cos(3 * math.pi / 4) / math.cos(psi / 2))
+    np.testing.assert_allclose(sol.switches.t, [arrival, departure], rtol=0, atol=1e-7)
+    times = np.linspace(arrival, departure, 50)[1:-1]
+    assert np.abs((sol.sol(times) ** 2).sum(axis=0) - 2).max() < 1e-12
+
+
+def test_scipy_interpolant_as_characteristic() -> None:
+    """A spring law from a table, with dry friction: energy falls, and the mass sticks in the end."""
+    interpolate = pytest.importorskip("scipy.interpolate")
+    nodes = np.linspace(-2, 2, 400)
+    spring = interpolate.CubicSpline(nodes, np.sin(nodes))
+
+    def field(t: float, x: Any) -> Any:
+        return [x[1], -float(spring(float(x[0]))) - 0.1 * float(np.sign(float(x[1])))]
+
+    def exact(t: float, x: Any) -> Any:
+        return [x[1], -np.sin(x[0]) - 0.1 * np.sign(x[1])]
+
+    options: dict[str, Any] = {"rtol": 1e-8, "atol": 1e-8}
+    called = fl.solve_ivp(field, (0, 30), [1.0, 0.0], surfaces=velocity, **options)
+    traced = fl.solve_ivp(exact, (0, 30), [1.0, 0.0], **options)
+    assert called.switches.mode_after == traced.switches.mode_after
+    assert called.segments[-1].mode == (0,)
+    # The cubic spline is off by h^4 / 384 = 3e-11.
+    np.testing.assert_allclose(called.switches.t, traced.switches.t, rtol=0, atol=1e-6)
+
+
+def test_several_surfaces() -> None:
+    problem = fl.problems.get("two_masses")
+
+    def field(t: float, x: Any) -> Any:
+        y1, y2, v1, v2 = (float(value) for value in x)
+        rough1, rough2 = (0.6 if y1 < 0 else 1.0), (0.5 if y2 < 0 else 0.2)
+        return [
+            v1,
+            v2,
+            y2 - y1 - math.copysign(rough1, v1),
+            y1 - y2 - math.copysign(rough2, v2),
+        ]
+
+    surfaces = [lambda t, x, j=j: x[j] for j in range(4)]
+    options: dict[str, Any] = {"rtol": 1e-8, "atol": 1e-8}
+    called = fl.solve_ivp(field, (0, 10), problem.y0, surfaces=surfaces, **options)
+    traced = fl.solve_ivp(problem.fun, (0, 10), problem.y0, **options)
+    assert len(traced.switches) == 17
+    inactive = [s for s in called.switches if s.mode_after not in traced.switches.mode_after]
+    assert inactive == []
+    np.testing.assert_allclose(called.switches.t, traced.switches.t, rtol=0, atol=1e-6)
+
+
+def test_moving_surface() -> None:
+    def field(t: float, x: Any) -> Any:
+        return [-2.0 if float(x[0]) > math.sin(t) else 2.0]
+
+    sol = fl.solve_ivp(field, (0, 10), [1.0], surfaces=lambda t, x: x[0] - np.sin(t), rtol=1e-9, atol=1e-9)
+    assert [s.kind for s in sol.switches] == ["enter_sliding"]
+    np.testing.assert_allclose(sol.y[0, -1], math.sin(10), rtol=0, atol=1e-12)
+    assert sol.sol.multipliers(3.0)[0] == pytest.approx(-math.cos(3.0) / 2, abs=1e-7)
+
+
+@pytest.mark.parametrize("height", [0.5, 1.0, 30.0])
+def test_undeclared_jump_in_time_is_noticed(height: float) -> None:
+    def field(t: float, x: Any) -> Any:
+        return [-float(x[0]) + (height if float(t) > 0.7 else 0.0)]
+
+    sol = fl.solve_ivp(field, (0, 2), [1.0], surfaces=lambda t, x: x[0] + 1000.0)
+    assert sol.success
+    (warning,) = sol.warnings
+    assert warning.code == "undeclared_jump"
+    assert warning.t == pytest.approx(0.7, abs=1e-2)
+    assert "surfaces" in warning.message
+
+
+def test_undeclared_jump_in_the_state_is_noticed() -> None:
+    def field(t: float, x: Any) -> Any:
+        return [1.0 if float(x[0]) < 0.7 else 3.0]
+
+    sol = fl.solve_ivp(field, (0, 2), [0.0], surfaces=lambda t, x: x[0] + 10.0)
+    (warning,) = sol.warnings
+    assert warning.code == "undeclared_jump"
+    assert warning.t == pytest.approx(0.7, abs=1e-2)
+
+
+def test_smooth_black_boxes_give_no_warning() -> None:
+    """Fast but smooth: sharp peaks, decay, high frequency."""
+    fields: list[Any] = [
+        lambda t, x: [math.exp(-((float(t) - 1.0) ** 2) / 2e-4)],
+        lambda t, x: [-50.0 * float(x[0])],
+        lambda t, x: [math.sin(40.0 * float(t))],
+        lambda t, x: [1.0 / (1e-3 + (float(t) - 1.0) ** 2)],
+    ]
+    for field in fields:
+        sol = fl.solve_ivp(field, (0, 2), [1.0], surfaces=lambda t, x: x[0] + 1e6)
+        assert sol.success
+        assert sol.warnings == []
+
+
+def test_declared_surface_where_nothing_jumps() -> None:
+    """It is a crossing if it is monitored at all, and it changes nothing."""
+    sol = fl.solve_ivp(
+        lambda t, x: [-float(x[0])], (0, 3), [1.0], surfaces=lambda t, x: x[0] - 0.5, rtol=1e-9, atol=1e-12
+    )
+    assert sol.success
+    assert set(sol.switches.kind) <= {"crossing"}
+    assert sol.y[0, -1] == pytest.approx(math.exp(-3), rel=1e-8)

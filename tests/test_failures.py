@@ -1,0 +1,252 @@
+"""Runs that fail half-way: nothing computed is lost, and nothing runs for ever."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import filippov as fl
+import numpy as np
+import pytest
+
+
+def oscillator(t: float, x: Any) -> Any:
+    return [x[1], -x[0] + np.sin(t / 3) - 0.4 * np.sign(x[1])]
+
+
+def slow_oscillator(t: float, x: Any) -> Any:
+    y, v = float(x[0]), float(x[1])
+    return [v, -y + math.sin(t / 3) - (0.4 if v > 0 else -0.4)]
+
+
+def assert_partial(sol: fl.Solution, exact: Callable[[float], float], until: float) -> None:
+    """The run failed near `until`, and what is there is right and complete."""
+    assert not sol.success
+    assert sol.status < 0
+    assert sol.message
+    assert 0.5 * until < sol.t[-1] <= until + 1e-6
+    assert sol.segments[0].t_start == 0.0
+    assert sol.segments[-1].t_end == sol.t[-1]
+    assert sol.sol is not None
+    assert sol.sol.t_max == sol.t[-1]
+    for t in np.linspace(0, sol.t[-1], 20):
+        assert sol.sol(t)[0] == pytest.approx(exact(t), abs=1e-4)
+    assert np.isfinite(sol.y).all()
+
+
+def test_traced_field_that_becomes_nan() -> None:
+    """x = 1 - 2/3 (1 - (1 - t)^1.5) ends at t = 1."""
+    sol = fl.solve_ivp(lambda t, x: [-np.sqrt(1.0 - t)], (0, 2), [1.0])
+    assert "not finite" in sol.message
+    assert_partial(sol, lambda t: 1 - 2 / 3 * (1 - max(1 - t, 0.0) ** 1.5), 1.0)
+
+
+def test_called_field_that_becomes_nan() -> None:
+    def field(t: float, x: Any) -> Any:
+        return [math.nan if t > 0.5 else -float(x[0])]
+
+    sol = fl.solve_ivp(field, (0, 2), [1.0], surfaces=lambda t, x: x[0] + 10.0)
+    assert "not finite" in sol.message
+    assert_partial(sol, lambda t: math.exp(-t), 0.5)
+
+
+def test_field_that_is_nan_at_the_start() -> None:
+    sol = fl.solve_ivp(lambda t, x: [np.log(x[0])], (0, 2), [-1.0])
+    assert not sol.success
+    assert "not finite" in sol.message
+    assert sol.t.tolist() == [0.0]
+    assert sol.y.tolist() == [[-1.0]]
+
+
+def test_field_that_grows_beyond_all_bounds() -> None:
+    sol = fl.solve_ivp(lambda t, x: [x[0] ** 2], (0, 2), [1.0])
+    assert not sol.success
+    assert sol.t[-1] == pytest.approx(1.0, abs=1e-5)
+    assert sol.sol(0.5)[0] == pytest.approx(2.0, rel=1e-5)
+    assert "step" in sol.message
+
+
+def test_failure_keeps_the_switches_before_it() -> None:
+    def field(t: float, x: Any) -> Any:
+        return [*oscillator(t, x[:2]), np.sqrt(20.0 - t)]
+
+    sol = fl.solve_ivp(field, (0, 40), [1.0, 2.0, 0.0], rtol=1e-8, atol=1e-8)
+    whole = fl.solve_ivp(oscillator, (0, 40), [1.0, 2.0], rtol=1e-8, atol=1e-8)
+    assert not sol.success
+    assert sol.t[-1] == pytest.approx(20.0, abs=1e-5)
+    count = int((whole.switches.t < 20.0).sum())
+    assert count >= 4
+    assert sol.switches.mode_after == whole.switches.mode_after[:count]
+    np.testing.assert_allclose(sol.switches.t, whole.switches.t[:count], rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("error", [RuntimeError, ValueError, ZeroDivisionError, KeyError])
+def test_field_that_raises(error: type[Exception]) -> None:
+    def field(t: float, x: Any) -> Any:
+        if float(t) > 0.5:
+            raise error("half-way")
+        return [-float(x[0])]
+
+    sol = fl.solve_ivp(field, (0, 2), [1.0], surfaces=lambda t, x: x[0] + 10.0)
+    assert type(sol.error) is error
+    assert "half-way" in sol.message
+    assert error.__name__ in sol.message
+    assert_partial(sol, lambda t: math.exp(-t), 0.5)
+
+
+def test_traceback_leads_to_the_line_of_the_user() -> None:
+    def field(t: float, x: Any) -> Any:
+        return [-float(x[0]) / (0 if float(t) > 0.5 else 1)]
+
+    sol = fl.solve_ivp(field, (0, 2), [1.0], surfaces=lambda t, x: x[0] + 10.0)
+    assert isinstance(sol.error, ZeroDivisionError)
+    trace = sol.error.__traceback__
+    assert trace is not None
+    while trace.tb_next is not None:
+        trace = trace.tb_next
+    assert trace.tb_frame.f_code.co_name == "field"
+
+
+def test_surface_and_event_that_raise() -> None:
+    def late(t: float, x: Any) -> Any:
+        if float(t) > 0.5:
+            raise RuntimeError("half-way")
+        return x[0] + 10.0
+
+    for options in ({"surfaces": late}, {"surfaces": lambda t, x: x[0] + 10.0, "events": late}):
+        sol = fl.solve_ivp(lambda t, x: [-float(x[0])], (0, 2), [1.0], **options)
+        assert isinstance(sol.error, RuntimeError)
+        assert not sol.success
+        assert 0.1 < sol.t[-1] <= 0.5
+        assert sol.sol(sol.t[-1])[0] == pytest.approx(math.exp(-sol.t[-1]), abs=1e-5)
+
+
+def test_wrong_shape_half_way() -> None:
+    def field(t: float, x: Any) -> Any:
+        return [-float(x[0])] if float(t) <= 0.5 else [1.0, 2.0]
+
+    try:
+        sol = fl.solve_ivp(field, (0, 2), [1.0], surfaces=lambda t, x: x[0] + 10.0)
+    except fl.FilippovError as error:
+        assert "2" in str(error)
+    else:
+        assert not sol.success
+        assert "2" in sol.message
+        assert 0.1 < sol.t[-1] <= 0.5
+
+
+def test_keyboard_interrupt_inside_a_function() -> None:
+    def field(t: float, x: Any) -> Any:
+        if float(t) > 0.5:
+            raise KeyboardInterrupt
+        return [-float(x[0])]
+
+    with pytest.raises(KeyboardInterrupt) as info:
+        fl.solve_ivp(field, (0, 2), [1.0], surfaces=lambda t, x: x[0] + 10.0)
+    assert isinstance(info.value, fl.Interrupted)
+    assert_partial(info.value.partial, lambda t: math.exp(-t), 0.5)
+
+
+def test_system_exit_is_not_swallowed() -> None:
+    def field(t: float, x: Any) -> Any:
+        if float(t) > 0.5:
+            raise SystemExit(3)
+        return [-float(x[0])]
+
+    try:
+        sol = fl.solve_ivp(field, (0, 2), [1.0], surfaces=lambda t, x: x[0] + 10.0)
+    except SystemExit as stop:
+        assert stop.code == 3
+    else:
+        assert isinstance(sol.error, SystemExit)
+
+
+def interrupted(run: Callable[[], Any], after: float) -> tuple[fl.Interrupted, float]:
+    """Send Ctrl-C to this process after some time; return the exception and the delay."""
+    sent: list[float] = []
+
+    def send() -> None:
+        sent.append(time.perf_counter())
+        os.kill(os.getpid(), signal.SIGINT)
+
+    timer = threading.Timer(after, send)
+    timer.start()
+    try:
+        with pytest.raises(KeyboardInterrupt) as info:
+            run()
+        delay = time.perf_counter() - sent[0]
+    finally:
+        timer.cancel()
+        timer.join()
+    assert isinstance(info.value, fl.Interrupted)
+    return info.value, delay
+
+
+ENDLESS: dict[str, Callable[[], Any]] = {
+    "traced": lambda: fl.solve_ivp(oscillator, (0, 1e9), [1.0, 2.0]),
+    "black box": lambda: fl.solve_ivp(slow_oscillator, (0, 1e9), [1.0, 2.0], surfaces=lambda t, x: x[1]),
+    "chatter": lambda: fl.solve_ivp(lambda t, x: [np.sign(np.sin(1e7 * t))], (0, 1e9), [0.0]),
+    "only the end": lambda: fl.solve_ivp(oscillator, (0, 1e9), [1.0, 2.0], dense_output=False, t_eval=[1e9]),
+}
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals are sent in another way on Windows")
+@pytest.mark.parametrize("name", ENDLESS)
+def test_ctrl_c(name: str) -> None:
+    error, delay = interrupted(ENDLESS[name], after=0.1)
+    # 0.1 s is promised; as much again for a loaded machine.
+    assert delay < 0.2
+    partial = error.partial
+    assert not partial.success
+    assert "t = " in str(error)
+    if name != "only the end":
+        assert len(partial.switches) > 0
+        assert partial.t[-1] > 0.0
+        assert np.isfinite(partial.sol(partial.t[-1])).all()
+
+
+@pytest.mark.parametrize("name", ENDLESS)
+def test_max_wall_time(name: str) -> None:
+    calls = {
+        "traced": (oscillator, {}),
+        "black box": (slow_oscillator, {"surfaces": lambda t, x: x[1]}),
+        "chatter": (lambda t, x: [np.sign(np.sin(1e7 * t)), 0.0], {}),
+        "only the end": (oscillator, {"dense_output": False, "t_eval": [1e9]}),
+    }
+    fun, options = calls[name]
+    start = time.perf_counter()
+    sol = fl.solve_ivp(fun, (0, 1e9), [1.0, 2.0], max_wall_time=0.1, **options)
+    assert time.perf_counter() - start < 0.4  # collecting the solution takes time too
+    assert not sol.success
+    assert "max_wall_time" in sol.message
+
+
+def test_max_steps() -> None:
+    sol = fl.solve_ivp(oscillator, (0, 1e9), [1.0, 2.0], max_steps=500)
+    assert not sol.success
+    assert "max_steps" in sol.message
+    assert 10 < sol.t[-1] < 1000
+    assert 300 <= len(sol.t) <= 501
+
+
+@pytest.mark.parametrize("limit", [1, 7, 20])
+def test_max_events(limit: int) -> None:
+    sol = fl.solve_ivp(oscillator, (0, 200), [1.0, 2.0], max_events=limit)
+    assert not sol.success
+    assert "max_events" in sol.message
+    assert len(sol.switches) == limit
+    assert sol.t[-1] == sol.switches.t[-1]
+
+
+def test_t_eval_up_to_the_failure() -> None:
+    times = np.linspace(0, 2, 21)
+    sol = fl.solve_ivp(lambda t, x: [-np.sqrt(1.0 - t)], (0, 2), [1.0], t_eval=times)
+    assert not sol.success
+    np.testing.assert_array_equal(sol.t, times[: len(sol.t)])
+    assert len(sol.t) in (10, 11)
+    assert sol.y.shape == (1, len(sol.t))
