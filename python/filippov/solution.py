@@ -217,7 +217,8 @@ class Solution:
             y=run.y,
             sol=DenseSolution(run, t0, run.t_last) if dense_output else None,
             t_events=list(run.t_events) if has_events else None,
-            y_events=list(run.y_events) if has_events else None,
+            # SciPy's shape: (k, n), and (0,) where there is none.
+            y_events=[y if len(y) else np.empty(0) for y in run.y_events] if has_events else None,
             nfev=int(stats.get("nfev", 0)),
             njev=int(stats.get("njev", 0)),
             nlu=int(stats.get("nlu", 0)),

@@ -352,6 +352,15 @@ impl Graph {
             let quotient = self.quotient(a, b);
             return self.negative(quotient);
         }
+        // A common factor cancels, as `0*x` is 0: the quotient is not NaN where the factor vanishes.
+        if let Node::Binary(BinaryOp::Mul, left, right) = *self.node(a) {
+            if left == b {
+                return right;
+            }
+            if right == b {
+                return left;
+            }
+        }
         // A sign is its own reciprocal: it leaves the quotient to the front.
         if !self.have_few_signs(a, b) {
             return self.insert(Node::Binary(BinaryOp::Div, a, b));

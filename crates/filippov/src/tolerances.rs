@@ -32,6 +32,10 @@ pub const STAGE_SPREAD: f64 = 0.75;
 /// Bisections of a step in the search for zeros; 2^-48 of a step is below the rounding of time.
 pub const MAX_DEPTH: u32 = 48;
 
+/// Where a change of sign is narrowed down to rounding and the function is still larger than this
+/// fraction of its values over the step, it has a pole or a jump there and no zero.
+pub const POLE: f64 = 1e-3;
+
 /// Samples that one search may take; bisecting to one zero takes about four per level of depth.
 pub const MOST_SAMPLES: u32 = 1000;
 
@@ -59,9 +63,19 @@ pub const SIDE_REACH: f64 = 1e3;
 /// Shortest step in units of the rounding of time.
 pub const SHORTEST_STEP: f64 = 16.0 * EPS;
 
-/// A step shorter than this fraction of its recent predecessors, across which the field still
-/// changes by a third of its size, is the mark of a jump that no surface declares.
+/// A step shorter than this fraction of its recent predecessors is looked at for a jump that no surface
+/// declares.
 pub const JUMP_SHRINK: f64 = 1e-2;
+
+/// The field jumps in a step if its range over the stages exceeds this fraction of its size ...
+pub const JUMP_SIZE: f64 = 0.02;
+
+/// ... and this share of the range falls between two neighbouring stages, at most half a step apart.
+pub const JUMP_SHARE: f64 = 0.9;
+
+/// A motion that can go no further towards the edge of its field has arrived at a surface that is nearer
+/// than this fraction of the tolerance.
+pub const ARRIVED: f64 = 1e-3;
 
 /// That many switches without any progress of time end a run.
 pub const MOST_SWITCHES_AT_ONE_TIME: u32 = 64;

@@ -11,7 +11,7 @@ use crate::event::{EventFunction, Monitored};
 use crate::field::NormalComponents;
 use crate::stepper::nested;
 use crate::system::{dot, PiecewiseSystem};
-use crate::tolerances::{EPS, EXTRAPOLATION, ONE_SIDED_AIM, RESOLVED_DEPTH, SURFACE_NOISE};
+use crate::tolerances::{EPS, EXTRAPOLATION, ONE_SIDED_AIM, POLE, RESOLVED_DEPTH, SURFACE_NOISE};
 
 /// Scratch space of the event stage, and values at the end of the step.
 pub(super) struct Detector {
@@ -299,6 +299,11 @@ impl Integrator<'_> {
             Some(Zero::Crossing(bracket)) => {
                 let theta = refine(&mut g, bracket, width)?;
                 let scale = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+                if g(theta)?.abs() > POLE * scale {
+                    // A pole: the sign changes without a zero.
+                    self.detector.uncertain = true;
+                    return Ok(None);
+                }
                 if bracket.is_steep(scale, noise) {
                     return Ok(Some((theta, false)));
                 }

@@ -156,11 +156,18 @@ impl<'a> Integrator<'a> {
             dt = remaining;
         }
         if dt < SHORTEST_STEP * self.t.abs() && dt < remaining {
-            return Ok(Some(if self.one_sided {
-                Stop::NotFinite
-            } else {
-                Stop::StepTooSmall
-            }));
+            if !self.one_sided {
+                return Ok(Some(Stop::StepTooSmall));
+            }
+            return match self.arrival_at_edge()? {
+                Some(event) => {
+                    // The steps shrank towards the edge: the next motion takes a guess of its own.
+                    self.dt = f64::NAN;
+                    self.one_sided = false;
+                    self.switch(&event)
+                }
+                None => Ok(Some(Stop::NotFinite)),
+            };
         }
         let sliding = self.motion.sliding().is_some();
         match self.attempt(dt)? {

@@ -1,9 +1,11 @@
 //! Steps at the edge of the field: where it ends at a surface, and where it jumps without one.
 
+use super::detect::Found;
 use super::integrator::Integrator;
 use super::{Warning, WarningCode};
-use crate::event::Monitored;
-use crate::tolerances::{JUMP_SHRINK, ONE_SIDED_AIM};
+use crate::error::FieldError;
+use crate::event::{EventFunction, Monitored};
+use crate::tolerances::{ARRIVED, JUMP_SHRINK, ONE_SIDED_AIM};
 
 impl Integrator<'_> {
     /// Where a field was found to end at its surfaces, a step that would pass the next one aims at it
@@ -41,30 +43,47 @@ impl Integrator<'_> {
         times.fold(f64::INFINITY, f64::min)
     }
 
-    /// Warns where the field jumps over a step far shorter than its predecessors.
-    pub(super) fn note_jump(&mut self, dt: f64) {
-        if dt < JUMP_SHRINK * self.recent_dt {
-            let (a, b) = (
-                self.stepper.start_derivative(),
-                self.stepper.end_derivative(),
-            );
-            let jumps = a
-                .iter()
-                .zip(b)
-                .any(|(a, b)| (a - b).abs() > 0.3 * (a.abs() + b.abs()));
-            if jumps {
-                let t = self.t + dt;
-                self.warnings.push(Warning {
-                    t,
-                    code: WarningCode::UndeclaredJump,
-                    text: format!(
-                        "the right-hand side jumps near t = {t:.10} and no surface is declared there; \
-                         give its switching function in surfaces="
-                    ),
-                });
-                self.recent_dt = 0.0;
+    /// The event at the current point, if the motion can go no further because its field ends at a
+    /// surface that it has reached to a small part of the tolerance.
+    pub(super) fn arrival_at_edge(&mut self) -> Result<Option<Found>, FieldError> {
+        let mut gradient = vec![0.0; self.x.len()];
+        for m in &self.motion.monitored {
+            let EventFunction::Surface(j) = m.function else {
+                continue;
+            };
+            let signs = &self.motion.signs;
+            self.system
+                .gradient(j, self.t, &self.x, signs, &mut gradient)?;
+            let components = gradient.iter().zip(&self.x).enumerate();
+            let tolerance: f64 = components
+                .map(|(i, (g, x))| g.abs() * self.scale.of(i, *x, *x))
+                .sum();
+            if m.rate < 0.0 && m.value <= ARRIVED * tolerance {
+                return Ok(Some(Found {
+                    theta: 0.0,
+                    functions: vec![m.function],
+                    touch: false,
+                }));
             }
         }
-        self.recent_dt = dt.max(0.9 * self.recent_dt);
+        Ok(None)
+    }
+
+    /// Warns where the field jumps over a step far shorter than its predecessors.
+    pub(super) fn note_jump(&mut self, dt: f64) {
+        let is_short = dt < JUMP_SHRINK * self.recent_dt;
+        if is_short && !self.meets_edges && self.stepper.field_jumps() {
+            let t = self.t + dt;
+            self.warnings.push(Warning {
+                t,
+                code: WarningCode::UndeclaredJump,
+                text: format!(
+                    "the right-hand side jumps near t = {t:.10} and no surface is declared there; \
+                     give its switching function in surfaces="
+                ),
+            });
+            self.recent_dt = 0.0;
+        }
+        self.recent_dt = dt.max(0.98 * self.recent_dt);
     }
 }

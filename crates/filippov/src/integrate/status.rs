@@ -108,7 +108,7 @@ impl Stop {
                 names(surfaces)
             ),
             Stop::NotFinite => format!(
-                "Stopped at t = {t:.10} in mode ({mode}): the right-hand side is not finite (NaN or infinity) here."
+                "Stopped at t = {t:.10} in mode ({mode}): the right-hand side, or a switching function, is not finite (NaN or infinity) here."
             ),
             Stop::FieldRaised(_) => {
                 format!("Stopped at t = {t:.10} in mode ({mode}): the right-hand side raised an exception.")

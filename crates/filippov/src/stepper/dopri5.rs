@@ -4,6 +4,7 @@ use super::coefficients_dopri5::{A2, A3, A4, A5, A6, A8, A9, B, C, C8, C9, D, E}
 use super::{ErrorScale, Interpolant};
 use crate::error::FieldError;
 use crate::field::SmoothField;
+use crate::tolerances::{JUMP_SHARE, JUMP_SIZE};
 
 /// What came of an attempted step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -237,6 +238,21 @@ impl Dopri5 {
             .map(|i| weight * (rows[4][i] - self.free_quartic[i] + theta * rows[5][i]))
             .collect();
         scale.norm(&defect, &self.y1)
+    }
+
+    /// Does the field jump within the attempted step? Then nearly all of the range of some component
+    /// falls between two neighbouring stages; a smooth layer spreads it.
+    pub fn field_jumps(&self) -> bool {
+        let ordered = [0, 1, 2, 3, 4, 6].map(|stage: usize| &self.k[stage]);
+        (0..self.y1.len()).any(|i| {
+            let values = ordered.map(|k| k[i]);
+            let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+            let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let largest = values.windows(2).map(|w| (w[1] - w[0]).abs());
+            let largest = largest.fold(0.0_f64, f64::max);
+            let size = low.abs().max(high.abs());
+            high - low > JUMP_SIZE * size && largest > JUMP_SHARE * (high - low)
+        })
     }
 
     /// The extension computed last.
