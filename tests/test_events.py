@@ -186,7 +186,7 @@ def test_events_of_a_piecewise_system_equal_those_of_the_dense_output() -> None:
     roots = [
         optimize.brentq(lambda t: sol.sol(t)[0] - 0.2, grid[i], grid[i + 1], xtol=1e-13) for i in changes
     ]
-    assert len(roots) > 10
+    assert len(roots) == 8
     np.testing.assert_allclose(sol.t_events[0], roots, rtol=0, atol=1e-10)
 
 

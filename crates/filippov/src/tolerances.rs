@@ -65,7 +65,7 @@ pub const SHORTEST_STEP: f64 = 16.0 * EPS;
 
 /// A step shorter than this fraction of its recent predecessors is looked at for a jump that no surface
 /// declares.
-pub const JUMP_SHRINK: f64 = 1e-2;
+pub const JUMP_SHRINK: f64 = 0.05;
 
 /// The field jumps in a step if its range over the stages exceeds this fraction of its size ...
 pub const JUMP_SIZE: f64 = 0.02;

@@ -24,6 +24,8 @@ pub(super) struct UserEvents<'a> {
     /// Time of the last zero, per event: divided out while it is the start of the search.
     last: Vec<f64>,
     zeros: Vec<Vec<UserZero>>,
+    /// No step has been taken yet: a zero at the very start counts, as in SciPy.
+    at_start: bool,
 }
 
 impl<'a> UserEvents<'a> {
@@ -34,6 +36,7 @@ impl<'a> UserEvents<'a> {
             left: vec![f64::NAN; d],
             last: vec![f64::NAN; d],
             zeros: vec![Vec::new(); d],
+            at_start: true,
         }
     }
 
@@ -97,6 +100,7 @@ impl Integrator<'_> {
                 return Ok(Some(index));
             }
         }
+        self.user_events.at_start = false;
         for k in 0..self.user_events.events.len() {
             self.user_events.left[k] = self.user_value(k, theta)?;
         }
@@ -127,6 +131,12 @@ impl Integrator<'_> {
                 if divided {
                     let probe = from + 1e-7 * (theta - from);
                     sign = self.user_value(index, probe)?.signum();
+                }
+                if self.user_events.at_start && start == 0.0 && from == 0.0 {
+                    let direction = self.user_events.events[index].direction;
+                    if sign != 0.0 && direction * sign >= 0.0 {
+                        zeros.push((0.0, index));
+                    }
                 }
                 let limit = (theta - from) * 1e-7;
                 let mut g = |at: f64| {
