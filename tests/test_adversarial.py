@@ -18,9 +18,7 @@ def kinds(sol: fl.Solution) -> list[str]:
 @pytest.mark.parametrize("place", [0.001, 0.3, 0.77])
 def test_pair_of_crossings_in_one_step(gap: float, place: float) -> None:
     """The field is constant on both sides: one step would do, and the ends of the step show nothing."""
-    sol = fl.solve_ivp(
-        lambda t, x: [np.where((t - place) * (t - place - gap) < 0, 1.0, 0.0)], (0, 1), [0.0]
-    )
+    sol = fl.solve_ivp(lambda t, x: [np.where((t - place) * (t - place - gap) < 0, 1.0, 0.0)], (0, 1), [0.0])
     assert kinds(sol) == ["crossing", "crossing"]
     # The product vanishes within rounding, 1e-16 / gap of its zeros.
     np.testing.assert_allclose(sol.switches.t, [place, place + gap], rtol=0, atol=1e-8)
@@ -190,9 +188,7 @@ def test_pulses_while_sliding() -> None:
 
 
 def test_chatter_is_bounded_by_max_events() -> None:
-    sol = fl.solve_ivp(
-        lambda t, x: [np.sign(np.sin(1e6 * x[0] + 1e7 * t))], (0, 2), [3.0], max_events=500
-    )
+    sol = fl.solve_ivp(lambda t, x: [np.sign(np.sin(1e6 * x[0] + 1e7 * t))], (0, 2), [3.0], max_events=500)
     assert not sol.success
     assert "max_events" in sol.message
     assert len(sol.switches) == 500
@@ -200,7 +196,9 @@ def test_chatter_is_bounded_by_max_events() -> None:
 
 
 @pytest.mark.parametrize(
-    "h", [lambda x: x[0] - x[0], lambda x: 0 * x[0], lambda x: x[0] ** 2 - x[0] * x[0]], ids=["x-x", "0x", "x2-x2"]
+    "h",
+    [lambda x: x[0] - x[0], lambda x: 0 * x[0], lambda x: x[0] ** 2 - x[0] * x[0]],
+    ids=["x-x", "0x", "x2-x2"],
 )
 def test_switching_function_that_is_zero_by_algebra(h: Any) -> None:
     """It is the constant 0, and the field is that of `np.where(0 > 0, ...)`."""
@@ -225,7 +223,9 @@ def test_inactive_surface_is_no_event() -> None:
     assert len(turns) >= 2
     assert len(passes) >= 5
     # For y < 0 it is half a period of the free oscillator, whatever the friction above.
-    downward = [s.t for s in sol.switches if s.surfaces == (sol.surfaces.index("x[0]"),) and s.y_before[1] < 0]
+    downward = [
+        s.t for s in sol.switches if s.surfaces == (sol.surfaces.index("x[0]"),) and s.y_before[1] < 0
+    ]
     upward = [s.t for s in sol.switches if s.surfaces == (sol.surfaces.index("x[0]"),) and s.y_before[1] > 0]
     for down in downward:
         later = [t for t in upward if t > down]

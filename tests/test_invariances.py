@@ -243,7 +243,9 @@ def test_forms_of_one_relay_agree() -> None:
     forms = [
         fl.System(lambda t, x: A @ x - b * np.sign(x[0]), n=3),
         fl.System.relay(A, b, [1.0, 0.0, 0.0]),
-        fl.System.from_fields({1: lambda t, x: A @ x - b, -1: lambda t, x: A @ x + b}, lambda t, x: x[0], n=3),
+        fl.System.from_fields(
+            {1: lambda t, x: A @ x - b, -1: lambda t, x: A @ x + b}, lambda t, x: x[0], n=3
+        ),
         fl.System.from_fields(lambda t, x, s: A @ x - b * s[0], lambda t, x: x[0], n=3),
         fl.System.from_base(lambda t, x: A @ x - b, [lambda t, x: 2 * b], [lambda t, x: x[0]], n=3),
     ]

@@ -112,9 +112,7 @@ def test_field_that_ends_at_its_surface_at_any_power() -> None:
 
 def test_field_that_is_left_tangentially() -> None:
     """sqrt(x) above: x = (t/2)^2 leaves x = 0 against its own Lipschitz condition; below it rises at speed 1."""
-    system = fl.System.from_fields(
-        {1: lambda t, x: [np.sqrt(x[0]) + 1.0], -1: [1.0]}, lambda t, x: x[0], n=1
-    )
+    system = fl.System.from_fields({1: lambda t, x: [np.sqrt(x[0]) + 1.0], -1: [1.0]}, lambda t, x: x[0], n=1)
     sol = system.solve((0, 2), [-1.0], rtol=1e-10, atol=1e-12)
     assert [s.kind for s in sol.switches] == ["crossing"]
     assert sol.switches.t[0] == pytest.approx(1.0, abs=1e-12)
