@@ -109,15 +109,15 @@ def test_close_pair_of_zeros(gap: float) -> None:
     np.testing.assert_allclose(sol.t_events[0], [0.3, 0.3 + gap], rtol=0, atol=1e-9)
 
 
-def test_zero_at_the_start() -> None:
-    """Not reported, unlike in SciPy: a run that is restarted at its terminal event would stop at once."""
-    event = fl.Event(lambda t, y: y[0], terminal=2)
-    sol = fl.solve_ivp(pendulum, (0, 20), [0.0, 1.0], events=event, rtol=1e-10, atol=1e-10)
-    theirs = integrate.solve_ivp(
-        pendulum, (0, 10), [0.0, 1.0], events=lambda t, y: y[0], rtol=1e-10, atol=1e-12, max_step=0.05
-    )
-    assert theirs.t_events[0][0] == 0.0
-    np.testing.assert_allclose(sol.t_events[0], theirs.t_events[0][1:3], rtol=0, atol=1e-8)
+def test_zero_at_the_start_counts_as_in_scipy() -> None:
+    def zero(t: float, y: Any) -> Any:
+        return y[0]
+
+    for start in ([0.0, 1.0], [0.0, -1.0]):
+        for direction in (-1, 0, 1):
+            ours, _ = compare(pendulum, (0, 10), start, with_attributes(zero, direction=direction))
+            counted = direction * start[1] >= 0
+            assert (len(ours.t_events[0]) > 0 and ours.t_events[0][0] == 0.0) == counted
 
 
 def oscillator(t: float, x: Any) -> Any:

@@ -51,3 +51,6 @@ impl Kind {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
