@@ -1,4 +1,4 @@
-"""Points where event detection goes wrong: at the ends, in pairs, at touches, in pulses, and where h is odd."""
+"""Points where event detection goes wrong: at the ends, in pairs, at touches, in pulses, where h is odd."""
 
 from __future__ import annotations
 

@@ -96,7 +96,7 @@ def test_pounding_with_fields_that_are_nan_beyond(rtol: float) -> None:
 
 
 def test_field_that_ends_at_its_surface_at_any_power() -> None:
-    """x' = -1 - x^a above and -1 - (-x)^a below: one crossing, at the same time as without the power below."""
+    """x' = -1 - x^a above and -1 - (-x)^a below: one crossing, at the time of the field without the power."""
     for power in (0.5, 1.5, 2.5):
         above = lambda t, x, a=power: [-1.0 - x[0] ** a]  # noqa: E731
         below = lambda t, x, a=power: [-1.0 - (-x[0]) ** a]  # noqa: E731
@@ -111,7 +111,7 @@ def test_field_that_ends_at_its_surface_at_any_power() -> None:
 
 
 def test_field_that_is_left_tangentially() -> None:
-    """sqrt(x) above: x = (t/2)^2 leaves x = 0 against its own Lipschitz condition; below it rises at speed 1."""
+    """sqrt(x) above: x = (t/2)^2 leaves x = 0, where it is not Lipschitz; below it rises at speed 1."""
     system = fl.System.from_fields({1: lambda t, x: [np.sqrt(x[0]) + 1.0], -1: [1.0]}, lambda t, x: x[0], n=1)
     sol = system.solve((0, 2), [-1.0], rtol=1e-10, atol=1e-12)
     assert [s.kind for s in sol.switches] == ["crossing"]

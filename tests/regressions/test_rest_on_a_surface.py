@@ -1,4 +1,4 @@
-"""Motion along a surface on which both fields agree: a kink is no jump, and nothing needs a multiplier there."""
+"""Motion along a surface on which both fields agree: a kink is no jump and needs no multiplier."""
 
 from __future__ import annotations
 
