@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import filippov as fl
@@ -110,3 +111,45 @@ def test_accumulating_crossings_before_their_limit() -> None:
     sol = system_of(run).solve((0.0, 4.99999523162841796875 + 1e-8), run.y0, rtol=1e-10, atol=1e-10)
     np.testing.assert_allclose(sol.switches.t, [event.t for event in crossings], rtol=0, atol=1e-12)
     assert [s.mode_after for s in sol.switches] == [event.mode_after for event in crossings]
+
+
+def switching_cases(situation: str) -> list[Any]:
+    cases = json.loads((reference.DATA / "switching_cases.json").read_text())["cases"]
+    return [pytest.param(case, id=case["id"]) for case in cases if case["situation"] == situation]
+
+
+@pytest.mark.parametrize("case", switching_cases("classical"))
+def test_table_of_arrivals_at_one_surface(case: dict[str, Any]) -> None:
+    """Constant fields with the normal components of the table, reached from a distance of 1."""
+    fields = {side: [*case["fields"][str(side)], 1.0] for side in (-1, 1)}
+    (side,) = case["incoming"]
+    sol = fl.System.from_fields(fields, lambda t, x: x[0], n=2).solve((0, 10), [float(side), 0.0])
+    assert sol.segments[0].mode == (side,)
+    assert [s.mode_after for s in sol.switches] == [tuple(case["expected"])]
+    assert sol.switches.t[0] == pytest.approx(1 / abs(case["fields"][str(side)][0]), rel=1e-13)
+    if "lambda_out" in case:
+        assert sol.segments[-1].multipliers_end[0] == pytest.approx(case["lambda_out"], rel=1e-12)
+
+
+@pytest.mark.parametrize("case", switching_cases("codim1-exit"))
+def test_table_of_exits_from_one_surface(case: dict[str, Any]) -> None:
+    """One normal component vanishes at t = 1 and grows at the rate of the table."""
+    (minus,), (plus,) = case["fields"]["-1"], case["fields"]["1"]
+    rate = case["rate"]
+
+    def component(value: float) -> Any:
+        return lambda t, x: [rate * (t - 1) if value == 0.0 else value]
+
+    system = fl.System.from_fields({1: component(plus), -1: component(minus)}, lambda t, x: x[0], n=1)
+    sol = system.solve((1, 2), [0.0])
+    assert sol.segments[0].mode == tuple(case["expected"])
+    assert len(sol.switches) == 0
+    if case["expected"] != [0]:  # it slides before, too
+        sol = system.solve((0, 2), [0.0])
+        assert [s.mode_after for s in sol.switches] == [tuple(case["expected"])]
+        assert sol.switches.t[0] == pytest.approx(1.0, rel=1e-13)
+
+
+def test_tables_are_not_empty() -> None:
+    assert len(switching_cases("classical")) >= 8
+    assert len(switching_cases("codim1-exit")) >= 8

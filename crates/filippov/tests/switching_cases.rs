@@ -1,0 +1,459 @@
+//! The decision at one surface, one row per textbook case (`docs/theory/switching.md`, section 3.1).
+//!
+//! On h = x0 the fields are f- = a(t) and f+ = b(t) with Taylor coefficients a = [A1, B1, C1, ...] and
+//! b = [A2, B2, C2, ...], so that the derivatives of h along them are these numbers.
+#![allow(clippy::unwrap_used)]
+
+use filippov::switching::{decide, Arrival, Decision};
+use filippov::{ClosureSystem, PiecewiseSystem, TracedSystem};
+use filippov_expr::{Backend, Graph, Names, NodeId};
+
+use Arrival::{ExitMinus, ExitPlus, Region, Start};
+
+/// Label, derivatives of h along f-, along f+, arrival, the entry that follows, all candidates.
+type Row = (
+    &'static str,
+    &'static [f64],
+    &'static [f64],
+    Arrival,
+    i8,
+    &'static [i8],
+);
+
+const FIRST_ORDER: &[Row] = &[
+    ("I (+,+) from R-", &[1.0], &[2.0], Region(-1), 1, &[1]),
+    ("I (-,-) from R+", &[-1.0], &[-2.0], Region(1), -1, &[-1]),
+    ("I (+,-) from R-", &[1.0], &[-3.0], Region(-1), 0, &[0]),
+    ("I (+,-) from R+", &[1.0], &[-3.0], Region(1), 0, &[0]),
+    ("I (+,-) at a start", &[1.0], &[-3.0], Start, 0, &[0]),
+    ("I (+,+) at a start", &[1.0], &[3.0], Start, 1, &[1]),
+    ("I (-,-) at a start", &[-1.0], &[-3.0], Start, -1, &[-1]),
+    ("I (-,+), rising mean", &[-1.0], &[3.0], Start, 1, &[-1, 1]),
+    (
+        "I (-,+), falling mean",
+        &[-3.0],
+        &[1.0],
+        Start,
+        -1,
+        &[-1, 1],
+    ),
+];
+
+/// A second derivative decides.
+const TANGENCIES: &[Row] = &[
+    (
+        "II from sliding, B1 < 0",
+        &[0.0, -1.0],
+        &[-2.0],
+        ExitMinus,
+        -1,
+        &[-1],
+    ),
+    (
+        "II from R-, grazing",
+        &[0.0, -1.0],
+        &[-2.0],
+        Region(-1),
+        -1,
+        &[-1],
+    ),
+    (
+        "II from R-, next to repulsion",
+        &[0.0, -1.0],
+        &[2.0],
+        Region(-1),
+        -1,
+        &[-1, 1],
+    ),
+    (
+        "II from R+, B1 < 0",
+        &[0.0, -1.0],
+        &[-2.0],
+        Region(1),
+        -1,
+        &[-1],
+    ),
+    (
+        "II from R+, B1 > 0",
+        &[0.0, 1.0],
+        &[-2.0],
+        Region(1),
+        0,
+        &[0],
+    ),
+    (
+        "II at a start, B1 > 0, A2 > 0",
+        &[0.0, 1.0],
+        &[2.0],
+        Start,
+        1,
+        &[1],
+    ),
+    (
+        "III from sliding, B2 > 0",
+        &[2.0],
+        &[0.0, 1.0],
+        ExitPlus,
+        1,
+        &[1],
+    ),
+    (
+        "III from R+, grazing",
+        &[2.0],
+        &[0.0, 1.0],
+        Region(1),
+        1,
+        &[1],
+    ),
+    (
+        "III from R+, next to repulsion",
+        &[-2.0],
+        &[0.0, 1.0],
+        Region(1),
+        1,
+        &[-1, 1],
+    ),
+    (
+        "III from R-, B2 > 0",
+        &[2.0],
+        &[0.0, 1.0],
+        Region(-1),
+        1,
+        &[1],
+    ),
+    (
+        "III from R-, B2 < 0",
+        &[2.0],
+        &[0.0, -1.0],
+        Region(-1),
+        0,
+        &[0],
+    ),
+    (
+        "III at a start, B2 < 0, A1 < 0",
+        &[-2.0],
+        &[0.0, -1.0],
+        Start,
+        -1,
+        &[-1],
+    ),
+    (
+        "IV fold away from both",
+        &[0.0, -1.0],
+        &[0.0, 1.0],
+        Region(-1),
+        -1,
+        &[-1, 1],
+    ),
+    (
+        "IV the same from R+",
+        &[0.0, -1.0],
+        &[0.0, 1.0],
+        Region(1),
+        1,
+        &[-1, 1],
+    ),
+    (
+        "IV both to R-",
+        &[0.0, -1.0],
+        &[0.0, -2.0],
+        Region(-1),
+        -1,
+        &[-1],
+    ),
+    (
+        "IV both to R+",
+        &[0.0, 1.0],
+        &[0.0, 2.0],
+        Region(1),
+        1,
+        &[1],
+    ),
+    (
+        "IV sliding begins",
+        &[0.0, 1.0],
+        &[0.0, -2.0],
+        Start,
+        0,
+        &[0],
+    ),
+];
+
+/// Third and higher derivatives decide.
+const HIGHER: &[Row] = &[
+    (
+        "II from sliding, touch",
+        &[0.0, 0.0, 1.0],
+        &[-2.0],
+        ExitMinus,
+        0,
+        &[0],
+    ),
+    (
+        "II from R-, cubic contact",
+        &[0.0, 0.0, 1.0],
+        &[2.0],
+        Region(-1),
+        1,
+        &[1],
+    ),
+    (
+        "II from R-, cubic onto sliding",
+        &[0.0, 0.0, 1.0],
+        &[-2.0],
+        Region(-1),
+        0,
+        &[0],
+    ),
+    (
+        "II from sliding, odd order 3",
+        &[0.0, 0.0, 0.0, -1.0],
+        &[-2.0],
+        ExitMinus,
+        -1,
+        &[-1],
+    ),
+    (
+        "II from sliding, even order 4",
+        &[0.0, 0.0, 0.0, 0.0, 1.0],
+        &[-2.0],
+        ExitMinus,
+        0,
+        &[0],
+    ),
+    (
+        "III from sliding, touch",
+        &[2.0],
+        &[0.0, 0.0, -1.0],
+        ExitPlus,
+        0,
+        &[0],
+    ),
+    (
+        "III from R+, cubic contact",
+        &[-2.0],
+        &[0.0, 0.0, -1.0],
+        Region(1),
+        -1,
+        &[-1],
+    ),
+    (
+        "III from R+, cubic onto sliding",
+        &[2.0],
+        &[0.0, 0.0, -1.0],
+        Region(1),
+        0,
+        &[0],
+    ),
+    (
+        "III from sliding, odd order 3",
+        &[2.0],
+        &[0.0, 0.0, 0.0, 1.0],
+        ExitPlus,
+        1,
+        &[1],
+    ),
+    (
+        "III from sliding, even order 4",
+        &[2.0],
+        &[0.0, 0.0, 0.0, 0.0, -1.0],
+        ExitPlus,
+        0,
+        &[0],
+    ),
+];
+
+fn polynomial(derivatives: &[f64], t: f64) -> f64 {
+    let mut term = 1.0;
+    let mut sum = 0.0;
+    for (k, derivative) in derivatives.iter().enumerate() {
+        sum += derivative * term;
+        term *= t / (k + 1) as f64;
+    }
+    sum
+}
+
+fn polynomial_node(g: &mut Graph, derivatives: &[f64]) -> NodeId {
+    let t = g.time();
+    let mut term = g.constant(1.0);
+    let mut sum = g.constant(0.0);
+    for (k, &derivative) in derivatives.iter().enumerate() {
+        let factor = g.constant(derivative);
+        let part = g.mul(factor, term);
+        sum = g.add(sum, part);
+        let step = g.constant(1.0 / (k + 1) as f64);
+        let scaled = g.mul(t, step);
+        term = g.mul(term, scaled);
+    }
+    sum
+}
+
+fn traced(minus: &[f64], plus: &[f64]) -> TracedSystem {
+    let mut g = Graph::new();
+    let x = g.state(0);
+    let s = g.sign(x);
+    let (a, b) = (
+        polynomial_node(&mut g, minus),
+        polynomial_node(&mut g, plus),
+    );
+    let half = g.constant(0.5);
+    let (sum, difference) = (g.add(a, b), g.sub(b, a));
+    let (mean, jump) = (g.mul(half, sum), g.mul(half, difference));
+    let signed = g.mul(s, jump);
+    let rate = g.add(mean, signed);
+    TracedSystem::new(g, vec![rate], vec![], Names::default(), Backend::Auto).unwrap()
+}
+
+fn with_closures<T>(minus: &[f64], plus: &[f64], use_it: impl Fn(&dyn PiecewiseSystem) -> T) -> T {
+    let system = ClosureSystem::new(
+        1,
+        1,
+        |t, _x, s, dx| dx[0] = polynomial(if s[0] > 0.0 { plus } else { minus }, t),
+        |_t, x, h| h[0] = x[0],
+    );
+    use_it(&system)
+}
+
+fn decide_at_origin(system: &dyn PiecewiseSystem, arrival: Arrival) -> Decision {
+    decide(system, 0, arrival, 0.0, &[0.0], &[1.0]).unwrap()
+}
+
+fn check((label, minus, plus, arrival, entry, candidates): &Row, system: &dyn PiecewiseSystem) {
+    let decision = decide_at_origin(system, *arrival);
+    assert_eq!(
+        decision.entry, *entry,
+        "{label}: {decision:?} for f- {minus:?}, f+ {plus:?}"
+    );
+    assert_eq!(&decision.candidates, candidates, "{label}: {decision:?}");
+}
+
+/// The same case seen from the other side: h -> -h, fields and regions exchanged.
+fn mirrored(row: &Row) -> (Vec<f64>, Vec<f64>, Arrival, i8, Vec<i8>) {
+    let (_, minus, plus, arrival, entry, candidates) = row;
+    let turned = |values: &[f64]| values.iter().map(|v| -v).collect();
+    let arrival = match arrival {
+        Region(side) => Region(-side),
+        ExitMinus => ExitPlus,
+        ExitPlus => ExitMinus,
+        Start => Start,
+    };
+    (
+        turned(plus),
+        turned(minus),
+        arrival,
+        -entry,
+        candidates.iter().rev().map(|k| -k).collect(),
+    )
+}
+
+#[test]
+fn traced_systems_decide_every_row() {
+    for row in FIRST_ORDER.iter().chain(TANGENCIES).chain(HIGHER) {
+        check(row, &traced(row.1, row.2));
+    }
+}
+
+#[test]
+fn mirror_images_are_decided_alike() {
+    for row in FIRST_ORDER.iter().chain(TANGENCIES).chain(HIGHER) {
+        let (minus, plus, arrival, entry, candidates) = mirrored(row);
+        let decision = decide_at_origin(&traced(&minus, &plus), arrival);
+        assert_eq!(
+            (decision.entry, decision.candidates),
+            (entry, candidates),
+            "mirror of {}",
+            row.0
+        );
+    }
+}
+
+#[test]
+fn scaled_fields_are_decided_alike() {
+    for row in FIRST_ORDER.iter().chain(TANGENCIES).chain(HIGHER) {
+        for scale in [1e-6, 1e6] {
+            let scaled = |values: &[f64]| values.iter().map(|v| scale * v).collect::<Vec<_>>();
+            let decision = decide_at_origin(&traced(&scaled(row.1), &scaled(row.2)), row.3);
+            assert_eq!(
+                (decision.entry, decision.candidates.as_slice()),
+                (row.4, row.5),
+                "{scale} x {}",
+                row.0
+            );
+        }
+    }
+}
+
+#[test]
+fn closures_decide_up_to_second_derivatives() {
+    // Their derivatives are differences: orders above 2 are beyond them.
+    for row in FIRST_ORDER.iter().chain(TANGENCIES) {
+        with_closures(row.1, row.2, |system| check(row, system));
+    }
+}
+
+#[test]
+fn leading_derivatives_are_those_of_the_row() {
+    let decision = decide_at_origin(&traced(&[0.0, 0.0, 3.0], &[-2.0]), Region(-1));
+    assert_eq!((decision.minus.order, decision.minus.value), (3, 3.0));
+    assert_eq!((decision.plus.order, decision.plus.value), (1, -2.0));
+    assert!((decision.minus.coefficient() - 0.5).abs() < 1e-15);
+}
+
+#[test]
+fn small_but_genuine_values_are_no_tangency() {
+    for value in [1e-6, 1e-9] {
+        let decision = decide_at_origin(&traced(&[1.0], &[-value]), Region(-1));
+        assert_eq!(decision.entry, 0, "f+ = -{value}");
+        let decision = decide_at_origin(&traced(&[1.0], &[value]), Region(-1));
+        assert_eq!(decision.entry, 1, "f+ = {value}");
+    }
+}
+
+/// A two-fold at the origin of h = x: f- = (y, p, r) and f+ = (z, q, s), so that the second
+/// derivatives of h along the fields are L-L-h = p, L+L-h = q, L-L+h = r, L+L+h = s.
+fn two_fold(p: f64, q: f64, r: f64, s: f64, arrival: Arrival) -> Decision {
+    let system = ClosureSystem::new(
+        3,
+        1,
+        move |_t, x, signs, dx| {
+            let field = if signs[0] > 0.0 {
+                [x[2], q, s]
+            } else {
+                [x[1], p, r]
+            };
+            dx.copy_from_slice(&field);
+        },
+        |_t, x, h| h[0] = x[0],
+    );
+    decide(&system, 0, arrival, 0.0, &[0.0; 3], &[1.0]).unwrap()
+}
+
+#[test]
+fn two_folds() {
+    // Invisible from both sides and attracting along every mixture: sliding begins.
+    assert_eq!(two_fold(1.0, 0.5, -0.5, -1.0, Start).candidates, [0]);
+    // Visible from both sides: two ways out, kept to where it comes from.
+    let away = two_fold(-1.0, 0.5, -0.5, 1.0, Region(-1));
+    assert_eq!(
+        (away.entry, away.candidates.as_slice()),
+        (-1, [-1, 1].as_slice())
+    );
+    assert_eq!(two_fold(-1.0, 0.5, -0.5, 1.0, Region(1)).entry, 1);
+    // Visible from one side: that side.
+    assert_eq!(
+        two_fold(-1.0, -0.5, -0.5, -1.0, Region(-1)).candidates,
+        [-1]
+    );
+    assert_eq!(two_fold(1.0, 0.5, 0.5, 1.0, Region(1)).candidates, [1]);
+    // Invisible, but the mixture that keeps to the surface drifts into the repelling part: no sliding.
+    assert!(!two_fold(1.0, -3.0, 3.0, -1.0, Start)
+        .candidates
+        .contains(&-1));
+}
+
+#[test]
+fn a_field_that_agrees_with_its_neighbour_needs_no_decision() {
+    let decision = decide_at_origin(&traced(&[0.0], &[0.0]), Region(-1));
+    assert_eq!(decision.candidates.len(), 1);
+    assert_eq!((decision.minus.order, decision.plus.order), (0, 0));
+}
