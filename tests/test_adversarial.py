@@ -313,3 +313,20 @@ def test_discontinuous_switching_function() -> None:
     """h jumps from +1 to -1 without a zero: the switch is where it jumps."""
     sol = fl.solve_ivp(lambda t, x: [np.where(np.where(t < 0.7, 1.0, -1.0) > 0, 1.0, 3.0)], (0, 1), [0.0])
     assert sol.y[0, -1] == pytest.approx(0.7 + 0.9, rel=1e-12)
+
+
+# The first 40, and those of the first 1000 where a search without bounds on remainders loses a pair.
+@pytest.mark.parametrize("seed", [*range(40), 70, 260, 752, 768, 804])
+def test_sum_of_two_frequencies(seed: int) -> None:
+    """Constant fields on both sides: only the search decides how often h is looked at."""
+    rng = np.random.default_rng(seed)
+    first = rng.uniform(0.5, 30.0)
+    second, phase, level = first * rng.uniform(0.2, 3.0), rng.uniform(0, 6), rng.uniform(-0.999, 0.999)
+
+    def h(t: Any) -> Any:
+        return np.sin(first * t + phase) + 0.5 * np.sin(second * t) - level
+
+    sol = fl.solve_ivp(lambda t, x: [np.sign(h(t))], (0, 10), [0.0])
+    signs = np.sign(h(np.linspace(0, 10, 100_001)))
+    assert len(sol.switches) == np.count_nonzero(signs[1:] != signs[:-1])
+    assert np.abs(h(sol.switches.t)).max() < 1e-12

@@ -24,3 +24,40 @@ def test_run_does_not_leave_the_limit_point(rtol: float) -> None:
     if not sol.success:
         assert "x[0] = 0" in sol.message
         assert "x[1] = 0" in sol.message
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8, 1e-10, 1e-12])
+@pytest.mark.parametrize(
+    ("c", "d", "e"), [(0.0, 0.0, 0.0), (0.7, 0.2, 0.0), (0.7, 0.2, 0.1), (0.1, 0.1, 0.1), (0.7, 0.05, 0.02)]
+)
+def test_run_does_not_leave_a_limit_point_on_curved_surfaces(
+    c: float, d: float, e: float, rtol: float
+) -> None:
+    """The same rotation about an intersection off the origin, where h and the state have rounding errors."""
+
+    def rotation(t: float, x: Any) -> Any:
+        u = np.sign(x[0] - c - d * np.sin(x[1]))
+        v = np.sign(x[1] + 0.3 - e * x[0] ** 2)
+        return [-v + 0.02 * x[1], np.where(u < 0, -1.0, np.where(v < 0, 2.0, 1.0))]
+
+    sol = fl.solve_ivp(rotation, (0, 9), [-1.0, 0.0], rtol=rtol, atol=rtol, max_events=20_000)
+    close = np.flatnonzero(np.diff(sol.switches.t) < 1e-9)
+    assert len(close) > 0
+    limit = sol.switches[int(close[0])]
+    after = sol.y[:, sol.t >= limit.t]
+    # Speeds are about 2 and the sizes fall by 2 every turn: all that follows lies within some 1e-9.
+    assert np.abs(after - limit.y_after[:, None]).max() < 1e-7
+    assert not sol.success or sol.segments[-1].mode == (0, 0)
+
+
+def test_twisting_controller_reaches_the_origin_in_finite_time() -> None:
+    """x'' = -10 sign(x) - 3 sign(x') from (10, 10): rest at 12.264208764653926 (closed form, Siconos)."""
+
+    def twisting(t: float, x: Any) -> Any:
+        return [x[1], -10 * np.sign(x[0]) - 3 * np.sign(x[1])]
+
+    for rtol in (1e-4, 1e-8, 1e-12):
+        sol = fl.solve_ivp(twisting, (0, 14), [10.0, 10.0], rtol=rtol, atol=rtol, max_events=5000)
+        at_rest = sol.y[:, sol.t > 12.265]
+        assert np.abs(at_rest).max(initial=0.0) < 1e-8
+        assert sol.switches.t.max() == pytest.approx(12.264208764653926, abs=1e-6)

@@ -160,7 +160,7 @@ impl Integrator<'_> {
     }
 
     /// Surfaces that vanish at the event: those that were located, and all others that matter, are
-    /// approached and lie within rounding of zero.
+    /// not being left tangentially and lie within rounding of zero.
     fn vanishing_surfaces(&mut self, event: &Found, h: &[f64]) -> Result<Vec<usize>, FieldError> {
         let mut surfaces: Vec<usize> = event
             .functions
@@ -184,12 +184,12 @@ impl Integrator<'_> {
                 .zip(&self.x)
                 .map(|(g, x)| (g * x).abs())
                 .sum();
-            let approached = self
-                .motion
-                .monitored
-                .iter()
-                .any(|m| m.function == EventFunction::Surface(j) && m.deflation.is_none());
-            if approached && h.abs() <= SURFACE_NOISE * (size + (ht * self.t).abs()) {
+            // A surface that is being left tangentially stays near for long; one that was crossed at
+            // this very instant belongs to the event.
+            let departs = self.motion.monitored.iter().any(|m| {
+                m.function == EventFunction::Surface(j) && m.deflation.is_some_and(|d| d.order > 1)
+            });
+            if !departs && h.abs() <= SURFACE_NOISE * (size + (ht * self.t).abs()) {
                 surfaces.push(j);
             }
         }
