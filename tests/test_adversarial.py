@@ -330,3 +330,30 @@ def test_sum_of_two_frequencies(seed: int) -> None:
     signs = np.sign(h(np.linspace(0, 10, 100_001)))
     assert len(sol.switches) == np.count_nonzero(signs[1:] != signs[:-1])
     assert np.abs(h(sol.switches.t)).max() < 1e-12
+
+
+@pytest.mark.parametrize("half", [0.3, 0.03, 3e-3, 3e-4])
+@pytest.mark.parametrize("centre", [2.0, 2.345, 3.9])
+def test_short_excursion_from_sliding(half: float, centre: float) -> None:
+    """The upper field points away from the surface for a time 2 a only, within a step.
+
+    With f+ = a^2 - s^2, s = t - c, the motion leaves at s = -a and is back at s = 2 a, from 4 a^3 / 3 high.
+    """
+
+    def field(t: float, x: Any) -> Any:
+        return [1.0 + half**2 - (t - centre) ** 2 - np.sign(x[0])]
+
+    sol = fl.solve_ivp(field, (centre - 1.3, centre + 1.3), [0.0], rtol=1e-9, atol=1e-12)
+    assert kinds(sol)[:2] == ["exit_sliding", "enter_sliding"]
+    np.testing.assert_allclose(sol.switches.t[0], centre - half, rtol=0, atol=1e-11)
+    # The height is 4 a^3 / 3 and the speed of the return 3 a^2.
+    np.testing.assert_allclose(sol.switches.t[1], centre + 2 * half, rtol=0, atol=1e-9 + 1e-15 / half**2)
+    assert sol.sol(centre + half)[0] == pytest.approx(4 * half**3 / 3, rel=1e-6, abs=1e-13)
+
+
+def test_touch_of_the_exit_condition_while_sliding() -> None:
+    """The multiplier reaches +1 at t = 2 and falls again: the motion stays."""
+    sol = fl.solve_ivp(lambda t, x: [1.0 - (t - 2.0) ** 2 - np.sign(x[0])], (1, 3), [0.0])
+    assert set(kinds(sol)) <= {"grazing"}
+    assert sol.segments[-1].mode == (0,)
+    assert sol.y[0, -1] == 0.0
