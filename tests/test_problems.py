@@ -10,40 +10,10 @@ from typing import Any
 import filippov as fl
 import numpy as np
 import pytest
+from reference import RUNS
 
 DATA = Path(__file__).parent / "data"
 
-# problem -> file, run
-REFERENCES = {
-    "disode_planar": ("A_disode45_problem1", "main"),
-    "structural_pounding": ("B_disode45_problem2", "main"),
-    "relay_feedback": ("C_disode45_problem3", "main"),
-    "two_masses": ("D_disode45_problem4", "main"),
-    "dry_friction_autonomous": ("E_pk_dry_friction", "transient"),
-    "dry_friction_attractor_I": ("E_pk_dry_friction", "attractor_I"),
-    "dry_friction_attractor_II": ("E_pk_dry_friction", "attractor_II"),
-    "dry_friction_attractor_III": ("E_pk_dry_friction", "attractor_III"),
-    "relay_feedback_cycle": ("F_pk_relay", "limit_cycle"),
-    "relay_feedback_slow": ("F_pk_relay", "zeta-0.07_omega10_sigma1"),
-    "relay_feedback_fast": ("F_pk_relay", "sigma10_omega25"),
-    "drill_string_u1": ("G_pk_drill_string", "cycle_u1"),
-    "drill_string_u2": ("G_pk_drill_string", "cycle_u2"),
-    "drill_string_u3": ("G_pk_drill_string", "cycle_u3"),
-    "drill_string_u5": ("G_pk_drill_string", "cycle_u5"),
-    "drill_string": ("G_pk_drill_string", "transient_u3"),
-    "dieci_lopez_4_4": ("H_dl_example_4_4", "unequal_pp"),
-    "dieci_lopez_4_4_mp": ("H_dl_example_4_4", "unequal_mp"),
-    "dieci_lopez_4_4_plus1": ("H_dl_example_4_4", "unequal_plus1"),
-    "dieci_lopez_4_4_simultaneous": ("H_dl_example_4_4", "simultaneous"),
-    "dieci_lopez_6_1": ("H_dl_example_6_1", "outer_start"),
-    "dieci_lopez_6_1_far": ("H_dl_example_6_1", "far_start"),
-    "dieci_lopez_6_1_cycle": ("H_dl_example_6_1", "limit_cycle"),
-    "dieci_lopez_6_2": ("H_dl_example_6_2", "first_Sigma2"),
-    "dieci_lopez_6_2_plane_first": ("H_dl_example_6_2", "first_Sigma1"),
-    "dieci_lopez_6_4_i": ("H_dl_example_6_4", "i_transient"),
-    "dieci_lopez_6_4_i_cycle": ("H_dl_example_6_4", "i_limit_cycle"),
-    "dieci_lopez_6_4_ii": ("H_dl_example_6_4", "ii_chattering"),
-}
 # The definitions in these files are prose; here they are as expressions, in order.
 DEFINITIONS: dict[str, dict[str, str]] = {
     "A_disode45_problem1": {"g": "y2 - 0.2 - sin(2*y1)", "u": "-s1/(1 + abs(g)**1.5)"},
@@ -98,10 +68,10 @@ def stated_field(
     return [float(eval(component, {}, names)) for component in rhs]
 
 
-@pytest.mark.parametrize("name", sorted(REFERENCES))
+@pytest.mark.parametrize("name", sorted(RUNS))
 def test_field_is_the_one_stated_with_the_reference(name: str) -> None:
     problem = fl.problems.get(name)
-    file, run_id = REFERENCES[name]
+    file, run_id = RUNS[name]
     data, run = load(file, run_id)
     checked = 0
     for sample in run["samples"]:
@@ -129,10 +99,10 @@ def test_field_is_the_one_stated_with_the_reference(name: str) -> None:
     assert checked >= 20
 
 
-@pytest.mark.parametrize("name", sorted(REFERENCES))
+@pytest.mark.parametrize("name", sorted(RUNS))
 def test_initial_point_is_that_of_the_reference(name: str) -> None:
     problem = fl.problems.get(name)
-    _, run = load(*REFERENCES[name])
+    _, run = load(*RUNS[name])
     np.testing.assert_allclose(
         problem.y0, [float(value) for value in run["initial"]["y"]], rtol=1e-15, atol=0.0
     )

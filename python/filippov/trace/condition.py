@@ -28,6 +28,8 @@ class Condition:
 
     tracer: Tracer
 
+    # The three questions that `Comparison` and `Both` answer; a condition is always one of them.
+
     def choose(self, plus: int, minus: int) -> int:
         """Return the node that is `plus` where the condition holds and `minus` elsewhere."""
         raise NotImplementedError
