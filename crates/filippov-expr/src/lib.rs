@@ -33,11 +33,14 @@
 //!
 //! The crate knows nothing of time stepping. Modules: [`graph`] (construction, with `simplify`),
 //! [`switching`] (surfaces found and merged), `partition` (what depends on which sign), [`derivative`],
-//! `print`, `serial`, and [`program`] (native code by Cranelift, or a portable interpreter).
+//! `print`, `serial`, [`program`] (native code by Cranelift, or a portable interpreter), and [`enclosure`]
+//! (rigorous bounds along pieces of motions).
 
 pub mod derivative;
+pub mod enclosure;
 mod error;
 pub mod graph;
+pub mod interval;
 mod linear;
 #[cfg(feature = "native")]
 mod native;
@@ -54,8 +57,10 @@ pub mod switching;
 mod tape;
 
 pub use derivative::{Gradient, Wrt};
+pub use enclosure::{Enclosure, EnclosureProgram, Motion};
 pub use error::ExprError;
 pub use graph::Graph;
+pub use interval::Interval;
 pub use node::{Node, NodeId};
 pub use op::{BinaryOp, UnaryOp};
 pub use print::Names;

@@ -4,6 +4,7 @@ use std::cell::RefCell;
 
 use rustc_hash::FxHashMap;
 
+use crate::enclosure::{Enclosure, Motion};
 use crate::graph::Graph;
 use crate::node::{Node, NodeId};
 use crate::op::{BinaryOp, UnaryOp};
@@ -25,6 +26,98 @@ pub(crate) struct Arguments<'a> {
     pub s: &'a [f64],
     pub p: &'a [f64],
     pub v: &'a [f64],
+}
+
+/// What the instructions work on: numbers, or bounds of them.
+pub(crate) trait Number: Copy {
+    /// A number that does not move.
+    fn constant(value: f64) -> Self;
+    /// A function of one operand.
+    fn unary(self, op: UnaryOp) -> Self;
+    /// A function of two operands.
+    fn binary(self, op: BinaryOp, b: Self) -> Self;
+}
+
+impl Number for f64 {
+    #[inline]
+    fn constant(value: f64) -> Self {
+        value
+    }
+
+    #[inline]
+    fn unary(self, op: UnaryOp) -> Self {
+        op.apply(self)
+    }
+
+    #[inline]
+    fn binary(self, op: BinaryOp, b: Self) -> Self {
+        op.apply(self, b)
+    }
+}
+
+/// Where the instructions find the values of variables.
+trait Variables<N> {
+    fn time(&self) -> N;
+    fn state(&self, index: usize) -> N;
+    fn parameter(&self, index: usize) -> N;
+    fn input(&self, index: usize) -> N;
+    fn signs(&self) -> &[f64];
+}
+
+impl Variables<f64> for Arguments<'_> {
+    #[inline]
+    fn time(&self) -> f64 {
+        self.t
+    }
+
+    #[inline]
+    fn state(&self, index: usize) -> f64 {
+        self.x[index]
+    }
+
+    #[inline]
+    fn parameter(&self, index: usize) -> f64 {
+        self.p[index]
+    }
+
+    #[inline]
+    fn input(&self, index: usize) -> f64 {
+        self.v[index]
+    }
+
+    #[inline]
+    fn signs(&self) -> &[f64] {
+        self.s
+    }
+}
+
+/// A piece of motion, with signs and parameters.
+struct Piece<'a> {
+    motion: &'a dyn Motion,
+    s: &'a [f64],
+    p: &'a [f64],
+}
+
+impl Variables<Enclosure> for Piece<'_> {
+    fn time(&self) -> Enclosure {
+        Enclosure::time(self.motion.time())
+    }
+
+    fn state(&self, index: usize) -> Enclosure {
+        self.motion.state(index)
+    }
+
+    fn parameter(&self, index: usize) -> Enclosure {
+        Enclosure::constant(self.p[index])
+    }
+
+    fn input(&self, _: usize) -> Enclosure {
+        Enclosure::UNKNOWN
+    }
+
+    fn signs(&self) -> &[f64] {
+        self.s
+    }
 }
 
 /// One step: compute a value into the slot `to`, or store a slot as an output.
@@ -132,7 +225,7 @@ impl Tape {
     /// Runs the program; the caller has checked the lengths.
     pub fn run(&self, arguments: Arguments<'_>, out: &mut [f64]) {
         if self.n_slots <= STACK_SLOTS {
-            return self.run_in(&mut [0.0; STACK_SLOTS], arguments, out);
+            return self.interpret(&mut [0.0; STACK_SLOTS], &arguments, out);
         }
         let shared = SLOTS.try_with(|slots| {
             let Ok(mut slots) = slots.try_borrow_mut() else {
@@ -141,32 +234,54 @@ impl Tape {
             if slots.len() < self.n_slots {
                 slots.resize(self.n_slots, 0.0);
             }
-            self.run_in(&mut slots, arguments, out);
+            self.interpret(&mut slots, &arguments, out);
             true
         });
         if shared != Ok(true) {
             // The thread is ending and its storage is gone.
-            self.run_in(&mut vec![0.0; self.n_slots], arguments, out);
+            self.interpret(&mut vec![0.0; self.n_slots], &arguments, out);
         }
     }
 
-    fn run_in(&self, slots: &mut [f64], arguments: Arguments<'_>, out: &mut [f64]) {
-        let Arguments { t, x, s, p, v } = arguments;
+    /// Encloses the outputs along a piece of motion; the caller has checked the lengths.
+    pub fn enclose(&self, motion: &dyn Motion, s: &[f64], p: &[f64], out: &mut [Enclosure]) {
+        let piece = Piece { motion, s, p };
+        if self.n_slots <= STACK_SLOTS {
+            self.interpret(&mut [Enclosure::UNKNOWN; STACK_SLOTS], &piece, out);
+        } else {
+            self.interpret(&mut vec![Enclosure::UNKNOWN; self.n_slots], &piece, out);
+        }
+    }
+
+    fn interpret<N: Number>(&self, slots: &mut [N], variables: &impl Variables<N>, out: &mut [N]) {
+        let signs = variables.signs();
         for &instruction in &self.instructions {
             let (to, value) = match instruction {
-                Instruction::Constant { value, to } => (to, value),
-                Instruction::Time { to } => (to, t),
-                Instruction::State { index, to } => (to, x[index as usize]),
-                Instruction::Parameter { index, to } => (to, p[index as usize]),
-                Instruction::Sign { index, to } => (to, s[index as usize]),
-                Instruction::Input { index, to } => (to, v[index as usize]),
-                Instruction::Add { a, b, to } => (to, slots[a as usize] + slots[b as usize]),
-                Instruction::Sub { a, b, to } => (to, slots[a as usize] - slots[b as usize]),
-                Instruction::Mul { a, b, to } => (to, slots[a as usize] * slots[b as usize]),
-                Instruction::Div { a, b, to } => (to, slots[a as usize] / slots[b as usize]),
-                Instruction::Unary { op, a, to } => (to, op.apply(slots[a as usize])),
+                Instruction::Constant { value, to } => (to, N::constant(value)),
+                Instruction::Time { to } => (to, variables.time()),
+                Instruction::State { index, to } => (to, variables.state(index as usize)),
+                Instruction::Parameter { index, to } => (to, variables.parameter(index as usize)),
+                Instruction::Sign { index, to } => (to, N::constant(signs[index as usize])),
+                Instruction::Input { index, to } => (to, variables.input(index as usize)),
+                Instruction::Add { a, b, to } => (
+                    to,
+                    slots[a as usize].binary(BinaryOp::Add, slots[b as usize]),
+                ),
+                Instruction::Sub { a, b, to } => (
+                    to,
+                    slots[a as usize].binary(BinaryOp::Sub, slots[b as usize]),
+                ),
+                Instruction::Mul { a, b, to } => (
+                    to,
+                    slots[a as usize].binary(BinaryOp::Mul, slots[b as usize]),
+                ),
+                Instruction::Div { a, b, to } => (
+                    to,
+                    slots[a as usize].binary(BinaryOp::Div, slots[b as usize]),
+                ),
+                Instruction::Unary { op, a, to } => (to, slots[a as usize].unary(op)),
                 Instruction::Binary { op, a, b, to } => {
-                    (to, op.apply(slots[a as usize], slots[b as usize]))
+                    (to, slots[a as usize].binary(op, slots[b as usize]))
                 }
                 Instruction::Select {
                     sign,
@@ -175,7 +290,11 @@ impl Tape {
                     to,
                 } => (
                     to,
-                    slots[if s[sign as usize] > 0.0 { plus } else { minus } as usize],
+                    slots[if signs[sign as usize] > 0.0 {
+                        plus
+                    } else {
+                        minus
+                    } as usize],
                 ),
                 Instruction::Store { from, output } => {
                     out[output as usize] = slots[from as usize];

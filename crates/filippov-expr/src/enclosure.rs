@@ -1,0 +1,192 @@
+//! Enclosures: what a program and its rate may be while its arguments move within intervals.
+//!
+//! The certificate that a function has no zero along a motion, or exactly one, is a bound on its value
+//! or on its rate (Moore, Kearfott, Cloud: *Introduction to Interval Analysis*, 2009, chapters 5 and 6).
+//! Value and rate are carried together through the expression, as in forward differentiation.
+
+use crate::error::ExprError;
+use crate::graph::Graph;
+use crate::interval::Interval;
+use crate::node::NodeId;
+use crate::op::{BinaryOp, UnaryOp};
+use crate::schedule::Schedule;
+use crate::tape::{Number, Tape};
+
+/// Bounds of a moving value and of its rate of change.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Enclosure {
+    /// What the value may be.
+    pub value: Interval,
+    /// What its derivative in time may be.
+    pub rate: Interval,
+}
+
+/// The arguments of an enclosing program: a piece of a motion.
+pub trait Motion {
+    /// The times of the piece.
+    fn time(&self) -> Interval;
+    /// State `index` during the piece.
+    fn state(&self, index: usize) -> Enclosure;
+}
+
+/// A program that is evaluated on pieces of motions instead of points.
+///
+/// # Example
+/// ```
+/// use filippov_expr::{Enclosure, EnclosureProgram, Graph, Interval, Motion};
+/// let mut g = Graph::new();
+/// let (x, one) = (g.state(0), g.constant(1.0));
+/// let square = g.mul(x, x);
+/// let h = g.sub(square, one);
+///
+/// struct Rising; // x = t on [2, 3]
+/// impl Motion for Rising {
+///     fn time(&self) -> Interval { Interval::hull(2.0, 3.0) }
+///     fn state(&self, _: usize) -> Enclosure {
+///         Enclosure { value: self.time(), rate: Interval::point(1.0) }
+///     }
+/// }
+/// let program = EnclosureProgram::compile(&g, &[h])?;
+/// let mut out = [Enclosure::UNKNOWN];
+/// program.eval(&Rising, &[], &[], &mut out);
+/// assert!(out[0].value.lo > 2.999 && out[0].rate.lo > 3.999); // x^2 - 1 in [3, 8], 2 x in [4, 6]
+/// # Ok::<(), filippov_expr::ExprError>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct EnclosureProgram {
+    tape: Tape,
+    n_signs: usize,
+    n_parameters: usize,
+    n_outputs: usize,
+}
+
+impl EnclosureProgram {
+    /// Prepares the values of some nodes.
+    ///
+    /// # Errors
+    /// [`ExprError::UnknownNode`], [`ExprError::IndexTooLarge`].
+    pub fn compile(graph: &Graph, outputs: &[NodeId]) -> Result<Self, ExprError> {
+        let schedule = Schedule::new(graph, outputs)?;
+        Ok(EnclosureProgram {
+            tape: Tape::new(graph, &schedule),
+            n_signs: schedule.lengths.signs,
+            n_parameters: schedule.lengths.parameters,
+            n_outputs: outputs.len(),
+        })
+    }
+
+    /// Encloses the outputs along a piece of motion with signs `s` and parameters `p`. Nothing is
+    /// claimed if `s` or `p` is too short.
+    pub fn eval(&self, motion: &dyn Motion, s: &[f64], p: &[f64], out: &mut [Enclosure]) {
+        let long_enough =
+            s.len() >= self.n_signs && p.len() >= self.n_parameters && out.len() >= self.n_outputs;
+        if !long_enough {
+            out.fill(Enclosure::UNKNOWN);
+            return;
+        }
+        self.tape.enclose(motion, s, p, out);
+    }
+}
+
+impl Enclosure {
+    /// Nothing is known.
+    pub const UNKNOWN: Enclosure = Enclosure {
+        value: Interval::ALL,
+        rate: Interval::ALL,
+    };
+
+    /// A value that does not move.
+    pub const fn constant(value: f64) -> Self {
+        Enclosure {
+            value: Interval::point(value),
+            rate: Interval::ZERO,
+        }
+    }
+
+    /// The time itself.
+    pub const fn time(times: Interval) -> Self {
+        Enclosure {
+            value: times,
+            rate: Interval::point(1.0),
+        }
+    }
+
+    /// The derivative of a function of one operand, whose value is known to be in `value`.
+    fn slope(self, op: UnaryOp, value: Interval) -> Interval {
+        let one = Interval::point(1.0);
+        let a = self.value;
+        let root = |square: Interval| one.div(square.unary(UnaryOp::Sqrt));
+        match op {
+            UnaryOp::Neg => Interval::point(-1.0),
+            UnaryOp::Sqrt => Interval::point(0.5).div(value),
+            UnaryOp::Cbrt => Interval::point(1.0 / 3.0).div(value.square()),
+            UnaryOp::Exp => value,
+            UnaryOp::Expm1 => a.unary(UnaryOp::Exp),
+            UnaryOp::Exp2 => value.scaled(std::f64::consts::LN_2),
+            UnaryOp::Log => one.div(a),
+            UnaryOp::Log1p => one.div(one.add(a)),
+            UnaryOp::Log2 => Interval::point(std::f64::consts::LOG2_E).div(a),
+            UnaryOp::Log10 => Interval::point(std::f64::consts::LOG10_E).div(a),
+            UnaryOp::Sin => a.unary(UnaryOp::Cos),
+            UnaryOp::Cos => a.unary(UnaryOp::Sin).neg(),
+            UnaryOp::Tan => one.add(value.square()),
+            UnaryOp::Asin => root(one.sub(a.square())),
+            UnaryOp::Acos => root(one.sub(a.square())).neg(),
+            UnaryOp::Atan => one.div(one.add(a.square())),
+            UnaryOp::Sinh => a.unary(UnaryOp::Cosh),
+            UnaryOp::Cosh => a.unary(UnaryOp::Sinh),
+            UnaryOp::Tanh => one.div(a.unary(UnaryOp::Cosh).square()),
+            UnaryOp::Asinh => root(one.add(a.square())),
+            UnaryOp::Acosh => root(a.square().sub(one)),
+            UnaryOp::Atanh => one.div(one.sub(a.square())),
+        }
+    }
+}
+
+impl Number for Enclosure {
+    fn constant(value: f64) -> Self {
+        Self::constant(value)
+    }
+
+    fn unary(self, op: UnaryOp) -> Self {
+        let value = self.value.unary(op);
+        let rate = if self.rate.is_zero() {
+            Interval::ZERO
+        } else {
+            self.slope(op, value).mul(self.rate)
+        };
+        Enclosure { value, rate }
+    }
+
+    fn binary(self, op: BinaryOp, b: Self) -> Self {
+        let value = self.value.binary(op, b.value);
+        let (da, db) = (self.rate, b.rate);
+        let rate = match op {
+            BinaryOp::Add => da.add(db),
+            BinaryOp::Sub => da.sub(db),
+            BinaryOp::Mul => da.mul(b.value).add(self.value.mul(db)),
+            _ if da.is_zero() && db.is_zero() => Interval::ZERO,
+            BinaryOp::Div => da.sub(value.mul(db)).div(b.value),
+            BinaryOp::Pow => power_rate(self, b, value),
+            BinaryOp::Atan2 => {
+                let radius = self.value.square().add(b.value.square());
+                da.mul(b.value).sub(self.value.mul(db)).div(radius)
+            }
+            BinaryOp::Hypot => self.value.mul(da).add(b.value.mul(db)).div(value),
+        };
+        Enclosure { value, rate }
+    }
+}
+
+/// The rate of a^b, which is `value`: b a^(b-1) a' + a^b log(a) b'.
+fn power_rate(a: Enclosure, b: Enclosure, value: Interval) -> Interval {
+    let one = Interval::point(1.0);
+    let by_base = b
+        .value
+        .mul(a.value.binary(BinaryOp::Pow, b.value.sub_exactly(one)))
+        .mul(a.rate);
+    if b.rate.is_zero() {
+        return by_base;
+    }
+    by_base.add(value.mul(a.value.unary(UnaryOp::Log)).mul(b.rate))
+}

@@ -1,0 +1,320 @@
+//! Intervals: a set of numbers that is known to contain a value.
+
+use crate::op::{BinaryOp, UnaryOp};
+
+/// The numbers from `lo` to `hi`. An end that is infinite or NaN means that nothing is known.
+///
+/// Results are rounded outwards by a few units in the last place, more than the operations of [`UnaryOp`]
+/// and [`BinaryOp`] err.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Interval {
+    /// Lower end.
+    pub lo: f64,
+    /// Upper end.
+    pub hi: f64,
+}
+
+/// Relative error allowed for elementary functions: 4 units in the last place.
+const LIBRARY: f64 = 4.0 * f64::EPSILON;
+/// Beyond it sine and cosine are not followed: an interval of that size has lost the phase.
+const LARGEST_ANGLE: f64 = 1e9;
+
+impl Interval {
+    /// All numbers: nothing is known.
+    pub const ALL: Interval = Interval {
+        lo: f64::NEG_INFINITY,
+        hi: f64::INFINITY,
+    };
+
+    /// The single number 0.
+    pub const ZERO: Interval = Interval { lo: 0.0, hi: 0.0 };
+
+    /// A single number.
+    pub const fn point(value: f64) -> Self {
+        Interval {
+            lo: value,
+            hi: value,
+        }
+    }
+
+    /// The numbers between `a` and `b`, in either order.
+    pub fn hull(a: f64, b: f64) -> Self {
+        Interval {
+            lo: a.min(b),
+            hi: a.max(b),
+        }
+    }
+
+    /// The numbers within `radius` of `centre`.
+    pub fn around(centre: f64, radius: f64) -> Self {
+        Interval {
+            lo: centre - radius,
+            hi: centre + radius,
+        }
+        .outwards(f64::EPSILON)
+    }
+
+    /// Is there a bound on both sides?
+    pub fn is_bounded(self) -> bool {
+        self.lo.is_finite() && self.hi.is_finite()
+    }
+
+    /// Is the interval known to hold the number 0 only?
+    pub fn is_zero(self) -> bool {
+        self.lo == 0.0 && self.hi == 0.0
+    }
+
+    /// May 0 be in the interval?
+    pub fn contains_zero(self) -> bool {
+        !(self.lo > 0.0 || self.hi < 0.0)
+    }
+
+    /// The numbers times a factor.
+    #[must_use]
+    pub fn scaled(self, factor: f64) -> Self {
+        self.mul(Interval::point(factor))
+    }
+
+    fn outwards(self, relative: f64) -> Self {
+        // Exact zeros stay exact, so that what does not move stays a point; the products keep
+        // an underflow from claiming a bound that is too tight only beyond 1e-292.
+        Interval {
+            lo: self.lo - relative * self.lo.abs(),
+            hi: self.hi + relative * self.hi.abs(),
+        }
+        .checked()
+    }
+
+    /// NaN and crossed ends know nothing.
+    fn checked(self) -> Self {
+        if self.lo <= self.hi {
+            self
+        } else {
+            Interval::ALL
+        }
+    }
+
+    /// a + b.
+    #[must_use]
+    pub fn add(self, b: Self) -> Self {
+        Interval {
+            lo: self.lo + b.lo,
+            hi: self.hi + b.hi,
+        }
+        .outwards(f64::EPSILON)
+    }
+
+    /// a - b.
+    #[must_use]
+    pub fn sub(self, b: Self) -> Self {
+        self.add(b.neg())
+    }
+
+    /// a - b for single numbers without rounding outwards, so that an integer stays one.
+    #[must_use]
+    pub(crate) fn sub_exactly(self, b: Self) -> Self {
+        Interval {
+            lo: self.lo - b.hi,
+            hi: self.hi - b.lo,
+        }
+        .checked()
+    }
+
+    /// -a.
+    #[must_use]
+    pub fn neg(self) -> Self {
+        Interval {
+            lo: -self.hi,
+            hi: -self.lo,
+        }
+    }
+
+    /// a b.
+    #[must_use]
+    pub fn mul(self, b: Self) -> Self {
+        if self.is_zero() && b.is_bounded() || b.is_zero() && self.is_bounded() {
+            return Interval::ZERO;
+        }
+        let products = [
+            self.lo * b.lo,
+            self.lo * b.hi,
+            self.hi * b.lo,
+            self.hi * b.hi,
+        ];
+        Interval::spanning(products, f64::EPSILON)
+    }
+
+    /// a / b; nothing is known where b may vanish.
+    #[must_use]
+    pub fn div(self, b: Self) -> Self {
+        if b.contains_zero() {
+            return Interval::ALL;
+        }
+        let inverse = Interval {
+            lo: 1.0 / b.hi,
+            hi: 1.0 / b.lo,
+        };
+        self.mul(inverse.outwards(f64::EPSILON))
+    }
+
+    /// a^2.
+    #[must_use]
+    pub fn square(self) -> Self {
+        let (low, high) = self.magnitudes();
+        Interval {
+            lo: low * low,
+            hi: high * high,
+        }
+        .outwards(f64::EPSILON)
+    }
+
+    /// Smallest and largest absolute value.
+    fn magnitudes(self) -> (f64, f64) {
+        let (a, b) = (self.lo.abs(), self.hi.abs());
+        let low = if self.contains_zero() { 0.0 } else { a.min(b) };
+        (low, a.max(b))
+    }
+
+    /// What a function of one operand may be.
+    #[must_use]
+    pub fn unary(self, op: UnaryOp) -> Self {
+        use UnaryOp::{
+            Acos, Acosh, Asin, Asinh, Atan, Atanh, Cbrt, Cos, Cosh, Exp, Exp2, Expm1, Log, Log10,
+            Log1p, Log2, Neg, Sin, Sinh, Sqrt, Tan, Tanh,
+        };
+        if !self.is_bounded() {
+            // The operand may be NaN: a bound of its sine would hide that.
+            return Interval::ALL;
+        }
+        match op {
+            Neg => self.neg(),
+            Sin => self.sine(),
+            Cos => self.cosine(),
+            Tan => self.tangent(),
+            Cosh => {
+                let (low, high) = self.magnitudes();
+                Interval::spanning([low.cosh(), high.cosh()], LIBRARY)
+            }
+            // A NaN of an operand outside of the domain is noticed: nothing is known.
+            Sqrt | Cbrt | Exp | Expm1 | Exp2 | Log | Log1p | Log2 | Log10 | Asin | Acos | Atan
+            | Sinh | Tanh | Asinh | Acosh | Atanh => {
+                Interval::spanning([op.apply(self.lo), op.apply(self.hi)], LIBRARY)
+            }
+        }
+    }
+
+    /// What a function of two operands may be.
+    #[must_use]
+    pub fn binary(self, op: BinaryOp, b: Self) -> Self {
+        if !self.is_bounded() || !b.is_bounded() {
+            return Interval::ALL;
+        }
+        match op {
+            BinaryOp::Add => self.add(b),
+            BinaryOp::Sub => self.sub(b),
+            BinaryOp::Mul => self.mul(b),
+            BinaryOp::Div => self.div(b),
+            BinaryOp::Pow => self.power(b),
+            BinaryOp::Atan2 => self.angle(b),
+            BinaryOp::Hypot => {
+                let ((a_low, a_high), (b_low, b_high)) = (self.magnitudes(), b.magnitudes());
+                Interval::spanning([a_low.hypot(b_low), a_high.hypot(b_high)], LIBRARY)
+            }
+        }
+    }
+
+    /// The smallest interval with some values.
+    fn spanning<const N: usize>(values: [f64; N], relative: f64) -> Self {
+        let (mut lo, mut hi) = (values[0], values[0]);
+        for value in values {
+            if value.is_nan() {
+                return Interval::ALL;
+            }
+            (lo, hi) = (lo.min(value), hi.max(value));
+        }
+        Interval { lo, hi }.outwards(relative)
+    }
+
+    fn cosine(self) -> Self {
+        self.wave(0.0, [self.lo.cos(), self.hi.cos()])
+    }
+
+    fn sine(self) -> Self {
+        self.wave(0.5, [self.lo.sin(), self.hi.sin()])
+    }
+
+    /// A sine wave with extrema at (k + offset) pi, maxima for even k, given its values at the ends.
+    fn wave(self, offset: f64, ends: [f64; 2]) -> Self {
+        use std::f64::consts::PI;
+        if !(self.lo.abs() < LARGEST_ANGLE && self.hi.abs() < LARGEST_ANGLE) {
+            return Interval::hull(-1.0, 1.0);
+        }
+        // The slack covers the rounding of the quotients.
+        let slack = LIBRARY * (1.0 + self.lo.abs().max(self.hi.abs()));
+        let first = ((self.lo - slack) / PI - offset).ceil();
+        let last = ((self.hi + slack) / PI - offset).floor();
+        let mut range = Interval::spanning(ends, LIBRARY);
+        if last > first {
+            return Interval::hull(-1.0, 1.0);
+        }
+        if last >= first {
+            if first.rem_euclid(2.0) == 0.0 {
+                range.hi = 1.0;
+            } else {
+                range.lo = -1.0;
+            }
+        }
+        Interval {
+            lo: range.lo.max(-1.0),
+            hi: range.hi.min(1.0),
+        }
+    }
+
+    fn tangent(self) -> Self {
+        if self.cosine().contains_zero() {
+            return Interval::ALL;
+        }
+        Interval::spanning([self.lo.tan(), self.hi.tan()], LIBRARY)
+    }
+
+    fn power(self, exponent: Self) -> Self {
+        let n = exponent.lo;
+        if n == exponent.hi && n.fract() == 0.0 {
+            let (low, high) = self.magnitudes();
+            if n < 0.0 {
+                return Interval::point(1.0).div(self.power(Interval::point(-n)));
+            }
+            let even = (0.5 * n).fract() == 0.0;
+            return if even {
+                Interval::spanning([low.powf(n), high.powf(n)], LIBRARY)
+            } else {
+                Interval::spanning([self.lo.powf(n), self.hi.powf(n)], LIBRARY)
+            };
+        }
+        if self.lo < 0.0 || self.lo == 0.0 && exponent.lo <= 0.0 {
+            return Interval::ALL;
+        }
+        // Monotone in each operand for a fixed other one: extrema at the corners.
+        let corners = [
+            self.lo.powf(exponent.lo),
+            self.lo.powf(exponent.hi),
+            self.hi.powf(exponent.lo),
+            self.hi.powf(exponent.hi),
+        ];
+        Interval::spanning(corners, LIBRARY)
+    }
+
+    /// atan2(self, x): monotone along every edge of a box that stays away from its branch cut.
+    fn angle(self, x: Self) -> Self {
+        if self.contains_zero() && x.lo <= 0.0 {
+            return Interval::ALL;
+        }
+        let corners = [
+            self.lo.atan2(x.lo),
+            self.lo.atan2(x.hi),
+            self.hi.atan2(x.lo),
+            self.hi.atan2(x.hi),
+        ];
+        Interval::spanning(corners, LIBRARY)
+    }
+}

@@ -1,0 +1,146 @@
+//! Enclosures hold every value and every rate of the pieces that they are made for.
+#![allow(clippy::unwrap_used)]
+
+mod support;
+
+use filippov_expr::{BinaryOp, Enclosure, EnclosureProgram, Graph, Interval, Motion, UnaryOp};
+use proptest::prelude::*;
+use support::{build, recipes, values, Point, N_STATES};
+
+/// States that move along straight lines for a while.
+struct Line {
+    from: Point,
+    direction: Vec<f64>,
+    length: f64,
+}
+
+impl Line {
+    fn at(&self, share: f64) -> Point {
+        self.from.moved(&self.direction, share * self.length)
+    }
+}
+
+impl Motion for Line {
+    fn time(&self) -> Interval {
+        Interval::hull(self.from.t, self.at(1.0).t)
+    }
+
+    fn state(&self, index: usize) -> Enclosure {
+        Enclosure {
+            value: Interval::hull(self.from.x[index], self.at(1.0).x[index]),
+            rate: Interval::point(self.direction[index]),
+        }
+    }
+}
+
+fn enclosures(g: &Graph, nodes: &[filippov_expr::NodeId], line: &Line) -> Vec<Enclosure> {
+    let program = EnclosureProgram::compile(g, nodes).unwrap();
+    let mut out = vec![Enclosure::UNKNOWN; nodes.len()];
+    program.eval(
+        line,
+        &line.from.signs(g.n_surfaces()),
+        &line.from.p,
+        &mut out,
+    );
+    out
+}
+
+proptest! {
+    #![proptest_config(support::config(500))]
+
+    #[test]
+    fn every_value_and_every_difference_quotient_is_enclosed(
+        recipe in recipes(30),
+        from in support::points(),
+        direction in prop::collection::vec(-2.0..2.0, N_STATES),
+        length in prop::sample::select(vec![1.0, 0.1, 1e-3]),
+    ) {
+        let (g, nodes) = build(&recipe);
+        let line = Line { from, direction, length };
+        let bounds = enclosures(&g, &nodes, &line);
+        let samples: Vec<Vec<f64>> = (0..=8).map(|k| values(&g, &nodes, &line.at(f64::from(k) / 8.0))).collect();
+        for (k, bound) in bounds.iter().enumerate() {
+            // input 0 moves in no known way
+            if !bound.value.is_bounded() {
+                continue;
+            }
+            for pair in samples.windows(2) {
+                let (a, b) = (pair[0][k], pair[1][k]);
+                prop_assert!(bound.value.lo <= a && a <= bound.value.hi, "node {k}: {a} not in {:?}", bound.value);
+                if bound.rate.is_bounded() {
+                    // the mean value theorem: a difference quotient is a rate
+                    let quotient = (b - a) / (length / 8.0);
+                    let rounding = 1e-12 * (a.abs() + b.abs() + bound.value.hi - bound.value.lo + 1e-300) / length;
+                    prop_assert!(
+                        bound.rate.lo - rounding <= quotient && quotient <= bound.rate.hi + rounding,
+                        "node {k}: {quotient} not in {:?}", bound.rate
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn one_operation_is_enclosed(
+        op in prop::sample::select(UnaryOp::ALL.to_vec()),
+        centre in prop_oneof![-1.5..1.5, -40.0..40.0],
+        radius in prop_oneof![Just(0.0), 0.0..1e-6, 0.0..0.5, 0.0..20.0],
+    ) {
+        let range = Interval::around(centre, radius).unary(op);
+        for k in 0..=200 {
+            let value = op.apply(centre + radius * (f64::from(k) / 100.0 - 1.0));
+            if range.is_bounded() {
+                prop_assert!(range.lo <= value && value <= range.hi, "{op:?}: {value} not in {range:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn two_operands_are_enclosed(
+        op in prop::sample::select(BinaryOp::ALL.to_vec()),
+        a in -3.0..3.0_f64, da in 0.0..1.0_f64,
+        b in prop_oneof![-3.0..3.0_f64, (-4..5).prop_map(f64::from)],
+        db in prop_oneof![Just(0.0), 0.0..1.0_f64],
+    ) {
+        let range = Interval::hull(a, a + da).binary(op, Interval::hull(b, b + db));
+        // Rounding must not take a sample beyond the end.
+        let sample = |from: f64, length: f64, i: i32| (from + length * f64::from(i) / 10.0).min(from + length);
+        for i in 0..=10 {
+            for k in 0..=10 {
+                let value = op.apply(sample(a, da, i), sample(b, db, k));
+                if range.is_bounded() {
+                    prop_assert!(range.lo <= value && value <= range.hi, "{op:?}: {value} not in {range:?}");
+                }
+            }
+        }
+    }
+}
+
+/// The bounds shrink with the piece: the value's excess in proportion, which is what the search relies on.
+#[test]
+fn bounds_are_tight_for_short_pieces() {
+    let mut g = Graph::new();
+    let (x, y) = (g.state(0), g.state(1));
+    let (sine, product) = (g.unary(UnaryOp::Sin, x), g.mul(x, y));
+    let h = g.add(sine, product);
+    let from = Point {
+        t: 0.0,
+        x: vec![0.3, -0.7, 0.0],
+        p: vec![0.0, 0.0],
+        signs: vec![1.0],
+    };
+    let exact = 0.3_f64.sin() - 0.21;
+    let rate = 0.3_f64.cos() - 0.7 + 2.0 * 0.3;
+    for length in [1e-2, 1e-4, 1e-6] {
+        let line = Line {
+            from: from.clone(),
+            direction: vec![1.0, 2.0, 0.0],
+            length,
+        };
+        let bound = enclosures(&g, &[h], &line)[0];
+        assert!(bound.value.lo <= exact && exact <= bound.value.hi);
+        assert!(bound.value.hi - bound.value.lo < 6.0 * length);
+        assert!(bound.rate.lo <= rate && rate <= bound.rate.hi);
+        assert!(bound.rate.hi - bound.rate.lo < 12.0 * length);
+    }
+}
