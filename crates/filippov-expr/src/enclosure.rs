@@ -158,6 +158,13 @@ impl Number for Enclosure {
         Enclosure { value, rate }
     }
 
+    fn square(self) -> Self {
+        Enclosure {
+            value: self.value.square(),
+            rate: self.value.mul(self.rate).scaled(2.0),
+        }
+    }
+
     fn binary(self, op: BinaryOp, b: Self) -> Self {
         let value = self.value.binary(op, b.value);
         let (da, db) = (self.rate, b.rate);

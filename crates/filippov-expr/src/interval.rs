@@ -160,6 +160,9 @@ impl Interval {
     /// a^2.
     #[must_use]
     pub fn square(self) -> Self {
+        if !self.is_bounded() {
+            return Interval::ALL;
+        }
         let (low, high) = self.magnitudes();
         Interval {
             lo: low * low,

@@ -36,6 +36,10 @@ pub(crate) trait Number: Copy {
     fn unary(self, op: UnaryOp) -> Self;
     /// A function of two operands.
     fn binary(self, op: BinaryOp, b: Self) -> Self;
+    /// The product with itself.
+    fn square(self) -> Self {
+        self.binary(BinaryOp::Mul, self)
+    }
 }
 
 impl Number for f64 {
@@ -271,6 +275,7 @@ impl Tape {
                     to,
                     slots[a as usize].binary(BinaryOp::Sub, slots[b as usize]),
                 ),
+                Instruction::Mul { a, b, to } if a == b => (to, slots[a as usize].square()),
                 Instruction::Mul { a, b, to } => (
                     to,
                     slots[a as usize].binary(BinaryOp::Mul, slots[b as usize]),

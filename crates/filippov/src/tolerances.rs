@@ -29,6 +29,25 @@ pub const QUARTIC_REMAINDER: f64 = 0.25;
 /// their spread over the stages.
 pub const STAGE_SPREAD: f64 = 0.75;
 
+/// A function within this multiple of its rounding all along a piece is judged by samples: bounds of
+/// it are wider than itself.
+pub const HUGGING: f64 = 1e4;
+
+/// The motion on a curved surface lies beside the continuous extension by at most this multiple of the
+/// distances at the probes of the step ...
+pub const MARGIN: f64 = 2.0;
+
+/// ... and that distance changes over the step by at most this multiple of itself: as theta^2 (1-theta)^2
+/// it would be 5.
+pub const MARGIN_SLOPE: f64 = 8.0;
+
+/// Where no bounds exist after that many bisections (a root at the edge of its domain), samples decide.
+pub const UNBOUNDED_DEPTH: u32 = 6;
+
+/// Halvings of a step in the attempt to prove it free of zeros before it is searched with samples;
+/// each costs two bounds, the search at least two evaluations of the field.
+pub const PROOF_DEPTH: u32 = 3;
+
 /// Bisections of a step in the search for zeros; 2^-48 of a step is below the rounding of time.
 pub const MAX_DEPTH: u32 = 48;
 

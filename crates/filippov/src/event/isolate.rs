@@ -1,7 +1,8 @@
 //! Isolation of the first zero of a function of theta.
 
+use super::certificate::{Bounds, Verdict};
 use crate::error::FieldError;
-use crate::tolerances::{MAX_DEPTH, MOST_SAMPLES, QUARTIC_REMAINDER};
+use crate::tolerances::{MAX_DEPTH, MOST_SAMPLES, QUARTIC_REMAINDER, UNBOUNDED_DEPTH};
 
 /// A scalar function of theta.
 pub type Sampled<'a> = &'a mut dyn FnMut(f64) -> Result<f64, FieldError>;
@@ -56,10 +57,11 @@ pub struct Isolated {
 
 /// The first zero of `g` on [a, b], where `g(a) > 0`; `noise` is the rounding of g.
 ///
-/// Five samples give the Bernstein coefficients of a quartic. A piece is free of zeros if all of
-/// them exceed the remainder, estimated from the fourth difference; it has exactly one zero if they
-/// decrease by more than that from a positive to a negative value; else it is bisected. A function
-/// within `noise` everywhere has no zero: it vanishes identically.
+/// A piece is free of zeros, or has exactly one, where bounds of the function or of its slope prove it.
+/// Where there are none, five samples give the Bernstein coefficients of a quartic: no zero if all of
+/// them exceed the remainder, estimated from the fourth difference; exactly one if they decrease by more
+/// than that from a positive to a negative value. Other pieces are bisected. A function within `noise`
+/// everywhere has no zero: it vanishes identically.
 ///
 /// # Errors
 /// If `g` raises.
@@ -68,12 +70,24 @@ pub fn first_zero(g: Sampled, a: f64, b: f64, noise: f64) -> Result<Isolated, Fi
     for (i, value) in values.iter_mut().enumerate() {
         *value = g(a + (b - a) * 0.25 * i as f64)?;
     }
-    first_zero_sampled(g, a, b, values, noise, &PROBES)
+    first_zero_sampled(g, a, b, values, noise, Evidence::Probes(&PROBES))
 }
 
-/// As [`first_zero`], with the values at the quarters of [a, b] already known; the quartic is
-/// believed only where it also agrees with g at the `probes` (in [0, 1]). A polynomial of low degree
-/// needs none.
+/// What tells that the samples of a piece describe the function.
+pub enum Evidence<'a> {
+    /// The quartic is believed where it also agrees at these points of the piece (in [0, 1]). A polynomial
+    /// of low degree needs none.
+    Probes(&'a [f64]),
+    /// Bounds of the function before division by a zero at the start; `divided` says whether there is one.
+    Bounds {
+        /// The bounds.
+        bounds: Bounds<'a>,
+        /// The samples are of a quotient.
+        divided: bool,
+    },
+}
+
+/// As [`first_zero`], with the values at the quarters of [a, b] already known.
 ///
 /// # Errors
 /// If `g` raises.
@@ -83,7 +97,7 @@ pub fn first_zero_sampled(
     b: f64,
     values: [f64; 5],
     noise: f64,
-    probes: &[f64],
+    evidence: Evidence,
 ) -> Result<Isolated, FieldError> {
     if values.iter().all(|v| v.abs() <= noise) {
         return Ok(Isolated::default());
@@ -104,7 +118,7 @@ pub fn first_zero_sampled(
     let mut search = Search {
         g,
         noise,
-        probes,
+        evidence,
         budget: MOST_SAMPLES,
         result: Isolated {
             not_finite: !values.iter().all(|v| v.is_finite()),
@@ -124,7 +138,7 @@ pub const PROBES: [f64; 2] = [0.39, 0.815];
 struct Search<'a, 'b> {
     g: Sampled<'a>,
     noise: f64,
-    probes: &'b [f64],
+    evidence: Evidence<'b>,
     budget: u32,
     result: Isolated,
 }
@@ -154,11 +168,26 @@ impl Search<'_, '_> {
         if !self.is_certain() {
             return Ok(None);
         }
+        let verdict = self.verdict(a, b, v[2]);
+        match verdict {
+            Verdict::Clear => return Ok(None),
+            Verdict::Rising if v[0] >= -self.noise && v[4] > 0.0 => return Ok(None),
+            Verdict::Falling if v[4] > 0.0 => return Ok(None),
+            _ => {}
+        }
         let coefficients = bernstein(&v);
+        if verdict == Verdict::Falling && v[0] > 0.0 {
+            return Ok(bracket(a, b, &v, &coefficients, self.noise));
+        }
+        let believed = match verdict {
+            Verdict::Unavailable => true,
+            Verdict::Unbounded => depth >= UNBOUNDED_DEPTH,
+            _ => false,
+        };
         let remainder =
             QUARTIC_REMAINDER * (v[0] - 4.0 * v[1] + 6.0 * v[2] - 4.0 * v[3] + v[4]).abs();
         let lowest = coefficients.iter().copied().fold(f64::INFINITY, f64::min);
-        if lowest > remainder && self.agrees(a, b, &coefficients, lowest)? {
+        if believed && lowest > remainder && self.agrees(a, b, &coefficients, lowest)? {
             return Ok(None);
         }
         let m = 0.5 * (a + b);
@@ -168,7 +197,7 @@ impl Search<'_, '_> {
             .windows(2)
             .map(|w| w[0] - w[1])
             .fold(f64::INFINITY, f64::min);
-        let single = steepness > 2.0 * remainder && v[0] > 0.0 && v[4] <= 0.0;
+        let single = believed && steepness > 2.0 * remainder && v[0] > 0.0 && v[4] <= 0.0;
         if unresolved || single && self.agrees(a, b, &coefficients, steepness)? {
             return Ok(bracket(a, b, &v, &coefficients, self.noise));
         }
@@ -193,6 +222,17 @@ impl Search<'_, '_> {
         self.first(m, b, right, depth + 1)
     }
 
+    /// What the bounds prove about a piece.
+    fn verdict(&mut self, a: f64, b: f64, middle: f64) -> Verdict {
+        let Evidence::Bounds { bounds, divided } = &mut self.evidence else {
+            return Verdict::Unavailable;
+        };
+        let middle = (!*divided).then_some(middle);
+        bounds(a, b).map_or(Verdict::Unavailable, |bound| {
+            bound.verdict(b - a, middle, self.noise)
+        })
+    }
+
     /// Does the quartic agree with g at the probes, to half the margin?
     fn agrees(
         &mut self,
@@ -201,7 +241,11 @@ impl Search<'_, '_> {
         coefficients: &[f64; 5],
         margin: f64,
     ) -> Result<bool, FieldError> {
-        for &probe in self.probes {
+        let probes = match self.evidence {
+            Evidence::Probes(probes) => probes,
+            Evidence::Bounds { .. } => &PROBES,
+        };
+        for &probe in probes {
             let value = self.sample(a + (b - a) * probe)?;
             let close = (value - casteljau(*coefficients, probe)).abs() <= 0.5 * margin;
             if !close {

@@ -1,6 +1,6 @@
 //! A monitored function along the continuous extension of a step.
 
-use super::motion::{ModeField, Motion};
+use super::motion::ModeField;
 use crate::error::FieldError;
 use crate::event::{EventFunction, Monitored};
 use crate::field::NormalComponents;
@@ -10,7 +10,8 @@ use crate::system::PiecewiseSystem;
 /// A monitored function along the continuous extension.
 pub(super) struct Curve<'a, 'b> {
     pub system: &'a dyn PiecewiseSystem,
-    pub motion: &'a mut Motion<'b>,
+    pub field: &'a mut ModeField<'b>,
+    pub signs: &'a [f64],
     pub interpolant: &'a Interpolant,
     pub h: &'a mut [f64],
     pub x: &'a mut [f64],
@@ -24,14 +25,13 @@ impl Curve<'_, '_> {
     pub fn value(&mut self, m: &Monitored, theta: f64) -> Result<f64, FieldError> {
         let t = self.interpolant.t0 + theta * self.interpolant.dt;
         self.interpolant.at(theta, self.x);
-        match (m.function, &mut self.motion.field) {
+        match (m.function, &mut *self.field) {
             (EventFunction::Surface(j), field) => {
                 if let ModeField::Sliding(field) = field {
                     field.project(t, self.x)?;
                 }
                 *self.n_evaluations += 1;
-                self.system
-                    .surfaces(t, self.x, &self.motion.signs, self.h)?;
+                self.system.surfaces(t, self.x, self.signs, self.h)?;
                 Ok(m.orientation * self.h[j])
             }
             (exit, ModeField::Sliding(field)) => {

@@ -1,17 +1,21 @@
 //! The event stage of a step: the earliest zero of what the mode monitors.
 
+use super::bounds::BoundedCurve;
 use super::curve::{grazes, Curve};
 use super::integrator::Integrator;
 use super::motion::{ModeField, Motion};
 use crate::error::FieldError;
+use crate::event::certificate::is_clear;
 use crate::event::filter::{may_vanish, may_vanish_bent, may_vanish_between, may_vanish_deflated};
-use crate::event::isolate::{first_zero_sampled, Zero, PROBES};
+use crate::event::isolate::{first_zero_sampled, Evidence, Zero, PROBES};
 use crate::event::locate::refine;
 use crate::event::{EventFunction, Monitored};
 use crate::field::NormalComponents;
 use crate::stepper::nested;
 use crate::system::{dot, PiecewiseSystem};
-use crate::tolerances::{EPS, EXTRAPOLATION, ONE_SIDED_AIM, POLE, RESOLVED_DEPTH, SURFACE_NOISE};
+use crate::tolerances::{
+    EPS, EXTRAPOLATION, MARGIN, ONE_SIDED_AIM, POLE, PROOF_DEPTH, RESOLVED_DEPTH, SURFACE_NOISE,
+};
 
 /// Scratch space of the event stage, and values at the end of the step.
 pub(super) struct Detector {
@@ -31,6 +35,8 @@ pub(super) struct Detector {
     rate: Vec<f64>,
     gradient: Vec<f64>,
     x: Vec<f64>,
+    /// How far the projection onto a curved surface moves the extension in this step; else empty.
+    margin: Vec<f64>,
     /// Value and rate at the end of the step, per monitored function.
     right: Vec<(f64, f64)>,
     /// Which monitored functions the filter could not clear.
@@ -61,6 +67,7 @@ impl Detector {
             rate: vec![0.0; d],
             gradient: vec![0.0; n],
             x: vec![0.0; n],
+            margin: Vec::new(),
             right: Vec::new(),
             suspects: Vec::new(),
         }
@@ -183,46 +190,112 @@ impl Integrator<'_> {
 
     /// The filter: which functions may vanish within the step?
     fn collect_suspects(&mut self, dt: f64) -> Result<(), FieldError> {
-        let detector = &mut self.detector;
-        let motion = &mut self.motion;
-        detector.suspects.clear();
-        if motion
-            .monitored
-            .iter()
-            .any(|m| !m.affine && matches!(m.function, EventFunction::Surface(_)))
-        {
-            for (theta, h) in PROBES.into_iter().zip(&mut detector.probed) {
-                self.stepper.interpolant().at(theta, &mut detector.x);
-                let t = self.t + theta * dt;
-                self.system.surfaces(t, &detector.x, &motion.signs, h)?;
-                self.stats.n_surface_evaluations += 1;
+        self.detector.suspects.clear();
+        self.measure_margin(dt)?;
+        let mut probed = false;
+        for index in 0..self.motion.monitored.len() {
+            let m = self.motion.monitored[index];
+            let (value, rate) = self.detector.right[index];
+            let is_polynomial = m.affine && matches!(m.function, EventFunction::Surface(_));
+            if m.deflation.is_some() {
+                let step = (self.t, &self.x[..], self.stepper.end());
+                let noise = self
+                    .detector
+                    .noise(self.system, &self.motion, m.function, step)?;
+                self.motion.monitored[index].noise = noise;
             }
-        }
-        for index in 0..motion.monitored.len() {
-            let m = motion.monitored[index];
-            let (value, rate) = detector.right[index];
-            let suspect = match (m.function, m.deflation) {
-                (EventFunction::Surface(_), None) if m.affine => {
+            let is_cleared = if is_polynomial {
+                None
+            } else {
+                self.prove_clear(index, value)
+            };
+            let suspect = match (m.function, m.deflation, is_cleared) {
+                (_, _, Some(cleared)) => !cleared,
+                (EventFunction::Surface(_), None, _) if m.affine => {
                     may_vanish(m.value, m.rate * dt, value, rate * dt)
                 }
-                (EventFunction::Surface(j), None) => {
-                    let probes = [0, 1].map(|k| (PROBES[k], m.orientation * detector.probed[k][j]));
+                (EventFunction::Surface(j), None, _) => {
+                    if !probed {
+                        self.probe_surfaces(dt)?;
+                        probed = true;
+                    }
+                    let at = &self.detector.probed;
+                    let probes = [0, 1].map(|k| (PROBES[k], m.orientation * at[k][j]));
                     may_vanish_bent(m.value, m.rate * dt, value, rate * dt, &probes)
                 }
-                (EventFunction::Surface(_), Some(deflation)) => {
-                    let step = (self.t, &self.x[..], self.stepper.end());
-                    motion.monitored[index].noise =
-                        detector.noise(self.system, motion, m.function, step)?;
+                (EventFunction::Surface(_), Some(deflation), _) => {
                     let at_start = deflation.order == 1 && deflation.t == self.t && m.affine;
                     !at_start || may_vanish_deflated(deflation.leading * dt, value, rate * dt)
                 }
-                (EventFunction::ExitMinus, None) => may_vanish_between(&detector.stages[0]),
-                (EventFunction::ExitPlus, None) => may_vanish_between(&detector.stages[1]),
-                (_, Some(_)) => true,
+                (EventFunction::ExitMinus, None, _) => may_vanish_between(&self.detector.stages[0]),
+                (EventFunction::ExitPlus, None, _) => may_vanish_between(&self.detector.stages[1]),
+                (_, Some(_), _) => true,
             };
             if suspect {
-                detector.suspects.push(index);
+                self.detector.suspects.push(index);
             }
+        }
+        Ok(())
+    }
+
+    /// Do bounds over the step prove that a function has no zero in it? `None`: there are no bounds.
+    fn prove_clear(&self, index: usize, value_at_end: f64) -> Option<bool> {
+        let m = self.motion.monitored[index];
+        let curve = BoundedCurve {
+            system: self.system,
+            interpolant: self.stepper.interpolant(),
+            signs: &self.motion.signs,
+            sliding: self.motion.sliding(),
+            margin: &self.detector.margin,
+            monitored: m,
+        };
+        // Next to a zero that is divided out the function itself may only rise.
+        let at_start = if m.deflation.is_some() {
+            f64::INFINITY
+        } else {
+            m.value
+        };
+        is_clear(
+            &mut |a, b| curve.over(a, b),
+            at_start,
+            value_at_end,
+            m.noise,
+            PROOF_DEPTH,
+        )
+    }
+
+    /// How far the motion lies beside the continuous extension, from the probes of the step.
+    fn measure_margin(&mut self, dt: f64) -> Result<(), FieldError> {
+        let Detector { margin, x, .. } = &mut self.detector;
+        margin.clear();
+        let is_curved = self
+            .motion
+            .sliding()
+            .is_some_and(|j| !self.system.is_affine(j));
+        if !is_curved {
+            return Ok(());
+        }
+        margin.resize(x.len(), 0.0);
+        let mut moved = x.clone();
+        for theta in PROBES {
+            self.stepper.interpolant().at(theta, x);
+            moved.copy_from_slice(x);
+            self.motion.project(self.t + theta * dt, &mut moved)?;
+            for ((margin, x), moved) in margin.iter_mut().zip(&*x).zip(&moved) {
+                *margin = margin.max(MARGIN * (moved - x).abs());
+            }
+        }
+        Ok(())
+    }
+
+    /// All switching functions at the probes of the step.
+    fn probe_surfaces(&mut self, dt: f64) -> Result<(), FieldError> {
+        for (theta, h) in PROBES.into_iter().zip(&mut self.detector.probed) {
+            self.stepper.interpolant().at(theta, &mut self.detector.x);
+            let t = self.t + theta * dt;
+            self.system
+                .surfaces(t, &self.detector.x, &self.motion.signs, h)?;
+            self.stats.n_surface_evaluations += 1;
         }
         Ok(())
     }
@@ -256,10 +329,20 @@ impl Integrator<'_> {
             }
             _ => None,
         };
+        let interpolant = self.stepper.interpolant();
+        let bounds = BoundedCurve {
+            system: self.system,
+            interpolant,
+            signs: &self.motion.signs,
+            sliding: self.motion.sliding(),
+            margin: &self.detector.margin,
+            monitored: m,
+        };
         let mut curve = Curve {
             system: self.system,
-            motion: &mut self.motion,
-            interpolant: self.stepper.interpolant(),
+            field: &mut self.motion.field,
+            signs: &self.motion.signs,
+            interpolant,
             h: &mut self.detector.h,
             x: &mut self.detector.x,
             exits: &mut self.detector.exits,
@@ -283,14 +366,20 @@ impl Integrator<'_> {
                 _ => g(theta)?,
             };
         }
-        // Along the step an affine surface is a quintic; the quartic and its remainder describe it.
-        let probes = match (m.function, m.affine) {
-            (EventFunction::Surface(_), true) => &PROBES[..0],
-            (EventFunction::Surface(_), false) => &PROBES[..],
-            _ => &PROBES[..1],
+        let mut over = |a, b| bounds.over(a, b);
+        let is_bounded = polynomial.is_none() && over(from, to).is_some();
+        let evidence = match (m.function, is_bounded) {
+            (_, true) => Evidence::Bounds {
+                bounds: &mut over,
+                divided: m.deflation.is_some(),
+            },
+            // Along the step an affine surface is a quintic; the quartic and its remainder describe it.
+            (EventFunction::Surface(_), _) if m.affine => Evidence::Probes(&[]),
+            (EventFunction::Surface(_), _) => Evidence::Probes(&PROBES),
+            _ => Evidence::Probes(&PROBES[..1]),
         };
-        let isolated = first_zero_sampled(&mut g, from, to, values, noise, probes)?;
-        self.detector.unresolved |= isolated.depth > RESOLVED_DEPTH;
+        let isolated = first_zero_sampled(&mut g, from, to, values, noise, evidence)?;
+        self.detector.unresolved |= isolated.depth > RESOLVED_DEPTH && !is_bounded;
         self.detector.uncertain |= isolated.exhausted || isolated.not_finite;
         match isolated.zero {
             None => Ok(None),

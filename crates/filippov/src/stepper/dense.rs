@@ -47,6 +47,26 @@ impl Interpolant {
         evaluate(&self.coefficients, self.n, theta, y);
     }
 
+    /// The coefficients d0, .., d5 of component `i` in powers of theta - `centre`.
+    pub fn expanded(&self, i: usize, centre: f64) -> [f64; 6] {
+        let r = |k: usize| self.coefficients[k * self.n + i];
+        let mut d = [
+            r(0),
+            r(1) + r(2),
+            r(3) + r(4) - r(2),
+            r(5) - r(3) - 2.0 * r(4),
+            r(4) - 2.0 * r(5),
+            r(5),
+        ];
+        // Horner's scheme, once for every derivative.
+        for first in 0..5 {
+            for k in (first..5).rev() {
+                d[k] += centre * d[k + 1];
+            }
+        }
+        d
+    }
+
     /// Writes the derivative of the state in t at theta.
     pub fn derivative(&self, theta: f64, dy: &mut [f64]) {
         let n = self.n;

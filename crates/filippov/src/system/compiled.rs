@@ -2,7 +2,9 @@
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use filippov_expr::{Backend, ExprError, Gradient, Graph, Names, NodeId, Program};
+use filippov_expr::{
+    Backend, EnclosureProgram, ExprError, Gradient, Graph, Names, NodeId, Program,
+};
 use rustc_hash::FxHashMap;
 
 use super::tiered::{compile, TieredProgram};
@@ -21,6 +23,8 @@ pub(super) struct Model {
     pub affine: Vec<bool>,
     gradients: Vec<OnceLock<CompiledGradient>>,
     both_sides: Vec<OnceLock<TieredProgram>>,
+    enclosed_surfaces: Vec<OnceLock<Option<EnclosureProgram>>>,
+    enclosed_components: Vec<OnceLock<Option<EnclosureProgram>>>,
     lie: Mutex<LieCache>,
     /// Active surfaces of the modes met so far; a zero entry is the surface slid on.
     activity: Mutex<FxHashMap<Vec<i8>, Vec<bool>>>,
@@ -72,6 +76,8 @@ impl Model {
             affine: surfaces.iter().map(|&h| graph.is_affine(h)).collect(),
             gradients: surfaces.iter().map(|_| OnceLock::new()).collect(),
             both_sides: surfaces.iter().map(|_| OnceLock::new()).collect(),
+            enclosed_surfaces: surfaces.iter().map(|_| OnceLock::new()).collect(),
+            enclosed_components: surfaces.iter().map(|_| OnceLock::new()).collect(),
             lie: Mutex::new(LieCache::default()),
             activity: Mutex::default(),
             rates_program: OnceLock::new(),
@@ -118,6 +124,41 @@ impl Model {
             TieredProgram::new(graph, outputs, self.backend)
         });
         both.program()
+    }
+
+    /// Bounds of h_j along a motion.
+    pub fn enclosed_surface(&self, j: usize) -> Option<&EnclosureProgram> {
+        let program = self.enclosed_surfaces[j].get_or_init(|| {
+            EnclosureProgram::compile(&self.graph, &[self.graph.surface(j as u32)]).ok()
+        });
+        program.as_ref()
+    }
+
+    /// Bounds of the normal components of f- and f+ at surface `j` along a motion.
+    pub fn enclosed_normal_components(&self, j: usize) -> Option<&EnclosureProgram> {
+        let program = self.enclosed_components[j].get_or_init(|| {
+            let mut graph = self.graph.clone();
+            let components = [-1.0, 1.0].map(|side| self.normal_component(&mut graph, j, side));
+            EnclosureProgram::compile(&graph, &components).ok()
+        });
+        program.as_ref()
+    }
+
+    /// dh_j/dt along the field with sign `side` at surface `j`, from the components of the field that matter.
+    fn normal_component(&self, graph: &mut Graph, j: usize, side: f64) -> NodeId {
+        let mut signs = vec![None; graph.n_surfaces()];
+        signs[j] = Some(side);
+        let Gradient { time, states } = graph.gradient(graph.surface(j as u32));
+        let moving: Vec<NodeId> = states
+            .iter()
+            .map(|(i, _)| self.field[*i as usize])
+            .collect();
+        let field = graph.at_signs(&moving, &signs);
+        let terms = states.iter().zip(field);
+        terms.fold(time, |sum, (&(_, partial), velocity)| {
+            let term = graph.mul(partial, velocity);
+            graph.add(sum, term)
+        })
     }
 
     pub fn gradient(&self, j: usize) -> &CompiledGradient {

@@ -14,6 +14,8 @@ pub use both_sides::BothSides;
 pub use closures::ClosureSystem;
 pub use traced::TracedSystem;
 
+use filippov_expr::{Enclosure, Motion};
+
 use crate::error::FieldError;
 use crate::tolerances::EPS;
 
@@ -143,6 +145,25 @@ pub trait PiecewiseSystem: Sync {
     fn is_affine(&self, j: usize) -> bool {
         let _ = j;
         false
+    }
+
+    /// Rigorous bounds of h_j and of its rate along a piece of motion; `None` if the system cannot say,
+    /// and zeros are then found by sampling.
+    fn enclose_surface(&self, j: usize, motion: &dyn Motion, signs: &[f64]) -> Option<Enclosure> {
+        let _ = (j, motion, signs);
+        None
+    }
+
+    /// Rigorous bounds of the normal components of f- and f+ at h_j, and of their rates, along a piece of
+    /// motion on that surface; `None` if the system cannot say.
+    fn enclose_normal_components(
+        &self,
+        j: usize,
+        motion: &dyn Motion,
+        signs: &[f64],
+    ) -> Option<[Enclosure; 2]> {
+        let _ = (j, motion, signs);
+        None
     }
 
     /// The Lie derivative L_{f^w_k} ... L_{f^w_1} h_i, where f^w is the field with entry `j` of the

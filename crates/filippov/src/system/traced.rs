@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use filippov_expr::{Backend, ExprError, Graph, Names, NodeId};
+use filippov_expr::{Backend, Enclosure, ExprError, Graph, Motion, Names, NodeId};
 
 use super::compiled::{GradientValues, Model};
 use super::{BothSides, LieValue, PiecewiseSystem, Word};
@@ -186,6 +186,25 @@ impl PiecewiseSystem for TracedSystem {
 
     fn is_affine(&self, j: usize) -> bool {
         self.model.affine[j]
+    }
+
+    fn enclose_surface(&self, j: usize, motion: &dyn Motion, signs: &[f64]) -> Option<Enclosure> {
+        let mut out = [Enclosure::UNKNOWN];
+        let program = self.model.enclosed_surface(j)?;
+        program.eval(motion, signs, &self.parameters, &mut out);
+        Some(out[0])
+    }
+
+    fn enclose_normal_components(
+        &self,
+        j: usize,
+        motion: &dyn Motion,
+        signs: &[f64],
+    ) -> Option<[Enclosure; 2]> {
+        let mut out = [Enclosure::UNKNOWN; 2];
+        let program = self.model.enclosed_normal_components(j)?;
+        program.eval(motion, signs, &self.parameters, &mut out);
+        Some(out)
     }
 
     fn lie_derivative(

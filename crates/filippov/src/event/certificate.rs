@@ -1,0 +1,101 @@
+//! The certificate: what bounds of a function along a piece of a step say about its zeros.
+
+use filippov_expr::{Enclosure, Interval};
+
+use crate::tolerances::HUGGING;
+
+/// Bounds of a monitored function over a piece of a step.
+#[derive(Clone, Copy, Debug)]
+pub struct Bound {
+    /// Of the function, in the sense of the mode: positive inside.
+    pub value: Interval,
+    /// Of its derivative in theta.
+    pub slope: Interval,
+}
+
+/// What the bounds prove about a piece.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// There is no zero.
+    Clear,
+    /// The function rises throughout.
+    Rising,
+    /// The function falls throughout.
+    Falling,
+    /// Nothing, but shorter pieces may be decided.
+    Open,
+    /// Nothing: the function is not known to be finite. Shorter pieces may be decided.
+    Unbounded,
+    /// Nothing: there are no bounds, or the function is too near to zero for them all along.
+    Unavailable,
+}
+
+/// Bounds of a function on the piece from one theta to another.
+pub type Bounds<'a> = &'a mut dyn FnMut(f64, f64) -> Option<Bound>;
+
+impl Bound {
+    /// From the enclosure in time of a function that is positive inside of the mode after
+    /// multiplication by `orientation`.
+    pub fn new(enclosure: Enclosure, orientation: f64, dt: f64) -> Self {
+        Bound {
+            value: enclosure.value.scaled(orientation),
+            slope: enclosure.rate.scaled(orientation * dt),
+        }
+    }
+
+    /// What is proved about a piece of this length; `middle` is the value in its middle, if known.
+    pub fn verdict(&self, length: f64, middle: Option<f64>, noise: f64) -> Verdict {
+        let Bound { value, slope } = *self;
+        if !value.is_bounded() {
+            return Verdict::Unbounded;
+        }
+        if value.lo > noise {
+            return Verdict::Clear;
+        }
+        if slope.lo > 0.0 {
+            return Verdict::Rising;
+        }
+        if slope.hi < 0.0 {
+            return Verdict::Falling;
+        }
+        let steepest = slope.hi.max(-slope.lo);
+        if middle.is_some_and(|middle| middle - 0.5 * length * steepest > noise) {
+            return Verdict::Clear;
+        }
+        if value.hi.max(-value.lo) <= HUGGING * noise {
+            return Verdict::Unavailable;
+        }
+        Verdict::Open
+    }
+}
+
+/// Is a function that is `left` > 0 and `right` at the ends of a step proved to be free of zeros in it?
+/// `None`: there are no bounds. Halves the step up to `depth` times.
+pub fn is_clear(bounds: Bounds, left: f64, right: f64, noise: f64, depth: u32) -> Option<bool> {
+    let ends = (Some(left), Some(right));
+    is_clear_between(bounds, (0.0, 1.0), ends, noise, depth)
+}
+
+fn is_clear_between(
+    bounds: Bounds,
+    (a, b): (f64, f64),
+    (left, right): (Option<f64>, Option<f64>),
+    noise: f64,
+    depth: u32,
+) -> Option<bool> {
+    let above = |value: Option<f64>| value.is_some_and(|value| value > noise);
+    match bounds(a, b)?.verdict(b - a, None, noise) {
+        Verdict::Clear => Some(true),
+        Verdict::Rising if above(left) => Some(true),
+        Verdict::Falling if above(right) => Some(true),
+        _ if depth == 0 || !above(left.or(right)) => Some(false),
+        _ => {
+            let m = 0.5 * (a + b);
+            let first = is_clear_between(bounds, (a, m), (left, None), noise, depth - 1)?;
+            if !first {
+                return Some(false);
+            }
+            is_clear_between(bounds, (m, b), (None, right), noise, depth - 1)
+        }
+    }
+}
