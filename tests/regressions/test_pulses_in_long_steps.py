@@ -43,6 +43,52 @@ def test_single_pulse_along_a_constant_speed(width: float) -> None:
     assert lost == []
 
 
+@pytest.mark.parametrize("width", [1.0, 0.1, 0.01, 1e-3])
+def test_blow_on_a_stuck_mass(width: float) -> None:
+    """Sliding is left, and entered again, by a force that the sliding field does not see at all."""
+    lost = []
+    for centre in np.linspace(4, 7, 11):
+
+        def field(t: float, x: Any, c: float = centre) -> Any:
+            return [-np.sign(x[0]) + 2 * np.exp(-(((t - c) / width) ** 2))]
+
+        sol = fl.solve_ivp(field, (0, 10), [1.0])
+        if [switch.kind for switch in sol.switches] != ["enter_sliding", "exit_sliding", "enter_sliding"]:
+            lost.append(round(float(centre), 3))
+        else:
+            # The force exceeds friction from centre - width sqrt(log 2) on.
+            assert sol.switches[1].t == pytest.approx(centre - width * math.sqrt(math.log(2)), abs=1e-9)
+    assert lost == []
+
+
+@pytest.mark.parametrize("width", [0.3, 0.03, 0.003])
+def test_gate_while_sliding_on_a_curve(width: float) -> None:
+    """A pulse in time while the motion slides along the unit circle."""
+    for centre in np.linspace(1, 5, 5):
+
+        def field(t: float, x: Any, c: float = centre) -> Any:
+            inwards = np.sign(x[0] ** 2 + x[1] ** 2 - 1)
+            gate = np.sign(1 / (1 + ((t - c) / width) ** 2) - 0.5)
+            return [-x[1] - x[0] * inwards, x[0] - x[1] * inwards, gate]
+
+        sol = fl.solve_ivp(field, (0, 6), [2.0, 0.0, 0.0])
+        assert [switch.kind for switch in sol.switches].count("crossing") == 2
+        crossings = [switch.t for switch in sol.switches if switch.kind == "crossing"]
+        np.testing.assert_allclose(crossings, [centre - width, centre + width], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("width", [1.0, 0.1, 0.01])
+def test_event_of_the_user_in_a_long_step(width: float) -> None:
+    for centre in np.linspace(2, 8, 7):
+        sol = fl.solve_ivp(
+            lambda t, x: [1.0],
+            (0, 10),
+            [0.0],
+            events=lambda t, x, c=centre: 1 / (1 + ((x[0] - c) / width) ** 2) - 0.5,
+        )
+        np.testing.assert_allclose(sol.t_events[0], [centre - width, centre + width], rtol=0, atol=1e-9)
+
+
 # 6 of the first 1000 cases of test_adversarial.test_sum_of_two_frequencies.
 @pytest.mark.parametrize("seed", [287, 347, 438, 701, 835, 858])
 def test_shallow_pair_of_a_sum_of_two_frequencies(seed: int) -> None:

@@ -115,30 +115,30 @@ impl Enclosure {
     fn slope(self, op: UnaryOp, value: Interval) -> Interval {
         let one = Interval::point(1.0);
         let a = self.value;
-        let root = |square: Interval| one.div(square.unary(UnaryOp::Sqrt));
+        let root = |square: Interval| one / square.unary(UnaryOp::Sqrt);
         match op {
             UnaryOp::Neg => Interval::point(-1.0),
-            UnaryOp::Sqrt => Interval::point(0.5).div(value),
-            UnaryOp::Cbrt => Interval::point(1.0 / 3.0).div(value.square()),
+            UnaryOp::Sqrt => Interval::point(0.5) / value,
+            UnaryOp::Cbrt => Interval::point(1.0 / 3.0) / value.square(),
             UnaryOp::Exp => value,
             UnaryOp::Expm1 => a.unary(UnaryOp::Exp),
             UnaryOp::Exp2 => value.scaled(std::f64::consts::LN_2),
-            UnaryOp::Log => one.div(a),
-            UnaryOp::Log1p => one.div(one.add(a)),
-            UnaryOp::Log2 => Interval::point(std::f64::consts::LOG2_E).div(a),
-            UnaryOp::Log10 => Interval::point(std::f64::consts::LOG10_E).div(a),
+            UnaryOp::Log => one / a,
+            UnaryOp::Log1p => one / (one + a),
+            UnaryOp::Log2 => Interval::point(std::f64::consts::LOG2_E) / a,
+            UnaryOp::Log10 => Interval::point(std::f64::consts::LOG10_E) / a,
             UnaryOp::Sin => a.unary(UnaryOp::Cos),
-            UnaryOp::Cos => a.unary(UnaryOp::Sin).neg(),
-            UnaryOp::Tan => one.add(value.square()),
-            UnaryOp::Asin => root(one.sub(a.square())),
-            UnaryOp::Acos => root(one.sub(a.square())).neg(),
-            UnaryOp::Atan => one.div(one.add(a.square())),
+            UnaryOp::Cos => -a.unary(UnaryOp::Sin),
+            UnaryOp::Tan => one + value.square(),
+            UnaryOp::Asin => root(one - a.square()),
+            UnaryOp::Acos => -root(one - a.square()),
+            UnaryOp::Atan => one / (one + a.square()),
             UnaryOp::Sinh => a.unary(UnaryOp::Cosh),
             UnaryOp::Cosh => a.unary(UnaryOp::Sinh),
-            UnaryOp::Tanh => one.div(a.unary(UnaryOp::Cosh).square()),
-            UnaryOp::Asinh => root(one.add(a.square())),
-            UnaryOp::Acosh => root(a.square().sub(one)),
-            UnaryOp::Atanh => one.div(one.sub(a.square())),
+            UnaryOp::Tanh => one / a.unary(UnaryOp::Cosh).square(),
+            UnaryOp::Asinh => root(one + a.square()),
+            UnaryOp::Acosh => root(a.square() - one),
+            UnaryOp::Atanh => one / (one - a.square()),
         }
     }
 }
@@ -153,7 +153,7 @@ impl Number for Enclosure {
         let rate = if self.rate.is_zero() {
             Interval::ZERO
         } else {
-            self.slope(op, value).mul(self.rate)
+            self.slope(op, value) * self.rate
         };
         Enclosure { value, rate }
     }
@@ -161,7 +161,7 @@ impl Number for Enclosure {
     fn square(self) -> Self {
         Enclosure {
             value: self.value.square(),
-            rate: self.value.mul(self.rate).scaled(2.0),
+            rate: (self.value * self.rate).scaled(2.0),
         }
     }
 
@@ -169,17 +169,17 @@ impl Number for Enclosure {
         let value = self.value.binary(op, b.value);
         let (da, db) = (self.rate, b.rate);
         let rate = match op {
-            BinaryOp::Add => da.add(db),
-            BinaryOp::Sub => da.sub(db),
-            BinaryOp::Mul => da.mul(b.value).add(self.value.mul(db)),
+            BinaryOp::Add => da + db,
+            BinaryOp::Sub => da - db,
+            BinaryOp::Mul => da * b.value + self.value * db,
             _ if da.is_zero() && db.is_zero() => Interval::ZERO,
-            BinaryOp::Div => da.sub(value.mul(db)).div(b.value),
+            BinaryOp::Div => (da - value * db) / b.value,
             BinaryOp::Pow => power_rate(self, b, value),
             BinaryOp::Atan2 => {
-                let radius = self.value.square().add(b.value.square());
-                da.mul(b.value).sub(self.value.mul(db)).div(radius)
+                let radius = self.value.square() + b.value.square();
+                (da * b.value - self.value * db) / radius
             }
-            BinaryOp::Hypot => self.value.mul(da).add(b.value.mul(db)).div(value),
+            BinaryOp::Hypot => (self.value * da + b.value * db) / value,
         };
         Enclosure { value, rate }
     }
@@ -188,12 +188,10 @@ impl Number for Enclosure {
 /// The rate of a^b, which is `value`: b a^(b-1) a' + a^b log(a) b'.
 fn power_rate(a: Enclosure, b: Enclosure, value: Interval) -> Interval {
     let one = Interval::point(1.0);
-    let by_base = b
-        .value
-        .mul(a.value.binary(BinaryOp::Pow, b.value.sub_exactly(one)))
-        .mul(a.rate);
+    let lower = a.value.binary(BinaryOp::Pow, b.value.sub_exactly(one));
+    let by_base = b.value * lower * a.rate;
     if b.rate.is_zero() {
         return by_base;
     }
-    by_base.add(value.mul(a.value.unary(UnaryOp::Log)).mul(b.rate))
+    by_base + value * a.value.unary(UnaryOp::Log) * b.rate
 }

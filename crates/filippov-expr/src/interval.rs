@@ -1,5 +1,7 @@
 //! Intervals: a set of numbers that is known to contain a value.
 
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
 use crate::op::{BinaryOp, UnaryOp};
 
 /// The numbers from `lo` to `hi`. An end that is infinite or NaN means that nothing is known.
@@ -72,7 +74,7 @@ impl Interval {
     /// The numbers times a factor.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
-        self.mul(Interval::point(factor))
+        self * Interval::point(factor)
     }
 
     fn outwards(self, relative: f64) -> Self {
@@ -94,22 +96,6 @@ impl Interval {
         }
     }
 
-    /// a + b.
-    #[must_use]
-    pub fn add(self, b: Self) -> Self {
-        Interval {
-            lo: self.lo + b.lo,
-            hi: self.hi + b.hi,
-        }
-        .outwards(f64::EPSILON)
-    }
-
-    /// a - b.
-    #[must_use]
-    pub fn sub(self, b: Self) -> Self {
-        self.add(b.neg())
-    }
-
     /// a - b for single numbers without rounding outwards, so that an integer stays one.
     #[must_use]
     pub(crate) fn sub_exactly(self, b: Self) -> Self {
@@ -118,43 +104,6 @@ impl Interval {
             hi: self.hi - b.lo,
         }
         .checked()
-    }
-
-    /// -a.
-    #[must_use]
-    pub fn neg(self) -> Self {
-        Interval {
-            lo: -self.hi,
-            hi: -self.lo,
-        }
-    }
-
-    /// a b.
-    #[must_use]
-    pub fn mul(self, b: Self) -> Self {
-        if self.is_zero() && b.is_bounded() || b.is_zero() && self.is_bounded() {
-            return Interval::ZERO;
-        }
-        let products = [
-            self.lo * b.lo,
-            self.lo * b.hi,
-            self.hi * b.lo,
-            self.hi * b.hi,
-        ];
-        Interval::spanning(products, f64::EPSILON)
-    }
-
-    /// a / b; nothing is known where b may vanish.
-    #[must_use]
-    pub fn div(self, b: Self) -> Self {
-        if b.contains_zero() {
-            return Interval::ALL;
-        }
-        let inverse = Interval {
-            lo: 1.0 / b.hi,
-            hi: 1.0 / b.lo,
-        };
-        self.mul(inverse.outwards(f64::EPSILON))
     }
 
     /// a^2.
@@ -183,14 +132,14 @@ impl Interval {
     pub fn unary(self, op: UnaryOp) -> Self {
         use UnaryOp::{
             Acos, Acosh, Asin, Asinh, Atan, Atanh, Cbrt, Cos, Cosh, Exp, Exp2, Expm1, Log, Log10,
-            Log1p, Log2, Neg, Sin, Sinh, Sqrt, Tan, Tanh,
+            Log1p, Log2, Sin, Sinh, Sqrt, Tan, Tanh,
         };
         if !self.is_bounded() {
             // The operand may be NaN: a bound of its sine would hide that.
             return Interval::ALL;
         }
         match op {
-            Neg => self.neg(),
+            UnaryOp::Neg => -self,
             Sin => self.sine(),
             Cos => self.cosine(),
             Tan => self.tangent(),
@@ -213,10 +162,10 @@ impl Interval {
             return Interval::ALL;
         }
         match op {
-            BinaryOp::Add => self.add(b),
-            BinaryOp::Sub => self.sub(b),
-            BinaryOp::Mul => self.mul(b),
-            BinaryOp::Div => self.div(b),
+            BinaryOp::Add => self + b,
+            BinaryOp::Sub => self - b,
+            BinaryOp::Mul => self * b,
+            BinaryOp::Div => self / b,
             BinaryOp::Pow => self.power(b),
             BinaryOp::Atan2 => self.angle(b),
             BinaryOp::Hypot => {
@@ -285,7 +234,7 @@ impl Interval {
         if n == exponent.hi && n.fract() == 0.0 {
             let (low, high) = self.magnitudes();
             if n < 0.0 {
-                return Interval::point(1.0).div(self.power(Interval::point(-n)));
+                return Interval::point(1.0) / self.power(Interval::point(-n));
             }
             let even = (0.5 * n).fract() == 0.0;
             return if even {
@@ -319,5 +268,69 @@ impl Interval {
             self.hi.atan2(x.hi),
         ];
         Interval::spanning(corners, LIBRARY)
+    }
+}
+
+impl Add for Interval {
+    type Output = Self;
+
+    fn add(self, b: Self) -> Self {
+        Interval {
+            lo: self.lo + b.lo,
+            hi: self.hi + b.hi,
+        }
+        .outwards(f64::EPSILON)
+    }
+}
+
+impl Sub for Interval {
+    type Output = Self;
+
+    fn sub(self, b: Self) -> Self {
+        self + -b
+    }
+}
+
+impl Mul for Interval {
+    type Output = Self;
+
+    fn mul(self, b: Self) -> Self {
+        if self.is_zero() && b.is_bounded() || b.is_zero() && self.is_bounded() {
+            return Interval::ZERO;
+        }
+        let products = [
+            self.lo * b.lo,
+            self.lo * b.hi,
+            self.hi * b.lo,
+            self.hi * b.hi,
+        ];
+        Interval::spanning(products, f64::EPSILON)
+    }
+}
+
+impl Div for Interval {
+    type Output = Self;
+
+    /// Nothing is known where b may vanish.
+    fn div(self, b: Self) -> Self {
+        if b.contains_zero() {
+            return Interval::ALL;
+        }
+        let inverse = Interval {
+            lo: 1.0 / b.hi,
+            hi: 1.0 / b.lo,
+        };
+        self * inverse.outwards(f64::EPSILON)
+    }
+}
+
+impl Neg for Interval {
+    type Output = Self;
+
+    fn neg(self) -> Self {
+        Interval {
+            lo: -self.hi,
+            hi: -self.lo,
+        }
     }
 }

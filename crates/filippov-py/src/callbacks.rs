@@ -1,7 +1,11 @@
 //! Systems and events whose functions are Python callables.
 
+use std::sync::Arc;
+
 use filippov::{FieldError, PiecewiseSystem, UserFunction};
-use filippov_expr::Program;
+use filippov_expr::{
+    Backend, Enclosure, EnclosureProgram, ExprError, Graph, Motion, NodeId, Program,
+};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 
@@ -119,18 +123,42 @@ impl UserFunction for CalledEvent {
     }
 }
 
-/// A user's event as a compiled expression.
+/// The expression of a user's event, to be evaluated at points and enclosed along motions.
+pub struct EventExpression {
+    program: Program,
+    enclosing: EnclosureProgram,
+}
+
+impl EventExpression {
+    pub fn compile(graph: &Graph, node: NodeId) -> Result<Self, ExprError> {
+        Ok(EventExpression {
+            program: Program::compile(graph, &[node], Backend::Auto)?,
+            enclosing: EnclosureProgram::compile(graph, &[node])?,
+        })
+    }
+}
+
+/// A user's event as a compiled expression. Expressions with switches of their own are not compiled as
+/// events, so no signs are needed.
 pub struct CompiledEvent {
-    pub program: std::sync::Arc<Program>,
+    pub expression: Arc<EventExpression>,
     pub parameters: Vec<f64>,
 }
 
 impl UserFunction for CompiledEvent {
     fn value(&self, t: f64, x: &[f64]) -> Result<f64, FieldError> {
         let mut out = [0.0];
-        // Expressions with switches of their own are not compiled as events, so no signs are needed.
-        self.program
+        self.expression
+            .program
             .eval(t, x, &[], &self.parameters, &[], &mut out);
         Ok(out[0])
+    }
+
+    fn enclose(&self, motion: &dyn Motion) -> Option<Enclosure> {
+        let mut out = [Enclosure::UNKNOWN];
+        self.expression
+            .enclosing
+            .eval(motion, &[], &self.parameters, &mut out);
+        Some(out[0])
     }
 }

@@ -48,12 +48,12 @@ pub fn solve(
         let handle: Option<usize> = g.extract(py).ok();
         let function: Box<dyn UserFunction + Send + Sync> = match (handle, traced) {
             (Some(handle), Some(traced)) => {
-                let program = traced
+                let expression = traced
                     .get()
-                    .event_program(handle)
+                    .event_expression(handle)
                     .ok_or_else(|| PyValueError::new_err(format!("no event {handle}")))?;
                 Box::new(CompiledEvent {
-                    program,
+                    expression,
                     parameters: parameters.clone(),
                 })
             }

@@ -4,14 +4,14 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use filippov::field::{SlidingField, SmoothField};
 use filippov::{FieldError, PiecewiseSystem};
-use filippov_expr::{Backend, Graph, Names, NodeId, Program};
+use filippov_expr::{Backend, Graph, Names, NodeId};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::builder::Builder;
-use crate::callbacks::{Opaque, Signed, Surfaces};
+use crate::callbacks::{EventExpression, Opaque, Signed, Surfaces};
 
 type Array<'py> = PyReadonlyArray1<'py, f64>;
 type Output<'py> = Bound<'py, PyArray1<f64>>;
@@ -101,7 +101,7 @@ pub struct TracedSystem {
     pub system: filippov::TracedSystem,
     /// Kept for events, which are traced after the system into the same graph.
     builder: Option<Py<Builder>>,
-    events: Mutex<Vec<Arc<Program>>>,
+    events: Mutex<Vec<Arc<EventExpression>>>,
 }
 
 impl TracedSystem {
@@ -122,7 +122,7 @@ impl TracedSystem {
     }
 
     /// The event with this handle.
-    pub fn event_program(&self, handle: usize) -> Option<Arc<Program>> {
+    pub fn event_expression(&self, handle: usize) -> Option<Arc<EventExpression>> {
         self.events
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
@@ -239,10 +239,11 @@ impl TracedSystem {
             })?
             .borrow(py);
         let graph = builder.graph();
-        let program = Program::compile(&graph, &[Builder::node(&graph, node)?], Backend::Auto)
+        let node = Builder::node(&graph, node)?;
+        let event = EventExpression::compile(&graph, node)
             .map_err(|e| PyValueError::new_err(e.to_string()))?;
         let mut events = self.events.lock().unwrap_or_else(PoisonError::into_inner);
-        events.push(Arc::new(program));
+        events.push(Arc::new(event));
         Ok(events.len() - 1)
     }
 

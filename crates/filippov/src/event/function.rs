@@ -1,5 +1,7 @@
 //! What is monitored.
 
+use filippov_expr::{Enclosure, Motion};
+
 use crate::error::FieldError;
 
 /// A function whose zeros end a piece of motion, or are reported.
@@ -89,6 +91,13 @@ pub trait UserFunction {
     /// # Errors
     /// If the function raises.
     fn value(&self, t: f64, x: &[f64]) -> Result<f64, FieldError>;
+
+    /// Rigorous bounds of g and of its rate along a piece of motion; `None` if there are none, and zeros
+    /// are then found by sampling.
+    fn enclose(&self, motion: &dyn Motion) -> Option<Enclosure> {
+        let _ = motion;
+        None
+    }
 }
 
 impl<F: Fn(f64, &[f64]) -> f64> UserFunction for F {

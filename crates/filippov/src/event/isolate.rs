@@ -65,12 +65,18 @@ pub struct Isolated {
 ///
 /// # Errors
 /// If `g` raises.
-pub fn first_zero(g: Sampled, a: f64, b: f64, noise: f64) -> Result<Isolated, FieldError> {
+pub fn first_zero(
+    g: Sampled,
+    a: f64,
+    b: f64,
+    noise: f64,
+    evidence: Evidence,
+) -> Result<Isolated, FieldError> {
     let mut values = [0.0; 5];
     for (i, value) in values.iter_mut().enumerate() {
         *value = g(a + (b - a) * 0.25 * i as f64)?;
     }
-    first_zero_sampled(g, a, b, values, noise, Evidence::Probes(&PROBES))
+    first_zero_sampled(g, a, b, values, noise, evidence)
 }
 
 /// What tells that the samples of a piece describe the function.

@@ -1,12 +1,20 @@
 //! Zeros found, not missed and not invented.
 
 use super::filter::may_vanish;
-use super::isolate::{first_zero, Zero};
+use super::isolate::{first_zero, Evidence, Zero, PROBES};
 use super::locate::refine;
 use proptest::prelude::*;
 
 fn find(g: impl Fn(f64) -> f64) -> Option<Zero> {
-    first_zero(&mut |x| Ok(g(x)), 0.0, 1.0, 1e-15).unwrap().zero
+    first_zero(
+        &mut |x| Ok(g(x)),
+        0.0,
+        1.0,
+        1e-15,
+        Evidence::Probes(&PROBES),
+    )
+    .unwrap()
+    .zero
 }
 
 #[test]

@@ -1,11 +1,12 @@
 //! The event stage of a step: the earliest zero of what the mode monitors.
 
-use super::bounds::BoundedCurve;
+use std::cell::Cell;
+
+use super::bounds::{BoundedCurve, Piece};
 use super::curve::{grazes, Curve};
 use super::integrator::Integrator;
 use super::motion::{ModeField, Motion};
 use crate::error::FieldError;
-use crate::event::certificate::is_clear;
 use crate::event::filter::{may_vanish, may_vanish_bent, may_vanish_between, may_vanish_deflated};
 use crate::event::isolate::{first_zero_sampled, Evidence, Zero, PROBES};
 use crate::event::locate::refine;
@@ -13,9 +14,7 @@ use crate::event::{EventFunction, Monitored};
 use crate::field::NormalComponents;
 use crate::stepper::nested;
 use crate::system::{dot, PiecewiseSystem};
-use crate::tolerances::{
-    EPS, EXTRAPOLATION, MARGIN, ONE_SIDED_AIM, POLE, PROOF_DEPTH, RESOLVED_DEPTH, SURFACE_NOISE,
-};
+use crate::tolerances::{EPS, EXTRAPOLATION, ONE_SIDED_AIM, POLE, RESOLVED_DEPTH, SURFACE_NOISE};
 
 /// Scratch space of the event stage, and values at the end of the step.
 pub(super) struct Detector {
@@ -34,9 +33,11 @@ pub(super) struct Detector {
     probed: [Vec<f64>; 2],
     rate: Vec<f64>,
     gradient: Vec<f64>,
-    x: Vec<f64>,
+    pub x: Vec<f64>,
     /// How far the projection onto a curved surface moves the extension in this step; else empty.
-    margin: Vec<f64>,
+    pub margin: Vec<f64>,
+    /// Bounds of the normal components over the last piece of the extension of this step.
+    pub enclosed_exits: Cell<Option<Piece>>,
     /// Value and rate at the end of the step, per monitored function.
     right: Vec<(f64, f64)>,
     /// Which monitored functions the filter could not clear.
@@ -68,6 +69,7 @@ impl Detector {
             gradient: vec![0.0; n],
             x: vec![0.0; n],
             margin: Vec::new(),
+            enclosed_exits: Cell::new(None),
             right: Vec::new(),
             suspects: Vec::new(),
         }
@@ -162,6 +164,8 @@ impl Integrator<'_> {
         self.detector.unresolved = false;
         self.detector.uncertain = false;
         self.detector.exits.clear();
+        self.detector.enclosed_exits.set(None);
+        self.detector.margin.clear();
         self.detector.next_dt = None;
         if self.motion.monitored.is_empty() {
             return Ok(None);
@@ -238,56 +242,6 @@ impl Integrator<'_> {
         Ok(())
     }
 
-    /// Do bounds over the step prove that a function has no zero in it? `None`: there are no bounds.
-    fn prove_clear(&self, index: usize, value_at_end: f64) -> Option<bool> {
-        let m = self.motion.monitored[index];
-        let curve = BoundedCurve {
-            system: self.system,
-            interpolant: self.stepper.interpolant(),
-            signs: &self.motion.signs,
-            sliding: self.motion.sliding(),
-            margin: &self.detector.margin,
-            monitored: m,
-        };
-        // Next to a zero that is divided out the function itself may only rise.
-        let at_start = if m.deflation.is_some() {
-            f64::INFINITY
-        } else {
-            m.value
-        };
-        is_clear(
-            &mut |a, b| curve.over(a, b),
-            at_start,
-            value_at_end,
-            m.noise,
-            PROOF_DEPTH,
-        )
-    }
-
-    /// How far the motion lies beside the continuous extension, from the probes of the step.
-    fn measure_margin(&mut self, dt: f64) -> Result<(), FieldError> {
-        let Detector { margin, x, .. } = &mut self.detector;
-        margin.clear();
-        let is_curved = self
-            .motion
-            .sliding()
-            .is_some_and(|j| !self.system.is_affine(j));
-        if !is_curved {
-            return Ok(());
-        }
-        margin.resize(x.len(), 0.0);
-        let mut moved = x.clone();
-        for theta in PROBES {
-            self.stepper.interpolant().at(theta, x);
-            moved.copy_from_slice(x);
-            self.motion.project(self.t + theta * dt, &mut moved)?;
-            for ((margin, x), moved) in margin.iter_mut().zip(&*x).zip(&moved) {
-                *margin = margin.max(MARGIN * (moved - x).abs());
-            }
-        }
-        Ok(())
-    }
-
     /// All switching functions at the probes of the step.
     fn probe_surfaces(&mut self, dt: f64) -> Result<(), FieldError> {
         for (theta, h) in PROBES.into_iter().zip(&mut self.detector.probed) {
@@ -303,6 +257,7 @@ impl Integrator<'_> {
     /// Raises the continuous extension to order 5.
     fn extend(&mut self, dt: f64) -> Result<(), FieldError> {
         self.stats.n_extensions += 1;
+        self.detector.enclosed_exits.set(None);
         self.stepper
             .extend_order5(&mut self.motion.field, self.t, &self.x, dt)?;
         Ok(())
@@ -336,7 +291,7 @@ impl Integrator<'_> {
             signs: &self.motion.signs,
             sliding: self.motion.sliding(),
             margin: &self.detector.margin,
-            monitored: m,
+            last: &self.detector.enclosed_exits,
         };
         let mut curve = Curve {
             system: self.system,
@@ -366,7 +321,7 @@ impl Integrator<'_> {
                 _ => g(theta)?,
             };
         }
-        let mut over = |a, b| bounds.over(a, b);
+        let mut over = |a, b| bounds.over(&m, a, b);
         let is_bounded = polynomial.is_none() && over(from, to).is_some();
         let evidence = match (m.function, is_bounded) {
             (_, true) => Evidence::Bounds {

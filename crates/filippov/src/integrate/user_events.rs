@@ -1,10 +1,14 @@
 //! Zeros of a user's own functions.
 
 use super::integrator::Integrator;
+use super::motion::Motion;
 use crate::error::FieldError;
-use crate::event::isolate::{first_zero, Zero};
+use crate::event::certificate::Bound;
+use crate::event::isolate::{first_zero, Evidence, Zero};
 use crate::event::locate::refine;
-use crate::event::UserEvent;
+use crate::event::tube::Tube;
+use crate::event::{UserEvent, UserFunction};
+use crate::stepper::Interpolant;
 use crate::tolerances::{EPS, MOST_ZEROS};
 
 /// A zero of a user's function.
@@ -108,12 +112,13 @@ impl Integrator<'_> {
     }
 
     fn user_value(&mut self, index: usize, theta: f64) -> Result<f64, FieldError> {
-        let interpolant = self.stepper.interpolant();
-        let t = interpolant.t0 + theta * interpolant.dt;
-        let mut y = vec![0.0; self.x.len()];
-        interpolant.at(theta, &mut y);
-        self.motion.project(t, &mut y)?;
-        self.user_events.events[index].function.value(t, &y)
+        let function = self.user_events.events[index].function;
+        value_along(
+            function,
+            self.stepper.interpolant(),
+            &mut self.motion,
+            theta,
+        )
     }
 
     /// All zeros in (0, theta], in no order. A function that is not finite has none in this step.
@@ -139,15 +144,26 @@ impl Integrator<'_> {
                     }
                 }
                 let limit = (theta - from) * 1e-7;
+                let function = self.user_events.events[index].function;
+                let (interpolant, motion) = (self.stepper.interpolant(), &mut self.motion);
                 let mut g = |at: f64| {
                     if !divided {
-                        return Ok(sign * self.user_value(index, at)?);
+                        return Ok(sign * value_along(function, interpolant, motion, at)?);
                     }
                     // The zero at the start is divided out; its limit is the difference quotient.
                     let away = (at - from).max(limit);
-                    Ok(sign * self.user_value(index, from + away)? / away)
+                    Ok(sign * value_along(function, interpolant, motion, from + away)? / away)
                 };
-                let isolated = first_zero(&mut g, from, theta, noise)?;
+                let margin = &self.detector.margin;
+                let mut bounds = |a: f64, b: f64| {
+                    let enclosure = function.enclose(&Tube::new(interpolant, (a, b), margin))?;
+                    Some(Bound::new(enclosure, sign, dt))
+                };
+                let evidence = Evidence::Bounds {
+                    bounds: &mut bounds,
+                    divided,
+                };
+                let isolated = first_zero(&mut g, from, theta, noise, evidence)?;
                 if isolated.exhausted && !isolated.not_finite {
                     return Ok(None);
                 }
@@ -171,4 +187,18 @@ impl Integrator<'_> {
         }
         Ok(Some(zeros))
     }
+}
+
+/// The value of a user's function along the motion.
+fn value_along(
+    function: &dyn UserFunction,
+    interpolant: &Interpolant,
+    motion: &mut Motion,
+    theta: f64,
+) -> Result<f64, FieldError> {
+    let t = interpolant.t0 + theta * interpolant.dt;
+    let mut y = vec![0.0; interpolant.n_states()];
+    interpolant.at(theta, &mut y);
+    motion.project(t, &mut y)?;
+    function.value(t, &y)
 }

@@ -37,6 +37,11 @@ impl Interpolant {
         [y0, r1, r2, r3, r4, r5]
     }
 
+    /// Number of states.
+    pub fn n_states(&self) -> usize {
+        self.n
+    }
+
     /// The coefficients, six rows of n.
     pub fn coefficients(&self) -> &[f64] {
         &self.coefficients
