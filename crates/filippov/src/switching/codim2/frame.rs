@@ -82,6 +82,24 @@ impl Frame {
         }
     }
 
+    /// Unscaled normal components at an intersection of two surfaces seen in this frame.
+    ///
+    /// # Errors
+    /// If there are not two surfaces.
+    pub fn fields(&self, fields: &NormalFields) -> Result<NormalFields, Undecided> {
+        if fields.m() != 2 {
+            return Err(Undecided::Shape {
+                m: fields.m(),
+                found: fields.values().len(),
+            });
+        }
+        let seen = REGIONS.map(|k| {
+            let f = fields.in_region(&self.back(k));
+            self.of([f[0], f[1]])
+        });
+        NormalFields::new(2, seen.concat())
+    }
+
     fn exchanged<T: Copy>(&self, v: [T; 2]) -> [T; 2] {
         if self.exchange {
             [v[1], v[0]]
