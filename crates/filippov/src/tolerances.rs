@@ -107,7 +107,7 @@ pub const BESIDE_THE_ROOT: f64 = 1e-6;
 
 /// Drift of the normal components after an exit, as a fraction of their size: small enough to leave
 /// all signs as they are, large enough to pass the fold in some thousands of units of time.
-pub const AFTER_THE_EXIT: f64 = 1e-6;
+pub const AFTER_THE_EXIT: f64 = 1e-5;
 
 /// Successive ratios of accumulating returns agree within this fraction.
 pub const ACCUMULATION_AGREEMENT: f64 = 0.1;
@@ -161,7 +161,7 @@ pub const HIDDEN_OUTWARDS: f64 = 1e-10;
 /// is compared: tens to thousands of oscillations.
 pub const FIRST_WATCH: f64 = 100.0;
 /// See [`FIRST_WATCH`].
-pub const LAST_WATCH: f64 = 1e4;
+pub const LAST_WATCH: f64 = 1e5;
 
 /// The range of an oscillation, seen at the ends of steps, is the same within this fraction.
 pub const STEADY_CYCLE: f64 = 0.02;
