@@ -4,13 +4,35 @@
 //! functions that vanish there; they return data. First-order data decide; where they vanish, the
 //! first Lie derivative that does not.
 
+mod accumulation;
 mod codim1;
+pub mod codim2;
+mod hidden;
+mod incoming;
 mod intersection;
 mod lie;
+mod normal_fields;
+mod resolution;
+mod resolve;
+mod roots;
+mod single;
+mod small_matrix;
+mod stability;
 
+pub use accumulation::{accumulate, Accumulation, Return};
 pub use codim1::{decide, Arrival, Decision};
+pub use hidden::{
+    admissible, limit as limit_of_hidden_dynamics, Admissible, Outcome as HiddenOutcome,
+};
+pub use incoming::{ExitKind, Incoming};
 pub use intersection::{decide_intersection, IntersectionDecision};
 pub use lie::{first_nonzero, normal_component, Leading};
+pub use normal_fields::NormalFields;
+pub use resolution::{Continuation, Resolution, Undecided};
+pub use resolve::resolve;
+pub use roots::{multiplier_rates, newton, roots_in_cube, stable_roots, Roots};
+pub use small_matrix::Matrix;
+pub use stability::{is_negative_p_matrix, is_scaling_stable, is_stable_for};
 
 /// The word for what happened, as the field uses it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

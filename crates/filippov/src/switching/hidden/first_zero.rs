@@ -1,0 +1,94 @@
+//! The first time at which a polynomial becomes negative.
+
+use crate::tolerances::{SHORTEST_PIECE, ZERO_SEARCHES};
+
+/// The first time in (0, end] at which `p`, not negative at 0, becomes negative. A zero at 0 itself is
+/// divided out.
+///
+/// Intervals are excluded, or found to be monotone, by a bound of the derivative, and halved otherwise: no
+/// pair of zeros is lost, except one nearer together than rounding.
+pub(super) fn first_loss(p: &[f64], end: f64) -> Option<f64> {
+    let p = if p[0] > 0.0 { p } else { &p[1..] };
+    if p[0] < 0.0 {
+        return Some(0.0);
+    }
+    let mut pending = vec![(0.0, end)];
+    for _ in 0..ZERO_SEARCHES {
+        let (a, b) = pending.pop()?;
+        match look(p, a, b, end) {
+            Look::Nothing => {}
+            Look::Zero => return Some(bisect(p, a, b)),
+            Look::Unclear => {
+                let middle = 0.5 * (a + b);
+                pending.push((middle, b));
+                pending.push((a, middle));
+            }
+        }
+    }
+    None
+}
+
+enum Look {
+    Nothing,
+    Zero,
+    Unclear,
+}
+
+/// p(a) >= 0 is known. The derivative at the middle and a bound of the second one settle most intervals.
+fn look(p: &[f64], a: f64, b: f64, end: f64) -> Look {
+    let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
+    let slope = derivative(p, middle);
+    let bend = bound_of_second_derivative(p, b);
+    let lowest = value(p, middle) - slope.abs() * half - 0.5 * bend * half * half;
+    if lowest > 0.0 {
+        return Look::Nothing;
+    }
+    let monotone = slope.abs() > bend * half;
+    if monotone || b - a <= SHORTEST_PIECE * end {
+        return if value(p, b) < 0.0 {
+            Look::Zero
+        } else {
+            Look::Nothing
+        };
+    }
+    Look::Unclear
+}
+
+fn bisect(p: &[f64], mut a: f64, mut b: f64) -> f64 {
+    let mut t = 0.5 * (a + b);
+    while a < t && t < b {
+        let v = value(p, t);
+        if v < 0.0 {
+            b = t;
+        } else {
+            a = t;
+        }
+        // Newton's step from here if it stays inside, else the middle.
+        let newton = t - v / derivative(p, t);
+        let next = if newton > a && newton < b {
+            newton
+        } else {
+            0.5 * (a + b)
+        };
+        if (next - t).abs() <= f64::EPSILON * t {
+            return next;
+        }
+        t = next;
+    }
+    b
+}
+
+/// p(t).
+pub(super) fn value(p: &[f64], t: f64) -> f64 {
+    p.iter().rev().fold(0.0, |sum, c| sum * t + c)
+}
+
+fn derivative(p: &[f64], t: f64) -> f64 {
+    let powers = p.iter().enumerate().skip(1).rev();
+    powers.fold(0.0, |sum, (k, c)| sum * t + k as f64 * c)
+}
+
+fn bound_of_second_derivative(p: &[f64], t: f64) -> f64 {
+    let powers = p.iter().enumerate().skip(2).rev();
+    powers.fold(0.0, |sum, (k, c)| sum * t + (k * (k - 1)) as f64 * c.abs())
+}

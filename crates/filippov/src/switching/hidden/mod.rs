@@ -1,0 +1,103 @@
+//! Hidden dynamics: what the regularised motion does within the transition at an intersection.
+//!
+//! With u_i = h_i/eps, a transition function of slope 1 and the state frozen, the regularised motion is
+//!
+//! ```text
+//! u_i' = kappa_i g_i(pi(u_1), ..., pi(u_m)),     pi(u) = clip(u, -1, 1),
+//! ```
+//!
+//! where kappa_i > 0 scales surface i. What this motion tends to is what follows at the intersection. In each
+//! *cell*, a box of the grid u_i = -1, u_i = 1, it is multilinear; it is followed from cell to cell.
+
+mod admissible;
+mod cell;
+mod certificate;
+mod first_zero;
+mod line;
+mod plane;
+mod returns;
+mod space;
+mod strip;
+
+pub use admissible::{admissible, Admissible};
+
+use super::normal_fields::NormalFields;
+use crate::mode::Mode;
+
+/// What the hidden dynamics tends to.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Outcome {
+    /// All components of u grow without bound.
+    Region(Mode),
+    /// The components with a zero in the mode stay bounded, the others grow.
+    Sliding {
+        /// The mode.
+        mode: Mode,
+        /// lambda of the bounded components; empty if they go around no root that could be found.
+        multipliers: Vec<f64>,
+        /// Do they go around the root for ever?
+        oscillates: bool,
+    },
+    /// u grows without bound and without limit, by the factor gamma with each lap around the intersection.
+    OutwardSpiral {
+        /// Growth per lap.
+        gamma: f64,
+    },
+    /// It rests at a point that does not attract.
+    AtRest,
+    /// No certain outcome within the work that is allowed.
+    Unknown,
+}
+
+/// Follows the hidden dynamics from the state `u` to its limit, with the surfaces scaled by `kappa`.
+///
+/// One surface has a closed form. For two, the motion is a straight line in the four corners, exponential
+/// in the four strips, and a Taylor series in the square, and each outcome has a proof. For more surfaces
+/// Taylor series are used throughout; the outcomes "region" and "sliding at rest" are certain, an
+/// oscillation is one that was watched for a long time.
+///
+/// # Example
+/// ```
+/// use filippov::switching::{limit_of_hidden_dynamics, HiddenOutcome, NormalFields};
+///
+/// // Two surfaces, both attractive: f_j^k = -k_j, plus a bias of 1/2 on the first one.
+/// let f = vec![1.5, 1.0, -0.5, 1.0, 1.5, -1.0, -0.5, -1.0];
+/// let outcome = limit_of_hidden_dynamics(&NormalFields::new(2, f)?, &[0.0, -1.0], &[1.0, 1.0]);
+/// let HiddenOutcome::Sliding { multipliers, .. } = outcome else { panic!() };
+/// assert_eq!(multipliers, [0.5, 0.0]);
+/// # Ok::<(), filippov::switching::Undecided>(())
+/// ```
+///
+/// Reference: N. Guglielmi, E. Hairer (2015), SIAM J. Appl. Dyn. Syst. 14, 1454-1477.
+pub fn limit(fields: &NormalFields, u: &[f64], kappa: &[f64]) -> Outcome {
+    let scaled = fields.scaled(kappa);
+    let size = scaled.size();
+    if !(size > 0.0 && size.is_finite()) {
+        return Outcome::AtRest;
+    }
+    let unit = scaled.scaled(&vec![1.0 / size; fields.m()]);
+    match fields.m() {
+        1 => line::limit(&unit, u[0]),
+        2 => plane::limit(&unit, [u[0], u[1]]),
+        _ => space::limit(&unit, u),
+    }
+}
+
+/// The side of a component: -1, +1, or 0 within the transition. On the border the velocity decides.
+fn side(u: f64, velocity: f64) -> i8 {
+    if u > 1.0 || (u == 1.0 && velocity > 0.0) {
+        1
+    } else if u < -1.0 || (u == -1.0 && velocity < 0.0) {
+        -1
+    } else {
+        0
+    }
+}
+
+/// pi(u).
+fn clipped(u: &[f64]) -> Vec<f64> {
+    u.iter().map(|v| v.clamp(-1.0, 1.0)).collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,219 @@
+//! How a motion comes to an intersection, and where its hidden dynamics starts.
+
+use super::normal_fields::NormalFields;
+use super::resolution::Undecided;
+use super::roots::{newton, stable_roots};
+use crate::tolerances::{AFTER_THE_EXIT, BESIDE_THE_ROOT};
+
+/// What the motion did before.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Incoming {
+    /// It was in this region, and reached all surfaces at once.
+    Corner {
+        /// The region.
+        region: Vec<i8>,
+    },
+    /// It slid on the surfaces with a zero entry, and reached the others from the sides of their entries.
+    Face {
+        /// The mode.
+        mode: Vec<i8>,
+        /// lambda of the surfaces slid on, in their order; may be left empty if there is only one stable root.
+        multipliers: Vec<f64>,
+    },
+    /// It slid on all surfaces, and cannot go on so.
+    Exit {
+        /// What happened to the root.
+        kind: ExitKind,
+        /// The root.
+        lambda: Vec<f64>,
+        /// The rate at which g changes with time at fixed lambda. For two surfaces it serves where two
+        /// solutions are equally good; more surfaces need it.
+        drift: Option<Vec<f64>>,
+    },
+    /// The run starts here.
+    Start,
+}
+
+/// What happened to the root of sliding on all surfaces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ExitKind {
+    /// It leaves the cube: type (a).
+    Side,
+    /// It meets another root: type (b).
+    Fold,
+    /// It is no longer stable for any scaling: type (c).
+    Stability,
+}
+
+/// The states from which the hidden dynamics starts, and the fields in which it moves. The first state decides;
+/// the others are those that the discontinuous problem cannot tell from it.
+pub(super) struct Starts {
+    pub fields: NormalFields,
+    pub states: Vec<Vec<f64>>,
+}
+
+/// Offsets along the border of a corner, in units of the transition. Beyond the last one nothing changes.
+const OFFSETS: [f64; 9] = [0.05, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0, 30.0, 1000.0];
+
+impl Incoming {
+    /// The states from which the hidden dynamics starts.
+    ///
+    /// | before | state |
+    /// |---|---|
+    /// | region k | on the line u = tau f^k, where it leaves the corner; others: along the border of the corner |
+    /// | face | (lambda, e): e the sides from which the other surfaces are reached |
+    /// | exit | the root, in fields that have drifted a little |
+    /// | start | u = 0 |
+    pub(super) fn starts(&self, fields: &NormalFields, kappa: &[f64]) -> Result<Starts, Undecided> {
+        let same = |states| Starts {
+            fields: fields.clone(),
+            states,
+        };
+        match self {
+            Incoming::Corner { region } => corner_states(fields, region, kappa).map(same),
+            Incoming::Face { mode, multipliers } => {
+                let multipliers = polished(fields, mode, multipliers)?;
+                face_states(fields, mode, &multipliers).map(same)
+            }
+            Incoming::Exit {
+                kind,
+                lambda,
+                drift,
+            } => exit_state(fields, *kind, lambda, drift.as_deref()),
+            Incoming::Start => Ok(same(vec![vec![0.0; fields.m()]])),
+        }
+    }
+}
+
+fn corner_states(
+    fields: &NormalFields,
+    region: &[i8],
+    kappa: &[f64],
+) -> Result<Vec<Vec<f64>>, Undecided> {
+    let sides = region.iter().map(|&k| f64::from(k));
+    let f = fields
+        .in_region(region)
+        .iter()
+        .zip(kappa)
+        .map(|(f, k)| f * k);
+    let speeds: Vec<f64> = sides.zip(f).map(|(side, f)| -side * f).collect();
+    if let Some(surface) = speeds.iter().position(|&v| v <= 0.0) {
+        return Err(Undecided::NotArriving { surface });
+    }
+    let slowest = speeds.iter().copied().fold(f64::INFINITY, f64::min);
+    let central = speeds.iter().map(|v| v / slowest);
+    let central: Vec<f64> = central
+        .zip(region)
+        .map(|(s, &k)| s * f64::from(k))
+        .collect();
+    let all: Vec<usize> = (0..region.len()).collect();
+    let mut states = vec![central];
+    let corner: Vec<f64> = region.iter().map(|&k| f64::from(k)).collect();
+    states.extend(offsets(&corner, &all));
+    Ok(states)
+}
+
+/// Sliding on a face: one state, and others along its border if several surfaces are reached at once.
+fn face_states(
+    fields: &NormalFields,
+    mode: &[i8],
+    multipliers: &[f64],
+) -> Result<Vec<Vec<f64>>, Undecided> {
+    let mut next = multipliers.iter();
+    let value = |&k: &i8| {
+        if k == 0 {
+            next.next().copied()
+        } else {
+            Some(f64::from(k))
+        }
+    };
+    let state: Vec<f64> = mode.iter().filter_map(value).collect();
+    let g = fields.interpolate(&state);
+    let reached: Vec<usize> = (0..mode.len()).filter(|&i| mode[i] != 0).collect();
+    if let Some(&surface) = reached.iter().find(|&&i| state[i] * g[i] >= 0.0) {
+        return Err(Undecided::NotArriving { surface });
+    }
+    let mut states = vec![state.clone()];
+    if reached.len() > 1 {
+        states.extend(offsets(&state, &reached));
+    }
+    Ok(states)
+}
+
+/// A state on the border of a corner, moved along it in one of the components that are reached, or in all but one.
+fn offsets(state: &[f64], reached: &[usize]) -> Vec<Vec<f64>> {
+    let mut states = vec![state.to_vec()];
+    for &i in reached {
+        for offset in OFFSETS {
+            let mut one = state.to_vec();
+            let mut others = state.to_vec();
+            for &j in reached {
+                let moved = if i == j { &mut one } else { &mut others };
+                moved[j] *= 1.0 + offset;
+            }
+            states.push(one);
+            if reached.len() > 2 {
+                states.push(others);
+            }
+        }
+    }
+    states
+}
+
+fn polished(
+    fields: &NormalFields,
+    mode: &[i8],
+    multipliers: &[f64],
+) -> Result<Vec<f64>, Undecided> {
+    let face = fields.restrict(mode);
+    let not_sliding = Undecided::NotArriving {
+        surface: mode.iter().position(|&k| k == 0).unwrap_or(0),
+    };
+    let root = if multipliers.len() == face.m() {
+        newton(&face, multipliers)
+    } else {
+        stable_roots(&face).into_iter().next()
+    };
+    root.ok_or(not_sliding)
+}
+
+/// The root itself, in fields that have drifted for a short time; where stability is lost, a little beside it.
+fn exit_state(
+    fields: &NormalFields,
+    kind: ExitKind,
+    lambda: &[f64],
+    drift: Option<&[f64]>,
+) -> Result<Starts, Undecided> {
+    if lambda.len() != fields.m() {
+        return Err(Undecided::NotAnExit);
+    }
+    if kind == ExitKind::Stability {
+        return Ok(Starts {
+            fields: fields.clone(),
+            states: vec![beside(fields, lambda, drift)],
+        });
+    }
+    let drift = drift.ok_or(Undecided::NoDrift { m: fields.m() })?;
+    let largest = drift.iter().fold(0.0_f64, |m, d| m.max(d.abs()));
+    let factor = AFTER_THE_EXIT * fields.size() / largest;
+    if !factor.is_finite() {
+        return Err(Undecided::NoDrift { m: fields.m() });
+    }
+    let shift: Vec<f64> = drift.iter().map(|d| factor * d).collect();
+    Ok(Starts {
+        fields: fields.shifted(&shift),
+        states: vec![lambda.to_vec()],
+    })
+}
+
+/// The root, displaced in the direction in which it moves; along the diagonal if that is not known.
+fn beside(fields: &NormalFields, lambda: &[f64], drift: Option<&[f64]>) -> Vec<f64> {
+    let rates = drift.and_then(|drift| super::roots::multiplier_rates(fields, lambda, drift));
+    let rates = rates.filter(|rates| rates.iter().any(|&r| r != 0.0));
+    let rates = rates.unwrap_or_else(|| vec![1.0; lambda.len()]);
+    let length = rates.iter().map(|r| r * r).sum::<f64>().sqrt();
+    let moved = lambda.iter().zip(&rates);
+    moved
+        .map(|(l, r)| l + BESIDE_THE_ROOT * r / length)
+        .collect()
+}

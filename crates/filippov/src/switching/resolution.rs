@@ -1,0 +1,172 @@
+//! What a decision at an intersection returns.
+
+use crate::mode::Mode;
+
+/// How the motion goes on.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Continuation {
+    /// In this mode; one entry per surface of the intersection, in their order.
+    Mode(Mode),
+    /// It winds around the intersection of two surfaces, further out with each lap, without any mode
+    /// of its own near to it (`codim2::Lap::outward` starts it).
+    OutwardSpiral,
+}
+
+impl Continuation {
+    /// The continuation in the mode with these entries.
+    pub fn mode(entries: &[i8]) -> Self {
+        Continuation::Mode(Mode::new(entries.to_vec()))
+    }
+
+    /// The mode, unless the motion spirals.
+    pub fn as_mode(&self) -> Option<&Mode> {
+        match self {
+            Continuation::Mode(mode) => Some(mode),
+            Continuation::OutwardSpiral => None,
+        }
+    }
+}
+
+/// The decision at an intersection: the common currency of all rules for two and more surfaces.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Resolution {
+    /// The leaf of the decision tree, or the kind of outcome of the hidden dynamics
+    /// (`docs/theory/intersections.md` lists them).
+    pub leaf: &'static str,
+    /// What follows. `None` only from a tree whose leaf has two solutions that are equally good; then
+    /// [`super::resolve`] has the hidden dynamics choose, and never returns `None`.
+    pub chosen: Option<Continuation>,
+    /// lambda of the surfaces that the chosen mode slides on, in their order.
+    pub multipliers: Vec<f64>,
+    /// Is the outcome the same for all scalings of the surfaces? For two surfaces by proof, for more by
+    /// trial, except where the fields are affine in the signs.
+    pub unique: bool,
+    /// All outcomes that occur for some scaling; the chosen one among them.
+    pub candidates: Vec<Continuation>,
+    /// Does the hidden dynamics go around the root instead of coming to rest in it? The regularised
+    /// motion then oscillates within the intersection, and the multipliers are those of the root.
+    pub oscillates: bool,
+    /// The smallest magnitude among the quantities whose signs decided, as a fraction of their size.
+    pub margin: f64,
+    /// Do the fields, perturbed by a little, lead to another mode?
+    pub degenerate: bool,
+}
+
+impl Resolution {
+    /// A decision that does not depend on the scaling.
+    pub(super) fn sure(leaf: &'static str, chosen: Continuation) -> Self {
+        let candidates = vec![chosen.clone()];
+        Resolution::among(leaf, Some(chosen), candidates)
+    }
+
+    /// A decision whose outcome is one of several.
+    pub(super) fn among(
+        leaf: &'static str,
+        chosen: Option<Continuation>,
+        candidates: Vec<Continuation>,
+    ) -> Self {
+        Resolution {
+            leaf,
+            chosen,
+            multipliers: Vec::new(),
+            unique: candidates.len() == 1,
+            candidates,
+            oscillates: false,
+            margin: f64::INFINITY,
+            degenerate: false,
+        }
+    }
+
+    /// The chosen mode, if there is one.
+    pub fn mode(&self) -> Option<&Mode> {
+        self.chosen.as_ref().and_then(Continuation::as_mode)
+    }
+
+    /// Adds the candidates of another decision, each once.
+    pub(super) fn add_candidates(&mut self, others: &[Continuation]) {
+        for other in others {
+            if !self.candidates.contains(other) {
+                self.candidates.push(other.clone());
+            }
+        }
+    }
+}
+
+/// Why there is no decision: one variant per cause.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Undecided {
+    /// The number of values does not fit the number of surfaces.
+    #[error("{found} normal components do not fit {m} surfaces: m * 2^m are needed, m at most 10")]
+    Shape {
+        /// The number of surfaces.
+        m: usize,
+        /// The number of values.
+        found: usize,
+    },
+    /// A normal component is not finite.
+    #[error("a normal component is not finite; look at the fields at this point")]
+    NotFinite,
+    /// No field has a component normal to a surface.
+    #[error("all fields are tangent to surface {surface} of the intersection; first-order data do not decide")]
+    Tangent {
+        /// The surface, counted within the intersection.
+        surface: usize,
+    },
+    /// The normal components of both surfaces are proportional.
+    #[error("the normal components of both surfaces are proportional: are they the same surface?")]
+    Proportional,
+    /// The motion before does not arrive at the intersection.
+    #[error("the motion before does not arrive at surface {surface} of the intersection")]
+    NotArriving {
+        /// The surface, counted within the intersection.
+        surface: usize,
+    },
+    /// The data of an exit do not fit its kind.
+    #[error("these normal components are not those of an exit of this kind")]
+    NotAnExit,
+    /// An exit from three and more surfaces needs the rate at which the normal components change.
+    #[error("an exit from {m} surfaces needs the drift of the normal components")]
+    NoDrift {
+        /// The number of surfaces.
+        m: usize,
+    },
+    /// The hidden dynamics rests at a point that does not attract.
+    #[error("the hidden dynamics rests at a point that does not attract; perturb the state")]
+    AtRest,
+    /// The hidden dynamics came to no certain outcome.
+    #[error(
+        "the hidden dynamics came to no certain outcome; perturb the state or change the scaling"
+    )]
+    NoOutcome,
+}
+
+/// The signs of the quantities that a decision rests on, with the smallest of them.
+#[derive(Debug)]
+pub(super) struct Signs {
+    smallest: f64,
+}
+
+impl Signs {
+    pub(super) fn new() -> Self {
+        Signs {
+            smallest: f64::INFINITY,
+        }
+    }
+
+    /// Is this quantity, of size about 1, positive?
+    pub(super) fn positive(&mut self, value: f64) -> bool {
+        self.smallest = self.smallest.min(value.abs());
+        value > 0.0
+    }
+
+    /// Is this quantity, of size about 1, negative?
+    pub(super) fn negative(&mut self, value: f64) -> bool {
+        self.positive(-value)
+    }
+
+    /// The decision with the margin that its signs had.
+    pub(super) fn settle(&self, mut resolution: Resolution) -> Resolution {
+        resolution.margin = self.smallest;
+        resolution
+    }
+}

@@ -1,0 +1,324 @@
+//! The decision at an intersection, whatever came before and however many surfaces meet.
+
+use super::codim2::{self, Bilinear, Corners};
+use super::hidden::{admissible, limit, Outcome};
+use super::incoming::{ExitKind, Incoming};
+use super::normal_fields::NormalFields;
+use super::resolution::{Continuation, Resolution, Undecided};
+use super::roots::stable_roots;
+use super::single;
+use super::stability::{is_negative_p_matrix, is_stable_for};
+use crate::tolerances::DOUBTFUL;
+
+/// Decides what follows at an intersection of m surfaces, scaled by `kappa`.
+///
+/// One surface has its two figures, two surfaces their decision trees; where a tree says that the outcome depends on
+/// the scaling, and for three and more surfaces, the hidden dynamics at `kappa` decides. If a quantity whose sign
+/// decided is doubtful (`tolerances.rs`), the decision is repeated with perturbed fields, and
+/// [`Resolution::degenerate`] says whether they agree.
+///
+/// # Example
+/// ```
+/// use filippov::switching::{resolve, Incoming, NormalFields};
+///
+/// // Sliding on the first surface below the second one; both attract.
+/// let fields = NormalFields::new(2, vec![1.5, 1.0, -0.5, 1.0, 1.5, -1.0, -0.5, -1.0])?;
+/// let incoming = Incoming::Face { mode: vec![0, -1], multipliers: vec![0.5] };
+/// let resolution = resolve(&fields, &incoming, &[1.0, 1.0])?;
+/// assert_eq!(resolution.leaf, "E.A/root/trap");
+/// assert_eq!(resolution.multipliers, [0.5, 0.0]);
+/// assert!(resolution.unique);
+/// # Ok::<(), filippov::switching::Undecided>(())
+/// ```
+///
+/// # Errors
+/// If the data do not determine an outcome; each variant of [`Undecided`] says why.
+pub fn resolve(
+    fields: &NormalFields,
+    incoming: &Incoming,
+    kappa: &[f64],
+) -> Result<Resolution, Undecided> {
+    if kappa.len() != fields.m() || kappa.iter().any(|k| !(k.is_finite() && *k > 0.0)) {
+        return Err(Undecided::Shape {
+            m: fields.m(),
+            found: kappa.len(),
+        });
+    }
+    check_lengths(fields.m(), incoming)?;
+    let mut resolution = decide(fields, incoming, kappa)?;
+    if resolution.margin <= DOUBTFUL {
+        for perturbed in perturbations(fields) {
+            match decide(&perturbed, incoming, kappa) {
+                Ok(other) if other.chosen == resolution.chosen => {}
+                Ok(other) => {
+                    resolution.degenerate = true;
+                    resolution.unique = false;
+                    resolution.add_candidates(&other.candidates);
+                }
+                Err(_) => resolution.degenerate = true,
+            }
+        }
+    }
+    Ok(resolution)
+}
+
+fn check_lengths(m: usize, incoming: &Incoming) -> Result<(), Undecided> {
+    let found = match incoming {
+        Incoming::Corner { region } if region.contains(&0) => 0,
+        Incoming::Corner { region } => region.len(),
+        Incoming::Face { mode, .. } => mode.len(),
+        Incoming::Exit { lambda, drift, .. } => match drift {
+            Some(drift) if drift.len() != m => drift.len(),
+            _ => lambda.len(),
+        },
+        Incoming::Start => m,
+    };
+    if found == m {
+        Ok(())
+    } else {
+        Err(Undecided::Shape { m, found })
+    }
+}
+
+fn decide(
+    fields: &NormalFields,
+    incoming: &Incoming,
+    kappa: &[f64],
+) -> Result<Resolution, Undecided> {
+    if fields.m() == 2 && Bilinear::of_fields(fields).is_undetermined() {
+        return Err(Undecided::Proportional);
+    }
+    let mut resolution = match (fields.m(), incoming) {
+        (_, Incoming::Start) => start(fields, kappa),
+        (1, _) => at_one_surface(fields, incoming),
+        (2, Incoming::Face { .. } | Incoming::Exit { .. }) => by_tree(fields, incoming, kappa),
+        (2, _) => by_hidden_dynamics(fields, incoming, &[kappa.to_vec()]),
+        _ => by_hidden_dynamics(fields, incoming, &scalings(kappa)),
+    }?;
+    complete(&mut resolution, fields, kappa);
+    Ok(resolution)
+}
+
+fn at_one_surface(fields: &NormalFields, incoming: &Incoming) -> Result<Resolution, Undecided> {
+    match incoming {
+        Incoming::Exit { lambda, drift, .. } => {
+            single::leave(fields, lambda[0], drift.as_ref().map(|drift| drift[0]))
+        }
+        Incoming::Corner { region: entry } | Incoming::Face { mode: entry, .. }
+            if entry[0] != 0 =>
+        {
+            single::arrive(fields, entry[0])
+        }
+        _ => Err(Undecided::NotArriving { surface: 0 }),
+    }
+}
+
+/// Two surfaces: the trees, and the hidden dynamics for the leaves that depend on the scaling.
+fn by_tree(
+    fields: &NormalFields,
+    incoming: &Incoming,
+    kappa: &[f64],
+) -> Result<Resolution, Undecided> {
+    let corners = Corners::new(fields)?;
+    let mut resolution = match incoming {
+        Incoming::Exit { kind, lambda, .. } => {
+            let leave = match kind {
+                ExitKind::Side => codim2::leave_at_side,
+                ExitKind::Fold => codim2::leave_at_fold,
+                ExitKind::Stability => codim2::leave_where_unstable,
+            };
+            leave(&corners, [lambda[0], lambda[1]])?
+        }
+        Incoming::Face { mode, .. } => codim2::enter(&corners, [mode[0], mode[1]])?,
+        Incoming::Corner { .. } | Incoming::Start => return Err(Undecided::NoOutcome),
+    };
+    if !resolution.unique {
+        let starts = incoming.starts(fields, kappa)?;
+        let outcome = limit(&starts.fields, &starts.states[0], kappa);
+        match continuation(&outcome) {
+            Ok(found) if resolution.candidates.contains(&found) => {
+                resolution.oscillates = oscillates(&outcome);
+                resolution.chosen = Some(found);
+            }
+            other if resolution.chosen.is_none() => {
+                return Err(other.err().unwrap_or(Undecided::NoOutcome))
+            }
+            // The tree says what follows for scalings that are not extreme.
+            _ => resolution.degenerate = true,
+        }
+    }
+    Ok(resolution)
+}
+
+/// All start states and scalings; the first of each decides.
+fn by_hidden_dynamics(
+    fields: &NormalFields,
+    incoming: &Incoming,
+    scalings: &[Vec<f64>],
+) -> Result<Resolution, Undecided> {
+    let starts = incoming.starts(fields, &scalings[0])?;
+    let outcome = limit(&starts.fields, &starts.states[0], &scalings[0]);
+    let chosen = continuation(&outcome)?;
+    let mut resolution = Resolution::sure(leaf_of(&outcome), chosen.clone());
+    resolution.oscillates = oscillates(&outcome);
+    resolution.margin = smallest_component(fields);
+    if let Outcome::Sliding { multipliers, .. } = outcome {
+        resolution.multipliers = multipliers;
+    }
+    if has_one_mode_only(fields) && !resolution.oscillates {
+        return Ok(resolution);
+    }
+    let others = scalings.iter().flat_map(|kappa| {
+        let states = starts.states.iter();
+        states.map(|state| limit(&starts.fields, state, kappa))
+    });
+    for other in others.skip(1) {
+        match continuation(&other) {
+            Ok(other) => resolution.add_candidates(&[other]),
+            Err(_) => resolution.unique = false,
+        }
+    }
+    resolution.unique &= resolution.candidates.len() == 1;
+    Ok(resolution)
+}
+
+/// Without a past: the only admissible mode, or the one that the hidden dynamics tends to from u = 0.
+fn start(fields: &NormalFields, kappa: &[f64]) -> Result<Resolution, Undecided> {
+    let found = admissible(fields);
+    let margin = smallest_component(fields);
+    let mut resolution = if let [only] = found.as_slice() {
+        let mut resolution = Resolution::sure("start/only", only.continuation.clone());
+        resolution.multipliers = only.multipliers.clone();
+        resolution
+    } else {
+        let outcome = limit(fields, &vec![0.0; fields.m()], kappa);
+        let chosen = continuation(&outcome)?;
+        let mut resolution = Resolution::sure("start/several", chosen);
+        resolution.oscillates = oscillates(&outcome);
+        let candidates: Vec<Continuation> = found.into_iter().map(|a| a.continuation).collect();
+        resolution.add_candidates(&candidates);
+        resolution.unique = resolution.candidates.len() == 1;
+        resolution
+    };
+    resolution.margin = margin;
+    Ok(resolution)
+}
+
+/// Adds the multipliers of the chosen mode, and whether the regularised motion oscillates in it.
+fn complete(resolution: &mut Resolution, fields: &NormalFields, kappa: &[f64]) {
+    let Some(mode) = resolution.mode() else {
+        return;
+    };
+    let face = fields.restrict(mode.entries());
+    let both = || {
+        Bilinear::of_fields(&face)
+            .root()
+            .map(|root| root.point.to_vec())
+    };
+    let root = match face.m() {
+        0 => None,
+        _ if !resolution.multipliers.is_empty() => Some(resolution.multipliers.clone()),
+        2 => both(),
+        _ => stable_roots(&face).into_iter().next(),
+    };
+    let Some(root) = root else {
+        return;
+    };
+    let free = kappa.iter().zip(mode.entries()).filter(|(_, &k)| k == 0);
+    let free: Vec<f64> = free.map(|(&kappa, _)| kappa).collect();
+    resolution.oscillates |= !is_stable_for(&face.jacobian(&root), &free);
+    resolution.multipliers = root;
+}
+
+fn continuation(outcome: &Outcome) -> Result<Continuation, Undecided> {
+    match outcome {
+        Outcome::Region(mode) => Ok(Continuation::Mode(mode.clone())),
+        Outcome::Sliding {
+            mode, multipliers, ..
+        } if !multipliers.is_empty() => Ok(Continuation::Mode(mode.clone())),
+        Outcome::Sliding { .. } | Outcome::Unknown => Err(Undecided::NoOutcome),
+        Outcome::OutwardSpiral { .. } => Ok(Continuation::OutwardSpiral),
+        Outcome::AtRest => Err(Undecided::AtRest),
+    }
+}
+
+fn oscillates(outcome: &Outcome) -> bool {
+    matches!(
+        outcome,
+        Outcome::Sliding {
+            oscillates: true,
+            ..
+        }
+    )
+}
+
+fn leaf_of(outcome: &Outcome) -> &'static str {
+    match outcome {
+        Outcome::Region(_) => "hidden/classical",
+        Outcome::Sliding {
+            oscillates: true, ..
+        } => "hidden/oscillation",
+        Outcome::Sliding { .. } => "hidden/sliding",
+        Outcome::OutwardSpiral { .. } => "hidden/spiral",
+        Outcome::AtRest | Outcome::Unknown => "hidden/unknown",
+    }
+}
+
+/// Is there exactly one consistent mode, by the constant matrix G of affine fields?
+fn has_one_mode_only(fields: &NormalFields) -> bool {
+    fields.is_affine() && is_negative_p_matrix(&fields.jacobian(&vec![0.0; fields.m()]))
+}
+
+/// The scaling itself, each surface ten times larger and smaller, and all in rising and falling order.
+fn scalings(kappa: &[f64]) -> Vec<Vec<f64>> {
+    let m = kappa.len();
+    let changed = |factor: &dyn Fn(usize) -> f64| -> Vec<f64> {
+        kappa
+            .iter()
+            .enumerate()
+            .map(|(i, k)| factor(i) * k)
+            .collect()
+    };
+    let mut scalings = vec![kappa.to_vec()];
+    for j in 0..m {
+        for factor in [0.1, 10.0] {
+            scalings.push(changed(&|i| if i == j { factor } else { 1.0 }));
+        }
+    }
+    scalings.push(changed(&|i| 3.0_f64.powi(i as i32)));
+    scalings.push(changed(&|i| 3.0_f64.powi((m - i) as i32)));
+    scalings
+}
+
+/// The smallest normal component as a fraction of the largest one of its surface.
+fn smallest_component(fields: &NormalFields) -> f64 {
+    let values = fields.values().iter().enumerate();
+    let relative = values.map(|(i, v)| v.abs() / fields.row_size(i % fields.m()));
+    // A surface to which all fields are tangent gives NaN, which counts as doubtful.
+    relative.fold(f64::INFINITY, |m, v| {
+        if v < m {
+            v
+        } else if v.is_nan() {
+            0.0
+        } else {
+            m
+        }
+    })
+}
+
+/// The fields moved by the doubtful amount in different directions: signs by the parity of some bits of the index.
+fn perturbations(fields: &NormalFields) -> impl Iterator<Item = NormalFields> + '_ {
+    let directions = (1..=4_usize).flat_map(|mask| [(mask, 1.0), (mask, -1.0)]);
+    directions.map(|(mask, sign)| {
+        let m = fields.m();
+        let moved = fields.values().iter().enumerate().map(|(index, value)| {
+            let parity = if (index & mask).count_ones() % 2 == 0 {
+                sign
+            } else {
+                -sign
+            };
+            value + 2.0 * DOUBTFUL * parity * fields.row_size(index % m)
+        });
+        fields.with_values(moved.collect())
+    })
+}

@@ -1,0 +1,192 @@
+//! Square matrices of the size of an intersection: elimination, minors, stability.
+
+use std::ops::{Index, IndexMut};
+
+/// A small square matrix.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Matrix {
+    n: usize,
+    entries: Vec<f64>,
+}
+
+impl Matrix {
+    /// The zero matrix.
+    pub fn zeros(n: usize) -> Self {
+        Matrix {
+            n,
+            entries: vec![0.0; n * n],
+        }
+    }
+
+    /// Number of rows.
+    pub fn n(&self) -> usize {
+        self.n
+    }
+
+    /// The rows and columns with these indices.
+    pub fn principal(&self, indices: &[usize]) -> Matrix {
+        let mut part = Matrix::zeros(indices.len());
+        for (r, &i) in indices.iter().enumerate() {
+            for (c, &j) in indices.iter().enumerate() {
+                part[(r, c)] = self[(i, j)];
+            }
+        }
+        part
+    }
+
+    /// The determinant; 1 for a matrix without rows.
+    pub fn determinant(&self) -> f64 {
+        Elimination::of(self).determinant()
+    }
+
+    /// Solves A x = b; `None` if a pivot vanishes.
+    pub fn solve(&self, b: &[f64]) -> Option<Vec<f64>> {
+        Elimination::of(self).solve(b)
+    }
+
+    /// The inverse; `None` if a pivot vanishes.
+    pub fn inverse(&self) -> Option<Matrix> {
+        let elimination = Elimination::of(self);
+        let mut inverse = Matrix::zeros(self.n);
+        for column in 0..self.n {
+            let unit: Vec<f64> = (0..self.n)
+                .map(|i| f64::from(u8::from(i == column)))
+                .collect();
+            for (row, value) in elimination.solve(&unit)?.into_iter().enumerate() {
+                inverse[(row, column)] = value;
+            }
+        }
+        Some(inverse)
+    }
+
+    /// The product with another matrix of the same size.
+    pub fn times(&self, other: &Matrix) -> Matrix {
+        let mut product = Matrix::zeros(self.n);
+        for i in 0..self.n {
+            for j in 0..self.n {
+                product[(i, j)] = (0..self.n).map(|k| self[(i, k)] * other[(k, j)]).sum();
+            }
+        }
+        product
+    }
+
+    /// Do all eigenvalues have negative real parts?
+    ///
+    /// The characteristic polynomial by Faddeev and LeVerrier, then the array of Routh: exact enough for
+    /// the few surfaces that meet, and without eigenvalues.
+    pub fn is_hurwitz(&self) -> bool {
+        let mut upper: Vec<f64> = Vec::new();
+        let mut lower: Vec<f64> = Vec::new();
+        for (k, c) in self.characteristic_polynomial().into_iter().enumerate() {
+            if k % 2 == 0 { &mut upper } else { &mut lower }.push(c);
+        }
+        // Each pass makes a row of the array from the two above it; the first column decides.
+        for _ in 0..self.n {
+            let Some(&lead) = lower.first().filter(|&&lead| lead > 0.0) else {
+                return false;
+            };
+            let ratio = upper[0] / lead;
+            let entry = |row: &[f64], i: usize| row.get(i).copied().unwrap_or(0.0);
+            let next = (1..upper.len()).map(|i| upper[i] - ratio * entry(&lower, i));
+            let next: Vec<f64> = next.collect();
+            upper = std::mem::replace(&mut lower, next);
+        }
+        true
+    }
+
+    /// Coefficients of det(z - A), highest power first.
+    fn characteristic_polynomial(&self) -> Vec<f64> {
+        let mut coefficients = vec![1.0];
+        let mut power = Matrix::zeros(self.n);
+        for k in 1..=self.n {
+            for i in 0..self.n {
+                power[(i, i)] += coefficients[k - 1];
+            }
+            power = self.times(&power);
+            let trace: f64 = (0..self.n).map(|i| power[(i, i)]).sum();
+            coefficients.push(-trace / k as f64);
+        }
+        coefficients
+    }
+}
+
+impl Index<(usize, usize)> for Matrix {
+    type Output = f64;
+
+    fn index(&self, (row, column): (usize, usize)) -> &f64 {
+        &self.entries[row * self.n + column]
+    }
+}
+
+impl IndexMut<(usize, usize)> for Matrix {
+    fn index_mut(&mut self, (row, column): (usize, usize)) -> &mut f64 {
+        &mut self.entries[row * self.n + column]
+    }
+}
+
+/// Gaussian elimination with row pivoting: factors below and above the diagonal, row order, sign.
+struct Elimination {
+    factors: Matrix,
+    order: Vec<usize>,
+    sign: f64,
+}
+
+impl Elimination {
+    fn of(matrix: &Matrix) -> Self {
+        let n = matrix.n;
+        let mut a = matrix.clone();
+        let mut order: Vec<usize> = (0..n).collect();
+        let mut sign = 1.0;
+        for k in 0..n {
+            let larger = |p: usize, i: usize| {
+                if a[(i, k)].abs() > a[(p, k)].abs() {
+                    i
+                } else {
+                    p
+                }
+            };
+            let pivot = (k..n).fold(k, larger);
+            if pivot != k {
+                for j in 0..n {
+                    a.entries.swap(k * n + j, pivot * n + j);
+                }
+                order.swap(k, pivot);
+                sign = -sign;
+            }
+            if a[(k, k)] == 0.0 {
+                continue;
+            }
+            for i in k + 1..n {
+                let factor = a[(i, k)] / a[(k, k)];
+                a[(i, k)] = factor;
+                for j in k + 1..n {
+                    let update = factor * a[(k, j)];
+                    a[(i, j)] -= update;
+                }
+            }
+        }
+        Elimination {
+            factors: a,
+            order,
+            sign,
+        }
+    }
+
+    fn determinant(&self) -> f64 {
+        let diagonal = (0..self.factors.n).map(|i| self.factors[(i, i)]);
+        self.sign * diagonal.product::<f64>()
+    }
+
+    fn solve(&self, b: &[f64]) -> Option<Vec<f64>> {
+        let (a, n) = (&self.factors, self.factors.n);
+        let mut x: Vec<f64> = self.order.iter().map(|&row| b[row]).collect();
+        for i in 0..n {
+            x[i] -= (0..i).map(|j| a[(i, j)] * x[j]).sum::<f64>();
+        }
+        for i in (0..n).rev() {
+            let rest: f64 = (i + 1..n).map(|j| a[(i, j)] * x[j]).sum();
+            x[i] = (x[i] - rest) / a[(i, i)];
+        }
+        x.iter().all(|v| v.is_finite()).then_some(x)
+    }
+}
