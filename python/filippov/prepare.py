@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -158,6 +159,12 @@ def check_components(value: Any, n: int) -> None:
         )
     if components.dtype.kind == "c":
         raise ModelError("fun: returned complex numbers; split the states into real and imaginary parts")
+
+
+@lru_cache(maxsize=64)
+def numbered_states(n: int) -> tuple[str, ...]:
+    """Return the names of `n` states that have none of their own: ``x[0], x[1], ...``."""
+    return tuple(f"x[{i}]" for i in range(n))
 
 
 def parameter_vector(values: dict[str, float]) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -23,7 +24,6 @@ from filippov.options import (
     Options,
     check_args,
     check_options,
-    check_params,
     check_t_span,
     check_unknown,
     check_y0,
@@ -159,10 +159,7 @@ def solve_ivp(
     (True, ('x[1]',))
     """
     check_unknown(unknown, solve_ivp)
-    t0, t1 = check_t_span(t_span)
-    state = check_y0(y0)
-    n = len(state)
-    given: dict[str, Any] = {
+    given = {
         "method": method,
         "t_eval": t_eval,
         "dense_output": dense_output,
@@ -179,7 +176,31 @@ def solve_ivp(
         "max_wall_time": max_wall_time,
         "progress": progress,
     }
-    options = check_options(given, (t0, t1), n)
+    changed = {name: value for name, value in given.items() if value is not _DEFAULTS[name]}
+    return _solve(fun, t_span, y0, changed, events, args, params, surfaces)
+
+
+# Most calls change none of the options, or a few: only those are checked.
+_DEFAULTS: dict[str, Any] = {
+    name: parameter.default for name, parameter in inspect.signature(solve_ivp).parameters.items()
+}
+
+
+def _solve(
+    fun: Any,
+    t_span: Any,
+    y0: npt.ArrayLike,
+    changed: Mapping[str, Any],
+    events: Any,
+    args: Any,
+    params: Mapping[str, float] | None,
+    surfaces: Any,
+) -> Solution:
+    """Solve with the options that differ from their defaults; all arguments as in `solve_ivp`."""
+    t0, t1 = check_t_span(t_span)
+    state = check_y0(y0)
+    n = len(state)
+    options = check_options(changed, (t0, t1), n)
     constants = check_args(args)
     specs = normalise_events(events)
     system, values = _as_system(fun, n, constants, params, surfaces)
@@ -192,17 +213,14 @@ def solve_ivp(
         options.progress(float(run.t[-1]))
     solution = Solution.from_run(
         run,
+        prepared,
         t0=t0,
-        y0=state,
-        surfaces=prepared.surfaces,
         states=system.state_names(n),
         has_events=specs is not None,
         dense_output=options.dense_output,
-        backend=prepared.backend,
     )
-    if prepared.why_opaque:
-        solution.stats["black_box_reason"] = prepared.why_opaque
-    _raise_if_asked(run, solution, options)
+    if run.status < 0:
+        _raise_if_asked(run, solution, options)
     return solution
 
 
@@ -222,7 +240,8 @@ def _as_system(
         return fun, fun.parameter_values(params)
     if not callable(fun):
         raise InputError(f"fun: a function fun(t, y) or a System is needed, not {type(fun).__name__}")
-    return System(fun, n=n, params=params, surfaces=surfaces, args=args), check_params(params)
+    system = System(fun, n=n, params=params, surfaces=surfaces, args=args)
+    return system, system.parameter_values(None)
 
 
 def _backward(
