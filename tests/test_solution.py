@@ -262,3 +262,48 @@ def test_mode() -> None:
     for wrong in ((2,), "+x", (0.5,)):
         with pytest.raises(ValueError, match="mode"):
             fl.Mode(wrong)  # type: ignore[arg-type]
+
+
+def short_run() -> fl.Solution:
+    return fl.System(oscillator, args=(0.4, 1 / 3)).solve((0, 1), [1.0, 2.0])
+
+
+def test_names_of_the_fields_do_not_depend_on_what_was_asked_for() -> None:
+    untouched, touched = short_run(), short_run()
+    _ = touched.segments, touched.message, touched.t
+    touched.remark = "mine"  # type: ignore[attr-defined]
+    assert list(touched) == [*untouched, "remark"]
+    assert touched["remark"] == "mine"
+    assert set(untouched.keys()) <= set(dir(untouched))
+
+
+def test_a_field_that_was_not_asked_for_survives_pickling() -> None:
+    untouched = short_run()
+    copy = pickle.loads(pickle.dumps(untouched))
+    assert list(copy) == list(untouched)
+    assert copy.message == untouched.message
+    assert list(copy.switches.t) == list(untouched.switches.t)
+    np.testing.assert_array_equal(copy.y, untouched.y)
+    assert repr(copy) == repr(untouched)
+    with pytest.raises(AttributeError, match="the fields are t, y"):
+        _ = copy.state
+
+
+def test_fields_can_be_replaced() -> None:
+    sol = short_run()
+    sol.t = sol.t + 1.0
+    assert sol["t"][0] == 1.0
+    assert fl.Solution(t=np.arange(3.0))["t"][2] == 2.0
+    with pytest.raises(KeyError, match="the fields are t"):
+        fl.Solution(t=np.arange(3.0))["y"]
+
+
+def test_a_subclass_of_the_solution_keeps_its_own() -> None:
+    class Named(fl.Solution):
+        @property
+        def final(self) -> Any:
+            return self.y[:, -1]
+
+    named = Named(**dict(short_run()))
+    np.testing.assert_array_equal(named.final, short_run().y[:, -1])
+    assert np.array_equal(pickle.loads(pickle.dumps(short_run())).y[:, -1], named.final)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import pickle
 import subprocess
@@ -12,6 +13,7 @@ from typing import Any
 import filippov as fl
 import numpy as np
 import pytest
+from filippov.options import Options, check_options
 
 
 def oscillator(t: float, x: Any, F: float, omega: float) -> Any:
@@ -345,3 +347,13 @@ def test_lazy_packages() -> None:
     assert "plot" in dir(fl)
     with pytest.raises(AttributeError, match="nothing"):
         _ = fl.nothing  # type: ignore[attr-defined]
+
+
+def test_defaults_given_explicitly_are_the_defaults() -> None:
+    defaults = {
+        name: parameter.default
+        for name, parameter in inspect.signature(fl.solve_ivp).parameters.items()
+        if name in Options._fields
+    }
+    assert set(defaults) == set(Options._fields)
+    assert check_options(defaults, (0.0, 1.0), 1) == check_options({}, (0.0, 1.0), 1)

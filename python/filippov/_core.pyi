@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from typing_extensions import Self
 
-__all__ = ["Builder", "OpaqueSystem", "Run", "SignedSystem", "TracedSystem", "solve"]
+__all__ = ["Builder", "OpaqueSystem", "Run", "RunOptions", "SignedSystem", "TracedSystem", "solve"]
 
 _Array = npt.NDArray[np.float64]
 
@@ -136,12 +136,16 @@ class Run:
     def evaluate(self, t: _Array, left: bool = False) -> _Array: ...
     def multipliers(self, t: _Array) -> _Array: ...
 
+@final
+class RunOptions:
+    def __new__(cls, given: dict[str, Any]) -> Self: ...
+
 def solve(
     system: TracedSystem | OpaqueSystem | SignedSystem,
     t0: float,
     t1: float,
     y0: _Array,
     p: _Array,
-    options: dict[str, Any],
+    options: RunOptions,
     events: list[tuple[Callable[[float, _Array], float] | int, float, int, str]],
 ) -> Run: ...

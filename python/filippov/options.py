@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from filippov._core import RunOptions
 from filippov.errors import InputError, ToleranceError
 
 __all__ = ["Options", "check_options", "check_t_span", "check_y0"]
@@ -27,7 +28,7 @@ _POLICIES = {
     "zeno": (("accumulate",), ()),
 }
 _SCIPY_ONLY = ("jac", "jac_sparsity", "lband", "uband", "min_step")
-_SMALLEST_RTOL = 100 * np.finfo(float).eps
+_SMALLEST_RTOL = float(100 * np.finfo(float).eps)
 
 
 class Options(NamedTuple):
@@ -47,10 +48,31 @@ class Options(NamedTuple):
     dense_output: bool
     progress: Callable[..., Any] | None
 
-    def for_core(self) -> dict[str, Any]:
+    def for_core(self) -> RunOptions:
         """Return the options as the core takes them."""
+        if self is _DEFAULT_OPTIONS:
+            return _DEFAULT_FOR_CORE
         keep = "t_eval" if self.t_eval is not None and not self.dense_output else "steps"
-        return {**self._asdict(), "keep": keep}
+        return RunOptions({**self._asdict(), "keep": keep})
+
+
+# The defaults of `solve_ivp`, checked: a call that changes none of them needs no further check.
+_DEFAULT_OPTIONS = Options(
+    method="DOPRI5",
+    rtol=1e-6,
+    atol=1e-9,
+    first_step=None,
+    max_step=math.inf,
+    max_steps=10**8,
+    max_events=10**7,
+    max_wall_time=None,
+    sliding="canopy",
+    nonunique="regularize",
+    t_eval=None,
+    dense_output=True,
+    progress=None,
+)
+_DEFAULT_FOR_CORE = RunOptions(_DEFAULT_OPTIONS._asdict())
 
 
 def check_options(given: Mapping[str, Any], t_span: tuple[float, float], n: int) -> Options:
@@ -59,7 +81,7 @@ def check_options(given: Mapping[str, Any], t_span: tuple[float, float], n: int)
     Parameters
     ----------
     given : mapping
-        Every option by name, as given by the caller.
+        Options by name, as given by the caller; what is missing has its default value.
     t_span : tuple of float
         Checked interval of integration.
     n : int
@@ -74,27 +96,11 @@ def check_options(given: Mapping[str, Any], t_span: tuple[float, float], n: int)
     InputError
         If an option has a wrong type, value or shape; `ToleranceError` for `rtol` and `atol`.
     """
-    for policy, (available, planned) in _POLICIES.items():
-        _check_choice(policy, given[policy], available, planned)
-    if given["resets"] is not None:
-        raise InputError("resets: not available yet; stop with a terminal event, map the state, and go on")
-    max_step = given["max_step"]
-    max_wall_time = given["max_wall_time"]
-    return Options(
-        method=check_method(given["method"]),
-        rtol=_check_rtol(given["rtol"]),
-        atol=_check_atol(given["atol"], n),
-        first_step=_check_first_step(given["first_step"], t_span),
-        max_step=math.inf if max_step is None else _positive("max_step", max_step, infinite=True),
-        max_steps=_count("max_steps", given["max_steps"]),
-        max_events=_count("max_events", given["max_events"]),
-        max_wall_time=None if max_wall_time is None else _positive("max_wall_time", max_wall_time),
-        sliding=given["sliding"],
-        nonunique=given["nonunique"],
-        t_eval=_check_t_eval(given["t_eval"], t_span),
-        dense_output=bool(given["dense_output"]),
-        progress=_check_progress(given["progress"], t_span),
-    )
+    checked: dict[str, Any] = {}
+    for name, value in given.items():
+        checked[name] = _CHECKS[name](value, t_span, n)
+    checked.pop("resets", None)
+    return _DEFAULT_OPTIONS._replace(**checked) if checked else _DEFAULT_OPTIONS
 
 
 def check_method(method: Any) -> str:
@@ -122,6 +128,10 @@ def check_t_span(t_span: Any) -> tuple[float, float]:
     InputError
         If `t_span` is not two finite real numbers.
     """
+    if type(t_span) is tuple and len(t_span) == 2:
+        t0, t1 = t_span
+        if type(t0) is float and type(t1) is float and math.isfinite(t0) and math.isfinite(t1):
+            return t0, t1
     try:
         ends = [_real(end) for end in t_span]
     except (TypeError, ValueError):
@@ -139,6 +149,8 @@ def check_y0(y0: Any) -> Array:
     InputError
         If `y0` is not one-dimensional, empty, complex, or not finite.
     """
+    if type(y0) in (list, tuple) and {*map(type, y0)} == {float} and math.isfinite(sum(y0)):
+        return np.array(y0)
     try:
         state = np.asarray(y0)
     except ValueError as error:
@@ -214,16 +226,24 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     return f"; did you mean {nearest[0]!r}?" if nearest else ""
 
 
-def _check_choice(name: str, value: Any, available: tuple[str, ...], planned: tuple[str, ...]) -> None:
+def _check_policy(name: str, value: Any) -> str:
+    available, planned = _POLICIES[name]
     if isinstance(value, str) and value in available:
-        return
+        return value
     use = " or ".join(f'"{choice}"' for choice in available)
     if isinstance(value, str) and value in planned:
         raise InputError(f'{name}: "{value}" is not available yet; use {use}')
     raise InputError(f"{name}: unknown value {value!r}; use {use}")
 
 
+def _check_resets(resets: Any) -> None:
+    if resets is not None:
+        raise InputError("resets: not available yet; stop with a terminal event, map the state, and go on")
+
+
 def _check_rtol(rtol: Any) -> float:
+    if type(rtol) is float and _SMALLEST_RTOL <= rtol < math.inf:
+        return rtol
     if np.ndim(rtol) != 0:
         raise ToleranceError("rtol: a single number is needed; use atol for a tolerance per component")
     try:
@@ -236,13 +256,15 @@ def _check_rtol(rtol: Any) -> float:
         warnings.warn(
             f"rtol: {value:g} is below what double precision allows; {_SMALLEST_RTOL:.3g} is used",
             UserWarning,
-            stacklevel=4,
+            stacklevel=6,  # the caller of `solve_ivp`
         )
-        value = float(_SMALLEST_RTOL)
+        value = _SMALLEST_RTOL
     return value
 
 
 def _check_atol(atol: Any, n: int) -> float | Array:
+    if type(atol) is float and 0.0 <= atol < math.inf:
+        return atol
     try:
         raw = np.asarray(atol)
     except ValueError:
@@ -288,6 +310,14 @@ def _check_t_eval(t_eval: Any, t_span: tuple[float, float]) -> Array | None:
     return times
 
 
+def _check_max_step(max_step: Any) -> float:
+    return math.inf if max_step is None else _positive("max_step", max_step, infinite=True)
+
+
+def _check_max_wall_time(max_wall_time: Any) -> float | None:
+    return None if max_wall_time is None else _positive("max_wall_time", max_wall_time)
+
+
 def _check_progress(progress: Any, t_span: tuple[float, float]) -> Callable[..., Any] | None:
     if progress is None or progress is False:
         return None
@@ -322,6 +352,8 @@ def _positive(name: str, value: Any, infinite: bool = False) -> float:
 
 def _real(value: Any) -> float:
     """Convert a real number; text, truth values and complex numbers are refused with TypeError."""
+    if type(value) in (float, int):
+        return float(value)
     if (
         isinstance(value, (str, bytes, bool, np.bool_, complex))
         or np.iscomplexobj(value)
@@ -329,3 +361,23 @@ def _real(value: Any) -> float:
     ):
         raise TypeError
     return float(value)
+
+
+# The check of each option, given its value, the interval of integration and the number of states.
+_CHECKS: dict[str, Callable[[Any, tuple[float, float], int], Any]] = {
+    "sliding": lambda value, t_span, n: _check_policy("sliding", value),
+    "nonunique": lambda value, t_span, n: _check_policy("nonunique", value),
+    "zeno": lambda value, t_span, n: _check_policy("zeno", value),
+    "resets": lambda value, t_span, n: _check_resets(value),
+    "method": lambda value, t_span, n: check_method(value),
+    "rtol": lambda value, t_span, n: _check_rtol(value),
+    "atol": lambda value, t_span, n: _check_atol(value, n),
+    "first_step": lambda value, t_span, n: _check_first_step(value, t_span),
+    "max_step": lambda value, t_span, n: _check_max_step(value),
+    "max_steps": lambda value, t_span, n: _count("max_steps", value),
+    "max_events": lambda value, t_span, n: _count("max_events", value),
+    "max_wall_time": lambda value, t_span, n: _check_max_wall_time(value),
+    "t_eval": lambda value, t_span, n: _check_t_eval(value, t_span),
+    "dense_output": lambda value, t_span, n: bool(value),
+    "progress": lambda value, t_span, n: _check_progress(value, t_span),
+}

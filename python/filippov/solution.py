@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, KeysView
+from functools import cached_property
 from importlib import import_module
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +13,7 @@ import numpy.typing as npt
 from filippov._core import Run
 from filippov.backward import ReversedRun
 from filippov.modes import Mode
+from filippov.prepare import Prepared
 from filippov.start import StandingRun
 from filippov.switches import RunWarning, SegmentTable, SwitchTable, import_pandas
 
@@ -111,6 +113,38 @@ class DenseSolution:
             )
 
 
+_FIELDS = (
+    "t",
+    "y",
+    "sol",
+    "t_events",
+    "y_events",
+    "nfev",
+    "njev",
+    "nlu",
+    "status",
+    "message",
+    "success",
+    "stats",
+    "warnings",
+    "error",
+    "surfaces",
+    "states",
+    "switches",
+    "segments",
+)
+
+
+class _Origin(NamedTuple):
+    """What the fields of a solution are made of, besides the record of the core."""
+
+    prepared: Prepared
+    t0: float
+    states: tuple[str, ...]
+    has_events: bool
+    dense_output: bool
+
+
 class Solution:
     """The result of `solve_ivp`: fields by attribute and by key.
 
@@ -149,30 +183,15 @@ class Solution:
 
     Notes
     -----
+    A field is made when it is first asked for.
+
     A copy by `pickle` has everything but `sol`, which is ``None`` there: ask for the times with `t_eval`.
     """
 
-    t: Array
-    y: Array
-    sol: DenseSolution | None
-    t_events: list[Array] | None
-    y_events: list[Array] | None
-    nfev: int
-    njev: int
-    nlu: int
-    status: int
-    message: str
-    success: bool
-    switches: SwitchTable
-    segments: SegmentTable
-    stats: dict[str, int | float | str]
-    warnings: list[RunWarning]
-    error: BaseException | None
-    surfaces: tuple[str, ...]
-    states: tuple[str, ...]
-
-    __slots__ = ("__dict__", "_run")
+    __slots__ = ("__dict__", "_origin", "_run")
+    # Not there in a copy by pickle, which has all of its fields made.
     _run: AnyRun
+    _origin: _Origin
 
     def __init__(self, **fields: Any) -> None:
         self.__dict__.update(fields)
@@ -181,74 +200,143 @@ class Solution:
     def from_run(
         cls,
         run: AnyRun,
+        prepared: Prepared,
         *,
         t0: float,
-        y0: Array,
-        surfaces: tuple[str, ...],
         states: tuple[str, ...],
         has_events: bool,
         dense_output: bool,
-        backend: str,
     ) -> Solution:
-        """Collect what the core computed.
+        """Present what the core computed. Every field is made when it is first asked for.
 
         Parameters
         ----------
         run : Run
             The record of the core.
-        t0, y0 : float, ndarray of shape (n,)
-            Initial point.
-        surfaces, states : tuple of str
-            Printed switching functions and names of the states.
+        prepared : Prepared
+            The system that was run.
+        t0 : float
+            Initial time.
+        states : tuple of str
+            Names of the states.
         has_events : bool
             Whether the caller gave events (else `t_events` is ``None``).
         dense_output : bool
             Whether `sol` is kept.
-        backend : str
-            How the field was evaluated.
 
         Returns
         -------
         Solution
         """
-        stats = {**run.stats, "backend": backend}
-        solution = cls(
-            t=run.t,
-            y=run.y,
-            sol=DenseSolution(run, t0, run.t_last) if dense_output else None,
-            t_events=list(run.t_events) if has_events else None,
-            # SciPy's shape: (k, n), and (0,) where there is none.
-            y_events=[y if len(y) else np.empty(0) for y in run.y_events] if has_events else None,
-            nfev=int(stats.get("nfev", 0)),
-            njev=int(stats.get("njev", 0)),
-            nlu=int(stats.get("nlu", 0)),
-            status=run.status,
-            message=_message(run),
-            success=run.status >= 0,
-            stats=stats,
-            warnings=[RunWarning(*warning) for warning in run.warnings],
-            error=run.error,
-            surfaces=surfaces,
-            states=states,
-        )
+        solution = cls()
         solution._run = run
+        solution._origin = _Origin(prepared, t0, states, has_events, dense_output)
         return solution
 
+    @cached_property
+    def t(self) -> Array:
+        """Times, shape (n_points,)."""
+        return self._run.t
+
+    @cached_property
+    def y(self) -> Array:
+        """States at `t`, shape (n, n_points)."""
+        return self._run.y
+
+    @cached_property
+    def sol(self) -> DenseSolution | None:
+        """The solution as a function; ``None`` if ``dense_output=False``."""
+        origin = self._origin
+        return DenseSolution(self._run, origin.t0, self._run.t_last) if origin.dense_output else None
+
+    @cached_property
+    def t_events(self) -> list[Array] | None:
+        """Times of every event; ``None`` if none was given."""
+        return list(self._run.t_events) if self._origin.has_events else None
+
+    @cached_property
+    def y_events(self) -> list[Array] | None:
+        """States at every event; ``None`` if none was given."""
+        if not self._origin.has_events:
+            return None
+        # SciPy's shape: (k, n), and (0,) where there is none.
+        return [y if len(y) else np.empty(0) for y in self._run.y_events]
+
+    @cached_property
+    def nfev(self) -> int:
+        """Number of evaluations of the field."""
+        return int(self.stats.get("nfev", 0))
+
+    @cached_property
+    def njev(self) -> int:
+        """Number of Jacobians."""
+        return int(self.stats.get("njev", 0))
+
+    @cached_property
+    def nlu(self) -> int:
+        """Number of factorisations."""
+        return int(self.stats.get("nlu", 0))
+
+    @cached_property
+    def status(self) -> int:
+        """0: the end was reached; 1: a terminal event; negative: the run failed."""
+        return self._run.status
+
+    @cached_property
+    def message(self) -> str:
+        """The reason, in words."""
+        return _message(self._run)
+
+    @cached_property
+    def success(self) -> bool:
+        """Whether ``status >= 0``."""
+        return self._run.status >= 0
+
+    @cached_property
+    def stats(self) -> dict[str, int | float | str]:
+        """Counters of the run and how the field was evaluated."""
+        prepared = self._origin.prepared
+        reason = {"black_box_reason": prepared.why_opaque} if prepared.why_opaque else {}
+        return {**self._run.stats, "backend": prepared.backend, **reason}
+
+    @cached_property
+    def warnings(self) -> list[RunWarning]:
+        """What deserves a look."""
+        return [RunWarning(*warning) for warning in self._run.warnings]
+
+    @cached_property
+    def error(self) -> BaseException | None:
+        """The exception that a function of the user raised during the run."""
+        return self._run.error
+
+    @cached_property
+    def surfaces(self) -> tuple[str, ...]:
+        """Printed switching functions, in the order of the entries of a mode."""
+        return self._origin.prepared.surfaces
+
+    @cached_property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states."""
+        return self._origin.states
+
+    @cached_property
+    def switches(self) -> SwitchTable:
+        """Every change of mode."""
+        return SwitchTable(self._run.switches, self.surfaces, self.states)
+
+    @cached_property
+    def segments(self) -> SegmentTable:
+        """Pieces of constant mode."""
+        return SegmentTable(self._run.segments)
+
     def __getattr__(self, name: str) -> Any:
-        # The tables are made when they are first asked for: in a short run they are most of the work.
-        if name == "switches":
-            made: Any = SwitchTable(self._run.switches, self.surfaces, self.states)
-        elif name == "segments":
-            made = SegmentTable(self._run.segments)
-        else:
-            raise AttributeError(f"{name!r}; the fields are {', '.join(self)}")
-        self.__dict__[name] = made
-        return made
+        raise AttributeError(f"{name!r}; the fields are {', '.join(_FIELDS)}")
 
     def _fields(self) -> dict[str, Any]:
-        """Return all fields by name, the tables made."""
-        _ = self.switches, self.segments
-        return self.__dict__
+        """Return all fields by name, in their order, those made now that were not asked for yet."""
+        if not hasattr(self, "_run"):
+            return self.__dict__
+        return {**{name: getattr(self, name) for name in _FIELDS}, **self.__dict__}
 
     def __getstate__(self) -> dict[str, Any]:
         # The function holds the record of the core, which stays in its process.
@@ -258,6 +346,8 @@ class Solution:
         self.__dict__.update(state)
 
     def __getitem__(self, key: str) -> Any:
+        if key in _FIELDS and hasattr(self, key):
+            return getattr(self, key)
         try:
             return self._fields()[key]
         except KeyError:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import inspect
+from collections.abc import Callable, Hashable, Mapping
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,6 @@ from filippov.options import (
     Options,
     check_args,
     check_options,
-    check_params,
     check_t_span,
     check_unknown,
     check_y0,
@@ -33,6 +33,7 @@ from filippov.solution import AnyRun, Solution
 from filippov.start import StandingRun
 from filippov.system import System
 from filippov.trace import trace_event
+from filippov.trace.fingerprint import fingerprint
 
 __all__ = ["solve_ivp"]
 
@@ -159,10 +160,7 @@ def solve_ivp(
     (True, ('x[1]',))
     """
     check_unknown(unknown, solve_ivp)
-    t0, t1 = check_t_span(t_span)
-    state = check_y0(y0)
-    n = len(state)
-    given: dict[str, Any] = {
+    given = {
         "method": method,
         "t_eval": t_eval,
         "dense_output": dense_output,
@@ -179,7 +177,31 @@ def solve_ivp(
         "max_wall_time": max_wall_time,
         "progress": progress,
     }
-    options = check_options(given, (t0, t1), n)
+    changed = {name: value for name, value in given.items() if value is not _DEFAULTS[name]}
+    return _solve(fun, t_span, y0, changed, events, args, params, surfaces)
+
+
+# Most calls change none of the options, or a few: only those are checked.
+_DEFAULTS: dict[str, Any] = {
+    name: parameter.default for name, parameter in inspect.signature(solve_ivp).parameters.items()
+}
+
+
+def _solve(
+    fun: Any,
+    t_span: Any,
+    y0: npt.ArrayLike,
+    changed: Mapping[str, Any],
+    events: Any,
+    args: Any,
+    params: Mapping[str, float] | None,
+    surfaces: Any,
+) -> Solution:
+    """Solve with the options that differ from their defaults; all arguments as in `solve_ivp`."""
+    t0, t1 = check_t_span(t_span)
+    state = check_y0(y0)
+    n = len(state)
+    options = check_options(changed, (t0, t1), n)
     constants = check_args(args)
     specs = normalise_events(events)
     system, values = _as_system(fun, n, constants, params, surfaces)
@@ -192,17 +214,14 @@ def solve_ivp(
         options.progress(float(run.t[-1]))
     solution = Solution.from_run(
         run,
+        prepared,
         t0=t0,
-        y0=state,
-        surfaces=prepared.surfaces,
         states=system.state_names(n),
         has_events=specs is not None,
         dense_output=options.dense_output,
-        backend=prepared.backend,
     )
-    if prepared.why_opaque:
-        solution.stats["black_box_reason"] = prepared.why_opaque
-    _raise_if_asked(run, solution, options)
+    if run.status < 0:
+        _raise_if_asked(run, solution, options)
     return solution
 
 
@@ -222,7 +241,8 @@ def _as_system(
         return fun, fun.parameter_values(params)
     if not callable(fun):
         raise InputError(f"fun: a function fun(t, y) or a System is needed, not {type(fun).__name__}")
-    return System(fun, n=n, params=params, surfaces=surfaces, args=args), check_params(params)
+    system = System(fun, n=n, params=params, surfaces=surfaces, args=args)
+    return system, system.parameter_values(None)
 
 
 def _backward(
@@ -276,19 +296,36 @@ def _core_events(
     for index, spec in enumerate(specs):
         g = bind_function(spec.g, args, values)
         check_scalar_function(g, t0, y0, f"events: entry {index} ({spec.name})")
-        node = _event_node(prepared, spec, args, values)
+        node = _event_node(prepared, spec, t0, y0, args, values)
         events.append((g if node is None else node, spec.direction, spec.terminal, spec.name))
     return events
 
 
 def _event_node(
-    prepared: Prepared, spec: EventSpec, args: tuple[Any, ...], values: dict[str, float]
+    prepared: Prepared,
+    spec: EventSpec,
+    t0: float,
+    y0: Array,
+    args: tuple[Any, ...],
+    values: dict[str, float],
 ) -> int | None:
     """Return the handle of an event that could be traced; then no Python is called during the run."""
     if prepared.trace is None or not isinstance(prepared.core, TracedSystem):
         return None
-    node = trace_event(prepared.trace, selective(spec.g, values), args)
-    return None if node is None else prepared.core.event(node)
+
+    def key() -> Hashable | None:
+        read = fingerprint(spec.g, args)
+        return None if read is None else (t0, y0.tobytes(), tuple(values.items()), read)
+
+    before = key()
+    known = prepared.trace.events.find(before) if before is not None else None
+    if known is None:
+        g = selective(spec.g, values)
+        node = trace_event(prepared.trace, g, args, t0=t0, y0=y0, parameters=values)
+        known = (None if node is None else prepared.core.event(node),)
+        if before is not None and before == key():
+            prepared.trace.events.keep(before, known)
+    return known[0]
 
 
 def _raise_if_asked(run: AnyRun, solution: Solution, options: Options) -> None:

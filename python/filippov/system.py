@@ -15,7 +15,7 @@ from filippov.events import accepted_names, function_name
 from filippov.forms import Source, base_source, check_surfaces, fields_source, relay_source
 from filippov.modes import Mode
 from filippov.options import check_args, check_params, check_y0, did_you_mean
-from filippov.prepare import Prepared, check_n, parameter_vector, prepare
+from filippov.prepare import Prepared, check_n, numbered_states, parameter_vector, prepare
 from filippov.sliding import sliding_field
 from filippov.solution import Solution
 
@@ -83,6 +83,8 @@ class System:
         declared = surfaces is not None
         source = Source(fun, check_surfaces(surfaces), check_args(args), black_box=declared)
         self._setup(source, n, params, states)
+        if not self._params:
+            return
         refused = set(self._params).difference(accepted_names(fun, self._params))
         if refused:
             names = ", ".join(map(repr, sorted(refused)))
@@ -337,8 +339,10 @@ class System:
         """
         from filippov.solve import solve_ivp
 
-        named = {name: options.pop(name) for name in list(options) if name in self._params}
-        return solve_ivp(self, t_span, y0, params={**(params or {}), **named}, **options)
+        if self._params:
+            named = {name: options.pop(name) for name in self._params if name in options}
+            params = {**(params or {}), **named}
+        return solve_ivp(self, t_span, y0, params=params, **options)
 
     def parameter_values(self, given: Mapping[str, float] | None) -> dict[str, float]:
         """Return the values of all parameters, the defaults overridden by `given`.
@@ -348,7 +352,7 @@ class System:
         InputError
             If a name is unknown or a value is not a finite number.
         """
-        changes = check_params(given)
+        changes = check_params(given) if given is not None else {}
         for name in changes:
             if name not in self._params:
                 known = f"the parameters are {', '.join(self._params)}" if self._params else "it has none"
@@ -377,17 +381,19 @@ class System:
         """
         if self._n is not None and n != self._n:
             raise InputError(f"y0: the system has {self._n} states, y0 has {n}")
-        if self._prepared is not None and self._prepared.is_valid_for(n, values):
-            return self._prepared
+        known = self._prepared  # read once: another thread may trace for other values meanwhile
+        if known is not None and known.is_valid_for(n, values):
+            return known
         if self._source is None:
             raise ModelError(
                 "the function branches on parameter values, and it did not travel with the pickled system; "
-                f"this copy is valid for {self._prepared.pinned if self._prepared else {}} only"
+                f"this copy is valid for {known.pinned if known else {}} only"
             )
-        self._prepared = prepare(self._source, n, values, self._states, t0, y0)
+        prepared = prepare(self._source, n, values, self._states, t0, y0)
+        self._prepared = prepared
         if self._n is None:
             self._n = n
-        return self._prepared
+        return prepared
 
     def prepare_backward(self, n: int, s0: float, y0: Array, values: dict[str, float]) -> Prepared:
         """Return the system with time reversed, ``s = -t``; only for systems without surfaces.
@@ -403,7 +409,7 @@ class System:
 
     def state_names(self, n: int) -> tuple[str, ...]:
         """Return the names of `n` states."""
-        return self._states if self._states is not None else tuple(f"x[{i}]" for i in range(n))
+        return self._states if self._states is not None else numbered_states(n)
 
     def __getstate__(self) -> dict[str, Any]:
         state = self.__dict__.copy()

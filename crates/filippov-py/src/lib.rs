@@ -17,7 +17,7 @@ mod _core {
     #[pymodule_export]
     use super::run::Run;
     #[pymodule_export]
-    use super::solve::solve;
+    use super::solve::{solve, RunOptions};
     #[pymodule_export]
     use super::systems::{OpaqueSystem, SignedSystem, TracedSystem};
 }

@@ -16,6 +16,22 @@ use crate::systems::{OpaqueSystem, SignedSystem, TracedSystem};
 /// How often the interpreter is asked for signals and told the progress.
 const POLL_EVERY: Duration = Duration::from_millis(20);
 
+/// The options of a run, read once; `filippov.solve_ivp` checks them before.
+#[pyclass(frozen, module = "filippov._core")]
+pub struct RunOptions {
+    options: Options,
+    progress: Option<Py<PyAny>>,
+}
+
+#[pymethods]
+impl RunOptions {
+    #[new]
+    fn new(given: &Bound<'_, PyDict>) -> PyResult<Self> {
+        let (options, progress) = read_options(given)?;
+        Ok(RunOptions { options, progress })
+    }
+}
+
 /// Integrates a system; `filippov.solve_ivp` checks the arguments before.
 #[pyfunction]
 #[pyo3(signature = (system, t0, t1, y0, p, options, events))]
@@ -27,7 +43,7 @@ pub fn solve(
     t1: f64,
     y0: PyReadonlyArray1<'_, f64>,
     p: PyReadonlyArray1<'_, f64>,
-    options: &Bound<'_, PyDict>,
+    options: &RunOptions,
     events: Vec<(Py<PyAny>, f64, u64, String)>,
 ) -> PyResult<Run> {
     let parameters = p.as_slice()?.to_vec();
@@ -62,7 +78,7 @@ pub fn solve(
         functions.push((function, direction, terminal));
     }
     let y0 = y0.as_slice()?.to_vec();
-    let (options, progress) = read_options(options)?;
+    let RunOptions { options, progress } = options;
     let is_native = traced.is_some_and(|t| t.get().system.is_native());
     let solution = py
         .detach(|| {
@@ -85,7 +101,7 @@ pub fn solve(
                     py.check_signals().is_err() || matches!(reported, Some(Err(_)))
                 })
             };
-            solve_interruptible(&*core, (t0, t1), &y0, &options, &events, &mut interrupt)
+            solve_interruptible(&*core, (t0, t1), &y0, options, &events, &mut interrupt)
         })
         .map_err(|e| PyValueError::new_err(e.to_string()))?;
     Ok(Run::new(core, solution, is_native))

@@ -8,6 +8,7 @@ there.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -63,21 +64,21 @@ def verify(
     TraceError
         If they differ by more than 1e-9 of the size of the field.
     """
-    for idx in range(N_POINTS):
-        t, x = _point(t0, y0, idx)
-        with np.errstate(all="ignore"):
+    with np.errstate(all="ignore"):
+        for idx in range(N_POINTS):
+            t, x = _point(t0, y0, idx)
             signs = consistent_signs(system, t, x, values)
             if signs is None:
                 continue
-            traced = np.asarray(system.field(t, x, signs, values))
+            traced = system.field(t, x, signs, values)
             own = _evaluate(fun, t, x)
-        if own is None or own.shape != traced.shape or not np.isfinite(own + traced).all():
-            continue
-        difference = np.abs(own - traced)
-        scale = 1.0 + max(float(np.max(np.abs(own))), float(np.max(np.abs(traced))))
-        component = int(np.argmax(difference))
-        if difference[component] > _TOLERANCE * scale:
-            raise _disagreement(fun, role, t, x, component, own, traced)
+            if own is None or own.shape != traced.shape or not np.isfinite(own + traced).all():
+                continue
+            difference = np.abs(own - traced)
+            scale = 1.0 + float(max(np.abs(own).max(), np.abs(traced).max()))
+            component = int(difference.argmax())
+            if difference[component] > _TOLERANCE * scale:
+                raise _disagreement(fun, role, t, x, component, own, traced)
 
 
 def consistent_signs(system: TracedSystem, t: float, x: Vector, values: Vector) -> Vector | None:
@@ -89,12 +90,12 @@ def consistent_signs(system: TracedSystem, t: float, x: Vector, values: Vector) 
     if system.n_surfaces == 0:
         return signs
     for _ in range(system.n_surfaces + 1):
-        h = np.asarray(system.surface_values(t, x, signs, values))
+        h = system.surface_values(t, x, signs, values)
         # NaN beyond the domain of an inactive surface: either sign will do.
         new = np.where(h < 0.0, -1.0, 1.0)
-        if np.array_equal(new, signs):
-            tiny = 1e-13 * (1.0 + float(np.max(np.abs(x), initial=0.0)))
-            return None if bool(np.any(np.abs(h) <= tiny)) else signs
+        if (new == signs).all():
+            tiny = 1e-13 * (1.0 + float(np.abs(x).max(initial=0.0)))
+            return None if bool((np.abs(h) <= tiny).any()) else signs
         signs = new
     return None
 
@@ -103,10 +104,16 @@ def _point(t0: float, y0: Vector, idx: int) -> tuple[float, Vector]:
     """Return the point to compare at: the initial one, then deterministic irregular ones around it."""
     if idx == 0:
         return t0, y0.copy()
-    numbers = np.sin(12.9898 * np.arange(1, y0.size + 2) + 78.233 * idx) * 43758.5453
-    numbers = 2.0 * (numbers - np.floor(numbers)) - 1.0
+    numbers = _irregular(y0.size + 1, idx)
     t = t0 + 0.5 * (1.0 + float(numbers[-1])) * (1.0 + 0.1 * abs(t0))
     return t, y0 + numbers[:-1] * (1.0 + np.abs(y0))
+
+
+@lru_cache(maxsize=64)
+def _irregular(size: int, idx: int) -> Vector:
+    """Return numbers within [-1, 1] that follow no pattern, always the same."""
+    numbers = np.sin(12.9898 * np.arange(1, size + 1) + 78.233 * idx) * 43758.5453
+    return np.asarray(2.0 * (numbers - np.floor(numbers)) - 1.0)
 
 
 def _evaluate(fun: Callable[[float, Vector], Any], t: float, x: Vector) -> Vector | None:
