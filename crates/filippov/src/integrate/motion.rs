@@ -31,6 +31,7 @@ impl SmoothField for ModeField<'_> {
 /// One piece of constant mode.
 pub(super) struct Motion<'a> {
     pub mode: Mode,
+    pub t_start: f64,
     /// Signs handed to the field; the surface slid on counts as +1.
     pub signs: Vec<f64>,
     /// Surfaces whose sign matters in this mode.
@@ -40,9 +41,10 @@ pub(super) struct Motion<'a> {
 }
 
 impl<'a> Motion<'a> {
-    /// The motion in `mode`; zeros to divide out are given per function.
+    /// The motion in `mode` from `t_start`; zeros to divide out are given per function.
     pub fn new(
         system: &'a dyn PiecewiseSystem,
+        t_start: f64,
         mode: Mode,
         deflations: &[(EventFunction, Deflation)],
     ) -> Self {
@@ -77,6 +79,7 @@ impl<'a> Motion<'a> {
         }
         let mut motion = Motion {
             mode,
+            t_start,
             signs,
             active,
             field,

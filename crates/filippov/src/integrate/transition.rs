@@ -10,11 +10,11 @@ use crate::field::{eval_on_side, SmoothField};
 use crate::mode::Mode;
 use crate::options::NonUnique;
 use crate::solution::Switch;
-use crate::stepper::{initial_step, restart_step};
+use crate::stepper::{initial_step, restart_step, tiny_step, ErrorScale};
 use crate::switching::{
     decide, decide_intersection, first_nonzero, Arrival, Decision, Kind, Leading,
 };
-use crate::tolerances::{MOST_SWITCHES_AT_ONE_TIME, SURFACE_NOISE};
+use crate::tolerances::{FAMILIAR, MANY, MOST_SWITCHES_AT_ONE_TIME, REACH, SEVERAL, SURFACE_NOISE};
 
 /// A function that vanishes at the start of a motion, with its first non-vanishing derivative.
 #[derive(Clone, Copy, Debug)]
@@ -68,6 +68,32 @@ impl Left {
                 },
             )
         })
+    }
+}
+
+/// How the last motion in a mode went.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pace {
+    /// The step proposed at its end.
+    dt: f64,
+    /// How long it lasted.
+    duration: f64,
+}
+
+impl Pace {
+    /// The first step of another motion in the mode. After several steps the proposal had settled, and a
+    /// little less will do. Where it was several times the motion, the field hardly limits it: look as
+    /// far ahead as the last event was, though motions that become ever shorter are no reason to go
+    /// below a tiny step. In between, nothing is known.
+    fn first_step(self, x: &[f64], derivative: &[f64], scale: &ErrorScale) -> Option<f64> {
+        if self.duration >= MANY * self.dt {
+            Some(FAMILIAR * self.dt)
+        } else if self.dt >= SEVERAL * self.duration {
+            let reach = REACH * self.duration;
+            Some(self.dt.min(reach.max(tiny_step(x, derivative, scale))))
+        } else {
+            None
+        }
     }
 }
 
@@ -239,7 +265,8 @@ impl Integrator<'_> {
     pub(super) fn begin(&mut self, mode: Mode, left: &[Left]) -> Result<Option<Stop>, FieldError> {
         let deflations: Vec<_> = left.iter().filter_map(|l| l.deflation(self.t)).collect();
         self.stats.n_field_evaluations += self.motion.field.n_evaluations();
-        self.motion = Motion::new(self.system, mode, &deflations);
+        self.remember_pace();
+        self.motion = Motion::new(self.system, self.t, mode, &deflations);
         self.motion.project(self.t, &mut self.x)?;
         let mut derivative = vec![0.0; self.x.len()];
         match &mut self.motion.field {
@@ -268,8 +295,26 @@ impl Integrator<'_> {
         Ok(None)
     }
 
-    /// The first step of a motion: the proposal of the motion before, as far as Hairer's guess for
-    /// this one supports it, and no longer than a short excursion from the surface.
+    /// Keeps the pace of the motion that ends, for the next one in its mode.
+    fn remember_pace(&mut self) {
+        if self.dt.is_nan() {
+            return;
+        }
+        let pace = Pace {
+            dt: self.dt,
+            duration: self.t - self.motion.t_start,
+        };
+        match self.paces.get_mut(&self.motion.mode) {
+            Some(last) => *last = pace,
+            None => {
+                self.paces.insert(self.motion.mode.clone(), pace);
+            }
+        }
+    }
+
+    /// The first step of a motion: what the last motion in its mode suggests; else the proposal of the
+    /// motion before, as far as Hairer's guess for this one supports it. No longer than a short
+    /// excursion from the surface.
     fn first_step(&mut self, derivative: &[f64], left: &[Left]) -> Result<f64, FieldError> {
         let remaining = (self.t_end - self.t).max(f64::MIN_POSITIVE);
         if let (Some(first), true) = (self.options.first_step, self.dt.is_nan()) {
@@ -277,10 +322,11 @@ impl Integrator<'_> {
         }
         let longest = remaining.min(self.options.max_step);
         let (t, x, scale, field) = (self.t, &self.x, &self.scale, &mut self.motion.field);
-        let mut dt = if self.dt.is_nan() {
-            initial_step(field, t, x, derivative, scale, longest)?
-        } else {
-            restart_step(field, t, x, derivative, scale, self.dt.min(longest))?
+        let pace = self.paces.get(&self.motion.mode);
+        let mut dt = match pace.and_then(|pace| pace.first_step(x, derivative, scale)) {
+            Some(dt) => dt.min(longest),
+            None if self.dt.is_nan() => initial_step(field, t, x, derivative, scale, longest)?,
+            None => restart_step(field, t, x, derivative, scale, self.dt.min(longest))?,
         };
         for l in left {
             if let Left::Surface(j, leading) = l {
