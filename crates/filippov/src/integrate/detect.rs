@@ -1,5 +1,7 @@
 //! The event stage of a step: the earliest zero of what the mode monitors.
 
+use smallvec::{smallvec, SmallVec};
+
 use super::curve::{grazes, Curve};
 use super::integrator::Integrator;
 use super::motion::{ModeField, Motion};
@@ -43,7 +45,7 @@ pub(super) struct Found {
     /// Where, in steps.
     pub theta: f64,
     /// What vanishes there.
-    pub functions: Vec<EventFunction>,
+    pub functions: SmallVec<[EventFunction; 4]>,
     /// The functions come within rounding of zero without a change of sign.
     pub touch: bool,
 }
@@ -388,7 +390,7 @@ impl Integrator<'_> {
             _ => {
                 *found = Some(Found {
                     theta,
-                    functions: vec![function],
+                    functions: smallvec![function],
                     touch,
                 })
             }

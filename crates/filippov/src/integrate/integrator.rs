@@ -86,7 +86,7 @@ impl<'a> Integrator<'a> {
             t: t_span.0,
             t_end: t_span.1,
             x: y0.to_vec(),
-            motion: Motion::new(system, t_span.0, undecided, &[]),
+            motion: Motion::new(system, t_span.0, undecided),
             stepper: Dopri5::new(n),
             controller: Controller::default(),
             dt: f64::NAN,

@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use filippov_expr::{Backend, ExprError, Gradient, Graph, Names, NodeId, Program};
 use rustc_hash::FxHashMap;
+use smallvec::SmallVec;
 
 use super::tiered::{compile, TieredProgram};
 use super::Word;
@@ -23,7 +24,7 @@ pub(super) struct Model {
     both_sides: Vec<OnceLock<TieredProgram>>,
     lie: Mutex<LieCache>,
     /// Active surfaces of the modes met so far; a zero entry is the surface slid on.
-    activity: Mutex<FxHashMap<Vec<i8>, Vec<bool>>>,
+    activity: Mutex<FxHashMap<SmallVec<[i8; 16]>, Vec<bool>>>,
 }
 
 /// The gradient of one switching function: outputs are the derivative in t, then the listed states.
@@ -146,7 +147,7 @@ impl Model {
 
     /// Marks the surfaces whose sign matters in a mode.
     pub fn active(&self, signs: &[f64], sliding: Option<usize>, active: &mut [bool]) {
-        let key: Vec<i8> = signs
+        let key: SmallVec<[i8; 16]> = signs
             .iter()
             .enumerate()
             .map(|(j, &s)| if Some(j) == sliding { 0 } else { s as i8 })
