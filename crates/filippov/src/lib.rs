@@ -46,7 +46,7 @@ mod tolerances;
 pub use error::{Error, FieldError};
 pub use event::{UserEvent, UserFunction};
 pub use integrate::{solve, solve_interruptible, Integrator, Stats, Stop, Warning, WarningCode};
-pub use mode::Mode;
+pub use mode::{Mode, Signs};
 pub use options::{NonUnique, Options};
 pub use solution::{Segment, Side, Solution, Switch, UserZero};
 pub use switching::Kind;

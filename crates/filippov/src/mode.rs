@@ -2,16 +2,24 @@
 
 use std::fmt;
 
+use smallvec::SmallVec;
+
+/// The signs handed to a field; few are kept without allocation.
+pub type Signs = SmallVec<[f64; 8]>;
+
 /// A mode: one entry per surface, +1 where h > 0, -1 where h < 0, 0 while sliding on h = 0.
 #[derive(Clone, PartialEq, Eq, Hash)]
 pub struct Mode {
-    entries: Vec<i8>,
+    /// Few are kept without allocation: modes are copied at every switch.
+    entries: SmallVec<[i8; 16]>,
 }
 
 impl Mode {
     /// A mode from its entries, each -1, 0 or +1.
     pub fn new(entries: Vec<i8>) -> Self {
-        Mode { entries }
+        Mode {
+            entries: entries.into(),
+        }
     }
 
     /// The entries.
@@ -38,7 +46,7 @@ impl Mode {
     }
 
     /// The signs handed to the field: +1.0 or -1.0 per surface, a zero entry as +1.0.
-    pub fn signs(&self) -> Vec<f64> {
+    pub fn signs(&self) -> Signs {
         self.entries
             .iter()
             .map(|&e| if e < 0 { -1.0 } else { 1.0 })

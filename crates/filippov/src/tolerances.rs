@@ -77,7 +77,7 @@ pub const ONE_SIDED_AIM: f64 = 0.87;
 pub const SIDE_OFFSET: f64 = 8.0;
 
 /// A point counts as on a surface up to rounding within this multiple of the offset.
-pub const SIDE_REACH: f64 = 1e3;
+pub const SIDE_REACH: f64 = 1.25;
 
 /// Shortest step in units of the rounding of time.
 pub const SHORTEST_STEP: f64 = 16.0 * EPS;
@@ -205,3 +205,17 @@ pub const NEWTON_STEPS: usize = 30;
 
 /// An iterate beyond this does not come back to a root in the cube that is worth tracking.
 pub const FAR_FROM_THE_CUBE: f64 = 10.0;
+
+/// A motion of that many times the last step shows which step suits its mode.
+pub const MANY: f64 = 8.0;
+
+/// Share of the step last proposed in a mode with which the next motion there starts: its error is a
+/// tenth, so that a point where the field is less smooth is rarely a rejection.
+pub const FAMILIAR: f64 = 0.7;
+
+/// The field does not limit a step of that many times the motion: within it the error is below a
+/// hundredth of the tolerance.
+pub const SEVERAL: f64 = 3.0;
+
+/// How far ahead the first step looks then, as a multiple of the last motion in the mode.
+pub const REACH: f64 = 1.25;

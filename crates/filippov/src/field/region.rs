@@ -2,26 +2,34 @@
 
 use super::SmoothField;
 use crate::error::FieldError;
+use crate::mode::Signs;
 use crate::system::PiecewiseSystem;
 use crate::tolerances::{EPS, SIDE_OFFSET, SIDE_REACH};
 
 /// The smooth field of one region: f(t, x, s) with fixed signs.
 pub struct RegionField<'a> {
     system: &'a dyn PiecewiseSystem,
-    signs: Vec<f64>,
+    signs: Signs,
     n_evaluations: u64,
     departing: bool,
 }
 
 impl<'a> RegionField<'a> {
     /// The field of the region with these signs.
-    pub fn new(system: &'a dyn PiecewiseSystem, signs: Vec<f64>) -> Self {
+    pub fn new(system: &'a dyn PiecewiseSystem, signs: &[f64]) -> Self {
         RegionField {
             system,
-            signs,
+            signs: Signs::from_slice(signs),
             n_evaluations: 0,
             departing: false,
         }
+    }
+
+    /// Starts anew in another region.
+    pub fn restart(&mut self, signs: &[f64]) {
+        self.signs.copy_from_slice(signs);
+        self.n_evaluations = 0;
+        self.departing = false;
     }
 
     /// While the motion departs tangentially from a surface, stages may lie beyond it however short

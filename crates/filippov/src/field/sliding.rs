@@ -2,6 +2,7 @@
 
 use super::{Projector, SmoothField};
 use crate::error::FieldError;
+use crate::mode::Signs;
 use crate::system::{BothSides, PiecewiseSystem};
 
 /// The normal components on both sides of the surface slid on.
@@ -41,7 +42,7 @@ impl NormalComponents {
 pub struct SlidingField<'a> {
     system: &'a dyn PiecewiseSystem,
     surface: usize,
-    signs: Vec<f64>,
+    signs: Signs,
     sides: BothSides,
     projector: Projector,
     n_evaluations: u64,
@@ -54,7 +55,7 @@ impl<'a> SlidingField<'a> {
         SlidingField {
             system,
             surface: j,
-            signs: signs.to_vec(),
+            signs: Signs::from_slice(signs),
             sides: BothSides::new(system.n_states(), system.n_surfaces()),
             projector: Projector::default(),
             n_evaluations: 0,
@@ -63,6 +64,14 @@ impl<'a> SlidingField<'a> {
                 plus: f64::NAN,
             },
         }
+    }
+
+    /// Starts anew on another surface.
+    pub fn restart(&mut self, j: usize, signs: &[f64]) {
+        self.surface = j;
+        self.signs.copy_from_slice(signs);
+        self.sides.restart();
+        self.n_evaluations = 0;
     }
 
     /// The surface slid on.

@@ -2,6 +2,8 @@
 
 use std::cell::Cell;
 
+use smallvec::{smallvec, SmallVec};
+
 use super::bounds::{BoundedCurve, Piece};
 use super::curve::{grazes, Curve};
 use super::integrator::Integrator;
@@ -50,7 +52,7 @@ pub(super) struct Found {
     /// Where, in steps.
     pub theta: f64,
     /// What vanishes there.
-    pub functions: Vec<EventFunction>,
+    pub functions: SmallVec<[EventFunction; 4]>,
     /// The functions come within rounding of zero without a change of sign.
     pub touch: bool,
 }
@@ -432,7 +434,7 @@ impl Integrator<'_> {
             _ => {
                 *found = Some(Found {
                     theta,
-                    functions: vec![function],
+                    functions: smallvec![function],
                     touch,
                 })
             }

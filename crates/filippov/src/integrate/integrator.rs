@@ -12,13 +12,17 @@
 
 use std::time::Instant;
 
+use rustc_hash::FxHashMap;
+
 use super::detect::Detector;
 use super::motion::{ModeField, Motion};
+use super::transition::Pace;
 use super::user_events::UserEvents;
 use super::{Stats, Stop, Warning};
 use crate::error::{Error, FieldError};
 use crate::event::UserEvent;
 use crate::field::SmoothField;
+use crate::mode::Mode;
 use crate::options::Options;
 use crate::solution::{Recorder, Solution};
 use crate::stepper::{Attempt, Controller, Dopri5, ErrorScale};
@@ -43,6 +47,8 @@ pub struct Integrator<'a> {
     pub(super) controller: Controller,
     /// Proposed step.
     pub(super) dt: f64,
+    /// How the last motion went, by mode.
+    pub(super) paces: FxHashMap<Mode, Pace>,
     pub(super) detector: Detector,
     pub(super) user_events: UserEvents<'a>,
     pub(super) recorder: Recorder,
@@ -72,7 +78,7 @@ impl<'a> Integrator<'a> {
     ) -> Result<Self, Error> {
         super::start::check(system, t_span, y0, options)?;
         let n = system.n_states();
-        let undecided = crate::Mode::new(vec![1; system.n_surfaces()]);
+        let undecided = Mode::new(vec![1; system.n_surfaces()]);
         Ok(Integrator {
             system,
             options,
@@ -80,10 +86,11 @@ impl<'a> Integrator<'a> {
             t: t_span.0,
             t_end: t_span.1,
             x: y0.to_vec(),
-            motion: Motion::new(system, undecided, &[]),
+            motion: Motion::new(system, t_span.0, undecided),
             stepper: Dopri5::new(n),
             controller: Controller::default(),
             dt: f64::NAN,
+            paces: FxHashMap::default(),
             detector: Detector::new(n, system.n_surfaces()),
             user_events: UserEvents::new(events),
             recorder: Recorder::new(n, options),

@@ -61,7 +61,7 @@ impl Integrator<'_> {
             if m.rate < 0.0 && m.value <= ARRIVED * tolerance {
                 return Ok(Some(Found {
                     theta: 0.0,
-                    functions: vec![m.function],
+                    functions: smallvec::smallvec![m.function],
                     touch: false,
                 }));
             }

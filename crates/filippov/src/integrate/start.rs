@@ -1,7 +1,7 @@
 //! Where a run starts: arguments checked, the mode of the initial state found.
 
 use super::integrator::Integrator;
-use super::transition::Left;
+use super::transition::{Left, Lefts};
 use super::{Stop, WarningCode};
 use crate::error::{Error, FieldError};
 use crate::mode::Mode;
@@ -106,7 +106,7 @@ impl Integrator<'_> {
         }
         let meeting = self.meeting_at_start(&mode, &on_surface)?;
         let (mode, left) = match meeting.as_slice() {
-            [] => (mode, Vec::new()),
+            [] => (mode, Lefts::new()),
             [j] => match self.start_on_surface(&mode, *j)? {
                 Ok(placed) => placed,
                 Err(stop) => return Ok(Some(stop)),
@@ -169,7 +169,7 @@ impl Integrator<'_> {
         &mut self,
         mode: &Mode,
         j: usize,
-    ) -> Result<Result<(Mode, Vec<Left>), Stop>, FieldError> {
+    ) -> Result<Result<(Mode, Lefts), Stop>, FieldError> {
         let signs = mode.signs();
         let decision = decide(self.system, j, Arrival::Start, self.t, &self.x, &signs)?;
         let candidates: Vec<Mode> = decision

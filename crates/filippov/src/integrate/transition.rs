@@ -1,8 +1,10 @@
 //! The switching stage: from a located event to the next motion.
 
+use smallvec::{smallvec, SmallVec};
+
 use super::detect::Found;
 use super::integrator::Integrator;
-use super::motion::{ModeField, Motion};
+use super::motion::ModeField;
 use super::{Stop, Warning, WarningCode};
 use crate::error::FieldError;
 use crate::event::{Deflation, EventFunction};
@@ -10,11 +12,19 @@ use crate::field::{eval_on_side, SmoothField};
 use crate::mode::Mode;
 use crate::options::NonUnique;
 use crate::solution::Switch;
-use crate::stepper::{initial_step, restart_step};
+use crate::stepper::{initial_step, restart_step, tiny_step, ErrorScale};
 use crate::switching::{
     decide, decide_intersection, first_nonzero, Arrival, Decision, Kind, Leading,
 };
-use crate::tolerances::{MOST_SWITCHES_AT_ONE_TIME, SURFACE_NOISE};
+use crate::tolerances::{
+    FAMILIAR, MANY, MAX_LIE_ORDER, MOST_SWITCHES_AT_ONE_TIME, REACH, SEVERAL, SURFACE_NOISE,
+};
+
+/// One value per surface; few are kept without allocation.
+pub(super) type Values = SmallVec<[f64; 8]>;
+
+/// What vanishes at the start of a motion, seldom more than two functions.
+pub(super) type Lefts = SmallVec<[Left; 2]>;
 
 /// A function that vanishes at the start of a motion, with its first non-vanishing derivative.
 #[derive(Clone, Copy, Debug)]
@@ -27,10 +37,10 @@ pub(super) enum Left {
 
 impl Left {
     /// What vanishes after the decision at surface `j`.
-    pub fn after(j: usize, decision: &Decision) -> Vec<Left> {
+    pub fn after(j: usize, decision: &Decision) -> Lefts {
         match decision.entry {
-            -1 => vec![Left::Surface(j, decision.minus)],
-            1 => vec![Left::Surface(j, decision.plus)],
+            -1 => smallvec![Left::Surface(j, decision.minus)],
+            1 => smallvec![Left::Surface(j, decision.plus)],
             _ => [
                 (EventFunction::ExitMinus, decision.minus),
                 (EventFunction::ExitPlus, decision.plus),
@@ -71,10 +81,36 @@ impl Left {
     }
 }
 
+/// How the last motion in a mode went.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pace {
+    /// The step proposed at its end.
+    dt: f64,
+    /// How long it lasted.
+    duration: f64,
+}
+
+impl Pace {
+    /// The first step of another motion in the mode. After several steps the proposal had settled, and a
+    /// little less will do. Where it was several times the motion, the field hardly limits it: look as
+    /// far ahead as the last event was, though motions that become ever shorter are no reason to go
+    /// below a tiny step. In between, nothing is known.
+    fn first_step(self, x: &[f64], derivative: &[f64], scale: &ErrorScale) -> Option<f64> {
+        if self.duration >= MANY * self.dt {
+            Some(FAMILIAR * self.dt)
+        } else if self.dt >= SEVERAL * self.duration {
+            let reach = REACH * self.duration;
+            Some(self.dt.min(reach.max(tiny_step(x, derivative, scale))))
+        } else {
+            None
+        }
+    }
+}
+
 impl Integrator<'_> {
     /// Values of all switching functions at the current point.
-    pub(super) fn surface_values(&mut self, signs: &[f64]) -> Result<Vec<f64>, FieldError> {
-        let mut h = vec![0.0; self.system.n_surfaces()];
+    pub(super) fn surface_values(&mut self, signs: &[f64]) -> Result<Values, FieldError> {
+        let mut h: Values = smallvec![0.0; self.system.n_surfaces()];
         self.system.surfaces(self.t, &self.x, signs, &mut h)?;
         self.stats.n_surface_evaluations += 1;
         Ok(h)
@@ -117,12 +153,9 @@ impl Integrator<'_> {
             (&[j], Some(arrival)) => {
                 let decision = decide(self.system, j, arrival, self.t, &self.x, &mode.signs())?;
                 let after = mode.with(j, decision.entry);
-                let candidates: Vec<Mode> = decision
-                    .candidates
-                    .iter()
-                    .map(|&entry| mode.with(j, entry))
-                    .collect();
-                if candidates.len() > 1 {
+                if decision.candidates.len() > 1 {
+                    let candidates = decision.candidates.iter();
+                    let candidates = candidates.map(|&entry| mode.with(j, entry)).collect();
                     if self.options.nonunique == NonUnique::Error {
                         return Ok(Some(Stop::NonUnique {
                             surface: j,
@@ -171,7 +204,7 @@ impl Integrator<'_> {
             })
             .collect();
         let sliding = self.motion.sliding();
-        let mut gradient = vec![0.0; self.x.len()];
+        let mut gradient: Values = smallvec![0.0; self.x.len()];
         for (j, h) in h.iter().enumerate() {
             if !self.motion.active[j] || Some(j) == sliding || surfaces.contains(&j) {
                 continue;
@@ -209,7 +242,7 @@ impl Integrator<'_> {
 
     /// A touch: recorded, the mode stays.
     fn graze(&mut self, mode: &Mode, surfaces: &[usize]) -> Result<Option<Stop>, FieldError> {
-        let mut left = Vec::new();
+        let mut left = Lefts::new();
         let signs = mode.signs();
         for &j in surfaces {
             let side = mode.entries()[j];
@@ -237,50 +270,72 @@ impl Integrator<'_> {
 
     /// Starts a motion at the current point; `left` are the functions that vanish there.
     pub(super) fn begin(&mut self, mode: Mode, left: &[Left]) -> Result<Option<Stop>, FieldError> {
-        let deflations: Vec<_> = left.iter().filter_map(|l| l.deflation(self.t)).collect();
+        let deflations: SmallVec<[_; 2]> =
+            left.iter().filter_map(|l| l.deflation(self.t)).collect();
         self.stats.n_field_evaluations += self.motion.field.n_evaluations();
-        self.motion = Motion::new(self.system, mode, &deflations);
+        self.remember_pace();
+        self.motion.restart(self.system, self.t, mode, &deflations);
         self.motion.project(self.t, &mut self.x)?;
-        let mut derivative = vec![0.0; self.x.len()];
+        let derivative = self.stepper.start_derivative_mut();
         match &mut self.motion.field {
             ModeField::Region(_) => {
                 let signs = &self.motion.signs;
                 self.stats.n_field_evaluations +=
-                    eval_on_side(self.system, self.t, &self.x, signs, &mut derivative)?;
+                    eval_on_side(self.system, self.t, &self.x, signs, derivative)?;
             }
             ModeField::Sliding(field) => {
-                field.eval(self.t, &mut self.x, &mut derivative)?;
+                field.eval(self.t, &mut self.x, derivative)?;
                 let a = field.last();
                 self.detector.stages = [[a.minus; 7], [-a.plus; 7]];
             }
         }
-        self.stepper.set_start_derivative(&derivative);
         self.recorder.begin_segment(self.t, &self.motion.mode);
+        let derivative = self.stepper.start_derivative();
         if derivative.iter().any(|v| !v.is_finite()) {
             return Ok(Some(Stop::NotFinite));
         }
-        let start = (self.t, &self.x[..], &derivative[..]);
+        let start = (self.t, &self.x[..], derivative);
         self.detector.measure(self.system, &self.motion, start, 0)?;
         self.detector.accept_start(&mut self.motion.monitored);
         self.user_events.restart(self.t, &self.x)?;
         self.controller.restart();
-        self.dt = self.first_step(&derivative, left)?;
+        self.dt = self.first_step(left)?;
         Ok(None)
     }
 
-    /// The first step of a motion: the proposal of the motion before, as far as Hairer's guess for
-    /// this one supports it, and no longer than a short excursion from the surface.
-    fn first_step(&mut self, derivative: &[f64], left: &[Left]) -> Result<f64, FieldError> {
+    /// Keeps the pace of the motion that ends, for the next one in its mode.
+    fn remember_pace(&mut self) {
+        if self.dt.is_nan() {
+            return;
+        }
+        let pace = Pace {
+            dt: self.dt,
+            duration: self.t - self.motion.t_start,
+        };
+        match self.paces.get_mut(&self.motion.mode) {
+            Some(last) => *last = pace,
+            None => {
+                self.paces.insert(self.motion.mode.clone(), pace);
+            }
+        }
+    }
+
+    /// The first step of a motion: what the last motion in its mode suggests; else the proposal of the
+    /// motion before, as far as Hairer's guess for this one supports it. No longer than a short
+    /// excursion from the surface.
+    fn first_step(&mut self, left: &[Left]) -> Result<f64, FieldError> {
         let remaining = (self.t_end - self.t).max(f64::MIN_POSITIVE);
         if let (Some(first), true) = (self.options.first_step, self.dt.is_nan()) {
             return Ok(first.min(remaining));
         }
         let longest = remaining.min(self.options.max_step);
         let (t, x, scale, field) = (self.t, &self.x, &self.scale, &mut self.motion.field);
-        let mut dt = if self.dt.is_nan() {
-            initial_step(field, t, x, derivative, scale, longest)?
-        } else {
-            restart_step(field, t, x, derivative, scale, self.dt.min(longest))?
+        let derivative = self.stepper.start_derivative();
+        let pace = self.paces.get(&self.motion.mode);
+        let mut dt = match pace.and_then(|pace| pace.first_step(x, derivative, scale)) {
+            Some(dt) => dt.min(longest),
+            None if self.dt.is_nan() => initial_step(field, t, x, derivative, scale, longest)?,
+            None => restart_step(field, t, x, derivative, scale, self.dt.min(longest))?,
         };
         for l in left {
             if let Left::Surface(j, leading) = l {
@@ -294,14 +349,19 @@ impl Integrator<'_> {
     /// a τ^k/k! + b τ^(k+1)/(k+1)!, with a fifth to spare.
     fn excursion(&self, j: usize, leading: Leading) -> Result<f64, FieldError> {
         let order = leading.order + 1;
-        if leading.order < 2 || order > self.system.max_lie_order() {
+        if leading.order < 2 || order > self.system.max_lie_order().min(MAX_LIE_ORDER) {
             return Ok(f64::INFINITY);
         }
         let side = self.motion.mode.entries()[j];
         let signs = &self.motion.signs;
-        let next = self
-            .system
-            .lie_derivative(j, j, &vec![side; order], self.t, &self.x, signs)?;
+        let next = self.system.lie_derivative(
+            j,
+            j,
+            &[side; MAX_LIE_ORDER][..order],
+            self.t,
+            &self.x,
+            signs,
+        )?;
         let back = -(order as f64) * leading.value / next.value;
         Ok(if back > 0.0 {
             1.2 * back

@@ -42,11 +42,11 @@ impl ErrorScale {
 ///
 ///   dt <- dt * 0.9 err^-alpha err_old^beta,  beta = 0.04, alpha = 1/5 - 0.75 beta,
 ///
-/// kept within [0.2, 5], without growth right after a rejection.
-#[derive(Clone, Debug)]
+/// kept within [0.2, 5], without growth right after a rejection. After a restart err_old is err.
+#[derive(Clone, Debug, Default)]
 pub struct Controller {
     /// Binary logarithm of the error of the last accepted step.
-    old_log: f64,
+    old_log: Option<f64>,
     rejected: bool,
 }
 
@@ -58,23 +58,15 @@ const SMALLEST_OLD_LOG: f64 = -13.287_7;
 const SHRINK: f64 = 0.2;
 const GROW: f64 = 5.0;
 
-impl Default for Controller {
-    fn default() -> Self {
-        Controller {
-            old_log: SMALLEST_OLD_LOG,
-            rejected: false,
-        }
-    }
-}
-
 impl Controller {
     /// The factor for the next step after one with this error was accepted.
     pub fn accept(&mut self, error: f64) -> f64 {
         // err^-alpha err_old^beta by logarithms; a step size needs no more than three digits.
         let log = rough_log2(error.max(1e-10));
-        let factor = SAFETY * rough_exp2(BETA * self.old_log - ALPHA * log);
+        let old_log = self.old_log.unwrap_or(log);
+        let factor = SAFETY * rough_exp2(BETA * old_log - ALPHA * log);
         let limit = if self.rejected { 1.0 } else { GROW };
-        self.old_log = log.max(SMALLEST_OLD_LOG);
+        self.old_log = Some(log.max(SMALLEST_OLD_LOG));
         self.rejected = false;
         factor.clamp(SHRINK, limit)
     }

@@ -66,9 +66,9 @@ impl Dopri5 {
         &self.k[0]
     }
 
-    /// Replaces the derivative at the start of the step.
-    pub fn set_start_derivative(&mut self, dy: &[f64]) {
-        self.k[0].copy_from_slice(dy);
+    /// The derivative at the start of the step, to be replaced.
+    pub fn start_derivative_mut(&mut self) -> &mut [f64] {
+        &mut self.k[0]
     }
 
     /// The derivative at the end of the attempted step.

@@ -76,3 +76,15 @@ pub fn restart_step(
     }
     Ok(proposal.min((0.1 / fastest).powf(0.2)))
 }
+
+/// As the guess of [`initial_step`] without its evaluation, and aiming at a thousandth of the tolerance
+/// instead of a hundredth: a step whose error is negligible for any but a very fast field. Zero for a
+/// field at rest, which says nothing.
+pub fn tiny_step(y: &[f64], dy: &[f64], scale: &ErrorScale) -> f64 {
+    let step = (0.001 / scale.norm(dy, y)).powf(0.2);
+    if step.is_finite() {
+        step
+    } else {
+        0.0
+    }
+}

@@ -10,7 +10,7 @@ pub use controller::{Controller, ErrorScale};
 pub use dense::Interpolant;
 pub(crate) use dense::{evaluate, nested};
 pub use dopri5::{Attempt, Dopri5};
-pub use initial_step::{initial_step, restart_step};
+pub use initial_step::{initial_step, restart_step, tiny_step};
 
 #[cfg(test)]
 mod tests;

@@ -2,6 +2,7 @@
 
 use crate::error::FieldError;
 use crate::field::{move_inside, side_offsets};
+use crate::mode::Signs;
 use crate::system::{LieValue, PiecewiseSystem};
 use crate::tolerances::{MAX_LIE_ORDER, SIDE_REACH};
 
@@ -47,7 +48,7 @@ pub fn first_nonzero(
     x: &[f64],
     signs: &[f64],
 ) -> Result<Leading, FieldError> {
-    let mut signs_side = signs.to_vec();
+    let mut signs_side = Signs::from_slice(signs);
     signs_side[j] = f64::from(side);
     if let Some(leading) = scan(system, j, side, vanishing, t, x, &signs_side)? {
         return Ok(leading);
@@ -106,7 +107,7 @@ pub fn normal_component(
     x: &[f64],
     signs: &[f64],
 ) -> Result<LieValue, FieldError> {
-    let mut signs_side = signs.to_vec();
+    let mut signs_side = Signs::from_slice(signs);
     signs_side[j] = f64::from(side);
     let mut lie = system.lie_derivative(i, j, &[side], t, x, &signs_side)?;
     for offset in side_offsets(x) {

@@ -39,6 +39,11 @@ impl BothSides {
         }
     }
 
+    /// Forgets what was found out on the last surface.
+    pub(crate) fn restart(&mut self) {
+        self.meets_edges = false;
+    }
+
     /// Fills everything from the field, the surfaces and the gradient of the system.
     pub(super) fn both_sides_by_parts<S: PiecewiseSystem + ?Sized>(
         &mut self,

@@ -6,6 +6,7 @@ use filippov_expr::{
     Backend, EnclosureProgram, ExprError, Gradient, Graph, Names, NodeId, Program,
 };
 use rustc_hash::FxHashMap;
+use smallvec::SmallVec;
 
 use super::tiered::{compile, TieredProgram};
 use super::Word;
@@ -27,7 +28,7 @@ pub(super) struct Model {
     enclosed_components: Vec<OnceLock<Option<EnclosureProgram>>>,
     lie: Mutex<LieCache>,
     /// Active surfaces of the modes met so far; a zero entry is the surface slid on.
-    activity: Mutex<FxHashMap<Vec<i8>, Vec<bool>>>,
+    activity: Mutex<FxHashMap<SmallVec<[i8; 16]>, Vec<bool>>>,
 }
 
 /// The gradient of one switching function: outputs are the derivative in t, then the listed states.
@@ -187,7 +188,7 @@ impl Model {
 
     /// Marks the surfaces whose sign matters in a mode.
     pub fn active(&self, signs: &[f64], sliding: Option<usize>, active: &mut [bool]) {
-        let key: Vec<i8> = signs
+        let key: SmallVec<[i8; 16]> = signs
             .iter()
             .enumerate()
             .map(|(j, &s)| if Some(j) == sliding { 0 } else { s as i8 })
