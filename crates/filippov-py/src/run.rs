@@ -67,10 +67,10 @@ impl Run {
     /// The multiplier vector at a time; NaN for surfaces not slid on.
     fn multiplier_vector(&self, solution: &Solution, t: f64, side: Side) -> PyResult<Vec<f64>> {
         let mut out = vec![f64::NAN; self.system.n_surfaces()];
-        if let Some((j, value)) = solution
-            .multiplier(&*self.system, t, side)
-            .map_err(raised)?
-        {
+        let values = solution
+            .multipliers(&*self.system, t, side)
+            .map_err(raised)?;
+        for (j, value) in values {
             out[j] = value;
         }
         Ok(out)

@@ -222,7 +222,7 @@ impl TracedSystem {
                 "signs: one entry per surface is needed",
             ));
         }
-        self.system.active(signs.as_slice()?, None, &mut active);
+        self.system.active(signs.as_slice()?, &[], &mut active);
         Ok(active)
     }
 

@@ -1,4 +1,4 @@
-//! Modes: a region of smooth motion, or sliding on one surface.
+//! Modes: a region of smooth motion, or sliding on a set of surfaces.
 
 use std::fmt;
 
@@ -29,7 +29,15 @@ impl Mode {
 
     /// The surface slid on, if exactly one is.
     pub fn sliding(&self) -> Option<usize> {
-        self.entries.iter().position(|&e| e == 0)
+        let mut zeros = self.sliding_set();
+        let first = zeros.next();
+        first.filter(|_| zeros.next().is_none())
+    }
+
+    /// The surfaces slid on.
+    pub fn sliding_set(&self) -> impl Iterator<Item = usize> + '_ {
+        let entries = self.entries.iter().enumerate();
+        entries.filter(|(_, &e)| e == 0).map(|(j, _)| j)
     }
 
     /// Number of surfaces slid on.

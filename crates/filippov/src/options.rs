@@ -29,6 +29,9 @@ pub struct Options {
     pub max_wall_time: Option<f64>,
     /// Policy at non-unique points.
     pub nonunique: NonUnique,
+    /// Scaling of every surface in the regularisation that decides where the Filippov solution is not
+    /// unique; 1 for all if empty.
+    pub kappa: Vec<f64>,
     /// Times at which the state is wanted; every step end if `None`.
     pub t_eval: Option<Vec<f64>>,
     /// Keep the interpolants, so that the solution can be evaluated anywhere.
@@ -46,6 +49,7 @@ impl Default for Options {
             max_events: 10_000_000,
             max_wall_time: None,
             nonunique: NonUnique::Regularize,
+            kappa: Vec::new(),
             t_eval: None,
             dense_output: true,
         }

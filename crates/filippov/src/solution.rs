@@ -1,7 +1,7 @@
 //! The record of a run: steps, segments, switches.
 
 use crate::error::FieldError;
-use crate::field::{Projector, SlidingField};
+use crate::field::{IntersectionField, Projector, SlidingField};
 use crate::integrate::{Stats, Stop, Warning};
 use crate::mode::Mode;
 use crate::options::Options;
@@ -140,8 +140,9 @@ impl Solution {
             .partition_point(|s| s.steps.1 <= index)
             .min(self.segments.len() - 1);
         let mode = &self.segments[segment].mode;
-        if let Some(j) = mode.sliding() {
-            Projector::default().project(system, j, t, y, &mode.signs())?;
+        if mode.codimension() > 0 {
+            let set: Vec<usize> = mode.sliding_set().collect();
+            Projector::default().project_onto(system, &set, t, y, &mode.signs())?;
         }
         Ok(Some(mode))
     }
@@ -259,25 +260,35 @@ impl Recorder {
 }
 
 impl Solution {
-    /// The surface slid on at `t` and its multiplier, if the motion slides there.
+    /// The surfaces slid on at `t` and their multipliers; none in a region.
     ///
     /// # Errors
     /// If a function of the user raises.
-    pub fn multiplier(
+    pub fn multipliers(
         &self,
         system: &dyn PiecewiseSystem,
         t: f64,
         side: Side,
-    ) -> Result<Option<(usize, f64)>, FieldError> {
+    ) -> Result<Vec<(usize, f64)>, FieldError> {
         let mut y = vec![0.0; self.n_states];
         let Some(mode) = self.evaluate(system, t, side, &mut y)? else {
-            return Ok(None);
+            return Ok(Vec::new());
         };
-        let Some(j) = mode.sliding() else {
-            return Ok(None);
-        };
-        let mut field = SlidingField::new(system, j, &mode.signs());
-        Ok(Some((j, field.normal_components(t, &mut y)?.multiplier())))
+        let set: Vec<usize> = mode.sliding_set().collect();
+        Ok(match set.as_slice() {
+            [] => Vec::new(),
+            &[j] => {
+                let mut field = SlidingField::new(system, j, &mode.signs());
+                vec![(j, field.normal_components(t, &mut y)?.multiplier())]
+            }
+            _ => {
+                let mut field = IntersectionField::new(system, &set, &mode.signs(), &[]);
+                field.solve(t, &mut y)?;
+                set.into_iter()
+                    .zip(field.multipliers().iter().copied())
+                    .collect()
+            }
+        })
     }
 
     /// Replaces the step ends by the wanted times, as far as the run came.

@@ -219,3 +219,15 @@ pub const SEVERAL: f64 = 3.0;
 
 /// How far ahead the first step looks then, as a multiple of the last motion in the mode.
 pub const REACH: f64 = 1.25;
+
+/// Share of the last step over which rates at an event are taken by differences: short against the time in
+/// which anything changes, long against rounding.
+pub const DRIFT_SHARE: f64 = 1e-4;
+
+/// A normal component below this fraction of its terms, where an intersection is left, is that of a multiplier
+/// that just reached its end; the event is located to better than that.
+pub const DEPARTS_TANGENTIALLY: f64 = 1e-6;
+
+/// An outward spiral starts at this multiple of the tolerance from the intersection: a free parameter of a family
+/// of solutions, small, and well above the error of the event.
+pub const SPIRAL_START: f64 = 100.0;

@@ -13,6 +13,21 @@ pub enum EventFunction {
     ExitMinus,
     /// Minus the normal component of f+ while sliding: positive until its zero.
     ExitPlus,
+    /// An exit function of sliding on an intersection, by its index
+    /// ([`crate::field::IntersectionField::exit`]): positive until its zero.
+    Exit(usize),
+}
+
+impl EventFunction {
+    /// The index of an exit function among those of its motion.
+    pub fn exit_index(self) -> Option<usize> {
+        match self {
+            EventFunction::Surface(_) => None,
+            EventFunction::ExitMinus => Some(0),
+            EventFunction::ExitPlus => Some(1),
+            EventFunction::Exit(index) => Some(index),
+        }
+    }
 }
 
 /// A zero at the start of the motion that is divided out: near `t` the function is

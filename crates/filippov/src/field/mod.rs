@@ -1,9 +1,13 @@
 //! The smooth field of a mode: what a stepper integrates.
 
+mod intersection;
+mod meeting;
 mod project;
 mod region;
 mod sliding;
 
+pub use intersection::{IntersectionExit, IntersectionField};
+pub use meeting::MeetingFields;
 pub use project::Projector;
 pub use region::{eval_off_surface, eval_on_side, move_inside, side_offsets, RegionField};
 pub use sliding::{NormalComponents, SlidingField};

@@ -1,7 +1,8 @@
-//! Projection onto a surface.
+//! Projection onto a surface, or onto an intersection of surfaces.
 
 use crate::error::FieldError;
-use crate::system::PiecewiseSystem;
+use crate::switching::Matrix;
+use crate::system::{dot, dot_magnitude, PiecewiseSystem};
 use crate::tolerances::SURFACE_NOISE;
 
 /// Scratch space of the projection.
@@ -50,5 +51,55 @@ impl Projector {
                 .for_each(|(x, g)| *x -= shift * g);
         }
         Ok(())
+    }
+
+    /// Moves `x` onto all surfaces of `set` at once, x <- x - N^T (N N^T)^-1 h with the gradients as the rows of N,
+    /// repeated until every |h| is at the level of rounding, at most eight times.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn project_onto(
+        &mut self,
+        system: &dyn PiecewiseSystem,
+        set: &[usize],
+        t: f64,
+        x: &mut [f64],
+        signs: &[f64],
+    ) -> Result<(), FieldError> {
+        if let &[j] = set {
+            return self.project(system, j, t, x, signs);
+        }
+        let n = x.len();
+        self.h.resize(system.n_surfaces(), 0.0);
+        self.gradient.resize(n * set.len(), 0.0);
+        for _ in 0..8 {
+            system.surfaces(t, x, signs, &mut self.h)?;
+            let mut is_near = true;
+            for (row, &j) in self.gradient.chunks_exact_mut(n).zip(set) {
+                system.gradient(j, t, x, signs, row)?;
+                is_near &= self.h[j].abs() <= 0.25 * SURFACE_NOISE * dot_magnitude(row, x);
+            }
+            let Some(shifts) = self.shifts(set, n).filter(|_| !is_near) else {
+                break;
+            };
+            for (row, shift) in self.gradient.chunks_exact(n).zip(shifts) {
+                x.iter_mut().zip(row).for_each(|(x, g)| *x -= shift * g);
+            }
+        }
+        Ok(())
+    }
+
+    /// (N N^T)^-1 h; `None` if the gradients are dependent or h is not finite.
+    fn shifts(&self, set: &[usize], n: usize) -> Option<Vec<f64>> {
+        let row = |i: usize| &self.gradient[i * n..(i + 1) * n];
+        let mut gram = Matrix::zeros(set.len());
+        for i in 0..set.len() {
+            for j in 0..set.len() {
+                gram[(i, j)] = dot(row(i), row(j));
+            }
+        }
+        let h: Vec<f64> = set.iter().map(|&j| self.h[j]).collect();
+        gram.solve(&h)
+            .filter(|shifts| shifts.iter().all(|v| v.is_finite()))
     }
 }

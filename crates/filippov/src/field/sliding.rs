@@ -1,5 +1,7 @@
 //! The sliding field on one surface.
 
+use smallvec::{smallvec, SmallVec};
+
 use super::{Projector, SmoothField};
 use crate::error::FieldError;
 use crate::mode::Signs;
@@ -23,6 +25,11 @@ impl NormalComponents {
         } else {
             self.minus / (self.minus - self.plus)
         }
+    }
+
+    /// The exit functions: positive until sliding ends.
+    pub fn exits(&self) -> SmallVec<[f64; 6]> {
+        smallvec![self.minus, -self.plus]
     }
 
     /// The multiplier lambda in [-1, 1]: +1 is the field of the side h > 0,

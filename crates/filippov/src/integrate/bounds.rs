@@ -20,7 +20,7 @@ pub(super) struct BoundedCurve<'a> {
     pub system: &'a dyn PiecewiseSystem,
     pub interpolant: &'a Interpolant,
     pub signs: &'a [f64],
-    pub sliding: Option<usize>,
+    pub sliding: &'a [usize],
     /// How far the projection onto a curved surface moves the extension.
     pub margin: &'a [f64],
     /// The normal components on the last piece of this extension: they are asked for one after the other.
@@ -40,9 +40,9 @@ impl BoundedCurve<'_> {
                 let enclosure = self.system.enclose_surface(j, &tube, self.signs)?;
                 (enclosure, m.orientation)
             }
-            (EventFunction::ExitMinus, Some(j)) => (self.normal_components(j, a, b)?[0], 1.0),
-            (EventFunction::ExitPlus, Some(j)) => (self.normal_components(j, a, b)?[1], -1.0),
-            (_, None) => return None,
+            (EventFunction::ExitMinus, &[j]) => (self.normal_components(j, a, b)?[0], 1.0),
+            (EventFunction::ExitPlus, &[j]) => (self.normal_components(j, a, b)?[1], -1.0),
+            _ => return None,
         };
         Some(Bound::new(enclosure, orientation, self.interpolant.dt))
     }
@@ -93,7 +93,8 @@ impl Integrator<'_> {
         let is_curved = self
             .motion
             .sliding()
-            .is_some_and(|j| !self.system.is_affine(j));
+            .iter()
+            .any(|&j| !self.system.is_affine(j));
         if !is_curved {
             return Ok(());
         }

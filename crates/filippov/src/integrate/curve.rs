@@ -1,9 +1,8 @@
 //! A monitored function along the continuous extension of a step.
 
-use super::motion::ModeField;
+use super::motion::{Exits, ModeField};
 use crate::error::FieldError;
 use crate::event::{EventFunction, Monitored};
-use crate::field::NormalComponents;
 use crate::stepper::Interpolant;
 use crate::system::PiecewiseSystem;
 
@@ -15,8 +14,8 @@ pub(super) struct Curve<'a, 'b> {
     pub interpolant: &'a Interpolant,
     pub h: &'a mut [f64],
     pub x: &'a mut [f64],
-    /// Normal components already known along this step, by theta.
-    pub exits: &'a mut Vec<(f64, NormalComponents)>,
+    /// Exit functions already known along this step, by theta.
+    pub exits: &'a mut Vec<(f64, Exits)>,
     pub n_evaluations: &'a mut u64,
 }
 
@@ -25,37 +24,30 @@ impl Curve<'_, '_> {
     pub fn value(&mut self, m: &Monitored, theta: f64) -> Result<f64, FieldError> {
         let t = self.interpolant.t0 + theta * self.interpolant.dt;
         self.interpolant.at(theta, self.x);
-        match (m.function, &mut *self.field) {
-            (EventFunction::Surface(j), field) => {
-                if let ModeField::Sliding(field) = field {
-                    field.project(t, self.x)?;
-                }
-                *self.n_evaluations += 1;
-                self.system.surfaces(t, self.x, self.signs, self.h)?;
-                Ok(m.orientation * self.h[j])
+        let Some(index) = m.function.exit_index() else {
+            return self.surface(m, t);
+        };
+        let known = self.exits.iter().position(|(at, _)| *at == theta);
+        let at = match known {
+            Some(at) => at,
+            None => {
+                let exits = self.field.exits(t, self.x)?;
+                self.exits.push((theta, exits));
+                self.exits.len() - 1
             }
-            (exit, ModeField::Sliding(field)) => {
-                let known = self
-                    .exits
-                    .iter()
-                    .find(|(at, _)| *at == theta)
-                    .map(|(_, a)| *a);
-                let a = match known {
-                    Some(a) => a,
-                    None => field.normal_components(t, self.x)?,
-                };
-                if known.is_none() {
-                    self.exits.push((theta, a));
-                }
-                Ok(if exit == EventFunction::ExitMinus {
-                    a.minus
-                } else {
-                    -a.plus
-                })
-            }
-            // Exit functions are monitored while sliding only.
-            (_, ModeField::Region(_)) => Ok(f64::NAN),
-        }
+        };
+        Ok(self.exits[at].1.get(index).copied().unwrap_or(f64::NAN))
+    }
+
+    /// A switching function at the projection of the point in `x`.
+    fn surface(&mut self, m: &Monitored, t: f64) -> Result<f64, FieldError> {
+        let EventFunction::Surface(j) = m.function else {
+            return Ok(f64::NAN);
+        };
+        self.field.project(t, self.x)?;
+        *self.n_evaluations += 1;
+        self.system.surfaces(t, self.x, self.signs, self.h)?;
+        Ok(m.orientation * self.h[j])
     }
 }
 

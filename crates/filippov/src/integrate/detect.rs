@@ -7,29 +7,28 @@ use smallvec::{smallvec, SmallVec};
 use super::bounds::{BoundedCurve, Piece};
 use super::curve::{grazes, Curve};
 use super::integrator::Integrator;
-use super::motion::{ModeField, Motion};
+use super::motion::{Exits, ModeField, Motion};
 use crate::error::FieldError;
 use crate::event::filter::{may_vanish, may_vanish_bent, may_vanish_between, may_vanish_deflated};
 use crate::event::isolate::{first_zero_sampled, Evidence, Zero, PROBES};
 use crate::event::locate::refine;
 use crate::event::{EventFunction, Monitored};
-use crate::field::NormalComponents;
 use crate::stepper::nested;
 use crate::system::{dot, PiecewiseSystem};
 use crate::tolerances::{EPS, EXTRAPOLATION, ONE_SIDED_AIM, POLE, RESOLVED_DEPTH, SURFACE_NOISE};
 
 /// Scratch space of the event stage, and values at the end of the step.
 pub(super) struct Detector {
-    /// Exit functions at the seven stages: of f-, and minus that of f+.
-    pub stages: [[f64; 7]; 2],
+    /// The exit functions of the motion at the seven stages.
+    pub stages: Vec<[f64; 7]>,
     /// The step did not resolve a monitored function; it may not grow.
     pub unresolved: bool,
     /// A monitored function could not be searched; the step has to be shortened.
     pub uncertain: bool,
     /// Length of the next step, if the event stage knows better than the error control.
     pub next_dt: Option<f64>,
-    /// Normal components computed in the search of this step, by theta.
-    exits: Vec<(f64, NormalComponents)>,
+    /// Exit functions computed in the search of this step, by theta.
+    exits: Vec<(f64, Exits)>,
     h: Vec<f64>,
     /// Switching functions at the probes of the step.
     probed: [Vec<f64>; 2],
@@ -60,7 +59,7 @@ pub(super) struct Found {
 impl Detector {
     pub fn new(n: usize, d: usize) -> Self {
         Detector {
-            stages: [[f64::NAN; 7]; 2],
+            stages: Vec::new(),
             unresolved: false,
             uncertain: false,
             next_dt: None,
@@ -100,6 +99,7 @@ impl Detector {
                 }
                 EventFunction::ExitMinus => (self.stages[0][stage], f64::NAN),
                 EventFunction::ExitPlus => (self.stages[1][stage], f64::NAN),
+                EventFunction::Exit(index) => (self.stages[index][stage], f64::NAN),
             });
         }
         Ok(())
@@ -235,6 +235,9 @@ impl Integrator<'_> {
                 }
                 (EventFunction::ExitMinus, None, _) => may_vanish_between(&self.detector.stages[0]),
                 (EventFunction::ExitPlus, None, _) => may_vanish_between(&self.detector.stages[1]),
+                (EventFunction::Exit(index), None, _) => {
+                    may_vanish_between(&self.detector.stages[index])
+                }
                 (_, Some(_), _) => true,
             };
             if suspect {
@@ -291,7 +294,7 @@ impl Integrator<'_> {
             system: self.system,
             interpolant,
             signs: &self.motion.signs,
-            sliding: self.motion.sliding(),
+            sliding: &self.motion.sliding,
             margin: &self.detector.margin,
             last: &self.detector.enclosed_exits,
         };

@@ -176,7 +176,7 @@ impl<'a> Integrator<'a> {
                 None => Ok(Some(Stop::NotFinite)),
             };
         }
-        let sliding = self.motion.sliding().is_some();
+        let sliding = !self.motion.sliding().is_empty();
         match self.attempt(dt)? {
             Attempt::NotFinite => {
                 self.count_rejection(sliding);
@@ -205,12 +205,21 @@ impl<'a> Integrator<'a> {
                 };
                 self.stepper.attempt(&mut **field, observe, t, x, dt, scale)
             }
+            ModeField::Intersection(field) => {
+                let stages = &mut self.detector.stages;
+                let observe = |stage: usize, field: &crate::field::IntersectionField| {
+                    for (exit, value) in stages.iter_mut().zip(field.exits()) {
+                        exit[stage] = *value;
+                    }
+                };
+                self.stepper.attempt(&mut **field, observe, t, x, dt, scale)
+            }
         }
     }
 
     /// Accepts the step, or its part up to the first event.
     fn advance(&mut self, dt: f64, error: f64) -> Result<Option<Stop>, FieldError> {
-        let sliding = self.motion.sliding().is_some();
+        let sliding = !self.motion.sliding().is_empty();
         let t1 = if dt == self.t_end - self.t {
             self.t_end
         } else {

@@ -1,8 +1,10 @@
 //! The motion in one mode: its field, its signs, and what is monitored.
 
+use smallvec::SmallVec;
+
 use crate::error::FieldError;
 use crate::event::{Deflation, EventFunction, Monitored};
-use crate::field::{RegionField, SlidingField, SmoothField};
+use crate::field::{IntersectionField, RegionField, SlidingField, SmoothField};
 use crate::mode::{Mode, Signs};
 use crate::system::PiecewiseSystem;
 
@@ -10,21 +12,71 @@ use crate::system::PiecewiseSystem;
 pub(super) enum ModeField<'a> {
     Region(RegionField<'a>),
     Sliding(Box<SlidingField<'a>>),
+    Intersection(Box<IntersectionField<'a>>),
 }
 
+/// The surfaces slid on, in order.
+pub(super) type SlidingSet = SmallVec<[usize; 4]>;
+
+/// Values of the exit functions of a motion: positive inside.
+pub(super) type Exits = SmallVec<[f64; 6]>;
+
 impl<'a> ModeField<'a> {
-    fn new(system: &'a dyn PiecewiseSystem, sliding: Option<usize>, signs: &[f64]) -> Self {
-        match sliding {
-            None => ModeField::Region(RegionField::new(system, signs)),
-            Some(j) => ModeField::Sliding(Box::new(SlidingField::new(system, j, signs))),
+    fn new(system: &'a dyn PiecewiseSystem, sliding: &[usize], signs: &[f64]) -> Self {
+        match *sliding {
+            [] => ModeField::Region(RegionField::new(system, signs)),
+            [j] => ModeField::Sliding(Box::new(SlidingField::new(system, j, signs))),
+            _ => {
+                let field = IntersectionField::new(system, sliding, signs, &[]);
+                ModeField::Intersection(Box::new(field))
+            }
+        }
+    }
+
+    /// Number of functions that end sliding.
+    pub fn n_exits(&self) -> usize {
+        match self {
+            ModeField::Region(_) => 0,
+            ModeField::Sliding(_) => 2,
+            ModeField::Intersection(field) => field.n_exits(),
+        }
+    }
+
+    /// The exit functions at the last evaluation.
+    pub fn last_exits(&self) -> Exits {
+        match self {
+            ModeField::Region(_) => Exits::new(),
+            ModeField::Sliding(field) => field.last().exits(),
+            ModeField::Intersection(field) => Exits::from_slice(field.exits()),
+        }
+    }
+
+    /// The exit functions at (t, x), after projection.
+    pub fn exits(&mut self, t: f64, x: &mut [f64]) -> Result<Exits, FieldError> {
+        match self {
+            ModeField::Region(_) => {}
+            ModeField::Sliding(field) => {
+                field.normal_components(t, x)?;
+            }
+            ModeField::Intersection(field) => field.solve(t, x)?,
+        }
+        Ok(self.last_exits())
+    }
+
+    /// Moves `x` onto the surfaces slid on.
+    pub fn project(&mut self, t: f64, x: &mut [f64]) -> Result<(), FieldError> {
+        match self {
+            ModeField::Region(_) => Ok(()),
+            ModeField::Sliding(field) => field.project(t, x),
+            ModeField::Intersection(field) => field.project(t, x),
         }
     }
 
     /// Becomes the field of another mode of its kind; `false` if it is of another kind.
-    fn restart(&mut self, sliding: Option<usize>, signs: &[f64]) -> bool {
+    fn restart(&mut self, sliding: &[usize], signs: &[f64]) -> bool {
         match (self, sliding) {
-            (ModeField::Region(field), None) => field.restart(signs),
-            (ModeField::Sliding(field), Some(j)) => field.restart(j, signs),
+            (ModeField::Region(field), []) => field.restart(signs),
+            (ModeField::Sliding(field), &[j]) => field.restart(j, signs),
             _ => return false,
         }
         true
@@ -36,6 +88,7 @@ impl SmoothField for ModeField<'_> {
         match self {
             ModeField::Region(field) => field.eval(t, x, dx),
             ModeField::Sliding(field) => field.eval(t, x, dx),
+            ModeField::Intersection(field) => field.eval(t, x, dx),
         }
     }
 
@@ -43,6 +96,7 @@ impl SmoothField for ModeField<'_> {
         match self {
             ModeField::Region(field) => field.n_evaluations(),
             ModeField::Sliding(field) => field.n_evaluations(),
+            ModeField::Intersection(field) => field.n_evaluations(),
         }
     }
 }
@@ -51,11 +105,13 @@ impl SmoothField for ModeField<'_> {
 pub(super) struct Motion<'a> {
     pub mode: Mode,
     pub t_start: f64,
-    /// Signs handed to the field; the surface slid on counts as +1.
+    /// Signs handed to the field; the surfaces slid on count as +1.
     pub signs: Signs,
     /// Surfaces whose sign matters in this mode.
     pub active: Vec<bool>,
     pub field: ModeField<'a>,
+    /// The surfaces slid on.
+    pub sliding: SlidingSet,
     /// Fields of other kinds that earlier motions had, kept for their buffers.
     idle: Vec<ModeField<'a>>,
     pub monitored: Vec<Monitored>,
@@ -64,11 +120,12 @@ pub(super) struct Motion<'a> {
 impl<'a> Motion<'a> {
     /// The motion in `mode` from `t_start`.
     pub fn new(system: &'a dyn PiecewiseSystem, t_start: f64, mode: Mode) -> Self {
-        let signs = mode.signs();
+        let (signs, sliding): (_, SlidingSet) = (mode.signs(), mode.sliding_set().collect());
         let mut motion = Motion {
             t_start,
             active: vec![false; signs.len()],
-            field: ModeField::new(system, mode.sliding(), &signs),
+            field: ModeField::new(system, &sliding, &signs),
+            sliding,
             idle: Vec::new(),
             monitored: Vec::new(),
             signs,
@@ -86,19 +143,19 @@ impl<'a> Motion<'a> {
         mode: Mode,
         deflations: &[(EventFunction, Deflation)],
     ) {
-        let (signs, sliding) = (mode.signs(), mode.sliding());
-        if !self.field.restart(sliding, &signs) {
+        let (signs, sliding): (_, SlidingSet) = (mode.signs(), mode.sliding_set().collect());
+        if !self.field.restart(&sliding, &signs) {
             let known = self
                 .idle
                 .iter_mut()
-                .position(|f| f.restart(sliding, &signs));
+                .position(|f| f.restart(&sliding, &signs));
             let field = match known {
                 Some(index) => self.idle.swap_remove(index),
-                None => ModeField::new(system, sliding, &signs),
+                None => ModeField::new(system, &sliding, &signs),
             };
             self.idle.push(std::mem::replace(&mut self.field, field));
         }
-        (self.mode, self.t_start, self.signs) = (mode, t_start, signs);
+        (self.mode, self.t_start, self.signs, self.sliding) = (mode, t_start, signs, sliding);
         self.find_monitored(system, deflations);
     }
 
@@ -107,7 +164,7 @@ impl<'a> Motion<'a> {
         system: &dyn PiecewiseSystem,
         deflations: &[(EventFunction, Deflation)],
     ) {
-        let (signs, sliding) = (&self.signs, self.mode.sliding());
+        let (signs, sliding) = (&self.signs, &self.sliding);
         system.active(signs, sliding, &mut self.active);
         let monitor = |function, orientation, affine| Monitored {
             function,
@@ -123,15 +180,17 @@ impl<'a> Motion<'a> {
             noise: 0.0,
         };
         self.monitored.clear();
-        let surfaces = (0..signs.len()).filter(|&j| self.active[j] && Some(j) != sliding);
+        let surfaces = (0..signs.len()).filter(|j| self.active[*j] && !sliding.contains(j));
         self.monitored.extend(
             surfaces.map(|j| monitor(EventFunction::Surface(j), signs[j], system.is_affine(j))),
         );
-        if sliding.is_some() {
-            let exits = [EventFunction::ExitMinus, EventFunction::ExitPlus];
-            self.monitored
-                .extend(exits.map(|exit| monitor(exit, 1.0, false)));
-        }
+        let exits = (0..self.field.n_exits()).map(|index| match (sliding.len(), index) {
+            (1, 0) => EventFunction::ExitMinus,
+            (1, _) => EventFunction::ExitPlus,
+            _ => EventFunction::Exit(index),
+        });
+        self.monitored
+            .extend(exits.map(|exit| monitor(exit, 1.0, false)));
         self.note_departure();
     }
 
@@ -146,19 +205,22 @@ impl<'a> Motion<'a> {
         }
     }
 
-    /// The surface slid on.
-    pub fn sliding(&self) -> Option<usize> {
+    /// The surfaces slid on.
+    pub fn sliding(&self) -> &[usize] {
+        &self.sliding
+    }
+
+    /// The multipliers at the last evaluation, in the order of the surfaces slid on.
+    pub fn multipliers(&self) -> Vec<f64> {
         match &self.field {
-            ModeField::Region(_) => None,
-            ModeField::Sliding(field) => Some(field.surface()),
+            ModeField::Region(_) => Vec::new(),
+            ModeField::Sliding(field) => vec![field.last().multiplier()],
+            ModeField::Intersection(field) => field.multipliers().to_vec(),
         }
     }
 
-    /// Moves `x` onto the surface slid on.
+    /// Moves `x` onto the surfaces slid on.
     pub fn project(&mut self, t: f64, x: &mut [f64]) -> Result<(), FieldError> {
-        if let ModeField::Sliding(field) = &mut self.field {
-            field.project(t, x)?;
-        }
-        Ok(())
+        self.field.project(t, x)
     }
 }

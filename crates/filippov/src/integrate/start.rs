@@ -1,12 +1,12 @@
 //! Where a run starts: arguments checked, the mode of the initial state found.
 
 use super::integrator::Integrator;
-use super::transition::{Left, Lefts};
-use super::{Stop, WarningCode};
+use super::transition::{Decided, Left, Lefts};
+use super::Stop;
 use crate::error::{Error, FieldError};
 use crate::mode::Mode;
-use crate::options::{NonUnique, Options};
-use crate::switching::{decide, decide_intersection, Arrival};
+use crate::options::Options;
+use crate::switching::{decide, Arrival};
 use crate::system::PiecewiseSystem;
 use crate::tolerances::SURFACE_NOISE;
 
@@ -111,22 +111,10 @@ impl Integrator<'_> {
                 Ok(placed) => placed,
                 Err(stop) => return Ok(Some(stop)),
             },
-            _ => {
-                let decision = decide_intersection(self.system, &meeting, &mode, self.t, &self.x)?;
-                match decision.unique() {
-                    Some((mode, left)) => (
-                        mode.clone(),
-                        left.iter().map(|&(j, l)| Left::Surface(j, l)).collect(),
-                    ),
-                    None => {
-                        let candidates = decision.candidates;
-                        return Ok(Some(Stop::Intersection {
-                            surfaces: meeting,
-                            candidates,
-                        }));
-                    }
-                }
-            }
+            _ => match self.decide_at_start(&mode, &meeting)? {
+                Ok(placed) => placed,
+                Err(stop) => return Ok(Some(stop)),
+            },
         };
         self.begin(mode, &left)
     }
@@ -157,19 +145,14 @@ impl Integrator<'_> {
                 };
                 tried.set(j, if up { 1 } else { -1 });
             }
-            self.system.active(&tried.signs(), None, &mut active);
+            self.system.active(&tried.signs(), &[], &mut active);
             matters.iter_mut().zip(&active).for_each(|(m, a)| *m |= a);
         }
         Ok(zeros.into_iter().filter(|&j| matters[j]).collect())
     }
 
     /// The mode of a start on one surface, or the reason to stop.
-    #[allow(clippy::type_complexity)]
-    fn start_on_surface(
-        &mut self,
-        mode: &Mode,
-        j: usize,
-    ) -> Result<Result<(Mode, Lefts), Stop>, FieldError> {
+    fn start_on_surface(&mut self, mode: &Mode, j: usize) -> Result<Decided, FieldError> {
         let signs = mode.signs();
         let decision = decide(self.system, j, Arrival::Start, self.t, &self.x, &signs)?;
         let candidates: Vec<Mode> = decision
@@ -179,13 +162,9 @@ impl Integrator<'_> {
             .collect();
         let chosen = mode.with(j, decision.entry);
         if candidates.len() > 1 {
-            if self.options.nonunique == NonUnique::Error {
-                return Ok(Err(Stop::NonUnique {
-                    surface: j,
-                    candidates,
-                }));
+            if let Some(stop) = self.report_non_unique(&[j], &chosen, candidates) {
+                return Ok(Err(stop));
             }
-            self.warn_non_unique(j, &chosen, &candidates, WarningCode::NonUnique);
         }
         Ok(Ok((chosen, Left::after(j, &decision))))
     }

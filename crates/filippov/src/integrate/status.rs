@@ -2,6 +2,7 @@
 
 use crate::error::FieldError;
 use crate::mode::Mode;
+use crate::switching::Undecided;
 
 /// Why a run ended. Whatever the reason, the solution up to that time is kept.
 #[derive(Debug)]
@@ -35,11 +36,13 @@ pub enum Stop {
         surfaces: Vec<usize>,
         /// The attracting modes of codimension 0 and 1.
         candidates: Vec<Mode>,
+        /// Why the decision failed.
+        reason: Undecided,
     },
     /// The continuation is not unique, and `NonUnique::Error` was asked for.
     NonUnique {
-        /// The surface.
-        surface: usize,
+        /// The surfaces.
+        surfaces: Vec<usize>,
         /// The modes that are Filippov continuations.
         candidates: Vec<Mode>,
     },
@@ -113,9 +116,13 @@ impl Stop {
             Stop::FieldRaised(_) => {
                 format!("Stopped at t = {t:.10} in mode ({mode}): the right-hand side raised an exception.")
             }
-            Stop::Intersection { surfaces, candidates } => format!(
-                "Stopped at t = {t:.10}: the motion arrived at the intersection of {} from mode ({mode}). \
-                 Sliding on several surfaces at once is not available yet{}.",
+            Stop::Intersection {
+                surfaces,
+                candidates,
+                reason,
+            } => format!(
+                "Stopped at t = {t:.10}: the motion arrived at the intersection of {} from mode ({mode}), and what \
+                 follows is not decided: {reason}{}.",
                 names(surfaces),
                 if candidates.is_empty() {
                     String::new()
@@ -123,10 +130,13 @@ impl Stop {
                     format!("; candidates of lower codimension: {}", modes(candidates))
                 }
             ),
-            Stop::NonUnique { surface, candidates } => format!(
+            Stop::NonUnique {
+                surfaces,
+                candidates,
+            } => format!(
                 "Stopped at t = {t:.10}: the continuation at {} is not unique; candidates: {}. \
                  nonunique=\"regularize\" chooses one.",
-                names(&[*surface]),
+                names(surfaces),
                 modes(candidates)
             ),
         }

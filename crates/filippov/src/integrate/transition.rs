@@ -13,9 +13,7 @@ use crate::mode::Mode;
 use crate::options::NonUnique;
 use crate::solution::Switch;
 use crate::stepper::{initial_step, restart_step, tiny_step, ErrorScale};
-use crate::switching::{
-    decide, decide_intersection, first_nonzero, Arrival, Decision, Kind, Leading,
-};
+use crate::switching::{decide, first_nonzero, Arrival, Decision, Kind, Leading};
 use crate::tolerances::{
     FAMILIAR, MANY, MAX_LIE_ORDER, MOST_SWITCHES_AT_ONE_TIME, REACH, SEVERAL, SURFACE_NOISE,
 };
@@ -25,6 +23,9 @@ pub(super) type Values = SmallVec<[f64; 8]>;
 
 /// What vanishes at the start of a motion, seldom more than two functions.
 pub(super) type Lefts = SmallVec<[Left; 2]>;
+
+/// What follows, and what vanishes at its start; or why the run ends.
+pub(super) type Decided = Result<(Mode, Lefts), Stop>;
 
 /// A function that vanishes at the start of a motion, with its first non-vanishing derivative.
 #[derive(Clone, Copy, Debug)]
@@ -143,45 +144,20 @@ impl Integrator<'_> {
             return self.graze(&mode, &surfaces);
         }
         let arrival = self.arrival(event, &surfaces);
-        if let Some(j) = self.motion.sliding() {
+        let fresh = surfaces.clone();
+        for &j in self.motion.sliding() {
             if !surfaces.contains(&j) {
                 surfaces.push(j);
-                surfaces.sort_unstable();
             }
         }
-        let (after, left) = match (surfaces.as_slice(), arrival) {
-            (&[j], Some(arrival)) => {
-                let decision = decide(self.system, j, arrival, self.t, &self.x, &mode.signs())?;
-                let after = mode.with(j, decision.entry);
-                if decision.candidates.len() > 1 {
-                    let candidates = decision.candidates.iter();
-                    let candidates = candidates.map(|&entry| mode.with(j, entry)).collect();
-                    if self.options.nonunique == NonUnique::Error {
-                        return Ok(Some(Stop::NonUnique {
-                            surface: j,
-                            candidates,
-                        }));
-                    }
-                    self.warn_non_unique(j, &after, &candidates, WarningCode::NonUnique);
-                }
-                (after, Left::after(j, &decision))
-            }
-            _ => {
-                let decision = decide_intersection(self.system, &surfaces, &mode, self.t, &self.x)?;
-                match decision.unique() {
-                    Some((after, left)) => (
-                        after.clone(),
-                        left.iter().map(|&(j, l)| Left::Surface(j, l)).collect(),
-                    ),
-                    None => {
-                        let candidates = decision.candidates;
-                        return Ok(Some(Stop::Intersection {
-                            surfaces,
-                            candidates,
-                        }));
-                    }
-                }
-            }
+        surfaces.sort_unstable();
+        let decided = match (surfaces.as_slice(), arrival) {
+            (&[j], Some(arrival)) => self.decide_at_surface(&mode, j, arrival)?,
+            _ => self.decide_at_intersection(event, &mode, &surfaces, &fresh)?,
+        };
+        let (after, left) = match decided {
+            Ok(decided) => decided,
+            Err(stop) => return Ok(Some(stop)),
         };
         let changed: Vec<usize> = surfaces
             .iter()
@@ -190,6 +166,25 @@ impl Integrator<'_> {
             .collect();
         self.record(mode, after.clone(), changed);
         self.begin(after, &left)
+    }
+
+    /// What follows at one surface.
+    fn decide_at_surface(
+        &mut self,
+        mode: &Mode,
+        j: usize,
+        arrival: Arrival,
+    ) -> Result<Decided, FieldError> {
+        let decision = decide(self.system, j, arrival, self.t, &self.x, &mode.signs())?;
+        let after = mode.with(j, decision.entry);
+        if decision.candidates.len() > 1 {
+            let candidates = decision.candidates.iter();
+            let candidates: Vec<Mode> = candidates.map(|&entry| mode.with(j, entry)).collect();
+            if let Some(stop) = self.report_non_unique(&[j], &after, candidates) {
+                return Ok(Err(stop));
+            }
+        }
+        Ok(Ok((after, Left::after(j, &decision))))
     }
 
     /// Surfaces that vanish at the event: those that were located, and all others that matter, are
@@ -206,7 +201,7 @@ impl Integrator<'_> {
         let sliding = self.motion.sliding();
         let mut gradient: Values = smallvec![0.0; self.x.len()];
         for (j, h) in h.iter().enumerate() {
-            if !self.motion.active[j] || Some(j) == sliding || surfaces.contains(&j) {
+            if !self.motion.active[j] || sliding.contains(&j) || surfaces.contains(&j) {
                 continue;
             }
             let ht = self
@@ -233,9 +228,9 @@ impl Integrator<'_> {
     /// How the motion arrived, if one surface decides.
     fn arrival(&self, event: &Found, surfaces: &[usize]) -> Option<Arrival> {
         match (self.motion.sliding(), surfaces, event.functions.as_slice()) {
-            (None, &[j], _) => Some(Arrival::Region(self.motion.mode.entries()[j])),
-            (Some(_), [], [EventFunction::ExitMinus, ..]) => Some(Arrival::ExitMinus),
-            (Some(_), [], [EventFunction::ExitPlus, ..]) => Some(Arrival::ExitPlus),
+            ([], &[j], _) => Some(Arrival::Region(self.motion.mode.entries()[j])),
+            ([_], [], [EventFunction::ExitMinus, ..]) => Some(Arrival::ExitMinus),
+            ([_], [], [EventFunction::ExitPlus, ..]) => Some(Arrival::ExitPlus),
             _ => None,
         }
     }
@@ -255,7 +250,7 @@ impl Integrator<'_> {
         self.begin(mode.clone(), &left)
     }
 
-    fn record(&mut self, before: Mode, after: Mode, surfaces: Vec<usize>) {
+    pub(super) fn record(&mut self, before: Mode, after: Mode, surfaces: Vec<usize>) {
         let kind = Kind::between(&before, &after);
         self.recorder.switch(Switch {
             t: self.t,
@@ -283,10 +278,13 @@ impl Integrator<'_> {
                 self.stats.n_field_evaluations +=
                     eval_on_side(self.system, self.t, &self.x, signs, derivative)?;
             }
-            ModeField::Sliding(field) => {
+            field => {
                 field.eval(self.t, &mut self.x, derivative)?;
-                let a = field.last();
-                self.detector.stages = [[a.minus; 7], [-a.plus; 7]];
+                self.detector.stages.clear();
+                let exits = field.last_exits();
+                self.detector
+                    .stages
+                    .extend(exits.iter().map(|&exit| [exit; 7]));
             }
         }
         self.recorder.begin_segment(self.t, &self.motion.mode);
@@ -370,18 +368,40 @@ impl Integrator<'_> {
         })
     }
 
+    /// Warns of a point where several continuations are Filippov solutions, or stops there if that was asked for.
+    pub(super) fn report_non_unique(
+        &mut self,
+        surfaces: &[usize],
+        chosen: &Mode,
+        candidates: Vec<Mode>,
+    ) -> Option<Stop> {
+        if self.options.nonunique == NonUnique::Error {
+            let surfaces = surfaces.to_vec();
+            return Some(Stop::NonUnique {
+                surfaces,
+                candidates,
+            });
+        }
+        self.warn_non_unique(surfaces, chosen, &candidates, WarningCode::NonUnique);
+        None
+    }
+
     pub(super) fn warn_non_unique(
         &mut self,
-        j: usize,
+        surfaces: &[usize],
         chosen: &Mode,
         all: &[Mode],
         code: WarningCode,
     ) {
-        let names: Vec<String> = all.iter().map(|m| format!("({m})")).collect();
-        let surface = self.system.surface_name(j);
+        let modes: Vec<String> = all.iter().map(|m| format!("({m})")).collect();
+        let names = surfaces
+            .iter()
+            .map(|&j| self.system.surface_name(j) + " = 0");
+        let names: Vec<String> = names.collect();
         let text = format!(
-            "the continuation at {surface} = 0 is not unique: {}; ({chosen}) was chosen",
-            names.join(", ")
+            "the continuation at {} is not unique: {}; ({chosen}) was chosen",
+            names.join(", "),
+            modes.join(", ")
         );
         self.warnings.push(Warning {
             t: self.t,

@@ -185,6 +185,17 @@ impl Dopri5 {
         &self.interpolant
     }
 
+    /// Makes the continuous extension a straight line: the record of a motion that was not stepped.
+    pub fn set_straight(&mut self, t: f64, dt: f64, from: &[f64], to: &[f64]) {
+        (self.interpolant.t0, self.interpolant.dt) = (t, dt);
+        let [y0, r1, rest @ ..] = self.interpolant.rows();
+        y0.copy_from_slice(from);
+        let ends = from.iter().zip(to);
+        r1.iter_mut().zip(ends).for_each(|(r, (a, b))| *r = b - a);
+        rest.into_iter().for_each(|row| row.fill(0.0));
+        self.order5 = true;
+    }
+
     /// Raises the continuous extension of the attempted step to order 5, with two evaluations.
     ///
     /// The polynomial takes y and y' at both ends and y' at 1/5 and 1/2 of the step.

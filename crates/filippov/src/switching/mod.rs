@@ -47,6 +47,8 @@ pub enum Kind {
     SwitchSliding,
     /// The surface is touched and the mode stays.
     Grazing,
+    /// Infinitely many switches in finite time, up to their limit.
+    Accumulation,
 }
 
 impl Kind {
@@ -58,6 +60,7 @@ impl Kind {
             Kind::ExitSliding => "exit_sliding",
             Kind::SwitchSliding => "switch_sliding",
             Kind::Grazing => "grazing",
+            Kind::Accumulation => "accumulation",
         }
     }
 
@@ -68,7 +71,7 @@ impl Kind {
             _ if before == after => Kind::Grazing,
             Greater => Kind::EnterSliding,
             Less => Kind::ExitSliding,
-            Equal if before.sliding() == after.sliding() => Kind::Crossing,
+            Equal if before.sliding_set().eq(after.sliding_set()) => Kind::Crossing,
             Equal => Kind::SwitchSliding,
         }
     }

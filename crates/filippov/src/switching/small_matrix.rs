@@ -94,6 +94,22 @@ impl Matrix {
         true
     }
 
+    /// The last but one Hurwitz determinant of det(z - A): positive for stable matrices, and zero where a pair of
+    /// eigenvalues reaches the imaginary axis; 1 for fewer than two rows.
+    pub fn last_hurwitz_determinant(&self) -> f64 {
+        let a = self.characteristic_polynomial();
+        let size = self.n.saturating_sub(1);
+        let mut hurwitz = Matrix::zeros(size);
+        for i in 0..size {
+            for j in 0..size {
+                // Entry (i, j) is coefficient 2 (j + 1) - (i + 1).
+                let index = (2 * j + 1).checked_sub(i);
+                hurwitz[(i, j)] = index.and_then(|k| a.get(k)).copied().unwrap_or(0.0);
+            }
+        }
+        hurwitz.determinant()
+    }
+
     /// Coefficients of det(z - A), highest power first.
     fn characteristic_polynomial(&self) -> Vec<f64> {
         let mut coefficients = vec![1.0];

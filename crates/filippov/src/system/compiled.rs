@@ -11,6 +11,9 @@ use smallvec::SmallVec;
 use super::tiered::{compile, TieredProgram};
 use super::Word;
 
+/// Surfaces slid on at once whose sign patterns are all looked at.
+const MOST_ENUMERATED: usize = 4;
+
 /// A traced system with everything that was compiled of it so far.
 pub(super) struct Model {
     pub graph: Graph,
@@ -187,11 +190,11 @@ impl Model {
     }
 
     /// Marks the surfaces whose sign matters in a mode.
-    pub fn active(&self, signs: &[f64], sliding: Option<usize>, active: &mut [bool]) {
+    pub fn active(&self, signs: &[f64], sliding: &[usize], active: &mut [bool]) {
         let key: SmallVec<[i8; 16]> = signs
             .iter()
             .enumerate()
-            .map(|(j, &s)| if Some(j) == sliding { 0 } else { s as i8 })
+            .map(|(j, &s)| if sliding.contains(&j) { 0 } else { s as i8 })
             .collect();
         let mut known = self.activity.lock().unwrap_or_else(PoisonError::into_inner);
         let found = known
@@ -200,37 +203,43 @@ impl Model {
         active.copy_from_slice(found);
     }
 
-    /// Surfaces whose sign the field, or an active switching function, depends on in this mode.
-    fn find_active(&self, signs: &[f64], sliding: Option<usize>) -> Vec<bool> {
+    /// Surfaces whose sign the field, or an active switching function, depends on in this mode. While
+    /// sliding on many surfaces at once, those whose sign matters anywhere.
+    fn find_active(&self, signs: &[f64], sliding: &[usize]) -> Vec<bool> {
         let mut active = vec![false; signs.len()];
-        let sides: &[Option<f64>] = match sliding {
-            None => &[None],
-            Some(_) => &[Some(-1.0), Some(1.0)],
-        };
-        for side in sides {
+        if sliding.len() > MOST_ENUMERATED {
+            active.fill(true);
+            return active;
+        }
+        for pattern in 0..1_usize << sliding.len() {
             let mut signs = signs.to_vec();
-            if let (Some(j), Some(side)) = (sliding, side) {
-                signs[j] = *side;
+            for (bit, &j) in sliding.iter().enumerate() {
+                signs[j] = if pattern >> bit & 1 == 1 { 1.0 } else { -1.0 };
             }
-            let mut outputs = self.field.clone();
-            loop {
-                let found = self.graph.sign_dependencies(&outputs, &signs);
-                let fresh: Vec<usize> = (0..found.len())
-                    .filter(|&j| found[j] && !active[j])
-                    .collect();
-                for &j in &fresh {
-                    active[j] = true;
-                    outputs.push(self.graph.surface(j as u32));
-                }
-                if fresh.is_empty() {
-                    break;
-                }
-            }
+            let found = self.active_at(&signs);
+            active.iter_mut().zip(found).for_each(|(a, f)| *a |= f);
         }
-        if let Some(j) = sliding {
-            active[j] = true;
-        }
+        sliding.iter().for_each(|&j| active[j] = true);
         active
+    }
+
+    /// The surfaces that matter for one sign pattern.
+    fn active_at(&self, signs: &[f64]) -> Vec<bool> {
+        let mut active = vec![false; signs.len()];
+        let mut outputs = self.field.clone();
+        loop {
+            let found = self.graph.sign_dependencies(&outputs, signs);
+            let fresh: Vec<usize> = (0..found.len())
+                .filter(|&j| found[j] && !active[j])
+                .collect();
+            for &j in &fresh {
+                active[j] = true;
+                outputs.push(self.graph.surface(j as u32));
+            }
+            if fresh.is_empty() {
+                return active;
+            }
+        }
     }
 
     /// The program of a Lie derivative, made when it is first needed.

@@ -135,8 +135,8 @@ pub trait PiecewiseSystem: Sync {
     }
 
     /// Marks the surfaces whose sign matters for the motion with these signs (and with either
-    /// sign of the surface slid on).
-    fn active(&self, signs: &[f64], sliding: Option<usize>, active: &mut [bool]) {
+    /// sign of the surfaces slid on).
+    fn active(&self, signs: &[f64], sliding: &[usize], active: &mut [bool]) {
         let _ = (signs, sliding);
         active.fill(true);
     }

@@ -180,7 +180,7 @@ impl PiecewiseSystem for TracedSystem {
         }
     }
 
-    fn active(&self, signs: &[f64], sliding: Option<usize>, active: &mut [bool]) {
+    fn active(&self, signs: &[f64], sliding: &[usize], active: &mut [bool]) {
         self.model.active(signs, sliding, active);
     }
 

@@ -1,0 +1,105 @@
+//! All fields that meet at an intersection, with their normal components.
+
+use super::eval_on_side;
+use crate::error::FieldError;
+use crate::switching::{NormalFields, Undecided};
+use crate::system::{dot, PiecewiseSystem};
+
+/// The 2^m fields around an intersection of m surfaces, one after the other, and the gradients of the
+/// switching functions. Pattern p has sign +1 at surface i of the set where bit i of p is set.
+#[derive(Clone, Debug)]
+pub struct MeetingFields {
+    set: Vec<usize>,
+    n: usize,
+    fields: Vec<f64>,
+    /// Normal components, `[pattern * m + i]`.
+    components: Vec<f64>,
+    gradients: Vec<f64>,
+    time_derivatives: Vec<f64>,
+    signs: Vec<f64>,
+}
+
+impl MeetingFields {
+    /// Room for the fields around the surfaces of `set`.
+    pub fn new(system: &dyn PiecewiseSystem, set: &[usize]) -> Self {
+        let (n, m) = (system.n_states(), set.len());
+        MeetingFields {
+            set: set.to_vec(),
+            n,
+            fields: vec![0.0; n << m],
+            components: vec![0.0; m << m],
+            gradients: vec![0.0; n * m],
+            time_derivatives: vec![0.0; m],
+            signs: Vec::new(),
+        }
+    }
+
+    /// The surfaces.
+    pub fn set(&self) -> &[usize] {
+        &self.set
+    }
+
+    /// Evaluates everything at a point; `signs` holds the sides of the other surfaces. Returns the number
+    /// of evaluations of the right-hand side.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn evaluate(
+        &mut self,
+        system: &dyn PiecewiseSystem,
+        t: f64,
+        x: &[f64],
+        signs: &[f64],
+    ) -> Result<u64, FieldError> {
+        let (n, m) = (self.n, self.set.len());
+        self.signs.clear();
+        self.signs.extend_from_slice(signs);
+        for (i, &j) in self.set.iter().enumerate() {
+            let gradient = &mut self.gradients[i * n..(i + 1) * n];
+            self.time_derivatives[i] = system.gradient(j, t, x, signs, gradient)?;
+        }
+        let mut evaluations = 0;
+        for pattern in 0..1_usize << m {
+            for (i, &j) in self.set.iter().enumerate() {
+                self.signs[j] = if pattern >> i & 1 == 1 { 1.0 } else { -1.0 };
+            }
+            let field = &mut self.fields[pattern * n..(pattern + 1) * n];
+            evaluations += eval_on_side(system, t, x, &self.signs, field)?;
+            for i in 0..m {
+                let gradient = &self.gradients[i * n..(i + 1) * n];
+                self.components[pattern * m + i] = self.time_derivatives[i] + dot(gradient, field);
+            }
+        }
+        Ok(evaluations)
+    }
+
+    /// The normal components as data for a decision.
+    ///
+    /// # Errors
+    /// If one is not finite, or the surfaces are too many.
+    pub fn normal_fields(&self) -> Result<NormalFields, Undecided> {
+        NormalFields::new(self.set.len(), self.components.clone())
+    }
+
+    /// The field of one pattern.
+    pub fn field(&self, pattern: usize) -> &[f64] {
+        &self.fields[pattern * self.n..(pattern + 1) * self.n]
+    }
+
+    /// Writes the combination of the fields with these weights, one per pattern.
+    pub fn combine(&self, weights: &[f64], dx: &mut [f64]) {
+        dx.fill(0.0);
+        for (weight, field) in weights.iter().zip(self.fields.chunks_exact(self.n)) {
+            if *weight != 0.0 {
+                dx.iter_mut()
+                    .zip(field)
+                    .for_each(|(dx, f)| *dx += weight * f);
+            }
+        }
+    }
+
+    /// The gradients of the switching functions, one after the other.
+    pub fn gradients(&self) -> &[f64] {
+        &self.gradients
+    }
+}

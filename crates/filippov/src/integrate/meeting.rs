@@ -1,0 +1,291 @@
+//! Where surfaces meet: what follows at an intersection, from the switching stage.
+
+use smallvec::smallvec;
+
+use super::detect::Found;
+use super::integrator::Integrator;
+use super::motion::ModeField;
+use super::transition::{Decided, Left, Lefts};
+use super::Stop;
+use crate::error::FieldError;
+use crate::event::EventFunction;
+use crate::field::{IntersectionExit, IntersectionField, MeetingFields, SlidingField, SmoothField};
+use crate::mode::Mode;
+use crate::switching::{
+    decide_intersection, resolve, Continuation, ExitKind, Incoming, Leading, NormalFields,
+    Resolution, Undecided,
+};
+use crate::system::{dot, dot_magnitude};
+use crate::tolerances::{DEPARTS_TANGENTIALLY, DRIFT_SHARE};
+
+impl Integrator<'_> {
+    /// What follows where the surfaces of `meeting` vanish; `fresh` are those among them that were reached now.
+    pub(super) fn decide_at_intersection(
+        &mut self,
+        event: &Found,
+        mode: &Mode,
+        meeting: &[usize],
+        fresh: &[usize],
+    ) -> Result<Decided, FieldError> {
+        let corners = self.corners(meeting, mode)?;
+        let resolution = match corners.normal_fields() {
+            Ok(fields) => {
+                let incoming = self.incoming(event, mode, meeting, fresh, &fields)?;
+                resolve(&fields, &incoming, &self.kappa(meeting))
+            }
+            Err(undecided) => Err(undecided),
+        };
+        self.follow(mode, meeting, &corners, resolution)
+    }
+
+    /// What follows at a start where the surfaces of `meeting` vanish.
+    pub(super) fn decide_at_start(
+        &mut self,
+        mode: &Mode,
+        meeting: &[usize],
+    ) -> Result<Decided, FieldError> {
+        let corners = self.corners(meeting, mode)?;
+        let resolution = corners
+            .normal_fields()
+            .and_then(|fields| resolve(&fields, &Incoming::Start, &self.kappa(meeting)));
+        self.follow(mode, meeting, &corners, resolution)
+    }
+
+    /// All fields around the current point of an intersection.
+    pub(super) fn corners(
+        &mut self,
+        meeting: &[usize],
+        mode: &Mode,
+    ) -> Result<MeetingFields, FieldError> {
+        let mut corners = MeetingFields::new(self.system, meeting);
+        self.stats.n_field_evaluations +=
+            corners.evaluate(self.system, self.t, &self.x, &mode.signs())?;
+        Ok(corners)
+    }
+
+    /// The scaling of the surfaces of an intersection in the regularisation that decides.
+    pub(super) fn kappa(&self, meeting: &[usize]) -> Vec<f64> {
+        let kappa = &self.options.kappa;
+        meeting
+            .iter()
+            .map(|&j| kappa.get(j).copied().unwrap_or(1.0))
+            .collect()
+    }
+
+    /// How the motion came to the intersection.
+    fn incoming(
+        &mut self,
+        event: &Found,
+        mode: &Mode,
+        meeting: &[usize],
+        fresh: &[usize],
+        fields: &NormalFields,
+    ) -> Result<Incoming, FieldError> {
+        let entries: Vec<i8> = meeting.iter().map(|&j| mode.entries()[j]).collect();
+        if self.motion.sliding().is_empty() {
+            return Ok(Incoming::Corner { region: entries });
+        }
+        self.motion.field.exits(self.t, &mut self.x)?;
+        let multipliers = self.motion.multipliers();
+        let exit = event.functions.iter().find_map(|function| match function {
+            EventFunction::Exit(index) => Some(*index),
+            _ => None,
+        });
+        match (exit, &self.motion.field) {
+            (Some(index), ModeField::Intersection(field)) if fresh.is_empty() => {
+                let kind = match field.exit(index) {
+                    IntersectionExit::Side { .. } => ExitKind::Side,
+                    IntersectionExit::Fold => ExitKind::Fold,
+                    IntersectionExit::Stability => ExitKind::Stability,
+                };
+                let mut lambda = multipliers;
+                if let IntersectionExit::Side { position, end } = field.exit(index) {
+                    lambda[position] = f64::from(end);
+                }
+                let drift = self.drift(mode, meeting, fields, &lambda)?;
+                Ok(Incoming::Exit {
+                    kind,
+                    lambda,
+                    drift: Some(drift),
+                })
+            }
+            _ => Ok(Incoming::Face {
+                mode: entries,
+                multipliers,
+            }),
+        }
+    }
+
+    /// The rate at which the normal components change along the motion at fixed multipliers.
+    fn drift(
+        &mut self,
+        mode: &Mode,
+        meeting: &[usize],
+        fields: &NormalFields,
+        lambda: &[f64],
+    ) -> Result<Vec<f64>, FieldError> {
+        let mut velocity = vec![0.0; self.x.len()];
+        self.motion.field.eval(self.t, &mut self.x, &mut velocity)?;
+        let dt = DRIFT_SHARE * self.stepper.interpolant().dt;
+        let ahead: Vec<f64> = self
+            .x
+            .iter()
+            .zip(&velocity)
+            .map(|(x, v)| x + dt * v)
+            .collect();
+        let mut corners = MeetingFields::new(self.system, meeting);
+        self.stats.n_field_evaluations +=
+            corners.evaluate(self.system, self.t + dt, &ahead, &mode.signs())?;
+        let (now, then) = (fields.interpolate(lambda), corners.normal_fields());
+        Ok(match then {
+            Ok(then) => {
+                let pairs = then.interpolate(lambda).into_iter().zip(now);
+                pairs.map(|(then, now)| (then - now) / dt).collect()
+            }
+            Err(_) => vec![f64::NAN; meeting.len()],
+        })
+    }
+
+    /// Turns a resolution into the motion that follows. Where first-order data do not decide, the first
+    /// derivatives that do not vanish may still leave only one way.
+    fn follow(
+        &mut self,
+        mode: &Mode,
+        meeting: &[usize],
+        fields: &MeetingFields,
+        resolution: Result<Resolution, Undecided>,
+    ) -> Result<Decided, FieldError> {
+        let resolution = match resolution {
+            Ok(resolution) if !resolution.degenerate => resolution,
+            other => return self.decide_by_higher_order(mode, meeting, other),
+        };
+        let on_all = |k: &Mode| {
+            let mut full = mode.clone();
+            for (&j, &entry) in meeting.iter().zip(k.entries()) {
+                full.set(j, entry);
+            }
+            full
+        };
+        let (after, leaving) = match &resolution.chosen {
+            Some(Continuation::Mode(chosen)) => (on_all(chosen), meeting.to_vec()),
+            Some(Continuation::OutwardSpiral) => match self.start_spiral(meeting, mode, fields)? {
+                Some((region, border)) => (region, vec![border]),
+                None => return self.decide_by_higher_order(mode, meeting, Ok(resolution)),
+            },
+            None => return self.decide_by_higher_order(mode, meeting, Ok(resolution)),
+        };
+        let is_spiral = matches!(resolution.chosen, Some(Continuation::OutwardSpiral));
+        if !resolution.unique || is_spiral {
+            let candidates = resolution.candidates.iter();
+            let mut candidates: Vec<Mode> = candidates
+                .filter_map(Continuation::as_mode)
+                .map(on_all)
+                .collect();
+            if !candidates.contains(&after) {
+                candidates.push(after.clone());
+            }
+            if let Some(stop) = self.report_non_unique(meeting, &after, candidates) {
+                return Ok(Err(stop));
+            }
+        }
+        let left = self.departures(&after, &leaving, &resolution.multipliers)?;
+        Ok(Ok((after, left)))
+    }
+
+    fn decide_by_higher_order(
+        &mut self,
+        mode: &Mode,
+        meeting: &[usize],
+        resolution: Result<Resolution, Undecided>,
+    ) -> Result<Decided, FieldError> {
+        let decision = decide_intersection(self.system, meeting, mode, self.t, &self.x)?;
+        if let Some((after, left)) = decision.unique() {
+            let left = left.iter().map(|&(j, l)| Left::Surface(j, l)).collect();
+            return Ok(Ok((after.clone(), left)));
+        }
+        Ok(Err(Stop::Intersection {
+            surfaces: meeting.to_vec(),
+            candidates: decision.candidates,
+            reason: resolution.err().unwrap_or(Undecided::NoOutcome),
+        }))
+    }
+
+    /// The surfaces of `meeting` that the motion in `after` leaves, with the leading derivatives of h.
+    fn departures(
+        &mut self,
+        after: &Mode,
+        meeting: &[usize],
+        multipliers: &[f64],
+    ) -> Result<Lefts, FieldError> {
+        let mut left: Lefts = smallvec![];
+        let leaving: Vec<usize> = meeting
+            .iter()
+            .copied()
+            .filter(|&j| after.entries()[j] != 0)
+            .collect();
+        if leaving.is_empty() {
+            return Ok(left);
+        }
+        let (n, signs) = (self.x.len(), after.signs());
+        let mut velocity = vec![0.0; n];
+        self.velocity_in(after, multipliers, self.t, &self.x.clone(), &mut velocity)?;
+        let mut gradient = vec![0.0; n];
+        for j in leaving {
+            let ht = self
+                .system
+                .gradient(j, self.t, &self.x, &signs, &mut gradient)?;
+            let value = ht + dot(&gradient, &velocity);
+            let size = ht.abs() + dot_magnitude(&gradient, &velocity);
+            let leading = if value.abs() > DEPARTS_TANGENTIALLY * size {
+                Leading { order: 1, value }
+            } else {
+                // The normal component vanishes at the exit of a multiplier: its rate along the new motion.
+                let dt = DRIFT_SHARE * self.stepper.interpolant().dt;
+                let ahead: Vec<f64> = self
+                    .x
+                    .iter()
+                    .zip(&velocity)
+                    .map(|(x, v)| x + dt * v)
+                    .collect();
+                let mut next = vec![0.0; n];
+                self.velocity_in(after, multipliers, self.t + dt, &ahead, &mut next)?;
+                let ht = self
+                    .system
+                    .gradient(j, self.t + dt, &ahead, &signs, &mut gradient)?;
+                Leading {
+                    order: 2,
+                    value: (ht + dot(&gradient, &next) - value) / dt,
+                }
+            };
+            left.push(Left::Surface(j, leading));
+        }
+        Ok(left)
+    }
+
+    /// The field of a mode at a point near the current one.
+    fn velocity_in(
+        &mut self,
+        mode: &Mode,
+        multipliers: &[f64],
+        t: f64,
+        x: &[f64],
+        velocity: &mut [f64],
+    ) -> Result<(), FieldError> {
+        let (signs, mut x) = (mode.signs(), x.to_vec());
+        let set: Vec<usize> = mode.sliding_set().collect();
+        self.stats.n_field_evaluations += match set.as_slice() {
+            [] => crate::field::eval_on_side(self.system, t, &x, &signs, velocity)?,
+            &[j] => {
+                let mut field = SlidingField::new(self.system, j, &signs);
+                field.eval(t, &mut x, velocity)?;
+                field.n_evaluations()
+            }
+            _ => {
+                let mut field = IntersectionField::new(self.system, &set, &signs, multipliers);
+                field.eval(t, &mut x, velocity)?;
+                field.n_evaluations()
+            }
+        };
+        Ok(())
+    }
+}
