@@ -101,7 +101,8 @@ pub struct TracedSystem {
     pub system: filippov::TracedSystem,
     /// Kept for events, which are traced after the system into the same graph.
     builder: Option<Py<Builder>>,
-    events: Mutex<Vec<Arc<Program>>>,
+    /// Compiled events with their nodes; the index is the handle.
+    events: Mutex<Vec<(u32, Arc<Program>)>>,
 }
 
 impl TracedSystem {
@@ -127,7 +128,7 @@ impl TracedSystem {
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
             .get(handle)
-            .map(Arc::clone)
+            .map(|(_, program)| Arc::clone(program))
     }
 
     fn with(&self, p: &Array<'_>) -> PyResult<filippov::TracedSystem> {
@@ -229,7 +230,7 @@ impl TracedSystem {
         self.system.is_native()
     }
 
-    /// Compiles a node of the builder as an event; returns the handle for `solve`.
+    /// Compiles a node of the builder as an event, once; returns the handle for `solve`.
     fn event(&self, py: Python<'_>, node: u32) -> PyResult<usize> {
         let builder = self
             .builder
@@ -239,10 +240,13 @@ impl TracedSystem {
             })?
             .borrow(py);
         let graph = builder.graph();
+        let mut events = self.events.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = events.iter().position(|(compiled, _)| *compiled == node) {
+            return Ok(known);
+        }
         let program = Program::compile(&graph, &[Builder::node(&graph, node)?], Backend::Auto)
             .map_err(|e| PyValueError::new_err(e.to_string()))?;
-        let mut events = self.events.lock().unwrap_or_else(PoisonError::into_inner);
-        events.push(Arc::new(program));
+        events.push((node, Arc::new(program)));
         Ok(events.len() - 1)
     }
 
