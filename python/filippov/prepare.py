@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -14,6 +14,9 @@ from filippov.errors import InputError, ModelError, TraceError
 from filippov.events import bind_function, check_scalar_function, function_name, selective
 from filippov.forms import Source
 from filippov.trace import Trace, trace
+from filippov.trace.fingerprint import fingerprint
+from filippov.trace.reuse import Recent
+from filippov.trace.verify import verify
 
 __all__ = ["Prepared", "prepare"]
 
@@ -90,12 +93,17 @@ def prepare(
     ModelError
         If the functions return the wrong number of components.
     """
+    start = np.linspace(0.3, 0.7, n) if y0 is None else y0  # any point off the coordinate planes
+    key = _key(source, n, values, states)
+    kept = None if key is None else _KEPT.find(key)
+    if kept is not None and kept.holds(source, n, values, t0, start):
+        return kept.prepared
     try:
-        traced = _trace(source, source.fun, n, values, states, t0, y0)
+        traced = _trace(source, source.fun, n, values, states, t0, start)
     except TraceError as error:
         if source.branching is not None:
             try:
-                traced = _trace(source, source.branching, n, values, states, t0, y0)
+                traced = _trace(source, source.branching, n, values, states, t0, start)
             except TraceError:
                 return _prepare_opaque(source, n, values, t0, y0, error)
         elif source.surfaces or source.black_box:
@@ -103,7 +111,59 @@ def prepare(
         else:
             raise
     pinned = dict(values) if traced.guards else None
-    return Prepared(traced.system, traced, tuple(traced.system.surfaces()), pinned, "")
+    prepared = Prepared(traced.system, traced, tuple(traced.system.surfaces()), pinned, "")
+    # A function that has changed what it reads, a counter for instance, is traced again at the next call.
+    if key is not None and key == _key(source, n, values, states):
+        _KEPT.keep(key, _Kept(prepared, {_point(values, t0, start)}))
+    return prepared
+
+
+class _Kept(NamedTuple):
+    """A traced system, and the points at which it was compared with the function."""
+
+    prepared: Prepared
+    points: set[Hashable]
+
+    def holds(self, source: Source, n: int, values: dict[str, float], t0: float, y0: Array) -> bool:
+        """Whether this is what tracing would give, its check at this initial point included."""
+        traced = self.prepared.trace
+        if traced is None or not self.prepared.is_valid_for(n, values):
+            return False
+        point = _point(values, t0, y0)
+        if point not in self.points:
+            try:
+                verify(
+                    traced.system,
+                    lambda t, x: source.fun(t, x, *source.args, **values),
+                    t0,
+                    y0,
+                    parameter_vector(values),
+                )
+            except TraceError:
+                return False
+            if len(self.points) >= _MOST_POINTS:
+                self.points.clear()
+            self.points.add(point)
+        return True
+
+
+# Decision 0008: what makes it safe to keep a trace.
+_KEPT: Recent[_Kept] = Recent(32)
+_MOST_POINTS = 16
+
+
+def _key(
+    source: Source, n: int, values: dict[str, float], states: Sequence[str] | None
+) -> tuple[Any, ...] | None:
+    """Return what a trace follows from; None if that cannot be known."""
+    if source.signed is not None:  # built once for a System, around functions of this package
+        return None
+    read = fingerprint(source.fun, source.args, source.surfaces)
+    return None if read is None else (n, tuple(values), states and tuple(states), read)
+
+
+def _point(values: dict[str, float], t0: float, y0: Array) -> Hashable:
+    return t0, y0.tobytes(), tuple(values.values())
 
 
 def _trace(
@@ -113,7 +173,7 @@ def _trace(
     values: dict[str, float],
     states: Sequence[str] | None,
     t0: float,
-    y0: Array | None,
+    y0: Array,
 ) -> Trace:
     return trace(
         fun,
@@ -122,7 +182,7 @@ def _trace(
         parameters=values or None,
         surfaces=[selective(surface, values) for surface in source.surfaces] or None,
         t0=t0,
-        y0=np.linspace(0.3, 0.7, n) if y0 is None else y0,  # any point off the coordinate planes
+        y0=y0,
         states=states,
     )
 

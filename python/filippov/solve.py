@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from typing import Any
 
 import numpy as np
@@ -33,6 +33,7 @@ from filippov.solution import AnyRun, Solution
 from filippov.start import StandingRun
 from filippov.system import System
 from filippov.trace import trace_event
+from filippov.trace.fingerprint import fingerprint
 
 __all__ = ["solve_ivp"]
 
@@ -142,6 +143,10 @@ def solve_ivp(
     Notes
     -----
     Backward time, ``t1 < t0``, is allowed only without surfaces: Filippov flow is not reversible.
+
+    A function that is solved again is not traced again if nothing that it reads has changed. For a method, or
+    a function that reads objects, this is not known: make a `System` of it, which is traced once. The `args`
+    are constants of the trace; one trace serves all values of `params`.
 
     References
     ----------
@@ -295,19 +300,36 @@ def _core_events(
     for index, spec in enumerate(specs):
         g = bind_function(spec.g, args, values)
         check_scalar_function(g, t0, y0, f"events: entry {index} ({spec.name})")
-        node = _event_node(prepared, spec, args, values)
+        node = _event_node(prepared, spec, t0, y0, args, values)
         events.append((g if node is None else node, spec.direction, spec.terminal, spec.name))
     return events
 
 
 def _event_node(
-    prepared: Prepared, spec: EventSpec, args: tuple[Any, ...], values: dict[str, float]
+    prepared: Prepared,
+    spec: EventSpec,
+    t0: float,
+    y0: Array,
+    args: tuple[Any, ...],
+    values: dict[str, float],
 ) -> int | None:
     """Return the handle of an event that could be traced; then no Python is called during the run."""
     if prepared.trace is None or not isinstance(prepared.core, TracedSystem):
         return None
-    node = trace_event(prepared.trace, selective(spec.g, values), args)
-    return None if node is None else prepared.core.event(node)
+
+    def key() -> Hashable | None:
+        read = fingerprint(spec.g, args)
+        return None if read is None else (t0, y0.tobytes(), tuple(values.items()), read)
+
+    before = key()
+    known = prepared.trace.events.find(before) if before is not None else None
+    if known is None:
+        g = selective(spec.g, values)
+        node = trace_event(prepared.trace, g, args, t0=t0, y0=y0, parameters=values)
+        known = (None if node is None else prepared.core.event(node),)
+        if before is not None and before == key():
+            prepared.trace.events.keep(before, known)
+    return known[0]
 
 
 def _raise_if_asked(run: AnyRun, solution: Solution, options: Options) -> None:

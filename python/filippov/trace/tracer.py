@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from dataclasses import field as member
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from filippov.events import accepted_names
 from filippov.trace.branching import Guard, Tracer
 from filippov.trace.condition import Condition
 from filippov.trace.explain import explain_failure, explain_raise
+from filippov.trace.reuse import Recent
 from filippov.trace.scalar import Scalar
 from filippov.trace.verify import verify
 
@@ -50,6 +52,8 @@ class Trace:
         Index of each surface that was given, in their order.
     tracer : Tracer
         What `trace_event` needs of the trace.
+    events : Recent
+        Handles of events in `system` that were traced, None for those that could not be.
     """
 
     builder: Builder
@@ -61,6 +65,7 @@ class Trace:
     system: TracedSystem
     declared: tuple[int, ...]
     tracer: Tracer
+    events: Recent[tuple[int | None]] = member(default_factory=lambda: Recent(32))
 
 
 def trace(
@@ -146,7 +151,15 @@ def trace(
     )
 
 
-def trace_event(traced: Trace, g: Callable[..., Any], args: tuple[Any, ...] = ()) -> int | None:
+def trace_event(
+    traced: Trace,
+    g: Callable[..., Any],
+    args: tuple[Any, ...] = (),
+    *,
+    t0: float | None = None,
+    y0: NDArray[Any] | None = None,
+    parameters: Mapping[str, float] | None = None,
+) -> int | None:
     """Turn an event function into an expression of an existing trace.
 
     Parameters
@@ -157,6 +170,9 @@ def trace_event(traced: Trace, g: Callable[..., Any], args: tuple[Any, ...] = ()
         ``g(t, x, *args) -> float``; parameters of the trace that its signature names are handed over by name.
     args : tuple, optional
         Further arguments of `g`.
+    t0, y0, parameters : optional
+        Initial time, initial state and values of the parameters of this run; by default those with which the
+        field was traced.
 
     Returns
     -------
@@ -167,7 +183,16 @@ def trace_event(traced: Trace, g: Callable[..., Any], args: tuple[Any, ...] = ()
     from filippov._core import Builder, TracedSystem
 
     own = traced.tracer
-    scratch = _like(own, Builder())
+    values = dict(zip(own.parameters, own.values.tolist(), strict=True)) if parameters is None else parameters
+    t_start = own.t0 if t0 is None else t0
+    start = own.y0 if y0 is None else y0
+
+    def tracer_into(builder: Builder) -> Tracer:
+        return Tracer(
+            builder, t_start, start, parameters=dict(values), states=own.states, max_paths=own.max_paths
+        )
+
+    scratch = tracer_into(Builder())
     n = traced.n_states
     try:
         node = _explore(scratch, g, args, "event", None)[0]
@@ -175,27 +200,14 @@ def trace_event(traced: Trace, g: Callable[..., Any], args: tuple[Any, ...] = ()
         # Traced apart first: a switching function of its own must not enter the builder of the field.
         if not set(system.surfaces()) <= set(traced.system.surfaces()):
             return None
-        keywords = _named(g, dict(zip(own.parameters, own.values.tolist(), strict=True)), "event")
+        keywords = _named(g, dict(values), "event")
         repeated = lambda t, x: [g(t, x, *args, **keywords)] * n  # noqa: E731
-        verify(system, repeated, own.t0, own.y0, own.values, role="event")
-        tracer = _like(own, traced.builder)
+        verify(system, repeated, t_start, start, scratch.values, role="event")
+        tracer = tracer_into(traced.builder)
         tracer.guards.update(own.guards)
         return _explore(tracer, g, args, "event", None)[0]
     except (TraceError, ModelError):
         return None
-
-
-def _like(tracer: Tracer, builder: Builder) -> Tracer:
-    """Return a tracer with the same inputs that writes into another builder."""
-    parameters = dict(zip(tracer.parameters, tracer.values.tolist(), strict=True))
-    return Tracer(
-        builder,
-        tracer.t0,
-        tracer.y0,
-        parameters=parameters,
-        states=tracer.states,
-        max_paths=tracer.max_paths,
-    )
 
 
 def _declare(tracer: Tracer, surface: Callable[..., Any], args: tuple[Any, ...], role: str) -> int:

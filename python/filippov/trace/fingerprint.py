@@ -1,0 +1,274 @@
+"""What a function is and reads, as a value: functions with equal fingerprints have the same trace.
+
+A Python function reaches the rest of the program through the names, cells and constants of its code and
+through its arguments, and in no other way. So its fingerprint holds its code and, by value, everything that
+those resolve to now: numbers, strings, small arrays, containers of these, further Python functions with what
+they read, and functions of Python and NumPy that are known to depend on their arguments alone. What is none
+of these (an object of some class, a random generator, a file, an import inside of the function) makes the
+whole fingerprint ``None``: nothing can then be said, and the function is traced anew at every call.
+
+Names are looked up generously. The code does not say which object an attribute ``.k`` is read from, so ``k``
+is looked up in every module that is in reach; that can only make a fingerprint differ needlessly.
+"""
+
+from __future__ import annotations
+
+import dis
+import functools
+import math
+from collections.abc import Iterator
+from types import CodeType, FunctionType, ModuleType
+from typing import Any
+
+import numpy as np
+
+from filippov.trace.pure import PURE
+
+__all__ = ["Fingerprint", "fingerprint"]
+
+Fingerprint = tuple[Any, ...]
+
+_LARGEST_ARRAY = 1 << 16  # bytes, compared at every call
+_MOST_ITEMS = 2_000  # entries of a fingerprint; a larger one is no cheaper than a trace
+
+# Ways out of the names, cells, constants and arguments; and identity, which values do not have.
+_OPAQUE_OPERATIONS = frozenset(
+    [
+        *("IMPORT_NAME", "IMPORT_FROM", "IMPORT_STAR", "LOAD_NAME", "LOAD_BUILD_CLASS", "IS_OP"),
+        *(f"{verb}_{kind}" for verb in ("STORE", "DELETE") for kind in ("GLOBAL", "ATTR", "NAME")),
+    ]
+)
+# Attributes that lead to others by text, to the caller, to a file, to an address; and all with underscores.
+_OPAQUE_NAMES = frozenset(
+    [
+        *("format", "format_map", "gi_frame", "cr_frame", "ag_frame", "tb_frame"),
+        *("tofile", "dump", "setflags", "ctypes"),
+    ]
+)
+
+
+class _Unknown(Exception):
+    """Something that is not known to depend on its arguments alone."""
+
+
+class _Names:
+    """The names that a code object looks up, those of the functions inside of it included.
+
+    It stands for the code in a fingerprint: there is one for each code object, and it keeps it alive.
+    """
+
+    __slots__ = ("code", "is_opaque", "names")
+
+    def __init__(self, code: CodeType) -> None:
+        codes = list(_with_inner(code))
+        self.code = code
+        self.names = tuple(dict.fromkeys(name for each in codes for name in each.co_names))
+        self.is_opaque = any(map(_leads_out, codes)) or any(
+            name in _OPAQUE_NAMES or name.startswith("__") for name in self.names
+        )
+
+
+def _with_inner(code: CodeType) -> Iterator[CodeType]:
+    """Return a code object and those of the functions inside of it."""
+    yield code
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _with_inner(constant)
+
+
+def _leads_out(code: CodeType) -> bool:
+    """Whether a code object has an operation that says nothing can be known; ``is None`` has not."""
+    before: Any = code  # anything but None
+    for instruction in dis.get_instructions(code):
+        is_none = instruction.opname == "IS_OP" and before is None
+        if instruction.opname in _OPAQUE_OPERATIONS and not is_none:
+            return True
+        before = instruction.argval if instruction.opname == "LOAD_CONST" else code
+    return False
+
+
+_NAMES: dict[int, _Names] = {}
+# Modules of which a missing name may be supplied by a function: these two only import submodules.
+_LAZY_MODULES = ("numpy", "filippov")
+
+
+def fingerprint(*values: Any) -> Fingerprint | None:
+    """Return what `values` are, and what the functions among them read, as one hashable value.
+
+    Parameters
+    ----------
+    *values
+        Functions and plain data.
+
+    Returns
+    -------
+    tuple or None
+        Equal tuples mean functions that give the same results. ``None`` if that cannot be known.
+
+    Examples
+    --------
+    >>> from filippov.trace.fingerprint import fingerprint
+    >>> k = 2.0
+    >>> f, g = (lambda t, x: -k * x[0]), (lambda t, x: open("data").read())
+    >>> before = fingerprint(f)
+    >>> k = 3.0
+    >>> before == fingerprint(f), fingerprint(g)
+    (False, None)
+    """
+    reader = _Reader()
+    try:
+        for value in values:
+            reader.read(value)
+        reader.read_modules()
+    except (_Unknown, RecursionError):
+        return None
+    return tuple(reader.items)
+
+
+class _Reader:
+    """Collects the entries of one fingerprint: values behind their types, behind their names if any."""
+
+    def __init__(self) -> None:
+        self.items: list[Any] = []
+        self._objects: dict[int, int] = {}
+        self._modules: dict[int, ModuleType] = {}
+        self._names: dict[str, None] = {}
+        self._looked_up: set[tuple[int, str]] = set()
+
+    def read(self, value: Any) -> None:
+        """Add a value.
+
+        Raises
+        ------
+        _Unknown
+            If it is not one whose behaviour is known from its value.
+        """
+        kind = type(value)
+        self.items.append(kind)
+        size = len(value) if kind in (tuple, list, dict) else 0
+        if len(self.items) + size > _MOST_ITEMS:
+            raise _Unknown
+        if kind is float:
+            self._read_float(value)
+        elif kind in (int, bool, str, bytes, type(None)):
+            self.items.append(value)
+        elif id(value) in PURE:
+            self.items.append(value)
+            if not PURE[id(value)].is_unchanged():
+                raise _Unknown
+        elif kind is FunctionType:
+            if self._is_new(value):
+                self._read_function(value)
+        elif kind is tuple:
+            self.items.append(size)
+            for entry in value:
+                self.read(entry)
+        elif kind in (list, dict):
+            if self._is_new(value):
+                self.read(tuple(value) if kind is list else tuple(value.items()))
+        elif kind is np.ndarray:
+            self._read_array(value)
+        elif isinstance(value, np.generic) and value.dtype.kind in "fiub" and kind.__module__ == "numpy":
+            self._refuse_nan(value)
+            self.items.append(value.tobytes())
+        elif kind is ModuleType:
+            self._read_module(value)
+        elif kind is functools.partial:
+            for part in (value.func, value.args, value.keywords, value.__dict__):
+                self.read(part)
+        else:
+            raise _Unknown
+
+    def read_modules(self) -> None:
+        """Add what the names met so far are in the modules met so far, until there is nothing new."""
+        n_done = -1
+        while n_done != len(self._looked_up):
+            n_done = len(self._looked_up)
+            for module in list(self._modules.values()):
+                for name in list(self._names):
+                    self._look_up(module, name)
+
+    def _look_up(self, module: ModuleType, name: str) -> None:
+        if (id(module), name) in self._looked_up:
+            return
+        self._looked_up.add((id(module), name))
+        entries = vars(module)
+        if name in entries:
+            self.items.append(name)
+            self.read(entries[name])
+
+    def _is_new(self, value: Any) -> bool:
+        """Whether an object is met for the first time; it has a number, so that two names of it show."""
+        known = self._objects.get(id(value))
+        self.items.append(len(self._objects) if known is None else known)
+        if known is None:
+            self._objects[id(value)] = len(self._objects)
+        return known is None
+
+    def _refuse_nan(self, value: Any) -> None:
+        if value != value:  # `in` and `==` of containers look at its identity
+            raise _Unknown
+
+    def _read_float(self, value: float) -> None:
+        self._refuse_nan(value)
+        self.items.append(value)
+        if value == 0.0:
+            self.items.append(math.copysign(1.0, value))
+
+    def _read_array(self, value: Any) -> None:
+        if value.dtype.kind not in "fiub" or value.nbytes > _LARGEST_ARRAY:
+            raise _Unknown
+        if not self._is_new(value):
+            return
+        if value.base is not None and not self._is_new(value.base):  # two views of the same memory
+            raise _Unknown
+        self.items += (value.dtype.str, value.shape, value.strides, value.flags.writeable, value.tobytes())
+
+    def _read_module(self, module: ModuleType) -> None:
+        self.items.append(module)
+        supplied = "__getattr__" in vars(module) and module.__name__ not in _LAZY_MODULES
+        if supplied:
+            raise _Unknown
+        self._modules[id(module)] = module
+
+    def _read_function(self, function: FunctionType) -> None:
+        names = _names_of(function.__code__)
+        if names.is_opaque:
+            raise _Unknown
+        self.items.append(names)
+        for part in (function.__defaults__, function.__kwdefaults__, function.__dict__):
+            if part:
+                self.read(part)
+            else:
+                self.items.append(None)
+        for cell in function.__closure__ or ():
+            try:
+                content = cell.cell_contents
+            except ValueError:  # not assigned yet
+                raise _Unknown from None
+            self.read(content)
+        self._read_names(function, names.names)
+
+    def _read_names(self, function: FunctionType, names: tuple[str, ...]) -> None:
+        own, built_in = function.__globals__, function.__builtins__  # type: ignore[attr-defined]
+        if type(own) is not dict or type(built_in) is not dict:
+            raise _Unknown
+        for name in names:
+            self._names[name] = None
+            if name in own:
+                value = own[name]
+            elif name in built_in:
+                value = built_in[name]
+            else:
+                continue  # an attribute
+            self.items.append(name)
+            self.read(value)
+
+
+def _names_of(code: CodeType) -> _Names:
+    known = _NAMES.get(id(code))
+    if known is None or known.code is not code:
+        if len(_NAMES) > 1000:
+            _NAMES.clear()
+        known = _NAMES[id(code)] = _Names(code)
+    return known

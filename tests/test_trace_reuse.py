@@ -1,0 +1,476 @@
+"""A trace kept from an earlier call is used only where tracing again would give the same.
+
+Every change of what a function reads is made between two calls of `solve_ivp`; the second must give what a
+first call gives, and what the function itself says.
+"""
+
+from __future__ import annotations
+
+import builtins
+import functools
+import math
+import sys
+import types
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import filippov as fl
+import numpy as np
+import pytest
+from filippov import prepare
+from filippov.trace.fingerprint import fingerprint
+
+SPAN, START = (0.0, 1.0), (1.0, 2.0)
+
+slope = 1.0
+table = {"slope": [1.0, 2.0]}
+matrix = np.eye(2)
+matrix_view = np.arange(4.0).reshape(2, 2)
+settings = types.SimpleNamespace(slope=1.0)
+parameters = types.ModuleType("parameters")
+parameters.slope = 1.0  # type: ignore[attr-defined]
+alias_a = [1.0]
+alias_b = alias_a
+
+
+@pytest.fixture(autouse=True)
+def nothing_kept() -> Iterator[None]:
+    prepare._KEPT.clear()
+    yield
+    prepare._KEPT.clear()
+
+
+def final(fun: Any, **options: Any) -> tuple[float, ...]:
+    sol = fl.solve_ivp(fun, SPAN, START, **options)
+    return tuple(sol.y[:, -1].tolist())
+
+
+def fresh(fun: Any, **options: Any) -> tuple[float, ...]:
+    prepare._KEPT.clear()
+    return final(fun, **options)
+
+
+def is_kept(fun: Any, **options: Any) -> bool:
+    """Whether a second call of `solve_ivp` does without tracing."""
+    final(fun, **options)
+    n_calls = 0
+
+    def count(frame: Any, event: str, arg: Any) -> None:
+        nonlocal n_calls
+        n_calls += event == "call" and frame.f_code.co_name == "_explore"
+
+    sys.setprofile(count)
+    try:
+        final(fun, **options)
+    finally:
+        sys.setprofile(None)
+    return n_calls == 0
+
+
+def check_change(fun: Callable[..., Any], change: Callable[[], Any], **options: Any) -> None:
+    """The answer after a change is that of a first call, and differs from the one before."""
+    before = [final(fun, **options) for _ in range(3)]
+    assert before[0] == before[1] == before[2]
+    change()
+    after = final(fun, **options)
+    assert after == fresh(fun, **options)
+    assert after != before[0]
+
+
+# ------------------------------------------------------------------ what is kept
+
+
+def reads_nothing(t: Any, x: Any) -> Any:
+    return [x[1], -x[0] - 0.1 * np.sign(x[1])]
+
+
+def reads_global(t: Any, x: Any) -> Any:
+    return [x[1], -slope * x[0]]
+
+
+def helper(x: Any) -> Any:
+    return -slope * x
+
+
+def calls_helper(t: Any, x: Any) -> Any:
+    return [x[1], helper(x[0])]
+
+
+def reads_table(t: Any, x: Any) -> Any:
+    return [x[1], -table["slope"][0] * x[0]]
+
+
+def reads_matrix(t: Any, x: Any) -> Any:
+    return -matrix @ x
+
+
+def reads_matrix_view(t: Any, x: Any) -> Any:
+    return -matrix_view @ x
+
+
+def reads_module(t: Any, x: Any) -> Any:
+    return [x[1], -parameters.slope * x[0]]  # type: ignore[attr-defined]
+
+
+def uses_library(t: Any, x: Any, k: float = math.pi) -> Any:
+    dx = np.zeros_like(x)
+    dx[0] = fl.sin(x[1]) * np.linalg.norm(x)
+    dx[1] = -math.sqrt(k) * np.clip(x[0], -1.0, 1.0) + sum(v for v in x)
+    return dx
+
+
+def with_default(t: Any, x: Any, k: float = 1.0, *, m: float = 2.0) -> Any:
+    return [x[1], -k * m * x[0]]
+
+
+def recursive(t: Any, x: Any, depth: int = 3) -> Any:
+    if depth is None or depth == 0:
+        return [x[1], -x[0]]
+    return recursive(t, x, depth - 1)
+
+
+def closure(k: float) -> Callable[..., Any]:
+    return lambda t, x: [x[1], -k * x[0]]
+
+
+KEPT: dict[str, Callable[..., Any]] = {
+    function.__name__: function
+    for function in [
+        reads_nothing,
+        reads_global,
+        calls_helper,
+        reads_table,
+        reads_matrix,
+        reads_matrix_view,
+        reads_module,
+        uses_library,
+        with_default,
+        recursive,
+    ]
+}
+KEPT |= {
+    "closure": closure(2.0),
+    "lambda": lambda t, x: np.abs(x) - x,
+    "partial": functools.partial(with_default, k=3.0),
+}
+
+
+@pytest.mark.parametrize("name", KEPT)
+def test_a_function_that_reads_plain_data_is_traced_once(name: str) -> None:
+    assert is_kept(KEPT[name])
+
+
+def test_reference_problems_are_traced_once() -> None:
+    for name in fl.problems.names():
+        problem = fl.problems.get(name)
+        assert fingerprint(problem.fun, problem.args) is not None, name
+
+
+def test_parameters_by_name_are_not_part_of_a_trace() -> None:
+    final(with_default, params={"k": 1.0})
+    assert is_kept(with_default, params={"k": 2.0})
+    assert final(with_default, params={"k": 2.0}) == fresh(with_default, params={"k": 2.0})
+
+
+def test_a_trace_that_was_decided_by_a_parameter_is_for_that_value_only() -> None:
+    def fun(t: Any, x: Any, k: float) -> Any:
+        return [x[1], -x[0] if k > 0 else x[0]]
+
+    answers = {k: fresh(fun, params={"k": k}) for k in (1.0, -1.0)}
+    assert answers[1.0] != answers[-1.0]
+    for k in (1.0, -1.0, 1.0, 1.0, -1.0):
+        assert final(fun, params={"k": k}) == answers[k]
+
+
+# --------------------------------------------------------- what changes in between
+
+
+def test_global_changed(monkeypatch: pytest.MonkeyPatch) -> None:
+    check_change(reads_global, lambda: monkeypatch.setitem(globals(), "slope", 2.0))
+
+
+def test_global_of_a_helper_changed(monkeypatch: pytest.MonkeyPatch) -> None:
+    check_change(calls_helper, lambda: monkeypatch.setitem(globals(), "slope", 2.0))
+
+
+def test_helper_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
+    check_change(calls_helper, lambda: monkeypatch.setitem(globals(), "helper", lambda x: x))
+
+
+def test_code_of_a_helper_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
+    check_change(calls_helper, lambda: monkeypatch.setattr(helper, "__code__", (lambda x: x).__code__))
+
+
+def test_container_changed(monkeypatch: pytest.MonkeyPatch) -> None:
+    check_change(reads_table, lambda: monkeypatch.setitem(table, "slope", [3.0, 2.0]))
+    check_change(reads_table, lambda: table["slope"].__setitem__(0, 4.0))
+
+
+def test_matrix_changed_in_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(globals(), "matrix", np.eye(2))
+    check_change(reads_matrix, lambda: matrix.__setitem__((0, 1), 0.5))
+
+
+def test_attribute_of_a_module_changed(monkeypatch: pytest.MonkeyPatch) -> None:
+    check_change(reads_module, lambda: monkeypatch.setattr(parameters, "slope", 2.0))
+
+
+def test_attribute_of_an_object_changed(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fun(t: Any, x: Any) -> Any:
+        return [x[1], -settings.slope * x[0]]
+
+    check_change(fun, lambda: monkeypatch.setattr(settings, "slope", 2.0))
+
+
+def test_method_of_an_object() -> None:
+    class Oscillator:
+        slope = 1.0
+
+        def field(self, t: Any, x: Any) -> Any:
+            return [x[1], -self.slope * x[0]]
+
+        __call__ = field
+
+    oscillator = Oscillator()
+    for fun in (oscillator.field, oscillator):
+        oscillator.slope = 1.0
+        check_change(fun, lambda: setattr(oscillator, "slope", 2.0))
+
+
+def test_attribute_of_a_function_changed() -> None:
+    def fun(t: Any, x: Any) -> Any:
+        return [x[1], -reads_nothing.slope * x[0]]  # type: ignore[attr-defined]
+
+    reads_nothing.slope = 1.0  # type: ignore[attr-defined]
+    try:
+        check_change(fun, lambda: setattr(reads_nothing, "slope", 2.0))
+    finally:
+        del reads_nothing.slope  # type: ignore[attr-defined]
+
+
+def test_closure_changed() -> None:
+    k = 1.0
+
+    def change() -> None:
+        nonlocal k
+        k = 2.0
+
+    check_change(lambda t, x: [x[1], -k * x[0]], change)
+
+
+def test_closure_of_a_closure_changed() -> None:
+    k = 1.0
+
+    def inner(x: Any) -> Any:
+        return -k * x
+
+    def fun(t: Any, x: Any) -> Any:
+        return [x[1], *(inner(v) for v in x[:1])]
+
+    def change() -> None:
+        nonlocal k
+        k = 2.0
+
+    check_change(fun, change)
+
+
+@pytest.mark.parametrize("attribute", ["__defaults__", "__kwdefaults__", "__code__"])
+def test_defaults_and_code_changed(attribute: str) -> None:
+    def fun(t: Any, x: Any, k: float = 1.0, *, m: float = 1.0) -> Any:
+        return [x[1], -k * m * x[0]]
+
+    def other(t: Any, x: Any, k: float = 2.0, *, m: float = 3.0) -> Any:
+        return [x[1], k * m * x[0]]
+
+    check_change(fun, lambda: setattr(fun, attribute, getattr(other, attribute)))
+
+
+def test_mutable_default_changed() -> None:
+    def fun(t: Any, x: Any, k: list[float] = [1.0]) -> Any:  # noqa: B006
+        return [x[1], -k[0] * x[0]]
+
+    check_change(fun, lambda: fun.__defaults__[0].__setitem__(0, 2.0))  # type: ignore[index]
+
+
+def test_lambda_made_again_in_a_loop() -> None:
+    kept = [final(lambda t, x, k=k: [x[1], -k * x[0]]) for k in (1.0, 2.0, 1.0, 3.0)]
+    assert kept == [fresh(closure(k)) for k in (1.0, 2.0, 1.0, 3.0)]
+    assert [final(closure(k)) for k in (1.0, 2.0, 1.0, 3.0)] == kept
+
+
+def test_functions_of_numpy_and_python_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fun(t: Any, x: Any) -> Any:
+        return [np.sin(x[1]), -abs(x[0])]
+
+    check_change(fun, lambda: monkeypatch.setattr(np, "sin", np.cos))
+    check_change(fun, lambda: monkeypatch.setattr(np, "sin", lambda v: v))
+    check_change(fun, lambda: monkeypatch.setattr(builtins, "abs", lambda v: 2.0 * v))
+    check_change(fun, lambda: monkeypatch.setitem(globals(), "abs", lambda v: 3.0 * v))
+
+
+def test_function_of_the_package_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fun(t: Any, x: Any) -> Any:
+        return [fl.sin(x[1]), -x[0]]
+
+    check_change(fun, lambda: monkeypatch.setattr(fl, "sin", lambda v: v))
+
+
+def test_partial() -> None:
+    kept = [final(functools.partial(with_default, k=k)) for k in (1.0, 2.0, 1.0)]
+    assert kept == [fresh(with_default, args=(k,)) for k in (1.0, 2.0, 1.0)]
+    values = {"slope": 1.0}
+    held = functools.partial(lambda t, x, values: [x[1], -values["slope"] * x[0]], values=values)
+    check_change(held, lambda: values.update(slope=2.0))
+
+
+@pytest.mark.parametrize(
+    "args",
+    [(2.0,), (2,), (np.float32(0.1),), (-0.0,), (True,), (np.array([1.0, 3.0]),), ([1.0, 3.0],), (1.0,)],
+    ids=str,
+)
+def test_arguments_of_other_value_or_type(args: tuple[Any, ...]) -> None:
+    def fun(t: Any, x: Any, k: Any) -> Any:
+        if isinstance(k, list):
+            k = k[1]
+        return np.array([x[1], -x[0]]) * np.copysign(1.0, k) - k / 3
+
+    others: list[tuple[Any, ...]] = [(1.0,), (1,), (0.1,), (0.0,), (np.array([1.0, 2.0]),), ([1.0, 2.0],)]
+    for other in others:
+        final(fun, args=other)
+    assert final(fun, args=args) == fresh(fun, args=args)
+
+
+def test_array_argument_changed_in_place() -> None:
+    k = np.array([1.0, 2.0])
+    check_change(lambda t, x, k: -k * x, lambda: k.__setitem__(0, 3.0), args=(k,))
+
+
+def test_function_as_argument() -> None:
+    answers = [final(lambda t, x, f: f(x), args=(f,)) for f in (np.sin, np.cos, lambda v: v, lambda v: -v)]
+    assert len(set(answers)) == 4
+
+
+def test_surfaces_changed(monkeypatch: pytest.MonkeyPatch) -> None:
+    def solve() -> tuple[str, ...]:
+        return fl.solve_ivp(reads_nothing, SPAN, START, surfaces=lambda t, x: slope * x[0] + x[1]).surfaces
+
+    assert solve() == solve()
+    first = solve()
+    monkeypatch.setitem(globals(), "slope", 2.0)
+    assert solve() != first
+
+
+def test_names_that_lead_out_of_a_function(monkeypatch: pytest.MonkeyPatch) -> None:
+    def imports(t: Any, x: Any) -> Any:
+        from math import tau
+
+        return [x[1], -tau * x[0]]
+
+    def looks_up(t: Any, x: Any) -> Any:
+        return [x[1], -globals()["slope"] * x[0]]
+
+    def evaluates(t: Any, x: Any) -> Any:
+        return [x[1], eval("-slope") * x[0]]
+
+    def gets(t: Any, x: Any) -> Any:
+        return [x[1], -getattr(parameters, "slo" + "pe") * x[0]]
+
+    def formats(t: Any, x: Any) -> Any:
+        return [x[1], -float("{0.slope}".format(parameters)) * x[0]]  # noqa: UP030, UP032
+
+    def underscores(t: Any, x: Any) -> Any:
+        return [x[1], -parameters.__dict__["slope"] * x[0]]
+
+    monkeypatch.setattr(math, "tau", math.tau)
+    check_change(imports, lambda: monkeypatch.setattr(math, "tau", 1.0))
+    for fun in (looks_up, evaluates):
+        monkeypatch.setitem(globals(), "slope", 1.0)
+        check_change(fun, lambda: monkeypatch.setitem(globals(), "slope", 2.0))
+    for fun in (gets, formats, underscores):
+        monkeypatch.setattr(parameters, "slope", 1.0)
+        check_change(fun, lambda: monkeypatch.setattr(parameters, "slope", 2.0))
+
+
+def test_module_under_another_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    def take(module: Any) -> Any:
+        return module.slope
+
+    def fun(t: Any, x: Any) -> Any:
+        other = parameters
+        return [x[1], -take(other) * x[0]]
+
+    check_change(fun, lambda: monkeypatch.setattr(parameters, "slope", 2.0))
+
+
+def test_module_that_supplies_names(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = types.ModuleType("supplier")
+    values = {"k": 1.0}
+    module.__getattr__ = values.__getitem__  # type: ignore[method-assign]
+    check_change(lambda t, x: [x[1], -module.k * x[0]], lambda: values.update(k=2.0))
+
+
+def test_two_names_of_one_list(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fun(t: Any, x: Any) -> Any:
+        alias_a[0] = 2.0
+        k = alias_b[0]
+        alias_a[0] = 1.0
+        return [x[1], -k * x[0]]
+
+    check_change(fun, lambda: monkeypatch.setitem(globals(), "alias_b", [1.0]))
+
+
+def test_effects_of_a_function_are_not_lost() -> None:
+    calls: list[int] = []
+
+    def fun(t: Any, x: Any) -> Any:
+        calls.append(1)
+        return [x[1], -x[0]]
+
+    final(fun)
+    n_calls = len(calls)
+    final(fun)
+    assert len(calls) == 2 * n_calls
+
+
+def test_random_numbers_are_noticed_at_every_call() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(2):
+        with pytest.raises(fl.TraceError):
+            final(lambda t, x: [x[1], -rng.random() * x[0]])
+
+
+def test_a_new_initial_state_is_compared_again() -> None:
+    def seen_only_far_out(t: Any, x: Any) -> Any:
+        if x.dtype == float and x[0] > 100.0:
+            return [1.0, 1.0]
+        return -x
+
+    assert is_kept(seen_only_far_out)
+    with pytest.raises(fl.TraceError):
+        fl.solve_ivp(seen_only_far_out, SPAN, [200.0, 0.0])
+
+
+# ----------------------------------------------------------------- how it is kept
+
+
+def test_nothing_is_kept_beyond_the_limit() -> None:
+    for k in range(50):
+        fl.solve_ivp(lambda t, x, k=k: -k * x, SPAN, [1.0])
+    assert len(prepare._KEPT._values) == prepare._KEPT._size
+
+
+def test_large_data_are_not_compared() -> None:
+    for data in (np.zeros(100_000), [0.0] * 100_000, {k: 0.0 for k in range(100_000)}):
+        assert fingerprint(lambda t, x, data=data: -x) is None
+
+
+def test_threads() -> None:
+    expected = {k: fresh(closure(k)) for k in (1.0, 2.0, 3.0)}
+
+    def solve(index: int) -> bool:
+        k = 1.0 + index % 3
+        return final(closure(k), events=lambda t, x: x[0]) == expected[k]
+
+    with ThreadPoolExecutor(4) as pool:
+        assert all(pool.map(solve, range(60)))
