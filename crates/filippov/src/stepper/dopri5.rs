@@ -15,6 +15,9 @@ pub enum Attempt {
     NotFinite,
 }
 
+/// Number of states where it is not fixed at compile time.
+const ANY: usize = 0;
+
 /// The Dormand-Prince pair of order 5(4) with seven stages, the last of which is the first of the
 /// next step.
 ///
@@ -89,13 +92,33 @@ impl Dopri5 {
     pub fn attempt<F: SmoothField>(
         &mut self,
         field: &mut F,
+        observe: impl FnMut(usize, &F),
+        t: f64,
+        y: &[f64],
+        dt: f64,
+        scale: &ErrorScale,
+    ) -> Result<Attempt, FieldError> {
+        match y.len() {
+            1 => self.attempt_sized::<1, F>(field, observe, t, y, dt, scale),
+            2 => self.attempt_sized::<2, F>(field, observe, t, y, dt, scale),
+            3 => self.attempt_sized::<3, F>(field, observe, t, y, dt, scale),
+            4 => self.attempt_sized::<4, F>(field, observe, t, y, dt, scale),
+            _ => self.attempt_sized::<ANY, F>(field, observe, t, y, dt, scale),
+        }
+    }
+
+    /// As [`attempt`](Self::attempt) for `N` states: the loops over few states are unrolled.
+    fn attempt_sized<const N: usize, F: SmoothField>(
+        &mut self,
+        field: &mut F,
         mut observe: impl FnMut(usize, &F),
         t: f64,
         y: &[f64],
         dt: f64,
         scale: &ErrorScale,
     ) -> Result<Attempt, FieldError> {
-        let n = y.len();
+        let n = if N == ANY { y.len() } else { N };
+        let y = &y[..n];
         self.order5 = false;
         let [k1, k2, k3, k4, k5, k6, k7] = &mut self.k;
         let (k1, stage, y1) = (&k1[..n], &mut self.stage[..n], &mut self.y1[..n]);
@@ -162,7 +185,20 @@ impl Dopri5 {
 
     /// The continuous extension of order 4 of the attempted step; costs no evaluation.
     pub fn extend_order4(&mut self, t: f64, y: &[f64], dt: f64) -> &Interpolant {
-        let n = y.len();
+        match y.len() {
+            1 => self.extend_sized::<1>(t, y, dt),
+            2 => self.extend_sized::<2>(t, y, dt),
+            3 => self.extend_sized::<3>(t, y, dt),
+            4 => self.extend_sized::<4>(t, y, dt),
+            _ => self.extend_sized::<ANY>(t, y, dt),
+        }
+        &self.interpolant
+    }
+
+    #[inline(always)]
+    fn extend_sized<const N: usize>(&mut self, t: f64, y: &[f64], dt: f64) {
+        let n = if N == ANY { y.len() } else { N };
+        let y = &y[..n];
         let [k1, k3, k4, k5, k6, k7] = [0, 2, 3, 4, 5, 6].map(|stage: usize| &self.k[stage][..n]);
         let y1 = &self.y1[..n];
         self.interpolant.t0 = t;
@@ -182,7 +218,6 @@ impl Dopri5 {
                     + D[5] * k6[i]
                     + D[6] * k7[i]);
         }
-        &self.interpolant
     }
 
     /// Raises the continuous extension of the attempted step to order 5, with two evaluations.
