@@ -141,7 +141,7 @@ impl Solution {
             .min(self.segments.len() - 1);
         let mode = &self.segments[segment].mode;
         if let Some(j) = mode.sliding() {
-            Projector::default().project(system, j, t, y, &mode.signs())?;
+            Projector::new(n, system.n_surfaces()).project(system, j, t, y, &mode.signs())?;
         }
         Ok(Some(mode))
     }

@@ -5,15 +5,23 @@ use crate::system::PiecewiseSystem;
 use crate::tolerances::SURFACE_NOISE;
 
 /// Scratch space of the projection.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Projector {
     h: Vec<f64>,
     gradient: Vec<f64>,
 }
 
 impl Projector {
+    /// Space for a system with n states and d surfaces.
+    pub fn new(n: usize, d: usize) -> Self {
+        Projector {
+            h: vec![0.0; d],
+            gradient: vec![0.0; n],
+        }
+    }
+
     /// Moves `x` onto h_j(t, x) = 0 along the gradient: x <- x - h grad h / |grad h|^2, repeated
-    /// until |h| is at the level of rounding, at most four times.
+    /// until |h| is at the level of rounding, at most four times; once if h is affine.
     ///
     /// # Errors
     /// If a function of the user raises.
@@ -25,9 +33,8 @@ impl Projector {
         x: &mut [f64],
         signs: &[f64],
     ) -> Result<(), FieldError> {
-        self.h.resize(system.n_surfaces(), 0.0);
-        self.gradient.resize(x.len(), 0.0);
-        for _ in 0..4 {
+        let most = if system.is_affine(j) { 1 } else { 4 };
+        for _ in 0..most {
             system.surfaces(t, x, signs, &mut self.h)?;
             let h = self.h[j];
             if h == 0.0 || !h.is_finite() {
