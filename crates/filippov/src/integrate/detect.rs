@@ -9,7 +9,7 @@ use crate::error::FieldError;
 use crate::event::filter::{may_vanish, may_vanish_bent, may_vanish_between, may_vanish_deflated};
 use crate::event::isolate::{first_zero_sampled, Zero, PROBES};
 use crate::event::locate::refine;
-use crate::event::{EventFunction, Monitored};
+use crate::event::{Deflation, EventFunction, Monitored};
 use crate::field::NormalComponents;
 use crate::stepper::nested;
 use crate::system::{dot, PiecewiseSystem};
@@ -213,10 +213,14 @@ impl Integrator<'_> {
                 }
                 (EventFunction::Surface(_), Some(deflation)) => {
                     let step = (self.t, &self.x[..], self.stepper.end());
-                    motion.monitored[index].noise =
-                        detector.noise(self.system, motion, m.function, step)?;
-                    let at_start = deflation.order == 1 && deflation.t == self.t && m.affine;
-                    !at_start || may_vanish_deflated(deflation.leading * dt, value, rate * dt)
+                    let noise = detector.noise(self.system, motion, m.function, step)?;
+                    motion.monitored[index].noise = noise;
+                    let Deflation { t, order, leading } = deflation;
+                    // A multiple zero stays within rounding for long: the end has to be clear of it.
+                    let clear = order == 1 || order == 2 && value > 1e3 * noise;
+                    let leading = leading * dt.powi(order);
+                    let known = m.affine && t == self.t && clear;
+                    !known || may_vanish_deflated(leading, order, value, rate * dt)
                 }
                 (EventFunction::ExitMinus, None) => may_vanish_between(&detector.stages[0]),
                 (EventFunction::ExitPlus, None) => may_vanish_between(&detector.stages[1]),
