@@ -175,6 +175,11 @@ impl Recorder {
         }
     }
 
+    /// Are the continuous extensions kept?
+    pub fn keeps_dense(&self) -> bool {
+        self.keep_dense
+    }
+
     pub fn start(&mut self, t: f64, y: &[f64]) {
         self.y0.copy_from_slice(y);
         self.t.push(t);

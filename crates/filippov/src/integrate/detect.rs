@@ -170,7 +170,7 @@ impl Integrator<'_> {
         self.collect_suspects(dt)?;
         let mut found: Option<Found> = None;
         if !self.detector.suspects.is_empty() {
-            self.extend(dt)?;
+            self.extend()?;
             for k in 0..self.detector.suspects.len() {
                 let index = self.detector.suspects[k];
                 let zero = self.search(index, 0.0, 1.0, dt)?;
@@ -193,8 +193,9 @@ impl Integrator<'_> {
             .iter()
             .any(|m| !m.affine && matches!(m.function, EventFunction::Surface(_)))
         {
+            let extension = self.stepper.extend_order4(&self.x);
             for (theta, h) in PROBES.into_iter().zip(&mut detector.probed) {
-                self.stepper.interpolant().at(theta, &mut detector.x);
+                extension.at(theta, &mut detector.x);
                 let t = self.t + theta * dt;
                 self.system.surfaces(t, &detector.x, &motion.signs, h)?;
                 self.stats.n_surface_evaluations += 1;
@@ -234,10 +235,10 @@ impl Integrator<'_> {
     }
 
     /// Raises the continuous extension to order 5.
-    fn extend(&mut self, dt: f64) -> Result<(), FieldError> {
+    fn extend(&mut self) -> Result<(), FieldError> {
         self.stats.n_extensions += 1;
         self.stepper
-            .extend_order5(&mut self.motion.field, self.t, &self.x, dt)?;
+            .extend_order5(&mut self.motion.field, &self.x)?;
         Ok(())
     }
 
@@ -355,7 +356,7 @@ impl Integrator<'_> {
             let (value, rate) = self.detector.right[index];
             let near = rate < 0.0 && value < -rate * dt * 1.5 * (EXTRAPOLATION - 1.0);
             if near {
-                self.extend(dt)?;
+                self.extend()?;
                 let zero = self.search(index, 1.0, EXTRAPOLATION, dt)?;
                 // What lies beyond the end of the step may not exist; that is no reason to shorten it.
                 self.detector.uncertain = false;
