@@ -142,7 +142,13 @@ impl Solution {
         let mode = &self.segments[segment].mode;
         if mode.codimension() > 0 {
             let set: Vec<usize> = mode.sliding_set().collect();
-            Projector::default().project_onto(system, &set, t, y, &mode.signs())?;
+            Projector::new(n, system.n_surfaces()).project_onto(
+                system,
+                &set,
+                t,
+                y,
+                &mode.signs(),
+            )?;
         }
         Ok(Some(mode))
     }
@@ -174,6 +180,11 @@ impl Recorder {
             segments: Vec::new(),
             switches: Vec::new(),
         }
+    }
+
+    /// Are the continuous extensions kept?
+    pub fn keeps_dense(&self) -> bool {
+        self.keep_dense
     }
 
     pub fn start(&mut self, t: f64, y: &[f64]) {

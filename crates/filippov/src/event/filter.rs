@@ -44,14 +44,14 @@ pub fn may_vanish_between(stages: &[f64; 7]) -> bool {
     !excluded
 }
 
-/// As [`may_vanish`] for a function g with a simple zero at the start of the step divided out: its
-/// value at the start is `leading` (the slope of g there times the step).
+/// As [`may_vanish`] for a function g with a zero of some `order` at the start of the step divided out:
+/// the quotient at the start is `leading` (a simple zero: the slope of g there times the step).
 ///
-/// The quotient q = g/theta has q(1) = g1 and q'(1) = g1' - g1; the quadratic through q(0), q(1), q'(1)
+/// The quotient q = g/theta^k has q(1) = g1 and q'(1) = g1' - k g1; the quadratic through q(0), q(1), q'(1)
 /// is trusted half as far as the cubic.
 #[inline]
-pub fn may_vanish_deflated(leading: f64, g1: f64, slope1: f64) -> bool {
-    let middle = g1 - 0.5 * (slope1 - g1);
+pub fn may_vanish_deflated(leading: f64, order: i32, g1: f64, slope1: f64) -> bool {
+    let middle = g1 - 0.5 * (slope1 - f64::from(order) * g1);
     let low = leading.min(g1).min(middle);
     let high = leading.max(g1).max(middle);
     let excluded =

@@ -59,7 +59,7 @@ impl<'a> IntersectionField<'a> {
             weights: vec![0.0; 1 << set.len()],
             lambda: lambda.to_vec(),
             exits: vec![f64::NAN; Self::n_exits_of(set.len())],
-            projector: Projector::default(),
+            projector: Projector::new(system.n_states(), system.n_surfaces()),
             n_evaluations: 0,
         }
     }

@@ -6,15 +6,26 @@ use crate::system::{dot, dot_magnitude, PiecewiseSystem};
 use crate::tolerances::SURFACE_NOISE;
 
 /// Scratch space of the projection.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Projector {
     h: Vec<f64>,
     gradient: Vec<f64>,
+    /// The gradients of several surfaces.
+    rows: Vec<f64>,
 }
 
 impl Projector {
+    /// Space for a system with n states and d surfaces.
+    pub fn new(n: usize, d: usize) -> Self {
+        Projector {
+            h: vec![0.0; d],
+            gradient: vec![0.0; n],
+            rows: Vec::new(),
+        }
+    }
+
     /// Moves `x` onto h_j(t, x) = 0 along the gradient: x <- x - h grad h / |grad h|^2, repeated
-    /// until |h| is at the level of rounding, at most four times.
+    /// until |h| is at the level of rounding, at most four times; once if h is affine.
     ///
     /// # Errors
     /// If a function of the user raises.
@@ -26,9 +37,8 @@ impl Projector {
         x: &mut [f64],
         signs: &[f64],
     ) -> Result<(), FieldError> {
-        self.h.resize(system.n_surfaces(), 0.0);
-        self.gradient.resize(x.len(), 0.0);
-        for _ in 0..4 {
+        let most = if system.is_affine(j) { 1 } else { 4 };
+        for _ in 0..most {
             system.surfaces(t, x, signs, &mut self.h)?;
             let h = self.h[j];
             if h == 0.0 || !h.is_finite() {
@@ -70,19 +80,18 @@ impl Projector {
             return self.project(system, j, t, x, signs);
         }
         let n = x.len();
-        self.h.resize(system.n_surfaces(), 0.0);
-        self.gradient.resize(n * set.len(), 0.0);
+        self.rows.resize(n * set.len(), 0.0);
         for _ in 0..8 {
             system.surfaces(t, x, signs, &mut self.h)?;
             let mut is_near = true;
-            for (row, &j) in self.gradient.chunks_exact_mut(n).zip(set) {
+            for (row, &j) in self.rows.chunks_exact_mut(n).zip(set) {
                 system.gradient(j, t, x, signs, row)?;
                 is_near &= self.h[j].abs() <= 0.25 * SURFACE_NOISE * dot_magnitude(row, x);
             }
             let Some(shifts) = self.shifts(set, n).filter(|_| !is_near) else {
                 break;
             };
-            for (row, shift) in self.gradient.chunks_exact(n).zip(shifts) {
+            for (row, shift) in self.rows.chunks_exact(n).zip(shifts) {
                 x.iter_mut().zip(row).for_each(|(x, g)| *x -= shift * g);
             }
         }
@@ -91,7 +100,7 @@ impl Projector {
 
     /// (N N^T)^-1 h; `None` if the gradients are dependent or h is not finite.
     fn shifts(&self, set: &[usize], n: usize) -> Option<Vec<f64>> {
-        let row = |i: usize| &self.gradient[i * n..(i + 1) * n];
+        let row = |i: usize| &self.rows[i * n..(i + 1) * n];
         let mut gram = Matrix::zeros(set.len());
         for i in 0..set.len() {
             for j in 0..set.len() {

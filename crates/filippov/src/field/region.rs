@@ -37,22 +37,29 @@ impl<'a> RegionField<'a> {
     pub fn set_departing(&mut self, departing: bool) {
         self.departing = departing;
     }
+
+    /// The field just inside of the region, as near as it is finite.
+    #[cold]
+    fn eval_inside(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), FieldError> {
+        for offset in side_offsets(x) {
+            let inside = move_inside(self.system, t, x, &self.signs, offset, f64::INFINITY)?;
+            self.system.field(t, &inside, &self.signs, dx)?;
+            self.n_evaluations += 1;
+            if dx.iter().all(|v| v.is_finite()) {
+                break;
+            }
+        }
+        Ok(())
+    }
 }
 
 impl SmoothField for RegionField<'_> {
-    #[inline]
+    #[inline(always)]
     fn eval(&mut self, t: f64, x: &mut [f64], dx: &mut [f64]) -> Result<(), FieldError> {
         self.n_evaluations += 1;
         self.system.field(t, x, &self.signs, dx)?;
         if self.departing && dx.iter().any(|v| !v.is_finite()) {
-            for offset in side_offsets(x) {
-                let inside = move_inside(self.system, t, x, &self.signs, offset, f64::INFINITY)?;
-                self.system.field(t, &inside, &self.signs, dx)?;
-                self.n_evaluations += 1;
-                if dx.iter().all(|v| v.is_finite()) {
-                    break;
-                }
-            }
+            self.eval_inside(t, x, dx)?;
         }
         Ok(())
     }

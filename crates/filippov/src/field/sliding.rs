@@ -64,7 +64,7 @@ impl<'a> SlidingField<'a> {
             surface: j,
             signs: Signs::from_slice(signs),
             sides: BothSides::new(system.n_states(), system.n_surfaces()),
-            projector: Projector::default(),
+            projector: Projector::new(system.n_states(), system.n_surfaces()),
             n_evaluations: 0,
             last: NormalComponents {
                 minus: f64::NAN,

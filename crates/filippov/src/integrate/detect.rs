@@ -12,7 +12,7 @@ use crate::error::FieldError;
 use crate::event::filter::{may_vanish, may_vanish_bent, may_vanish_between, may_vanish_deflated};
 use crate::event::isolate::{first_zero_sampled, Evidence, Zero, PROBES};
 use crate::event::locate::refine;
-use crate::event::{EventFunction, Monitored};
+use crate::event::{Deflation, EventFunction, Monitored};
 use crate::stepper::nested;
 use crate::system::{dot, PiecewiseSystem};
 use crate::tolerances::{EPS, EXTRAPOLATION, ONE_SIDED_AIM, POLE, RESOLVED_DEPTH, SURFACE_NOISE};
@@ -181,7 +181,7 @@ impl Integrator<'_> {
         self.collect_suspects(dt)?;
         let mut found: Option<Found> = None;
         if !self.detector.suspects.is_empty() {
-            self.extend(dt)?;
+            self.extend()?;
             for k in 0..self.detector.suspects.len() {
                 let index = self.detector.suspects[k];
                 let zero = self.search(index, 0.0, 1.0, dt)?;
@@ -197,12 +197,16 @@ impl Integrator<'_> {
     /// The filter: which functions may vanish within the step?
     fn collect_suspects(&mut self, dt: f64) -> Result<(), FieldError> {
         self.detector.suspects.clear();
+        let is_polynomial =
+            |m: &Monitored| m.affine && matches!(m.function, EventFunction::Surface(_));
+        if !self.motion.monitored.iter().all(is_polynomial) {
+            self.stepper.extend_order4(&self.x);
+        }
         self.measure_margin(dt)?;
         let mut probed = false;
         for index in 0..self.motion.monitored.len() {
             let m = self.motion.monitored[index];
             let (value, rate) = self.detector.right[index];
-            let is_polynomial = m.affine && matches!(m.function, EventFunction::Surface(_));
             if m.deflation.is_some() {
                 let step = (self.t, &self.x[..], self.stepper.end());
                 let noise = self
@@ -210,7 +214,7 @@ impl Integrator<'_> {
                     .noise(self.system, &self.motion, m.function, step)?;
                 self.motion.monitored[index].noise = noise;
             }
-            let is_cleared = if is_polynomial {
+            let is_cleared = if is_polynomial(&m) {
                 None
             } else {
                 self.prove_clear(index, value)
@@ -230,8 +234,13 @@ impl Integrator<'_> {
                     may_vanish_bent(m.value, m.rate * dt, value, rate * dt, &probes)
                 }
                 (EventFunction::Surface(_), Some(deflation), _) => {
-                    let at_start = deflation.order == 1 && deflation.t == self.t && m.affine;
-                    !at_start || may_vanish_deflated(deflation.leading * dt, value, rate * dt)
+                    let noise = self.motion.monitored[index].noise;
+                    let Deflation { t, order, leading } = deflation;
+                    // A multiple zero stays within rounding for long: the end has to be clear of it.
+                    let clear = order == 1 || order == 2 && value > 1e3 * noise;
+                    let leading = leading * dt.powi(order);
+                    let known = m.affine && t == self.t && clear;
+                    !known || may_vanish_deflated(leading, order, value, rate * dt)
                 }
                 (EventFunction::ExitMinus, None, _) => may_vanish_between(&self.detector.stages[0]),
                 (EventFunction::ExitPlus, None, _) => may_vanish_between(&self.detector.stages[1]),
@@ -260,11 +269,11 @@ impl Integrator<'_> {
     }
 
     /// Raises the continuous extension to order 5.
-    fn extend(&mut self, dt: f64) -> Result<(), FieldError> {
+    fn extend(&mut self) -> Result<(), FieldError> {
         self.stats.n_extensions += 1;
         self.detector.enclosed_exits.set(None);
         self.stepper
-            .extend_order5(&mut self.motion.field, self.t, &self.x, dt)?;
+            .extend_order5(&mut self.motion.field, &self.x)?;
         Ok(())
     }
 
@@ -398,7 +407,7 @@ impl Integrator<'_> {
             let (value, rate) = self.detector.right[index];
             let near = rate < 0.0 && value < -rate * dt * 1.5 * (EXTRAPOLATION - 1.0);
             if near {
-                self.extend(dt)?;
+                self.extend()?;
                 let zero = self.search(index, 1.0, EXTRAPOLATION, dt)?;
                 // What lies beyond the end of the step may not exist; that is no reason to shorten it.
                 self.detector.uncertain = false;

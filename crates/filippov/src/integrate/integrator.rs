@@ -225,7 +225,6 @@ impl<'a> Integrator<'a> {
         } else {
             self.t + dt
         };
-        self.stepper.extend_order4(self.t, &self.x, dt);
         let found = self.detect(t1, dt)?;
         if self.detector.uncertain {
             self.count_rejection(sliding);
@@ -255,6 +254,9 @@ impl<'a> Integrator<'a> {
         }
         self.one_sided = self.detector.next_dt.is_some();
         self.dt = self.dt.min(self.detector.next_dt.unwrap_or(f64::INFINITY));
+        if self.recorder.keeps_dense() {
+            self.stepper.extend_order4(&self.x);
+        }
         let Some(event) = found else {
             self.recorder
                 .step(self.stepper.interpolant(), t1, self.stepper.end());

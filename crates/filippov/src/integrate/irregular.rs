@@ -11,8 +11,11 @@ impl Integrator<'_> {
     /// Where a field was found to end at its surfaces, a step that would pass the next one aims at it
     /// from the start, close enough for the continuous extension to reach it.
     pub(super) fn aim_at_surface(&mut self, dt: f64) -> f64 {
+        if !self.meets_edges || self.one_sided {
+            return dt;
+        }
         let nearest = self.nearest_surface();
-        if !self.meets_edges || self.one_sided || nearest > dt {
+        if nearest > dt {
             return dt;
         }
         self.one_sided = true;

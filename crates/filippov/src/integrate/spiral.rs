@@ -33,7 +33,8 @@ impl Integrator<'_> {
         let entries = meeting.iter().zip(first);
         entries.for_each(|(&j, entry)| region.set(j, entry));
         let t = self.t + jump.duration();
-        Projector::default().project(self.system, border, t, &mut end, &region.signs())?;
+        let mut projector = Projector::new(end.len(), self.system.n_surfaces());
+        projector.project(self.system, border, t, &mut end, &region.signs())?;
         self.move_straight(t, end);
         Ok(Some((region, border)))
     }

@@ -189,8 +189,12 @@ impl Integrator<'_> {
 
     /// Surfaces that vanish at the event: those that were located, and all others that matter, are
     /// not being left tangentially and lie within rounding of zero.
-    fn vanishing_surfaces(&mut self, event: &Found, h: &[f64]) -> Result<Vec<usize>, FieldError> {
-        let mut surfaces: Vec<usize> = event
+    fn vanishing_surfaces(
+        &mut self,
+        event: &Found,
+        h: &[f64],
+    ) -> Result<SmallVec<[usize; 4]>, FieldError> {
+        let mut surfaces: SmallVec<[usize; 4]> = event
             .functions
             .iter()
             .filter_map(|f| match f {

@@ -64,13 +64,16 @@ impl Integrator<'_> {
         &mut self,
         theta: f64,
     ) -> Result<Option<Vec<(f64, usize)>>, FieldError> {
+        if self.user_events.events.is_empty() {
+            return Ok(Some(Vec::new()));
+        }
+        self.stepper.extend_order4(&self.x);
         let found = self.search_user_zeros(theta)?;
         if found.as_ref().is_none_or(|zeros| zeros.is_empty()) {
             return Ok(found);
         }
-        let dt = self.stepper.interpolant().dt;
         self.stepper
-            .extend_order5(&mut self.motion.field, self.t, &self.x, dt)?;
+            .extend_order5(&mut self.motion.field, &self.x)?;
         let mut found = self.search_user_zeros(theta)?;
         if let Some(zeros) = &mut found {
             zeros.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -27,6 +27,7 @@ impl Interpolant {
         }
     }
 
+    #[inline]
     pub(super) fn rows(&mut self) -> [&mut [f64]; 6] {
         let n = self.n;
         let (y0, rest) = self.coefficients.split_at_mut(n);

@@ -15,6 +15,9 @@ pub enum Attempt {
     NotFinite,
 }
 
+/// Number of states where it is not fixed at compile time.
+const ANY: usize = 0;
+
 /// The Dormand-Prince pair of order 5(4) with seven stages, the last of which is the first of the
 /// next step.
 ///
@@ -30,7 +33,8 @@ pub struct Dopri5 {
     interpolant: Interpolant,
     /// Quartic coefficient of the free extension, kept when the extension is raised to order 5.
     free_quartic: Vec<f64>,
-    order5: bool,
+    /// Order of the extension of the attempted step, as far as it was computed.
+    extended: Option<u8>,
 }
 
 impl Dopri5 {
@@ -44,7 +48,7 @@ impl Dopri5 {
             y1: zeros(),
             interpolant: Interpolant::empty(n),
             free_quartic: zeros(),
-            order5: false,
+            extended: None,
         }
     }
 
@@ -89,14 +93,35 @@ impl Dopri5 {
     pub fn attempt<F: SmoothField>(
         &mut self,
         field: &mut F,
+        observe: impl FnMut(usize, &F),
+        t: f64,
+        y: &[f64],
+        dt: f64,
+        scale: &ErrorScale,
+    ) -> Result<Attempt, FieldError> {
+        match y.len() {
+            1 => self.attempt_sized::<1, F>(field, observe, t, y, dt, scale),
+            2 => self.attempt_sized::<2, F>(field, observe, t, y, dt, scale),
+            3 => self.attempt_sized::<3, F>(field, observe, t, y, dt, scale),
+            4 => self.attempt_sized::<4, F>(field, observe, t, y, dt, scale),
+            _ => self.attempt_sized::<ANY, F>(field, observe, t, y, dt, scale),
+        }
+    }
+
+    /// As [`attempt`](Self::attempt) for `N` states: the loops over few states are unrolled.
+    fn attempt_sized<const N: usize, F: SmoothField>(
+        &mut self,
+        field: &mut F,
         mut observe: impl FnMut(usize, &F),
         t: f64,
         y: &[f64],
         dt: f64,
         scale: &ErrorScale,
     ) -> Result<Attempt, FieldError> {
-        let n = y.len();
-        self.order5 = false;
+        let n = if N == ANY { y.len() } else { N };
+        let y = &y[..n];
+        self.extended = None;
+        (self.interpolant.t0, self.interpolant.dt) = (t, dt);
         let [k1, k2, k3, k4, k5, k6, k7] = &mut self.k;
         let (k1, stage, y1) = (&k1[..n], &mut self.stage[..n], &mut self.y1[..n]);
         let (k2, k3, k4) = (&mut k2[..n], &mut k3[..n], &mut k4[..n]);
@@ -160,13 +185,28 @@ impl Dopri5 {
         })
     }
 
-    /// The continuous extension of order 4 of the attempted step; costs no evaluation.
-    pub fn extend_order4(&mut self, t: f64, y: &[f64], dt: f64) -> &Interpolant {
-        let n = y.len();
+    /// The continuous extension of the attempted step from `y`, of order 4 unless it was raised to
+    /// order 5; costs no evaluation.
+    pub fn extend_order4(&mut self, y: &[f64]) -> &Interpolant {
+        if self.extended.is_none() {
+            match y.len() {
+                1 => self.extend_sized::<1>(y),
+                2 => self.extend_sized::<2>(y),
+                3 => self.extend_sized::<3>(y),
+                4 => self.extend_sized::<4>(y),
+                _ => self.extend_sized::<ANY>(y),
+            }
+            self.extended = Some(4);
+        }
+        &self.interpolant
+    }
+
+    #[inline(always)]
+    fn extend_sized<const N: usize>(&mut self, y: &[f64]) {
+        let n = if N == ANY { y.len() } else { N };
+        let (y, dt) = (&y[..n], self.interpolant.dt);
         let [k1, k3, k4, k5, k6, k7] = [0, 2, 3, 4, 5, 6].map(|stage: usize| &self.k[stage][..n]);
         let y1 = &self.y1[..n];
-        self.interpolant.t0 = t;
-        self.interpolant.dt = dt;
         let [y0, r1, r2, r3, r4, r5] = self.interpolant.rows().map(|row| &mut row[..n]);
         for i in 0..n {
             y0[i] = y[i];
@@ -182,7 +222,6 @@ impl Dopri5 {
                     + D[5] * k6[i]
                     + D[6] * k7[i]);
         }
-        &self.interpolant
     }
 
     /// Makes the continuous extension a straight line: the record of a motion that was not stepped.
@@ -193,7 +232,7 @@ impl Dopri5 {
         let ends = from.iter().zip(to);
         r1.iter_mut().zip(ends).for_each(|(r, (a, b))| *r = b - a);
         rest.into_iter().for_each(|row| row.fill(0.0));
-        self.order5 = true;
+        self.extended = Some(5);
     }
 
     /// Raises the continuous extension of the attempted step to order 5, with two evaluations.
@@ -205,14 +244,13 @@ impl Dopri5 {
     pub fn extend_order5(
         &mut self,
         field: &mut dyn SmoothField,
-        t: f64,
         y: &[f64],
-        dt: f64,
     ) -> Result<&Interpolant, FieldError> {
-        if self.order5 && self.interpolant.t0 == t && self.interpolant.dt == dt {
+        if self.extended == Some(5) {
             return Ok(&self.interpolant);
         }
-        self.extend_order4(t, y, dt);
+        self.extend_order4(y);
+        let (t, dt) = (self.interpolant.t0, self.interpolant.dt);
         for ((row, c), out) in [(&A8, C8), (&A9, C9)].into_iter().zip(&mut self.extra) {
             for (i, s) in self.stage.iter_mut().enumerate() {
                 let increment: f64 = row.iter().zip(&self.k).map(|(a, k)| a * k[i]).sum();
@@ -232,7 +270,7 @@ impl Dopri5 {
                 r4[i] = quartic;
             }
         }
-        self.order5 = true;
+        self.extended = Some(5);
         Ok(&self.interpolant)
     }
 

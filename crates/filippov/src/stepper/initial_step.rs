@@ -79,12 +79,12 @@ pub fn restart_step(
 
 /// As the guess of [`initial_step`] without its evaluation, and aiming at a thousandth of the tolerance
 /// instead of a hundredth: a step whose error is negligible for any but a very fast field. Zero for a
-/// field at rest, which says nothing.
+/// field at rest, which says nothing (Hairer's limit).
 pub fn tiny_step(y: &[f64], dy: &[f64], scale: &ErrorScale) -> f64 {
-    let step = (0.001 / scale.norm(dy, y)).powf(0.2);
-    if step.is_finite() {
-        step
-    } else {
+    let speed = scale.norm(dy, y);
+    if speed < 1e-5 {
         0.0
+    } else {
+        (0.001 / speed).powf(0.2)
     }
 }

@@ -126,7 +126,7 @@ fn local_errors(theta: f64) -> [f64; 2] {
         assert!(matches!(attempt, Attempt::Error(_)));
         let mut out = [0.0];
         stepper
-            .extend_order5(&mut Decay, t, &y, dt)
+            .extend_order5(&mut Decay, &y)
             .unwrap()
             .at(theta, &mut out);
         let end = t + theta * dt;
