@@ -231,6 +231,11 @@ impl Recorder {
         self.switches.push(switch);
     }
 
+    /// The switches so far.
+    pub fn switches(&self) -> &[Switch] {
+        &self.switches
+    }
+
     /// The surfaces of the switches recorded at this time.
     pub fn surfaces_switched_at(&self, t: f64) -> Vec<usize> {
         let latest = self.switches.iter().rev().take_while(|s| s.t == t);

@@ -231,3 +231,14 @@ pub const DEPARTS_TANGENTIALLY: f64 = 1e-6;
 /// An outward spiral starts at this multiple of the tolerance from the intersection: a free parameter of a family
 /// of solutions, small, and well above the error of the event.
 pub const SPIRAL_START: f64 = 100.0;
+
+/// Switches in one turn of an accumulation at most: a turn around two surfaces has four.
+pub const LONGEST_TURN: usize = 32;
+
+/// The square of the distance from which accumulating switches are extrapolated is at least this, also for a tolerance
+/// of zero.
+pub const NEAREST_ACCUMULATION: f64 = 1e-20;
+
+/// All fields count as tangent to a surface if their normal components are below this fraction of their size: the
+/// error of a point that accumulating switches lead to, or that was projected.
+pub const TANGENT_TO_ALL: f64 = 1e-7;

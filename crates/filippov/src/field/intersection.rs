@@ -3,7 +3,7 @@
 use super::{MeetingFields, Projector, SmoothField};
 use crate::error::FieldError;
 use crate::switching::codim2::Bilinear;
-use crate::switching::{newton, stable_roots, Matrix, NormalFields};
+use crate::switching::{least_multipliers, newton, stable_roots, Matrix, NormalFields};
 use crate::system::PiecewiseSystem;
 
 /// What ends sliding on an intersection of m surfaces: functions that are positive until then.
@@ -127,7 +127,10 @@ impl<'a> IntersectionField<'a> {
             self.lose_root();
             return Ok(());
         };
-        let found = if fields.m() == 2 {
+        let telling = self.corners.telling();
+        let found = if telling.len() < fields.m() {
+            self.solve_telling(&fields, &telling)
+        } else if fields.m() == 2 {
             self.solve_two(&fields)
         } else {
             self.solve_many(&fields)
@@ -169,6 +172,13 @@ impl<'a> IntersectionField<'a> {
             sign * jacobian.determinant(),
             jacobian.last_hurwitz_determinant(),
         );
+        Some(())
+    }
+
+    /// Sliding of higher order: some equations hold for all multipliers, and only their ends end the motion.
+    fn solve_telling(&mut self, fields: &NormalFields, telling: &[usize]) -> Option<()> {
+        self.lambda = least_multipliers(fields, telling)?;
+        self.fill_exits(1.0, 1.0);
         Some(())
     }
 

@@ -4,6 +4,7 @@ use super::eval_on_side;
 use crate::error::FieldError;
 use crate::switching::{NormalFields, Undecided};
 use crate::system::{dot, PiecewiseSystem};
+use crate::tolerances::TANGENT_TO_ALL;
 
 /// The 2^m fields around an intersection of m surfaces, one after the other, and the gradients of the
 /// switching functions. Pattern p has sign +1 at surface i of the set where bit i of p is set.
@@ -79,6 +80,24 @@ impl MeetingFields {
     /// If one is not finite, or the surfaces are too many.
     pub fn normal_fields(&self) -> Result<NormalFields, Undecided> {
         NormalFields::new(self.set.len(), self.components.clone())
+    }
+
+    /// The surfaces, counted within the set, whose equation says anything about the multipliers. To the others
+    /// all fields are tangent, up to rounding.
+    pub fn telling(&self) -> Vec<usize> {
+        let m = self.set.len();
+        let fastest = self
+            .fields
+            .chunks_exact(self.n)
+            .map(|f| dot(f, f))
+            .fold(0.0, f64::max);
+        let is_telling = |&i: &usize| {
+            let gradient = &self.gradients[i * self.n..(i + 1) * self.n];
+            let size = (dot(gradient, gradient) * fastest).sqrt();
+            let components = self.components.iter().skip(i).step_by(m);
+            components.fold(0.0_f64, |largest, c| largest.max(c.abs())) > TANGENT_TO_ALL * size
+        };
+        (0..m).filter(is_telling).collect()
     }
 
     /// The field of one pattern.

@@ -1,5 +1,6 @@
 //! The integrator: steps, events and switches in the right order.
 
+mod accumulation;
 mod bounds;
 mod curve;
 mod detect;

@@ -165,6 +165,9 @@ impl Integrator<'_> {
             .filter(|&j| mode.entries()[j] != after.entries()[j] || surfaces.len() == 1)
             .collect();
         self.record(mode, after.clone(), changed);
+        if let Some(limit) = self.accumulation()? {
+            return self.jump_to(limit, after);
+        }
         self.begin(after, &left)
     }
 

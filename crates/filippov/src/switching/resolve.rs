@@ -47,6 +47,9 @@ pub fn resolve(
     check_lengths(fields.m(), incoming)?;
     let mut resolution = decide(fields, incoming, kappa)?;
     if resolution.margin <= DOUBTFUL {
+        if let Some(only) = only_admissible(fields, incoming) {
+            return Ok(only);
+        }
         for perturbed in perturbations(fields) {
             match decide(&perturbed, incoming, kappa) {
                 Ok(other) if other.chosen == resolution.chosen => {}
@@ -60,6 +63,22 @@ pub fn resolve(
         }
     }
     Ok(resolution)
+}
+
+/// The only mode that leaves the intersection, if there is one and no normal component is doubtful. A tree
+/// can turn on a quantity that vanishes for a good reason: surfaces that do not influence one another.
+fn only_admissible(fields: &NormalFields, incoming: &Incoming) -> Option<Resolution> {
+    if matches!(incoming, Incoming::Exit { .. }) || smallest_component(fields) <= DOUBTFUL {
+        return None;
+    }
+    let found = admissible(fields);
+    let [only] = found.as_slice() else {
+        return None;
+    };
+    let mut resolution = Resolution::sure("admissible/only", only.continuation.clone());
+    resolution.multipliers = only.multipliers.clone();
+    resolution.margin = smallest_component(fields);
+    Some(resolution)
 }
 
 fn check_lengths(m: usize, incoming: &Incoming) -> Result<(), Undecided> {
