@@ -5,6 +5,7 @@ mod detect;
 mod integrator;
 mod irregular;
 mod motion;
+mod pace;
 mod solve;
 mod start;
 mod stats;
