@@ -108,11 +108,11 @@ impl Program {
             );
             return;
         }
-        let arguments = Arguments { t, x, s, p, v };
+        // Built in each arm: the native code takes registers, and nothing is written to memory for it.
         match &self.code {
             #[cfg(feature = "native")]
-            Code::Native(code) => code.run(arguments, out),
-            Code::Interpreted(tape) => tape.run(arguments, out),
+            Code::Native(code) => code.run(Arguments { t, x, s, p, v }, out),
+            Code::Interpreted(tape) => tape.run(Arguments { t, x, s, p, v }, out),
         }
     }
 }

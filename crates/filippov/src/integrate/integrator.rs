@@ -16,7 +16,7 @@ use rustc_hash::FxHashMap;
 
 use super::detect::Detector;
 use super::motion::{ModeField, Motion};
-use super::transition::Pace;
+use super::pace::Pace;
 use super::user_events::UserEvents;
 use super::{Stats, Stop, Warning};
 use crate::error::{Error, FieldError};

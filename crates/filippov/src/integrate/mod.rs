@@ -8,6 +8,7 @@ mod integrator;
 mod irregular;
 mod meeting;
 mod motion;
+mod pace;
 mod solve;
 mod spiral;
 mod start;
