@@ -242,3 +242,9 @@ pub const NEAREST_ACCUMULATION: f64 = 1e-20;
 /// All fields count as tangent to a surface if their normal components are below this fraction of their size: the
 /// error of a point that accumulating switches lead to, or that was projected.
 pub const TANGENT_TO_ALL: f64 = 1e-7;
+
+/// Surfaces slid on whose multipliers are bounded over a step: for more, m 2^m bounds cost more than samples.
+pub const MOST_ENCLOSED: usize = 3;
+
+/// The multipliers are sought within this distance of their values at the ends of the step.
+pub const ROOT_BOX: f64 = 0.2;

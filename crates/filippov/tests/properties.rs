@@ -139,10 +139,7 @@ fn signs_agree_with_the_mode_and_sliding_stays_on_the_surface() {
                     0 => {
                         slid.set(slid.get() + 1);
                         prop_assert!(value.abs() < 1e-13 * (1.0 + y[0].abs() + y[1].powi(2)));
-                        let (_, lam) = solution
-                            .multiplier(&system, t, Side::Right)
-                            .unwrap()
-                            .unwrap();
+                        let (_, lam) = solution.multipliers(&system, t, Side::Right).unwrap()[0];
                         prop_assert!(lam.abs() <= 1.0, "lambda = {}", lam);
                     }
                     sign => {
@@ -174,8 +171,9 @@ fn the_slope_is_the_field_of_the_mode() {
             let (y, mode) = at(&system, &solution, t, Side::Right);
             let (after, _) = at(&system, &solution, t + d, Side::Right);
             let (before, _) = at(&system, &solution, t - d, Side::Right);
-            let lam = match solution.multiplier(&system, t, Side::Right).unwrap() {
-                Some((_, lam)) => lam,
+            let multipliers = solution.multipliers(&system, t, Side::Right).unwrap();
+            let lam = match multipliers.first() {
+                Some((_, lam)) => *lam,
                 None => f64::from(mode.entries()[0]),
             };
             let (mut plus, mut minus) = ([0.0; 2], [0.0; 2]);

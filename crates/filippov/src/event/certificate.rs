@@ -24,7 +24,7 @@ pub enum Verdict {
     Falling,
     /// Nothing, but shorter pieces may be decided.
     Open,
-    /// Nothing: the function is not known to be finite. Shorter pieces may be decided.
+    /// Nothing: the function, or its slope, is not known to be finite. Shorter pieces may be decided.
     Unbounded,
     /// Nothing: there are no bounds, or the function is too near to zero for them all along.
     Unavailable,
@@ -51,6 +51,9 @@ impl Bound {
         }
         if value.lo > noise {
             return Verdict::Clear;
+        }
+        if !slope.is_bounded() {
+            return Verdict::Unbounded;
         }
         if slope.lo > 0.0 {
             return Verdict::Rising;

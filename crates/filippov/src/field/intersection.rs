@@ -23,6 +23,20 @@ pub enum IntersectionExit {
     Stability,
 }
 
+impl IntersectionExit {
+    /// Exit function `index` of sliding on m surfaces.
+    pub fn of(index: usize, m: usize) -> Self {
+        match index {
+            _ if index < 2 * m => IntersectionExit::Side {
+                position: index / 2,
+                end: if index.is_multiple_of(2) { -1 } else { 1 },
+            },
+            _ if index == 2 * m => IntersectionExit::Fold,
+            _ => IntersectionExit::Stability,
+        }
+    }
+}
+
 /// Filippov's field on an intersection of m >= 2 surfaces: the multilinear combination ("canopy") of the
 /// 2^m fields with the multipliers lambda in [-1, 1]^m that make it tangent to all surfaces,
 ///
@@ -80,15 +94,7 @@ impl<'a> IntersectionField<'a> {
 
     /// What exit function `index` is.
     pub fn exit(&self, index: usize) -> IntersectionExit {
-        let m = self.set().len();
-        match index {
-            _ if index < 2 * m => IntersectionExit::Side {
-                position: index / 2,
-                end: if index % 2 == 0 { -1 } else { 1 },
-            },
-            _ if index == 2 * m => IntersectionExit::Fold,
-            _ => IntersectionExit::Stability,
-        }
+        IntersectionExit::of(index, self.set().len())
     }
 
     /// The multipliers at the last evaluation, in the order of the set.
@@ -167,7 +173,11 @@ impl<'a> IntersectionField<'a> {
         self.lambda = newton(fields, &self.lambda)?;
         let mut jacobian = fields.jacobian(&self.lambda);
         normalise(&mut jacobian, fields);
-        let sign = if fields.m() % 2 == 0 { 1.0 } else { -1.0 };
+        let sign = if fields.m().is_multiple_of(2) {
+            1.0
+        } else {
+            -1.0
+        };
         self.fill_exits(
             sign * jacobian.determinant(),
             jacobian.last_hurwitz_determinant(),

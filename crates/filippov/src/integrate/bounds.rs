@@ -1,8 +1,8 @@
 //! Bounds of monitored functions along pieces of the step.
 
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 
-use filippov_expr::Enclosure;
+use filippov_expr::{Enclosure, Interval};
 
 use super::detect::Detector;
 use super::integrator::Integrator;
@@ -11,9 +11,11 @@ use crate::event::certificate::{is_clear, Bound};
 use crate::event::isolate::PROBES;
 use crate::event::tube::Tube;
 use crate::event::{EventFunction, Monitored};
+use crate::field::IntersectionExit;
 use crate::stepper::Interpolant;
+use crate::switching::{enclose_root, EnclosedRoot};
 use crate::system::PiecewiseSystem;
-use crate::tolerances::{MARGIN, PROOF_DEPTH};
+use crate::tolerances::{MARGIN, MOST_ENCLOSED, PROOF_DEPTH, ROOT_BOX};
 
 /// The continuous extension of a step, as far as it bounds what is monitored.
 pub(super) struct BoundedCurve<'a> {
@@ -23,12 +25,19 @@ pub(super) struct BoundedCurve<'a> {
     pub sliding: &'a [usize],
     /// How far the projection onto a curved surface moves the extension.
     pub margin: &'a [f64],
+    /// The exit functions of the motion at the stages of the step.
+    pub stages: &'a [[f64; 7]],
     /// The normal components on the last piece of this extension: they are asked for one after the other.
     pub last: &'a Cell<Option<Piece>>,
+    /// The multipliers on the last piece, while sliding on an intersection.
+    pub last_root: &'a RefCell<Option<RootPiece>>,
 }
 
 /// A piece with the bounds of both normal components.
 pub(super) type Piece = (f64, f64, [Enclosure; 2]);
+
+/// A piece with the bounds of the multipliers, if they are proved.
+pub(super) type RootPiece = (f64, f64, Option<EnclosedRoot>);
 
 impl BoundedCurve<'_> {
     /// The bounds of a function from theta = `a` to `b`, if the system can give any.
@@ -42,9 +51,81 @@ impl BoundedCurve<'_> {
             }
             (EventFunction::ExitMinus, &[j]) => (self.normal_components(j, a, b)?[0], 1.0),
             (EventFunction::ExitPlus, &[j]) => (self.normal_components(j, a, b)?[1], -1.0),
+            (EventFunction::Exit(index), _) => return self.exit(index, a, b),
             _ => return None,
         };
         Some(Bound::new(enclosure, orientation, self.interpolant.dt))
+    }
+
+    /// An exit function of sliding on an intersection, from bounds of the multipliers.
+    fn exit(&self, index: usize, a: f64, b: f64) -> Option<Bound> {
+        let m = self.sliding.len();
+        if m > MOST_ENCLOSED {
+            return None;
+        }
+        let mut last = self.last_root.borrow_mut();
+        let known = last.take().filter(|last| (last.0, last.1) == (a, b));
+        let piece = match known {
+            Some(piece) => piece,
+            None => (
+                a,
+                b,
+                enclose_root(&self.all_components(a, b)?, &self.guess()),
+            ),
+        };
+        let (_, _, root) = last.insert(piece);
+        let value = root
+            .as_ref()
+            .map(|root| match IntersectionExit::of(index, m) {
+                IntersectionExit::Side { position, end } => {
+                    Interval::point(1.0) + root.multipliers[position].scaled(-f64::from(end))
+                }
+                // The root is the only one in its box: it meets no other.
+                IntersectionExit::Fold => Interval::point(f64::MAX),
+                // Each entry is in units of its surface: only the signs count here.
+                IntersectionExit::Stability if m == 2 => {
+                    let [a, b] = [root.diagonal[0].hi, root.diagonal[1].hi];
+                    Interval::hull(-a.min(b), f64::MAX)
+                }
+                IntersectionExit::Stability => Interval::ALL,
+            });
+        Some(Bound {
+            value: value.unwrap_or(Interval::ALL),
+            slope: Interval::ALL,
+        })
+    }
+
+    /// Bounds of the normal components of all fields around the intersection.
+    fn all_components(&self, a: f64, b: f64) -> Option<Vec<Interval>> {
+        let tube = Tube::new(self.interpolant, (a, b), self.margin);
+        let m = self.sliding.len();
+        let mut components = vec![Interval::ALL; m << m];
+        let mut signs = self.signs.to_vec();
+        for pattern in 0..1_usize << m {
+            for (i, &j) in self.sliding.iter().enumerate() {
+                signs[j] = if pattern >> i & 1 == 1 { 1.0 } else { -1.0 };
+            }
+            let below = (0..m).filter(|i| pattern >> i & 1 == 0);
+            for i in below {
+                let sides =
+                    self.system
+                        .enclose_normal_components(self.sliding[i], &tube, &signs)?;
+                components[pattern * m + i] = sides[0].value;
+                components[(pattern | 1 << i) * m + i] = sides[1].value;
+            }
+        }
+        Some(components)
+    }
+
+    /// A box in which the multipliers are sought: between their values at the ends of the step, and some more.
+    fn guess(&self) -> Vec<Interval> {
+        let exits = self.stages.chunks_exact(2).take(self.sliding.len());
+        let ends = exits.map(|pair| Interval::hull(pair[0][0] - 1.0, pair[0][6] - 1.0));
+        ends.map(|l| Interval {
+            lo: l.lo - ROOT_BOX,
+            hi: l.hi + ROOT_BOX,
+        })
+        .collect()
     }
 
     fn normal_components(&self, j: usize, a: f64, b: f64) -> Option<[Enclosure; 2]> {
@@ -70,7 +151,9 @@ impl Integrator<'_> {
             signs: &self.motion.signs,
             sliding: self.motion.sliding(),
             margin: &self.detector.margin,
+            stages: &self.detector.stages,
             last: &self.detector.enclosed_exits,
+            last_root: &self.detector.enclosed_root,
         };
         // Next to a zero that is divided out the function itself may only rise.
         let at_start = if m.deflation.is_some() {

@@ -1,10 +1,10 @@
 //! The event stage of a step: the earliest zero of what the mode monitors.
 
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 
 use smallvec::{smallvec, SmallVec};
 
-use super::bounds::{BoundedCurve, Piece};
+use super::bounds::{BoundedCurve, Piece, RootPiece};
 use super::curve::{grazes, Curve};
 use super::integrator::Integrator;
 use super::motion::{Exits, ModeField, Motion};
@@ -39,6 +39,8 @@ pub(super) struct Detector {
     pub margin: Vec<f64>,
     /// Bounds of the normal components over the last piece of the extension of this step.
     pub enclosed_exits: Cell<Option<Piece>>,
+    /// Bounds of the multipliers there, while sliding on an intersection.
+    pub enclosed_root: RefCell<Option<RootPiece>>,
     /// Value and rate at the end of the step, per monitored function.
     right: Vec<(f64, f64)>,
     /// Which monitored functions the filter could not clear.
@@ -71,6 +73,7 @@ impl Detector {
             x: vec![0.0; n],
             margin: Vec::new(),
             enclosed_exits: Cell::new(None),
+            enclosed_root: RefCell::new(None),
             right: Vec::new(),
             suspects: Vec::new(),
         }
@@ -167,6 +170,7 @@ impl Integrator<'_> {
         self.detector.uncertain = false;
         self.detector.exits.clear();
         self.detector.enclosed_exits.set(None);
+        self.detector.enclosed_root.take();
         self.detector.margin.clear();
         self.detector.next_dt = None;
         if self.motion.monitored.is_empty() {
@@ -272,6 +276,7 @@ impl Integrator<'_> {
     fn extend(&mut self) -> Result<(), FieldError> {
         self.stats.n_extensions += 1;
         self.detector.enclosed_exits.set(None);
+        self.detector.enclosed_root.take();
         self.stepper
             .extend_order5(&mut self.motion.field, &self.x)?;
         Ok(())
@@ -305,7 +310,9 @@ impl Integrator<'_> {
             signs: &self.motion.signs,
             sliding: &self.motion.sliding,
             margin: &self.detector.margin,
+            stages: &self.detector.stages,
             last: &self.detector.enclosed_exits,
+            last_root: &self.detector.enclosed_root,
         };
         let mut curve = Curve {
             system: self.system,

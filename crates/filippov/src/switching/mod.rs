@@ -7,6 +7,7 @@
 mod accumulation;
 mod codim1;
 pub mod codim2;
+mod enclosed_root;
 mod hidden;
 mod incoming;
 mod intersection;
@@ -22,6 +23,7 @@ mod stability;
 
 pub use accumulation::{accumulate, Accumulation, Return};
 pub use codim1::{decide, Arrival, Decision};
+pub use enclosed_root::{enclose_root, EnclosedRoot};
 pub use hidden::{
     admissible, limit as limit_of_hidden_dynamics, Admissible, Outcome as HiddenOutcome,
 };

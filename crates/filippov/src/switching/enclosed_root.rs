@@ -1,0 +1,164 @@
+//! Bounds of the multipliers while the normal components move within intervals.
+
+use filippov_expr::Interval;
+
+use super::small_matrix::Matrix;
+
+/// What is known of the multipliers of sliding on m surfaces over a piece of motion.
+#[derive(Clone, Debug)]
+pub struct EnclosedRoot {
+    /// The multipliers.
+    pub multipliers: Vec<Interval>,
+    /// The diagonal of G in a box around them; G is invertible there.
+    pub diagonal: Vec<Interval>,
+}
+
+/// Encloses the root of the canopy equations for all normal components within `components`
+/// (`[pattern * m + j]`, as in [`super::NormalFields`]): proved to exist, and to be the only one, in the box of
+/// `guess`. `None` if that is not proved.
+///
+/// Krawczyk's operator: with lambda_0 the middle of the box L and C an approximate inverse of G(lambda_0),
+///
+///   K = lambda_0 - C g(lambda_0) + (I - C G(L)) (L - lambda_0)
+///
+/// lies in L only if every g within the bounds has exactly one root in L, which is in K.
+///
+/// Reference: R. Krawczyk, Newton-Algorithmen zur Bestimmung von Nullstellen mit Fehlerschranken, *Computing* 4
+/// (1969); Moore, Kearfott, Cloud (2009), chapter 8.
+pub fn enclose_root(components: &[Interval], guess: &[Interval]) -> Option<EnclosedRoot> {
+    let m = guess.len();
+    let middle: Vec<Interval> = guess
+        .iter()
+        .map(|l| Interval::point(0.5 * (l.lo + l.hi)))
+        .collect();
+    let row =
+        |j: usize| -> Vec<Interval> { components.iter().skip(j).step_by(m).copied().collect() };
+    let jacobian: Vec<Vec<Interval>> = (0..m)
+        .map(|j| {
+            (0..m)
+                .map(|p| interpolate(differences(&row(j), p), guess, Some(p)))
+                .collect()
+        })
+        .collect();
+    let mut approximate = Matrix::zeros(m);
+    for j in 0..m {
+        for p in 0..m {
+            approximate[(j, p)] = 0.5 * (jacobian[j][p].lo + jacobian[j][p].hi);
+        }
+    }
+    let inverse = approximate.inverse()?;
+    let g: Vec<Interval> = (0..m).map(|j| interpolate(row(j), &middle, None)).collect();
+    let mut multipliers = Vec::with_capacity(m);
+    for i in 0..m {
+        let mut k = middle[i];
+        for j in 0..m {
+            k = k - g[j].scaled(inverse[(i, j)]);
+        }
+        for p in 0..m {
+            let mut defect = Interval::point(if i == p { 1.0 } else { 0.0 });
+            for j in 0..m {
+                defect = defect - jacobian[j][p].scaled(inverse[(i, j)]);
+            }
+            k = k + defect * (guess[p] - middle[p]);
+        }
+        if !(k.lo > guess[i].lo && k.hi < guess[i].hi) {
+            return None;
+        }
+        multipliers.push(k);
+    }
+    let diagonal = (0..m).map(|i| jacobian[i][i]).collect();
+    Some(EnclosedRoot {
+        multipliers,
+        diagonal,
+    })
+}
+
+/// Half the differences of the values in direction `axis`, for all patterns of the other bits (those with
+/// bit `axis` hold the same number).
+fn differences(values: &[Interval], axis: usize) -> Vec<Interval> {
+    let bit = 1 << axis;
+    let pairs = (0..values.len()).map(|pattern| (values[pattern | bit], values[pattern & !bit]));
+    pairs
+        .map(|(plus, minus)| (plus - minus).scaled(0.5))
+        .collect()
+}
+
+/// The multilinear interpolant at a box, one axis after the other; `skip` is an axis that the values do not
+/// depend on.
+fn interpolate(mut values: Vec<Interval>, at: &[Interval], skip: Option<usize>) -> Interval {
+    for (axis, l) in at.iter().enumerate().rev() {
+        let half = 1 << axis;
+        for pattern in 0..half {
+            let (minus, plus) = (values[pattern], values[pattern + half]);
+            values[pattern] = if skip == Some(axis) {
+                minus
+            } else {
+                let share = (*l + Interval::point(1.0)).scaled(0.5);
+                minus + share * (plus - minus)
+            };
+        }
+    }
+    values[0]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn around(value: f64, radius: f64) -> Interval {
+        Interval::around(value, radius)
+    }
+
+    /// g_i = c_i - lambda_i, with c_i within 0.1 of (0.5, 0.2): the root is c.
+    #[test]
+    fn root_of_two_independent_equations() {
+        let mut components = Vec::new();
+        for pattern in 0..4 {
+            for (i, c) in [0.5, 0.2].into_iter().enumerate() {
+                let side = if pattern >> i & 1 == 1 { 1.0 } else { -1.0 };
+                components.push(around(c - side, 0.1));
+            }
+        }
+        let guess = [around(0.5, 0.4), around(0.2, 0.4)];
+        let found = enclose_root(&components, &guess).map(|root| root.multipliers);
+        let Some(found) = found else {
+            panic!("not proved")
+        };
+        assert!(found[0].lo <= 0.4 && found[0].hi >= 0.6 && found[0].lo > 0.2 && found[0].hi < 0.8);
+        assert!(found[1].lo <= 0.1 && found[1].hi >= 0.3);
+        // With the root outside of the box nothing is claimed.
+        let elsewhere = [around(-0.5, 0.4), around(0.2, 0.4)];
+        assert!(enclose_root(&components, &elsewhere).is_none());
+    }
+
+    /// Equations with a product, moving within bounds: the roots of samples lie within the enclosure.
+    #[test]
+    fn roots_of_samples_are_enclosed() {
+        let value = |pattern: usize, i: usize, shift: f64| {
+            let [x, y] = [0, 1].map(|bit| if pattern >> bit & 1 == 1 { 1.0 } else { -1.0 });
+            [0.3 - x + 0.4 * x * y + shift, -0.2 - y + 0.3 * x - shift][i]
+        };
+        let mut components = Vec::new();
+        for pattern in 0..4 {
+            components.extend([0, 1].map(|i| around(value(pattern, i, 0.0), 0.02)));
+        }
+        let root = |shift: f64| {
+            let values = (0..4).flat_map(|pattern| [0, 1].map(|i| value(pattern, i, shift)));
+            let fields = crate::switching::NormalFields::new(2, values.collect());
+            let found = fields
+                .ok()
+                .and_then(|f| crate::switching::newton(&f, &[0.2, -0.1]));
+            found.unwrap_or_default()
+        };
+        let centre = root(0.0);
+        let guess: Vec<Interval> = centre.iter().map(|&l| around(l, 0.2)).collect();
+        let Some(found) = enclose_root(&components, &guess) else {
+            panic!("not proved")
+        };
+        for k in -10..=10 {
+            for (bound, l) in found.multipliers.iter().zip(root(0.002 * f64::from(k))) {
+                assert!(bound.lo <= l && l <= bound.hi, "{l} not in {bound:?}");
+            }
+        }
+    }
+}
