@@ -107,7 +107,17 @@ pub const BESIDE_THE_ROOT: f64 = 1e-6;
 
 /// Drift of the normal components after an exit, as a fraction of their size: small enough to leave
 /// all signs as they are, large enough to pass the fold in some thousands of units of time.
+///
+/// Also the allowance for the eigenvalue that vanishes there.
 pub const AFTER_THE_EXIT: f64 = 1e-5;
+
+/// Offsets along the border of a corner, in units of the transition, from which the hidden dynamics is tried. They
+/// grow until the strips are crossed without a change; an outcome of a narrower band of offsets may be missed.
+pub const CORNER_OFFSETS: [f64; 9] = [0.05, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0, 30.0, 1000.0];
+
+/// Share of the largest ellipse around a stable root in which a quadratic form surely decreases: so that
+/// rounding does not matter.
+pub const BASIN_SHARE: f64 = 0.9;
 
 /// Successive ratios of accumulating returns agree within this fraction.
 pub const ACCUMULATION_AGREEMENT: f64 = 0.1;
@@ -129,8 +139,7 @@ pub const SHORTEST_PIECE: f64 = 1e-12;
 /// method ends them after a few.
 pub const MOST_HALVINGS: usize = 200;
 
-/// The hidden dynamics has come to a stable rest point within this distance: far less than the distance
-/// of the rest point to a border of its basin in any case that is not degenerate.
+/// Returns this near to the root, and oscillations this small, are at the root.
 pub const AT_THE_ROOT: f64 = 1e-7;
 
 /// Returns that differ by less than this fraction lie on a cycle.

@@ -2,8 +2,8 @@
 
 use super::normal_fields::NormalFields;
 use super::resolution::Undecided;
-use super::roots::{newton, stable_roots};
-use crate::tolerances::{AFTER_THE_EXIT, BESIDE_THE_ROOT};
+use super::roots::{multiplier_rates, newton, stable_roots};
+use crate::tolerances::{AFTER_THE_EXIT, BESIDE_THE_ROOT, CORNER_OFFSETS};
 
 /// What the motion did before.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,9 +51,6 @@ pub(super) struct Starts {
     pub fields: NormalFields,
     pub states: Vec<Vec<f64>>,
 }
-
-/// Offsets along the border of a corner, in units of the transition. Beyond the last one nothing changes.
-const OFFSETS: [f64; 9] = [0.05, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0, 30.0, 1000.0];
 
 impl Incoming {
     /// The states from which the hidden dynamics starts.
@@ -144,7 +141,7 @@ fn face_states(
 fn offsets(state: &[f64], reached: &[usize]) -> Vec<Vec<f64>> {
     let mut states = vec![state.to_vec()];
     for &i in reached {
-        for offset in OFFSETS {
+        for offset in CORNER_OFFSETS {
             let mut one = state.to_vec();
             let mut others = state.to_vec();
             for &j in reached {
@@ -208,7 +205,7 @@ fn exit_state(
 
 /// The root, displaced in the direction in which it moves; along the diagonal if that is not known.
 fn beside(fields: &NormalFields, lambda: &[f64], drift: Option<&[f64]>) -> Vec<f64> {
-    let rates = drift.and_then(|drift| super::roots::multiplier_rates(fields, lambda, drift));
+    let rates = drift.and_then(|drift| multiplier_rates(fields, lambda, drift));
     let rates = rates.filter(|rates| rates.iter().any(|&r| r != 0.0));
     let rates = rates.unwrap_or_else(|| vec![1.0; lambda.len()]);
     let length = rates.iter().map(|r| r * r).sum::<f64>().sqrt();

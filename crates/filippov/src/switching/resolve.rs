@@ -5,17 +5,17 @@ use super::hidden::{admissible, limit, Outcome};
 use super::incoming::{ExitKind, Incoming};
 use super::normal_fields::NormalFields;
 use super::resolution::{Continuation, Resolution, Undecided};
-use super::roots::stable_roots;
+use super::roots::{newton, stable_roots};
 use super::single;
 use super::stability::{is_negative_p_matrix, is_stable_for};
-use crate::tolerances::DOUBTFUL;
+use crate::tolerances::{AFTER_THE_EXIT, DOUBTFUL};
 
 /// Decides what follows at an intersection of m surfaces, scaled by `kappa`.
 ///
 /// One surface has its two figures, two surfaces their decision trees; where a tree says that the outcome depends on
 /// the scaling, and for three and more surfaces, the hidden dynamics at `kappa` decides. If a quantity whose sign
-/// decided is doubtful (`tolerances.rs`), the decision is repeated with perturbed fields, and
-/// [`Resolution::degenerate`] says whether they agree.
+/// decided is doubtful (`tolerances.rs`), the decision is repeated with perturbed fields: if they agree, theirs
+/// counts, and if not, [`Resolution::degenerate`] says so.
 ///
 /// # Example
 /// ```
@@ -45,21 +45,38 @@ pub fn resolve(
         });
     }
     check_lengths(fields.m(), incoming)?;
-    let mut resolution = decide(fields, incoming, kappa)?;
+    let resolution = decide(fields, incoming, kappa)?;
     if resolution.margin <= DOUBTFUL {
-        for perturbed in perturbations(fields) {
-            match decide(&perturbed, incoming, kappa) {
-                Ok(other) if other.chosen == resolution.chosen => {}
-                Ok(other) => {
-                    resolution.degenerate = true;
-                    resolution.unique = false;
-                    resolution.add_candidates(&other.candidates);
-                }
-                Err(_) => resolution.degenerate = true,
-            }
-        }
+        Ok(in_doubt(resolution, fields, incoming, kappa))
+    } else {
+        Ok(resolution)
     }
-    Ok(resolution)
+}
+
+/// The decision for fields next to these. If all of them agree, theirs counts: a tie, as between surfaces that do
+/// not know of each other, is then no obstacle. Otherwise the decision is degenerate.
+fn in_doubt(
+    mut resolution: Resolution,
+    fields: &NormalFields,
+    incoming: &Incoming,
+    kappa: &[f64],
+) -> Resolution {
+    let perturbed = perturbations(fields).map(|other| decide(&other, incoming, kappa));
+    let others: Vec<Result<Resolution, Undecided>> = perturbed.collect();
+    let agreed: Vec<&Resolution> = others.iter().flatten().collect();
+    let agree = agreed.len() == others.len() && agreed.iter().all(|o| o.chosen == agreed[0].chosen);
+    let margin = resolution.margin;
+    if agree {
+        resolution = agreed[0].clone();
+        resolution.margin = margin;
+    }
+    for other in agreed {
+        resolution.add_candidates(&other.candidates);
+    }
+    resolution.degenerate |= !agree;
+    resolution.unique &= resolution.candidates.len() == 1 && !resolution.degenerate;
+    complete(&mut resolution, fields, kappa);
+    resolution
 }
 
 fn check_lengths(m: usize, incoming: &Incoming) -> Result<(), Undecided> {
@@ -93,7 +110,11 @@ fn decide(
         (1, _) => at_one_surface(fields, incoming),
         (2, Incoming::Face { .. } | Incoming::Exit { .. }) => by_tree(fields, incoming, kappa),
         (2, _) => by_hidden_dynamics(fields, incoming, &[kappa.to_vec()]),
-        _ => by_hidden_dynamics(fields, incoming, &scalings(kappa)),
+        _ => by_hidden_dynamics(
+            fields,
+            incoming,
+            &comparable_scalings(fields, incoming, kappa),
+        ),
     }?;
     complete(&mut resolution, fields, kappa);
     Ok(resolution)
@@ -217,7 +238,10 @@ fn complete(resolution: &mut Resolution, fields: &NormalFields, kappa: &[f64]) {
     };
     let root = match face.m() {
         0 => None,
-        _ if !resolution.multipliers.is_empty() => Some(resolution.multipliers.clone()),
+        _ if resolution.multipliers.len() == face.m() => {
+            let known = &resolution.multipliers;
+            newton(&face, known).or_else(|| Some(known.clone()))
+        }
         2 => both(),
         _ => stable_roots(&face).into_iter().next(),
     };
@@ -269,6 +293,26 @@ fn has_one_mode_only(fields: &NormalFields) -> bool {
     fields.is_affine() && is_negative_p_matrix(&fields.jacobian(&vec![0.0; fields.m()]))
 }
 
+/// The scalings to compare. After an exit only those count for which the root was stable before.
+fn comparable_scalings(fields: &NormalFields, incoming: &Incoming, kappa: &[f64]) -> Vec<Vec<f64>> {
+    let mut scalings = scalings(kappa);
+    if let Incoming::Exit { kind, lambda, .. } = incoming {
+        if *kind != ExitKind::Stability {
+            let mut jacobian = fields.jacobian(lambda);
+            for i in 0..lambda.len() {
+                // At a fold one eigenvalue vanishes.
+                jacobian[(i, i)] -= AFTER_THE_EXIT * fields.size();
+            }
+            let others = scalings.split_off(1);
+            let stable = others
+                .into_iter()
+                .filter(|kappa| is_stable_for(&jacobian, kappa));
+            scalings.extend(stable);
+        }
+    }
+    scalings
+}
+
 /// The scaling itself, each surface ten times larger and smaller, and all in rising and falling order.
 fn scalings(kappa: &[f64]) -> Vec<Vec<f64>> {
     let m = kappa.len();
@@ -306,18 +350,18 @@ fn smallest_component(fields: &NormalFields) -> f64 {
     })
 }
 
-/// The fields moved by the doubtful amount in different directions: signs by the parity of some bits of the index.
+/// The fields moved by up to twice the doubtful amount in four directions and their opposites. The directions are
+/// fractional parts of multiples of square roots: without any relation that could keep a tie.
 fn perturbations(fields: &NormalFields) -> impl Iterator<Item = NormalFields> + '_ {
-    let directions = (1..=4_usize).flat_map(|mask| [(mask, 1.0), (mask, -1.0)]);
-    directions.map(|(mask, sign)| {
-        let m = fields.m();
+    let roots = [2.0_f64, 3.0, 5.0, 7.0].map(f64::sqrt);
+    let directions = roots
+        .into_iter()
+        .flat_map(|root| [(root, 1.0), (root, -1.0)]);
+    directions.map(|(root, sign)| {
         let moved = fields.values().iter().enumerate().map(|(index, value)| {
-            let parity = if (index & mask).count_ones() % 2 == 0 {
-                sign
-            } else {
-                -sign
-            };
-            value + 2.0 * DOUBTFUL * parity * fields.row_size(index % m)
+            let direction = 2.0 * (root * (index + 1) as f64).fract() - 1.0;
+            let size = fields.row_size(index % fields.m());
+            value + 2.0 * DOUBTFUL * sign * direction * size
         });
         fields.with_values(moved.collect())
     })

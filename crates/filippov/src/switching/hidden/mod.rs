@@ -10,6 +10,7 @@
 //! *cell*, a box of the grid u_i = -1, u_i = 1, it is multilinear; it is followed from cell to cell.
 
 mod admissible;
+mod basin;
 mod cell;
 mod certificate;
 mod first_zero;
