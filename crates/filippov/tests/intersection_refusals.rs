@@ -95,8 +95,8 @@ fn zeros_that_do_not_decide_are_no_doubt() {
     assert!(!found.degenerate && found.unique, "{found:?}");
 }
 
-/// Surfaces that do not know of each other: g_j depends on lambda_j only, so that the entry is a tie between left
-/// and right turning. Each surface is decided by itself.
+/// Surfaces that do not know of each other: g_j depends on lambda_j only, so that the entry is a
+/// tie between left and right turning. Each surface is decided by itself.
 #[test]
 fn surfaces_without_coupling_are_no_obstacle() {
     let mut random = Random::new(16);
@@ -149,7 +149,8 @@ fn the_scaling_decides_what_is_ambiguous() {
     }
 }
 
-/// Without a past: one admissible mode is taken, of several the one that the hidden dynamics finds from 0.
+/// Without a past: one admissible mode is taken, of several the one that the hidden dynamics finds
+/// from 0.
 #[test]
 fn starts_on_an_intersection() {
     let mut random = Random::new(13);
@@ -194,7 +195,8 @@ fn exits_of_three_surfaces_need_the_drift() {
     );
 }
 
-/// Fields affine in the signs with -G a P-matrix have one mode only: no scaling is tried, and none disagrees.
+/// Fields affine in the signs with -G a P-matrix have one mode only: no scaling is tried, and none
+/// disagrees.
 #[test]
 fn friction_of_three_surfaces_is_unique() {
     let mut random = Random::new(14);
@@ -250,9 +252,9 @@ fn entries_of_three_surfaces_are_consistent() {
         assert!(found.candidates.contains(&Continuation::Mode(mode.clone())));
         assert_eq!(found.multipliers.len(), mode.codimension());
     }
-    println!(
-        "{decided} decided, {refused} refused, {ambiguous} ambiguous, {oscillating} oscillating"
-    );
     assert!(refused <= 3, "{refused} refused");
-    assert!(ambiguous > 5, "{ambiguous} ambiguous");
+    assert!(
+        ambiguous > 5 && oscillating < 15,
+        "{ambiguous} ambiguous, {oscillating} oscillating"
+    );
 }

@@ -13,11 +13,13 @@ pub enum Incoming {
         /// The region.
         region: Vec<i8>,
     },
-    /// It slid on the surfaces with a zero entry, and reached the others from the sides of their entries.
+    /// It slid on the surfaces with a zero entry, and reached the others from the sides of their
+    /// entries.
     Face {
         /// The mode.
         mode: Vec<i8>,
-        /// lambda of the surfaces slid on, in their order; may be left empty if there is only one stable root.
+        /// lambda of the surfaces slid on, in their order; may be left empty if there is only one
+        /// stable root.
         multipliers: Vec<f64>,
     },
     /// It slid on all surfaces, and cannot go on so.
@@ -45,8 +47,8 @@ pub enum ExitKind {
     Stability,
 }
 
-/// The states from which the hidden dynamics starts, and the fields in which it moves. The first state decides;
-/// the others are those that the discontinuous problem cannot tell from it.
+/// The states from which the hidden dynamics starts, and the fields in which it moves. The first
+/// state decides; the others are those that the discontinuous problem cannot tell from it.
 pub(super) struct Starts {
     pub fields: NormalFields,
     pub states: Vec<Vec<f64>>,
@@ -137,7 +139,8 @@ fn face_states(
     Ok(states)
 }
 
-/// A state on the border of a corner, moved along it in one of the components that are reached, or in all but one.
+/// A state on the border of a corner, moved along it in one of the components that are reached, or
+/// in all but one.
 fn offsets(state: &[f64], reached: &[usize]) -> Vec<Vec<f64>> {
     let mut states = vec![state.to_vec()];
     for &i in reached {
@@ -174,7 +177,8 @@ fn polished(
     root.ok_or(not_sliding)
 }
 
-/// The root itself, in fields that have drifted for a short time; where stability is lost, a little beside it.
+/// The root itself, in fields that have drifted for a short time; where stability is lost, a little
+/// beside it.
 fn exit_state(
     fields: &NormalFields,
     kind: ExitKind,

@@ -12,21 +12,24 @@ use crate::tolerances::{AFTER_THE_EXIT, DOUBTFUL};
 
 /// Decides what follows at an intersection of m surfaces, scaled by `kappa`.
 ///
-/// One surface has its two figures, two surfaces their decision trees; where a tree says that the outcome depends on
-/// the scaling, and for three and more surfaces, the hidden dynamics at `kappa` decides. If a quantity whose sign
-/// decided is doubtful (`tolerances.rs`), the decision is repeated with perturbed fields: if they agree, theirs
-/// counts, and if not, [`Resolution::degenerate`] says so.
+/// One surface has its two figures, two surfaces their decision trees; where a tree says that the
+/// outcome depends on the scaling, and for three and more surfaces, the hidden dynamics at `kappa`
+/// decides. If a quantity whose sign decided is doubtful (`tolerances.rs`), the decision is
+/// repeated with perturbed fields: if they agree, theirs counts, and if not,
+/// [`Resolution::degenerate`] says so.
 ///
 /// # Example
 /// ```
 /// use filippov::switching::{resolve, Incoming, NormalFields};
+/// use filippov::Mode;
 ///
-/// // Sliding on the first surface below the second one; both attract.
-/// let fields = NormalFields::new(2, vec![1.5, 1.0, -0.5, 1.0, 1.5, -1.0, -0.5, -1.0])?;
-/// let incoming = Incoming::Face { mode: vec![0, -1], multipliers: vec![0.5] };
+/// // Sliding on the first surface reaches the second one; both attract.
+/// let fields = NormalFields::new(2, vec![1.75, 0.25, -0.25, 1.25, 1.25, -1.75, -0.75, -0.75])?;
+/// let incoming = Incoming::Face { mode: vec![0, -1], multipliers: vec![0.75] };
 /// let resolution = resolve(&fields, &incoming, &[1.0, 1.0])?;
-/// assert_eq!(resolution.leaf, "E.A/root/trap");
-/// assert_eq!(resolution.multipliers, [0.5, 0.0]);
+/// assert_eq!(resolution.leaf, "E.A/root/turn");
+/// assert_eq!(resolution.mode(), Some(&Mode::new(vec![0, 0])));
+/// assert!((resolution.multipliers[0] - 0.5).abs() < 1e-15);
 /// assert!(resolution.unique);
 /// # Ok::<(), filippov::switching::Undecided>(())
 /// ```
@@ -53,8 +56,9 @@ pub fn resolve(
     }
 }
 
-/// The decision for fields next to these. If all of them agree, theirs counts: a tie, as between surfaces that do
-/// not know of each other, is then no obstacle. Otherwise the decision is degenerate.
+/// The decision for fields next to these. If all of them agree, theirs counts: a tie, as between
+/// surfaces that do not know of each other, is then no obstacle. Otherwise the decision is
+/// degenerate.
 fn in_doubt(
     mut resolution: Resolution,
     fields: &NormalFields,
@@ -350,8 +354,9 @@ fn smallest_component(fields: &NormalFields) -> f64 {
     })
 }
 
-/// The fields moved by up to twice the doubtful amount in four directions and their opposites. The directions are
-/// fractional parts of multiples of square roots: without any relation that could keep a tie.
+/// The fields moved by up to twice the doubtful amount in four directions and their opposites. The
+/// directions are fractional parts of multiples of square roots: without any relation that could
+/// keep a tie.
 fn perturbations(fields: &NormalFields) -> impl Iterator<Item = NormalFields> + '_ {
     let roots = [2.0_f64, 3.0, 5.0, 7.0].map(f64::sqrt);
     let directions = roots

@@ -97,7 +97,8 @@ fn degenerate_data_are_refused() {
         Err(Undecided::Shape { m: 3, .. })
     ));
     assert!(Lap::around(&attracting([0.0, 0.0]), [-1, -1]).is_none());
-    // The same equation twice, with zeros in the square; and without: two surfaces that are both crossed.
+    // The same equation twice, with zeros in the square; and without: two surfaces that are both
+    // crossed.
     let same = NormalFields::new(2, vec![1.0, 2.0, -1.0, -2.0, 0.5, 1.0, -0.5, -1.0]).unwrap();
     assert!(Bilinear::of_fields(&same).is_undetermined());
     let crossed = NormalFields::new(2, vec![1.0; 8]).unwrap();

@@ -167,11 +167,11 @@ impl Plane {
             Verdict::ToTheRoot => Some(self.stays(self.basin.is_none())),
             Verdict::ToACycle => Some(self.stays(true)),
             Verdict::TooMany => Some(self.out_of_work()),
-            Verdict::Far => match self.gamma.filter(|&gamma| gamma > 1.0) {
-                Some(gamma) => Some(Outcome::OutwardSpiral { gamma }),
-                // Without rotation for ever the next laps come back, or end in a certificate.
-                None => None,
-            },
+            // Without rotation for ever the next laps come back, or end in a certificate.
+            Verdict::Far => {
+                let gamma = self.gamma.filter(|&gamma| gamma > 1.0);
+                gamma.map(|gamma| Outcome::OutwardSpiral { gamma })
+            }
         }
     }
 

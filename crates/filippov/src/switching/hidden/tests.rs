@@ -36,8 +36,8 @@ fn mode_of(outcome: &Outcome) -> String {
     }
 }
 
-/// Two drivers that share nothing but the series within the square. The one for many surfaces does not know
-/// spirals, and may not settle a cycle.
+/// Two drivers that share nothing but the series within the square. The one for many surfaces does
+/// not know spirals, and may not settle a cycle.
 #[test]
 fn two_surfaces_by_both_drivers() {
     let mut random = Random(1);
@@ -141,8 +141,8 @@ fn series_are_exact_to_rounding() {
 
 #[test]
 fn the_first_of_several_zeros_is_found() {
-    // (t - 0.3)(t - 0.3001)(t - 0.9), positive between the last two reversed: negative before 0.3 is not allowed,
-    // so with the opposite sign.
+    // (t - 0.3)(t - 0.3001)(t - 0.9), positive between the last two reversed: negative before 0.3
+    // is not allowed, so with the opposite sign.
     let roots = [0.3, 0.3001, 0.9];
     let p = [
         roots[0] * roots[1] * roots[2],
