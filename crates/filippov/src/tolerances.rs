@@ -80,8 +80,8 @@ pub const ARRIVED: f64 = 1e-3;
 /// That many switches without any progress of time end a run.
 pub const MOST_SWITCHES_AT_ONE_TIME: u32 = 64;
 
-/// Largest number of surfaces that meet: their 2^m fields are all evaluated.
-pub const MOST_MEETING: usize = 10;
+/// Largest number of surfaces that meet: their 2^m fields are all evaluated, and all 3^m modes looked at.
+pub const MOST_MEETING: usize = 6;
 
 /// Two normalised bilinear equations are the same if all coefficients of their eliminants, sums of
 /// products of coefficients of size 1, are rounding errors below this.

@@ -3,8 +3,10 @@
 
 mod random_fields;
 
+use filippov::switching::codim2::Lap;
 use filippov::switching::{
-    admissible, resolve, Continuation, ExitKind, Incoming, NormalFields, Undecided,
+    admissible, limit_of_hidden_dynamics, resolve, Admissible, Continuation, ExitKind,
+    HiddenOutcome, Incoming, NormalFields, Undecided,
 };
 use random_fields::{entry, rotation, Random};
 
@@ -26,16 +28,20 @@ fn shapes_and_values_are_checked() {
     assert_eq!(NormalFields::new(2, values), Err(Undecided::NotFinite));
     let fields = NormalFields::new(2, vec![1.0; 8]).unwrap();
     for kappa in [vec![1.0], vec![1.0, 0.0], vec![1.0, f64::NAN]] {
-        assert!(matches!(
-            resolve(&fields, &Incoming::Start, &kappa),
-            Err(Undecided::Shape { .. })
-        ));
+        let refused = resolve(&fields, &Incoming::Start, &kappa);
+        assert_eq!(refused, Err(Undecided::Scaling { m: 2 }));
     }
-    let short = Incoming::Corner { region: vec![-1] };
-    assert!(matches!(
-        resolve(&fields, &short, &[1.0, 1.0]),
-        Err(Undecided::Shape { .. })
-    ));
+    let corner = |region: &[i8]| Incoming::Corner {
+        region: region.to_vec(),
+    };
+    for incoming in [corner(&[-1]), corner(&[-1, 0]), face(&[0, -1, -1])] {
+        let refused = resolve(&fields, &incoming, &[1.0, 1.0]);
+        assert_eq!(refused, Err(Undecided::IncomingShape { m: 2 }));
+    }
+    for mode in [[0, 0], [-1, 1]] {
+        let refused = resolve(&fields, &face(&mode), &[1.0, 1.0]);
+        assert_eq!(refused, Err(Undecided::NotArriving { surface: 0 }));
+    }
 }
 
 #[test]
@@ -172,6 +178,57 @@ fn starts_on_an_intersection() {
         }
     }
     assert!(counts.iter().all(|&n| n > 500), "{counts:?}");
+}
+
+/// Rotating fields have the outward spiral as a continuation if and only if gamma > 1.
+#[test]
+fn outward_spirals_are_admissible() {
+    let mut random = Random::new(17);
+    let mut counts = [0; 2];
+    for _ in 0..1000 {
+        let fields = rotation(&mut random);
+        let gamma = Lap::around(&fields, [-1, -1]).unwrap().gamma;
+        let spirals = |a: &Admissible| a.continuation == Continuation::OutwardSpiral;
+        let found = admissible(&fields).iter().any(spirals);
+        assert_eq!(found, gamma > 1.0, "{fields:?}");
+        counts[usize::from(found)] += 1;
+    }
+    assert!(counts.iter().all(|&n| n > 300), "{counts:?}");
+}
+
+/// Two surfaces around whose root the hidden dynamics oscillates, and a third one that is left at a steady pace.
+#[test]
+fn oscillations_on_a_face_are_seen() {
+    let mut random = Random::new(18);
+    let mut found = 0;
+    while found < 10 {
+        let (two, mode) = entry(&mut random);
+        let state = |held: f64| [f64::from(mode[0]), f64::from(mode[1]), held];
+        let start = [f64::from(mode[0]), f64::from(mode[1])];
+        let HiddenOutcome::Sliding {
+            oscillates: true, ..
+        } = limit_of_hidden_dynamics(&two, &start, &[1.0, 1.0])
+        else {
+            continue;
+        };
+        found += 1;
+        for side in [-1_i8, 1] {
+            let leaving = 0.3 * f64::from(side);
+            let values = (0..8).flat_map(|p| [two.at(p & 3)[0], two.at(p & 3)[1], leaving]);
+            let three = NormalFields::new(3, values.collect()).unwrap();
+            let outcome = limit_of_hidden_dynamics(&three, &state(0.0), &[1.0; 3]);
+            let HiddenOutcome::Sliding {
+                mode, oscillates, ..
+            } = &outcome
+            else {
+                panic!("{outcome:?} of {three:?}");
+            };
+            assert_eq!(
+                (mode.entries(), *oscillates),
+                ([0, 0, side].as_slice(), true)
+            );
+        }
+    }
 }
 
 #[test]

@@ -129,6 +129,9 @@ fn face_states(
     let state: Vec<f64> = mode.iter().filter_map(value).collect();
     let g = fields.interpolate(&state);
     let reached: Vec<usize> = (0..mode.len()).filter(|&i| mode[i] != 0).collect();
+    if reached.is_empty() {
+        return Err(Undecided::NotArriving { surface: 0 });
+    }
     if let Some(&surface) = reached.iter().find(|&&i| state[i] * g[i] >= 0.0) {
         return Err(Undecided::NotArriving { surface });
     }

@@ -42,10 +42,7 @@ pub fn resolve(
     kappa: &[f64],
 ) -> Result<Resolution, Undecided> {
     if kappa.len() != fields.m() || kappa.iter().any(|k| !(k.is_finite() && *k > 0.0)) {
-        return Err(Undecided::Shape {
-            m: fields.m(),
-            found: kappa.len(),
-        });
+        return Err(Undecided::Scaling { m: fields.m() });
     }
     check_lengths(fields.m(), incoming)?;
     let resolution = decide(fields, incoming, kappa)?;
@@ -84,21 +81,15 @@ fn in_doubt(
 }
 
 fn check_lengths(m: usize, incoming: &Incoming) -> Result<(), Undecided> {
-    let found = match incoming {
-        Incoming::Corner { region } if region.contains(&0) => 0,
-        Incoming::Corner { region } => region.len(),
-        Incoming::Face { mode, .. } => mode.len(),
-        Incoming::Exit { lambda, drift, .. } => match drift {
-            Some(drift) if drift.len() != m => drift.len(),
-            _ => lambda.len(),
-        },
-        Incoming::Start => m,
+    let fits = match incoming {
+        Incoming::Corner { region } => region.len() == m && !region.contains(&0),
+        Incoming::Face { mode, .. } => mode.len() == m,
+        Incoming::Exit { lambda, drift, .. } => {
+            lambda.len() == m && drift.as_ref().is_none_or(|drift| drift.len() == m)
+        }
+        Incoming::Start => true,
     };
-    if found == m {
-        Ok(())
-    } else {
-        Err(Undecided::Shape { m, found })
-    }
+    fits.then_some(()).ok_or(Undecided::IncomingShape { m })
 }
 
 fn decide(
