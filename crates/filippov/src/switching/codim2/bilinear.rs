@@ -73,7 +73,7 @@ impl Bilinear {
         self.rows.map(|[a, b, c, d]| a + b * x + (c + d * x) * y)
     }
 
-    /// G(x, y), with entry [j][p] the derivative of g_j by multiplier p.
+    /// G(x, y), with entry `[j][p]` the derivative of g_j by multiplier p.
     pub fn jacobian(&self, [x, y]: [f64; 2]) -> [[f64; 2]; 2] {
         self.rows.map(|[_, b, c, d]| [b + d * y, c + d * x])
     }
