@@ -128,18 +128,20 @@ pub const ACCUMULATION_AGREEMENT: f64 = 0.1;
 /// Returns that shrink by less than this do not accumulate soon enough to be extrapolated.
 pub const SLOWEST_ACCUMULATION: f64 = 0.95;
 
-/// Pieces (corners, strips, steps of a series) that one run of the hidden dynamics may take. The
-/// longest of 10^5 random cases took a fifth of this.
+/// Pieces (corners, strips, steps of a series) that one run of the hidden dynamics may take: some
+/// tenths of a second. Of 830 000 random runs one did not end within, a fold passed at a ratio of
+/// scalings of 27.
 pub const MOST_PIECES: usize = 100_000;
 
-/// Interval tests in the search for the end of one piece; a simple zero takes about ten.
+/// Interval tests in the search for the end of one piece: a zero needs as many as halvings isolate it,
+/// so that this leaves room for dozens of near misses.
 pub const ZERO_SEARCHES: usize = 2000;
 
 /// Two zeros nearer together than this fraction of a piece are one touch.
 pub const SHORTEST_PIECE: f64 = 1e-12;
 
-/// Halvings and Newton steps for an event time; halvings alone need at most 1100 for any number,
-/// and Newton's method ends them after a few.
+/// Halvings and Newton steps for an event time; Newton's method ends them after a few, halvings alone
+/// after 53 in a bracket of one size.
 pub const MOST_HALVINGS: usize = 200;
 
 /// Returns this near to the root, and oscillations this small, are at the root.
@@ -183,7 +185,8 @@ pub const STEADY_CYCLE: f64 = 0.02;
 /// |I - G(middle)^-1 G| below this makes a box hold one root at most, and Newton's method converge in it.
 pub const INJECTIVE: f64 = 0.5;
 
-/// Boxes looked at in the search for all roots in a cube; three surfaces need about a hundred.
+/// Boxes looked at in the search for all roots in a cube: for three surfaces it ends within a
+/// millisecond, for six it can take seconds.
 pub const MOST_BOXES: usize = 100_000;
 
 /// Boxes narrower than this hold a root that is multiple up to rounding.
