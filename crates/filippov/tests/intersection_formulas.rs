@@ -1,4 +1,5 @@
-//! Formulas at an intersection: roots, their continuation past a fold, laps, the end of infinitely many laps.
+//! Formulas at an intersection: roots, their continuation past a fold, laps, the end of infinitely
+//! many laps.
 #![allow(clippy::unwrap_used)]
 
 mod random_fields;
@@ -62,8 +63,8 @@ fn roots_of_special_equations() {
     }
 }
 
-/// The continued root is continuous at the fold, like the root of the distance before it, constant to first order
-/// in it beyond.
+/// The continued root is continuous at the fold, like the root of the distance before it, constant
+/// to first order in it beyond.
 #[test]
 fn the_root_is_continued_past_a_fold() {
     let mut random = Random::new(2);
@@ -181,8 +182,9 @@ fn the_predictor_of_a_root() {
     }
 }
 
-/// Stability by minors and by Routh, for random matrices and scalings: stable for a scaling that is tried implies
-/// a chain of minors, with the one exception in about 700 that is known for three surfaces.
+/// Stability by minors and by Routh, for random matrices and scalings: stable for a scaling that is
+/// tried implies a chain of minors, with the one exception in about 700 that is known for three
+/// surfaces.
 #[test]
 fn chains_of_minors_and_scalings() {
     let mut random = Random::new(6);
@@ -256,7 +258,7 @@ impl Varying {
         loop {
             let fields = rotation(random);
             let gamma = Lap::around(&fields, [-1, -1]).unwrap().gamma;
-            if gamma < 0.1 || gamma > 0.6 {
+            if !(0.1..=0.6).contains(&gamma) {
                 continue;
             }
             return Varying {
@@ -350,7 +352,6 @@ fn orders_of_the_jump() {
     for (orders, expected) in orders.iter_mut().zip([2.0, 3.0]) {
         orders.sort_by(f64::total_cmp);
         let (low, median, high) = (orders[6], orders[30], orders[53]);
-        println!("order {expected}: {low} {median} {high}");
         assert!((median - expected).abs() < 0.02, "median {median}");
         // A few field sets have a small constant and show their next order still.
         assert!((low - expected).abs() < 0.2 && (high - expected).abs() < 0.2);
@@ -424,6 +425,5 @@ fn exits_of_three_surfaces() {
         );
         counts[n % 2] += 1;
     }
-    println!("{counts:?} of 100");
-    assert!(counts[0] > 90 && counts[1] > 60, "{counts:?}");
+    assert!(counts[0] > 90 && counts[1] > 80, "{counts:?}");
 }

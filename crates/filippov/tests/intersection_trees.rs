@@ -102,7 +102,6 @@ fn trees_and_hidden_dynamics_agree() {
     exits(SIDES, exit_side, leave_at_side);
     exits(FOLDS, exit_fold, leave_at_fold);
     exits(STABILITY, exit_stability, leave_where_unstable);
-    println!("{:#?}", tally.leaves);
     let hit: Vec<&str> = tally.leaves.keys().copied().collect();
     assert_eq!(hit, LEAVES);
     for (leaf, counts) in tally.leaves {

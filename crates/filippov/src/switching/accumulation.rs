@@ -14,8 +14,9 @@ pub struct Return {
 /// The limit of a sequence of returns.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Accumulation {
-    /// The time of the limit, T + (T - T_before) rho/(1 - rho). The state follows by the same formula, and has
-    /// to be projected onto the intersection; the error is a multiple of the square of the distance.
+    /// The time of the limit, T + (T - T_before) rho/(1 - rho). The state follows by the same
+    /// formula, and has to be projected onto the intersection; the error is a multiple of the
+    /// square of the distance.
     pub time: f64,
     /// Ratio rho of the last two intervals.
     pub ratio: f64,

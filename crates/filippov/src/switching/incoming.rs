@@ -2,8 +2,8 @@
 
 use super::normal_fields::NormalFields;
 use super::resolution::Undecided;
-use super::roots::{newton, stable_roots};
-use crate::tolerances::{AFTER_THE_EXIT, BESIDE_THE_ROOT};
+use super::roots::{multiplier_rates, newton, stable_roots};
+use crate::tolerances::{AFTER_THE_EXIT, BESIDE_THE_ROOT, CORNER_OFFSETS};
 
 /// What the motion did before.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,11 +13,13 @@ pub enum Incoming {
         /// The region.
         region: Vec<i8>,
     },
-    /// It slid on the surfaces with a zero entry, and reached the others from the sides of their entries.
+    /// It slid on the surfaces with a zero entry, and reached the others from the sides of their
+    /// entries.
     Face {
         /// The mode.
         mode: Vec<i8>,
-        /// lambda of the surfaces slid on, in their order; may be left empty if there is only one stable root.
+        /// lambda of the surfaces slid on, in their order; may be left empty if there is only one
+        /// stable root.
         multipliers: Vec<f64>,
     },
     /// It slid on all surfaces, and cannot go on so.
@@ -45,15 +47,12 @@ pub enum ExitKind {
     Stability,
 }
 
-/// The states from which the hidden dynamics starts, and the fields in which it moves. The first state decides;
-/// the others are those that the discontinuous problem cannot tell from it.
+/// The states from which the hidden dynamics starts, and the fields in which it moves. The first
+/// state decides; the others are those that the discontinuous problem cannot tell from it.
 pub(super) struct Starts {
     pub fields: NormalFields,
     pub states: Vec<Vec<f64>>,
 }
-
-/// Offsets along the border of a corner, in units of the transition. Beyond the last one nothing changes.
-const OFFSETS: [f64; 9] = [0.05, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0, 30.0, 1000.0];
 
 impl Incoming {
     /// The states from which the hidden dynamics starts.
@@ -130,6 +129,9 @@ fn face_states(
     let state: Vec<f64> = mode.iter().filter_map(value).collect();
     let g = fields.interpolate(&state);
     let reached: Vec<usize> = (0..mode.len()).filter(|&i| mode[i] != 0).collect();
+    if reached.is_empty() {
+        return Err(Undecided::NotArriving { surface: 0 });
+    }
     if let Some(&surface) = reached.iter().find(|&&i| state[i] * g[i] >= 0.0) {
         return Err(Undecided::NotArriving { surface });
     }
@@ -140,11 +142,12 @@ fn face_states(
     Ok(states)
 }
 
-/// A state on the border of a corner, moved along it in one of the components that are reached, or in all but one.
+/// A state on the border of a corner, moved along it in one of the components that are reached, or
+/// in all but one.
 fn offsets(state: &[f64], reached: &[usize]) -> Vec<Vec<f64>> {
     let mut states = vec![state.to_vec()];
     for &i in reached {
-        for offset in OFFSETS {
+        for offset in CORNER_OFFSETS {
             let mut one = state.to_vec();
             let mut others = state.to_vec();
             for &j in reached {
@@ -177,7 +180,8 @@ fn polished(
     root.ok_or(not_sliding)
 }
 
-/// The root itself, in fields that have drifted for a short time; where stability is lost, a little beside it.
+/// The root itself, in fields that have drifted for a short time; where stability is lost, a little
+/// beside it.
 fn exit_state(
     fields: &NormalFields,
     kind: ExitKind,
@@ -208,7 +212,7 @@ fn exit_state(
 
 /// The root, displaced in the direction in which it moves; along the diagonal if that is not known.
 fn beside(fields: &NormalFields, lambda: &[f64], drift: Option<&[f64]>) -> Vec<f64> {
-    let rates = drift.and_then(|drift| super::roots::multiplier_rates(fields, lambda, drift));
+    let rates = drift.and_then(|drift| multiplier_rates(fields, lambda, drift));
     let rates = rates.filter(|rates| rates.iter().any(|&r| r != 0.0));
     let rates = rates.unwrap_or_else(|| vec![1.0; lambda.len()]);
     let length = rates.iter().map(|r| r * r).sum::<f64>().sqrt();

@@ -8,7 +8,8 @@ use crate::tolerances::MOST_MEETING;
 /// patterns k.
 ///
 /// Patterns are numbered by their bits: bit i is set where k_i = +1. In this numbering
-/// `values[pattern * m + j]` is f_j^k. The *canopy* is the interpolant that is linear in each multiplier,
+/// `values[pattern * m + j]` is f_j^k. The *canopy* is the interpolant that is linear in each
+/// multiplier,
 ///
 /// ```text
 /// g_j(lambda) = sum over k of prod_i (1 + k_i lambda_i)/2 * f_j^k .
@@ -35,8 +36,8 @@ impl NormalFields {
     /// Normal components from their values, `m * 2^m` of them.
     ///
     /// # Errors
-    /// [`Undecided::Shape`] if the number of values does not fit, [`Undecided::NotFinite`] if one of them
-    /// is not finite.
+    /// [`Undecided::Shape`] if the number of values does not fit, [`Undecided::NotFinite`] if one
+    /// of them is not finite.
     pub fn new(m: usize, values: Vec<f64>) -> Result<Self, Undecided> {
         if m == 0 || m > MOST_MEETING || values.len() != m << m {
             return Err(Undecided::Shape {
@@ -153,8 +154,8 @@ impl NormalFields {
         })
     }
 
-    /// The fields whose canopy on the whole cube is that of these on the half of it with lambda_axis on this
-    /// side of 0.
+    /// The fields whose canopy on the whole cube is that of these on the half of it with
+    /// lambda_axis on this side of 0.
     #[must_use]
     pub fn half(&self, axis: usize, side: i8) -> NormalFields {
         let mut values = self.values.clone();

@@ -96,12 +96,24 @@ impl Resolution {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Undecided {
     /// The number of values does not fit the number of surfaces.
-    #[error("{found} normal components do not fit {m} surfaces: m * 2^m are needed, m at most 10")]
+    #[error("{found} normal components do not fit {m} surfaces: m * 2^m are needed, m at most 6")]
     Shape {
         /// The number of surfaces.
         m: usize,
         /// The number of values.
         found: usize,
+    },
+    /// The motion before is given for another number of surfaces, or a region by a mode with zeros.
+    #[error("the motion before does not fit the {m} surfaces that meet")]
+    IncomingShape {
+        /// The number of surfaces.
+        m: usize,
+    },
+    /// The scaling is not one positive number per surface.
+    #[error("kappa must have {m} positive entries")]
+    Scaling {
+        /// The number of surfaces.
+        m: usize,
     },
     /// A normal component is not finite.
     #[error("a normal component is not finite; look at the fields at this point")]

@@ -5,28 +5,31 @@ use super::hidden::{admissible, limit, Outcome};
 use super::incoming::{ExitKind, Incoming};
 use super::normal_fields::NormalFields;
 use super::resolution::{Continuation, Resolution, Undecided};
-use super::roots::stable_roots;
+use super::roots::{newton, stable_roots};
 use super::single;
 use super::stability::{is_negative_p_matrix, is_stable_for};
-use crate::tolerances::DOUBTFUL;
+use crate::tolerances::{AFTER_THE_EXIT, DOUBTFUL};
 
 /// Decides what follows at an intersection of m surfaces, scaled by `kappa`.
 ///
-/// One surface has its two figures, two surfaces their decision trees; where a tree says that the outcome depends on
-/// the scaling, and for three and more surfaces, the hidden dynamics at `kappa` decides. If a quantity whose sign
-/// decided is doubtful (`tolerances.rs`), the decision is repeated with perturbed fields, and
-/// [`Resolution::degenerate`] says whether they agree.
+/// One surface has its two figures, two surfaces their decision trees; where a tree says that the
+/// outcome depends on the scaling, and for three and more surfaces, the hidden dynamics at `kappa`
+/// decides. If a quantity whose sign decided is doubtful (`tolerances.rs`), the decision is
+/// repeated with perturbed fields: if they agree, theirs counts, and if not,
+/// [`Resolution::degenerate`] says so.
 ///
 /// # Example
 /// ```
 /// use filippov::switching::{resolve, Incoming, NormalFields};
+/// use filippov::Mode;
 ///
-/// // Sliding on the first surface below the second one; both attract.
-/// let fields = NormalFields::new(2, vec![1.5, 1.0, -0.5, 1.0, 1.5, -1.0, -0.5, -1.0])?;
-/// let incoming = Incoming::Face { mode: vec![0, -1], multipliers: vec![0.5] };
+/// // Sliding on the first surface reaches the second one; both attract.
+/// let fields = NormalFields::new(2, vec![1.75, 0.25, -0.25, 1.25, 1.25, -1.75, -0.75, -0.75])?;
+/// let incoming = Incoming::Face { mode: vec![0, -1], multipliers: vec![0.75] };
 /// let resolution = resolve(&fields, &incoming, &[1.0, 1.0])?;
-/// assert_eq!(resolution.leaf, "E.A/root/trap");
-/// assert_eq!(resolution.multipliers, [0.5, 0.0]);
+/// assert_eq!(resolution.leaf, "E.A/root/turn");
+/// assert_eq!(resolution.mode(), Some(&Mode::new(vec![0, 0])));
+/// assert!((resolution.multipliers[0] - 0.5).abs() < 1e-15);
 /// assert!(resolution.unique);
 /// # Ok::<(), filippov::switching::Undecided>(())
 /// ```
@@ -39,64 +42,54 @@ pub fn resolve(
     kappa: &[f64],
 ) -> Result<Resolution, Undecided> {
     if kappa.len() != fields.m() || kappa.iter().any(|k| !(k.is_finite() && *k > 0.0)) {
-        return Err(Undecided::Shape {
-            m: fields.m(),
-            found: kappa.len(),
-        });
+        return Err(Undecided::Scaling { m: fields.m() });
     }
     check_lengths(fields.m(), incoming)?;
-    let mut resolution = decide(fields, incoming, kappa)?;
+    let resolution = decide(fields, incoming, kappa)?;
     if resolution.margin <= DOUBTFUL {
-        if let Some(only) = only_admissible(fields, incoming) {
-            return Ok(only);
-        }
-        for perturbed in perturbations(fields) {
-            match decide(&perturbed, incoming, kappa) {
-                Ok(other) if other.chosen == resolution.chosen => {}
-                Ok(other) => {
-                    resolution.degenerate = true;
-                    resolution.unique = false;
-                    resolution.add_candidates(&other.candidates);
-                }
-                Err(_) => resolution.degenerate = true,
-            }
-        }
+        Ok(in_doubt(resolution, fields, incoming, kappa))
+    } else {
+        Ok(resolution)
     }
-    Ok(resolution)
 }
 
-/// The only mode that leaves the intersection, if there is one and no normal component is doubtful. A tree
-/// can turn on a quantity that vanishes for a good reason: surfaces that do not influence one another.
-fn only_admissible(fields: &NormalFields, incoming: &Incoming) -> Option<Resolution> {
-    if matches!(incoming, Incoming::Exit { .. }) || smallest_component(fields) <= DOUBTFUL {
-        return None;
+/// The decision for fields next to these. If all of them agree, theirs counts: a tie, as between
+/// surfaces that do not know of each other, is then no obstacle. Otherwise the decision is
+/// degenerate.
+fn in_doubt(
+    mut resolution: Resolution,
+    fields: &NormalFields,
+    incoming: &Incoming,
+    kappa: &[f64],
+) -> Resolution {
+    let perturbed = perturbations(fields).map(|other| decide(&other, incoming, kappa));
+    let others: Vec<Result<Resolution, Undecided>> = perturbed.collect();
+    let agreed: Vec<&Resolution> = others.iter().flatten().collect();
+    let agree = agreed.len() == others.len() && agreed.iter().all(|o| o.chosen == agreed[0].chosen);
+    let margin = resolution.margin;
+    if agree {
+        resolution = agreed[0].clone();
+        resolution.margin = margin;
     }
-    let found = admissible(fields);
-    let [only] = found.as_slice() else {
-        return None;
-    };
-    let mut resolution = Resolution::sure("admissible/only", only.continuation.clone());
-    resolution.multipliers = only.multipliers.clone();
-    resolution.margin = smallest_component(fields);
-    Some(resolution)
+    for other in agreed {
+        resolution.add_candidates(&other.candidates);
+    }
+    resolution.degenerate |= !agree;
+    resolution.unique &= resolution.candidates.len() == 1 && !resolution.degenerate;
+    complete(&mut resolution, fields, kappa);
+    resolution
 }
 
 fn check_lengths(m: usize, incoming: &Incoming) -> Result<(), Undecided> {
-    let found = match incoming {
-        Incoming::Corner { region } if region.contains(&0) => 0,
-        Incoming::Corner { region } => region.len(),
-        Incoming::Face { mode, .. } => mode.len(),
-        Incoming::Exit { lambda, drift, .. } => match drift {
-            Some(drift) if drift.len() != m => drift.len(),
-            _ => lambda.len(),
-        },
-        Incoming::Start => m,
+    let fits = match incoming {
+        Incoming::Corner { region } => region.len() == m && !region.contains(&0),
+        Incoming::Face { mode, .. } => mode.len() == m,
+        Incoming::Exit { lambda, drift, .. } => {
+            lambda.len() == m && drift.as_ref().is_none_or(|drift| drift.len() == m)
+        }
+        Incoming::Start => true,
     };
-    if found == m {
-        Ok(())
-    } else {
-        Err(Undecided::Shape { m, found })
-    }
+    fits.then_some(()).ok_or(Undecided::IncomingShape { m })
 }
 
 fn decide(
@@ -112,7 +105,11 @@ fn decide(
         (1, _) => at_one_surface(fields, incoming),
         (2, Incoming::Face { .. } | Incoming::Exit { .. }) => by_tree(fields, incoming, kappa),
         (2, _) => by_hidden_dynamics(fields, incoming, &[kappa.to_vec()]),
-        _ => by_hidden_dynamics(fields, incoming, &scalings(kappa)),
+        _ => by_hidden_dynamics(
+            fields,
+            incoming,
+            &comparable_scalings(fields, incoming, kappa),
+        ),
     }?;
     complete(&mut resolution, fields, kappa);
     Ok(resolution)
@@ -236,7 +233,10 @@ fn complete(resolution: &mut Resolution, fields: &NormalFields, kappa: &[f64]) {
     };
     let root = match face.m() {
         0 => None,
-        _ if !resolution.multipliers.is_empty() => Some(resolution.multipliers.clone()),
+        _ if resolution.multipliers.len() == face.m() => {
+            let known = &resolution.multipliers;
+            newton(&face, known).or_else(|| Some(known.clone()))
+        }
         2 => both(),
         _ => stable_roots(&face).into_iter().next(),
     };
@@ -288,6 +288,26 @@ fn has_one_mode_only(fields: &NormalFields) -> bool {
     fields.is_affine() && is_negative_p_matrix(&fields.jacobian(&vec![0.0; fields.m()]))
 }
 
+/// The scalings to compare. After an exit only those count for which the root was stable before.
+fn comparable_scalings(fields: &NormalFields, incoming: &Incoming, kappa: &[f64]) -> Vec<Vec<f64>> {
+    let mut scalings = scalings(kappa);
+    if let Incoming::Exit { kind, lambda, .. } = incoming {
+        if *kind != ExitKind::Stability {
+            let mut jacobian = fields.jacobian(lambda);
+            for i in 0..lambda.len() {
+                // At a fold one eigenvalue vanishes.
+                jacobian[(i, i)] -= AFTER_THE_EXIT * fields.size();
+            }
+            let others = scalings.split_off(1);
+            let stable = others
+                .into_iter()
+                .filter(|kappa| is_stable_for(&jacobian, kappa));
+            scalings.extend(stable);
+        }
+    }
+    scalings
+}
+
 /// The scaling itself, each surface ten times larger and smaller, and all in rising and falling order.
 fn scalings(kappa: &[f64]) -> Vec<Vec<f64>> {
     let m = kappa.len();
@@ -325,18 +345,19 @@ fn smallest_component(fields: &NormalFields) -> f64 {
     })
 }
 
-/// The fields moved by the doubtful amount in different directions: signs by the parity of some bits of the index.
+/// The fields moved by up to twice the doubtful amount in four directions and their opposites. The
+/// directions are fractional parts of multiples of square roots: without any relation that could
+/// keep a tie.
 fn perturbations(fields: &NormalFields) -> impl Iterator<Item = NormalFields> + '_ {
-    let directions = (1..=4_usize).flat_map(|mask| [(mask, 1.0), (mask, -1.0)]);
-    directions.map(|(mask, sign)| {
-        let m = fields.m();
+    let roots = [2.0_f64, 3.0, 5.0, 7.0].map(f64::sqrt);
+    let directions = roots
+        .into_iter()
+        .flat_map(|root| [(root, 1.0), (root, -1.0)]);
+    directions.map(|(root, sign)| {
         let moved = fields.values().iter().enumerate().map(|(index, value)| {
-            let parity = if (index & mask).count_ones() % 2 == 0 {
-                sign
-            } else {
-                -sign
-            };
-            value + 2.0 * DOUBTFUL * parity * fields.row_size(index % m)
+            let direction = 2.0 * (root * (index + 1) as f64).fract() - 1.0;
+            let size = fields.row_size(index % fields.m());
+            value + 2.0 * DOUBTFUL * sign * direction * size
         });
         fields.with_values(moved.collect())
     })

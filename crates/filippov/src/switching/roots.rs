@@ -13,15 +13,16 @@ use crate::tolerances::{
 pub struct Roots {
     /// The roots, each once.
     pub points: Vec<Vec<f64>>,
-    /// Are these certainly all? Not if a multiple root, or one at the border of many boxes, used up the work.
+    /// Are these certainly all? Not if a multiple root, or one at the border of many boxes, used up
+    /// the work.
     pub complete: bool,
 }
 
 /// All roots of g = 0 in (-1, 1)^m by branch and prune.
 ///
-/// A function that is linear in each multiplier takes its extrema over a box at the vertices, and so do the
-/// entries of G. So a box is discarded rigorously if some g_i has one sign at all of them, and holds one
-/// root at most if |I - G(middle)^-1 G| < 1 there.
+/// A function that is linear in each multiplier takes its extrema over a box at the vertices, and
+/// so do the entries of G. So a box is discarded rigorously if some g_i has one sign at all of
+/// them, and holds one root at most if |I - G(middle)^-1 G| < 1 there.
 pub fn roots_in_cube(fields: &NormalFields) -> Roots {
     let m = fields.m();
     let mut roots = Roots {
@@ -48,8 +49,8 @@ pub fn roots_in_cube(fields: &NormalFields) -> Roots {
     roots
 }
 
-/// The roots at which a motion can slide: in the cube, with sign det G = (-1)^m, and stable for some scaling.
-/// For one and two surfaces in closed form.
+/// The roots at which a motion can slide: in the cube, with sign det G = (-1)^m, and stable for
+/// some scaling. For one and two surfaces in closed form.
 pub fn stable_roots(fields: &NormalFields) -> Vec<Vec<f64>> {
     match fields.m() {
         0 => vec![Vec::new()],
@@ -96,8 +97,8 @@ pub fn newton(fields: &NormalFields, start: &[f64]) -> Option<Vec<f64>> {
     None
 }
 
-/// The rate at which the root moves, lambda' = -G^-1 g', where `drift` is the rate g' at fixed lambda: the
-/// predictor of a tracked root. `None` at a multiple root.
+/// The rate at which the root moves, lambda' = -G^-1 g', where `drift` is the rate g' at fixed
+/// lambda: the predictor of a tracked root. `None` at a multiple root.
 pub fn multiplier_rates(fields: &NormalFields, lambda: &[f64], drift: &[f64]) -> Option<Vec<f64>> {
     let rates = fields.jacobian(lambda).solve(drift)?;
     Some(rates.into_iter().map(|rate| -rate).collect())

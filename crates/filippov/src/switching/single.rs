@@ -3,8 +3,8 @@
 use super::normal_fields::NormalFields;
 use super::resolution::{Continuation, Resolution, Signs, Undecided};
 
-/// A motion from region `side` reaches the surface: it crosses if the field on the other side leads on, and slides
-/// otherwise.
+/// A motion from region `side` reaches the surface: it crosses if the field on the other side leads
+/// on, and slides otherwise.
 pub(super) fn arrive(fields: &NormalFields, side: i8) -> Result<Resolution, Undecided> {
     let size = size(fields)?;
     let mut signs = Signs::new();

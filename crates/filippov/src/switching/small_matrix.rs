@@ -72,8 +72,8 @@ impl Matrix {
 
     /// Do all eigenvalues have negative real parts?
     ///
-    /// The characteristic polynomial by Faddeev and LeVerrier, then the array of Routh: exact enough for
-    /// the few surfaces that meet, and without eigenvalues.
+    /// The characteristic polynomial by Faddeev and LeVerrier, then the array of Routh: exact
+    /// enough for the few surfaces that meet, and without eigenvalues.
     pub fn is_hurwitz(&self) -> bool {
         let mut upper: Vec<f64> = Vec::new();
         let mut lower: Vec<f64> = Vec::new();

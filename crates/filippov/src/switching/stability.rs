@@ -14,7 +14,7 @@ pub fn is_scaling_stable(jacobian: &Matrix) -> bool {
     for subset in 1..1_usize << m {
         let members: Vec<usize> = (0..m).filter(|i| subset >> i & 1 == 1).collect();
         let follows = members.iter().any(|i| chained[subset & !(1 << i)]);
-        let sign = if members.len() % 2 == 0 { 1.0 } else { -1.0 };
+        let sign = (-1.0_f64).powi(members.len() as i32);
         chained[subset] = follows && sign * jacobian.principal(&members).determinant() > 0.0;
     }
     chained[(1 << m) - 1]
@@ -31,13 +31,13 @@ pub fn is_stable_for(jacobian: &Matrix, kappa: &[f64]) -> bool {
     scaled.is_hurwitz()
 }
 
-/// Are all principal minors of -G positive? If G is constant, as for fields that are affine in the signs,
-/// then exactly one mode is consistent (Gale, Nikaido 1965).
+/// Are all principal minors of -G positive? If G is constant, as for fields that are affine in the
+/// signs, then exactly one mode is consistent (Gale, Nikaido 1965).
 pub fn is_negative_p_matrix(jacobian: &Matrix) -> bool {
     let m = jacobian.n();
     (1..1_usize << m).all(|subset| {
         let members: Vec<usize> = (0..m).filter(|i| subset >> i & 1 == 1).collect();
-        let sign = if members.len() % 2 == 0 { 1.0 } else { -1.0 };
+        let sign = (-1.0_f64).powi(members.len() as i32);
         sign * jacobian.principal(&members).determinant() > 0.0
     })
 }

@@ -80,9 +80,7 @@ impl Around {
 pub fn entry(random: &mut Random) -> (NormalFields, [i8; 2]) {
     loop {
         let mut values = random.normals::<8>();
-        for j in 0..8 {
-            values[j] *= random.ratio(0.5);
-        }
+        values = values.map(|value| value * random.ratio(0.5));
         // (--) and (+-): the first surface attracts.
         (values[0], values[2]) = (values[0].abs(), -values[2].abs());
         if random.between(0.0, 1.0) < 0.5 {

@@ -73,7 +73,7 @@ impl Bilinear {
         self.rows.map(|[a, b, c, d]| a + b * x + (c + d * x) * y)
     }
 
-    /// G(x, y), with entry [j][p] the derivative of g_j by multiplier p.
+    /// G(x, y), with entry `[j][p]` the derivative of g_j by multiplier p.
     pub fn jacobian(&self, [x, y]: [f64; 2]) -> [[f64; 2]; 2] {
         self.rows.map(|[_, b, c, d]| [b + d * y, c + d * x])
     }
@@ -109,17 +109,17 @@ impl Bilinear {
         Some(root)
     }
 
-    /// The root with det G > 0, continued beyond the point where both roots meet by the abscissa of the
-    /// minimum of |Delta|: r = sqrt(max(Delta, 0)). A trial stage slightly beyond such a point is defined
-    /// by it; at the point itself it is the double root (-q1/(2 q2), -s1/(2 s2)).
+    /// The root with det G > 0, continued beyond the point where both roots meet by the abscissa of
+    /// the minimum of |Delta|: r = sqrt(max(Delta, 0)). A trial stage slightly beyond such a point
+    /// is defined by it; at the point itself it is the double root (-q1/(2 q2), -s1/(2 s2)).
     pub fn extended_root(&self) -> Option<[f64; 2]> {
         let eliminated = eliminate(&self.normalised());
         let root = eliminated.root(eliminated.delta.max(0.0).sqrt())?;
         Some(root.point)
     }
 
-    /// The root with det G > 0 if the motion can slide at it: inside the square and stable for some scaling of
-    /// the surfaces, min(G11, G22) < 0.
+    /// The root with det G > 0 if the motion can slide at it: inside the square and stable for some
+    /// scaling of the surfaces, min(G11, G22) < 0.
     pub fn sliding_root(&self) -> Option<Root> {
         let root = self.root().filter(|root| root.in_square())?;
         let jacobian = self.jacobian(root.point);

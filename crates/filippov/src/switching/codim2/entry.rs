@@ -26,6 +26,9 @@ use crate::switching::resolution::{Continuation, Resolution, Signs, Undecided};
 /// If there is no attractive sliding in this mode, if it does not arrive, or if the normal
 /// components of the surfaces are proportional.
 pub fn enter(corners: &Corners, mode: [i8; 2]) -> Result<Resolution, Undecided> {
+    if mode.iter().filter(|&&k| k == 0).count() != 1 {
+        return Err(Undecided::NotArriving { surface: 0 });
+    }
     let mut signs = Signs::new();
     let (frame, corners, x0) = normal_frame(corners, mode, &mut signs)?;
     let bilinear = Bilinear::of(&corners);

@@ -5,8 +5,8 @@ use crate::switching::resolution::{Continuation, Resolution, Signs, Undecided};
 
 /// Decides what follows where the two roots of sliding on two surfaces coalesce at `lambda`.
 ///
-/// The curves g_1 = 0 and g_2 = 0 touch at the double root. In the frame where they rise there and, after they
-/// have parted, that of g_2 lies above that of g_1:
+/// The curves g_1 = 0 and g_2 = 0 touch at the double root. In the frame where they rise there and,
+/// after they have parted, that of g_2 lies above that of g_1:
 ///
 /// | G11, G22 | test | continuation | leaf |
 /// |---|---|---|---|
@@ -18,9 +18,11 @@ use crate::switching::resolution::{Continuation, Resolution, Signs, Undecided};
 /// | +, - | f_2^{--} > 0 | (-, 0) | `Xb/c1` |
 /// | +, - | f_2^{--} < 0 | (-, -) | `Xb/c2` |
 ///
-/// The strip between the curves, and the half strip that follows it, are invariant under the hidden dynamics.
+/// The strip between the curves, and the half strip that follows it, are invariant under the hidden
+/// dynamics.
 ///
-/// Reference: Guglielmi, Hairer (2022), section 4.3.2, with the signs of `docs/theory/intersections.md`.
+/// Reference: Guglielmi, Hairer (2022), section 4.3.2, with the signs of
+/// `docs/theory/intersections.md`.
 ///
 /// # Errors
 /// If the root was not stable for any scaling (G11 > 0 and G22 > 0).

@@ -7,8 +7,9 @@ use crate::tolerances::VANISHING_DIAGONAL;
 /// Decides what follows where one diagonal entry of G vanishes at the root `lambda` and the other one
 /// is positive.
 ///
-/// In the frame where G11 = 0 < G22, G12 > 0 and f_1^{--} < 0 < f_1^{-+}, the equation g_1 = 0 has become
-/// (C + D x)(y - lambda_2) = 0. Without a zero of C + D x in the square (Figure 4.8: f_1^{++} > 0):
+/// In the frame where G11 = 0 < G22, G12 > 0 and f_1^{--} < 0 < f_1^{-+}, the equation g_1 = 0 has
+/// become (C + D x)(y - lambda_2) = 0. Without a zero of C + D x in the square (Figure 4.8:
+/// f_1^{++} > 0):
 ///
 /// | f_2^{++} | f_2^{--} | continuation | leaf |
 /// |---|---|---|---|

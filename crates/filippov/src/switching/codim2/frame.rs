@@ -5,8 +5,8 @@ use std::ops::Neg;
 use crate::switching::normal_fields::{pattern_of, NormalFields};
 use crate::switching::resolution::Undecided;
 
-/// The normal components of the four fields at an intersection of two surfaces, with each surface scaled
-/// so that its largest component has magnitude 1. Decisions do not depend on such a scaling.
+/// The normal components of the four fields at an intersection of two surfaces, with each surface
+/// scaled so that its largest component has magnitude 1. Decisions do not depend on such a scaling.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Corners {
     values: [[f64; 2]; 4],
@@ -40,8 +40,8 @@ impl Corners {
     }
 }
 
-/// One of the eight frames at an intersection of two surfaces: exchange the surfaces or not, then change
-/// the sign of each h_j or not.
+/// One of the eight frames at an intersection of two surfaces: exchange the surfaces or not, then
+/// change the sign of each h_j or not.
 ///
 /// Modes, multipliers, states of the hidden dynamics and normal components all transform as vectors.
 /// Each decision tree is stated in a normal frame: transform, decide, transform the mode back.

@@ -9,7 +9,8 @@ use crate::switching::normal_fields::NormalFields;
 /// the next distance is t |f_i| with i the other surface. After four regions the distance is
 /// gamma times the first one. The lap is stated for a first distance of 1.
 ///
-/// Reference: Guglielmi, Hairer (2022), formulas (6.1) to (6.3), corrected in `docs/theory/intersections.md`.
+/// Reference: Guglielmi, Hairer (2022), formulas (6.1) to (6.3), corrected in
+/// `docs/theory/intersections.md`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lap {
     /// The regions in the order in which they are visited.
@@ -35,8 +36,8 @@ pub struct Jump {
 const CYCLE: [[i8; 2]; 4] = [[-1, -1], [1, -1], [1, 1], [-1, 1]];
 
 impl Lap {
-    /// The lap that starts where the motion enters region `first`, on the border to the region before it.
-    /// `None` if the fields do not rotate.
+    /// The lap that starts where the motion enters region `first`, on the border to the region
+    /// before it. `None` if the fields do not rotate.
     pub fn around(fields: &NormalFields, first: [i8; 2]) -> Option<Lap> {
         let regions = cycle_from(fields, first)?;
         let mut distance = 1.0;
@@ -57,14 +58,15 @@ impl Lap {
     }
 
     /// From distance `delta` to the end of all laps on the intersection, if the motion is attracted
-    /// (gamma < 1): times delta t_j/(1 - gamma). The state has to be projected onto the intersection then.
-    /// Under fields that vary the error is a multiple of delta^2.
+    /// (gamma < 1): times delta t_j/(1 - gamma). The state has to be projected onto the
+    /// intersection then. Under fields that vary the error is a multiple of delta^2.
     pub fn inward(&self, delta: f64) -> Option<Jump> {
         (self.gamma < 1.0).then(|| self.jump(delta / (1.0 - self.gamma)))
     }
 
-    /// From the intersection to distance (gamma - 1) delta by the infinitely many laps of an outward spiral
-    /// (gamma > 1): the times are those of one lap from distance delta, a free parameter.
+    /// From the intersection to distance (gamma - 1) delta by the infinitely many laps of an
+    /// outward spiral (gamma > 1): the times are those of one lap from distance delta, a free
+    /// parameter.
     pub fn outward(&self, delta: f64) -> Option<Jump> {
         (self.gamma > 1.0).then(|| self.jump(delta))
     }

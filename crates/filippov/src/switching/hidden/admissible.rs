@@ -15,16 +15,16 @@ pub struct Admissible {
     pub multipliers: Vec<f64>,
 }
 
-/// Lists the attracting continuations: for each mode k the root lambda of its face that is stable for some
-/// scaling, if the field there leaves every other surface i on the side k_i,
+/// Lists the attracting continuations: for each mode k the root lambda of its face that is stable
+/// for some scaling, if the field there leaves every other surface i on the side k_i,
 ///
 /// ```text
 /// k_i g_i(lambda) > 0 for all i with k_i != 0,
 /// ```
 ///
-/// and for two surfaces with rotating fields and gamma > 1 the outward spiral. Several entries mean that the
-/// Filippov solution from such a point is not unique. For three and more surfaces, spirals around two of them
-/// while a third one is left are not looked for.
+/// and for two surfaces with rotating fields and gamma > 1 the outward spiral. Several entries mean
+/// that the Filippov solution from such a point is not unique. For three and more surfaces, spirals
+/// around two of them while a third one is left are not looked for.
 pub fn admissible(fields: &NormalFields) -> Vec<Admissible> {
     let mut found = Vec::new();
     let mut mode = vec![-1_i8; fields.m()];

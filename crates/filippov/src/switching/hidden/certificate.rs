@@ -4,9 +4,9 @@ use crate::switching::normal_fields::NormalFields;
 use crate::switching::roots::newton;
 use crate::tolerances::{HIDDEN_OUTWARDS, HIDDEN_REST, HIDDEN_REST_REACH};
 
-/// The multipliers at which the motion comes to rest on the face of these sides, if it is sure to do so: the
-/// components within the transition move no more, Newton's method finds an attracting rest point
-/// next to them, and there all clipped components move outwards.
+/// The multipliers at which the motion comes to rest on the face of these sides, if it is sure to
+/// do so: the components within the transition move no more, Newton's method finds an attracting
+/// rest point next to them, and there all clipped components move outwards.
 pub(super) fn rest_on_face(
     fields: &NormalFields,
     sides: &[i8],

@@ -5,8 +5,8 @@ use crate::tolerances::{SHORTEST_PIECE, ZERO_SEARCHES};
 /// The first time in (0, end] at which `p`, not negative at 0, becomes negative. A zero at 0 itself is
 /// divided out.
 ///
-/// Intervals are excluded, or found to be monotone, by a bound of the derivative, and halved otherwise: no
-/// pair of zeros is lost, except one nearer together than rounding.
+/// Intervals are excluded, or found to be monotone, by a bound of the derivative, and halved
+/// otherwise: no pair of zeros is lost, except one nearer together than rounding.
 pub(super) fn first_loss(p: &[f64], end: f64) -> Option<f64> {
     let p = if p[0] > 0.0 { p } else { &p[1..] };
     if p[0] < 0.0 {
@@ -34,7 +34,8 @@ enum Look {
     Unclear,
 }
 
-/// p(a) >= 0 is known. The derivative at the middle and a bound of the second one settle most intervals.
+/// p(a) >= 0 is known. The derivative at the middle and a bound of the second one settle most
+/// intervals.
 fn look(p: &[f64], a: f64, b: f64, end: f64) -> Look {
     let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
     let slope = derivative(p, middle);

@@ -1,5 +1,6 @@
 //! Hidden dynamics of two surfaces, exact from event to event.
 
+use super::basin::Basin;
 use super::cell::{Cell, StepEnd};
 use super::returns::{Returns, Verdict};
 use super::strip::{Strip, StripEnd};
@@ -7,7 +8,7 @@ use super::{clipped, side, Outcome};
 use crate::mode::Mode;
 use crate::switching::codim2::{Bilinear, Lap};
 use crate::switching::normal_fields::NormalFields;
-use crate::tolerances::{AT_THE_ROOT, MOST_PIECES};
+use crate::tolerances::MOST_PIECES;
 
 /// Follows the motion from u, piece by piece: corner, strip, or a step within the square.
 ///
@@ -15,6 +16,7 @@ use crate::tolerances::{AT_THE_ROOT, MOST_PIECES};
 /// |---|---|
 /// | a corner whose field points outwards in both components | region |
 /// | a strip with an attracting rest point at which the clipped component grows | sliding on one |
+/// | the basin of a stable root | sliding on both |
 /// | a return to the half line {y = P.y, x > P.x} that is not further out than the last | sliding on both |
 /// | rotating fields with gamma > 1, and returns that have come far out | outward spiral |
 pub(super) fn limit(fields: &NormalFields, u: [f64; 2]) -> Outcome {
@@ -32,7 +34,7 @@ struct Plane {
     bilinear: Bilinear,
     /// The only root that a cycle can enclose.
     root: Option<[f64; 2]>,
-    root_is_stable: bool,
+    basin: Option<Basin>,
     gamma: Option<f64>,
     square: Cell,
     returns: Returns,
@@ -43,15 +45,11 @@ impl Plane {
         let bilinear = Bilinear::of_fields(fields);
         let root = bilinear.root().filter(|root| root.in_square());
         let root = root.map(|root| root.point);
-        let trace = root.map(|point| {
-            let jacobian = bilinear.jacobian(point);
-            jacobian[0][0] + jacobian[1][1]
-        });
         Plane {
             u,
             bilinear,
             root,
-            root_is_stable: trace.is_some_and(|trace| trace < 0.0),
+            basin: root.and_then(|root| Basin::around(&bilinear, root)),
             gamma: Lap::around(fields, [-1, -1]).map(|lap| lap.gamma),
             square: Cell::new(fields, &[0, 0]),
             returns: Returns::default(),
@@ -148,10 +146,8 @@ impl Plane {
     }
 
     fn step_in_square(&mut self, velocity: [f64; 2]) -> Option<Outcome> {
-        if let Some([x, y]) = self.root.filter(|_| self.root_is_stable) {
-            if (self.u[0] - x).hypot(self.u[1] - y) < AT_THE_ROOT {
-                return Some(self.stays(false));
-            }
+        if self.basin.is_some_and(|basin| basin.contains(self.u)) {
+            return Some(self.stays(false));
         }
         if velocity == [0.0, 0.0] {
             return Some(Outcome::AtRest);
@@ -168,14 +164,14 @@ impl Plane {
     fn note_return(&mut self, distance: f64) -> Option<Outcome> {
         match self.returns.note(distance) {
             Verdict::Open => None,
-            Verdict::ToTheRoot => Some(self.stays(!self.root_is_stable)),
+            Verdict::ToTheRoot => Some(self.stays(self.basin.is_none())),
             Verdict::ToACycle => Some(self.stays(true)),
             Verdict::TooMany => Some(self.out_of_work()),
-            Verdict::Far => match self.gamma.filter(|&gamma| gamma > 1.0) {
-                Some(gamma) => Some(Outcome::OutwardSpiral { gamma }),
-                // Without rotation for ever the next laps come back, or end in a certificate.
-                None => None,
-            },
+            // Without rotation for ever the next laps come back, or end in a certificate.
+            Verdict::Far => {
+                let gamma = self.gamma.filter(|&gamma| gamma > 1.0);
+                gamma.map(|gamma| Outcome::OutwardSpiral { gamma })
+            }
         }
     }
 
@@ -189,7 +185,7 @@ impl Plane {
 
     fn out_of_work(&self) -> Outcome {
         if self.returns.contracts() {
-            self.stays(!self.root_is_stable)
+            self.stays(self.basin.is_none())
         } else {
             Outcome::Unknown
         }

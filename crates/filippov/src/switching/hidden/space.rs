@@ -74,8 +74,9 @@ fn oscillation(fields: &NormalFields, mode: &[i8]) -> Outcome {
 
 /// The range of each component over windows of time, each twice as long as the one before.
 ///
-/// A component that oscillates has the same range in both; one that grows leaves its range. This is an
-/// observation, not a proof: growth by less than the tolerance over thousands of oscillations is not seen.
+/// A component that oscillates has the same range in both; one that grows leaves its range. This is
+/// an observation, not a proof: growth by less than the tolerance over thousands of oscillations is
+/// not seen.
 struct Watch {
     time: f64,
     end: f64,
@@ -97,7 +98,8 @@ impl Watch {
         self.end > LAST_WATCH
     }
 
-    /// Notes the state after a step; at the end of a window the mode in which the motion oscillates, if so.
+    /// Notes the state after a step; at the end of a window the mode in which the motion
+    /// oscillates, if so.
     fn note(&mut self, time: f64, u: &[f64]) -> Option<Vec<i8>> {
         self.time += time;
         for (range, &v) in self.now.iter_mut().zip(u) {

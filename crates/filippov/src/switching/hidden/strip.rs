@@ -2,8 +2,8 @@
 
 use crate::tolerances::MOST_HALVINGS;
 
-/// The motion s' = alpha + beta s, w' = p + q s from (s, w): s the component within the transition, w >= 0 the
-/// distance of the other one to it.
+/// The motion s' = alpha + beta s, w' = p + q s from (s, w): s the component within the transition,
+/// w >= 0 the distance of the other one to it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Strip {
     pub s: f64,
