@@ -61,6 +61,26 @@ def test_blow_on_a_stuck_mass(width: float) -> None:
     assert lost == []
 
 
+@pytest.mark.parametrize("width", [1.0, 0.1, 0.01, 1e-3])
+def test_blow_while_sliding_on_two_surfaces(width: float) -> None:
+    lost = []
+    for centre in np.linspace(4, 7, 7):
+
+        def field(t: float, x: Any, c: float = centre) -> Any:
+            blow = 2 * np.exp(-(((t - c) / width) ** 2))
+            return [-np.sign(x[0]) + blow + 0.1 * np.sign(x[1]), -np.sign(x[1]) + 0.2]
+
+        sol = fl.solve_ivp(field, (0, 10), [1.0, 0.5])
+        modes = [switch.mode_after for switch in sol.switches]
+        if modes != [(1, 0), (0, 0), (1, 0), (0, 0)]:
+            lost.append(round(float(centre), 3))
+        else:
+            # Sliding on both, sign(x1) counts as 0.2: the blow exceeds 0.98 there.
+            start = centre - width * math.sqrt(math.log(2 / 0.98))
+            assert sol.switches[2].t == pytest.approx(start, abs=1e-9)
+    assert lost == []
+
+
 @pytest.mark.parametrize("width", [0.3, 0.03, 0.003])
 def test_gate_while_sliding_on_a_curve(width: float) -> None:
     """A pulse in time while the motion slides along the unit circle."""

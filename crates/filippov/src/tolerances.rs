@@ -44,6 +44,14 @@ pub const MARGIN_SLOPE: f64 = 8.0;
 /// Where no bounds exist after that many bisections (a root at the edge of its domain), samples decide.
 pub const UNBOUNDED_DEPTH: u32 = 6;
 
+/// The same for multipliers on intersections, whose bounds prove something only on short pieces where the fields
+/// change fast.
+pub const UNPROVED_DEPTH: u32 = 14;
+
+/// After that many pieces of a step without a proof the samples decide in the rest of it: the reason is not a short
+/// pulse, which lies in few pieces, but lasts, as near a fold of the multipliers.
+pub const MOST_UNPROVED: u32 = 64;
+
 /// Halvings of a step in the attempt to prove it free of zeros before it is searched with samples;
 /// each costs two bounds, the search at least two evaluations of the field.
 pub const PROOF_DEPTH: u32 = 3;
@@ -263,5 +271,6 @@ pub const TANGENT_TO_ALL: f64 = 1e-7;
 /// Surfaces slid on whose multipliers are bounded over a step: for more, m 2^m bounds cost more than samples.
 pub const MOST_ENCLOSED: usize = 3;
 
-/// The multipliers are sought within this distance of their values at the ends of the step.
-pub const ROOT_BOX: f64 = 0.2;
+/// The multipliers are sought within these distances of their values at the ends of the step: the larger, the more
+/// they may move; the smaller, the nearer another root may be.
+pub const ROOT_BOXES: [f64; 3] = [0.2, 0.02, 0.002];

@@ -2,7 +2,7 @@
 
 use super::certificate::{Bounds, Verdict};
 use crate::error::FieldError;
-use crate::tolerances::{MAX_DEPTH, MOST_SAMPLES, QUARTIC_REMAINDER, UNBOUNDED_DEPTH};
+use crate::tolerances::{MAX_DEPTH, MOST_SAMPLES, MOST_UNPROVED, QUARTIC_REMAINDER};
 
 /// A scalar function of theta.
 pub type Sampled<'a> = &'a mut dyn FnMut(f64) -> Result<f64, FieldError>;
@@ -90,6 +90,8 @@ pub enum Evidence<'a> {
         bounds: Bounds<'a>,
         /// The samples are of a quotient.
         divided: bool,
+        /// Where the bounds say nothing after that many bisections, the samples decide.
+        patience: u32,
     },
 }
 
@@ -126,6 +128,7 @@ pub fn first_zero_sampled(
         noise,
         evidence,
         budget: MOST_SAMPLES,
+        unproved: 0,
         result: Isolated {
             not_finite: !values.iter().all(|v| v.is_finite()),
             ..Isolated::default()
@@ -146,6 +149,8 @@ struct Search<'a, 'b> {
     noise: f64,
     evidence: Evidence<'b>,
     budget: u32,
+    /// Pieces of which nothing could be proved so far.
+    unproved: u32,
     result: Isolated,
 }
 
@@ -187,7 +192,10 @@ impl Search<'_, '_> {
         }
         let believed = match verdict {
             Verdict::Unavailable => true,
-            Verdict::Unbounded => depth >= UNBOUNDED_DEPTH,
+            Verdict::Unbounded => {
+                self.unproved += 1;
+                depth >= self.patience() || self.unproved > MOST_UNPROVED
+            }
             _ => false,
         };
         let remainder =
@@ -228,9 +236,19 @@ impl Search<'_, '_> {
         self.first(m, b, right, depth + 1)
     }
 
+    fn patience(&self) -> u32 {
+        match self.evidence {
+            Evidence::Bounds { patience, .. } => patience,
+            Evidence::Probes(_) => 0,
+        }
+    }
+
     /// What the bounds prove about a piece.
     fn verdict(&mut self, a: f64, b: f64, middle: f64) -> Verdict {
-        let Evidence::Bounds { bounds, divided } = &mut self.evidence else {
+        let Evidence::Bounds {
+            bounds, divided, ..
+        } = &mut self.evidence
+        else {
             return Verdict::Unavailable;
         };
         let middle = (!*divided).then_some(middle);

@@ -13,9 +13,9 @@ use crate::event::tube::Tube;
 use crate::event::{EventFunction, Monitored};
 use crate::field::IntersectionExit;
 use crate::stepper::Interpolant;
-use crate::switching::{enclose_root, EnclosedRoot};
+use crate::switching::{enclose_root, EnclosedRoot, RootBounds};
 use crate::system::PiecewiseSystem;
-use crate::tolerances::{MARGIN, MOST_ENCLOSED, PROOF_DEPTH, ROOT_BOX};
+use crate::tolerances::{MARGIN, MOST_ENCLOSED, PROOF_DEPTH, ROOT_BOXES};
 
 /// The continuous extension of a step, as far as it bounds what is monitored.
 pub(super) struct BoundedCurve<'a> {
@@ -36,8 +36,8 @@ pub(super) struct BoundedCurve<'a> {
 /// A piece with the bounds of both normal components.
 pub(super) type Piece = (f64, f64, [Enclosure; 2]);
 
-/// A piece with the bounds of the multipliers, if they are proved.
-pub(super) type RootPiece = (f64, f64, Option<EnclosedRoot>);
+/// A piece with the bounds of the multipliers.
+pub(super) type RootPiece = (f64, f64, RootBounds);
 
 impl BoundedCurve<'_> {
     /// The bounds of a function from theta = `a` to `b`, if the system can give any.
@@ -67,30 +67,15 @@ impl BoundedCurve<'_> {
         let known = last.take().filter(|last| (last.0, last.1) == (a, b));
         let piece = match known {
             Some(piece) => piece,
-            None => (
-                a,
-                b,
-                enclose_root(&self.all_components(a, b)?, &self.guess()),
-            ),
+            None => (a, b, self.enclosed_root(a, b)?),
         };
-        let (_, _, root) = last.insert(piece);
-        let value = root
-            .as_ref()
-            .map(|root| match IntersectionExit::of(index, m) {
-                IntersectionExit::Side { position, end } => {
-                    Interval::point(1.0) + root.multipliers[position].scaled(-f64::from(end))
-                }
-                // The root is the only one in its box: it meets no other.
-                IntersectionExit::Fold => Interval::point(f64::MAX),
-                // Each entry is in units of its surface: only the signs count here.
-                IntersectionExit::Stability if m == 2 => {
-                    let [a, b] = [root.diagonal[0].hi, root.diagonal[1].hi];
-                    Interval::hull(-a.min(b), f64::MAX)
-                }
-                IntersectionExit::Stability => Interval::ALL,
-            });
+        let value = match &last.insert(piece).2 {
+            RootBounds::Proved(root) => exit_bound(IntersectionExit::of(index, m), root)?,
+            RootBounds::Unproved => Interval::ALL,
+            RootBounds::Singular => return None,
+        };
         Some(Bound {
-            value: value.unwrap_or(Interval::ALL),
+            value,
             slope: Interval::ALL,
         })
     }
@@ -117,17 +102,6 @@ impl BoundedCurve<'_> {
         Some(components)
     }
 
-    /// A box in which the multipliers are sought: between their values at the ends of the step, and some more.
-    fn guess(&self) -> Vec<Interval> {
-        let exits = self.stages.chunks_exact(2).take(self.sliding.len());
-        let ends = exits.map(|pair| Interval::hull(pair[0][0] - 1.0, pair[0][6] - 1.0));
-        ends.map(|l| Interval {
-            lo: l.lo - ROOT_BOX,
-            hi: l.hi + ROOT_BOX,
-        })
-        .collect()
-    }
-
     fn normal_components(&self, j: usize, a: f64, b: f64) -> Option<[Enclosure; 2]> {
         if let Some((_, _, known)) = self.last.get().filter(|last| (last.0, last.1) == (a, b)) {
             return Some(known);
@@ -139,6 +113,42 @@ impl BoundedCurve<'_> {
         self.last.set(Some((a, b, components)));
         Some(components)
     }
+
+    /// The multipliers on a piece, from boxes around their values at the ends of the step.
+    fn enclosed_root(&self, a: f64, b: f64) -> Option<RootBounds> {
+        let components = self.all_components(a, b)?;
+        let exits = self.stages.chunks_exact(2).take(self.sliding.len());
+        let ends = exits.map(|pair| Interval::hull(pair[0][0] - 1.0, pair[0][6] - 1.0));
+        let ends: Vec<Interval> = ends.collect();
+        let boxes = ROOT_BOXES.into_iter().map(|radius| {
+            let wider = |l: &Interval| Interval::hull(l.lo - radius, l.hi + radius);
+            enclose_root(&components, &ends.iter().map(wider).collect::<Vec<_>>())
+        });
+        let mut found = RootBounds::Unproved;
+        for bounds in boxes {
+            found = bounds;
+            if !matches!(found, RootBounds::Unproved) {
+                break;
+            }
+        }
+        Some(found)
+    }
+}
+
+/// Bounds of an exit function where the multipliers are bounded; none for the stability of three and more.
+fn exit_bound(exit: IntersectionExit, root: &EnclosedRoot) -> Option<Interval> {
+    Some(match exit {
+        IntersectionExit::Side { position, end } => {
+            Interval::point(1.0) + root.multipliers[position].scaled(-f64::from(end))
+        }
+        // The root is the only one in its box: it meets no other.
+        IntersectionExit::Fold => Interval::point(f64::MAX),
+        // Each entry is in units of its surface: only the sign counts.
+        IntersectionExit::Stability => match root.diagonal[..] {
+            [first, second] => Interval::hull(-first.hi.min(second.hi), f64::MAX),
+            _ => return None,
+        },
+    })
 }
 
 impl Integrator<'_> {

@@ -15,7 +15,10 @@ use crate::event::locate::refine;
 use crate::event::{Deflation, EventFunction, Monitored};
 use crate::stepper::nested;
 use crate::system::{dot, PiecewiseSystem};
-use crate::tolerances::{EPS, EXTRAPOLATION, ONE_SIDED_AIM, POLE, RESOLVED_DEPTH, SURFACE_NOISE};
+use crate::tolerances::{
+    EPS, EXTRAPOLATION, ONE_SIDED_AIM, POLE, RESOLVED_DEPTH, SURFACE_NOISE, UNBOUNDED_DEPTH,
+    UNPROVED_DEPTH,
+};
 
 /// Scratch space of the event stage, and values at the end of the step.
 pub(super) struct Detector {
@@ -348,6 +351,10 @@ impl Integrator<'_> {
             (_, true) => Evidence::Bounds {
                 bounds: &mut over,
                 divided: m.deflation.is_some(),
+                patience: match m.function {
+                    EventFunction::Exit(_) => UNPROVED_DEPTH,
+                    _ => UNBOUNDED_DEPTH,
+                },
             },
             // Along the step an affine surface is a quintic; the quartic and its remainder describe it.
             (EventFunction::Surface(_), _) if m.affine => Evidence::Probes(&[]),

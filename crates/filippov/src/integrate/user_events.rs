@@ -9,7 +9,7 @@ use crate::event::locate::refine;
 use crate::event::tube::Tube;
 use crate::event::{UserEvent, UserFunction};
 use crate::stepper::Interpolant;
-use crate::tolerances::{EPS, MOST_ZEROS};
+use crate::tolerances::{EPS, MOST_ZEROS, UNBOUNDED_DEPTH};
 
 /// A zero of a user's function.
 #[derive(Clone, Debug, PartialEq)]
@@ -165,6 +165,7 @@ impl Integrator<'_> {
                 let evidence = Evidence::Bounds {
                     bounds: &mut bounds,
                     divided,
+                    patience: UNBOUNDED_DEPTH,
                 };
                 let isolated = first_zero(&mut g, from, theta, noise, evidence)?;
                 if isolated.exhausted && !isolated.not_finite {

@@ -4,6 +4,11 @@ use filippov_expr::Interval;
 
 use super::small_matrix::Matrix;
 
+/// Boxes tried.
+const WIDENINGS: usize = 4;
+/// A box wider than this says nothing about multipliers in [-1, 1].
+const WIDEST: f64 = 8.0;
+
 /// What is known of the multipliers of sliding on m surfaces over a piece of motion.
 #[derive(Clone, Debug)]
 pub struct EnclosedRoot {
@@ -13,9 +18,20 @@ pub struct EnclosedRoot {
     pub diagonal: Vec<Interval>,
 }
 
+/// What could be said of the multipliers.
+#[derive(Clone, Debug)]
+pub enum RootBounds {
+    /// They are proved to lie there.
+    Proved(EnclosedRoot),
+    /// The bounds are too wide to prove anything; shorter pieces may do.
+    Unproved,
+    /// The equations do not determine the multipliers.
+    Singular,
+}
+
 /// Encloses the root of the canopy equations for all normal components within `components`
-/// (`[pattern * m + j]`, as in [`super::NormalFields`]): proved to exist, and to be the only one, in the box of
-/// `guess`. `None` if that is not proved.
+/// (`[pattern * m + j]`, as in [`super::NormalFields`]): proved to exist, and to be the only one, in a box
+/// around `guess`, which is widened a few times.
 ///
 /// Krawczyk's operator: with lambda_0 the middle of the box L and C an approximate inverse of G(lambda_0),
 ///
@@ -25,7 +41,36 @@ pub struct EnclosedRoot {
 ///
 /// Reference: R. Krawczyk, Newton-Algorithmen zur Bestimmung von Nullstellen mit Fehlerschranken, *Computing* 4
 /// (1969); Moore, Kearfott, Cloud (2009), chapter 8.
-pub fn enclose_root(components: &[Interval], guess: &[Interval]) -> Option<EnclosedRoot> {
+pub fn enclose_root(components: &[Interval], guess: &[Interval]) -> RootBounds {
+    let mut guess = guess.to_vec();
+    for _ in 0..WIDENINGS {
+        let Some((image, diagonal)) = krawczyk(components, &guess) else {
+            return RootBounds::Singular;
+        };
+        let mut pairs = image.iter().zip(&guess);
+        if pairs.all(|(k, l)| k.lo > l.lo && k.hi < l.hi) {
+            return RootBounds::Proved(EnclosedRoot {
+                multipliers: image,
+                diagonal,
+            });
+        }
+        for (l, k) in guess.iter_mut().zip(&image) {
+            let (lo, hi) = (l.lo.min(k.lo), l.hi.max(k.hi));
+            let more = 0.1 * (hi - lo);
+            *l = Interval::hull(lo - more, hi + more);
+        }
+        if guess
+            .iter()
+            .any(|l| !l.is_bounded() || l.hi - l.lo > WIDEST)
+        {
+            break;
+        }
+    }
+    RootBounds::Unproved
+}
+
+/// The image of a box, and the diagonal of G in it; `None` if G is singular.
+fn krawczyk(components: &[Interval], guess: &[Interval]) -> Option<(Vec<Interval>, Vec<Interval>)> {
     let m = guess.len();
     let middle: Vec<Interval> = guess
         .iter()
@@ -61,16 +106,10 @@ pub fn enclose_root(components: &[Interval], guess: &[Interval]) -> Option<Enclo
             }
             k = k + defect * (guess[p] - middle[p]);
         }
-        if !(k.lo > guess[i].lo && k.hi < guess[i].hi) {
-            return None;
-        }
         multipliers.push(k);
     }
     let diagonal = (0..m).map(|i| jacobian[i][i]).collect();
-    Some(EnclosedRoot {
-        multipliers,
-        diagonal,
-    })
+    Some((multipliers, diagonal))
 }
 
 /// Half the differences of the values in direction `axis`, for all patterns of the other bits (those with
@@ -84,17 +123,18 @@ fn differences(values: &[Interval], axis: usize) -> Vec<Interval> {
 }
 
 /// The multilinear interpolant at a box, one axis after the other; `skip` is an axis that the values do not
-/// depend on.
+/// depend on. It is linear along each axis, so that the ends of the box bound it.
 fn interpolate(mut values: Vec<Interval>, at: &[Interval], skip: Option<usize>) -> Interval {
     for (axis, l) in at.iter().enumerate().rev() {
         let half = 1 << axis;
         for pattern in 0..half {
             let (minus, plus) = (values[pattern], values[pattern + half]);
+            let blend = |l: f64| minus.scaled(0.5 * (1.0 - l)) + plus.scaled(0.5 * (1.0 + l));
             values[pattern] = if skip == Some(axis) {
                 minus
             } else {
-                let share = (*l + Interval::point(1.0)).scaled(0.5);
-                minus + share * (plus - minus)
+                let (low, high) = (blend(l.lo), blend(l.hi));
+                Interval::hull(low.lo.min(high.lo), low.hi.max(high.hi))
             };
         }
     }
@@ -109,7 +149,14 @@ mod tests {
         Interval::around(value, radius)
     }
 
-    /// g_i = c_i - lambda_i, with c_i within 0.1 of (0.5, 0.2): the root is c.
+    fn proved(components: &[Interval], guess: &[Interval]) -> Vec<Interval> {
+        match enclose_root(components, guess) {
+            RootBounds::Proved(root) => root.multipliers,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// g_i = c_i - lambda_i, with c_i within 0.1 of (0.5, 0.2): the root is c, wherever the search begins.
     #[test]
     fn root_of_two_independent_equations() {
         let mut components = Vec::new();
@@ -119,16 +166,23 @@ mod tests {
                 components.push(around(c - side, 0.1));
             }
         }
-        let guess = [around(0.5, 0.4), around(0.2, 0.4)];
-        let found = enclose_root(&components, &guess).map(|root| root.multipliers);
-        let Some(found) = found else {
-            panic!("not proved")
-        };
-        assert!(found[0].lo <= 0.4 && found[0].hi >= 0.6 && found[0].lo > 0.2 && found[0].hi < 0.8);
-        assert!(found[1].lo <= 0.1 && found[1].hi >= 0.3);
-        // With the root outside of the box nothing is claimed.
-        let elsewhere = [around(-0.5, 0.4), around(0.2, 0.4)];
-        assert!(enclose_root(&components, &elsewhere).is_none());
+        for start in [[0.5, 0.2], [-0.5, 0.2], [0.9, -0.9]] {
+            let found = proved(&components, &start.map(|l| around(l, 0.2)));
+            assert!(found[0].lo <= 0.4 && found[0].hi >= 0.6);
+            assert!(found[0].lo > -0.2 && found[0].hi < 1.2);
+            assert!(found[1].lo <= 0.1 && found[1].hi >= 0.3);
+        }
+    }
+
+    /// A surface to which all fields are tangent leaves its multiplier open.
+    #[test]
+    fn undetermined_multipliers_are_refused() {
+        let components = [0.0, -1.0, 0.0, -1.0, 0.0, 1.0, 0.0, 1.0].map(Interval::point);
+        let guess = [around(0.0, 0.2), around(0.0, 0.2)];
+        assert!(matches!(
+            enclose_root(&components, &guess),
+            RootBounds::Singular
+        ));
     }
 
     /// Equations with a product, moving within bounds: the roots of samples lie within the enclosure.
@@ -152,11 +206,9 @@ mod tests {
         };
         let centre = root(0.0);
         let guess: Vec<Interval> = centre.iter().map(|&l| around(l, 0.2)).collect();
-        let Some(found) = enclose_root(&components, &guess) else {
-            panic!("not proved")
-        };
+        let found = proved(&components, &guess);
         for k in -10..=10 {
-            for (bound, l) in found.multipliers.iter().zip(root(0.002 * f64::from(k))) {
+            for (bound, l) in found.iter().zip(root(0.002 * f64::from(k))) {
                 assert!(bound.lo <= l && l <= bound.hi, "{l} not in {bound:?}");
             }
         }

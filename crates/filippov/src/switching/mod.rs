@@ -23,7 +23,7 @@ mod stability;
 
 pub use accumulation::{accumulate, Accumulation, Return};
 pub use codim1::{decide, Arrival, Decision};
-pub use enclosed_root::{enclose_root, EnclosedRoot};
+pub use enclosed_root::{enclose_root, EnclosedRoot, RootBounds};
 pub use hidden::{
     admissible, limit as limit_of_hidden_dynamics, Admissible, Outcome as HiddenOutcome,
 };
