@@ -98,3 +98,12 @@ pub const ARRIVED: f64 = 1e-3;
 
 /// That many switches without any progress of time end a run.
 pub const MOST_SWITCHES_AT_ONE_TIME: u32 = 64;
+
+/// A linear system whose rows and columns have size 1 is singular if a pivot is below this number times the
+/// number of unknowns: elimination leaves about one rounding error per unknown, amplified by the few
+/// decades that physical coefficients spread over.
+pub const SINGULAR_PIVOT: f64 = 64.0 * EPS;
+
+/// Unknowns with entries below this fraction of the largest have no part in a vector of the null space:
+/// rounding errors of elimination are far below it, genuine shares far above.
+pub const NULL_VECTOR_ENTRY: f64 = 1e-6;
