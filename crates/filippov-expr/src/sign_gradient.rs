@@ -155,11 +155,9 @@ impl<'g> Sweep<'g> {
                     }
                 }
             }
-            Node::Binary(BinaryOp::Div, a, b) => {
-                if graph.facts(a).has_sign {
-                    let change = graph.div(adjoint, b);
-                    give(graph, a, change);
-                }
+            Node::Binary(BinaryOp::Div, a, b) if graph.facts(a).has_sign => {
+                let change = graph.div(adjoint, b);
+                give(graph, a, change);
             }
             _ => {}
         }

@@ -27,6 +27,14 @@ pub struct Singular {
     pub unknowns: Vec<usize>,
 }
 
+/// Components that are factored together.
+#[derive(Clone, Debug)]
+struct Block {
+    joined: Component,
+    /// Unknowns of the largest of them.
+    largest: usize,
+}
+
 /// Factors and solves square systems. The ordering is kept while the pattern stays the same.
 ///
 /// # Example
@@ -43,17 +51,19 @@ pub struct Singular {
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct SparseSolver {
-    /// The pattern that the components belong to: columns of each row, row lengths in front.
+    /// The pattern that the blocks belong to: columns of each row, row lengths in front.
     ordered: Vec<usize>,
-    components: Vec<Component>,
+    blocks: Vec<Block>,
     factors: Vec<BandLu>,
     /// Rows and columns are divided by these before elimination.
     row_scale: Vec<f64>,
     column_scale: Vec<f64>,
-    /// For each unknown its place in its component.
+    /// For each unknown its place in its block.
     place: Vec<usize>,
     buffer: Vec<f64>,
     n_orderings: usize,
+    /// Of factors that other orderings replaced.
+    n_operations_before: usize,
 }
 
 impl SparseSolver {
@@ -67,7 +77,8 @@ impl SparseSolver {
     pub fn factor(&mut self, matrix: &SparseRows) -> Result<(), Singular> {
         self.order(matrix);
         self.scale(matrix);
-        for (component, factor) in self.components.iter().zip(&mut self.factors) {
+        for (block, factor) in self.blocks.iter().zip(&mut self.factors) {
+            let component = &block.joined;
             factor.reset(component.unknowns.len(), component.bandwidth);
             for (i, &row) in component.unknowns.iter().enumerate() {
                 for (column, value) in matrix.row(row) {
@@ -75,7 +86,7 @@ impl SparseSolver {
                     factor.add(i, self.place[column], scaled);
                 }
             }
-            let threshold = SINGULAR_PIVOT * component.unknowns.len() as f64;
+            let threshold = SINGULAR_PIVOT * block.largest as f64;
             if let Err(null) = factor.factor(threshold) {
                 let scaled = component.unknowns.iter().zip(null);
                 return Err(Singular {
@@ -88,7 +99,8 @@ impl SparseSolver {
 
     /// Solves in place with the matrix factored last.
     pub fn solve(&mut self, x: &mut [f64]) {
-        for (component, factor) in self.components.iter().zip(&mut self.factors) {
+        for (block, factor) in self.blocks.iter().zip(&mut self.factors) {
+            let component = &block.joined;
             self.buffer.clear();
             let scaled = component.unknowns.iter().map(|&i| x[i] / self.row_scale[i]);
             self.buffer.extend(scaled);
@@ -102,7 +114,7 @@ impl SparseSolver {
     /// What couples the unknowns of the matrix factored last.
     pub fn pattern(&self) -> Pattern {
         let n: usize = self.place.len();
-        let bandwidth = self.components.iter().map(|c| c.bandwidth).max();
+        let bandwidth = self.blocks.iter().map(|block| block.joined.bandwidth).max();
         match bandwidth {
             None | Some(0) => Pattern::Diagonal,
             Some(b) if b + 1 == n => Pattern::Dense,
@@ -112,7 +124,8 @@ impl SparseSolver {
 
     /// Multiplications and divisions of all factorisations and solutions.
     pub fn n_operations(&self) -> usize {
-        self.factors.iter().map(|factor| factor.n_operations).sum()
+        let now: usize = self.factors.iter().map(|factor| factor.n_operations).sum();
+        self.n_operations_before + now
     }
 
     /// How often an ordering was looked for.
@@ -128,15 +141,12 @@ impl SparseSolver {
             return;
         }
         self.ordered = key.collect();
-        self.components = components(matrix);
-        let operations = self.n_operations();
-        self.factors = vec![BandLu::default(); self.components.len()];
-        if let Some(first) = self.factors.first_mut() {
-            first.n_operations = operations;
-        }
+        self.blocks = blocks(components(matrix));
+        self.n_operations_before = self.n_operations();
+        self.factors = vec![BandLu::default(); self.blocks.len()];
         self.place = vec![0; n];
-        for component in &self.components {
-            for (place, &i) in component.unknowns.iter().enumerate() {
+        for block in &self.blocks {
+            for (place, &i) in block.joined.unknowns.iter().enumerate() {
                 self.place[i] = place;
             }
         }
@@ -163,6 +173,26 @@ impl SparseSolver {
             *size = or_one(*size);
         }
     }
+}
+
+/// Components of the same bandwidth joined: nothing couples them, and one band serves them all.
+fn blocks(mut components: Vec<Component>) -> Vec<Block> {
+    components.sort_by_key(|component| component.bandwidth);
+    let mut blocks: Vec<Block> = Vec::new();
+    for component in components {
+        let size = component.unknowns.len();
+        match blocks.last_mut() {
+            Some(last) if last.joined.bandwidth == component.bandwidth => {
+                last.joined.unknowns.extend(component.unknowns);
+                last.largest = last.largest.max(size);
+            }
+            _ => blocks.push(Block {
+                joined: component,
+                largest: size,
+            }),
+        }
+    }
+    blocks
 }
 
 /// The unknowns that take part in a vector of the null space.

@@ -47,13 +47,13 @@ impl AffineModel {
             conflicts[k as usize].push(j);
         }
         let (mut time_rates, mut gradients) = (Vec::new(), Vec::new());
-        for j in 0..d {
+        for (j, conflicts) in conflicts.iter_mut().enumerate() {
             let Gradient { time, states } = graph.gradient(graph.surface(j as u32));
             let nodes: Vec<NodeId> = [time]
                 .into_iter()
                 .chain(states.iter().map(|s| s.1))
                 .collect();
-            conflicts[j].extend(signs_in(&graph, &nodes));
+            conflicts.extend(signs_in(&graph, &nodes));
             time_rates.push(source(&graph, time, &mut outputs));
             let entries = states.iter();
             let row = entries.map(|&(i, node)| (i as usize, source(&graph, node, &mut outputs)));
