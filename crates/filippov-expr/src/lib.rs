@@ -36,6 +36,7 @@
 //! `print`, `serial`, [`program`] (native code by Cranelift, or a portable interpreter), and [`enclosure`]
 //! (rigorous bounds along pieces of motions).
 
+pub mod blend;
 pub mod derivative;
 pub mod enclosure;
 mod error;
@@ -51,11 +52,13 @@ mod print;
 pub mod program;
 mod schedule;
 mod serial;
+mod sign_gradient;
 mod simplify;
 mod spelling;
 pub mod switching;
 mod tape;
 
+pub use blend::SignDependence;
 pub use derivative::{Gradient, Wrt};
 pub use enclosure::{Enclosure, EnclosureProgram, Motion};
 pub use error::ExprError;

@@ -38,6 +38,7 @@ mod integrate;
 mod mode;
 mod options;
 mod solution;
+pub mod sparse;
 pub mod stepper;
 pub mod switching;
 mod system;
@@ -50,4 +51,7 @@ pub use mode::{Mode, Signs};
 pub use options::{NonUnique, Options};
 pub use solution::{Segment, Side, Solution, Switch, UserZero};
 pub use switching::Kind;
-pub use system::{BothSides, ClosureSystem, LieValue, PiecewiseSystem, TracedSystem, Word};
+pub use system::{
+    AffineParts, AffineSigns, BothSides, ClosureSystem, LieValue, PiecewiseSystem, SingularSliding,
+    TracedSystem, Word,
+};

@@ -274,3 +274,20 @@ pub const MOST_ENCLOSED: usize = 3;
 /// The multipliers are sought within these distances of their values at the ends of the step: the larger, the more
 /// they may move; the smaller, the nearer another root may be.
 pub const ROOT_BOXES: [f64; 3] = [0.2, 0.02, 0.002];
+
+/// A linear system whose rows and columns have size 1 is singular if a pivot is below this number times the
+/// number of unknowns: elimination leaves about one rounding error per unknown, amplified by the few
+/// decades that physical coefficients spread over.
+pub const SINGULAR_PIVOT: f64 = 64.0 * EPS;
+
+/// Unknowns with entries below this fraction of the largest have no part in a vector of the null space:
+/// rounding errors of elimination are far below it, genuine shares far above.
+pub const NULL_VECTOR_ENTRY: f64 = 1e-6;
+
+/// The rate of a switching function in a relay problem counts as zero below this fraction of the sum of the
+/// magnitudes it is made of: as [`TANGENT`], and for the same reason.
+pub const RELAY_ZERO: f64 = TANGENT;
+
+/// Share of a row that is taken off the diagonal of a singular relay problem. Proximal steps then converge by
+/// about this factor each; the damped matrix has half of the digits left.
+pub const RELAY_DAMPING: f64 = 1e-6;

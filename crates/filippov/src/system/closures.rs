@@ -1,6 +1,6 @@
 //! A system given by Rust closures.
 
-use super::{dot, dot_magnitude, LieValue, PiecewiseSystem, Word};
+use super::{dot, dot_magnitude, AffineSigns, LieValue, PiecewiseSystem, Word};
 use crate::error::FieldError;
 use crate::tolerances::EPS;
 
@@ -27,6 +27,7 @@ pub struct ClosureSystem<F, H> {
     n_surfaces: usize,
     field: F,
     surfaces: H,
+    is_affine_in_signs: bool,
 }
 
 impl<F, H> ClosureSystem<F, H>
@@ -42,7 +43,16 @@ where
             n_surfaces,
             field,
             surfaces,
+            is_affine_in_signs: false,
         }
+    }
+
+    /// Declares that the field is affine in the signs, f = a(t, x) + B(t, x) s, and that the gradients of the
+    /// switching functions do not depend on them: sliding on m surfaces then takes m + 1 evaluations.
+    #[must_use]
+    pub fn with_affine_signs(mut self) -> Self {
+        self.is_affine_in_signs = true;
+        self
     }
 }
 
@@ -68,6 +78,21 @@ where
         (self.surfaces)(t, x, h);
         Ok(())
     }
+
+    fn affine_signs(&self) -> Option<&dyn AffineSigns> {
+        if self.is_affine_in_signs {
+            Some(self)
+        } else {
+            None
+        }
+    }
+}
+
+impl<F, H> AffineSigns for ClosureSystem<F, H>
+where
+    F: Fn(f64, &[f64], &[f64], &mut [f64]) + Sync,
+    H: Fn(f64, &[f64], &mut [f64]) + Sync,
+{
 }
 
 /// Lie derivatives by differences: order one from the gradient, each further order by a difference

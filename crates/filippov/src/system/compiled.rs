@@ -8,6 +8,7 @@ use filippov_expr::{
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 
+use super::affine_model::AffineModel;
 use super::tiered::{compile, TieredProgram};
 use super::Word;
 
@@ -24,6 +25,7 @@ pub(super) struct Model {
     pub field_program: Program,
     pub surfaces_program: TieredProgram,
     rates_program: OnceLock<TieredProgram>,
+    affine_signs: OnceLock<AffineModel>,
     pub affine: Vec<bool>,
     gradients: Vec<OnceLock<CompiledGradient>>,
     both_sides: Vec<OnceLock<TieredProgram>>,
@@ -85,6 +87,7 @@ impl Model {
             lie: Mutex::new(LieCache::default()),
             activity: Mutex::default(),
             rates_program: OnceLock::new(),
+            affine_signs: OnceLock::new(),
             field_program,
             surfaces_program,
             graph,
@@ -107,6 +110,12 @@ impl Model {
             TieredProgram::new(graph, outputs, self.backend)
         });
         rates.program()
+    }
+
+    /// Field, jumps and gradients for sliding where the field is affine in signs.
+    pub fn affine_signs(&self) -> &AffineModel {
+        let make = || AffineModel::new(&self.graph, &self.field, self.backend);
+        self.affine_signs.get_or_init(make)
     }
 
     /// The normal components and the fields of both sides, as one program that shares what they have

@@ -4,12 +4,15 @@
 //! switching function h_j(t, x). The signs are *data*: the caller says which smooth field it
 //! wants, also slightly beyond a surface, and the field never looks at the sign of h itself.
 
+mod affine;
+mod affine_model;
 mod both_sides;
 mod closures;
 mod compiled;
 mod tiered;
 mod traced;
 
+pub use affine::{AffineParts, AffineSigns, SingularSliding};
 pub use both_sides::BothSides;
 pub use closures::ClosureSystem;
 pub use traced::TracedSystem;
@@ -195,6 +198,12 @@ pub trait PiecewiseSystem: Sync {
     /// Highest order of Lie derivative worth asking for.
     fn max_lie_order(&self) -> usize {
         3
+    }
+
+    /// The system as one whose field is affine in the signs of sets of surfaces, where the multipliers of
+    /// sliding follow from a linear system; `None` if it cannot say.
+    fn affine_signs(&self) -> Option<&dyn AffineSigns> {
+        None
     }
 
     /// A readable name of surface `j` for messages.

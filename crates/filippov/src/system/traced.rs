@@ -5,7 +5,7 @@ use std::sync::Arc;
 use filippov_expr::{Backend, Enclosure, ExprError, Graph, Motion, Names, NodeId};
 
 use super::compiled::{GradientValues, Model};
-use super::{BothSides, LieValue, PiecewiseSystem, Word};
+use super::{AffineParts, AffineSigns, BothSides, LieValue, PiecewiseSystem, Word};
 use crate::error::FieldError;
 use crate::tolerances::{MAX_LIE_ORDER, TANGENT};
 
@@ -241,9 +241,31 @@ impl PiecewiseSystem for TracedSystem {
         MAX_LIE_ORDER
     }
 
+    fn affine_signs(&self) -> Option<&dyn AffineSigns> {
+        Some(self)
+    }
+
     fn surface_name(&self, j: usize) -> String {
         self.model
             .graph
             .text(self.model.graph.surface(j as u32), &self.model.names)
+    }
+}
+
+impl AffineSigns for TracedSystem {
+    fn affine_parts(&self, surfaces: &[usize]) -> Option<AffineParts> {
+        self.model.affine_signs().parts(surfaces)
+    }
+
+    fn fill_affine_parts(
+        &self,
+        t: f64,
+        x: &[f64],
+        signs: &[f64],
+        parts: &mut AffineParts,
+    ) -> Result<u64, FieldError> {
+        let compiled = self.model.affine_signs();
+        compiled.fill(t, x, signs, &self.parameters, parts);
+        Ok(1)
     }
 }

@@ -1,0 +1,202 @@
+//! Sparse matrices by rows, and their product.
+
+/// A sparse matrix by rows. The pattern is kept while values change.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SparseRows {
+    /// Where each row starts in `columns` and `values`; one entry more than rows.
+    starts: Vec<usize>,
+    columns: Vec<usize>,
+    values: Vec<f64>,
+    n_columns: usize,
+}
+
+impl SparseRows {
+    /// An empty matrix to which rows are added.
+    pub fn new(n_columns: usize) -> Self {
+        SparseRows {
+            starts: vec![0],
+            columns: Vec::new(),
+            values: Vec::new(),
+            n_columns,
+        }
+    }
+
+    /// A matrix from its dense rows; entries that are 0 are left out.
+    pub fn from_dense(rows: &[Vec<f64>]) -> Self {
+        let mut matrix = SparseRows::new(rows.first().map_or(0, Vec::len));
+        for row in rows {
+            let entries = row.iter().copied().enumerate().filter(|&(_, v)| v != 0.0);
+            matrix.push_row(entries);
+        }
+        matrix
+    }
+
+    /// Adds a row, its columns in increasing order.
+    pub fn push_row(&mut self, entries: impl IntoIterator<Item = (usize, f64)>) {
+        for (column, value) in entries {
+            self.columns.push(column);
+            self.values.push(value);
+        }
+        self.starts.push(self.columns.len());
+    }
+
+    /// Number of rows.
+    pub fn n_rows(&self) -> usize {
+        self.starts.len().saturating_sub(1)
+    }
+
+    /// Number of columns.
+    pub fn n_columns(&self) -> usize {
+        self.n_columns
+    }
+
+    /// Number of stored entries.
+    pub fn n_entries(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// Column and value of the entries of a row.
+    pub fn row(&self, i: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let range = self.starts[i]..self.starts[i + 1];
+        let values = &self.values[range.clone()];
+        self.columns[range]
+            .iter()
+            .copied()
+            .zip(values.iter().copied())
+    }
+
+    /// The columns of a row.
+    pub fn columns(&self, i: usize) -> &[usize] {
+        &self.columns[self.starts[i]..self.starts[i + 1]]
+    }
+
+    /// All values, row by row.
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// All values, row by row, to be overwritten.
+    pub fn values_mut(&mut self) -> &mut [f64] {
+        &mut self.values
+    }
+
+    /// Entry (i, i).
+    pub fn diagonal(&self, i: usize) -> f64 {
+        let found = self.row(i).find(|&(column, _)| column == i);
+        found.map_or(0.0, |(_, value)| value)
+    }
+
+    /// Row i times a vector.
+    pub fn dot(&self, i: usize, x: &[f64]) -> f64 {
+        self.row(i).map(|(column, value)| value * x[column]).sum()
+    }
+
+    /// The sum of |entry| |x| over row i: what rounding of the product is measured by.
+    pub fn magnitude(&self, i: usize, x: &[f64]) -> f64 {
+        let terms = self.row(i).map(|(column, value)| (value * x[column]).abs());
+        terms.sum()
+    }
+
+    /// The transposed matrix.
+    #[must_use]
+    pub fn transposed(&self) -> SparseRows {
+        let mut starts = vec![0; self.n_columns + 1];
+        for &column in &self.columns {
+            starts[column + 1] += 1;
+        }
+        for i in 0..self.n_columns {
+            starts[i + 1] += starts[i];
+        }
+        let mut next = starts.clone();
+        let mut columns = vec![0; self.columns.len()];
+        let mut values = vec![0.0; self.columns.len()];
+        for i in 0..self.n_rows() {
+            for (column, value) in self.row(i) {
+                let slot = next[column];
+                next[column] += 1;
+                columns[slot] = i;
+                values[slot] = value;
+            }
+        }
+        SparseRows {
+            starts,
+            columns,
+            values,
+            n_columns: self.n_rows(),
+        }
+    }
+
+    /// Rows and columns of a square matrix that `kept` lists in increasing order; `position` says for every
+    /// index where it is in `kept`, `usize::MAX` if it is not.
+    #[must_use]
+    pub fn principal(&self, kept: &[usize], position: &[usize]) -> SparseRows {
+        let mut block = SparseRows::new(kept.len());
+        for &i in kept {
+            let entries = self.row(i).filter(|&(j, _)| position[j] != usize::MAX);
+            block.push_row(entries.map(|(j, value)| (position[j], value)));
+        }
+        block
+    }
+
+    /// Are all values finite?
+    pub fn is_finite(&self) -> bool {
+        self.values.iter().all(|value| value.is_finite())
+    }
+}
+
+/// The product A B^T of two matrices whose patterns stay: which entries meet is found once.
+#[derive(Clone, Debug, Default)]
+pub struct SparseProduct {
+    /// (entry of the product, entry of A, entry of B), in the order of summation.
+    terms: Vec<(u32, u32, u32)>,
+    /// The product.
+    pub matrix: SparseRows,
+}
+
+impl SparseProduct {
+    /// Finds the pattern of A B^T. Its diagonal is always kept.
+    pub fn new(a: &SparseRows, b: &SparseRows) -> Self {
+        // For each column of B, the rows and entries that have it.
+        let mut users: Vec<Vec<(usize, u32)>> = vec![Vec::new(); b.n_columns()];
+        for j in 0..b.n_rows() {
+            for (offset, &column) in b.columns(j).iter().enumerate() {
+                users[column].push((j, (b.starts[j] + offset) as u32));
+            }
+        }
+        let mut matrix = SparseRows::new(b.n_rows());
+        let mut terms = Vec::new();
+        for i in 0..a.n_rows() {
+            let mut met = Vec::new();
+            for (offset, &column) in a.columns(i).iter().enumerate() {
+                let entry = (a.starts[i] + offset) as u32;
+                met.extend(users[column].iter().map(|&(j, other)| (j, entry, other)));
+            }
+            met.sort_unstable();
+            let mut columns: Vec<usize> = met.iter().map(|term| term.0).collect();
+            columns.extend((i < b.n_rows()).then_some(i));
+            columns.sort_unstable();
+            columns.dedup();
+            let start = matrix.n_entries();
+            for (j, entry, other) in met {
+                let slot = start + columns.partition_point(|&column| column < j);
+                terms.push((slot as u32, entry, other));
+            }
+            matrix.push_row(columns.into_iter().map(|column| (column, 0.0)));
+        }
+        SparseProduct { terms, matrix }
+    }
+
+    /// Computes the values; A and B have the patterns of [`SparseProduct::new`].
+    pub fn update(&mut self, a: &SparseRows, b: &SparseRows) {
+        self.matrix.values.fill(0.0);
+        for &(slot, entry, other) in &self.terms {
+            self.matrix.values[slot as usize] +=
+                a.values[entry as usize] * b.values[other as usize];
+        }
+    }
+
+    /// Number of multiplications of an update.
+    pub fn n_operations(&self) -> usize {
+        self.terms.len()
+    }
+}

@@ -1,0 +1,125 @@
+//! Solutions against the matrix, singular ones named, costs counted.
+
+use super::{
+    components, is_positive_definite, Pattern, Singular, SparseProduct, SparseRows, SparseSolver,
+};
+
+/// Numbers in [-1, 1), the same in every run.
+fn pseudo_random(state: &mut u64) -> f64 {
+    *state = state
+        .wrapping_mul(6_364_136_223_846_793_005)
+        .wrapping_add(1_442_695_040_888_963_407);
+    (*state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+}
+
+fn residual(matrix: &SparseRows, b: &[f64]) -> f64 {
+    let mut x = b.to_vec();
+    let mut solver = SparseSolver::default();
+    solver.factor(matrix).expect("not singular");
+    solver.solve(&mut x);
+    (0..b.len()).fold(0.0, |worst, i| {
+        f64::max(worst, (matrix.dot(i, &x) - b[i]).abs())
+    })
+}
+
+#[test]
+fn random_matrices_of_all_bandwidths_are_solved() {
+    let mut state = 1;
+    for n in [1, 2, 5, 20] {
+        for b in [0, 1, 3, n] {
+            let rows: Vec<Vec<f64>> = (0..n)
+                .map(|i: usize| {
+                    let entry = |j: usize| {
+                        if i.abs_diff(j) <= b {
+                            pseudo_random(&mut state)
+                        } else {
+                            0.0
+                        }
+                    };
+                    (0..n).map(entry).collect()
+                })
+                .collect();
+            let b: Vec<f64> = (0..n).map(|_| pseudo_random(&mut state)).collect();
+            assert!(residual(&SparseRows::from_dense(&rows), &b) < 1e-10);
+        }
+    }
+}
+
+#[test]
+fn a_shuffled_chain_is_found_to_be_tridiagonal() {
+    let place = |i: usize| i * 37 % 100;
+    let mut rows = vec![vec![0.0; 100]; 100];
+    for i in 0..100 {
+        rows[place(i)][place(i)] = 2.5;
+        if i > 0 {
+            rows[place(i)][place(i - 1)] = -1.0;
+            rows[place(i - 1)][place(i)] = -1.0;
+        }
+    }
+    let matrix = SparseRows::from_dense(&rows);
+    let found = components(&matrix);
+    assert_eq!((found.len(), found[0].bandwidth), (1, 1));
+    assert!(is_positive_definite(&matrix));
+}
+
+#[test]
+fn singular_matrices_name_the_columns_that_depend_on_one_another() {
+    let matrix = SparseRows::from_dense(&[
+        vec![1.0, 0.0, 2.0, 0.0],
+        vec![0.0, 3.0, 0.0, 1.0],
+        vec![2.0, 0.0, 4.0, 0.0],
+        vec![0.0, 1.0, 0.0, 1e-3],
+    ]);
+    let found = SparseSolver::default().factor(&matrix);
+    assert_eq!(
+        found,
+        Err(Singular {
+            unknowns: vec![0, 2]
+        })
+    );
+    // Units do not matter.
+    let tiny = SparseRows::from_dense(&[vec![1e-200, 0.0], vec![0.0, 1e150]]);
+    assert_eq!(SparseSolver::default().factor(&tiny), Ok(()));
+    let third = 1.0 / 3.0;
+    let nearly = SparseRows::from_dense(&[vec![0.1, third], vec![0.3, 1.0]]);
+    assert_eq!(
+        SparseSolver::default().factor(&nearly),
+        Err(Singular {
+            unknowns: vec![0, 1]
+        })
+    );
+}
+
+#[test]
+fn the_ordering_is_kept_with_the_pattern_and_the_cost_is_linear() {
+    let cost = |n: usize| {
+        let mut matrix = SparseRows::new(n);
+        for i in 0..n {
+            let columns = i.saturating_sub(1)..(i + 2).min(n);
+            matrix.push_row(columns.map(|j| (j, if i == j { -3.0 } else { 1.0 })));
+        }
+        let mut solver = SparseSolver::default();
+        for round in 0..3 {
+            matrix.values_mut()[0] = -3.0 - f64::from(round);
+            solver.factor(&matrix).expect("diagonally dominant");
+            solver.solve(&mut vec![1.0; n]);
+        }
+        assert_eq!(
+            (solver.n_orderings(), solver.pattern()),
+            (1, Pattern::Banded { bandwidth: 1 })
+        );
+        solver.n_operations() as f64 / n as f64
+    };
+    assert!(cost(1000) < 1.1 * cost(100));
+}
+
+#[test]
+fn products_are_those_of_the_dense_rows() {
+    let a = SparseRows::from_dense(&[vec![1.0, 0.0, 2.0], vec![0.0, 3.0, 0.0]]);
+    let b = SparseRows::from_dense(&[vec![0.0, 0.0, 5.0], vec![7.0, 0.0, 1.0]]);
+    let mut product = SparseProduct::new(&a, &b);
+    product.update(&a, &b);
+    let entries: Vec<Vec<(usize, f64)>> = (0..2).map(|i| product.matrix.row(i).collect()).collect();
+    assert_eq!(entries, [vec![(0, 10.0), (1, 9.0)], vec![(1, 0.0)]]);
+    assert_eq!(a.transposed().transposed(), a);
+}

@@ -1,0 +1,145 @@
+//! Is a matrix a P-matrix, one with positive principal minors?
+//!
+//! Decided for each connected component: minors up to [`MOST_MINORS`] unknowns, else by conditions that suffice.
+//!
+//! Reference: Cottle, Pang, Stone, *The Linear Complementarity Problem* (1992), section 3.3.
+
+use crate::sparse::{components, is_positive_definite, SparseRows, SparseSolver};
+use crate::tolerances::SINGULAR_PIVOT;
+
+/// Largest component whose minors are computed; m unknowns take about 2^m eliminations.
+const MOST_MINORS: usize = 10;
+
+/// Are all principal minors positive? `None` if that is not known.
+///
+/// Beyond [`MOST_MINORS`] coupled unknowns two classes are recognised: H-matrices with positive diagonal
+/// (diagonally dominant after some scaling of the columns), and those that some positive diagonal D makes positive
+/// definite, A D + D A^T > 0, with D tried so that A D is symmetric if it can be: friction with
+/// different coefficients.
+pub fn is_p_matrix(matrix: &SparseRows) -> Option<bool> {
+    let mut position = vec![usize::MAX; matrix.n_rows()];
+    let mut answer = Some(true);
+    for component in components(matrix) {
+        let mut unknowns = component.unknowns;
+        unknowns.sort_unstable();
+        for (place, &i) in unknowns.iter().enumerate() {
+            position[i] = place;
+        }
+        let block = matrix.principal(&unknowns, &position);
+        for &i in &unknowns {
+            position[i] = usize::MAX;
+        }
+        match decide_block(&block) {
+            Some(true) => {}
+            Some(false) => return Some(false),
+            None => answer = None,
+        }
+    }
+    answer
+}
+
+fn decide_block(block: &SparseRows) -> Option<bool> {
+    let m = block.n_rows();
+    if (0..m).any(|i| block.diagonal(i) <= 0.0) {
+        return Some(false);
+    }
+    if is_h_matrix(block) || is_diagonally_stable(block) {
+        return Some(true);
+    }
+    if m > MOST_MINORS {
+        return None;
+    }
+    let mut dense = vec![vec![0.0; m]; m];
+    for (i, row) in dense.iter_mut().enumerate() {
+        for (j, value) in block.row(i) {
+            row[j] = value / (block.diagonal(i) * block.diagonal(j)).sqrt();
+        }
+    }
+    Some(has_positive_minors(&dense))
+}
+
+/// Does the comparison matrix (|a_ii| on the diagonal, -|a_ij| beside it) map some positive vector to a positive
+/// vector? Then it is an M-matrix.
+fn is_h_matrix(block: &SparseRows) -> bool {
+    let m = block.n_rows();
+    let mut comparison = SparseRows::new(m);
+    for i in 0..m {
+        let entries = block.row(i);
+        comparison.push_row(entries.map(|(j, v)| (j, if i == j { v.abs() } else { -v.abs() })));
+    }
+    let mut solver = SparseSolver::default();
+    if solver.factor(&comparison).is_err() {
+        return false;
+    }
+    let mut weights: Vec<f64> = (0..m).map(|i| block.diagonal(i)).collect();
+    solver.solve(&mut weights);
+    weights
+        .iter()
+        .all(|&weight| weight > 0.0 && weight.is_finite())
+}
+
+/// Is A D + D A^T positive definite for the D that makes A D symmetric, or for D = 1?
+fn is_diagonally_stable(block: &SparseRows) -> bool {
+    is_positive_definite(block)
+        || symmetrising_scale(block).is_some_and(|scale| {
+            let mut scaled = SparseRows::new(block.n_columns());
+            for i in 0..block.n_rows() {
+                scaled.push_row(block.row(i).map(|(j, value)| (j, value * scale[j])));
+            }
+            is_positive_definite(&scaled)
+        })
+}
+
+/// Positive numbers with a_ij d_j = a_ji d_i along a walk through the component.
+fn symmetrising_scale(block: &SparseRows) -> Option<Vec<f64>> {
+    let transposed = block.transposed();
+    let mut scale = vec![0.0; block.n_rows()];
+    let mut order = vec![0];
+    scale[0] = 1.0;
+    let mut next = 0;
+    while next < order.len() {
+        let i = order[next];
+        next += 1;
+        for (j, value) in block.row(i) {
+            let mirrored = transposed.row(i).find(|entry| entry.0 == j)?.1;
+            if scale[j] == 0.0 {
+                scale[j] = scale[i] * mirrored / value;
+                // Also refuses a NaN.
+                let is_positive = scale[j] > 0.0 && scale[j].is_finite();
+                if !is_positive {
+                    return None;
+                }
+                order.push(j);
+            }
+        }
+    }
+    Some(scale)
+}
+
+/// By the first pivot: A is a P-matrix if a_11 > 0, and A without the first unknown and the Schur complement of
+/// a_11 both are (Tsatsomeros, Li 2000).
+fn has_positive_minors(a: &[Vec<f64>]) -> bool {
+    let Some(first) = a.first() else {
+        return true;
+    };
+    let pivot = first[0];
+    let is_positive = pivot > SINGULAR_PIVOT * a.len() as f64;
+    if !is_positive {
+        return false;
+    }
+    let rest: Vec<Vec<f64>> = a[1..].iter().map(|row| row[1..].to_vec()).collect();
+    let complement: Vec<Vec<f64>> = a[1..]
+        .iter()
+        .map(|row| {
+            let factor = row[0] / pivot;
+            let entries = row[1..].iter().zip(&first[1..]);
+            entries
+                .map(|(value, above)| value - factor * above)
+                .collect()
+        })
+        .collect();
+    has_positive_minors(&rest) && has_positive_minors(&complement)
+}
+
+#[cfg(test)]
+pub(super) mod tests;

@@ -1,0 +1,477 @@
+//! The mode at surfaces in whose signs the field is affine: a relay problem.
+//!
+//! With nu_i + (N s)_i the rate of h_i at the signs s, find s in [-1, 1]^m and v with
+//!
+//! ```text
+//! (R)   v = nu + N s,    v_i > 0 => s_i = 1,    v_i < 0 => s_i = -1,    v_i = 0 => s_i in [-1, 1].
+//! ```
+//!
+//! Where v_i is not 0 the surface is left to that side, where it is 0 the motion slides with lambda_i = s_i. A
+//! solution always exists; it is the only one for all nu if and only if -N is a P-matrix (friction).
+//!
+//! The algorithm, with one sparse linear system per step:
+//!
+//! 1. The semismooth Newton method on u -> nu + N clip(u) - (u - clip(u)): every surface in a wrong state changes
+//!    it at once. When the number of wrong states stops decreasing, only the one of least index changes,
+//!    until it is lower again. For P-matrices this is finite, and from the mode before it takes a few steps.
+//! 2. N singular on the sliding surfaces, as with redundant contacts: the same for N - diag(d) with a small d,
+//!    and its result improved by proximal steps. Of the solutions, which then differ in s but not
+//!    in v if -N is monotone, this finds the one with small s.
+//! 3. Up to [`MOST_ENUMERATED`] surfaces all 3^m modes are tried; beyond, the problem is left undecided.
+//!
+//! References: Cottle, Pang, Stone (1992); Júdice, Pires, *A block principal pivoting algorithm* (1994);
+//! Guglielmi, Hairer (2022); `docs/theory/switching.md`.
+
+use super::p_matrix::is_p_matrix;
+use crate::sparse::{Singular, SparseRows, SparseSolver};
+use crate::tolerances::{RELAY_DAMPING, RELAY_ZERO};
+
+/// Largest number of surfaces for which all modes are tried.
+pub const MOST_ENUMERATED: usize = 8;
+
+/// Steps without fewer wrong states before single changes.
+const PATIENCE: usize = 4;
+
+/// Proximal steps; each gains a factor of about 1 / d.
+const MOST_PROXIMAL: usize = 30;
+
+/// Is the solution of a relay problem the only one?
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Uniqueness {
+    /// It is.
+    Certain,
+    /// There are others.
+    Several,
+    /// Not known.
+    Unknown,
+}
+
+/// A solution of (R).
+#[derive(Clone, Debug, PartialEq)]
+pub struct RelaySolution {
+    /// -1 or +1 where the surface is left, 0 where the motion slides.
+    pub modes: Vec<i8>,
+    /// The signs and multipliers s.
+    pub signs: Vec<f64>,
+    /// The rates v = nu + N s; exactly 0 where the motion slides.
+    pub rates: Vec<f64>,
+    /// Is this the only solution?
+    pub uniqueness: Uniqueness,
+    /// Entries with v_i = 0 and |s_i| = 1 within rounding: `modes` has one of the two possibilities, and
+    /// derivatives along the motion decide.
+    pub degenerate: Vec<usize>,
+    /// Linear systems solved.
+    pub n_pivots: usize,
+    /// Multiplications and divisions in them.
+    pub n_operations: usize,
+}
+
+/// A relay problem that was not solved.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RelayError {
+    /// A coefficient is NaN or infinite.
+    #[error("the rates at the surfaces are not finite: the field does not exist there")]
+    NotFinite,
+    /// No solution was found.
+    #[error("no mode was found for {n_surfaces} surfaces that meet, and their jumps are not those of friction")]
+    Undecided {
+        /// How many surfaces meet.
+        n_surfaces: usize,
+    },
+}
+
+/// Solves (R), starting from the modes `before` (entries -1, 0, +1), which the result does not depend on if
+/// it is unique.
+///
+/// # Errors
+/// [`RelayError`].
+///
+/// # Example
+/// ```
+/// use filippov::sparse::SparseRows;
+/// use filippov::switching::{solve_relay, Uniqueness};
+/// // Two masses of 1 pushed with 0.5 and 3 against friction of 1, joined by a damper.
+/// let n = SparseRows::from_dense(&[vec![-1.0, 0.2], vec![0.2, -1.0]]);
+/// let found = solve_relay(&[0.5, 3.0], &n, &[0, 0])?;
+/// assert_eq!(found.modes, [0, 1]);
+/// assert!((found.signs[0] - 0.7).abs() < 1e-15 && (found.rates[1] - 2.14).abs() < 1e-15);
+/// assert_eq!(found.uniqueness, Uniqueness::Certain);
+/// # Ok::<(), filippov::switching::RelayError>(())
+/// ```
+pub fn solve_relay(nu: &[f64], n: &SparseRows, before: &[i8]) -> Result<RelaySolution, RelayError> {
+    if !n.is_finite() || !nu.iter().all(|v| v.is_finite()) {
+        return Err(RelayError::NotFinite);
+    }
+    let leaders = leaders(nu, n);
+    let core = Core::new(nu, n, &leaders);
+    let start: Vec<i8> = leaders.iter().map(|&i| before[i]).collect();
+    let solved = core.solve(&start)?;
+    let mut signs = vec![0.0; nu.len()];
+    for (&i, &sign) in leaders.iter().zip(&solved.signs) {
+        signs[i] = sign.clamp(-1.0, 1.0);
+    }
+    let mut solution = completed(nu, n, signs, &leaders, &solved.modes, before);
+    solution.uniqueness = solved.uniqueness;
+    if solution
+        .degenerate
+        .iter()
+        .any(|i| leaders.binary_search(i).is_err())
+    {
+        solution.uniqueness = Uniqueness::Unknown;
+    }
+    (solution.n_pivots, solution.n_operations) = (solved.n_pivots, solved.n_operations);
+    Ok(solution)
+}
+
+/// All solutions of (R) for up to [`MOST_ENUMERATED`] surfaces, and whether there may be more of them in between:
+/// a mode with singular N may hold a continuum.
+pub fn all_relay_modes(nu: &[f64], n: &SparseRows) -> (Vec<Vec<i8>>, bool) {
+    let all: Vec<usize> = (0..nu.len()).collect();
+    let (found, has_singular) = Core::new(nu, n, &all).enumerate();
+    (
+        found.into_iter().map(|state| state.modes).collect(),
+        has_singular,
+    )
+}
+
+/// The surfaces whose sign has any effect. The others, kinks, follow: their sign is that of their rate.
+fn leaders(nu: &[f64], n: &SparseRows) -> Vec<usize> {
+    let mut has_effect = vec![false; nu.len()];
+    let ones = vec![1.0; nu.len()];
+    for (i, nu) in nu.iter().enumerate() {
+        let noise = RELAY_ZERO * (nu.abs() + n.magnitude(i, &ones));
+        for (j, value) in n.row(i) {
+            has_effect[j] |= value.abs() > noise;
+        }
+    }
+    (0..nu.len()).filter(|&j| has_effect[j]).collect()
+}
+
+/// The whole solution from the signs of the leaders.
+fn completed(
+    nu: &[f64],
+    n: &SparseRows,
+    mut signs: Vec<f64>,
+    leaders: &[usize],
+    modes_of_leaders: &[i8],
+    before: &[i8],
+) -> RelaySolution {
+    let m = nu.len();
+    let mut modes = before.to_vec();
+    let mut rates = vec![0.0; m];
+    let mut degenerate = Vec::new();
+    let mut at = leaders.iter().zip(modes_of_leaders).peekable();
+    let leading = signs.clone();
+    for i in 0..m {
+        let rate = nu[i] + n.dot(i, &leading);
+        let noise = RELAY_ZERO * (nu[i].abs() + n.magnitude(i, &leading));
+        match at.next_if(|entry| *entry.0 == i) {
+            Some((_, &mode)) => {
+                modes[i] = mode;
+                let touches = mode == 0 && signs[i].abs() >= 1.0 - slack(n, i, noise);
+                if touches || (mode != 0 && rate.abs() <= noise) {
+                    degenerate.push(i);
+                }
+            }
+            None if rate.abs() <= noise => degenerate.push(i),
+            None => {
+                modes[i] = if rate > 0.0 { 1 } else { -1 };
+                signs[i] = f64::from(modes[i]);
+            }
+        }
+        rates[i] = if modes[i] == 0 { 0.0 } else { rate };
+    }
+    RelaySolution {
+        modes,
+        signs,
+        rates,
+        uniqueness: Uniqueness::Unknown,
+        degenerate,
+        n_pivots: 0,
+        n_operations: 0,
+    }
+}
+
+/// (R) for the surfaces that have an effect.
+struct Core {
+    nu: Vec<f64>,
+    n: SparseRows,
+}
+
+/// Modes with their signs and rates: the equations of (R) without the inequalities.
+#[derive(Clone, Debug)]
+struct State {
+    modes: Vec<i8>,
+    signs: Vec<f64>,
+    rates: Vec<f64>,
+}
+
+struct Solved {
+    modes: Vec<i8>,
+    signs: Vec<f64>,
+    uniqueness: Uniqueness,
+    n_pivots: usize,
+    n_operations: usize,
+}
+
+/// The linear systems of one problem, counted.
+#[derive(Default)]
+struct Pivots {
+    solver: SparseSolver,
+    n_pivots: usize,
+}
+
+impl Core {
+    fn new(nu: &[f64], n: &SparseRows, kept: &[usize]) -> Self {
+        let mut position = vec![usize::MAX; nu.len()];
+        for (place, &i) in kept.iter().enumerate() {
+            position[i] = place;
+        }
+        Core {
+            nu: kept.iter().map(|&i| nu[i]).collect(),
+            n: n.principal(kept, &position),
+        }
+    }
+
+    fn solve(&self, start: &[i8]) -> Result<Solved, RelayError> {
+        let mut pivots = Pivots::default();
+        let is_p = is_p_matrix(&negative(&self.n)) == Some(true);
+        let mut state = self.pivot(start, &mut pivots);
+        // A surface that is left at rate 0 may share what it carries with others.
+        if !is_p && !state.as_ref().is_some_and(|state| self.is_strict(state)) {
+            let shared = self.proximal(start, &mut pivots);
+            state = shared.filter(|shared| self.is_solution(shared)).or(state);
+        }
+        let mut state = state.filter(|state| self.is_solution(state));
+        let mut uniqueness = match is_p {
+            true => Uniqueness::Certain,
+            false => Uniqueness::Unknown,
+        };
+        if !is_p && self.nu.len() <= MOST_ENUMERATED {
+            let (all, has_singular) = self.enumerate();
+            uniqueness = match (all.len(), has_singular) {
+                (2.., _) => Uniqueness::Several,
+                (1, false) => Uniqueness::Certain,
+                _ => Uniqueness::Unknown,
+            };
+            state = state.or_else(|| all.into_iter().next());
+        }
+        let state = state.ok_or(RelayError::Undecided {
+            n_surfaces: self.nu.len(),
+        })?;
+        Ok(Solved {
+            modes: state.modes,
+            signs: state.signs,
+            uniqueness,
+            n_pivots: pivots.n_pivots,
+            n_operations: pivots.solver.n_operations(),
+        })
+    }
+
+    /// Are the rates of all surfaces that are left different from 0?
+    fn is_strict(&self, state: &State) -> bool {
+        let modes = state.modes.iter().enumerate();
+        let mut left = modes.filter(|entry| *entry.1 != 0).map(|entry| entry.0);
+        left.all(|i| state.rates[i].abs() > self.noise(&state.signs, i))
+    }
+
+    /// Principal pivoting: many states at a time while that helps, else one.
+    fn pivot(&self, start: &[i8], pivots: &mut Pivots) -> Option<State> {
+        let mut modes = start.to_vec();
+        let mut fewest = usize::MAX;
+        let mut patience = PATIENCE;
+        for _ in 0..100 + 10 * modes.len() {
+            let state = self.state(&modes, pivots).ok()?;
+            let wrong: Vec<usize> = (0..modes.len())
+                .filter(|&i| self.is_wrong(&state, i))
+                .collect();
+            if wrong.is_empty() {
+                return Some(state);
+            }
+            if wrong.len() < fewest {
+                (fewest, patience) = (wrong.len(), PATIENCE);
+            } else {
+                patience = patience.saturating_sub(1);
+            }
+            let changed = if patience > 0 {
+                &wrong[..]
+            } else {
+                &wrong[..1]
+            };
+            for &i in changed {
+                modes[i] = self.better(&state, i, patience > 0);
+            }
+        }
+        None
+    }
+
+    /// The mode of an entry in a wrong state. A jump from one side to the other is allowed only where many states
+    /// change: one at a time, such jumps might repeat.
+    fn better(&self, state: &State, i: usize, may_jump: bool) -> i8 {
+        let side = |value: f64| if value > 0.0 { 1 } else { -1 };
+        if state.modes[i] == 0 {
+            return side(state.signs[i]);
+        }
+        let reach = 2.0 * self.n.diagonal(i).abs();
+        if may_jump && state.rates[i].abs() > reach {
+            side(state.rates[i])
+        } else {
+            0
+        }
+    }
+
+    /// Signs and rates for given modes: N_FF s_F = -(nu_F + N_FJ s_J) for the sliding surfaces F.
+    fn state(&self, modes: &[i8], pivots: &mut Pivots) -> Result<State, Singular> {
+        let m = modes.len();
+        let mut signs: Vec<f64> = modes.iter().map(|&mode| f64::from(mode)).collect();
+        let sliding: Vec<usize> = (0..m).filter(|&i| modes[i] == 0).collect();
+        let mut position = vec![usize::MAX; m];
+        for (place, &i) in sliding.iter().enumerate() {
+            position[i] = place;
+        }
+        let mut unknown: Vec<f64> = sliding
+            .iter()
+            .map(|&i| -self.nu[i] - self.n.dot(i, &signs))
+            .collect();
+        pivots.n_pivots += 1;
+        pivots
+            .solver
+            .factor(&self.n.principal(&sliding, &position))?;
+        pivots.solver.solve(&mut unknown);
+        for (&i, &sign) in sliding.iter().zip(&unknown) {
+            signs[i] = sign;
+        }
+        let rate = |i: usize| {
+            if modes[i] == 0 {
+                0.0
+            } else {
+                self.nu[i] + self.n.dot(i, &signs)
+            }
+        };
+        Ok(State {
+            rates: (0..m).map(rate).collect(),
+            modes: modes.to_vec(),
+            signs,
+        })
+    }
+
+    /// A rate below this is rounding.
+    fn noise(&self, signs: &[f64], i: usize) -> f64 {
+        RELAY_ZERO * (self.nu[i].abs() + self.n.magnitude(i, signs))
+    }
+
+    fn is_wrong(&self, state: &State, i: usize) -> bool {
+        let noise = self.noise(&state.signs, i);
+        if state.modes[i] == 0 {
+            let fits = state.signs[i].abs() <= 1.0 + slack(&self.n, i, noise);
+            !fits
+        } else {
+            f64::from(state.modes[i]) * state.rates[i] < -noise
+        }
+    }
+
+    /// Do signs and modes satisfy (R), with sliding rates computed and not assumed to be 0?
+    fn is_solution(&self, state: &State) -> bool {
+        let signs: Vec<f64> = state
+            .signs
+            .iter()
+            .map(|sign| sign.clamp(-1.0, 1.0))
+            .collect();
+        (0..signs.len()).all(|i| {
+            let rate = self.nu[i] + self.n.dot(i, &signs);
+            let noise = 8.0 * self.noise(&signs, i);
+            match state.modes[i] {
+                0 => rate.abs() <= noise,
+                mode => f64::from(mode) * rate >= -noise,
+            }
+        })
+    }
+
+    /// Solves with N - diag(d), then repeatedly with nu + d s for the s before, until d (s - s before) is rounding.
+    fn proximal(&self, start: &[i8], pivots: &mut Pivots) -> Option<State> {
+        let m = self.nu.len();
+        let damping: Vec<f64> = (0..m)
+            .map(|i| RELAY_DAMPING * largest(&self.n, i))
+            .collect();
+        let mut damped = Core {
+            nu: self.nu.clone(),
+            n: with_diagonal(&self.n, &damping),
+        };
+        let mut center = vec![0.0; m];
+        let mut modes = start.to_vec();
+        for _ in 0..MOST_PROXIMAL {
+            for i in 0..m {
+                damped.nu[i] = self.nu[i] + damping[i] * center[i];
+            }
+            let state = damped.pivot(&modes, pivots)?;
+            let is_done = (0..m).all(|i| {
+                let residual = damping[i] * (state.signs[i] - center[i]).abs();
+                residual <= self.noise(&state.signs, i)
+            });
+            if is_done {
+                return Some(state);
+            }
+            center.clone_from(&state.signs);
+            modes = state.modes;
+        }
+        None
+    }
+
+    /// All solutions by trying every mode; also whether a mode was singular.
+    fn enumerate(&self) -> (Vec<State>, bool) {
+        let m = self.nu.len();
+        let mut pivots = Pivots::default();
+        let (mut found, mut has_singular) = (Vec::new(), false);
+        if m > MOST_ENUMERATED {
+            return (found, true);
+        }
+        for pattern in 0..3_usize.pow(m as u32) {
+            let digit = |i: usize| (pattern / 3_usize.pow(i as u32) % 3) as i8 - 1;
+            let modes: Vec<i8> = (0..m).map(digit).collect();
+            match self.state(&modes, &mut pivots) {
+                Err(_) => has_singular = true,
+                Ok(state) if !(0..m).any(|i| self.is_wrong(&state, i)) => found.push(state),
+                Ok(_) => {}
+            }
+        }
+        (found, has_singular)
+    }
+}
+
+/// The largest entry of a row.
+fn largest(matrix: &SparseRows, i: usize) -> f64 {
+    matrix.row(i).fold(0.0, |size, (_, v)| size.max(v.abs()))
+}
+
+/// How much of a sign is rounding, if the rates are known up to `noise`.
+fn slack(n: &SparseRows, i: usize, noise: f64) -> f64 {
+    let size = largest(n, i);
+    RELAY_ZERO + if size > 0.0 { noise / size } else { 0.0 }
+}
+
+fn negative(matrix: &SparseRows) -> SparseRows {
+    let mut result = matrix.clone();
+    result
+        .values_mut()
+        .iter_mut()
+        .for_each(|value| *value = -*value);
+    result
+}
+
+/// The matrix less a diagonal.
+fn with_diagonal(matrix: &SparseRows, less: &[f64]) -> SparseRows {
+    let mut result = SparseRows::new(matrix.n_columns());
+    for (i, less) in less.iter().enumerate() {
+        let mut entries: Vec<(usize, f64)> = matrix.row(i).collect();
+        match entries.iter_mut().find(|entry| entry.0 == i) {
+            Some(entry) => entry.1 -= less,
+            None => entries.push((i, -less)),
+        }
+        entries.sort_unstable_by_key(|entry| entry.0);
+        result.push_row(entries);
+    }
+    result
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,249 @@
+//! Fields that are affine in the signs of the surfaces slid on: multipliers by one linear system.
+//!
+//! Around a point of the surfaces Z let f(s) = a + B s_Z, with the other signs fixed. Then
+//!
+//! ```text
+//! dh_i/dt = d_t h_i + grad h_i . f = nu_i + (N s_Z)_i,    N = grad h_Z B,    i in Z,
+//! ```
+//!
+//! so sliding on Z, dh_Z/dt = 0, determines the multipliers by N lambda = -nu, and at an event the mode follows
+//! from the relay problem of [`crate::switching::solve_relay`]. Nothing is formed for 2^m sign patterns; in
+//! a chain B, grad h and N are sparse, and everything costs O(n).
+//!
+//! References: Piiroinen, Kuznetsov (2008), (21)-(24), with s = 1 - 2 mu; Guglielmi, Hairer (2022), section 7.
+
+use super::PiecewiseSystem;
+use crate::error::FieldError;
+use crate::field::eval_on_side;
+use crate::sparse::{Pattern, SparseProduct, SparseRows, SparseSolver};
+
+/// A system whose field is affine in the signs of some sets of surfaces.
+///
+/// Duties of an implementer:
+///
+/// 1. [`affine_parts`](Self::affine_parts) returns `None` unless f(t, x, s) is affine in the entries of s on these
+///    surfaces for any values of the others, and the gradients of their switching functions do not depend
+///    on these entries. It fixes the patterns of gradients and jumps.
+/// 2. [`fill_affine_parts`](Self::fill_affine_parts) fills field, gradients, jumps and rates in time; entries of
+///    `signs` on the surfaces may be any numbers, the others are -1.0 or +1.0.
+///
+/// The provided methods suit a black box that is affine in all signs: m + 1 evaluations for m surfaces,
+/// at signs -1 and +1 only, and dense matrices.
+pub trait AffineSigns: PiecewiseSystem {
+    /// Space for these surfaces (increasing), if the field is affine in their signs together.
+    fn affine_parts(&self, surfaces: &[usize]) -> Option<AffineParts> {
+        let n = self.n_states();
+        let mut full = SparseRows::new(n);
+        for _ in surfaces {
+            full.push_row((0..n).map(|i| (i, 0.0)));
+        }
+        Some(AffineParts::new(n, surfaces, full.clone(), full))
+    }
+
+    /// Writes f(t, x, s), the gradients and time derivatives of the switching functions, and df/ds_j. Returns
+    /// the number of evaluations of the right-hand side.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    fn fill_affine_parts(
+        &self,
+        t: f64,
+        x: &[f64],
+        signs: &[f64],
+        parts: &mut AffineParts,
+    ) -> Result<u64, FieldError> {
+        let n = self.n_states();
+        let mut vertex = signs.to_vec();
+        for &j in &parts.surfaces {
+            vertex[j] = if signs[j] < 0.0 { -1.0 } else { 1.0 };
+        }
+        let mut evaluations = eval_on_side(self, t, x, &vertex, &mut parts.field)?;
+        let base = parts.field.clone();
+        let mut flipped = vec![0.0; n];
+        for (row, &j) in parts.surfaces.iter().enumerate() {
+            let range = row * n..(row + 1) * n;
+            let gradient = &mut parts.gradients.values_mut()[range.clone()];
+            parts.time_rates[row] = self.gradient(j, t, x, &vertex, gradient)?;
+            vertex[j] = -vertex[j];
+            evaluations += eval_on_side(self, t, x, &vertex, &mut flipped)?;
+            vertex[j] = -vertex[j];
+            let jump = &mut parts.jumps.values_mut()[range];
+            for (i, jump) in jump.iter_mut().enumerate() {
+                *jump = 0.5 * vertex[j] * (base[i] - flipped[i]);
+                parts.field[i] += *jump * (signs[j] - vertex[j]);
+            }
+        }
+        Ok(evaluations)
+    }
+}
+
+/// Sliding is not determined: signs of these surfaces can change together without any effect on dh/dt.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the multipliers of the surfaces {surfaces:?} are not determined: their jumps are dependent there")]
+pub struct SingularSliding {
+    /// The surfaces concerned.
+    pub surfaces: Vec<usize>,
+}
+
+/// The parts of an affine field at a point, and the sliding field that follows from them.
+///
+/// # Example
+/// ```
+/// use filippov::{AffineSigns, ClosureSystem, PiecewiseSystem};
+/// // Two masses on a belt each: v_i' = 0.2 - v_i - sign(v_i), sliding on both surfaces.
+/// let system = ClosureSystem::new(
+///     2,
+///     2,
+///     |_t, v, s, dv| (0..2).for_each(|i| dv[i] = 0.2 - v[i] - s[i]),
+///     |_t, v, h| h.copy_from_slice(v),
+/// )
+/// .with_affine_signs();
+/// let affine = system.affine_signs().expect("declared above");
+/// let mut parts = affine.affine_parts(&[0, 1]).expect("affine in all signs");
+/// parts.evaluate(affine, 0.0, &[0.0, 0.0], &[1.0, 1.0])?;
+/// let mut rates = [f64::NAN; 2];
+/// parts.slide(&mut rates).expect("both jumps are independent");
+/// assert!(rates.iter().all(|v| v.abs() < 1e-15));
+/// assert!(parts.multipliers().iter().all(|lambda| (lambda - 0.2).abs() < 1e-9));
+/// # Ok::<(), filippov::FieldError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct AffineParts {
+    surfaces: Vec<usize>,
+    /// f(t, x, s) at the signs of the evaluation.
+    pub field: Vec<f64>,
+    /// d_t h_i, one entry per surface.
+    pub time_rates: Vec<f64>,
+    /// Row i is grad h_i.
+    pub gradients: SparseRows,
+    /// Row j is df/ds_j.
+    pub jumps: SparseRows,
+    /// Space for a system that computes all at once.
+    pub(super) outputs: Vec<f64>,
+    normal: SparseProduct,
+    /// The signs of the evaluation on the surfaces.
+    signs: Vec<f64>,
+    rates: Vec<f64>,
+    multipliers: Vec<f64>,
+    solver: SparseSolver,
+}
+
+impl AffineParts {
+    /// Space for surfaces with gradients and jumps of these patterns; their values do not matter.
+    pub fn new(n: usize, surfaces: &[usize], gradients: SparseRows, jumps: SparseRows) -> Self {
+        let m = surfaces.len();
+        AffineParts {
+            surfaces: surfaces.to_vec(),
+            field: vec![0.0; n],
+            time_rates: vec![0.0; m],
+            normal: SparseProduct::new(&gradients, &jumps),
+            gradients,
+            jumps,
+            outputs: Vec::new(),
+            signs: vec![0.0; m],
+            rates: vec![0.0; m],
+            multipliers: vec![f64::NAN; m],
+            solver: SparseSolver::default(),
+        }
+    }
+
+    /// Evaluates everything at a point. Entries of `signs` on the surfaces are any numbers: the nearer to the
+    /// multipliers, the less cancels. Returns the number of evaluations of the right-hand side.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn evaluate(
+        &mut self,
+        system: &dyn AffineSigns,
+        t: f64,
+        x: &[f64],
+        signs: &[f64],
+    ) -> Result<u64, FieldError> {
+        let evaluations = system.fill_affine_parts(t, x, signs, self)?;
+        self.normal.update(&self.gradients, &self.jumps);
+        for (row, &j) in self.surfaces.iter().enumerate() {
+            self.signs[row] = signs[j];
+            self.rates[row] = self.time_rates[row] + self.gradients.dot(row, &self.field);
+        }
+        Ok(evaluations)
+    }
+
+    /// The surfaces.
+    pub fn surfaces(&self) -> &[usize] {
+        &self.surfaces
+    }
+
+    /// N: how dh_i/dt depends on s_j.
+    pub fn normal(&self) -> &SparseRows {
+        &self.normal.matrix
+    }
+
+    /// dh_i/dt at the signs of the evaluation.
+    pub fn rates(&self) -> &[f64] {
+        &self.rates
+    }
+
+    /// nu: dh_i/dt at s_Z = 0, the other signs as in the evaluation.
+    pub fn nu(&self) -> Vec<f64> {
+        let rows = self.rates.iter().enumerate();
+        rows.map(|(i, rate)| rate - self.normal.matrix.dot(i, &self.signs))
+            .collect()
+    }
+
+    /// Writes the field at these signs of the surfaces, f + B (s - s of the evaluation).
+    pub fn combine(&self, signs: &[f64], dx: &mut [f64]) {
+        dx.copy_from_slice(&self.field);
+        for (row, (sign, here)) in signs.iter().zip(&self.signs).enumerate() {
+            let change = sign - here;
+            for (i, jump) in self.jumps.row(row) {
+                dx[i] += change * jump;
+            }
+        }
+    }
+
+    /// Solves for the multipliers and writes the sliding field; [`AffineParts::evaluate`] comes first. Where
+    /// the field is not finite neither are they.
+    ///
+    /// # Errors
+    /// [`SingularSliding`] with the surfaces whose multipliers are not determined.
+    pub fn slide(&mut self, dx: &mut [f64]) -> Result<(), SingularSliding> {
+        self.multipliers.clear();
+        self.multipliers.extend(self.rates.iter().map(|rate| -rate));
+        if !self.normal.matrix.is_finite() {
+            self.multipliers.fill(f64::NAN);
+            dx.fill(f64::NAN);
+            return Ok(());
+        }
+        if let Err(singular) = self.solver.factor(&self.normal.matrix) {
+            self.multipliers.fill(f64::NAN);
+            let surfaces = singular.unknowns.iter().map(|&row| self.surfaces[row]);
+            return Err(SingularSliding {
+                surfaces: surfaces.collect(),
+            });
+        }
+        self.solver.solve(&mut self.multipliers);
+        for (lambda, here) in self.multipliers.iter_mut().zip(&self.signs) {
+            *lambda += here;
+        }
+        self.combine(&self.multipliers, dx);
+        Ok(())
+    }
+
+    /// The multipliers that [`AffineParts::slide`] found, one per surface.
+    pub fn multipliers(&self) -> &[f64] {
+        &self.multipliers
+    }
+
+    /// What couples the surfaces.
+    pub fn pattern(&self) -> Pattern {
+        self.solver.pattern()
+    }
+
+    /// Multiplications and divisions of the solutions so far, and of one product N = grad h B.
+    pub fn n_operations(&self) -> usize {
+        self.solver.n_operations() + self.normal.n_operations()
+    }
+}
+
+#[cfg(test)]
+mod tests;

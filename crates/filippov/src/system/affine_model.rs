@@ -1,0 +1,177 @@
+//! What is compiled of a traced system for sliding where its field is affine in the signs.
+//!
+//! One program for all surfaces: the field blended over all signs, its derivatives by them, and all gradients.
+//! As each derivative is free of its own sign, it serves every set of surfaces of which no two multiply each
+//! other; a motion that visits many sets compiles nothing anew. Numbers that are constant are kept apart.
+
+use filippov_expr::{Backend, Gradient, Graph, NodeId, SignDependence};
+
+use super::affine::AffineParts;
+use super::tiered::TieredProgram;
+use crate::sparse::SparseRows;
+
+/// A value that is a number, or computed by the program.
+#[derive(Clone, Copy)]
+enum Source {
+    Constant(f64),
+    Output(usize),
+}
+
+/// The nonzero entries of a row: state and value.
+type Row = Vec<(usize, Source)>;
+
+/// The compiled parts of all surfaces.
+pub(super) struct AffineModel {
+    program: TieredProgram,
+    n_states: usize,
+    time_rates: Vec<Source>,
+    gradients: Vec<Row>,
+    jumps: Vec<Row>,
+    /// Surfaces whose sign the field is multilinear in.
+    is_blended: Vec<bool>,
+    /// Surfaces that may not be slid on together with this one: their signs multiply, or one is in the
+    /// gradient of the other.
+    conflicts: Vec<Vec<u32>>,
+}
+
+impl AffineModel {
+    pub fn new(graph: &Graph, field: &[NodeId], backend: Backend) -> Self {
+        let mut graph = graph.clone();
+        let d = graph.n_surfaces();
+        let all: Vec<u32> = (0..d as u32).collect();
+        let dependence = graph.sign_dependence(field, &all);
+        let mut outputs = dependence.values.clone();
+        let mut conflicts = vec![Vec::new(); d];
+        for &(j, k) in &dependence.couplings {
+            conflicts[j as usize].push(k);
+            conflicts[k as usize].push(j);
+        }
+        let (mut time_rates, mut gradients) = (Vec::new(), Vec::new());
+        for (j, conflicts) in conflicts.iter_mut().enumerate() {
+            let Gradient { time, states } = graph.gradient(graph.surface(j as u32));
+            let nodes: Vec<NodeId> = [time]
+                .into_iter()
+                .chain(states.iter().map(|s| s.1))
+                .collect();
+            conflicts.extend(signs_in(&graph, &nodes));
+            time_rates.push(source(&graph, time, &mut outputs));
+            let entries = states.iter();
+            let row = entries.map(|&(i, node)| (i as usize, source(&graph, node, &mut outputs)));
+            gradients.push(row.collect());
+        }
+        let jumps = jumps(&graph, &dependence, d, &mut outputs);
+        let mut is_blended = vec![false; d];
+        for &j in &dependence.surfaces {
+            is_blended[j as usize] = true;
+        }
+        AffineModel {
+            program: TieredProgram::new(graph, outputs, backend),
+            n_states: field.len(),
+            time_rates,
+            gradients,
+            jumps,
+            is_blended,
+            conflicts,
+        }
+    }
+
+    /// Space for these surfaces, if the field is affine in their signs together.
+    pub fn parts(&self, surfaces: &[usize]) -> Option<AffineParts> {
+        let mut among = vec![false; self.is_blended.len()];
+        for &j in surfaces {
+            among[j] = true;
+        }
+        let fits = |&j: &usize| {
+            self.is_blended[j] && !self.conflicts[j].iter().any(|&k| among[k as usize])
+        };
+        if !surfaces.iter().all(fits) {
+            return None;
+        }
+        let matrix = |rows: &[Row]| {
+            let mut matrix = SparseRows::new(self.n_states);
+            for &j in surfaces {
+                let pattern = rows[j].iter();
+                matrix.push_row(pattern.map(|&(state, value)| match value {
+                    Source::Constant(value) => (state, value),
+                    Source::Output(_) => (state, 0.0),
+                }));
+            }
+            matrix
+        };
+        let (gradients, jumps) = (matrix(&self.gradients), matrix(&self.jumps));
+        Some(AffineParts::new(self.n_states, surfaces, gradients, jumps))
+    }
+
+    /// Evaluates everything that varies.
+    pub fn fill(
+        &self,
+        t: f64,
+        x: &[f64],
+        signs: &[f64],
+        parameters: &[f64],
+        parts: &mut AffineParts,
+    ) {
+        let program = self.program.program();
+        let mut outputs = std::mem::take(&mut parts.outputs);
+        outputs.resize(program.n_outputs(), 0.0);
+        program.eval(t, x, signs, parameters, &[], &mut outputs);
+        parts.field.copy_from_slice(&outputs[..self.n_states]);
+        let value = |source: Source| match source {
+            Source::Constant(value) => value,
+            Source::Output(k) => outputs[k],
+        };
+        let (mut in_gradients, mut in_jumps) = (0, 0);
+        for row in 0..parts.surfaces().len() {
+            let j = parts.surfaces()[row];
+            parts.time_rates[row] = value(self.time_rates[j]);
+            let gradients = &mut parts.gradients.values_mut()[in_gradients..];
+            for (entry, &(_, source)) in gradients.iter_mut().zip(&self.gradients[j]) {
+                *entry = value(source);
+            }
+            in_gradients += self.gradients[j].len();
+            let jumps = &mut parts.jumps.values_mut()[in_jumps..];
+            for (entry, &(_, source)) in jumps.iter_mut().zip(&self.jumps[j]) {
+                *entry = value(source);
+            }
+            in_jumps += self.jumps[j].len();
+        }
+        parts.outputs = outputs;
+    }
+}
+
+/// The value of a node: its number, or an output more.
+fn source(graph: &Graph, node: NodeId, outputs: &mut Vec<NodeId>) -> Source {
+    match graph.as_constant(node) {
+        Some(value) => Source::Constant(value),
+        None => {
+            outputs.push(node);
+            Source::Output(outputs.len() - 1)
+        }
+    }
+}
+
+/// For each surface the components of the field that jump there.
+fn jumps(
+    graph: &Graph,
+    dependence: &SignDependence,
+    d: usize,
+    outputs: &mut Vec<NodeId>,
+) -> Vec<Row> {
+    let mut jumps = vec![Row::new(); d];
+    for (state, derivatives) in dependence.derivatives.iter().enumerate() {
+        for &(j, node) in derivatives {
+            jumps[j as usize].push((state, source(graph, node, outputs)));
+        }
+    }
+    jumps
+}
+
+/// The surfaces whose signs these values contain.
+fn signs_in(graph: &Graph, nodes: &[NodeId]) -> Vec<u32> {
+    if nodes.iter().all(|&node| graph.as_constant(node).is_some()) {
+        return Vec::new();
+    }
+    let found = graph.sign_dependencies(nodes, &[]);
+    let indices = found.into_iter().enumerate().filter(|entry| entry.1);
+    indices.map(|(j, _)| j as u32).collect()
+}
