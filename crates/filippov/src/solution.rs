@@ -1,7 +1,7 @@
 //! The record of a run: steps, segments, switches.
 
 use crate::error::FieldError;
-use crate::field::{IntersectionField, Projector, SlidingField};
+use crate::field::{IntersectionField, Projector, SlidingField, SmoothField};
 use crate::integrate::{Stats, Stop, Warning};
 use crate::mode::Mode;
 use crate::options::Options;
@@ -299,7 +299,7 @@ impl Solution {
             }
             _ => {
                 let mut field = IntersectionField::new(system, &set, &mode.signs(), &[]);
-                field.solve(t, &mut y)?;
+                field.eval(t, &mut y, &mut vec![0.0; self.n_states])?;
                 set.into_iter()
                     .zip(field.multipliers().iter().copied())
                     .collect()

@@ -1,11 +1,15 @@
 //! The smooth field of a mode: what a stepper integrates.
 
+mod affine;
+mod canopy;
 mod intersection;
 mod meeting;
 mod project;
 mod region;
 mod sliding;
 
+pub use affine::AffineLaw;
+pub use canopy::Canopy;
 pub use intersection::{IntersectionExit, IntersectionField};
 pub use meeting::MeetingFields;
 pub use project::Projector;

@@ -16,7 +16,7 @@ use crate::switching::{
     Resolution, Undecided,
 };
 use crate::system::{dot, dot_magnitude};
-use crate::tolerances::{DEPARTS_TANGENTIALLY, DRIFT_SHARE};
+use crate::tolerances::{DEPARTS_TANGENTIALLY, DRIFT_SHARE, MOST_MEETING};
 
 impl Integrator<'_> {
     /// What follows where the surfaces of `meeting` vanish; `fresh` are those among them that were reached now.
@@ -27,6 +27,12 @@ impl Integrator<'_> {
         meeting: &[usize],
         fresh: &[usize],
     ) -> Result<Decided, FieldError> {
+        if let Some(decided) = self.decide_by_relay(Some(event), mode, meeting)? {
+            return Ok(decided);
+        }
+        if meeting.len() > MOST_MEETING {
+            return Ok(Err(too_many(meeting)));
+        }
         let corners = self.corners(meeting, mode)?;
         let resolution = match corners.normal_fields() {
             Ok(fields) => {
@@ -44,6 +50,12 @@ impl Integrator<'_> {
         mode: &Mode,
         meeting: &[usize],
     ) -> Result<Decided, FieldError> {
+        if let Some(decided) = self.decide_by_relay(None, mode, meeting)? {
+            return Ok(decided);
+        }
+        if meeting.len() > MOST_MEETING {
+            return Ok(Err(too_many(meeting)));
+        }
         let corners = self.corners(meeting, mode)?;
         let resolution = corners
             .normal_fields()
@@ -211,7 +223,7 @@ impl Integrator<'_> {
     }
 
     /// The surfaces of `meeting` that the motion in `after` leaves, with the leading derivatives of h.
-    fn departures(
+    pub(super) fn departures(
         &mut self,
         after: &Mode,
         meeting: &[usize],
@@ -287,5 +299,17 @@ impl Integrator<'_> {
             }
         };
         Ok(())
+    }
+}
+
+/// More surfaces than all of whose fields can be looked at.
+fn too_many(meeting: &[usize]) -> Stop {
+    Stop::Intersection {
+        surfaces: meeting.to_vec(),
+        candidates: Vec::new(),
+        reason: Undecided::Shape {
+            m: meeting.len(),
+            found: 0,
+        },
     }
 }

@@ -9,6 +9,7 @@ mod irregular;
 mod meeting;
 mod motion;
 mod pace;
+mod relay;
 mod solve;
 mod spiral;
 mod start;

@@ -58,7 +58,10 @@ impl<'a> ModeField<'a> {
             ModeField::Sliding(field) => {
                 field.normal_components(t, x)?;
             }
-            ModeField::Intersection(field) => field.solve(t, x)?,
+            ModeField::Intersection(field) => {
+                let mut rates = vec![0.0; x.len()];
+                field.eval(t, x, &mut rates)?;
+            }
         }
         Ok(self.last_exits())
     }

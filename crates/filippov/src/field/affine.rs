@@ -1,0 +1,111 @@
+//! The law of sliding on many surfaces where the field is affine in their signs.
+
+use crate::error::FieldError;
+use crate::switching::Matrix;
+use crate::system::{AffineParts, AffineSigns, PiecewiseSystem};
+use crate::tolerances::{MOST_MEETING, SURFACE_NOISE};
+
+/// Sweeps over all surfaces of a projection; gradients that are orthogonal need one.
+const MOST_SWEEPS: usize = 50;
+
+/// Multipliers by one sparse linear system, however many surfaces there are.
+pub struct AffineLaw<'a> {
+    system: &'a dyn AffineSigns,
+    parts: AffineParts,
+    /// The signs of the last evaluation: those of the mode, with the multipliers last found.
+    signs: Vec<f64>,
+    h: Vec<f64>,
+}
+
+impl<'a> AffineLaw<'a> {
+    /// The law for these surfaces; `None` if the field is not affine in their signs.
+    pub fn new(system: &'a dyn PiecewiseSystem, set: &[usize], signs: &[f64]) -> Option<Self> {
+        let affine = system.affine_signs()?;
+        let mut signs = signs.to_vec();
+        set.iter().for_each(|&j| signs[j] = 0.0);
+        Some(AffineLaw {
+            system: affine,
+            parts: affine.affine_parts(set)?,
+            signs,
+            h: vec![0.0; system.n_surfaces()],
+        })
+    }
+
+    /// Writes the sliding field at (t, x); NaN, also in the multipliers, where it is not determined. Returns the
+    /// number of evaluations of the right-hand side.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn eval(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<u64, FieldError> {
+        let evaluations = self.parts.evaluate(self.system, t, x, &self.signs)?;
+        if self.parts.slide(dx).is_err() {
+            dx.fill(f64::NAN);
+        }
+        for (&j, &lambda) in self.parts.surfaces().iter().zip(self.parts.multipliers()) {
+            // The nearer the evaluation is to the multipliers, the less cancels.
+            self.signs[j] = if lambda.is_finite() { lambda } else { 0.0 };
+        }
+        Ok(evaluations)
+    }
+
+    /// The multipliers last found.
+    pub fn multipliers(&self) -> &[f64] {
+        self.parts.multipliers()
+    }
+
+    /// The exit functions of the root, as those of the canopy: the determinant of N with the sign of a stable one,
+    /// and the stability. Only for a few surfaces; the friction of many bodies is stable for good.
+    pub fn ends(&self) -> [f64; 2] {
+        let (normal, m) = (self.parts.normal(), self.parts.surfaces().len());
+        if m > MOST_MEETING {
+            return [1.0, 1.0];
+        }
+        let mut jacobian = Matrix::zeros(m);
+        for i in 0..m {
+            let size = normal
+                .row(i)
+                .fold(0.0_f64, |size, (_, v)| size.max(v.abs()));
+            normal.row(i).for_each(|(j, v)| jacobian[(i, j)] = v / size);
+        }
+        if m == 2 {
+            return [
+                jacobian.determinant(),
+                -jacobian[(0, 0)].min(jacobian[(1, 1)]),
+            ];
+        }
+        let sign = if m.is_multiple_of(2) { 1.0 } else { -1.0 };
+        [
+            sign * jacobian.determinant(),
+            jacobian.last_hurwitz_determinant(),
+        ]
+    }
+
+    /// Moves `x` onto all surfaces, one after the other along their gradients, until all |h| are at the level of
+    /// rounding (Kaczmarz's method). The gradients are those of the last evaluation.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn project(&mut self, t: f64, x: &mut [f64], signs: &[f64]) -> Result<(), FieldError> {
+        for _ in 0..MOST_SWEEPS {
+            self.system.surfaces(t, x, signs, &mut self.h)?;
+            let mut is_near = true;
+            let gradients = &self.parts.gradients;
+            // Moves of earlier rows change h of later ones: to first order by their common states.
+            let start = x.to_vec();
+            for (row, &j) in self.parts.surfaces().iter().enumerate() {
+                let moved: f64 = gradients.row(row).map(|(i, g)| g * (x[i] - start[i])).sum();
+                let h = self.h[j] + moved;
+                let square: f64 = gradients.row(row).map(|(_, g)| g * g).sum();
+                if square == 0.0 || h.abs() <= 0.25 * SURFACE_NOISE * gradients.magnitude(row, x) {
+                    continue;
+                }
+                is_near = false;
+                gradients.row(row).for_each(|(i, g)| x[i] -= g * h / square);
+            }
+            if is_near {
+                break;
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,95 @@
+//! Meetings of surfaces where the field is affine in their signs: one relay problem, whatever their number.
+
+use super::detect::Found;
+use super::integrator::Integrator;
+use super::transition::Decided;
+use super::WarningCode;
+use crate::error::FieldError;
+use crate::event::EventFunction;
+use crate::field::SmoothField;
+use crate::mode::Mode;
+use crate::switching::{solve_relay, RelaySolution, Uniqueness};
+use crate::tolerances::{DRIFT_SHARE, MOST_MEETING};
+
+impl Integrator<'_> {
+    /// What follows where the surfaces of `meeting` vanish, if the field is affine in their signs and the relay
+    /// problem has certainly one solution; for many surfaces also if that is not known, with a warning. `None`
+    /// otherwise.
+    ///
+    /// Several surfaces may be reached and left at one instant. Where first-order data leave both open, as they do at the
+    /// exit of a multiplier, they are taken a moment later along the motion that ends.
+    pub(super) fn decide_by_relay(
+        &mut self,
+        event: Option<&Found>,
+        mode: &Mode,
+        meeting: &[usize],
+    ) -> Result<Option<Decided>, FieldError> {
+        let exits = event.is_some_and(|event| {
+            let mut functions = event.functions.iter();
+            functions.any(|f| {
+                matches!(
+                    f,
+                    EventFunction::Exit(_) | EventFunction::ExitMinus | EventFunction::ExitPlus
+                )
+            })
+        });
+        let mut found = self.solve_relay_at(mode, meeting, exits)?;
+        let is_degenerate = |found: &Option<RelaySolution>| {
+            found
+                .as_ref()
+                .is_some_and(|found| !found.degenerate.is_empty())
+        };
+        if is_degenerate(&found) && event.is_some() && !exits {
+            found = self.solve_relay_at(mode, meeting, true)?;
+        }
+        let Some(found) = found.filter(|found| found.degenerate.is_empty()) else {
+            return Ok(None);
+        };
+        let is_certain = found.uniqueness == Uniqueness::Certain;
+        if !is_certain && meeting.len() <= MOST_MEETING {
+            return Ok(None);
+        }
+        let mut after = mode.clone();
+        let (mut multipliers, entries) = (Vec::new(), found.modes.iter().zip(&found.signs));
+        for (&j, (&entry, &sign)) in meeting.iter().zip(entries) {
+            after.set(j, entry);
+            if entry == 0 {
+                multipliers.push(sign);
+            }
+        }
+        if !is_certain {
+            let candidates = [after.clone()];
+            self.warn_non_unique(meeting, &after, &candidates, WarningCode::NonUnique);
+        }
+        let left = self.departures(&after, meeting, &multipliers)?;
+        Ok(Some(Ok((after, left))))
+    }
+
+    /// The relay problem at the current point, or a moment later.
+    fn solve_relay_at(
+        &mut self,
+        mode: &Mode,
+        meeting: &[usize],
+        later: bool,
+    ) -> Result<Option<RelaySolution>, FieldError> {
+        let system = self.system;
+        let Some(affine) = system.affine_signs() else {
+            return Ok(None);
+        };
+        let Some(mut parts) = affine.affine_parts(meeting) else {
+            return Ok(None);
+        };
+        let (mut t, mut x) = (self.t, self.x.clone());
+        if later {
+            let mut velocity = vec![0.0; x.len()];
+            self.motion.field.eval(t, &mut x, &mut velocity)?;
+            let dt = DRIFT_SHARE * self.stepper.interpolant().dt;
+            x.iter_mut().zip(&velocity).for_each(|(x, v)| *x += dt * v);
+            t += dt;
+        }
+        let signs: Vec<f64> = mode.entries().iter().map(|&e| f64::from(e)).collect();
+        self.stats.n_field_evaluations += parts.evaluate(affine, t, &x, &signs)?;
+        let before: Vec<i8> = meeting.iter().map(|&j| mode.entries()[j]).collect();
+        Ok(solve_relay(&parts.nu(), parts.normal(), &before).ok())
+    }
+}
