@@ -183,12 +183,7 @@ impl Integrator<'_> {
     /// How far the motion lies beside the continuous extension, from the probes of the step.
     pub(super) fn measure_margin(&mut self, dt: f64) -> Result<(), FieldError> {
         let Detector { margin, x, .. } = &mut self.detector;
-        let is_curved = self
-            .motion
-            .sliding()
-            .iter()
-            .any(|&j| !self.system.is_affine(j));
-        if !is_curved {
+        if self.motion.is_straight {
             return Ok(());
         }
         margin.resize(x.len(), 0.0);

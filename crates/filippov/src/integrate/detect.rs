@@ -7,7 +7,7 @@ use smallvec::{smallvec, SmallVec};
 use super::bounds::{BoundedCurve, Piece, RootPiece};
 use super::curve::{grazes, Curve};
 use super::integrator::Integrator;
-use super::motion::{Exits, ModeField, Motion};
+use super::motion::{Exits, Motion};
 use crate::error::FieldError;
 use crate::event::filter::{may_vanish, may_vanish_bent, may_vanish_between, may_vanish_deflated};
 use crate::event::isolate::{first_zero_sampled, Evidence, Zero, PROBES};
@@ -153,15 +153,10 @@ impl Detector {
                 .fold(0.0_f64, |m, v| m.max(v.abs()));
             return Ok(4.0 * SURFACE_NOISE * largest);
         };
-        let ht = system.gradient(j, t, end, &motion.signs, &mut self.gradient)?;
-        let states = start.iter().zip(end).map(|(a, b)| a.abs().max(b.abs()));
-        let size: f64 = self
-            .gradient
-            .iter()
-            .zip(states)
-            .map(|(g, x)| (g * x).abs())
-            .sum();
-        Ok(SURFACE_NOISE * (size + (ht * t).abs()))
+        let size = system
+            .surface_size(j, t, end, &motion.signs)?
+            .max(system.surface_size(j, t, start, &motion.signs)?);
+        Ok(SURFACE_NOISE * size)
     }
 }
 
@@ -300,9 +295,9 @@ impl Integrator<'_> {
             .noise(self.system, &self.motion, m.function, step)?;
         self.motion.monitored[index].noise = noise;
         let width = 0.5 * EPS * (self.t.abs() / dt).max(to);
-        let polynomial = match (m.function, &self.motion.field) {
-            (EventFunction::Surface(j), ModeField::Region(_)) if m.affine => {
-                Some(self.affine_polynomial(j, m.orientation, dt)?)
+        let polynomial = match m.function {
+            EventFunction::Surface(j) if m.affine && self.motion.is_straight => {
+                Some(self.affine_polynomial(j, m, dt)?)
             }
             _ => None,
         };
@@ -391,27 +386,19 @@ impl Integrator<'_> {
     fn affine_polynomial(
         &mut self,
         j: usize,
-        orientation: f64,
+        m: Monitored,
         dt: f64,
     ) -> Result<[f64; 6], FieldError> {
-        let (gradient, h) = (&mut self.detector.gradient, &mut self.detector.h);
-        let ht = self
-            .system
-            .gradient(j, self.t, &self.x, &self.motion.signs, gradient)?;
-        self.system
-            .surfaces(self.t, &self.x, &self.motion.signs, h)?;
-        self.stats.n_surface_evaluations += 1;
-        let mut rows = [0.0; 6];
+        let gradient = &mut self.detector.gradient;
+        let signs = &self.motion.signs;
+        let ht = self.system.gradient(j, self.t, &self.x, signs, gradient)?;
+        let mut rows = [m.value, 0.0, 0.0, 0.0, 0.0, 0.0];
         let extension = self.stepper.interpolant().coefficients();
-        for (row, values) in rows
-            .iter_mut()
-            .zip(extension.chunks_exact(gradient.len()))
-            .skip(1)
-        {
-            *row = orientation * dot(gradient, values);
+        let values = extension.chunks_exact(gradient.len());
+        for (row, values) in rows.iter_mut().zip(values).skip(1) {
+            *row = m.orientation * dot(gradient, values);
         }
-        rows[0] = orientation * h[j];
-        rows[1] += orientation * ht * dt;
+        rows[1] += m.orientation * ht * dt;
         Ok(rows)
     }
 

@@ -113,8 +113,10 @@ pub(super) struct Motion<'a> {
     /// Surfaces whose sign matters in this mode.
     pub active: Vec<bool>,
     pub field: ModeField<'a>,
-    /// The surfaces slid on.
+    /// The surfaces slid on, in increasing order.
     pub sliding: SlidingSet,
+    /// All of them are affine: the continuous extension of a step does not leave them.
+    pub is_straight: bool,
     /// Fields of other kinds that earlier motions had, kept for their buffers.
     idle: Vec<ModeField<'a>>,
     pub monitored: Vec<Monitored>,
@@ -128,6 +130,7 @@ impl<'a> Motion<'a> {
             t_start,
             active: vec![false; signs.len()],
             field: ModeField::new(system, &sliding, &signs),
+            is_straight: sliding.iter().all(|&j| system.is_affine(j)),
             sliding,
             idle: Vec::new(),
             monitored: Vec::new(),
@@ -158,6 +161,7 @@ impl<'a> Motion<'a> {
             };
             self.idle.push(std::mem::replace(&mut self.field, field));
         }
+        self.is_straight = sliding.iter().all(|&j| system.is_affine(j));
         (self.mode, self.t_start, self.signs, self.sliding) = (mode, t_start, signs, sliding);
         self.find_monitored(system, deflations);
     }
@@ -183,7 +187,7 @@ impl<'a> Motion<'a> {
             noise: 0.0,
         };
         self.monitored.clear();
-        let surfaces = (0..signs.len()).filter(|j| self.active[*j] && !sliding.contains(j));
+        let surfaces = (0..signs.len()).filter(|&j| self.active[j] && self.mode.entries()[j] != 0);
         self.monitored.extend(
             surfaces.map(|j| monitor(EventFunction::Surface(j), signs[j], system.is_affine(j))),
         );

@@ -95,7 +95,8 @@ impl Integrator<'_> {
                 return Ok(Some(Stop::NotFinite));
             }
             for j in 0..d {
-                let noise = self.start_noise(j, &signs)?;
+                let size = self.system.surface_size(j, self.t, &self.x, &signs)?;
+                let noise = SURFACE_NOISE * size;
                 on_surface[j] = h[j].abs() <= noise;
                 let entry = if h[j] < 0.0 { -1 } else { 1 };
                 mode.set(j, entry);
@@ -167,18 +168,5 @@ impl Integrator<'_> {
             }
         }
         Ok(Ok((chosen, Left::after(j, &decision))))
-    }
-
-    fn start_noise(&mut self, j: usize, signs: &[f64]) -> Result<f64, FieldError> {
-        let mut gradient = vec![0.0; self.x.len()];
-        let ht = self
-            .system
-            .gradient(j, self.t, &self.x, signs, &mut gradient)?;
-        let size: f64 = gradient
-            .iter()
-            .zip(&self.x)
-            .map(|(g, x)| (g * x).abs())
-            .sum();
-        Ok(SURFACE_NOISE * (size + (ht * self.t).abs()))
     }
 }

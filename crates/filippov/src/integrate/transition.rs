@@ -176,26 +176,22 @@ impl Integrator<'_> {
                 _ => None,
             })
             .collect();
-        let sliding = self.motion.sliding();
-        let mut gradient: Values = smallvec![0.0; self.x.len()];
         for (j, h) in h.iter().enumerate() {
-            if !self.motion.active[j] || sliding.contains(&j) || surfaces.contains(&j) {
+            let slides = self.motion.mode.entries()[j] == 0;
+            if !self.motion.active[j] || slides || surfaces.contains(&j) {
                 continue;
             }
-            let ht = self
-                .system
-                .gradient(j, self.t, &self.x, &self.motion.signs, &mut gradient)?;
-            let size: f64 = gradient
-                .iter()
-                .zip(&self.x)
-                .map(|(g, x)| (g * x).abs())
-                .sum();
+            let signs = &self.motion.signs;
+            let size = self.system.surface_size(j, self.t, &self.x, signs)?;
+            if h.abs() > SURFACE_NOISE * size {
+                continue;
+            }
             // A surface that is being left tangentially stays near for long; one that was crossed at
             // this very instant belongs to the event.
             let departs = self.motion.monitored.iter().any(|m| {
                 m.function == EventFunction::Surface(j) && m.deflation.is_some_and(|d| d.order > 1)
             });
-            if !departs && h.abs() <= SURFACE_NOISE * (size + (ht * self.t).abs()) {
+            if !departs {
                 surfaces.push(j);
             }
         }

@@ -203,7 +203,13 @@ impl Model {
         let key: SmallVec<[i8; 16]> = signs
             .iter()
             .enumerate()
-            .map(|(j, &s)| if sliding.contains(&j) { 0 } else { s as i8 })
+            .map(|(j, &s)| {
+                if sliding.binary_search(&j).is_ok() {
+                    0
+                } else {
+                    s as i8
+                }
+            })
             .collect();
         let mut known = self.activity.lock().unwrap_or_else(PoisonError::into_inner);
         let found = known

@@ -121,6 +121,17 @@ pub trait PiecewiseSystem: Sync {
         Ok((at(up, x)? - at(down, x)?) / (up - down))
     }
 
+    /// The size of the terms that h_j is made of at a point, sum |d_i h_j x_i| + |d_t h_j t|: h_j is zero up to
+    /// rounding far below it.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    fn surface_size(&self, j: usize, t: f64, x: &[f64], signs: &[f64]) -> Result<f64, FieldError> {
+        let mut gradient = vec![0.0; x.len()];
+        let ht = self.gradient(j, t, x, signs, &mut gradient)?;
+        Ok(dot_magnitude(&gradient, x) + (ht * t).abs())
+    }
+
     /// Everything that sliding on h_j needs at a point of the surface: fields and normal components of
     /// both sides. `signs[j]` is ignored. Returns the number of evaluations of the right-hand side.
     ///

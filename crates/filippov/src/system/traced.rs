@@ -1,10 +1,11 @@
 //! A system given by a traced expression graph.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use filippov_expr::{Backend, Enclosure, ExprError, Graph, Motion, Names, NodeId};
 
-use super::compiled::{GradientValues, Model};
+use super::compiled::{CompiledGradient, GradientValues, Model};
 use super::{AffineParts, AffineSigns, BothSides, LieValue, PiecewiseSystem, Word};
 use crate::error::FieldError;
 use crate::tolerances::{MAX_LIE_ORDER, TANGENT};
@@ -78,6 +79,29 @@ impl TracedSystem {
     }
 }
 
+impl TracedSystem {
+    /// The derivative of h_j in t, then those by the states that it depends on.
+    fn gradient_values(
+        &self,
+        j: usize,
+        t: f64,
+        x: &[f64],
+        signs: &[f64],
+    ) -> (&CompiledGradient, Cow<'_, [f64]>) {
+        let compiled = self.model.gradient(j);
+        let values = match &compiled.values {
+            GradientValues::Constant(values) => Cow::Borrowed(&values[..]),
+            GradientValues::Computed(tiered) => {
+                let program = tiered.program();
+                let mut computed = vec![0.0; program.n_outputs()];
+                program.eval(t, x, signs, &self.parameters, &[], &mut computed);
+                Cow::Owned(computed)
+            }
+        };
+        (compiled, values)
+    }
+}
+
 impl PiecewiseSystem for TracedSystem {
     fn n_states(&self) -> usize {
         self.model.n_states
@@ -135,22 +159,19 @@ impl PiecewiseSystem for TracedSystem {
         signs: &[f64],
         gradient: &mut [f64],
     ) -> Result<f64, FieldError> {
-        let compiled = self.model.gradient(j);
-        let mut computed = Vec::new();
-        let values = match &compiled.values {
-            GradientValues::Constant(values) => values,
-            GradientValues::Computed(tiered) => {
-                let program = tiered.program();
-                computed.resize(program.n_outputs(), 0.0);
-                program.eval(t, x, signs, &self.parameters, &[], &mut computed);
-                &computed
-            }
-        };
+        let (compiled, values) = self.gradient_values(j, t, x, signs);
         gradient.fill(0.0);
         for (&state, &value) in compiled.states.iter().zip(&values[1..]) {
             gradient[state] = value;
         }
         Ok(values[0])
+    }
+
+    fn surface_size(&self, j: usize, t: f64, x: &[f64], signs: &[f64]) -> Result<f64, FieldError> {
+        let (compiled, values) = self.gradient_values(j, t, x, signs);
+        let entries = compiled.states.iter().zip(&values[1..]);
+        let size: f64 = entries.map(|(&i, value)| (value * x[i]).abs()).sum();
+        Ok(size + (values[0] * t).abs())
     }
 
     fn both_sides(
