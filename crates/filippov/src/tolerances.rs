@@ -115,3 +115,7 @@ pub const RELAY_ZERO: f64 = TANGENT;
 /// Share of a row that is taken off the diagonal of a singular relay problem. Proximal steps then converge by
 /// about this factor each; the damped matrix has half of the digits left.
 pub const RELAY_DAMPING: f64 = 1e-6;
+
+/// A matrix with diagonal 1 counts as definite, or as one with positive minors, if all pivots exceed this: what is
+/// claimed of it (that a mode is the only one) has to be clear of rounding.
+pub const DEFINITE_PIVOT: f64 = 1e-10;

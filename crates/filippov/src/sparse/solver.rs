@@ -3,7 +3,7 @@
 use super::band::BandLu;
 use super::order::{components, Component};
 use super::rows::SparseRows;
-use crate::tolerances::{NULL_VECTOR_ENTRY, SINGULAR_PIVOT};
+use crate::tolerances::{DEFINITE_PIVOT, NULL_VECTOR_ENTRY, SINGULAR_PIVOT};
 
 /// What couples the unknowns of a system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -227,6 +227,6 @@ pub fn is_positive_definite(matrix: &SparseRows) -> bool {
                 band.add(place[j], place[i], scaled);
             }
         }
-        band.is_positive_definite(SINGULAR_PIVOT * component.unknowns.len() as f64)
+        band.is_positive_definite(DEFINITE_PIVOT)
     })
 }

@@ -238,7 +238,10 @@ impl Core {
         let is_p = is_p_matrix(&negative(&self.n)) == Some(true);
         let mut state = self.pivot(start, &mut pivots);
         // A surface that is left at rate 0 may share what it carries with others.
-        if !is_p && !state.as_ref().is_some_and(|state| self.is_strict(state)) {
+        if !state
+            .as_ref()
+            .is_some_and(|state| is_p || self.is_strict(state))
+        {
             let shared = self.proximal(start, &mut pivots);
             state = shared.filter(|shared| self.is_solution(shared)).or(state);
         }
