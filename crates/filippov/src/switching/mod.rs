@@ -14,7 +14,9 @@ pub use codim1::{decide, Arrival, Decision};
 pub use intersection::{decide_intersection, IntersectionDecision};
 pub use lie::{first_nonzero, normal_component, Leading};
 pub use p_matrix::is_p_matrix;
-pub use relay::{all_relay_modes, solve_relay, RelayError, RelaySolution, Uniqueness};
+pub use relay::{
+    all_relay_modes, solve_relay, RelayError, RelayProblem, RelaySolution, Uniqueness,
+};
 
 /// The word for what happened, as the field uses it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
