@@ -1,6 +1,6 @@
 //! Is a matrix a P-matrix, one with positive principal minors?
 //!
-//! Decided for each connected component: minors up to [`MOST_MINORS`] unknowns, else by conditions that suffice.
+//! Decided for each connected component: minors up to 10 unknowns, else by conditions that suffice.
 //!
 //! Reference: Cottle, Pang, Stone, *The Linear Complementarity Problem* (1992), section 3.3.
 
@@ -12,7 +12,7 @@ const MOST_MINORS: usize = 10;
 
 /// Are all principal minors positive? `None` if that is not known.
 ///
-/// Beyond [`MOST_MINORS`] coupled unknowns two classes are recognised: H-matrices with positive diagonal
+/// Beyond 10 coupled unknowns two classes are recognised: H-matrices with positive diagonal
 /// (diagonally dominant after some scaling of the columns), and those that some positive diagonal D makes positive
 /// definite, A D + D A^T > 0, with D tried so that A D is symmetric if it can be: friction with
 /// different coefficients.

@@ -17,7 +17,7 @@
 //! 2. N singular on the sliding surfaces, as with redundant contacts: the same for N - diag(d) with a small d,
 //!    and its result improved by proximal steps. Of the solutions, which then differ in s but not
 //!    in v if -N is monotone, this finds the one with small s.
-//! 3. Up to [`MOST_ENUMERATED`] surfaces all 3^m modes are tried; beyond, the problem is left undecided.
+//! 3. Up to `MOST_ENUMERATED` surfaces all 3^m modes are tried; beyond, the problem is left undecided.
 //!
 //! References: Cottle, Pang, Stone (1992); Júdice, Pires, *A block principal pivoting algorithm* (1994);
 //! Guglielmi, Hairer (2022); `docs/theory/switching.md`.
@@ -125,7 +125,7 @@ pub fn solve_relay(problem: &RelayProblem, before: &[i8]) -> Result<RelaySolutio
     Ok(solution)
 }
 
-/// All solutions of (R) for up to [`MOST_ENUMERATED`] surfaces, and whether there may be more of them in between:
+/// All solutions of (R) for up to `MOST_ENUMERATED` surfaces, and whether there may be more of them in between:
 /// a mode with singular N may hold a continuum.
 pub fn all_relay_modes(problem: &RelayProblem) -> (Vec<Vec<i8>>, bool) {
     let (found, has_singular) = problem.enumerate();
