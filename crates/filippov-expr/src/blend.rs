@@ -15,7 +15,7 @@
 //!   (1 + s_j)/2 (value at s_j = 1) + (1 - s_j)/2 (value at s_j = -1) for j in E: the sign of a select, the
 //!   signs that two factors share, all signs inside of a function or a divisor.
 //!
-//! With more than [`MOST_SIGNS`] signs in the way it gives up. Friction of every kind passes: `s*F(|v|)` has
+//! With more than 3 signs in the way it gives up. Friction of every kind passes: `s*F(|v|)` has
 //! one sign, whatever F is. The derivatives by all signs follow in one reverse sweep per value, so a field
 //! of n components that contain few signs each costs O(n), whatever the number of surfaces.
 //!

@@ -284,10 +284,10 @@ pub const SINGULAR_PIVOT: f64 = 64.0 * EPS;
 /// rounding errors of elimination are far below it, genuine shares far above.
 pub const NULL_VECTOR_ENTRY: f64 = 1e-6;
 
-/// The rate of a switching function in a relay problem counts as zero below this fraction of the sum of the
-/// magnitudes it is made of: as [`TANGENT`], and for the same reason.
-pub const RELAY_ZERO: f64 = TANGENT;
-
 /// Share of a row that is taken off the diagonal of a singular relay problem. Proximal steps then converge by
 /// about this factor each; the damped matrix has half of the digits left.
 pub const RELAY_DAMPING: f64 = 1e-6;
+
+/// A matrix with diagonal 1 counts as definite, or as one with positive minors, if all pivots exceed this: what is
+/// claimed of it (that a mode is the only one) has to be clear of rounding.
+pub const DEFINITE_PIVOT: f64 = 1e-10;

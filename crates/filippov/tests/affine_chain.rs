@@ -2,7 +2,7 @@
 //! the relay problem, the field by one linear system, without ever forming the fields of all signs.
 #![allow(clippy::unwrap_used)]
 
-use filippov::switching::{solve_relay, Uniqueness};
+use filippov::switching::{solve_relay, RelayProblem, Uniqueness};
 use filippov::{PiecewiseSystem, TracedSystem};
 use filippov_expr::{Backend, Graph, Names, NodeId};
 
@@ -40,7 +40,12 @@ fn released(system: &TracedSystem, x: &[f64]) -> (Vec<i8>, Vec<f64>) {
     let state: Vec<f64> = x.iter().copied().chain(vec![0.0; d]).collect();
     let mut parts = affine.affine_parts(&surfaces).unwrap();
     parts.evaluate(affine, 0.0, &state, &vec![0.0; d]).unwrap();
-    let found = solve_relay(&parts.nu(), parts.normal(), &vec![0; d]).unwrap();
+    let problem = RelayProblem {
+        nu: parts.nu(),
+        n: parts.normal().clone(),
+        noise: system.lie_tolerance(1),
+    };
+    let found = solve_relay(&problem, &vec![0; d]).unwrap();
     assert_eq!(found.uniqueness, Uniqueness::Certain);
     let mut field = vec![0.0; 2 * d];
     parts.combine(&found.signs, &mut field);

@@ -8,7 +8,7 @@ use crate::error::FieldError;
 use crate::event::EventFunction;
 use crate::field::SmoothField;
 use crate::mode::Mode;
-use crate::switching::{solve_relay, RelaySolution, Uniqueness};
+use crate::switching::{solve_relay, RelayProblem, RelaySolution, Uniqueness};
 use crate::tolerances::{DRIFT_SHARE, MOST_MEETING};
 
 impl Integrator<'_> {
@@ -90,6 +90,11 @@ impl Integrator<'_> {
         let signs: Vec<f64> = mode.entries().iter().map(|&e| f64::from(e)).collect();
         self.stats.n_field_evaluations += parts.evaluate(affine, t, &x, &signs)?;
         let before: Vec<i8> = meeting.iter().map(|&j| mode.entries()[j]).collect();
-        Ok(solve_relay(&parts.nu(), parts.normal(), &before).ok())
+        let problem = RelayProblem {
+            nu: parts.nu(),
+            n: parts.normal().clone(),
+            noise: system.lie_tolerance(1),
+        };
+        Ok(solve_relay(&problem, &before).ok())
     }
 }

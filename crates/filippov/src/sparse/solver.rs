@@ -3,7 +3,7 @@
 use super::band::BandLu;
 use super::order::{components, Component};
 use super::rows::SparseRows;
-use crate::tolerances::{NULL_VECTOR_ENTRY, SINGULAR_PIVOT};
+use crate::tolerances::{DEFINITE_PIVOT, NULL_VECTOR_ENTRY, SINGULAR_PIVOT};
 
 /// What couples the unknowns of a system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,11 +62,22 @@ pub struct SparseSolver {
     place: Vec<usize>,
     buffer: Vec<f64>,
     n_orderings: usize,
+    /// Relative errors of the entries, beside rounding.
+    noise: f64,
     /// Of factors that other orderings replaced.
     n_operations_before: usize,
 }
 
 impl SparseSolver {
+    /// A solver for matrices whose entries are known up to this fraction of the largest ones in row and column,
+    /// as from differences: what is singular within it counts as singular.
+    pub fn with_noise(noise: f64) -> Self {
+        SparseSolver {
+            noise,
+            ..SparseSolver::default()
+        }
+    }
+
     /// Factors a matrix.
     ///
     /// Rows and columns are scaled to the size 1 first, so that units do not matter. A matrix with entries
@@ -86,7 +97,7 @@ impl SparseSolver {
                     factor.add(i, self.place[column], scaled);
                 }
             }
-            let threshold = SINGULAR_PIVOT * block.largest as f64;
+            let threshold = self.noise.max(SINGULAR_PIVOT * block.largest as f64);
             if let Err(null) = factor.factor(threshold) {
                 let scaled = component.unknowns.iter().zip(null);
                 return Err(Singular {
@@ -227,6 +238,6 @@ pub fn is_positive_definite(matrix: &SparseRows) -> bool {
                 band.add(place[j], place[i], scaled);
             }
         }
-        band.is_positive_definite(SINGULAR_PIVOT * component.unknowns.len() as f64)
+        band.is_positive_definite(DEFINITE_PIVOT)
     })
 }

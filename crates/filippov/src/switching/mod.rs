@@ -35,7 +35,9 @@ pub use lie::{first_nonzero, normal_component, Leading};
 pub use normal_fields::NormalFields;
 pub use p_matrix::is_p_matrix;
 pub use redundant::least_multipliers;
-pub use relay::{all_relay_modes, solve_relay, RelayError, RelaySolution, Uniqueness};
+pub use relay::{
+    all_relay_modes, solve_relay, RelayError, RelayProblem, RelaySolution, Uniqueness,
+};
 pub use resolution::{Continuation, Resolution, Undecided};
 pub use resolve::resolve;
 pub use roots::{multiplier_rates, newton, roots_in_cube, stable_roots, Roots};

@@ -1,18 +1,18 @@
 //! Is a matrix a P-matrix, one with positive principal minors?
 //!
-//! Decided for each connected component: minors up to [`MOST_MINORS`] unknowns, else by conditions that suffice.
+//! Decided for each connected component: minors up to 10 unknowns, else by conditions that suffice.
 //!
 //! Reference: Cottle, Pang, Stone, *The Linear Complementarity Problem* (1992), section 3.3.
 
 use crate::sparse::{components, is_positive_definite, SparseRows, SparseSolver};
-use crate::tolerances::SINGULAR_PIVOT;
+use crate::tolerances::DEFINITE_PIVOT;
 
 /// Largest component whose minors are computed; m unknowns take about 2^m eliminations.
 const MOST_MINORS: usize = 10;
 
 /// Are all principal minors positive? `None` if that is not known.
 ///
-/// Beyond [`MOST_MINORS`] coupled unknowns two classes are recognised: H-matrices with positive diagonal
+/// Beyond 10 coupled unknowns two classes are recognised: H-matrices with positive diagonal
 /// (diagonally dominant after some scaling of the columns), and those that some positive diagonal D makes positive
 /// definite, A D + D A^T > 0, with D tried so that A D is symmetric if it can be: friction with
 /// different coefficients.
@@ -71,11 +71,12 @@ fn is_h_matrix(block: &SparseRows) -> bool {
     if solver.factor(&comparison).is_err() {
         return false;
     }
-    let mut weights: Vec<f64> = (0..m).map(|i| block.diagonal(i)).collect();
+    let mut weights: Vec<f64> = (0..m).map(|i| comparison.diagonal(i)).collect();
     solver.solve(&mut weights);
+    // Rounding of a singular matrix makes them large.
     weights
         .iter()
-        .all(|&weight| weight > 0.0 && weight.is_finite())
+        .all(|&weight| weight > 0.0 && weight < 1.0 / DEFINITE_PIVOT)
 }
 
 /// Is A D + D A^T positive definite for the D that makes A D symmetric, or for D = 1?
@@ -123,7 +124,7 @@ fn has_positive_minors(a: &[Vec<f64>]) -> bool {
         return true;
     };
     let pivot = first[0];
-    let is_positive = pivot > SINGULAR_PIVOT * a.len() as f64;
+    let is_positive = pivot > DEFINITE_PIVOT;
     if !is_positive {
         return false;
     }

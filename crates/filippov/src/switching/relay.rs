@@ -17,14 +17,14 @@
 //! 2. N singular on the sliding surfaces, as with redundant contacts: the same for N - diag(d) with a small d,
 //!    and its result improved by proximal steps. Of the solutions, which then differ in s but not
 //!    in v if -N is monotone, this finds the one with small s.
-//! 3. Up to [`MOST_ENUMERATED`] surfaces all 3^m modes are tried; beyond, the problem is left undecided.
+//! 3. Up to `MOST_ENUMERATED` surfaces all 3^m modes are tried; beyond, the problem is left undecided.
 //!
 //! References: Cottle, Pang, Stone (1992); Júdice, Pires, *A block principal pivoting algorithm* (1994);
 //! Guglielmi, Hairer (2022); `docs/theory/switching.md`.
 
 use super::p_matrix::is_p_matrix;
 use crate::sparse::{Singular, SparseRows, SparseSolver};
-use crate::tolerances::{RELAY_DAMPING, RELAY_ZERO};
+use crate::tolerances::RELAY_DAMPING;
 
 /// Largest number of surfaces for which all modes are tried.
 pub const MOST_ENUMERATED: usize = 8;
@@ -34,6 +34,17 @@ const PATIENCE: usize = 4;
 
 /// Proximal steps; each gains a factor of about 1 / d.
 const MOST_PROXIMAL: usize = 30;
+
+/// The data of (R), one entry or row per surface.
+#[derive(Clone, Debug)]
+pub struct RelayProblem {
+    /// The rates of the switching functions at s = 0.
+    pub nu: Vec<f64>,
+    /// How they depend on the signs.
+    pub n: SparseRows,
+    /// Rates below this fraction of the sum of their terms count as zero: `PiecewiseSystem::lie_tolerance(1)`.
+    pub noise: f64,
+}
 
 /// Is the solution of a relay problem the only one?
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -89,113 +100,37 @@ pub enum RelayError {
 /// # Example
 /// ```
 /// use filippov::sparse::SparseRows;
-/// use filippov::switching::{solve_relay, Uniqueness};
+/// use filippov::switching::{solve_relay, RelayProblem, Uniqueness};
 /// // Two masses of 1 pushed with 0.5 and 3 against friction of 1, joined by a damper.
 /// let n = SparseRows::from_dense(&[vec![-1.0, 0.2], vec![0.2, -1.0]]);
-/// let found = solve_relay(&[0.5, 3.0], &n, &[0, 0])?;
+/// let problem = RelayProblem { nu: vec![0.5, 3.0], n, noise: 1e-11 };
+/// let found = solve_relay(&problem, &[0, 0])?;
 /// assert_eq!(found.modes, [0, 1]);
 /// assert!((found.signs[0] - 0.7).abs() < 1e-15 && (found.rates[1] - 2.14).abs() < 1e-15);
 /// assert_eq!(found.uniqueness, Uniqueness::Certain);
 /// # Ok::<(), filippov::switching::RelayError>(())
 /// ```
-pub fn solve_relay(nu: &[f64], n: &SparseRows, before: &[i8]) -> Result<RelaySolution, RelayError> {
-    if !n.is_finite() || !nu.iter().all(|v| v.is_finite()) {
+pub fn solve_relay(problem: &RelayProblem, before: &[i8]) -> Result<RelaySolution, RelayError> {
+    if !problem.n.is_finite() || !problem.nu.iter().all(|v| v.is_finite()) {
         return Err(RelayError::NotFinite);
     }
-    let leaders = leaders(nu, n);
-    let core = Core::new(nu, n, &leaders);
+    let leaders = problem.leaders();
     let start: Vec<i8> = leaders.iter().map(|&i| before[i]).collect();
-    let solved = core.solve(&start)?;
-    let mut signs = vec![0.0; nu.len()];
-    for (&i, &sign) in leaders.iter().zip(&solved.signs) {
-        signs[i] = sign.clamp(-1.0, 1.0);
-    }
-    let mut solution = completed(nu, n, signs, &leaders, &solved.modes, before);
-    solution.uniqueness = solved.uniqueness;
-    if solution
-        .degenerate
-        .iter()
-        .any(|i| leaders.binary_search(i).is_err())
-    {
+    let solved = problem.restricted(&leaders).solve(&start)?;
+    let mut solution = problem.completed(&leaders, &solved, before);
+    let is_follower = |i: &usize| leaders.binary_search(i).is_err();
+    if solution.degenerate.iter().any(is_follower) {
         solution.uniqueness = Uniqueness::Unknown;
     }
-    (solution.n_pivots, solution.n_operations) = (solved.n_pivots, solved.n_operations);
     Ok(solution)
 }
 
-/// All solutions of (R) for up to [`MOST_ENUMERATED`] surfaces, and whether there may be more of them in between:
+/// All solutions of (R) for up to `MOST_ENUMERATED` surfaces, and whether there may be more of them in between:
 /// a mode with singular N may hold a continuum.
-pub fn all_relay_modes(nu: &[f64], n: &SparseRows) -> (Vec<Vec<i8>>, bool) {
-    let all: Vec<usize> = (0..nu.len()).collect();
-    let (found, has_singular) = Core::new(nu, n, &all).enumerate();
-    (
-        found.into_iter().map(|state| state.modes).collect(),
-        has_singular,
-    )
-}
-
-/// The surfaces whose sign has any effect. The others, kinks, follow: their sign is that of their rate.
-fn leaders(nu: &[f64], n: &SparseRows) -> Vec<usize> {
-    let mut has_effect = vec![false; nu.len()];
-    let ones = vec![1.0; nu.len()];
-    for (i, nu) in nu.iter().enumerate() {
-        let noise = RELAY_ZERO * (nu.abs() + n.magnitude(i, &ones));
-        for (j, value) in n.row(i) {
-            has_effect[j] |= value.abs() > noise;
-        }
-    }
-    (0..nu.len()).filter(|&j| has_effect[j]).collect()
-}
-
-/// The whole solution from the signs of the leaders.
-fn completed(
-    nu: &[f64],
-    n: &SparseRows,
-    mut signs: Vec<f64>,
-    leaders: &[usize],
-    modes_of_leaders: &[i8],
-    before: &[i8],
-) -> RelaySolution {
-    let m = nu.len();
-    let mut modes = before.to_vec();
-    let mut rates = vec![0.0; m];
-    let mut degenerate = Vec::new();
-    let mut at = leaders.iter().zip(modes_of_leaders).peekable();
-    let leading = signs.clone();
-    for i in 0..m {
-        let rate = nu[i] + n.dot(i, &leading);
-        let noise = RELAY_ZERO * (nu[i].abs() + n.magnitude(i, &leading));
-        match at.next_if(|entry| *entry.0 == i) {
-            Some((_, &mode)) => {
-                modes[i] = mode;
-                let touches = mode == 0 && signs[i].abs() >= 1.0 - slack(n, i, noise);
-                if touches || (mode != 0 && rate.abs() <= noise) {
-                    degenerate.push(i);
-                }
-            }
-            None if rate.abs() <= noise => degenerate.push(i),
-            None => {
-                modes[i] = if rate > 0.0 { 1 } else { -1 };
-                signs[i] = f64::from(modes[i]);
-            }
-        }
-        rates[i] = if modes[i] == 0 { 0.0 } else { rate };
-    }
-    RelaySolution {
-        modes,
-        signs,
-        rates,
-        uniqueness: Uniqueness::Unknown,
-        degenerate,
-        n_pivots: 0,
-        n_operations: 0,
-    }
-}
-
-/// (R) for the surfaces that have an effect.
-struct Core {
-    nu: Vec<f64>,
-    n: SparseRows,
+pub fn all_relay_modes(problem: &RelayProblem) -> (Vec<Vec<i8>>, bool) {
+    let (found, has_singular) = problem.enumerate();
+    let modes = found.into_iter().map(|state| state.modes);
+    (modes.collect(), has_singular)
 }
 
 /// Modes with their signs and rates: the equations of (R) without the inequalities.
@@ -221,15 +156,69 @@ struct Pivots {
     n_pivots: usize,
 }
 
-impl Core {
-    fn new(nu: &[f64], n: &SparseRows, kept: &[usize]) -> Self {
-        let mut position = vec![usize::MAX; nu.len()];
+impl RelayProblem {
+    /// The surfaces whose sign has any effect. The others, kinks, follow: their sign is that of their rate.
+    fn leaders(&self) -> Vec<usize> {
+        let m = self.nu.len();
+        let mut has_effect = vec![false; m];
+        let ones = vec![1.0; m];
+        for i in 0..m {
+            let noise = self.rounding(&ones, i);
+            for (j, value) in self.n.row(i) {
+                has_effect[j] |= value.abs() > noise;
+            }
+        }
+        (0..m).filter(|&j| has_effect[j]).collect()
+    }
+
+    /// The problem of some surfaces, in increasing order, without the others.
+    fn restricted(&self, kept: &[usize]) -> Self {
+        let mut position = vec![usize::MAX; self.nu.len()];
         for (place, &i) in kept.iter().enumerate() {
             position[i] = place;
         }
-        Core {
-            nu: kept.iter().map(|&i| nu[i]).collect(),
-            n: n.principal(kept, &position),
+        RelayProblem {
+            nu: kept.iter().map(|&i| self.nu[i]).collect(),
+            n: self.n.principal(kept, &position),
+            noise: self.noise,
+        }
+    }
+
+    /// The whole solution from that of the leaders.
+    fn completed(&self, leaders: &[usize], solved: &Solved, before: &[i8]) -> RelaySolution {
+        let m = self.nu.len();
+        let mut modes = before.to_vec();
+        let mut leading = vec![0.0; m];
+        for (place, &i) in leaders.iter().enumerate() {
+            modes[i] = solved.modes[place];
+            leading[i] = solved.signs[place].clamp(-1.0, 1.0);
+        }
+        let mut signs = leading.clone();
+        let mut rates = vec![0.0; m];
+        let mut degenerate = Vec::new();
+        for i in 0..m {
+            let rate = self.nu[i] + self.n.dot(i, &leading);
+            let rounding = self.rounding(&leading, i);
+            let is_zero = rate.abs() <= rounding;
+            if leaders.binary_search(&i).is_err() && !is_zero {
+                modes[i] = if rate > 0.0 { 1 } else { -1 };
+                signs[i] = f64::from(modes[i]);
+            } else if leaders.binary_search(&i).is_err()
+                || modes[i] != 0 && is_zero
+                || modes[i] == 0 && signs[i].abs() >= 1.0 - self.slack(rounding, i)
+            {
+                degenerate.push(i);
+            }
+            rates[i] = if modes[i] == 0 { 0.0 } else { rate };
+        }
+        RelaySolution {
+            modes,
+            signs,
+            rates,
+            uniqueness: solved.uniqueness,
+            degenerate,
+            n_pivots: solved.n_pivots,
+            n_operations: solved.n_operations,
         }
     }
 
@@ -238,7 +227,10 @@ impl Core {
         let is_p = is_p_matrix(&negative(&self.n)) == Some(true);
         let mut state = self.pivot(start, &mut pivots);
         // A surface that is left at rate 0 may share what it carries with others.
-        if !is_p && !state.as_ref().is_some_and(|state| self.is_strict(state)) {
+        if !state
+            .as_ref()
+            .is_some_and(|state| is_p || self.is_strict(state))
+        {
             let shared = self.proximal(start, &mut pivots);
             state = shared.filter(|shared| self.is_solution(shared)).or(state);
         }
@@ -272,7 +264,7 @@ impl Core {
     fn is_strict(&self, state: &State) -> bool {
         let modes = state.modes.iter().enumerate();
         let mut left = modes.filter(|entry| *entry.1 != 0).map(|entry| entry.0);
-        left.all(|i| state.rates[i].abs() > self.noise(&state.signs, i))
+        left.all(|i| state.rates[i].abs() > self.rounding(&state.signs, i))
     }
 
     /// Principal pivoting: many states at a time while that helps, else one.
@@ -356,17 +348,23 @@ impl Core {
     }
 
     /// A rate below this is rounding.
-    fn noise(&self, signs: &[f64], i: usize) -> f64 {
-        RELAY_ZERO * (self.nu[i].abs() + self.n.magnitude(i, signs))
+    fn rounding(&self, signs: &[f64], i: usize) -> f64 {
+        self.noise * (self.nu[i].abs() + self.n.magnitude(i, signs))
+    }
+
+    /// How much of a sign is rounding, if the rates are known up to `rounding`.
+    fn slack(&self, rounding: f64, i: usize) -> f64 {
+        let size = largest(&self.n, i);
+        self.noise + if size > 0.0 { rounding / size } else { 0.0 }
     }
 
     fn is_wrong(&self, state: &State, i: usize) -> bool {
-        let noise = self.noise(&state.signs, i);
+        let rounding = self.rounding(&state.signs, i);
         if state.modes[i] == 0 {
-            let fits = state.signs[i].abs() <= 1.0 + slack(&self.n, i, noise);
+            let fits = state.signs[i].abs() <= 1.0 + self.slack(rounding, i);
             !fits
         } else {
-            f64::from(state.modes[i]) * state.rates[i] < -noise
+            f64::from(state.modes[i]) * state.rates[i] < -rounding
         }
     }
 
@@ -379,10 +377,10 @@ impl Core {
             .collect();
         (0..signs.len()).all(|i| {
             let rate = self.nu[i] + self.n.dot(i, &signs);
-            let noise = 8.0 * self.noise(&signs, i);
+            let rounding = 8.0 * self.rounding(&signs, i);
             match state.modes[i] {
-                0 => rate.abs() <= noise,
-                mode => f64::from(mode) * rate >= -noise,
+                0 => rate.abs() <= rounding,
+                mode => f64::from(mode) * rate >= -rounding,
             }
         })
     }
@@ -393,9 +391,10 @@ impl Core {
         let damping: Vec<f64> = (0..m)
             .map(|i| RELAY_DAMPING * largest(&self.n, i))
             .collect();
-        let mut damped = Core {
+        let mut damped = RelayProblem {
             nu: self.nu.clone(),
             n: with_diagonal(&self.n, &damping),
+            noise: self.noise,
         };
         let mut center = vec![0.0; m];
         let mut modes = start.to_vec();
@@ -406,7 +405,7 @@ impl Core {
             let state = damped.pivot(&modes, pivots)?;
             let is_done = (0..m).all(|i| {
                 let residual = damping[i] * (state.signs[i] - center[i]).abs();
-                residual <= self.noise(&state.signs, i)
+                residual <= self.rounding(&state.signs, i)
             });
             if is_done {
                 return Some(state);
@@ -441,12 +440,6 @@ impl Core {
 /// The largest entry of a row.
 fn largest(matrix: &SparseRows, i: usize) -> f64 {
     matrix.row(i).fold(0.0, |size, (_, v)| size.max(v.abs()))
-}
-
-/// How much of a sign is rounding, if the rates are known up to `noise`.
-fn slack(n: &SparseRows, i: usize, noise: f64) -> f64 {
-    let size = largest(n, i);
-    RELAY_ZERO + if size > 0.0 { noise / size } else { 0.0 }
 }
 
 fn negative(matrix: &SparseRows) -> SparseRows {

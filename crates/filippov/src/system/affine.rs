@@ -37,7 +37,9 @@ pub trait AffineSigns: PiecewiseSystem {
         for _ in surfaces {
             full.push_row((0..n).map(|i| (i, 0.0)));
         }
-        Some(AffineParts::new(n, surfaces, full.clone(), full))
+        let mut parts = AffineParts::new(n, surfaces, full.clone(), full);
+        parts.solver = SparseSolver::with_noise(self.lie_tolerance(1));
+        Some(parts)
     }
 
     /// Writes f(t, x, s), the gradients and time derivatives of the switching functions, and df/ds_j. Returns

@@ -1,9 +1,21 @@
 //! Relay problems: by hand, the cases of `tests/data`, random ones against all modes, chains.
 
 use super::super::p_matrix::tests::smallest_minor;
-use super::{all_relay_modes, solve_relay, RelayError, RelaySolution, Uniqueness};
+use super::{all_relay_modes, RelayError, RelayProblem, RelaySolution, Uniqueness};
 use crate::sparse::SparseRows;
 use proptest::prelude::*;
+
+fn problem(nu: &[f64], n: &SparseRows) -> RelayProblem {
+    RelayProblem {
+        nu: nu.to_vec(),
+        n: n.clone(),
+        noise: 1e-11,
+    }
+}
+
+fn solve_relay(nu: &[f64], n: &SparseRows, before: &[i8]) -> Result<RelaySolution, RelayError> {
+    super::solve_relay(&problem(nu, n), before)
+}
 
 fn solved(nu: &[f64], rows: &[Vec<f64>], before: &[i8]) -> RelaySolution {
     solve_relay(nu, &SparseRows::from_dense(rows), before).expect("solvable")
@@ -65,7 +77,8 @@ fn repulsion_has_several_solutions() {
         (found.modes, found.uniqueness),
         (vec![-1], Uniqueness::Several)
     );
-    let (all, has_singular) = all_relay_modes(&[0.1], &SparseRows::from_dense(&[vec![1.0]]));
+    let (all, has_singular) =
+        all_relay_modes(&problem(&[0.1], &SparseRows::from_dense(&[vec![1.0]])));
     assert_eq!((all.len(), has_singular), (3, false));
     let pushed = solved(&[3.0], &[vec![1.0]], &[-1]);
     assert_eq!(
@@ -206,7 +219,7 @@ proptest! {
         prop_assert_eq!(found.uniqueness, Uniqueness::Certain);
         prop_assert!(violation(&nu, &n, &found) < 1e-10);
         if found.degenerate.is_empty() {
-            let (all, _) = all_relay_modes(&nu, &n);
+            let (all, _) = all_relay_modes(&problem(&nu, &n));
             prop_assert_eq!(all, vec![found.modes.clone()]);
         }
         let again = solve_relay(&nu, &n, &found.modes).expect("a P-matrix");
