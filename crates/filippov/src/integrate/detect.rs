@@ -14,7 +14,7 @@ use crate::event::isolate::{first_zero_sampled, Evidence, Zero, PROBES};
 use crate::event::locate::refine;
 use crate::event::{Deflation, EventFunction, Monitored};
 use crate::stepper::nested;
-use crate::system::{dot, PiecewiseSystem};
+use crate::system::PiecewiseSystem;
 use crate::tolerances::{
     EPS, EXTRAPOLATION, ONE_SIDED_AIM, POLE, RESOLVED_DEPTH, SURFACE_NOISE, UNBOUNDED_DEPTH,
     UNPROVED_DEPTH,
@@ -36,7 +36,6 @@ pub(super) struct Detector {
     /// Switching functions at the probes of the step.
     probed: [Vec<f64>; 2],
     rate: Vec<f64>,
-    gradient: Vec<f64>,
     pub x: Vec<f64>,
     /// How far the projection onto a curved surface moves the extension in this step; else empty.
     pub margin: Vec<f64>,
@@ -46,6 +45,8 @@ pub(super) struct Detector {
     pub enclosed_root: RefCell<Option<RootPiece>>,
     /// Value and rate at the end of the step, per monitored function.
     right: Vec<(f64, f64)>,
+    /// Rounding of the exit functions in this step, once it was needed.
+    exit_noise: Option<f64>,
     /// Which monitored functions the filter could not clear.
     suspects: Vec<usize>,
 }
@@ -72,12 +73,12 @@ impl Detector {
             h: vec![0.0; d],
             probed: [vec![0.0; d], vec![0.0; d]],
             rate: vec![0.0; d],
-            gradient: vec![0.0; n],
             x: vec![0.0; n],
             margin: Vec::new(),
             enclosed_exits: Cell::new(None),
             enclosed_root: RefCell::new(None),
             right: Vec::new(),
+            exit_noise: None,
             suspects: Vec::new(),
         }
     }
@@ -146,12 +147,12 @@ impl Detector {
         (t, start, end): (f64, &[f64], &[f64]),
     ) -> Result<f64, FieldError> {
         let EventFunction::Surface(j) = function else {
-            let largest = self
-                .stages
-                .iter()
-                .flatten()
-                .fold(0.0_f64, |m, v| m.max(v.abs()));
-            return Ok(4.0 * SURFACE_NOISE * largest);
+            let stages = &self.stages;
+            let noise = *self.exit_noise.get_or_insert_with(|| {
+                let values = stages.iter().flatten();
+                4.0 * SURFACE_NOISE * values.fold(0.0_f64, |m, v| m.max(v.abs()))
+            });
+            return Ok(noise);
         };
         let size = system
             .surface_size(j, t, end, &motion.signs)?
@@ -170,6 +171,7 @@ impl Integrator<'_> {
         self.detector.enclosed_exits.set(None);
         self.detector.enclosed_root.take();
         self.detector.margin.clear();
+        self.detector.exit_noise = None;
         self.detector.next_dt = None;
         if self.motion.monitored.is_empty() {
             return Ok(None);
@@ -389,15 +391,14 @@ impl Integrator<'_> {
         m: Monitored,
         dt: f64,
     ) -> Result<[f64; 6], FieldError> {
-        let gradient = &mut self.detector.gradient;
-        let signs = &self.motion.signs;
-        let ht = self.system.gradient(j, self.t, &self.x, signs, gradient)?;
-        let mut rows = [m.value, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let (point, signs) = ((self.t, &self.x[..]), &self.motion.signs);
         let extension = self.stepper.interpolant().coefficients();
-        let values = extension.chunks_exact(gradient.len());
-        for (row, values) in rows.iter_mut().zip(values).skip(1) {
-            *row = m.orientation * dot(gradient, values);
-        }
+        let mut rows = [0.0; 6];
+        let ht = self
+            .system
+            .gradient_products(j, point, signs, extension, &mut rows)?;
+        rows.iter_mut().for_each(|row| *row *= m.orientation);
+        rows[0] = m.value;
         rows[1] += m.orientation * ht * dt;
         Ok(rows)
     }

@@ -121,6 +121,27 @@ pub trait PiecewiseSystem: Sync {
         Ok((at(up, x)? - at(down, x)?) / (up - down))
     }
 
+    /// Writes the products of the gradient of h_j with vectors of n entries that stand one after the other, and
+    /// returns its derivative in t.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    fn gradient_products(
+        &self,
+        j: usize,
+        (t, x): (f64, &[f64]),
+        signs: &[f64],
+        vectors: &[f64],
+        products: &mut [f64],
+    ) -> Result<f64, FieldError> {
+        let mut gradient = vec![0.0; x.len()];
+        let ht = self.gradient(j, t, x, signs, &mut gradient)?;
+        for (product, vector) in products.iter_mut().zip(vectors.chunks_exact(x.len())) {
+            *product = dot(&gradient, vector);
+        }
+        Ok(ht)
+    }
+
     /// The size of the terms that h_j is made of at a point, sum |d_i h_j x_i| + |d_t h_j t|: h_j is zero up to
     /// rounding far below it.
     ///

@@ -167,6 +167,22 @@ impl PiecewiseSystem for TracedSystem {
         Ok(values[0])
     }
 
+    fn gradient_products(
+        &self,
+        j: usize,
+        (t, x): (f64, &[f64]),
+        signs: &[f64],
+        vectors: &[f64],
+        products: &mut [f64],
+    ) -> Result<f64, FieldError> {
+        let (compiled, values) = self.gradient_values(j, t, x, signs);
+        for (product, vector) in products.iter_mut().zip(vectors.chunks_exact(x.len())) {
+            let entries = compiled.states.iter().zip(&values[1..]);
+            *product = entries.map(|(&i, value)| value * vector[i]).sum();
+        }
+        Ok(values[0])
+    }
+
     fn surface_size(&self, j: usize, t: f64, x: &[f64], signs: &[f64]) -> Result<f64, FieldError> {
         let (compiled, values) = self.gradient_values(j, t, x, signs);
         let entries = compiled.states.iter().zip(&values[1..]);
