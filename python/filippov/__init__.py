@@ -61,6 +61,7 @@ from filippov.functions import (
     tanh,
     where,
 )
+from filippov.hidden import HiddenDynamics, hidden_dynamics
 from filippov.modes import Mode
 from filippov.solution import DenseSolution, Solution
 from filippov.solve import solve_ivp
@@ -75,6 +76,7 @@ __all__ = [
     "DenseSolution",
     "Event",
     "FilippovError",
+    "HiddenDynamics",
     "InputError",
     "Interrupted",
     "IntersectionError",
@@ -108,6 +110,7 @@ __all__ = [
     "exp2",
     "expm1",
     "heaviside",
+    "hidden_dynamics",
     "hypot",
     "log",
     "log1p",

@@ -10,6 +10,7 @@ use pyo3::types::{PyDict, PyTuple};
 use crate::systems::{core_of, raised};
 
 type Array<'py> = PyReadonlyArray1<'py, f64>;
+type FieldAndMultipliers<'py> = (Bound<'py, PyArray1<f64>>, Vec<f64>);
 
 /// The field of a mode with two and more zero entries and its multipliers; None if there are none.
 #[pyfunction]
@@ -22,7 +23,7 @@ pub fn intersection_field<'py>(
     mode: Vec<i8>,
     p: Array<'py>,
     near: Vec<f64>,
-) -> PyResult<Option<(Bound<'py, PyArray1<f64>>, Vec<f64>)>> {
+) -> PyResult<Option<FieldAndMultipliers<'py>>> {
     let core = core_of(system, &p)?;
     let x = x.as_slice()?;
     if x.len() != core.n_states() || mode.len() != core.n_surfaces() {
