@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from functools import cache
 from typing import Any
 
@@ -165,36 +166,39 @@ def test_solution_fulfils_the_equation(case: Any) -> None:
 
 @pytest.mark.parametrize("case", every())
 def test_sliding_field_is_tangential(case: Any) -> None:
+    if case == "disode_planar":
+        pytest.skip("its fields end at the surface: there is no field on a side of it to compare with")
     sol, source = get(case)
     assert sol.sol is not None
     for segment in sol.segments:
         if not segment.mode.is_sliding or segment.duration < 1e-6:
             continue
-        (j,) = segment.sliding
-        if sol.surfaces[j] not in SURFACES:
-            continue
-        component = int(sol.surfaces[j][2])
         for t in inner_times(segment, 3):
-            field = source.field(t, sol.sol(t), segment.mode)
-            assert abs(field[component]) < 1e-12 * (1.0 + np.abs(field).max())
-            lam = sol.sol.multipliers(t)[j]
-            sides = []
-            for side in (1, -1):
+            state = sol.sol(t)
+            field = source.field(t, state, segment.mode)
+            for name in (sol.surfaces[j] for j in segment.sliding):
+                if name in SURFACES:
+                    assert abs(field[int(name[2])]) < 1e-12 * (1.0 + np.abs(field).max())
+            # The mean of the fields around, weighted by the multipliers of the solution.
+            lam = sol.sol.multipliers(t)
+            mean = np.zeros_like(field)
+            for sides in itertools.product((-1, 1), repeat=segment.mode.codimension):
                 mode = list(segment.mode)
-                mode[j] = side
-                sides.append(source.field(t, sol.sol(t), mode))
-            mean = 0.5 * (1 + lam) * sides[0] + 0.5 * (1 - lam) * sides[1]
+                weight = 1.0
+                for j, side in zip(segment.sliding, sides, strict=True):
+                    mode[j] = side
+                    weight *= 0.5 * (1 + side * lam[j])
+                mean += weight * source.field(t, state, mode)
             np.testing.assert_allclose(field, mean, rtol=1e-9, atol=1e-9)
 
 
 def test_random_relays_do_what_they_should() -> None:
-    """The random cases are not all alike: some slide, most switch, few end at an intersection."""
+    """The random cases are not all alike: some slide, also on both surfaces, most switch."""
     solutions = [relay(seed)[0] for seed in range(30)]
     assert sum(len(sol.switches) > 2 for sol in solutions) >= 10
     assert sum(any(s.mode.is_sliding for s in sol.segments) for sol in solutions) >= 6
     for sol in solutions:
-        assert sol.success or "intersection" in sol.message, sol.message
-    assert sum(sol.success for sol in solutions) >= 20
+        assert sol.success, sol.message
 
 
 def test_statistics_of_the_transient() -> None:

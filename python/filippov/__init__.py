@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from filippov.classification import Classification
 from filippov.decorator import system
 from filippov.errors import (
     FilippovError,
@@ -60,6 +61,7 @@ from filippov.functions import (
     tanh,
     where,
 )
+from filippov.hidden import HiddenDynamics, hidden_dynamics
 from filippov.modes import Mode
 from filippov.solution import DenseSolution, Solution
 from filippov.solve import solve_ivp
@@ -70,9 +72,11 @@ if TYPE_CHECKING:
     from filippov import plot, problems
 
 __all__ = [
+    "Classification",
     "DenseSolution",
     "Event",
     "FilippovError",
+    "HiddenDynamics",
     "InputError",
     "Interrupted",
     "IntersectionError",
@@ -106,6 +110,7 @@ __all__ = [
     "exp2",
     "expm1",
     "heaviside",
+    "hidden_dynamics",
     "hypot",
     "log",
     "log1p",

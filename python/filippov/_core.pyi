@@ -7,7 +7,18 @@ import numpy as np
 import numpy.typing as npt
 from typing_extensions import Self
 
-__all__ = ["Builder", "OpaqueSystem", "Run", "RunOptions", "SignedSystem", "TracedSystem", "solve"]
+__all__ = [
+    "Builder",
+    "OpaqueSystem",
+    "Run",
+    "RunOptions",
+    "SignedSystem",
+    "TracedSystem",
+    "classify",
+    "hidden_dynamics",
+    "intersection_field",
+    "solve",
+]
 
 _Array = npt.NDArray[np.float64]
 
@@ -149,3 +160,20 @@ def solve(
     options: RunOptions,
     events: list[tuple[Callable[[float, _Array], float] | int, float, int, str]],
 ) -> Run: ...
+def intersection_field(
+    system: TracedSystem | OpaqueSystem | SignedSystem,
+    t: float,
+    x: _Array,
+    mode: list[int],
+    p: _Array,
+    near: list[float],
+) -> tuple[_Array, list[float]] | None: ...
+def classify(
+    system: TracedSystem | OpaqueSystem | SignedSystem,
+    t: float,
+    x: _Array,
+    p: _Array,
+    reach: float,
+    kappa: list[float],
+) -> dict[str, Any] | None: ...
+def hidden_dynamics(components: _Array, before: list[int] | None, kappa: list[float]) -> dict[str, Any]: ...

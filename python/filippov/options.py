@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import math
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -44,6 +44,7 @@ class Options(NamedTuple):
     max_wall_time: float | None
     sliding: str
     nonunique: str
+    kappa: tuple[float, ...]
     t_eval: Array | None
     dense_output: bool
     progress: Callable[..., Any] | None
@@ -68,6 +69,7 @@ _DEFAULT_OPTIONS = Options(
     max_wall_time=None,
     sliding="canopy",
     nonunique="regularize",
+    kappa=(),
     t_eval=None,
     dense_output=True,
     progress=None,
@@ -236,6 +238,47 @@ def _check_policy(name: str, value: Any) -> str:
     raise InputError(f"{name}: unknown value {value!r}; use {use}")
 
 
+def check_kappa(kappa: Any) -> tuple[float, ...]:
+    """Return the scaling of the surfaces: positive numbers, one for all, or one per surface; ``None`` is 1.
+
+    Raises
+    ------
+    InputError
+        If it is something else. How many surfaces there are is known only to `fit_kappa`.
+    """
+    if kappa is None:
+        return ()
+    try:
+        single = np.ndim(kappa) == 0
+        values = (_real(kappa),) if single else tuple(_real(value) for value in kappa)
+    except (TypeError, ValueError):
+        raise InputError(f"kappa: a positive number, or one per surface, is needed, not {kappa!r}") from None
+    if not all(0.0 < value < math.inf for value in values):
+        raise InputError(f"kappa: must be positive and finite, it is {kappa!r}")
+    # One number for all surfaces: only the ratios matter.
+    return () if single else values
+
+
+def fit_kappa(kappa: tuple[float, ...], surfaces: Sequence[str]) -> None:
+    """Refuse a scaling that has not one entry per surface."""
+    if kappa and len(kappa) != len(surfaces):
+        names = f" ({', '.join(surfaces)})" if surfaces else ""
+        raise InputError(
+            f"kappa: one entry per surface is needed: {len(surfaces)}{names}, it has {len(kappa)}"
+        )
+
+
+def check_distance(atol: Any) -> float:
+    """Return a distance that is not negative."""
+    try:
+        value = _real(atol)
+    except (TypeError, ValueError):
+        value = math.nan
+    if not 0.0 <= value < math.inf:
+        raise InputError(f"atol: a distance, not negative, is needed, not {atol!r}")
+    return value
+
+
 def _check_resets(resets: Any) -> None:
     if resets is not None:
         raise InputError("resets: not available yet; stop with a terminal event, map the state, and go on")
@@ -367,6 +410,7 @@ def _real(value: Any) -> float:
 _CHECKS: dict[str, Callable[[Any, tuple[float, float], int], Any]] = {
     "sliding": lambda value, t_span, n: _check_policy("sliding", value),
     "nonunique": lambda value, t_span, n: _check_policy("nonunique", value),
+    "kappa": lambda value, t_span, n: check_kappa(value),
     "zeno": lambda value, t_span, n: _check_policy("zeno", value),
     "resets": lambda value, t_span, n: _check_resets(value),
     "method": lambda value, t_span, n: check_method(value),

@@ -2,27 +2,32 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
-from filippov.errors import InputError, ModelError
+from filippov._core import intersection_field
+from filippov.errors import ModelError
 from filippov.modes import Mode
 from filippov.prepare import Prepared
 
-__all__ = ["sliding_field"]
+__all__ = ["MOST_MEETING", "sliding_field"]
 
 Array = npt.NDArray[np.float64]
 
 # Rounding of the normal components; a multiplier within it counts as admissible.
 _MARGIN = 1e-9
+# Largest number of surfaces that meet in the core: their 2**m fields are all evaluated.
+MOST_MEETING = 10
 
 
 def sliding_field(prepared: Prepared, t: float, x: Array, mode: Mode, p: Array) -> Array:
-    """Return the field of `mode`, for at most one sliding surface.
+    """Return the field of `mode`.
 
-    With ``h = h_j`` the sliding surface and ``f_plus, f_minus`` the fields on its two sides, the field is
-    ``(1 + lam)/2 f_plus + (1 - lam)/2 f_minus`` with
-    ``lam = (a + b) / (b - a)``, ``a = dh/dt`` along ``f_plus``, ``b = dh/dt`` along ``f_minus``.
+    With m sliding surfaces it is the multilinear combination ("canopy") of the 2**m fields around the point
+    with the multipliers `lam` that make it tangent to all of them; for one surface
+    ``(1 + lam)/2 f_plus + (1 - lam)/2 f_minus``.
 
     Parameters
     ----------
@@ -41,22 +46,21 @@ def sliding_field(prepared: Prepared, t: float, x: Array, mode: Mode, p: Array) 
 
     Raises
     ------
-    InputError
-        If the mode slides on several surfaces.
     ModelError
-        If no combination of the two fields is tangent.
+        If no combination of the fields is tangent, or too many surfaces meet.
     """
-    core = prepared.core
-    signs = np.array(mode, dtype=np.float64)
     if mode.codimension == 0:
-        return core.field(t, x, signs, p)
-    if mode.codimension > 1:
-        raise InputError(
-            "mode: the field of sliding on several surfaces is not offered here; at most one entry 0"
-        )
+        return prepared.core.field(t, x, np.array(mode, dtype=np.float64), p)
+    if mode.codimension == 1:
+        return _on_one_surface(prepared, t, x, mode, p)
+    return _on_several_surfaces(prepared, t, x, mode, p)
+
+
+def _on_one_surface(prepared: Prepared, t: float, x: Array, mode: Mode, p: Array) -> Array:
     (j,) = mode.sliding
+    signs = np.array(mode, dtype=np.float64)
     signs[j] = 1.0
-    field, b, a = core.sliding_field(t, x, signs, p, j)
+    field, b, a = prepared.core.sliding_field(t, x, signs, p, j)
     lam = (a + b) / (b - a) if b != a else 0.0
     if not abs(lam) <= 1.0 + _MARGIN:
         name = prepared.surfaces[j]
@@ -67,5 +71,29 @@ def sliding_field(prepared: Prepared, t: float, x: Array, mode: Mode, p: Array) 
             state=x,
             surface=name,
             mode=mode,
+        )
+    return field
+
+
+def _on_several_surfaces(prepared: Prepared, t: float, x: Array, mode: Mode, p: Array) -> Array:
+    names = ", ".join(f"{prepared.surfaces[j]} = 0" for j in mode.sliding)
+    where: dict[str, Any] = {"t": t, "state": x, "surface": names, "mode": mode}
+    if mode.codimension > MOST_MEETING:
+        raise ModelError(
+            f"mode: sliding on {mode.codimension} surfaces; at most {MOST_MEETING} may meet", **where
+        )
+    value = intersection_field(prepared.core, t, x, list(mode), p, [])
+    if value is None:
+        raise ModelError(
+            f"there is no sliding motion on {names} here: no combination of the fields around is tangent",
+            **where,
+        )
+    field, multipliers = value
+    if not all(abs(lam) <= 1.0 + _MARGIN for lam in multipliers):
+        shown = ", ".join(f"{lam:g}" for lam in multipliers)
+        raise ModelError(
+            f"there is no sliding motion on {names} here: it would need the multipliers {shown}, not all of "
+            "them in [-1, 1]",
+            **where,
         )
     return field

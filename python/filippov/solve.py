@@ -27,6 +27,7 @@ from filippov.options import (
     check_t_span,
     check_unknown,
     check_y0,
+    fit_kappa,
 )
 from filippov.prepare import Prepared, parameter_vector
 from filippov.solution import AnyRun, Solution
@@ -60,6 +61,7 @@ def solve_ivp(
     max_step: float = np.inf,
     sliding: str = "canopy",
     nonunique: str = "regularize",
+    kappa: npt.ArrayLike | None = None,
     zeno: str = "accumulate",
     max_events: int = 10**7,
     max_steps: int = 10**8,
@@ -113,6 +115,10 @@ def solve_ivp(
     nonunique : {"regularize", "error"}, optional
         What to do where the solution is not unique: follow the limit of the regularised system and note the
         alternatives in `warnings`, or raise `NonUniqueError`.
+    kappa : float or array_like, shape (n_surfaces,), optional
+        Where surfaces meet and the Filippov solution is not unique, the limit of the regularised system
+        ``sign h_j -> clip(kappa_j h_j / eps, -1, 1)`` decides: positive numbers that scale the surfaces, in
+        the order of ``system.surfaces``. Only their ratios matter. Default: 1 for all.
     zeno : {"accumulate"}, optional
         What to do where switches accumulate: go on from the limit point.
     max_events, max_steps : int, optional
@@ -175,6 +181,7 @@ def solve_ivp(
         "max_step": max_step,
         "sliding": sliding,
         "nonunique": nonunique,
+        "kappa": kappa,
         "zeno": zeno,
         "max_events": max_events,
         "max_steps": max_steps,
@@ -210,6 +217,7 @@ def _solve(
     specs = normalise_events(events)
     system, values = _as_system(fun, n, constants, params, surfaces)
     prepared = system.prepare(n, t0, state, values)
+    fit_kappa(options.kappa, prepared.surfaces)
     if t1 < t0:
         prepared, specs = _backward(system, prepared, specs, state, values, t0)
     core_events = _core_events(specs or [], prepared, t0 if t1 >= t0 else -t0, state, constants, values)

@@ -10,11 +10,20 @@ import numpy.typing as npt
 
 from filippov._core import TracedSystem
 from filippov.backward import reversed_source
+from filippov.classification import Classification, classify
 from filippov.errors import InputError, ModelError
 from filippov.events import accepted_names, function_name
 from filippov.forms import Source, base_source, check_surfaces, fields_source, relay_source
 from filippov.modes import Mode
-from filippov.options import check_args, check_params, check_y0, did_you_mean
+from filippov.options import (
+    check_args,
+    check_distance,
+    check_kappa,
+    check_params,
+    check_y0,
+    did_you_mean,
+    fit_kappa,
+)
 from filippov.prepare import Prepared, check_n, numbered_states, parameter_vector, prepare
 from filippov.sliding import sliding_field
 from filippov.solution import Solution
@@ -253,10 +262,7 @@ class System:
     def surfaces(self) -> list[str]:
         """Printed switching functions ``h_j``, in the order of the entries of a mode.
 
-        Raises
-        ------
-        ModelError
-            If the number of states is not known yet.
+        It is a `ModelError` to ask for them while the number of states is not known.
         """
         return list(self._prepared_now().surfaces)
 
@@ -274,7 +280,8 @@ class System:
         """Return the field of a mode.
 
         The mode selects the field, whatever the signs of ``h_j`` at the point are. With one entry 0 it is the
-        sliding field ``(1 + lam)/2 f_plus + (1 - lam)/2 f_minus``, with `lam` from ``dh/dt = 0``.
+        sliding field ``(1 + lam)/2 f_plus + (1 - lam)/2 f_minus``, with `lam` from ``dh/dt = 0``. With
+        several it is the combination of the fields around that is linear in each multiplier (*canopy*).
 
         Parameters
         ----------
@@ -283,7 +290,7 @@ class System:
         x : array_like, shape (n,)
             State.
         mode : Mode, tuple of int, or str
-            Entries over {-1, 0, +1}, one per surface; at most one 0.
+            Entries over {-1, 0, +1}, one per surface.
         **params : float
             Parameter values other than the defaults.
 
@@ -316,6 +323,50 @@ class System:
                 f"mode: one entry per surface is needed: {len(prepared.surfaces)}, it has {len(entries)}"
             )
         return sliding_field(prepared, float(t), state, entries, parameter_vector(values))
+
+    def classify(
+        self, t: float, x: npt.ArrayLike, atol: float = 0.0, kappa: Any = None, **params: float
+    ) -> Classification:
+        """Return what happens at a point: which surfaces vanish there, and how a motion goes on.
+
+        Parameters
+        ----------
+        t : float
+            Time.
+        x : array_like, shape (n,)
+            State.
+        atol : float, optional
+            A surface nearer than this counts as met; by default only one that vanishes to rounding.
+        kappa : float or array_like, shape (n_surfaces,), optional
+            Scaling of the surfaces, as for `solve_ivp`.
+        **params : float
+            Parameter values other than the defaults.
+
+        Returns
+        -------
+        Classification
+
+        Raises
+        ------
+        InputError
+            If an argument or a parameter name does not fit.
+        ModelError
+            If a field or a switching function is not finite at the point.
+
+        Examples
+        --------
+        >>> import numpy as np, filippov as fl
+        >>> relays = fl.System(lambda t, x: [0.5 - np.sign(x[0]), -0.2 - np.sign(x[1])], n=2)
+        >>> relays.classify(0.0, [0.0, 0.0])
+        intersection at x[0] = 0, x[1] = 0: several surfaces meet
+        goes on in mode 00, multipliers 0.5, -0.2 (start/only)
+        """
+        state = check_y0(x)
+        values = self.parameter_values(params)
+        prepared = self.prepare(len(state), float(t), state, values)
+        scaling, reach = check_kappa(kappa), check_distance(atol)
+        fit_kappa(scaling, prepared.surfaces)
+        return classify(prepared, float(t), state, parameter_vector(values), reach, scaling)
 
     def solve(
         self, t_span: Any, y0: npt.ArrayLike, params: Mapping[str, float] | None = None, **options: Any

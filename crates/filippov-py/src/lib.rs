@@ -3,6 +3,7 @@
 mod builder;
 mod callbacks;
 mod conversion;
+mod inspect;
 mod run;
 mod solve;
 mod systems;
@@ -14,6 +15,8 @@ use pyo3::prelude::*;
 mod _core {
     #[pymodule_export]
     use super::builder::Builder;
+    #[pymodule_export]
+    use super::inspect::{classify, hidden_dynamics, intersection_field};
     #[pymodule_export]
     use super::run::Run;
     #[pymodule_export]

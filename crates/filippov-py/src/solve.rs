@@ -1,17 +1,16 @@
 //! The call of the integrator.
 
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use filippov::{solve_interruptible, NonUnique, Options, PiecewiseSystem, UserEvent, UserFunction};
+use filippov::{solve_interruptible, NonUnique, Options, UserEvent, UserFunction};
 use numpy::PyReadonlyArray1;
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::callbacks::{CalledEvent, CompiledEvent};
 use crate::run::Run;
-use crate::systems::{OpaqueSystem, SignedSystem, TracedSystem};
+use crate::systems::{core_of, TracedSystem};
 
 /// How often the interpreter is asked for signals and told the progress.
 const POLL_EVERY: Duration = Duration::from_millis(20);
@@ -48,17 +47,7 @@ pub fn solve(
 ) -> PyResult<Run> {
     let parameters = p.as_slice()?.to_vec();
     let traced = system.cast::<TracedSystem>().ok();
-    let core: Arc<dyn PiecewiseSystem + Send + Sync> = if let Some(traced) = traced {
-        Arc::new(traced.get().system.with_parameters(parameters.clone()))
-    } else if let Ok(opaque) = system.cast::<OpaqueSystem>() {
-        Arc::clone(&opaque.get().system) as _
-    } else if let Ok(signed) = system.cast::<SignedSystem>() {
-        Arc::clone(&signed.get().system) as _
-    } else {
-        return Err(PyTypeError::new_err(
-            "system: a TracedSystem, OpaqueSystem or SignedSystem is needed",
-        ));
-    };
+    let core = core_of(&system, &p)?;
     let mut functions: Vec<(Box<dyn UserFunction + Send + Sync>, f64, u64)> = Vec::new();
     for (g, direction, terminal, _name) in events {
         let handle: Option<usize> = g.extract(py).ok();
@@ -136,6 +125,7 @@ fn read_options(given: &Bound<'_, PyDict>) -> PyResult<(Options, Option<Py<PyAny
                     }
                 }
             }
+            "kappa" => options.kappa = value.extract()?,
             "t_eval" => options.t_eval = value.extract()?,
             "dense_output" => options.dense_output = value.extract()?,
             "progress" if !value.is_none() => progress = Some(value.unbind()),

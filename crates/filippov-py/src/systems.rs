@@ -6,7 +6,7 @@ use filippov::field::{SlidingField, SmoothField};
 use filippov::{FieldError, PiecewiseSystem};
 use filippov_expr::{Backend, Graph, Names, NodeId};
 use numpy::{PyArray1, PyReadonlyArray1};
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
@@ -22,6 +22,25 @@ pub fn raised(error: FieldError) -> PyErr {
         Ok(error) => *error,
         Err(_) => PyRuntimeError::new_err("a function of the system failed"),
     }
+}
+
+/// A system of the core that can be run by threads.
+pub type CoreSystem = Arc<dyn PiecewiseSystem + Send + Sync>;
+
+/// The system of the core behind a Python object, with these parameter values.
+pub fn core_of(system: &Bound<'_, PyAny>, p: &Array<'_>) -> PyResult<CoreSystem> {
+    if let Ok(traced) = system.cast::<TracedSystem>() {
+        return Ok(Arc::new(traced.get().with(p)?));
+    }
+    if let Ok(opaque) = system.cast::<OpaqueSystem>() {
+        return Ok(Arc::clone(&opaque.get().system) as _);
+    }
+    if let Ok(signed) = system.cast::<SignedSystem>() {
+        return Ok(Arc::clone(&signed.get().system) as _);
+    }
+    Err(PyTypeError::new_err(
+        "system: a TracedSystem, OpaqueSystem or SignedSystem is needed",
+    ))
 }
 
 fn field_of<'py>(

@@ -34,6 +34,7 @@
 mod error;
 pub mod event;
 pub mod field;
+mod inspect;
 mod integrate;
 mod mode;
 mod options;
@@ -46,6 +47,10 @@ mod tolerances;
 
 pub use error::{Error, FieldError};
 pub use event::{UserEvent, UserFunction};
+pub use inspect::{
+    classify, hidden_dynamics, intersection_field, Classification, HiddenDynamics, HiddenRoot,
+    IntersectionValue, PointKind,
+};
 pub use integrate::{solve, solve_interruptible, Integrator, Stats, Stop, Warning, WarningCode};
 pub use mode::{Mode, Signs};
 pub use options::{NonUnique, Options};

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from filippov.modes import Mode
 
-__all__ = ["DARK", "LIGHT", "Theme", "apply_theme", "import_pyplot", "mode_colours", "theme"]
+__all__ = ["DARK", "LIGHT", "Theme", "apply_theme", "import_pyplot", "mode_colours", "palette", "theme"]
 
 _COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442")
 
@@ -45,13 +45,19 @@ def import_pyplot() -> Any:
     return pyplot
 
 
+def palette(dark: bool) -> list[str]:
+    """Return the colours in the order of use."""
+    colours = list(_COLOURS)
+    if dark:
+        colours[0], colours[4] = colours[4], colours[0]
+    return colours
+
+
 def mode_colours(modes: Sequence[Mode], dark: bool) -> dict[Mode, str]:
     """Return a colour for every mode that occurs, in the order of first appearance."""
-    palette = list(_COLOURS)
-    if dark:
-        palette[0], palette[4] = palette[4], palette[0]
+    colours = palette(dark)
     ordered = list(dict.fromkeys(modes))
-    return {mode: palette[index % len(palette)] for index, mode in enumerate(ordered)}
+    return {mode: colours[index % len(colours)] for index, mode in enumerate(ordered)}
 
 
 def apply_theme(axes: Any, chosen: Theme) -> None:

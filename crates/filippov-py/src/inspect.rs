@@ -1,0 +1,124 @@
+//! Inspection of points: the field of a mode, what happens at a point, its hidden dynamics.
+
+use filippov::switching::{HiddenOutcome, NormalFields};
+use filippov::{Classification, Mode};
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
+
+use crate::systems::{core_of, raised};
+
+type Array<'py> = PyReadonlyArray1<'py, f64>;
+type FieldAndMultipliers<'py> = (Bound<'py, PyArray1<f64>>, Vec<f64>);
+
+/// The field of a mode with two and more zero entries and its multipliers; None if there are none.
+#[pyfunction]
+#[pyo3(signature = (system, t, x, mode, p, near))]
+pub fn intersection_field<'py>(
+    py: Python<'py>,
+    system: &Bound<'py, PyAny>,
+    t: f64,
+    x: Array<'py>,
+    mode: Vec<i8>,
+    p: Array<'py>,
+    near: Vec<f64>,
+) -> PyResult<Option<FieldAndMultipliers<'py>>> {
+    let core = core_of(system, &p)?;
+    let x = x.as_slice()?;
+    if x.len() != core.n_states() || mode.len() != core.n_surfaces() {
+        return Err(PyValueError::new_err("x or mode has a wrong length"));
+    }
+    let value = filippov::intersection_field(&*core, t, x, &Mode::new(mode), &near);
+    let value = value.map_err(raised)?;
+    Ok(value.map(|value| (PyArray1::from_vec(py, value.dx), value.multipliers)))
+}
+
+/// What happens at a point; None if something is not finite.
+#[pyfunction]
+#[pyo3(signature = (system, t, x, p, reach, kappa))]
+pub fn classify<'py>(
+    py: Python<'py>,
+    system: &Bound<'py, PyAny>,
+    t: f64,
+    x: Array<'py>,
+    p: Array<'py>,
+    reach: f64,
+    kappa: Vec<f64>,
+) -> PyResult<Option<Bound<'py, PyDict>>> {
+    let core = core_of(system, &p)?;
+    let x = x.as_slice()?;
+    if x.len() != core.n_states() {
+        return Err(PyValueError::new_err("x has a wrong length"));
+    }
+    let point = filippov::classify(&*core, t, x, reach, &kappa).map_err(raised)?;
+    point.map(|point| as_dict(py, point)).transpose()
+}
+
+fn as_dict(py: Python<'_>, point: Classification) -> PyResult<Bound<'_, PyDict>> {
+    let dict = PyDict::new(py);
+    let mode = |mode: &Mode| PyTuple::new(py, mode.entries());
+    dict.set_item("kind", point.kind.name())?;
+    dict.set_item("surfaces", PyTuple::new(py, &point.surfaces)?)?;
+    dict.set_item("mode", point.mode.as_ref().map(mode).transpose()?)?;
+    dict.set_item("multipliers", PyTuple::new(py, &point.multipliers)?)?;
+    let candidates: PyResult<Vec<_>> = point.candidates.iter().map(mode).collect();
+    dict.set_item("candidates", PyTuple::new(py, candidates?)?)?;
+    dict.set_item("unique", point.unique)?;
+    dict.set_item("spirals", point.spirals)?;
+    dict.set_item("leaf", point.leaf)?;
+    let reason = point.undecided.map(|reason| reason.to_string());
+    dict.set_item("reason", reason.unwrap_or_default())?;
+    dict.set_item("components", PyArray1::from_vec(py, point.components))?;
+    let leading = point
+        .leading
+        .map(|sides| sides.map(|side| (side.order, side.value)));
+    dict.set_item("leading", leading.map(Vec::from))?;
+    Ok(dict)
+}
+
+/// Rest points, incoming state and outcome of the hidden dynamics of m surfaces.
+#[pyfunction]
+#[pyo3(signature = (components, before, kappa))]
+pub fn hidden_dynamics<'py>(
+    py: Python<'py>,
+    components: Array<'py>,
+    before: Option<Vec<i8>>,
+    kappa: Vec<f64>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let wrong = |text: String| PyValueError::new_err(text);
+    let fields = NormalFields::new(kappa.len(), components.as_slice()?.to_vec())
+        .map_err(|e| wrong(e.to_string()))?;
+    if before
+        .as_ref()
+        .is_some_and(|before| before.len() != kappa.len())
+    {
+        return Err(wrong("before has a wrong length".into()));
+    }
+    let found = filippov::hidden_dynamics(&fields, before.map(Mode::new).as_ref(), &kappa);
+    let dict = PyDict::new(py);
+    let roots: Vec<_> = found
+        .roots
+        .into_iter()
+        .map(|root| (root.lambda, root.is_stable))
+        .collect();
+    dict.set_item("roots", roots)?;
+    dict.set_item("incoming", found.incoming)?;
+    let (outcome, mode) = match found.outcome {
+        None => ("not arriving", None),
+        Some(HiddenOutcome::Region(mode)) => ("region", Some(mode)),
+        Some(HiddenOutcome::Sliding {
+            mode, oscillates, ..
+        }) => (
+            if oscillates { "oscillation" } else { "sliding" },
+            Some(mode),
+        ),
+        Some(HiddenOutcome::OutwardSpiral { .. }) => ("spiral", None),
+        Some(HiddenOutcome::AtRest) => ("at rest", None),
+        Some(HiddenOutcome::Unknown) => ("unknown", None),
+    };
+    dict.set_item("outcome", outcome)?;
+    let mode = mode.map(|mode| PyTuple::new(py, mode.entries()));
+    dict.set_item("mode", mode.transpose()?)?;
+    Ok(dict)
+}

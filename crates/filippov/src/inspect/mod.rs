@@ -1,0 +1,14 @@
+//! Inspection: the field of a mode at a point, what happens at a point, and its hidden dynamics.
+//!
+//! Nothing here is part of a run; the decisions are those of the switching stage.
+
+mod classify;
+mod hidden_dynamics;
+mod mode_field;
+
+pub use classify::{classify, Classification, PointKind};
+pub use hidden_dynamics::{hidden_dynamics, HiddenDynamics, HiddenRoot};
+pub use mode_field::{intersection_field, IntersectionValue};
+
+#[cfg(test)]
+mod tests;
