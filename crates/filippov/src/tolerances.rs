@@ -103,7 +103,7 @@ pub const MOST_SWITCHES_AT_ONE_TIME: u32 = 64;
 pub const MOST_MEETING: usize = 10;
 
 /// Two normalised bilinear equations are the same if all coefficients of their eliminants, sums of
-/// products of coefficients of size 1, are rounding errors below this.
+/// products of coefficients of size 1, are rounding errors below this; so is a component of a null vector.
 pub const PROPORTIONAL: f64 = 64.0 * EPS;
 
 /// A discriminant of normalised equations up to this is that of a double root: the multipliers, known to
@@ -242,3 +242,17 @@ pub const NEAREST_ACCUMULATION: f64 = 1e-20;
 /// All fields count as tangent to a surface if their normal components are below this fraction of their size: the
 /// error of a point that accumulating switches lead to, or that was projected.
 pub const TANGENT_TO_ALL: f64 = 1e-7;
+
+/// The equations of the weights of least norm, normalised, hold up to this: some roundings.
+pub const LEAST_NORM_DONE: f64 = 1e-14;
+
+/// Keeps a Hessian regular where fewer weights are positive than there are equations; so small that Newton's method
+/// is not slowed down.
+pub const LEAST_NORM_RIDGE: f64 = 1e-15;
+
+/// Newton steps for the weights of least norm: one per set of positive weights, of which there are a few.
+pub const LEAST_NORM_STEPS: usize = 100;
+
+/// Largest number of surfaces at whose intersection all Filippov solutions are listed: there are 3^m modes to look
+/// at, and those of three and more surfaces take a search for all roots.
+pub const MOST_LISTED: usize = 3;

@@ -5,6 +5,7 @@ mod meeting;
 mod project;
 mod region;
 mod sliding;
+pub mod weights;
 
 pub use intersection::{IntersectionExit, IntersectionField};
 pub use meeting::MeetingFields;

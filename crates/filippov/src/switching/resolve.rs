@@ -284,7 +284,7 @@ fn leaf_of(outcome: &Outcome) -> &'static str {
 }
 
 /// Is there exactly one consistent mode, by the constant matrix G of affine fields?
-fn has_one_mode_only(fields: &NormalFields) -> bool {
+pub fn has_one_mode_only(fields: &NormalFields) -> bool {
     fields.is_affine() && is_negative_p_matrix(&fields.jacobian(&vec![0.0; fields.m()]))
 }
 

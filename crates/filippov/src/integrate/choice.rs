@@ -1,0 +1,79 @@
+//! Points where several continuations are Filippov solutions: which is taken, and who is told.
+
+use super::integrator::Integrator;
+use super::transition::{Decided, Left};
+use super::{Stop, Warning, WarningCode};
+use crate::mode::Mode;
+use crate::options::NonUnique;
+use crate::switching::Decision;
+
+impl Integrator<'_> {
+    /// The motion after the decision at one surface.
+    pub(super) fn follow_at_surface(
+        &mut self,
+        mode: &Mode,
+        j: usize,
+        mut decision: Decision,
+    ) -> Decided {
+        let mut after = mode.with(j, decision.entry);
+        if decision.candidates.len() > 1 {
+            let candidates = decision.candidates.iter();
+            let candidates = candidates.map(|&entry| mode.with(j, entry)).collect();
+            after = self.choose(&[j], after, candidates)?;
+            decision.entry = after.entries()[j];
+        }
+        Ok((after, Left::after(j, &decision)))
+    }
+
+    /// The mode that [`crate::Options::choices`] asks for at the next non-unique point.
+    pub(super) fn asked(&self) -> Option<&Mode> {
+        self.options.choices.get(self.n_choices)
+    }
+
+    /// The continuation that is taken among several: the one asked for; else `preferred`, or none at all if the
+    /// policy is to stop.
+    pub(super) fn choose(
+        &mut self,
+        surfaces: &[usize],
+        preferred: Mode,
+        candidates: Vec<Mode>,
+    ) -> Result<Mode, Stop> {
+        let asked = self.asked().cloned();
+        self.n_choices += 1;
+        let chosen = match asked {
+            Some(asked) if candidates.contains(&asked) => Some(asked),
+            Some(_) => None,
+            None if self.options.nonunique == NonUnique::Error => None,
+            None => Some(preferred),
+        };
+        let Some(chosen) = chosen else {
+            return Err(Stop::NonUnique {
+                surfaces: surfaces.to_vec(),
+                candidates,
+            });
+        };
+        self.warn_non_unique(surfaces, &chosen, candidates);
+        Ok(chosen)
+    }
+
+    fn warn_non_unique(&mut self, surfaces: &[usize], chosen: &Mode, mut candidates: Vec<Mode>) {
+        let modes: Vec<String> = candidates.iter().map(|m| format!("({m})")).collect();
+        let names = surfaces
+            .iter()
+            .map(|&j| self.system.surface_name(j) + " = 0");
+        let names: Vec<String> = names.collect();
+        let text = format!(
+            "the continuation at {} is not unique: {}; ({chosen}) was chosen",
+            names.join(", "),
+            modes.join(", ")
+        );
+        // The chosen one first, the others in their order.
+        candidates.sort_by_key(|mode| mode != chosen);
+        self.warnings.push(Warning {
+            t: self.t,
+            code: WarningCode::NonUnique,
+            text,
+            candidates,
+        });
+    }
+}
