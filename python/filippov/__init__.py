@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from filippov.branches import Branches
 from filippov.decorator import system
 from filippov.errors import (
     FilippovError,
@@ -70,6 +71,7 @@ if TYPE_CHECKING:
     from filippov import plot, problems
 
 __all__ = [
+    "Branches",
     "DenseSolution",
     "Event",
     "FilippovError",
