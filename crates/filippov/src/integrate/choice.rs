@@ -3,9 +3,13 @@
 use super::integrator::Integrator;
 use super::transition::{Decided, Left};
 use super::{Stop, Warning, WarningCode};
+use crate::error::FieldError;
+use crate::field::eval_on_side;
 use crate::mode::Mode;
 use crate::options::NonUnique;
-use crate::switching::Decision;
+use crate::switching::{first_nonzero, normal_component, Decision, Leading};
+use crate::system::dot;
+use crate::tolerances::DEPARTS_TANGENTIALLY;
 
 impl Integrator<'_> {
     /// The motion after the decision at one surface.
@@ -23,6 +27,28 @@ impl Integrator<'_> {
             decision.entry = after.entries()[j];
         }
         Ok((after, Left::after(j, &decision)))
+    }
+
+    /// Where the motion in `mode` touches surface j: the first derivative of h along the field beyond, if that
+    /// leaves the surface too. Then the solution is not unique.
+    pub(super) fn leaves_beyond(
+        &self,
+        mode: &Mode,
+        j: usize,
+    ) -> Result<Option<Leading>, FieldError> {
+        let (beyond, signs) = (-mode.entries()[j], mode.signs());
+        let along = normal_component(self.system, j, j, beyond, self.t, &self.x, &signs)?;
+        let mut field = vec![0.0; self.x.len()];
+        let mut gradient = field.clone();
+        let other = mode.with(j, beyond).signs();
+        eval_on_side(self.system, self.t, &self.x, &other, &mut field)?;
+        self.system
+            .gradient(j, self.t, &self.x, &signs, &mut gradient)?;
+        let size = (dot(&field, &field) * dot(&gradient, &gradient)).sqrt();
+        // A touch is located to the square root of rounding: a component of that size vanishes.
+        let vanishing = usize::from(along.value.abs() <= DEPARTS_TANGENTIALLY * size);
+        let leading = first_nonzero(self.system, j, beyond, vanishing, self.t, &self.x, &signs)?;
+        Ok((leading.sign() == beyond).then_some(leading))
     }
 
     /// The mode that [`crate::Options::choices`] asks for at the next non-unique point.

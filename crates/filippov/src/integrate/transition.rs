@@ -237,6 +237,20 @@ impl Integrator<'_> {
     fn graze(&mut self, mode: &Mode, surfaces: &[usize]) -> Result<Option<Stop>, FieldError> {
         let mut left = Lefts::new();
         let signs = mode.signs();
+        if let (&[j], []) = (surfaces, self.motion.sliding()) {
+            if let Some(leading) = self.leaves_beyond(mode, j)? {
+                let beyond = mode.with(j, -mode.entries()[j]);
+                let candidates = vec![mode.clone(), beyond.clone()];
+                match self.choose(&[j], mode.clone(), candidates) {
+                    Ok(after) if after == beyond => {
+                        self.record(mode.clone(), after.clone(), vec![j]);
+                        return self.begin(after, &[Left::Surface(j, leading)]);
+                    }
+                    Ok(_) => {}
+                    Err(stop) => return Ok(Some(stop)),
+                }
+            }
+        }
         for &j in surfaces {
             let side = mode.entries()[j];
             let leading = first_nonzero(self.system, j, side, 1, self.t, &self.x, &signs)?;
