@@ -287,3 +287,21 @@ fn neighbours_agree_with_the_admissible_modes() {
     }
     assert!(n_leaving > 1000);
 }
+
+/// Not only where all fields point to the intersection: wherever no motion leaves it.
+#[test]
+fn moments_are_not_negative_where_nothing_leaves() {
+    let mut random = Random(7);
+    let mut n_attracting = 0;
+    for _ in 0..20_000 {
+        let values = (0..8).map(|_| random.normal()).collect();
+        let fields = NormalFields::new(2, values).unwrap();
+        let all = neighbours(SlidingRule::Moments, &fields);
+        if all.iter().all(|neighbour| neighbour.margin > 1e-9) {
+            n_attracting += 1;
+            let weights = moments(&fields).unwrap();
+            assert!(weights.iter().all(|w| *w > -1e-9), "{weights:?} {fields:?}");
+        }
+    }
+    assert!(n_attracting > 1000);
+}
