@@ -124,8 +124,9 @@ def test_unknown_method(method: Any) -> None:
     ("name", "value"),
     [
         ("sliding", "utkin"),
-        ("sliding", "moments"),
-        ("nonunique", "branch"),
+        ("sliding", None),
+        ("nonunique", "tree"),
+        ("max_branches", 0),
         ("nonunique", None),
         ("zeno", "stop"),
         ("resets", []),

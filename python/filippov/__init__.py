@@ -14,6 +14,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from filippov.classification import Classification
+from filippov.branches import Branches
 from filippov.decorator import system
 from filippov.errors import (
     FilippovError,
@@ -73,6 +74,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Classification",
+    "Branches",
     "DenseSolution",
     "Event",
     "FilippovError",

@@ -56,7 +56,8 @@ class ReversedRun:
         self.message = run.message
         self.error = run.error
         self.stats = run.stats
-        self.warnings = [(0.0 - t, code, text) for t, code, text in run.warnings]
+        self.warnings = [(0.0 - row[0], *row[1:]) for row in run.warnings]
+        self.candidates = run.candidates
 
     def evaluate(self, t: Array, left: bool) -> Array:
         """Return the states at the times `t`, shape (n, k)."""

@@ -93,8 +93,11 @@ class StepSizeError(FilippovError):
 class NonUniqueError(FilippovError):
     """The solution is not unique at a point, and ``nonunique="error"`` was asked for.
 
-    `partial` is the solution up to that point.
+    `partial` is the solution up to that point, `candidates` are the modes (tuples of int) in which a solution
+    can go on.
     """
+
+    candidates: tuple[tuple[int, ...], ...] = ()
 
 
 class IntersectionError(FilippovError):

@@ -23,8 +23,8 @@ _PLANNED_METHODS = ("Taylor", "DOP853", "Midpoint", "Rodas5P")
 _STIFF_METHODS = ("Radau", "BDF", "LSODA")
 # name -> (available values, values that are planned)
 _POLICIES = {
-    "sliding": (("canopy",), ("moments", "dieci-lopez", "minimum-norm")),
-    "nonunique": (("regularize", "error"), ("branch",)),
+    "sliding": (("canopy", "moments", "dieci-lopez", "minimum-norm"), ()),
+    "nonunique": (("regularize", "error", "branch"), ()),
     "zeno": (("accumulate",), ()),
 }
 _SCIPY_ONLY = ("jac", "jac_sparsity", "lband", "uband", "min_step")
@@ -48,13 +48,14 @@ class Options(NamedTuple):
     t_eval: Array | None
     dense_output: bool
     progress: Callable[..., Any] | None
+    max_branches: int
 
-    def for_core(self) -> RunOptions:
-        """Return the options as the core takes them."""
-        if self is _DEFAULT_OPTIONS:
+    def for_core(self, choices: Sequence[tuple[int, ...]] = ()) -> RunOptions:
+        """Return the options as the core takes them; `choices` are modes to take at non-unique points."""
+        if self is _DEFAULT_OPTIONS and not choices:
             return _DEFAULT_FOR_CORE
         keep = "t_eval" if self.t_eval is not None and not self.dense_output else "steps"
-        return RunOptions({**self._asdict(), "keep": keep})
+        return RunOptions({**self._asdict(), "keep": keep, "choices": choices})
 
 
 # The defaults of `solve_ivp`, checked: a call that changes none of them needs no further check.
@@ -73,6 +74,7 @@ _DEFAULT_OPTIONS = Options(
     t_eval=None,
     dense_output=True,
     progress=None,
+    max_branches=64,
 )
 _DEFAULT_FOR_CORE = RunOptions(_DEFAULT_OPTIONS._asdict())
 
@@ -421,6 +423,7 @@ _CHECKS: dict[str, Callable[[Any, tuple[float, float], int], Any]] = {
     "max_steps": lambda value, t_span, n: _count("max_steps", value),
     "max_events": lambda value, t_span, n: _count("max_events", value),
     "max_wall_time": lambda value, t_span, n: _check_max_wall_time(value),
+    "max_branches": lambda value, t_span, n: _count("max_branches", value),
     "t_eval": lambda value, t_span, n: _check_t_eval(value, t_span),
     "dense_output": lambda value, t_span, n: bool(value),
     "progress": lambda value, t_span, n: _check_progress(value, t_span),

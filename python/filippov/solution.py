@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, KeysView
 from functools import cached_property
 from importlib import import_module
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,9 @@ from filippov.modes import Mode
 from filippov.prepare import Prepared
 from filippov.start import StandingRun
 from filippov.switches import RunWarning, SegmentTable, SwitchTable, import_pandas
+
+if TYPE_CHECKING:
+    from filippov.branches import Branches
 
 __all__ = ["DenseSolution", "Solution"]
 
@@ -132,6 +135,7 @@ _FIELDS = (
     "states",
     "switches",
     "segments",
+    "branches",
 )
 
 
@@ -174,6 +178,8 @@ class Solution:
         Counters of the run and how the field was evaluated (``stats["backend"]``).
     warnings : list of RunWarning
         What deserves a look.
+    branches : Branches or None
+        All solutions from the initial state, with ``nonunique="branch"``; this one is the first.
     error : BaseException or None
         The exception that a function of the user raised during the run.
     surfaces : tuple of str
@@ -302,7 +308,15 @@ class Solution:
     @cached_property
     def warnings(self) -> list[RunWarning]:
         """What deserves a look."""
-        return [RunWarning(*warning) for warning in self._run.warnings]
+        return [
+            RunWarning(t, code, text, tuple(Mode(mode) for mode in candidates))
+            for t, code, text, candidates in self._run.warnings
+        ]
+
+    @cached_property
+    def branches(self) -> Branches | None:
+        """All solutions, with ``nonunique="branch"``; else ``None``."""
+        return None
 
     @cached_property
     def error(self) -> BaseException | None:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from filippov._core import TracedSystem
 from filippov._core import solve as run_core
 from filippov.backward import ReversedRun, reversed_function
+from filippov.branches import explore
 from filippov.errors import InputError, Interrupted, NonUniqueError
 from filippov.events import (
     EventSpec,
@@ -20,6 +21,7 @@ from filippov.events import (
     normalise_events,
     selective,
 )
+from filippov.modes import Mode
 from filippov.options import (
     Options,
     check_args,
@@ -63,6 +65,7 @@ def solve_ivp(
     nonunique: str = "regularize",
     kappa: npt.ArrayLike | None = None,
     zeno: str = "accumulate",
+    max_branches: int = 64,
     max_events: int = 10**7,
     max_steps: int = 10**8,
     max_wall_time: float | None = None,
@@ -110,17 +113,26 @@ def solve_ivp(
         Length of the first step. Default: chosen by the method.
     max_step : float, optional
         Longest step allowed. Default: no limit.
-    sliding : {"canopy"}, optional
-        Which combination of the neighbouring fields is taken where several surfaces meet.
-    nonunique : {"regularize", "error"}, optional
+    sliding : {"canopy", "moments", "minimum-norm", "dieci-lopez"}, optional
+        Which combination of the 2**m fields slides where m >= 2 surfaces meet; on one surface it is Filippov's.
+        ``"canopy"``, the default: products of one multiplier per surface, the limit of regularised systems.
+        ``"moments"``: two surfaces only; the weights change smoothly into those of sliding on one surface.
+        ``"minimum-norm"``: the tangent combination whose weights have the least norm.
+        ``"dieci-lopez"``: projected fields; all of them have to point towards the intersection.
+        For fields that are affine in the signs (friction, relays) the first three agree. Where a rule does not
+        apply the run stops and says so.
+    nonunique : {"regularize", "error", "branch"}, optional
         What to do where the solution is not unique: follow the limit of the regularised system and note the
-        alternatives in `warnings`, or raise `NonUniqueError`.
+        alternatives in `warnings`; raise `NonUniqueError`; or follow all alternatives: the solution returned
+        is that of ``"regularize"``, and its `branches` are all of them, see `Branches`.
     kappa : float or array_like, shape (n_surfaces,), optional
         Where surfaces meet and the Filippov solution is not unique, the limit of the regularised system
         ``sign h_j -> clip(kappa_j h_j / eps, -1, 1)`` decides: positive numbers that scale the surfaces, in
         the order of ``system.surfaces``. Only their ratios matter. Default: 1 for all.
     zeno : {"accumulate"}, optional
         What to do where switches accumulate: go on from the limit point.
+    max_branches : int, optional
+        Largest number of solutions with ``nonunique="branch"``; a warning tells if there are more.
     max_events, max_steps : int, optional
         Largest numbers of switches and of steps.
     max_wall_time : float, optional
@@ -132,8 +144,8 @@ def solve_ivp(
     -------
     Solution
         SciPy's fields (``t, y, sol, t_events, y_events, nfev, njev, nlu, status, message, success``) and
-        ``switches, segments, stats, warnings``. If the run fails half-way, ``success`` is False and the
-        solution up to there is returned; an exception that `fun` raised during the run is in ``error``.
+        ``switches, segments, stats, warnings, branches``. If the run fails half-way, ``success`` is False and
+        the solution up to there is returned; an exception that `fun` raised during the run is in ``error``.
 
     Raises
     ------
@@ -142,7 +154,7 @@ def solve_ivp(
     TraceError
         If `fun` cannot be traced and no `surfaces` are given.
     NonUniqueError
-        With ``nonunique="error"``; `partial` is the solution up to there.
+        With ``nonunique="error"``; `partial` is the solution up to there, `candidates` the modes that follow.
     KeyboardInterrupt
         On Ctrl-C; `partial` is the solution up to there.
 
@@ -183,6 +195,7 @@ def solve_ivp(
         "nonunique": nonunique,
         "kappa": kappa,
         "zeno": zeno,
+        "max_branches": max_branches,
         "max_events": max_events,
         "max_steps": max_steps,
         "max_wall_time": max_wall_time,
@@ -221,20 +234,36 @@ def _solve(
     if t1 < t0:
         prepared, specs = _backward(system, prepared, specs, state, values, t0)
     core_events = _core_events(specs or [], prepared, t0 if t1 >= t0 else -t0, state, constants, values)
-    run = _run(prepared, t0, t1, state, values, options, core_events)
-    if options.progress is not None and len(run.t):
-        options.progress(float(run.t[-1]))
-    solution = Solution.from_run(
-        run,
-        prepared,
-        t0=t0,
-        states=system.state_names(n),
-        has_events=specs is not None,
-        dense_output=options.dense_output,
-    )
-    if run.status < 0:
-        _raise_if_asked(run, solution, options)
+
+    def follow(choices: tuple[Mode, ...]) -> Solution:
+        run = _run(prepared, t0, t1, state, values, options, core_events, choices)
+        if options.progress is not None and len(run.t):
+            options.progress(float(run.t[-1]))
+        solution = Solution.from_run(
+            run,
+            prepared,
+            t0=t0,
+            states=system.state_names(n),
+            has_events=specs is not None,
+            dense_output=options.dense_output,
+        )
+        if run.status < 0:
+            _raise_if_asked(run, solution, options)
+        return solution
+
+    solution = follow(())
+    if options.nonunique == "branch":
+        _add_branches(solution, follow, options.max_branches)
     return solution
+
+
+def _add_branches(
+    solution: Solution, follow: Callable[[tuple[Mode, ...]], Solution], max_branches: int
+) -> None:
+    branches, warning = explore(solution, follow, max_branches)
+    solution.branches = branches
+    if warning is not None:
+        solution.warnings.append(warning)
 
 
 def _as_system(
@@ -284,12 +313,13 @@ def _run(
     values: dict[str, float],
     options: Options,
     events: list[CoreEvent],
+    choices: tuple[Mode, ...],
 ) -> AnyRun:
     p = parameter_vector(values)
     if t1 == t0:
         return StandingRun(t0, y0, len(prepared.surfaces), len(events), options.t_eval)
     if t1 > t0:
-        return run_core(prepared.core, t0, t1, y0, p, options.for_core(), events)
+        return run_core(prepared.core, t0, t1, y0, p, options.for_core(choices), events)
     if options.t_eval is not None:
         options = options._replace(t_eval=-options.t_eval)
     return ReversedRun(run_core(prepared.core, -t0, -t1, y0, p, options.for_core(), events))
@@ -345,10 +375,12 @@ def _raise_if_asked(run: AnyRun, solution: Solution, options: Options) -> None:
         raise Interrupted(run.message or "interrupted", partial=solution)
     if run.reason == "non_unique" and options.nonunique == "error":
         last = solution.switches[-1] if len(solution.switches) else None
-        raise NonUniqueError(
+        error = NonUniqueError(
             run.message,
             t=float(solution.t[-1]) if len(solution.t) else None,
             state=solution.y[:, -1] if solution.y.size else None,
             mode=last.mode_after if last else None,
             partial=solution,
         )
+        error.candidates = tuple(Mode(mode) for mode in run.candidates)
+        raise error

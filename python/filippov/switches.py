@@ -87,14 +87,17 @@ class RunWarning(NamedTuple):
     t : float
         Time at which it was noticed.
     code : str
-        Short name, for example ``"non_unique"``, ``"grazing"``, ``"undeclared_jump"``.
+        Short name: ``"non_unique"``, ``"undeclared_jump"`` or ``"max_branches"``.
     message : str
         What was found, in words.
+    candidates : tuple of Mode
+        For ``"non_unique"`` all modes in which a solution goes on, the chosen one first; else empty.
     """
 
     t: float
     code: str
     message: str
+    candidates: tuple[Mode, ...] = ()
 
     def __str__(self) -> str:
         return f"t = {self.t:.10g}: {self.message} [{self.code}]"

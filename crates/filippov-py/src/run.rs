@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use filippov::{PiecewiseSystem, Side, Solution, Stop};
+use filippov::{Mode, PiecewiseSystem, Side, Solution, Stop};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -31,6 +31,15 @@ type SegmentRow<'py> = (
     Vector<'py>,
     Vector<'py>,
 );
+
+type WarningRow<'py> = (f64, &'static str, String, Vec<Bound<'py, PyTuple>>);
+
+fn modes<'py>(py: Python<'py>, modes: &[Mode]) -> PyResult<Vec<Bound<'py, PyTuple>>> {
+    modes
+        .iter()
+        .map(|mode| PyTuple::new(py, mode.entries()))
+        .collect()
+}
 
 /// What a run computed.
 #[pyclass(frozen, module = "filippov._core")]
@@ -211,12 +220,24 @@ impl Run {
     }
 
     #[getter]
-    fn warnings(&self) -> Vec<(f64, &'static str, String)> {
+    fn warnings<'py>(&self, py: Python<'py>) -> PyResult<Vec<WarningRow<'py>>> {
         self.solution()
             .warnings
             .iter()
-            .map(|w| (w.t, w.code.name(), w.text.clone()))
+            .map(|w| {
+                let candidates = modes(py, &w.candidates)?;
+                Ok((w.t, w.code.name(), w.text.clone(), candidates))
+            })
             .collect()
+    }
+
+    /// The continuations where the run ended at a non-unique point; else empty.
+    #[getter]
+    fn candidates<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyTuple>>> {
+        match &self.solution().stop {
+            Stop::NonUnique { candidates, .. } => modes(py, candidates),
+            _ => Ok(Vec::new()),
+        }
     }
 
     /// States at the times `t`, shape (n_states, len(t)).

@@ -2,7 +2,9 @@
 
 use std::time::{Duration, Instant};
 
-use filippov::{solve_interruptible, NonUnique, Options, UserEvent, UserFunction};
+use filippov::{
+    solve_interruptible, Mode, NonUnique, Options, SlidingRule, UserEvent, UserFunction,
+};
 use numpy::PyReadonlyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -116,7 +118,8 @@ fn read_options(given: &Bound<'_, PyDict>) -> PyResult<(Options, Option<Py<PyAny
             "max_wall_time" => options.max_wall_time = value.extract()?,
             "nonunique" => {
                 options.nonunique = match value.extract::<String>()?.as_str() {
-                    "regularize" => NonUnique::Regularize,
+                    // The tree of all solutions is made of runs with the choices of each.
+                    "regularize" | "branch" => NonUnique::Regularize,
                     "error" => NonUnique::Error,
                     other => {
                         return Err(PyValueError::new_err(format!(
@@ -126,10 +129,15 @@ fn read_options(given: &Bound<'_, PyDict>) -> PyResult<(Options, Option<Py<PyAny
                 }
             }
             "kappa" => options.kappa = value.extract()?,
+            "choices" => {
+                let choices: Vec<Vec<i8>> = value.extract()?;
+                options.choices = choices.into_iter().map(Mode::new).collect();
+            }
+            "sliding" => options.sliding = sliding_rule(&value.extract::<String>()?)?,
             "t_eval" => options.t_eval = value.extract()?,
             "dense_output" => options.dense_output = value.extract()?,
             "progress" if !value.is_none() => progress = Some(value.unbind()),
-            "progress" | "method" | "sliding" | "keep" => {}
+            "progress" | "method" | "max_branches" | "keep" => {}
             other => {
                 return Err(PyValueError::new_err(format!(
                     "options: unknown key {other:?}"
@@ -138,4 +146,15 @@ fn read_options(given: &Bound<'_, PyDict>) -> PyResult<(Options, Option<Py<PyAny
         }
     }
     Ok((options, progress))
+}
+
+fn sliding_rule(name: &str) -> PyResult<SlidingRule> {
+    let rules = [
+        SlidingRule::Canopy,
+        SlidingRule::Moments,
+        SlidingRule::DieciLopez,
+        SlidingRule::MinimumNorm,
+    ];
+    let known = rules.into_iter().find(|rule| rule.name() == name);
+    known.ok_or_else(|| PyValueError::new_err(format!("sliding: unknown rule {name:?}")))
 }

@@ -1,5 +1,7 @@
 //! The options of a run, with their defaults.
 
+use crate::mode::Mode;
+
 /// What happens at a point where several continuations are Filippov solutions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NonUnique {
@@ -8,6 +10,34 @@ pub enum NonUnique {
     Regularize,
     /// Stop with [`crate::Stop::NonUnique`].
     Error,
+}
+
+/// Which combination of the 2^m fields slides where m >= 2 surfaces meet. On one surface all are Filippov's, and
+/// for fields that are affine in the signs all but [`SlidingRule::DieciLopez`] give the same field.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SlidingRule {
+    /// Products of one multiplier per surface: the limit of regularised systems.
+    #[default]
+    Canopy,
+    /// The moments of Dieci and Difonzo; two surfaces only.
+    Moments,
+    /// Projected fields with the rational weights of Dieci and Lopez; all fields must point towards the
+    /// intersection.
+    DieciLopez,
+    /// The combination of least norm.
+    MinimumNorm,
+}
+
+impl SlidingRule {
+    /// The name used in options.
+    pub fn name(self) -> &'static str {
+        match self {
+            SlidingRule::Canopy => "canopy",
+            SlidingRule::Moments => "moments",
+            SlidingRule::DieciLopez => "dieci-lopez",
+            SlidingRule::MinimumNorm => "minimum-norm",
+        }
+    }
 }
 
 /// Options of [`crate::solve`].
@@ -29,6 +59,11 @@ pub struct Options {
     pub max_wall_time: Option<f64>,
     /// Policy at non-unique points.
     pub nonunique: NonUnique,
+    /// The modes to take at the first non-unique points, in order; later points follow the policy. A mode that is
+    /// not among the candidates ends the run with [`crate::Stop::NonUnique`].
+    pub choices: Vec<Mode>,
+    /// The sliding field where several surfaces meet.
+    pub sliding: SlidingRule,
     /// Scaling of every surface in the regularisation that decides where the Filippov solution is not
     /// unique; 1 for all if empty.
     pub kappa: Vec<f64>,
@@ -49,6 +84,8 @@ impl Default for Options {
             max_events: 10_000_000,
             max_wall_time: None,
             nonunique: NonUnique::Regularize,
+            choices: Vec::new(),
+            sliding: SlidingRule::default(),
             kappa: Vec::new(),
             t_eval: None,
             dense_output: true,

@@ -4,7 +4,7 @@ use crate::error::FieldError;
 use crate::field::{IntersectionField, Projector, SlidingField, SmoothField};
 use crate::integrate::{Stats, Stop, Warning};
 use crate::mode::Mode;
-use crate::options::Options;
+use crate::options::{Options, SlidingRule};
 use crate::stepper::Interpolant;
 use crate::switching::Kind;
 use crate::system::PiecewiseSystem;
@@ -79,6 +79,8 @@ pub struct Solution {
     pub stop: Stop,
     /// The last time reached.
     pub t_last: f64,
+    /// The sliding field where several surfaces meet.
+    pub sliding: SlidingRule,
     /// The mode at the end.
     pub mode: Mode,
     /// Counters.
@@ -248,7 +250,7 @@ impl Recorder {
     #[allow(clippy::too_many_arguments)]
     pub fn finish(
         mut self,
-        t_last: f64,
+        (t_last, sliding): (f64, SlidingRule),
         mode: Mode,
         stop: Stop,
         stats: Stats,
@@ -265,6 +267,7 @@ impl Recorder {
             user_zeros,
             stop,
             t_last,
+            sliding,
             mode,
             stats,
             warnings,
@@ -298,7 +301,8 @@ impl Solution {
                 vec![(j, field.normal_components(t, &mut y)?.multiplier())]
             }
             _ => {
-                let mut field = IntersectionField::new(system, &set, &mode.signs(), &[]);
+                let field = IntersectionField::new(system, &set, &mode.signs(), &[]);
+                let mut field = field.with_rule(self.sliding);
                 field.eval(t, &mut y, &mut vec![0.0; self.n_states])?;
                 set.into_iter()
                     .zip(field.multipliers().iter().copied())

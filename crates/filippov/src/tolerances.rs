@@ -111,7 +111,7 @@ pub const MOST_SWITCHES_AT_ONE_TIME: u32 = 64;
 pub const MOST_MEETING: usize = 6;
 
 /// Two normalised bilinear equations are the same if all coefficients of their eliminants, sums of
-/// products of coefficients of size 1, are rounding errors below this.
+/// products of coefficients of size 1, are rounding errors below this; so is a component of a null vector.
 pub const PROPORTIONAL: f64 = 64.0 * EPS;
 
 /// A discriminant of normalised equations up to this is that of a double root: the multipliers,
@@ -291,3 +291,17 @@ pub const RELAY_DAMPING: f64 = 1e-6;
 /// A matrix with diagonal 1 counts as definite, or as one with positive minors, if all pivots exceed this: what is
 /// claimed of it (that a mode is the only one) has to be clear of rounding.
 pub const DEFINITE_PIVOT: f64 = 1e-10;
+
+/// The equations of the weights of least norm, normalised, hold up to this: some roundings.
+pub const LEAST_NORM_DONE: f64 = 1e-14;
+
+/// Keeps a Hessian regular where fewer weights are positive than there are equations; so small that Newton's method
+/// is not slowed down.
+pub const LEAST_NORM_RIDGE: f64 = 1e-15;
+
+/// Newton steps for the weights of least norm: one per set of positive weights, of which there are a few.
+pub const LEAST_NORM_STEPS: usize = 100;
+
+/// Largest number of surfaces at whose intersection all Filippov solutions are listed: there are 3^m modes to look
+/// at, and those of three and more surfaces take a search for all roots.
+pub const MOST_LISTED: usize = 3;

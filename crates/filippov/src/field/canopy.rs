@@ -1,5 +1,6 @@
 //! The law of sliding on a few surfaces: the multilinear combination of all fields around them.
 
+use super::weights::fill_product_weights;
 use super::MeetingFields;
 use crate::error::FieldError;
 use crate::switching::codim2::Bilinear;
@@ -49,13 +50,7 @@ impl Canopy {
         } else {
             solve_many(&fields, lambda)?
         };
-        for (pattern, weight) in self.weights.iter_mut().enumerate() {
-            let factors = lambda.iter().enumerate();
-            *weight = factors.fold(1.0, |product, (i, lambda)| {
-                let sign = if pattern >> i & 1 == 1 { 1.0 } else { -1.0 };
-                product * 0.5 * (1.0 + sign * lambda)
-            });
-        }
+        fill_product_weights(lambda, &mut self.weights);
         self.fields.combine(&self.weights, dx);
         Some(ends)
     }

@@ -1,24 +1,29 @@
 //! The sliding field on an intersection of surfaces.
 
-use super::{AffineLaw, Canopy, Projector, SmoothField};
+use super::weights::RuleFailure;
+use super::{AffineLaw, Canopy, Projector, RuleLaw, SmoothField};
 use crate::error::FieldError;
+use crate::mode::Mode;
+use crate::options::SlidingRule;
 use crate::system::PiecewiseSystem;
 use crate::tolerances::MOST_MEETING;
 
 /// What ends sliding on an intersection of m surfaces: functions that are positive until then.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum IntersectionExit {
-    /// A multiplier reaches -1 or +1: 1 + lambda_i and 1 - lambda_i, i counted within the set.
+    /// A multiplier reaches -1 or +1: 1 + lambda_i and 1 - lambda_i, i counted within the set. For a rule other
+    /// than the canopy: a motion on that side of surface i begins to leave the intersection.
     Side {
         /// Which multiplier.
         position: usize,
         /// The end, -1 or +1.
         end: i8,
     },
-    /// Two roots meet: (-1)^m det G, for two surfaces the discriminant.
+    /// Two roots meet: (-1)^m det G, for two surfaces the discriminant. For a rule other than the canopy: a
+    /// premise of the rule fails.
     Fold,
     /// No scaling of the surfaces makes the root stable any longer: -min(G11, G22), or the last Hurwitz
-    /// determinant.
+    /// determinant. For a rule other than the canopy: the fields begin to wind outwards.
     Stability,
 }
 
@@ -52,6 +57,8 @@ pub struct IntersectionField<'a> {
     signs: Vec<f64>,
     affine: Option<AffineLaw<'a>>,
     canopy: Option<Canopy>,
+    /// Another combination of the fields, if that was chosen.
+    by_rule: Option<RuleLaw>,
     lambda: Vec<f64>,
     exits: Vec<f64>,
     projector: Projector,
@@ -74,11 +81,39 @@ impl<'a> IntersectionField<'a> {
             signs: signs.to_vec(),
             affine: AffineLaw::new(system, set, signs),
             canopy: (set.len() <= MOST_MEETING).then(|| Canopy::new(system, set)),
+            by_rule: None,
             lambda: lambda.to_vec(),
             exits: vec![f64::NAN; 2 * set.len() + 2],
             projector: Projector::new(system.n_states(), system.n_surfaces()),
             n_evaluations: 0,
         }
+    }
+
+    /// The same with another combination of the fields; up to [`MOST_MEETING`] surfaces.
+    #[must_use]
+    pub fn with_rule(mut self, rule: SlidingRule) -> Self {
+        let applies = rule != SlidingRule::Canopy && self.set.len() <= MOST_MEETING;
+        self.by_rule = applies.then(|| RuleLaw::new(self.system, &self.set, rule));
+        self
+    }
+
+    /// The combination of the fields.
+    pub fn rule(&self) -> SlidingRule {
+        self.by_rule
+            .as_ref()
+            .map_or(SlidingRule::Canopy, RuleLaw::rule)
+    }
+
+    /// Why the chosen rule does not give the field at the last evaluation ([`RuleLaw::refusal`]). The canopy
+    /// has its own decisions.
+    pub fn refusal(&self, tolerance: f64) -> Option<RuleFailure> {
+        self.by_rule.as_ref()?.refusal(tolerance)
+    }
+
+    /// The motions that leave the intersection under the chosen rule ([`RuleLaw::leaving`]).
+    pub fn leaving(&self, tolerance: f64) -> Vec<Mode> {
+        let by_rule = self.by_rule.as_ref();
+        by_rule.map_or_else(Vec::new, |law| law.leaving(tolerance))
     }
 
     /// The surfaces slid on.
@@ -123,6 +158,12 @@ impl<'a> IntersectionField<'a> {
     /// no root they are NaN.
     fn solve(&mut self, t: f64, x: &mut [f64], dx: &mut [f64]) -> Result<(), FieldError> {
         self.project(t, x)?;
+        if let Some(law) = &mut self.by_rule {
+            let evaluated = (self.system, &self.signs[..]);
+            self.n_evaluations += law.eval(evaluated, t, x, &mut self.lambda, dx)?;
+            self.exits.copy_from_slice(law.exits());
+            return Ok(());
+        }
         if let Some(law) = &mut self.affine {
             self.n_evaluations += law.eval(t, x, dx)?;
             if law.multipliers().iter().all(|l| l.is_finite()) {

@@ -2,7 +2,7 @@
 
 use super::eval_on_side;
 use crate::error::FieldError;
-use crate::switching::{NormalFields, Undecided};
+use crate::switching::{Matrix, NormalFields, Undecided};
 use crate::system::{dot, PiecewiseSystem};
 use crate::tolerances::TANGENT_TO_ALL;
 
@@ -82,6 +82,16 @@ impl MeetingFields {
         NormalFields::new(self.set.len(), self.components.clone())
     }
 
+    /// The normal components in units of the gradients: those along unit normals.
+    ///
+    /// # Errors
+    /// As [`normal_fields`](Self::normal_fields).
+    pub fn unit_normal_fields(&self) -> Result<NormalFields, Undecided> {
+        let lengths = self.gradients.chunks_exact(self.n);
+        let factors: Vec<f64> = lengths.map(|g| 1.0 / dot(g, g).sqrt()).collect();
+        Ok(self.normal_fields()?.scaled(&factors))
+    }
+
     /// The surfaces, counted within the set, whose equation says anything about the multipliers. To the others
     /// all fields are tangent, up to rounding.
     pub fn telling(&self) -> Vec<usize> {
@@ -114,6 +124,32 @@ impl MeetingFields {
                     .zip(field)
                     .for_each(|(dx, f)| *dx += weight * f);
             }
+        }
+    }
+
+    /// Projects the combination `dx` with these weights onto the intersection: dx - N^T (N N^T)^-1 r with the
+    /// gradients as the rows of N and r the normal components of the combination.
+    pub fn make_tangent(&self, weights: &[f64], dx: &mut [f64]) {
+        let m = self.set.len();
+        let row = |i: usize| &self.gradients[i * self.n..(i + 1) * self.n];
+        let mut gram = Matrix::zeros(m);
+        for i in 0..m {
+            for j in 0..m {
+                gram[(i, j)] = dot(row(i), row(j));
+            }
+        }
+        let component = |i: usize| {
+            let components = self.components.iter().skip(i).step_by(m);
+            weights.iter().zip(components).map(|(w, c)| w * c).sum()
+        };
+        let residuals: Vec<f64> = (0..m).map(component).collect();
+        match gram.solve(&residuals) {
+            Some(shifts) => {
+                for (i, shift) in shifts.iter().enumerate() {
+                    dx.iter_mut().zip(row(i)).for_each(|(v, g)| *v -= shift * g);
+                }
+            }
+            None => dx.fill(f64::NAN),
         }
     }
 

@@ -1,14 +1,17 @@
 //! The smooth field of a mode: what a stepper integrates.
 
 mod affine;
+mod by_rule;
 mod canopy;
 mod intersection;
 mod meeting;
 mod project;
 mod region;
 mod sliding;
+pub mod weights;
 
 pub use affine::AffineLaw;
+pub use by_rule::RuleLaw;
 pub use canopy::Canopy;
 pub use intersection::{IntersectionExit, IntersectionField};
 pub use meeting::MeetingFields;

@@ -54,6 +54,8 @@ pub struct Integrator<'a> {
     pub(super) recorder: Recorder,
     pub(super) stats: Stats,
     pub(super) warnings: Vec<Warning>,
+    /// How many non-unique points were met.
+    pub(super) n_choices: usize,
     /// The last attempt met a point where the field does not exist.
     pub(super) one_sided: bool,
     /// Some attempt of this run met such a point.
@@ -86,7 +88,7 @@ impl<'a> Integrator<'a> {
             t: t_span.0,
             t_end: t_span.1,
             x: y0.to_vec(),
-            motion: Motion::new(system, t_span.0, undecided),
+            motion: Motion::new(system, t_span.0, undecided, options.sliding),
             stepper: Dopri5::new(n),
             controller: Controller::default(),
             dt: f64::NAN,
@@ -96,6 +98,7 @@ impl<'a> Integrator<'a> {
             recorder: Recorder::new(n, options),
             stats: Stats::default(),
             warnings: Vec::new(),
+            n_choices: 0,
             one_sided: false,
             meets_edges: false,
             recent_dt: 0.0,
@@ -286,7 +289,7 @@ impl<'a> Integrator<'a> {
         self.stats.n_field_evaluations += self.motion.field.n_evaluations();
         let (zeros, recorder) = (self.user_events.into_zeros(), self.recorder);
         recorder.finish(
-            self.t,
+            (self.t, self.options.sliding),
             self.motion.mode,
             stop,
             self.stats,

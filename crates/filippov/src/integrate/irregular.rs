@@ -86,6 +86,7 @@ impl Integrator<'_> {
                     "the right-hand side jumps near t = {t:.10} and no surface is declared there; \
                      give its switching function in surfaces="
                 ),
+                candidates: Vec::new(),
             });
             self.recent_dt = 0.0;
         }

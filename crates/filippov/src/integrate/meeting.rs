@@ -12,11 +12,11 @@ use crate::event::EventFunction;
 use crate::field::{IntersectionExit, IntersectionField, MeetingFields, SlidingField, SmoothField};
 use crate::mode::Mode;
 use crate::switching::{
-    decide_intersection, resolve, Continuation, ExitKind, Incoming, Leading, NormalFields,
-    Resolution, Undecided,
+    admissible, decide_intersection, has_one_mode_only, resolve, Continuation, ExitKind, Incoming,
+    Leading, NormalFields, Resolution, Undecided,
 };
 use crate::system::{dot, dot_magnitude};
-use crate::tolerances::{DEPARTS_TANGENTIALLY, DRIFT_SHARE, MOST_MEETING};
+use crate::tolerances::{DEPARTS_TANGENTIALLY, DRIFT_SHARE, MOST_LISTED, MOST_MEETING};
 
 impl Integrator<'_> {
     /// What follows where the surfaces of `meeting` vanish; `fresh` are those among them that were reached now.
@@ -27,6 +27,9 @@ impl Integrator<'_> {
         meeting: &[usize],
         fresh: &[usize],
     ) -> Result<Decided, FieldError> {
+        if fresh.is_empty() && self.slides_by_rule() {
+            return self.leave_by_rule(mode, meeting);
+        }
         if let Some(decided) = self.decide_by_relay(Some(event), mode, meeting)? {
             return Ok(decided);
         }
@@ -34,14 +37,16 @@ impl Integrator<'_> {
             return Ok(Err(too_many(meeting)));
         }
         let corners = self.corners(meeting, mode)?;
+        let mut others = Vec::new();
         let resolution = match corners.normal_fields() {
             Ok(fields) => {
                 let incoming = self.incoming(event, mode, meeting, fresh, &fields)?;
+                others = other_solutions(&fields, &incoming);
                 resolve(&fields, &incoming, &self.kappa(meeting))
             }
             Err(undecided) => Err(undecided),
         };
-        self.follow(mode, meeting, &corners, resolution)
+        self.follow(mode, meeting, &corners, resolution, &others)
     }
 
     /// What follows at a start where the surfaces of `meeting` vanish.
@@ -60,7 +65,7 @@ impl Integrator<'_> {
         let resolution = corners
             .normal_fields()
             .and_then(|fields| resolve(&fields, &Incoming::Start, &self.kappa(meeting)));
-        self.follow(mode, meeting, &corners, resolution)
+        self.follow(mode, meeting, &corners, resolution, &[])
     }
 
     /// All fields around the current point of an intersection.
@@ -159,13 +164,14 @@ impl Integrator<'_> {
     }
 
     /// Turns a resolution into the motion that follows. Where first-order data do not decide, the first
-    /// derivatives that do not vanish may still leave only one way.
+    /// derivatives that do not vanish may still leave only one way. `others` are further Filippov solutions.
     fn follow(
         &mut self,
         mode: &Mode,
         meeting: &[usize],
         fields: &MeetingFields,
         resolution: Result<Resolution, Undecided>,
+        others: &[Continuation],
     ) -> Result<Decided, FieldError> {
         let resolution = match resolution {
             Ok(resolution) if !resolution.degenerate => resolution,
@@ -178,29 +184,40 @@ impl Integrator<'_> {
             }
             full
         };
-        let (after, leaving) = match &resolution.chosen {
+        let mut candidates: Vec<Mode> = Vec::new();
+        for mode in resolution.candidates.iter().chain(others) {
+            let mode = mode.as_mode().map(on_all);
+            candidates.extend(mode.filter(|mode| !candidates.contains(mode)));
+        }
+        let is_spiral = matches!(resolution.chosen, Some(Continuation::OutwardSpiral));
+        let asked = self.asked().filter(|asked| candidates.contains(asked));
+        let (mut after, leaving) = match &resolution.chosen {
             Some(Continuation::Mode(chosen)) => (on_all(chosen), meeting.to_vec()),
-            Some(Continuation::OutwardSpiral) => match self.start_spiral(meeting, mode, fields)? {
-                Some((region, border)) => (region, vec![border]),
-                None => return self.decide_by_higher_order(mode, meeting, Ok(resolution)),
+            Some(Continuation::OutwardSpiral) => match asked {
+                Some(asked) => (asked.clone(), meeting.to_vec()),
+                None => match self.start_spiral(meeting, mode, fields)? {
+                    Some((region, border)) => (region, vec![border]),
+                    None => return self.decide_by_higher_order(mode, meeting, Ok(resolution)),
+                },
             },
             None => return self.decide_by_higher_order(mode, meeting, Ok(resolution)),
         };
-        let is_spiral = matches!(resolution.chosen, Some(Continuation::OutwardSpiral));
-        if !resolution.unique || is_spiral {
-            let candidates = resolution.candidates.iter();
-            let mut candidates: Vec<Mode> = candidates
-                .filter_map(Continuation::as_mode)
-                .map(on_all)
-                .collect();
+        let preferred = after.clone();
+        if !resolution.unique || is_spiral || candidates.len() > 1 {
             if !candidates.contains(&after) {
                 candidates.push(after.clone());
             }
-            if let Some(stop) = self.report_non_unique(meeting, &after, candidates) {
-                return Ok(Err(stop));
-            }
+            after = match self.choose(meeting, after, candidates) {
+                Ok(after) => after,
+                Err(stop) => return Ok(Err(stop)),
+            };
         }
-        let left = self.departures(&after, &leaving, &resolution.multipliers)?;
+        let multipliers: &[f64] = if after == preferred && !is_spiral {
+            &resolution.multipliers
+        } else {
+            &[]
+        };
+        let left = self.departures(&after, &leaving, multipliers)?;
         Ok(Ok((after, left)))
     }
 
@@ -293,7 +310,8 @@ impl Integrator<'_> {
                 field.n_evaluations()
             }
             _ => {
-                let mut field = IntersectionField::new(self.system, &set, &signs, multipliers);
+                let field = IntersectionField::new(self.system, &set, &signs, multipliers);
+                let mut field = field.with_rule(self.options.sliding);
                 field.eval(t, &mut x, velocity)?;
                 field.n_evaluations()
             }
@@ -312,4 +330,15 @@ fn too_many(meeting: &[usize]) -> Stop {
             found: 0,
         },
     }
+}
+
+/// All attracting continuations at an intersection that is reached, whatever the regularisation selects: Filippov
+/// solutions, and several if the solution is not unique. Not looked for where many surfaces meet.
+fn other_solutions(fields: &NormalFields, incoming: &Incoming) -> Vec<Continuation> {
+    let is_exit = matches!(incoming, Incoming::Exit { .. });
+    if is_exit || fields.m() > MOST_LISTED || has_one_mode_only(fields) {
+        return Vec::new();
+    }
+    let found = admissible(fields).into_iter();
+    found.map(|found| found.continuation).collect()
 }

@@ -2,10 +2,12 @@
 
 mod accumulation;
 mod bounds;
+mod choice;
 mod curve;
 mod detect;
 mod integrator;
 mod irregular;
+mod leave_by_rule;
 mod meeting;
 mod motion;
 mod pace;

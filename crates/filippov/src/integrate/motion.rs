@@ -6,6 +6,7 @@ use crate::error::FieldError;
 use crate::event::{Deflation, EventFunction, Monitored};
 use crate::field::{IntersectionField, RegionField, SlidingField, SmoothField};
 use crate::mode::{Mode, Signs};
+use crate::options::SlidingRule;
 use crate::system::PiecewiseSystem;
 
 /// The smooth field of a mode.
@@ -22,13 +23,18 @@ pub(super) type SlidingSet = SmallVec<[usize; 4]>;
 pub(super) type Exits = SmallVec<[f64; 6]>;
 
 impl<'a> ModeField<'a> {
-    fn new(system: &'a dyn PiecewiseSystem, sliding: &[usize], signs: &[f64]) -> Self {
+    fn new(
+        system: &'a dyn PiecewiseSystem,
+        rule: SlidingRule,
+        sliding: &[usize],
+        signs: &[f64],
+    ) -> Self {
         match *sliding {
             [] => ModeField::Region(RegionField::new(system, signs)),
             [j] => ModeField::Sliding(Box::new(SlidingField::new(system, j, signs))),
             _ => {
                 let field = IntersectionField::new(system, sliding, signs, &[]);
-                ModeField::Intersection(Box::new(field))
+                ModeField::Intersection(Box::new(field.with_rule(rule)))
             }
         }
     }
@@ -120,20 +126,28 @@ pub(super) struct Motion<'a> {
     /// Fields of other kinds that earlier motions had, kept for their buffers.
     idle: Vec<ModeField<'a>>,
     pub monitored: Vec<Monitored>,
+    /// The sliding field where several surfaces meet.
+    rule: SlidingRule,
 }
 
 impl<'a> Motion<'a> {
     /// The motion in `mode` from `t_start`.
-    pub fn new(system: &'a dyn PiecewiseSystem, t_start: f64, mode: Mode) -> Self {
+    pub fn new(
+        system: &'a dyn PiecewiseSystem,
+        t_start: f64,
+        mode: Mode,
+        rule: SlidingRule,
+    ) -> Self {
         let (signs, sliding): (_, SlidingSet) = (mode.signs(), mode.sliding_set().collect());
         let mut motion = Motion {
             t_start,
             active: vec![false; signs.len()],
-            field: ModeField::new(system, &sliding, &signs),
+            field: ModeField::new(system, rule, &sliding, &signs),
             is_straight: sliding.iter().all(|&j| system.is_affine(j)),
             sliding,
             idle: Vec::new(),
             monitored: Vec::new(),
+            rule,
             signs,
             mode,
         };
@@ -157,7 +171,7 @@ impl<'a> Motion<'a> {
                 .position(|f| f.restart(&sliding, &signs));
             let field = match known {
                 Some(index) => self.idle.swap_remove(index),
-                None => ModeField::new(system, &sliding, &signs),
+                None => ModeField::new(system, self.rule, &sliding, &signs),
             };
             self.idle.push(std::mem::replace(&mut self.field, field));
         }

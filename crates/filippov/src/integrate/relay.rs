@@ -3,7 +3,6 @@
 use super::detect::Found;
 use super::integrator::Integrator;
 use super::transition::Decided;
-use super::WarningCode;
 use crate::error::FieldError;
 use crate::event::EventFunction;
 use crate::field::SmoothField;
@@ -58,8 +57,10 @@ impl Integrator<'_> {
             }
         }
         if !is_certain {
-            let candidates = [after.clone()];
-            self.warn_non_unique(meeting, &after, &candidates, WarningCode::NonUnique);
+            match self.choose(meeting, after.clone(), vec![after.clone()]) {
+                Ok(chosen) => after = chosen,
+                Err(stop) => return Ok(Some(Err(stop))),
+            }
         }
         let left = self.departures(&after, meeting, &multipliers)?;
         Ok(Some(Ok((after, left))))

@@ -1,7 +1,7 @@
 //! Where a run starts: arguments checked, the mode of the initial state found.
 
 use super::integrator::Integrator;
-use super::transition::{Decided, Left, Lefts};
+use super::transition::{Decided, Lefts};
 use super::Stop;
 use crate::error::{Error, FieldError};
 use crate::mode::Mode;
@@ -156,17 +156,6 @@ impl Integrator<'_> {
     fn start_on_surface(&mut self, mode: &Mode, j: usize) -> Result<Decided, FieldError> {
         let signs = mode.signs();
         let decision = decide(self.system, j, Arrival::Start, self.t, &self.x, &signs)?;
-        let candidates: Vec<Mode> = decision
-            .candidates
-            .iter()
-            .map(|&e| mode.with(j, e))
-            .collect();
-        let chosen = mode.with(j, decision.entry);
-        if candidates.len() > 1 {
-            if let Some(stop) = self.report_non_unique(&[j], &chosen, candidates) {
-                return Ok(Err(stop));
-            }
-        }
-        Ok(Ok((chosen, Left::after(j, &decision))))
+        Ok(self.follow_at_surface(mode, j, decision))
     }
 }

@@ -1,7 +1,9 @@
 //! How a run ends, and what it warns of.
 
 use crate::error::FieldError;
+use crate::field::weights::RuleFailure;
 use crate::mode::Mode;
+use crate::options::SlidingRule;
 use crate::switching::Undecided;
 
 /// Why a run ended. Whatever the reason, the solution up to that time is kept.
@@ -39,7 +41,17 @@ pub enum Stop {
         /// Why the decision failed.
         reason: Undecided,
     },
-    /// The continuation is not unique, and `NonUnique::Error` was asked for.
+    /// Several surfaces meet, and the chosen combination of their fields does not slide there.
+    SlidingRule {
+        /// The surfaces.
+        surfaces: Vec<usize>,
+        /// The chosen combination.
+        rule: SlidingRule,
+        /// Which of its premises fails.
+        reason: RuleFailure,
+    },
+    /// The continuation is not unique, and `NonUnique::Error` was asked for, or a choice is not among the
+    /// candidates.
     NonUnique {
         /// The surfaces.
         surfaces: Vec<usize>,
@@ -68,6 +80,7 @@ impl Stop {
             Stop::NotFinite => "field_not_finite",
             Stop::FieldRaised(_) => "field_raised",
             Stop::Intersection { .. } => "intersection",
+            Stop::SlidingRule { .. } => "sliding_rule",
             Stop::NonUnique { .. } => "non_unique",
         }
     }
@@ -130,6 +143,16 @@ impl Stop {
                     format!("; candidates of lower codimension: {}", modes(candidates))
                 }
             ),
+            Stop::SlidingRule {
+                surfaces,
+                rule,
+                reason,
+            } => format!(
+                "Stopped at t = {t:.10}: sliding=\"{}\" does not say how the motion goes on at the intersection of {}: \
+                 {reason}.",
+                rule.name(),
+                names(surfaces)
+            ),
             Stop::NonUnique {
                 surfaces,
                 candidates,
@@ -171,4 +194,6 @@ pub struct Warning {
     pub code: WarningCode,
     /// What happened.
     pub text: String,
+    /// At a non-unique point: all continuations, the chosen one first.
+    pub candidates: Vec<Mode>,
 }

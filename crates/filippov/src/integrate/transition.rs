@@ -5,12 +5,11 @@ use smallvec::{smallvec, SmallVec};
 use super::detect::Found;
 use super::integrator::Integrator;
 use super::motion::ModeField;
-use super::{Stop, Warning, WarningCode};
+use super::Stop;
 use crate::error::FieldError;
 use crate::event::{Deflation, EventFunction};
 use crate::field::{eval_on_side, SmoothField};
 use crate::mode::Mode;
-use crate::options::NonUnique;
 use crate::solution::Switch;
 use crate::switching::{decide, first_nonzero, Arrival, Decision, Kind, Leading};
 use crate::tolerances::{MOST_SWITCHES_AT_ONE_TIME, SURFACE_NOISE};
@@ -150,15 +149,7 @@ impl Integrator<'_> {
         arrival: Arrival,
     ) -> Result<Decided, FieldError> {
         let decision = decide(self.system, j, arrival, self.t, &self.x, &mode.signs())?;
-        let after = mode.with(j, decision.entry);
-        if decision.candidates.len() > 1 {
-            let candidates = decision.candidates.iter();
-            let candidates: Vec<Mode> = candidates.map(|&entry| mode.with(j, entry)).collect();
-            if let Some(stop) = self.report_non_unique(&[j], &after, candidates) {
-                return Ok(Err(stop));
-            }
-        }
-        Ok(Ok((after, Left::after(j, &decision))))
+        Ok(self.follow_at_surface(mode, j, decision))
     }
 
     /// Surfaces that vanish at the event: those that were located, and all others that matter, are
@@ -213,6 +204,20 @@ impl Integrator<'_> {
     fn graze(&mut self, mode: &Mode, surfaces: &[usize]) -> Result<Option<Stop>, FieldError> {
         let mut left = Lefts::new();
         let signs = mode.signs();
+        if let (&[j], []) = (surfaces, self.motion.sliding()) {
+            if let Some(leading) = self.leaves_beyond(mode, j)? {
+                let beyond = mode.with(j, -mode.entries()[j]);
+                let candidates = vec![mode.clone(), beyond.clone()];
+                match self.choose(&[j], mode.clone(), candidates) {
+                    Ok(after) if after == beyond => {
+                        self.record(mode.clone(), after.clone(), vec![j]);
+                        return self.begin(after, &[Left::Surface(j, leading)]);
+                    }
+                    Ok(_) => {}
+                    Err(stop) => return Ok(Some(stop)),
+                }
+            }
+        }
         for &j in surfaces {
             let side = mode.entries()[j];
             let leading = first_nonzero(self.system, j, side, 1, self.t, &self.x, &signs)?;
@@ -262,6 +267,9 @@ impl Integrator<'_> {
             }
         }
         self.recorder.begin_segment(self.t, &self.motion.mode);
+        if let Some(stop) = self.refusal() {
+            return Ok(Some(stop));
+        }
         let derivative = self.stepper.start_derivative();
         if derivative.iter().any(|v| !v.is_finite()) {
             return Ok(Some(Stop::NotFinite));
@@ -273,47 +281,5 @@ impl Integrator<'_> {
         self.controller.restart();
         self.dt = self.first_step(left)?;
         Ok(None)
-    }
-
-    /// Warns of a point where several continuations are Filippov solutions, or stops there if that was asked for.
-    pub(super) fn report_non_unique(
-        &mut self,
-        surfaces: &[usize],
-        chosen: &Mode,
-        candidates: Vec<Mode>,
-    ) -> Option<Stop> {
-        if self.options.nonunique == NonUnique::Error {
-            let surfaces = surfaces.to_vec();
-            return Some(Stop::NonUnique {
-                surfaces,
-                candidates,
-            });
-        }
-        self.warn_non_unique(surfaces, chosen, &candidates, WarningCode::NonUnique);
-        None
-    }
-
-    pub(super) fn warn_non_unique(
-        &mut self,
-        surfaces: &[usize],
-        chosen: &Mode,
-        all: &[Mode],
-        code: WarningCode,
-    ) {
-        let modes: Vec<String> = all.iter().map(|m| format!("({m})")).collect();
-        let names = surfaces
-            .iter()
-            .map(|&j| self.system.surface_name(j) + " = 0");
-        let names: Vec<String> = names.collect();
-        let text = format!(
-            "the continuation at {} is not unique: {}; ({chosen}) was chosen",
-            names.join(", "),
-            modes.join(", ")
-        );
-        self.warnings.push(Warning {
-            t: self.t,
-            code,
-            text,
-        });
     }
 }

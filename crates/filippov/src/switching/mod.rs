@@ -39,7 +39,7 @@ pub use relay::{
     all_relay_modes, solve_relay, RelayError, RelayProblem, RelaySolution, Uniqueness,
 };
 pub use resolution::{Continuation, Resolution, Undecided};
-pub use resolve::resolve;
+pub use resolve::{has_one_mode_only, resolve};
 pub use roots::{multiplier_rates, newton, roots_in_cube, stable_roots, Roots};
 pub use small_matrix::Matrix;
 pub use stability::{is_negative_p_matrix, is_scaling_stable, is_stable_for};

@@ -208,7 +208,11 @@ fn start(fields: &NormalFields, kappa: &[f64]) -> Result<Resolution, Undecided> 
         resolution
     } else {
         let outcome = limit(fields, &vec![0.0; fields.m()], kappa);
-        let chosen = continuation(&outcome)?;
+        let chosen = match (continuation(&outcome), found.last()) {
+            // Fields in balance: as good as any other is the last one, that of the most entries +1.
+            (Err(Undecided::AtRest), Some(last)) => last.continuation.clone(),
+            (chosen, _) => chosen?,
+        };
         let mut resolution = Resolution::sure("start/several", chosen);
         resolution.oscillates = oscillates(&outcome);
         let candidates: Vec<Continuation> = found.into_iter().map(|a| a.continuation).collect();
@@ -284,7 +288,7 @@ fn leaf_of(outcome: &Outcome) -> &'static str {
 }
 
 /// Is there exactly one consistent mode, by the constant matrix G of affine fields?
-fn has_one_mode_only(fields: &NormalFields) -> bool {
+pub fn has_one_mode_only(fields: &NormalFields) -> bool {
     fields.is_affine() && is_negative_p_matrix(&fields.jacobian(&vec![0.0; fields.m()]))
 }
 
