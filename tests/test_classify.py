@@ -127,14 +127,26 @@ def test_field_without_sliding_is_refused() -> None:
     np.testing.assert_allclose(away.field(0.0, [0.0, 0.0, 0.0], "00"), [0, 0, 1], rtol=0, atol=1e-15)
 
 
-def test_too_many_surfaces() -> None:
+def test_many_surfaces() -> None:
+    """Friction on any number of bodies; but not fields whose signs multiply."""
     n = 11
-    system = fl.System(lambda t, x: [-np.sign(v) for v in x], n=n)
-    with pytest.raises(fl.ModelError, match="at most 10"):
+    friction = fl.System(lambda t, x: [0.5 - np.sign(v) for v in x], n=n)
+    np.testing.assert_allclose(friction.field(0.0, np.zeros(n), (0,) * n), 0.0, rtol=0, atol=1e-15)
+    point = friction.classify(0.0, np.zeros(n))
+    assert point.mode == (0,) * n
+    assert point.unique
+    np.testing.assert_allclose(point.multipliers, 0.5, rtol=0, atol=1e-15)
+
+    def products(t: float, x: Any) -> Any:
+        signs = [np.sign(v) for v in x]
+        return [0.1 * signs[i - 1] * signs[i - 2] - signs[i] for i in range(n)]
+
+    system = fl.System(products, n=n)
+    with pytest.raises(fl.ModelError, match="no combination of the fields"):
         system.field(0.0, np.zeros(n), (0,) * n)
     point = system.classify(0.0, np.zeros(n))
     assert point.mode is None
-    assert "at most 10" in point.reason
+    assert "at most 6" in point.reason
 
 
 def test_points_that_are_not_finite() -> None:

@@ -13,8 +13,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from filippov.classification import Classification
 from filippov.branches import Branches
+from filippov.classification import Classification
 from filippov.decorator import system
 from filippov.errors import (
     FilippovError,
@@ -73,8 +73,8 @@ if TYPE_CHECKING:
     from filippov import plot, problems
 
 __all__ = [
-    "Classification",
     "Branches",
+    "Classification",
     "DenseSolution",
     "Event",
     "FilippovError",

@@ -12,14 +12,12 @@ from filippov.errors import ModelError
 from filippov.modes import Mode
 from filippov.prepare import Prepared
 
-__all__ = ["MOST_MEETING", "sliding_field"]
+__all__ = ["sliding_field"]
 
 Array = npt.NDArray[np.float64]
 
 # Rounding of the normal components; a multiplier within it counts as admissible.
 _MARGIN = 1e-9
-# Largest number of surfaces that meet in the core: their 2**m fields are all evaluated.
-MOST_MEETING = 10
 
 
 def sliding_field(prepared: Prepared, t: float, x: Array, mode: Mode, p: Array) -> Array:
@@ -78,10 +76,6 @@ def _on_one_surface(prepared: Prepared, t: float, x: Array, mode: Mode, p: Array
 def _on_several_surfaces(prepared: Prepared, t: float, x: Array, mode: Mode, p: Array) -> Array:
     names = ", ".join(f"{prepared.surfaces[j]} = 0" for j in mode.sliding)
     where: dict[str, Any] = {"t": t, "state": x, "surface": names, "mode": mode}
-    if mode.codimension > MOST_MEETING:
-        raise ModelError(
-            f"mode: sliding on {mode.codimension} surfaces; at most {MOST_MEETING} may meet", **where
-        )
     value = intersection_field(prepared.core, t, x, list(mode), p, [])
     if value is None:
         raise ModelError(

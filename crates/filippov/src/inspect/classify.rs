@@ -4,8 +4,8 @@ use crate::error::FieldError;
 use crate::field::{eval_on_side, MeetingFields};
 use crate::mode::Mode;
 use crate::switching::{
-    decide, decide_intersection, resolve, Arrival, Continuation, Incoming, Leading, NormalFields,
-    Resolution, Undecided,
+    decide, decide_intersection, relay_at, resolve, Arrival, Continuation, Incoming, Leading,
+    NormalFields, Resolution, Undecided, Uniqueness,
 };
 use crate::system::{dot, dot_magnitude, PiecewiseSystem};
 use crate::tolerances::{MOST_MEETING, SURFACE_NOISE};
@@ -257,9 +257,7 @@ fn at_intersection(
 ) -> Result<Option<Classification>, FieldError> {
     let mut point = Classification::open(PointKind::Intersection, surfaces);
     if point.surfaces.len() > MOST_MEETING {
-        let m = point.surfaces.len();
-        point.undecided = Some(Undecided::Shape { m, found: 0 });
-        return Ok(Some(point));
+        return at_many(system, t, x, mode, point);
     }
     let meeting = point.surfaces.clone();
     let Some(fields) = fields_around(system, t, x, mode, &meeting)? else {
@@ -289,6 +287,37 @@ fn at_intersection(
                 point.undecided = Some(other.err().unwrap_or(Undecided::NoOutcome));
             }
             point.candidates = decision.candidates;
+        }
+    }
+    Ok(Some(point))
+}
+
+/// More surfaces than all of whose fields can be looked at: the relay problem, if the field is affine in the signs.
+fn at_many(
+    system: &dyn PiecewiseSystem,
+    t: f64,
+    x: &[f64],
+    mode: &Mode,
+    mut point: Classification,
+) -> Result<Option<Classification>, FieldError> {
+    let (found, _) = relay_at(system, (t, x), mode, &point.surfaces)?;
+    match found.filter(|found| found.degenerate.is_empty()) {
+        Some(found) => {
+            let mut after = mode.clone();
+            for ((&j, &entry), &sign) in point.surfaces.iter().zip(&found.modes).zip(&found.signs) {
+                after.set(j, entry);
+                if entry == 0 {
+                    point.multipliers.push(sign);
+                }
+            }
+            point.unique = found.uniqueness == Uniqueness::Certain;
+            point.candidates = vec![after.clone()];
+            point.mode = Some(after);
+            point.leaf = "relay";
+        }
+        None => {
+            let m = point.surfaces.len();
+            point.undecided = Some(Undecided::Shape { m, found: 0 });
         }
     }
     Ok(Some(point))

@@ -27,6 +27,8 @@ pub(super) struct BoundedCurve<'a> {
     pub margin: &'a [f64],
     /// The exit functions of the motion at the stages of the step.
     pub stages: &'a [[f64; 7]],
+    /// Whether these are functions of the multipliers of the canopy.
+    pub by_multipliers: bool,
     /// The normal components on the last piece of this extension: they are asked for one after the other.
     pub last: &'a Cell<Option<Piece>>,
     /// The multipliers on the last piece, while sliding on an intersection.
@@ -60,7 +62,7 @@ impl BoundedCurve<'_> {
     /// An exit function of sliding on an intersection, from bounds of the multipliers.
     fn exit(&self, index: usize, a: f64, b: f64) -> Option<Bound> {
         let m = self.sliding.len();
-        if m > MOST_ENCLOSED {
+        if m > MOST_ENCLOSED || !self.by_multipliers {
             return None;
         }
         let mut last = self.last_root.borrow_mut();
@@ -162,6 +164,7 @@ impl Integrator<'_> {
             sliding: self.motion.sliding(),
             margin: &self.detector.margin,
             stages: &self.detector.stages,
+            by_multipliers: !self.slides_by_rule(),
             last: &self.detector.enclosed_exits,
             last_root: &self.detector.enclosed_root,
         };

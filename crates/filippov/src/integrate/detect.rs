@@ -303,6 +303,7 @@ impl Integrator<'_> {
             }
             _ => None,
         };
+        let by_multipliers = !self.slides_by_rule();
         let interpolant = self.stepper.interpolant();
         let bounds = BoundedCurve {
             system: self.system,
@@ -311,6 +312,7 @@ impl Integrator<'_> {
             sliding: &self.motion.sliding,
             margin: &self.detector.margin,
             stages: &self.detector.stages,
+            by_multipliers,
             last: &self.detector.enclosed_exits,
             last_root: &self.detector.enclosed_root,
         };

@@ -7,7 +7,7 @@ use crate::error::FieldError;
 use crate::event::EventFunction;
 use crate::field::SmoothField;
 use crate::mode::Mode;
-use crate::switching::{solve_relay, RelayProblem, RelaySolution, Uniqueness};
+use crate::switching::{relay_at, RelaySolution, Uniqueness};
 use crate::tolerances::{DRIFT_SHARE, MOST_MEETING};
 
 impl Integrator<'_> {
@@ -73,13 +73,6 @@ impl Integrator<'_> {
         meeting: &[usize],
         later: bool,
     ) -> Result<Option<RelaySolution>, FieldError> {
-        let system = self.system;
-        let Some(affine) = system.affine_signs() else {
-            return Ok(None);
-        };
-        let Some(mut parts) = affine.affine_parts(meeting) else {
-            return Ok(None);
-        };
         let (mut t, mut x) = (self.t, self.x.clone());
         if later {
             let mut velocity = vec![0.0; x.len()];
@@ -88,14 +81,8 @@ impl Integrator<'_> {
             x.iter_mut().zip(&velocity).for_each(|(x, v)| *x += dt * v);
             t += dt;
         }
-        let signs: Vec<f64> = mode.entries().iter().map(|&e| f64::from(e)).collect();
-        self.stats.n_field_evaluations += parts.evaluate(affine, t, &x, &signs)?;
-        let before: Vec<i8> = meeting.iter().map(|&j| mode.entries()[j]).collect();
-        let problem = RelayProblem {
-            nu: parts.nu(),
-            n: parts.normal().clone(),
-            noise: system.lie_tolerance(1),
-        };
-        Ok(solve_relay(&problem, &before).ok())
+        let (found, evaluations) = relay_at(self.system, (t, &x), mode, meeting)?;
+        self.stats.n_field_evaluations += evaluations;
+        Ok(found)
     }
 }

@@ -16,6 +16,7 @@ mod normal_fields;
 mod p_matrix;
 mod redundant;
 mod relay;
+mod relay_at;
 mod resolution;
 mod resolve;
 mod roots;
@@ -38,6 +39,7 @@ pub use redundant::least_multipliers;
 pub use relay::{
     all_relay_modes, solve_relay, RelayError, RelayProblem, RelaySolution, Uniqueness,
 };
+pub use relay_at::relay_at;
 pub use resolution::{Continuation, Resolution, Undecided};
 pub use resolve::{has_one_mode_only, resolve};
 pub use roots::{multiplier_rates, newton, roots_in_cube, stable_roots, Roots};

@@ -1,0 +1,35 @@
+//! The relay problem of a system at a point where surfaces meet.
+
+use super::relay::{solve_relay, RelayProblem, RelaySolution};
+use crate::error::FieldError;
+use crate::mode::Mode;
+use crate::system::PiecewiseSystem;
+
+/// Solves the relay problem at a point where the surfaces of `meeting` vanish, with the entries of `mode` there as
+/// the first guess. `None` if the field is not affine in their signs, or if no solution was found. Returns
+/// also the number of evaluations of the right-hand side.
+///
+/// # Errors
+/// If a function of the user raises.
+pub fn relay_at(
+    system: &dyn PiecewiseSystem,
+    (t, x): (f64, &[f64]),
+    mode: &Mode,
+    meeting: &[usize],
+) -> Result<(Option<RelaySolution>, u64), FieldError> {
+    let parts = system
+        .affine_signs()
+        .and_then(|affine| Some((affine, affine.affine_parts(meeting)?)));
+    let Some((affine, mut parts)) = parts else {
+        return Ok((None, 0));
+    };
+    let signs: Vec<f64> = mode.entries().iter().map(|&e| f64::from(e)).collect();
+    let evaluations = parts.evaluate(affine, t, x, &signs)?;
+    let before: Vec<i8> = meeting.iter().map(|&j| mode.entries()[j]).collect();
+    let problem = RelayProblem {
+        nu: parts.nu(),
+        n: parts.normal().clone(),
+        noise: system.lie_tolerance(1),
+    };
+    Ok((solve_relay(&problem, &before).ok(), evaluations))
+}
