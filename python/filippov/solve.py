@@ -112,13 +112,13 @@ def solve_ivp(
     max_step : float, optional
         Longest step allowed. Default: no limit.
     sliding : {"canopy", "moments", "minimum-norm", "dieci-lopez"}, optional
-        Which combination of the 2**m fields slides where m >= 2 surfaces meet; on one surface it is Filippov's.
+        Which combination of the 2**m fields slides where m >= 2 surfaces meet; on one it is Filippov's.
         ``"canopy"``, the default: products of one multiplier per surface, the limit of regularised systems.
         ``"moments"``: two surfaces only; the weights change smoothly into those of sliding on one surface.
         ``"minimum-norm"``: the tangent combination whose weights have the least norm.
         ``"dieci-lopez"``: projected fields; all of them have to point towards the intersection.
-        For fields that are affine in the signs (friction, relays) the first three agree. Where a rule does not
-        apply the run stops and says so.
+        For fields that are affine in the signs (friction, relays) the first three agree. Where a rule does
+        not apply the run stops and says so.
     nonunique : {"regularize", "error", "branch"}, optional
         What to do where the solution is not unique: follow the limit of the regularised system and note the
         alternatives in `warnings`; raise `NonUniqueError`; or follow all alternatives: the solution returned
