@@ -320,7 +320,7 @@ def test_base_and_deltas_on_one_and_on_three_surfaces(seed: int) -> None:
     start -= rows[0] * (rows[0] @ start) / (rows[0] @ rows[0])  # on it to rounding
     field, mu = linear_superposition(base, deltas, rows, [0], [1, 2])
     sol = system.solve((0, 0.1), start)
-    assert sol.segments[0].mode == (0, -1, -1)
+    assert sol.segments[-1].mode == (0, -1, -1)
     np.testing.assert_allclose(sol.y[:, -1], start + 0.1 * field, rtol=0, atol=1e-12)
 
 

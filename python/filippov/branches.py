@@ -81,7 +81,7 @@ class Branches(Sequence[Solution]):
     --------
     >>> import numpy as np, filippov as fl
     >>> sol = fl.solve_ivp(lambda t, x: np.sign(x), (0, 1), [0.0], nonunique="branch")
-    >>> [path.y[0, -1].round(12) for path in sol.branches.paths()]
+    >>> [round(float(path.y[0, -1]), 12) for path in sol.branches.paths()]
     [1.0, -1.0]
     >>> [str(piece.mode) for piece in sol.branches.tree.children]
     ['+', '-']
