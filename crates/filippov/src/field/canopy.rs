@@ -4,7 +4,7 @@ use super::weights::fill_product_weights;
 use super::MeetingFields;
 use crate::error::FieldError;
 use crate::switching::codim2::Bilinear;
-use crate::switching::{least_multipliers, newton, stable_roots, Matrix, NormalFields};
+use crate::switching::{least_multipliers, newton, stable_roots, NormalFields};
 use crate::system::PiecewiseSystem;
 
 /// The canopy of the 2^m fields around an intersection, and the root that the motion follows.
@@ -74,8 +74,8 @@ fn solve_many(fields: &NormalFields, lambda: &mut Vec<f64>) -> Option<[f64; 2]> 
         *lambda = stable_roots(fields).into_iter().next()?;
     }
     *lambda = newton(fields, lambda)?;
-    let mut jacobian = fields.jacobian(lambda);
-    normalise(&mut jacobian, fields);
+    // Stable for equal scalings of the surfaces as they are: that is what decides where the motion began.
+    let jacobian = fields.jacobian(lambda);
     let sign = if fields.m().is_multiple_of(2) {
         1.0
     } else {
@@ -83,14 +83,4 @@ fn solve_many(fields: &NormalFields, lambda: &mut Vec<f64>) -> Option<[f64; 2]> 
     };
     let fold = sign * jacobian.determinant();
     Some([fold, jacobian.last_hurwitz_determinant()])
-}
-
-/// Divides every row by the size of its normal components, so that the scaling of a surface does not matter.
-fn normalise(jacobian: &mut Matrix, fields: &NormalFields) {
-    for i in 0..fields.m() {
-        let size = fields.row_size(i);
-        for j in 0..fields.m() {
-            jacobian[(i, j)] /= size;
-        }
-    }
 }
