@@ -10,8 +10,13 @@ from regularised import T_END, random_case
 
 WIDTHS = (1e-4, 1e-5)
 TIMES = np.linspace(0.0, T_END, 31)
-# Seeds of runs that fail for reasons in the core; minimal cases are in `regressions`.
-FAILING = {9: "a root that is stable for kappa = 1, but not in the scaling of its exit function"}
+# Seeds of runs that fail for reasons in the core.
+FAILING = {
+    # Minimal case: regressions/test_stability_of_three_surfaces.py
+    9: "a root that is stable for kappa = 1, but not in the scaling of its exit function",
+    # Each turn shrinks a thousandfold: rounding is reached before the turns are seen to be alike.
+    248: "the last crossing meets both surfaces within rounding, and the region does not arrive at one",
+}
 
 
 def distances(seed: int) -> tuple[Any, list[float]]:
@@ -33,14 +38,14 @@ def approaches(found: list[float]) -> bool:
     return found[1] <= 1.2 * found[0] + 0.1
 
 
-def cases(seeds: range) -> list[Any]:
+def cases(seeds: list[int]) -> list[Any]:
     return [
         pytest.param(seed, marks=[pytest.mark.xfail(reason=FAILING[seed])] if seed in FAILING else [])
         for seed in seeds
     ]
 
 
-@pytest.mark.parametrize("seed", cases(range(24)))
+@pytest.mark.parametrize("seed", cases([*range(24), 248]))
 def test_regularised_motion_approaches_the_solution(seed: int) -> None:
     _, found = distances(seed)
     assert approaches(found)
@@ -60,8 +65,8 @@ def loses_its_root(run: Any) -> bool:
 def test_many_regularised_motions() -> None:
     """All of 200 systems approach the solution, 198 at the rate of the width.
 
-    One run fails (see `FAILING`). In another one a root is lost, and there the regularised motion leaves late,
-    by a power of the width below 1: 0.8 from 1e-3 to 1e-7. No motion that is not unique is an exception.
+    One run fails (see `FAILING`). In another one a root is lost, and there the regularised motion leaves
+    late, by a power of the width below 1: 0.8 from 1e-3 to 1e-7. No other one is an exception.
     """
     exceptions, roots_lost, sliding = [], [], {0: 0, 1: 0, 2: 0, 3: 0}
     for seed in range(200):
