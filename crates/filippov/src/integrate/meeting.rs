@@ -42,7 +42,17 @@ impl Integrator<'_> {
             Ok(fields) => {
                 let incoming = self.incoming(event, mode, meeting, fresh, &fields)?;
                 others = other_solutions(&fields, &incoming);
-                resolve(&fields, &incoming, &self.kappa(meeting))
+                let kappa = self.kappa(meeting);
+                match resolve(&fields, &incoming, &kappa) {
+                    // The last of many turns is within rounding of all surfaces: its region leads past one of
+                    // them, and has no meaning any more.
+                    Err(Undecided::NotArriving { .. })
+                        if matches!(incoming, Incoming::Corner { .. }) =>
+                    {
+                        resolve(&fields, &Incoming::Start, &kappa)
+                    }
+                    decided => decided,
+                }
             }
             Err(undecided) => Err(undecided),
         };
