@@ -42,7 +42,7 @@ def test_spiral_that_shrinks_a_thousandfold_with_each_turn() -> None:
     """Rounding is reached before turns are seen to be alike; the last crossing meets both surfaces."""
     run, found = distances(248)
     assert run.segments[-1].mode == (0, 0)
-    # In proportion to the width on average: 7, 5, 10, 10, 7 from 1e-3 to 1e-7; the phase of the spiral differs.
+    # In proportion to the width on average, with the phase of the spiral: 7, 5, 10, 10, 7 from 1e-3 to 1e-7.
     assert max(found) < 15.0
 
 
