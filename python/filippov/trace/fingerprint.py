@@ -18,7 +18,7 @@ import functools
 import math
 from collections.abc import Iterator
 from types import CodeType, FunctionType, ModuleType
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -250,7 +250,7 @@ class _Reader:
         self._read_names(function, names.names)
 
     def _read_names(self, function: FunctionType, names: tuple[str, ...]) -> None:
-        own, built_in = function.__globals__, function.__builtins__  # type: ignore[attr-defined]
+        own, built_in = function.__globals__, cast("Any", function).__builtins__
         if type(own) is not dict or type(built_in) is not dict:
             raise _Unknown
         for name in names:
