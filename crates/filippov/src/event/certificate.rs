@@ -72,33 +72,59 @@ impl Bound {
     }
 }
 
-/// Is a function that is `left` > 0 and `right` at the ends of a step proved to be free of zeros in it?
-/// `None`: there are no bounds. Halves the step up to `depth` times.
-pub fn is_clear(bounds: Bounds, left: f64, right: f64, noise: f64, depth: u32) -> Option<bool> {
-    let ends = (Some(left), Some(right));
-    is_clear_between(bounds, (0.0, 1.0), ends, noise, depth)
+/// What the bounds prove about a whole step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Proof {
+    /// There is no zero.
+    Clear,
+    /// There may be one.
+    Open,
+    /// There are no bounds, or none of its parts is known to be finite: they say nothing about this function.
+    Silent,
 }
 
-fn is_clear_between(
+/// What is proved about a function that is `left` > 0 and `right` at the ends of a step. Halves the step up to
+/// `depth` times.
+pub fn prove(bounds: Bounds, left: f64, right: f64, noise: f64, depth: u32) -> Proof {
+    let ends = (Some(left), Some(right));
+    prove_between(bounds, (0.0, 1.0), ends, noise, depth)
+}
+
+fn prove_between(
     bounds: Bounds,
     (a, b): (f64, f64),
     (left, right): (Option<f64>, Option<f64>),
     noise: f64,
     depth: u32,
-) -> Option<bool> {
+) -> Proof {
     let above = |value: Option<f64>| value.is_some_and(|value| value > noise);
-    match bounds(a, b)?.verdict(b - a, None, noise) {
-        Verdict::Clear => Some(true),
-        Verdict::Rising if above(left) => Some(true),
-        Verdict::Falling if above(right) => Some(true),
-        _ if depth == 0 || !above(left.or(right)) => Some(false),
+    let Some(bound) = bounds(a, b) else {
+        return Proof::Silent;
+    };
+    let verdict = bound.verdict(b - a, None, noise);
+    match verdict {
+        Verdict::Clear => Proof::Clear,
+        Verdict::Rising if above(left) => Proof::Clear,
+        Verdict::Falling if above(right) => Proof::Clear,
+        Verdict::Unbounded if depth == 0 => Proof::Silent,
+        Verdict::Open | Verdict::Rising | Verdict::Falling
+            if depth == 0 || !above(left.or(right)) =>
+        {
+            Proof::Open
+        }
+        _ if depth == 0 => Proof::Open,
         _ => {
             let m = 0.5 * (a + b);
-            let first = is_clear_between(bounds, (a, m), (left, None), noise, depth - 1)?;
-            if !first {
-                return Some(false);
+            let first = prove_between(bounds, (a, m), (left, None), noise, depth - 1);
+            if first == Proof::Open {
+                return Proof::Open;
             }
-            is_clear_between(bounds, (m, b), (None, right), noise, depth - 1)
+            let second = prove_between(bounds, (m, b), (None, right), noise, depth - 1);
+            match (first, second) {
+                (Proof::Clear, Proof::Clear) => Proof::Clear,
+                (Proof::Silent, Proof::Silent) => Proof::Silent,
+                _ => Proof::Open,
+            }
         }
     }
 }

@@ -7,7 +7,7 @@ use filippov_expr::{Enclosure, Interval};
 use super::detect::Detector;
 use super::integrator::Integrator;
 use crate::error::FieldError;
-use crate::event::certificate::{is_clear, Bound};
+use crate::event::certificate::{prove, Bound, Proof};
 use crate::event::isolate::PROBES;
 use crate::event::tube::Tube;
 use crate::event::{EventFunction, Monitored};
@@ -154,8 +154,8 @@ fn exit_bound(exit: IntersectionExit, root: &EnclosedRoot) -> Option<Interval> {
 }
 
 impl Integrator<'_> {
-    /// Do bounds over the step prove that a function has no zero in it? `None`: there are no bounds.
-    pub(super) fn prove_clear(&self, index: usize, value_at_end: f64) -> Option<bool> {
+    /// What bounds over the step prove about a function.
+    pub(super) fn prove_clear(&self, index: usize, value_at_end: f64) -> Proof {
         let m = self.motion.monitored[index];
         let curve = BoundedCurve {
             system: self.system,
@@ -174,7 +174,7 @@ impl Integrator<'_> {
         } else {
             m.value
         };
-        is_clear(
+        prove(
             &mut |a, b| curve.over(&m, a, b),
             at_start,
             value_at_end,

@@ -9,6 +9,7 @@ use super::curve::{grazes, Curve};
 use super::integrator::Integrator;
 use super::motion::{Exits, Motion};
 use crate::error::FieldError;
+use crate::event::certificate::Proof;
 use crate::event::filter::{may_vanish, may_vanish_bent, may_vanish_between, may_vanish_deflated};
 use crate::event::isolate::{first_zero_sampled, Evidence, Zero, PROBES};
 use crate::event::locate::refine;
@@ -47,8 +48,8 @@ pub(super) struct Detector {
     right: Vec<(f64, f64)>,
     /// Rounding of the exit functions in this step, once it was needed.
     exit_noise: Option<f64>,
-    /// Which monitored functions the filter could not clear.
-    suspects: Vec<usize>,
+    /// Which monitored functions could not be cleared, and whether bounds say anything about them.
+    suspects: Vec<(usize, bool)>,
 }
 
 /// The earliest zero of a step.
@@ -187,8 +188,8 @@ impl Integrator<'_> {
         if !self.detector.suspects.is_empty() {
             self.extend()?;
             for k in 0..self.detector.suspects.len() {
-                let index = self.detector.suspects[k];
-                let zero = self.search(index, 0.0, 1.0, dt)?;
+                let (index, bounded) = self.detector.suspects[k];
+                let zero = self.search((index, bounded), (0.0, 1.0), dt)?;
                 self.keep_earliest(&mut found, index, zero, dt);
             }
         }
@@ -218,13 +219,14 @@ impl Integrator<'_> {
                     .noise(self.system, &self.motion, m.function, step)?;
                 self.motion.monitored[index].noise = noise;
             }
-            let is_cleared = if is_polynomial(&m) {
-                None
+            let proof = if is_polynomial(&m) {
+                Proof::Silent
             } else {
                 self.prove_clear(index, value)
             };
-            let suspect = match (m.function, m.deflation, is_cleared) {
-                (_, _, Some(cleared)) => !cleared,
+            let suspect = match (m.function, m.deflation, proof) {
+                (_, _, Proof::Clear) => false,
+                (_, _, Proof::Open) => true,
                 (EventFunction::Surface(_), None, _) if m.affine => {
                     may_vanish(m.value, m.rate * dt, value, rate * dt)
                 }
@@ -254,7 +256,7 @@ impl Integrator<'_> {
                 (_, Some(_), _) => true,
             };
             if suspect {
-                self.detector.suspects.push(index);
+                self.detector.suspects.push((index, proof == Proof::Open));
             }
         }
         Ok(())
@@ -285,9 +287,8 @@ impl Integrator<'_> {
     /// The first zero of one monitored function on [from, to], refined to rounding.
     fn search(
         &mut self,
-        index: usize,
-        from: f64,
-        to: f64,
+        (index, has_bounds): (usize, bool),
+        (from, to): (f64, f64),
         dt: f64,
     ) -> Result<Option<(f64, bool)>, FieldError> {
         let m = self.motion.monitored[index];
@@ -345,7 +346,7 @@ impl Integrator<'_> {
             };
         }
         let mut over = |a, b| bounds.over(&m, a, b);
-        let is_bounded = polynomial.is_none() && over(from, to).is_some();
+        let is_bounded = polynomial.is_none() && has_bounds;
         let evidence = match (m.function, is_bounded) {
             (_, true) => Evidence::Bounds {
                 bounds: &mut over,
@@ -412,7 +413,7 @@ impl Integrator<'_> {
             let near = rate < 0.0 && value < -rate * dt * 1.5 * (EXTRAPOLATION - 1.0);
             if near {
                 self.extend()?;
-                let zero = self.search(index, 1.0, EXTRAPOLATION, dt)?;
+                let zero = self.search((index, false), (1.0, EXTRAPOLATION), dt)?;
                 // What lies beyond the end of the step may not exist; that is no reason to shorten it.
                 self.detector.uncertain = false;
                 let Some((theta, _)) = zero else { continue };
