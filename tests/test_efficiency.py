@@ -1,0 +1,50 @@
+"""What a run costs: a loss of efficiency is a failure, as a wrong number is."""
+
+from __future__ import annotations
+
+import filippov as fl
+import numpy as np
+import pytest
+import reference
+
+# Evaluations of the right-hand side, of switching functions, and attempted steps at rtol = atol = 1e-6.
+COSTS = {
+    "disode_planar": (914, 524, 94),
+    "structural_pounding": (1589, 205, 251),
+    "relay_feedback": (3739, 449, 433),
+    "two_masses": (748, 114, 94),
+    "dry_friction_autonomous": (3164, 428, 385),
+    "relay_feedback_slow": (5201, 600, 559),
+    "relay_feedback_fast": (7563, 946, 910),
+    "drill_string": (2386, 336, 328),
+    "dieci_lopez_4_4": (104, 10, 7),
+    "dieci_lopez_6_1": (402, 58, 54),
+    "dieci_lopez_6_2": (386, 41, 21),
+    "dieci_lopez_6_4_i": (2519, 310, 295),
+    "dieci_lopez_6_4_ii": (4437, 946, 507),
+}
+
+
+@pytest.mark.parametrize("name", COSTS)
+def test_cost_of_reference_runs(name: str) -> None:
+    """Within a tenth: rounding may differ between platforms, and change a step here and there."""
+    stats = reference.solve(name, 1e-6).stats
+    cost = (stats["nfev"], stats["n_surface_evaluations"], stats["n_steps"] + stats["n_rejected"])
+    assert (np.array(cost) <= 1.1 * np.array(COSTS[name]) + 5).all(), cost
+
+
+def test_cost_of_a_biased_relay() -> None:
+    sol = fl.solve_ivp(lambda t, x: [0.3 - np.sign(x[0])], (0, 10), [1.0])
+    assert sol.nfev < 60
+
+
+def test_cost_of_many_sticking_masses_does_not_depend_on_their_number() -> None:
+    """An evaluation of the field is one, however many multipliers it needs."""
+
+    def cost(d: int) -> int:
+        sol = fl.solve_ivp(lambda t, x: [0.5 * np.sin(t) - np.sign(v) for v in x], (0, 20), np.full(d, 0.5))
+        assert sol.segments[-1].mode == d * (0,)
+        return sol.nfev
+
+    few, many = cost(3), cost(60)
+    assert many <= 1.5 * few
