@@ -1,6 +1,7 @@
 //! The smooth field of a mode: what a stepper integrates.
 
 mod affine;
+mod affine_bounds;
 mod by_rule;
 mod canopy;
 mod intersection;
@@ -11,6 +12,7 @@ mod sliding;
 pub mod weights;
 
 pub use affine::AffineLaw;
+pub use affine_bounds::AffineBounds;
 pub use by_rule::RuleLaw;
 pub use canopy::Canopy;
 pub use intersection::{IntersectionExit, IntersectionField};

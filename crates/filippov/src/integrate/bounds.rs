@@ -11,7 +11,8 @@ use crate::event::certificate::{prove, Bound, Proof};
 use crate::event::isolate::PROBES;
 use crate::event::tube::Tube;
 use crate::event::{EventFunction, Monitored};
-use crate::field::IntersectionExit;
+use crate::field::{AffineBounds, IntersectionExit};
+use crate::options::SlidingRule;
 use crate::stepper::Interpolant;
 use crate::switching::{enclose_root, EnclosedRoot, RootBounds};
 use crate::system::PiecewiseSystem;
@@ -27,7 +28,9 @@ pub(super) struct BoundedCurve<'a> {
     pub margin: &'a [f64],
     /// The exit functions of the motion at the stages of the step.
     pub stages: &'a [[f64; 7]],
-    /// Whether these are functions of the multipliers of the canopy.
+    /// Bounds of many multipliers, where the field is affine in the signs.
+    pub affine: Option<&'a AffineBounds>,
+    /// Whether the exit functions are those of the multipliers of the canopy.
     pub by_multipliers: bool,
     /// The normal components on the last piece of this extension: they are asked for one after the other.
     pub last: &'a Cell<Option<Piece>>,
@@ -62,7 +65,7 @@ impl BoundedCurve<'_> {
     /// An exit function of sliding on an intersection, from bounds of the multipliers.
     fn exit(&self, index: usize, a: f64, b: f64) -> Option<Bound> {
         let m = self.sliding.len();
-        if m > MOST_ENCLOSED || !self.by_multipliers {
+        if !self.by_multipliers || m > MOST_ENCLOSED && self.affine.is_none() {
             return None;
         }
         let mut last = self.last_root.borrow_mut();
@@ -118,6 +121,19 @@ impl BoundedCurve<'_> {
 
     /// The multipliers on a piece, from boxes around their values at the ends of the step.
     fn enclosed_root(&self, a: f64, b: f64) -> Option<RootBounds> {
+        if let (Some(bounds), Some(affine)) = (self.affine, self.system.affine_signs()) {
+            let tube = Tube::new(self.interpolant, (a, b), self.margin);
+            let exits = self.stages.chunks_exact(2).take(self.sliding.len());
+            let middles = exits.map(|pair| 0.5 * (pair[0][0] + pair[0][6]) - 1.0);
+            let near: Vec<f64> = middles.collect();
+            let found = bounds.enclose(affine, self.sliding, &tube, self.signs, &near);
+            return Some(found.map_or(RootBounds::Unproved, |multipliers| {
+                RootBounds::Proved(EnclosedRoot {
+                    multipliers,
+                    diagonal: Vec::new(),
+                })
+            }));
+        }
         let components = self.all_components(a, b)?;
         let exits = self.stages.chunks_exact(2).take(self.sliding.len());
         let ends = exits.map(|pair| Interval::hull(pair[0][0] - 1.0, pair[0][6] - 1.0));
@@ -147,6 +163,7 @@ fn exit_bound(exit: IntersectionExit, root: &EnclosedRoot) -> Option<Interval> {
         IntersectionExit::Fold => Interval::point(f64::MAX),
         // Each entry is in units of its surface: only the sign counts.
         IntersectionExit::Stability => match root.diagonal[..] {
+            [] => Interval::point(f64::MAX),
             [first, second] => Interval::hull(-first.hi.min(second.hi), f64::MAX),
             _ => return None,
         },
@@ -164,6 +181,7 @@ impl Integrator<'_> {
             sliding: self.motion.sliding(),
             margin: &self.detector.margin,
             stages: &self.detector.stages,
+            affine: self.motion.affine_bounds(),
             by_multipliers: !self.slides_by_rule(),
             last: &self.detector.enclosed_exits,
             last_root: &self.detector.enclosed_root,
@@ -181,6 +199,27 @@ impl Integrator<'_> {
             m.noise,
             PROOF_DEPTH,
         )
+    }
+
+    /// Prepares the bounds of many multipliers, once per motion.
+    pub(super) fn prepare_bounds(&mut self) -> Result<(), FieldError> {
+        let (motion, system) = (&mut self.motion, self.system);
+        if motion.sliding.len() < 2
+            || motion.has_bounds()
+            || self.options.sliding != SlidingRule::Canopy
+        {
+            return Ok(());
+        }
+        let mut bounds = None;
+        if let Some(affine) = system.affine_signs() {
+            let point = (self.t, &self.x[..]);
+            let (found, evaluations) =
+                AffineBounds::new(affine, &motion.sliding, point, &motion.signs)?;
+            self.stats.n_field_evaluations += evaluations;
+            bounds = found;
+        }
+        motion.set_bounds(bounds);
+        Ok(())
     }
 
     /// How far the motion lies beside the continuous extension, from the probes of the step.

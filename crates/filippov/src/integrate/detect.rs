@@ -208,6 +208,7 @@ impl Integrator<'_> {
             self.stepper.extend_order4(&self.x);
         }
         self.measure_margin(dt)?;
+        self.prepare_bounds()?;
         let mut probed = false;
         for index in 0..self.motion.monitored.len() {
             let m = self.motion.monitored[index];
@@ -313,6 +314,7 @@ impl Integrator<'_> {
             sliding: &self.motion.sliding,
             margin: &self.detector.margin,
             stages: &self.detector.stages,
+            affine: self.motion.affine_bounds.as_ref().and_then(Option::as_ref),
             by_multipliers,
             last: &self.detector.enclosed_exits,
             last_root: &self.detector.enclosed_root,

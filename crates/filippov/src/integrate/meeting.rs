@@ -12,8 +12,8 @@ use crate::event::EventFunction;
 use crate::field::{IntersectionExit, IntersectionField, MeetingFields, SlidingField, SmoothField};
 use crate::mode::Mode;
 use crate::switching::{
-    admissible, decide_intersection, has_one_mode_only, resolve, Continuation, ExitKind, Incoming,
-    Leading, NormalFields, Resolution, Undecided,
+    admissible, decide_intersection, first_nonzero, has_one_mode_only, resolve, Continuation,
+    ExitKind, Incoming, Leading, NormalFields, Resolution, Undecided,
 };
 use crate::system::{dot, dot_magnitude};
 use crate::tolerances::{DEPARTS_TANGENTIALLY, DRIFT_SHARE, MOST_LISTED, MOST_MEETING};
@@ -275,30 +275,65 @@ impl Integrator<'_> {
                 .gradient(j, self.t, &self.x, &signs, &mut gradient)?;
             let value = ht + dot(&gradient, &velocity);
             let size = ht.abs() + dot_magnitude(&gradient, &velocity);
-            let leading = if value.abs() > DEPARTS_TANGENTIALLY * size {
+            let leading = if value.abs() > DEPARTS_TANGENTIALLY * size
+                && self.departs_clearly(after, multipliers, j, value)?
+            {
                 Leading { order: 1, value }
+            } else if after.codimension() == 0 {
+                let side = after.entries()[j];
+                first_nonzero(self.system, j, side, 1, self.t, &self.x, &signs)?
             } else {
                 // The normal component vanishes at the exit of a multiplier: its rate along the new motion.
-                let dt = DRIFT_SHARE * self.stepper.interpolant().dt;
-                let ahead: Vec<f64> = self
-                    .x
-                    .iter()
-                    .zip(&velocity)
-                    .map(|(x, v)| x + dt * v)
-                    .collect();
-                let mut next = vec![0.0; n];
-                self.velocity_in(after, multipliers, self.t + dt, &ahead, &mut next)?;
-                let ht = self
-                    .system
-                    .gradient(j, self.t + dt, &ahead, &signs, &mut gradient)?;
-                Leading {
-                    order: 2,
-                    value: (ht + dot(&gradient, &next) - value) / dt,
-                }
+                let value = self.acceleration_of(after, multipliers, j, &velocity)?;
+                Leading { order: 2, value }
             };
             left.push(Left::Surface(j, leading));
         }
         Ok(left)
+    }
+
+    /// Is a normal component clear of rounding, compared with that beyond the surface? At the exit of a multiplier
+    /// all forces may balance, and nothing of the motion itself tells how large they are.
+    fn departs_clearly(
+        &mut self,
+        after: &Mode,
+        multipliers: &[f64],
+        j: usize,
+        value: f64,
+    ) -> Result<bool, FieldError> {
+        let beyond = after.with(j, -after.entries()[j]);
+        let (x, mut velocity) = (self.x.clone(), vec![0.0; self.x.len()]);
+        self.velocity_in(&beyond, multipliers, self.t, &x, &mut velocity)?;
+        let mut gradient = vec![0.0; x.len()];
+        let signs = beyond.signs();
+        let ht = self.system.gradient(j, self.t, &x, &signs, &mut gradient)?;
+        let other = ht + dot(&gradient, &velocity);
+        Ok(!(value.abs() <= DEPARTS_TANGENTIALLY * other.abs()))
+    }
+
+    /// The rate of dh_j/dt along the motion in `after`, which has this velocity.
+    fn acceleration_of(
+        &mut self,
+        after: &Mode,
+        multipliers: &[f64],
+        j: usize,
+        velocity: &[f64],
+    ) -> Result<f64, FieldError> {
+        let (n, signs) = (self.x.len(), after.signs());
+        let mut gradient = vec![0.0; n];
+        let ht = self
+            .system
+            .gradient(j, self.t, &self.x, &signs, &mut gradient)?;
+        let now = ht + dot(&gradient, velocity);
+        let dt = DRIFT_SHARE * self.stepper.interpolant().dt;
+        let pairs = self.x.iter().zip(velocity);
+        let ahead: Vec<f64> = pairs.map(|(x, v)| x + dt * v).collect();
+        let mut next = vec![0.0; n];
+        self.velocity_in(after, multipliers, self.t + dt, &ahead, &mut next)?;
+        let ht = self
+            .system
+            .gradient(j, self.t + dt, &ahead, &signs, &mut gradient)?;
+        Ok((ht + dot(&gradient, &next) - now) / dt)
     }
 
     /// The field of a mode at a point near the current one.

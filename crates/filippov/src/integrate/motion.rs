@@ -4,7 +4,7 @@ use smallvec::SmallVec;
 
 use crate::error::FieldError;
 use crate::event::{Deflation, EventFunction, Monitored};
-use crate::field::{IntersectionField, RegionField, SlidingField, SmoothField};
+use crate::field::{AffineBounds, IntersectionField, RegionField, SlidingField, SmoothField};
 use crate::mode::{Mode, Signs};
 use crate::options::SlidingRule;
 use crate::system::PiecewiseSystem;
@@ -121,6 +121,8 @@ pub(super) struct Motion<'a> {
     pub field: ModeField<'a>,
     /// The surfaces slid on, in increasing order.
     pub sliding: SlidingSet,
+    /// Bounds of their multipliers, once they were asked for and if there are any.
+    pub affine_bounds: Option<Option<AffineBounds>>,
     /// All of them are affine: the continuous extension of a step does not leave them.
     pub is_straight: bool,
     /// Fields of other kinds that earlier motions had, kept for their buffers.
@@ -143,6 +145,7 @@ impl<'a> Motion<'a> {
             t_start,
             active: vec![false; signs.len()],
             field: ModeField::new(system, rule, &sliding, &signs),
+            affine_bounds: None,
             is_straight: sliding.iter().all(|&j| system.is_affine(j)),
             sliding,
             idle: Vec::new(),
@@ -175,6 +178,7 @@ impl<'a> Motion<'a> {
             };
             self.idle.push(std::mem::replace(&mut self.field, field));
         }
+        self.affine_bounds = None;
         self.is_straight = sliding.iter().all(|&j| system.is_affine(j));
         (self.mode, self.t_start, self.signs, self.sliding) = (mode, t_start, signs, sliding);
         self.find_monitored(system, deflations);
@@ -224,6 +228,21 @@ impl<'a> Motion<'a> {
         if let ModeField::Region(field) = &mut self.field {
             field.set_departing(departing);
         }
+    }
+
+    /// Bounds of the multipliers, if there are any.
+    pub fn affine_bounds(&self) -> Option<&AffineBounds> {
+        self.affine_bounds.as_ref()?.as_ref()
+    }
+
+    /// Were they asked for?
+    pub fn has_bounds(&self) -> bool {
+        self.affine_bounds.is_some()
+    }
+
+    /// Keeps the answer.
+    pub fn set_bounds(&mut self, bounds: Option<AffineBounds>) {
+        self.affine_bounds = Some(bounds);
     }
 
     /// The surfaces slid on.

@@ -8,7 +8,7 @@ use crate::event::EventFunction;
 use crate::field::SmoothField;
 use crate::mode::Mode;
 use crate::switching::{relay_at, RelaySolution, Uniqueness};
-use crate::tolerances::{DRIFT_SHARE, MOST_MEETING};
+use crate::tolerances::{AT_SIDE, DRIFT_SHARE, MOST_MEETING};
 
 impl Integrator<'_> {
     /// What follows where the surfaces of `meeting` vanish, if the field is affine in their signs and the relay
@@ -41,9 +41,15 @@ impl Integrator<'_> {
         if is_degenerate(&found) && event.is_some() && !exits {
             found = self.solve_relay_at(mode, meeting, true)?;
         }
-        let Some(found) = found.filter(|found| found.degenerate.is_empty()) else {
+        let Some(mut found) = found else {
             return Ok(None);
         };
+        if !found.degenerate.is_empty() {
+            if event.is_none() {
+                return Ok(None);
+            }
+            self.let_go(mode, meeting, &mut found);
+        }
         let is_certain = found.uniqueness == Uniqueness::Certain;
         if !is_certain && meeting.len() <= MOST_MEETING {
             return Ok(None);
@@ -64,6 +70,30 @@ impl Integrator<'_> {
         }
         let left = self.departures(&after, meeting, &multipliers)?;
         Ok(Some(Ok((after, left))))
+    }
+
+    /// Multipliers at their ends with rates that vanish: loads passed on from a contact that begins to slip. Those
+    /// that slid until now and are at the same end let go too; if the load does not grow they are caught at
+    /// once. All others stay as they are.
+    fn let_go(&self, mode: &Mode, meeting: &[usize], found: &mut RelaySolution) {
+        let multipliers = self.motion.multipliers();
+        for &k in &found.degenerate {
+            let j = meeting[k];
+            let before = mode.entries()[j];
+            let position = self.motion.sliding().binary_search(&j);
+            let lambda = position.ok().and_then(|at| multipliers.get(at));
+            let is_at_end = lambda.is_some_and(|l| (l - found.signs[k]).abs() <= AT_SIDE);
+            found.modes[k] = match before {
+                0 if is_at_end => {
+                    if found.signs[k] < 0.0 {
+                        -1
+                    } else {
+                        1
+                    }
+                }
+                other => other,
+            };
+        }
     }
 
     /// The relay problem at the current point, or a moment later.

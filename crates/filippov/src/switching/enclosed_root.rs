@@ -14,7 +14,7 @@ const WIDEST: f64 = 8.0;
 pub struct EnclosedRoot {
     /// The multipliers.
     pub multipliers: Vec<Interval>,
-    /// The diagonal of G in a box around them; G is invertible there.
+    /// The diagonal of G in a box around them, where G is invertible; empty if G is constant.
     pub diagonal: Vec<Interval>,
 }
 

@@ -12,6 +12,8 @@
 //!
 //! References: Piiroinen, Kuznetsov (2008), (21)-(24), with s = 1 - 2 mu; Guglielmi, Hairer (2022), section 7.
 
+use filippov_expr::{Interval, Motion};
+
 use super::PiecewiseSystem;
 use crate::error::FieldError;
 use crate::field::eval_on_side;
@@ -76,6 +78,19 @@ pub trait AffineSigns: PiecewiseSystem {
             }
         }
         Ok(evaluations)
+    }
+
+    /// Are the gradient of h_j and the jump of the field with s_j the same all along every motion?
+    fn is_steady(&self, j: usize) -> bool {
+        let _ = j;
+        false
+    }
+
+    /// Rigorous bounds of dh_j/dt along a piece of motion; entries of `signs` may be any numbers on surfaces that
+    /// [`affine_parts`](Self::affine_parts) accepts together. `None` if there are none.
+    fn enclose_rate(&self, j: usize, motion: &dyn Motion, signs: &[f64]) -> Option<Interval> {
+        let _ = (j, motion, signs);
+        None
     }
 }
 

@@ -4,7 +4,11 @@
 //! As each derivative is free of its own sign, it serves every set of surfaces of which no two multiply each
 //! other; a motion that visits many sets compiles nothing anew. Numbers that are constant are kept apart.
 
-use filippov_expr::{Backend, Gradient, Graph, NodeId, SignDependence};
+use std::sync::OnceLock;
+
+use filippov_expr::{
+    Backend, Enclosure, EnclosureProgram, Gradient, Graph, Interval, Motion, NodeId, SignDependence,
+};
 
 use super::affine::AffineParts;
 use super::tiered::TieredProgram;
@@ -29,6 +33,12 @@ pub(super) struct AffineModel {
     jumps: Vec<Row>,
     /// Surfaces whose sign the field is multilinear in.
     is_blended: Vec<bool>,
+    /// Gradients and jumps that are the same all along every motion.
+    is_steady: Vec<bool>,
+    graph: Graph,
+    /// dh_j/dt along the blended field, and bounds of it once they were asked for.
+    rates: Vec<NodeId>,
+    enclosing: Vec<OnceLock<Option<EnclosureProgram>>>,
     /// Surfaces that may not be slid on together with this one: their signs multiply, or one is in the
     /// gradient of the other.
     conflicts: Vec<Vec<u32>>,
@@ -47,6 +57,7 @@ impl AffineModel {
             conflicts[k as usize].push(j);
         }
         let (mut time_rates, mut gradients) = (Vec::new(), Vec::new());
+        let (mut rates, mut is_steady) = (Vec::new(), Vec::new());
         for (j, conflicts) in conflicts.iter_mut().enumerate() {
             let Gradient { time, states } = graph.gradient(graph.surface(j as u32));
             let nodes: Vec<NodeId> = [time]
@@ -54,10 +65,20 @@ impl AffineModel {
                 .chain(states.iter().map(|s| s.1))
                 .collect();
             conflicts.extend(signs_in(&graph, &nodes));
+            is_steady.push(!nodes[1..].iter().any(|&node| graph.depends_on_motion(node)));
+            rates.push(states.iter().fold(time, |sum, &(i, partial)| {
+                let term = graph.mul(partial, dependence.values[i as usize]);
+                graph.add(sum, term)
+            }));
             time_rates.push(source(&graph, time, &mut outputs));
             let entries = states.iter();
             let row = entries.map(|&(i, node)| (i as usize, source(&graph, node, &mut outputs)));
             gradients.push(row.collect());
+        }
+        for derivatives in &dependence.derivatives {
+            for &(j, node) in derivatives {
+                is_steady[j as usize] &= !graph.depends_on_motion(node);
+            }
         }
         let jumps = jumps(&graph, &dependence, d, &mut outputs);
         let mut is_blended = vec![false; d];
@@ -65,7 +86,11 @@ impl AffineModel {
             is_blended[j as usize] = true;
         }
         AffineModel {
-            program: TieredProgram::new(graph, outputs, backend),
+            program: TieredProgram::new(graph.clone(), outputs, backend),
+            graph,
+            enclosing: rates.iter().map(|_| OnceLock::new()).collect(),
+            rates,
+            is_steady,
             n_states: field.len(),
             time_rates,
             gradients,
@@ -100,6 +125,26 @@ impl AffineModel {
         };
         let (gradients, jumps) = (matrix(&self.gradients), matrix(&self.jumps));
         Some(AffineParts::new(self.n_states, surfaces, gradients, jumps))
+    }
+
+    /// Are gradient and jump of surface `j` the same all along every motion?
+    pub fn is_steady(&self, j: usize) -> bool {
+        self.is_steady[j]
+    }
+
+    /// Bounds of dh_j/dt along a piece of motion.
+    pub fn enclose_rate(
+        &self,
+        j: usize,
+        motion: &dyn Motion,
+        signs: &[f64],
+        parameters: &[f64],
+    ) -> Option<Interval> {
+        let compile = || EnclosureProgram::compile(&self.graph, &[self.rates[j]]).ok();
+        let program = self.enclosing[j].get_or_init(compile).as_ref()?;
+        let mut out = [Enclosure::UNKNOWN];
+        program.eval(motion, signs, parameters, &mut out);
+        Some(out[0].value)
     }
 
     /// Evaluates everything that varies.

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use filippov_expr::{Backend, Enclosure, ExprError, Graph, Motion, Names, NodeId};
+use filippov_expr::{Backend, Enclosure, ExprError, Graph, Interval, Motion, Names, NodeId};
 
 use super::compiled::{CompiledGradient, GradientValues, Model};
 use super::{AffineParts, AffineSigns, BothSides, LieValue, PiecewiseSystem, Word};
@@ -304,5 +304,14 @@ impl AffineSigns for TracedSystem {
         let compiled = self.model.affine_signs();
         compiled.fill(t, x, signs, &self.parameters, parts);
         Ok(1)
+    }
+
+    fn is_steady(&self, j: usize) -> bool {
+        self.model.affine_signs().is_steady(j)
+    }
+
+    fn enclose_rate(&self, j: usize, motion: &dyn Motion, signs: &[f64]) -> Option<Interval> {
+        let model = self.model.affine_signs();
+        model.enclose_rate(j, motion, signs, &self.parameters)
     }
 }
