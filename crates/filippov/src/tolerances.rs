@@ -305,3 +305,6 @@ pub const LEAST_NORM_STEPS: usize = 100;
 /// Largest number of surfaces at whose intersection all Filippov solutions are listed: there are 3^m modes to look
 /// at, and those of three and more surfaces take a search for all roots.
 pub const MOST_LISTED: usize = 3;
+
+/// After a touch of an exit function the search goes on from this share of the step behind it.
+pub const BEYOND_TOUCH: f64 = 0.02;

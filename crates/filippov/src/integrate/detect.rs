@@ -17,8 +17,8 @@ use crate::event::{Deflation, EventFunction, Monitored};
 use crate::stepper::nested;
 use crate::system::PiecewiseSystem;
 use crate::tolerances::{
-    EPS, EXTRAPOLATION, ONE_SIDED_AIM, POLE, RESOLVED_DEPTH, SURFACE_NOISE, UNBOUNDED_DEPTH,
-    UNPROVED_DEPTH,
+    BEYOND_TOUCH, EPS, EXTRAPOLATION, ONE_SIDED_AIM, POLE, RESOLVED_DEPTH, SURFACE_NOISE,
+    UNBOUNDED_DEPTH, UNPROVED_DEPTH,
 };
 
 /// Scratch space of the event stage, and values at the end of the step.
@@ -369,7 +369,19 @@ impl Integrator<'_> {
         match isolated.zero {
             None => Ok(None),
             Some(Zero::Touch(theta)) if theta <= from => Ok(None),
+            // A multiplier that touches its end goes on; it may leave later in the step.
+            Some(Zero::Touch(theta)) if matches!(m.function, EventFunction::Exit(_)) => {
+                let rest = theta + BEYOND_TOUCH * (to - from);
+                if rest >= to {
+                    return Ok(None);
+                }
+                self.search((index, has_bounds), (rest, to), dt)
+            }
             Some(Zero::Touch(theta)) => Ok(Some((theta, true))),
+            // Beyond the surface from the start, by the rounding of what moved the state: the switch is now.
+            Some(Zero::Crossing(bracket)) if bracket.lo >= bracket.hi => {
+                Ok(Some((bracket.lo, false)))
+            }
             Some(Zero::Crossing(bracket)) => {
                 let theta = refine(&mut g, bracket, width)?;
                 let scale = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));

@@ -2,7 +2,7 @@
 
 use super::detect::Found;
 use super::integrator::Integrator;
-use super::transition::Decided;
+use super::transition::{Decided, Left, Lefts};
 use crate::error::FieldError;
 use crate::event::EventFunction;
 use crate::field::SmoothField;
@@ -68,8 +68,31 @@ impl Integrator<'_> {
                 Err(stop) => return Ok(Some(Err(stop))),
             }
         }
-        let left = self.departures(&after, meeting, &multipliers)?;
+        let left = self.departures_caught(&mut after, meeting, &multipliers)?;
         Ok(Some(Ok((after, left))))
+    }
+
+    /// What the motion in `after` leaves; surfaces that it would pass to the wrong side are slid on instead.
+    fn departures_caught(
+        &mut self,
+        after: &mut Mode,
+        meeting: &[usize],
+        multipliers: &[f64],
+    ) -> Result<Lefts, FieldError> {
+        let mut left = self.departures(after, meeting, multipliers)?;
+        for _ in meeting {
+            let is_wrong = |l: &&Left| match l {
+                Left::Surface(j, leading) => leading.value * f64::from(after.entries()[*j]) <= 0.0,
+                Left::Exit(..) => false,
+            };
+            let wrong: Vec<usize> = left.iter().filter(is_wrong).map(Left::surface).collect();
+            if wrong.is_empty() {
+                break;
+            }
+            wrong.iter().for_each(|&j| after.set(j, 0));
+            left = self.departures(after, meeting, &[])?;
+        }
+        Ok(left)
     }
 
     /// Multipliers at their ends with rates that vanish: loads passed on from a contact that begins to slip. Those

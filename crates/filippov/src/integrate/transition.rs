@@ -58,6 +58,14 @@ impl Left {
         }
     }
 
+    /// The surface that is left; for an exit function there is none.
+    pub fn surface(&self) -> usize {
+        match self {
+            Left::Surface(j, _) => *j,
+            Left::Exit(..) => usize::MAX,
+        }
+    }
+
     fn deflation(self, t: f64) -> Option<(EventFunction, Deflation)> {
         let (function, leading) = match self {
             Left::Surface(j, leading) => (EventFunction::Surface(j), leading),
@@ -129,11 +137,11 @@ impl Integrator<'_> {
             Ok(decided) => decided,
             Err(stop) => return Ok(Some(stop)),
         };
-        let changed: Vec<usize> = surfaces
-            .iter()
-            .copied()
-            .filter(|&j| mode.entries()[j] != after.entries()[j] || surfaces.len() == 1)
-            .collect();
+        let is_changed = |j: &usize| mode.entries()[*j] != after.entries()[*j];
+        let mut changed: Vec<usize> = surfaces.iter().copied().filter(is_changed).collect();
+        if changed.is_empty() {
+            changed = surfaces.to_vec();
+        }
         self.record(mode, after.clone(), changed);
         if let Some(limit) = self.accumulation()? {
             return self.jump_to(limit, after);
