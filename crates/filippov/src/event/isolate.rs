@@ -29,6 +29,8 @@ pub struct Bracket {
     pub g_hi: f64,
     /// Where the interpolating polynomial vanishes.
     pub guess: f64,
+    /// Its slope there.
+    pub slope: f64,
 }
 
 impl Bracket {
@@ -117,6 +119,7 @@ pub fn first_zero_sampled(
             g_lo: values[0],
             g_hi: values[0],
             guess: a,
+            slope: f64::NAN,
         };
         return Ok(Isolated {
             zero: Some(Zero::Crossing(here)),
@@ -271,7 +274,7 @@ impl Search<'_, '_> {
         };
         for &probe in probes {
             let value = self.sample(a + (b - a) * probe)?;
-            let close = (value - casteljau(*coefficients, probe)).abs() <= 0.5 * margin;
+            let close = (value - quartic(*coefficients, probe).0).abs() <= 0.5 * margin;
             if !close {
                 return Ok(false);
             }
@@ -296,7 +299,7 @@ fn bracket(a: f64, b: f64, v: &[f64; 5], coefficients: &[f64; 5], noise: f64) ->
         // Regula falsi with the halved retained value; six steps give more digits than the quartic has.
         for _ in 0..6 {
             x = low + (high - low) * p_low / (p_low - p_high);
-            let p = casteljau(*coefficients, x);
+            let p = quartic(*coefficients, x).0;
             if p > 0.0 {
                 (low, p_low) = (x, p);
                 p_high *= 0.5;
@@ -305,13 +308,18 @@ fn bracket(a: f64, b: f64, v: &[f64; 5], coefficients: &[f64; 5], noise: f64) ->
                 p_low *= 0.5;
             }
         }
-        let guess = a + (b - a) * x;
+        let (p, slope) = quartic(*coefficients, x);
+        let newton = x - p / slope;
+        if newton > low && newton < high {
+            x = newton;
+        }
         let crossing = Bracket {
             lo: at(i),
             hi: at(i + 1),
             g_lo: v[i],
             g_hi: v[i + 1],
-            guess,
+            guess: a + (b - a) * x,
+            slope: slope / (b - a),
         };
         return Some(Zero::Crossing(crossing));
     }
@@ -319,14 +327,15 @@ fn bracket(a: f64, b: f64, v: &[f64; 5], coefficients: &[f64; 5], noise: f64) ->
     (v[smallest].abs() <= noise).then(|| Zero::Touch(at(smallest)))
 }
 
-/// The polynomial with these Bernstein coefficients.
-fn casteljau(mut c: [f64; 5], x: f64) -> f64 {
-    for n in (1..5).rev() {
+/// The polynomial with these Bernstein coefficients and its slope, by de Casteljau's scheme.
+fn quartic(mut c: [f64; 5], x: f64) -> (f64, f64) {
+    for n in (2..5).rev() {
         for i in 0..n {
             c[i] += x * (c[i + 1] - c[i]);
         }
     }
-    c[0]
+    let difference = c[1] - c[0];
+    (c[0] + x * difference, 4.0 * difference)
 }
 
 /// Bernstein coefficients of the quartic through values at 0, 1/4, 1/2, 3/4, 1.

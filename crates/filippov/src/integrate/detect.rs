@@ -11,7 +11,7 @@ use super::motion::{Exits, Motion};
 use crate::error::FieldError;
 use crate::event::filter::{may_vanish, may_vanish_bent, may_vanish_between, may_vanish_deflated};
 use crate::event::isolate::{first_zero_sampled, Evidence, Zero, PROBES};
-use crate::event::locate::refine;
+use crate::event::locate::{refine, Located};
 use crate::event::{Deflation, EventFunction, Monitored};
 use crate::stepper::nested;
 use crate::system::PiecewiseSystem;
@@ -368,9 +368,9 @@ impl Integrator<'_> {
             Some(Zero::Touch(theta)) if theta <= from => Ok(None),
             Some(Zero::Touch(theta)) => Ok(Some((theta, true))),
             Some(Zero::Crossing(bracket)) => {
-                let theta = refine(&mut g, bracket, width)?;
+                let Located { theta, residual } = refine(&mut g, bracket, width)?;
                 let scale = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-                if g(theta)?.abs() > POLE * scale {
+                if residual > POLE * scale {
                     // A pole: the sign changes without a zero.
                     self.detector.uncertain = true;
                     return Ok(None);
