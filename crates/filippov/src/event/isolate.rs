@@ -137,7 +137,8 @@ pub fn first_zero_sampled(
             ..Isolated::default()
         },
     };
-    let zero = search.first(a, b, values, 0)?;
+    let [left, first, middle, third, right] = values;
+    let zero = search.first((a, b), [left, middle, right], Some([first, third]), 0)?;
     Ok(Isolated {
         zero: zero.filter(|_| search.is_certain()),
         ..search.result
@@ -170,25 +171,37 @@ impl Search<'_, '_> {
         Ok(value)
     }
 
-    /// The first zero on [a, b], given the values at its quarters.
+    /// The first zero on [a, b], given the values at its ends and in its middle. Those at the quarters
+    /// between are sampled where they are not given and bounds do not clear the piece without them.
     fn first(
         &mut self,
-        a: f64,
-        b: f64,
-        v: [f64; 5],
+        (a, b): (f64, f64),
+        [left, middle, right]: [f64; 3],
+        quarters: Option<[f64; 2]>,
         depth: u32,
     ) -> Result<Option<Zero>, FieldError> {
         self.result.depth = depth.max(self.result.depth);
         if !self.is_certain() {
             return Ok(None);
         }
-        let verdict = self.verdict(a, b, v[2]);
+        let verdict = self.verdict(a, b, middle);
         match verdict {
             Verdict::Clear => return Ok(None),
-            Verdict::Rising if v[0] >= -self.noise && v[4] > 0.0 => return Ok(None),
-            Verdict::Falling if v[4] > 0.0 => return Ok(None),
+            Verdict::Rising if left >= -self.noise && right > 0.0 => return Ok(None),
+            Verdict::Falling if right > 0.0 => return Ok(None),
             _ => {}
         }
+        let [first, third] = match quarters {
+            Some(quarters) => quarters,
+            None => {
+                let quarter = 0.25 * (b - a);
+                [self.sample(a + quarter)?, self.sample(a + 3.0 * quarter)?]
+            }
+        };
+        if !self.is_certain() {
+            return Ok(None);
+        }
+        let v = [left, first, middle, third, right];
         let coefficients = bernstein(&v);
         if verdict == Verdict::Falling && v[0] > 0.0 {
             return Ok(bracket(a, b, &v, &coefficients, self.noise));
@@ -218,25 +231,10 @@ impl Search<'_, '_> {
         if unresolved || single && self.agrees(a, b, &coefficients, steepness)? {
             return Ok(bracket(a, b, &v, &coefficients, self.noise));
         }
-        let quarter = 0.125 * (b - a);
-        let left = [
-            v[0],
-            self.sample(a + quarter)?,
-            v[1],
-            self.sample(a + 3.0 * quarter)?,
-            v[2],
-        ];
-        if let Some(zero) = self.first(a, m, left, depth + 1)? {
+        if let Some(zero) = self.first((a, m), [v[0], v[1], v[2]], None, depth + 1)? {
             return Ok(Some(zero));
         }
-        let right = [
-            v[2],
-            self.sample(m + quarter)?,
-            v[3],
-            self.sample(m + 3.0 * quarter)?,
-            v[4],
-        ];
-        self.first(m, b, right, depth + 1)
+        self.first((m, b), [v[2], v[3], v[4]], None, depth + 1)
     }
 
     fn patience(&self) -> u32 {
