@@ -75,6 +75,9 @@ impl Bound {
 /// Is a function that is `left` > 0 and `right` at the ends of a step proved to be free of zeros in it?
 /// `None`: there are no bounds. Halves the step up to `depth` times.
 pub fn is_clear(bounds: Bounds, left: f64, right: f64, noise: f64, depth: u32) -> Option<bool> {
+    if right <= 0.0 {
+        return Some(false);
+    }
     let ends = (Some(left), Some(right));
     is_clear_between(bounds, (0.0, 1.0), ends, noise, depth)
 }

@@ -182,6 +182,10 @@ impl Integrator<'_> {
             self.detector.uncertain = true;
             return Ok(None);
         }
+        if self.detector.right.iter().any(|&(value, _)| value <= 0.0) {
+            // There will be a search: the extension that it needs serves the filter too.
+            self.extend()?;
+        }
         self.collect_suspects(dt)?;
         let mut found: Option<Found> = None;
         if !self.detector.suspects.is_empty() {
@@ -274,6 +278,9 @@ impl Integrator<'_> {
 
     /// Raises the continuous extension to order 5.
     fn extend(&mut self) -> Result<(), FieldError> {
+        if self.stepper.has_order5() {
+            return Ok(());
+        }
         self.stats.n_extensions += 1;
         self.detector.enclosed_exits.set(None);
         self.detector.enclosed_root.take();
