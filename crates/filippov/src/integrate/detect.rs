@@ -328,6 +328,7 @@ impl Integrator<'_> {
             field: &mut self.motion.field,
             signs: &self.motion.signs,
             interpolant,
+            is_straight: self.motion.is_straight,
             h: &mut self.detector.h,
             x: &mut self.detector.x,
             exits: &mut self.detector.exits,
