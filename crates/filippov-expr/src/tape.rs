@@ -12,6 +12,8 @@ use crate::schedule::Schedule;
 
 /// Programs with at most this many slots work on the stack.
 const STACK_SLOTS: usize = 64;
+/// The same for bounds of short programs: a slot of bounds takes four words to clear.
+const FEW_SLOTS: usize = 8;
 
 thread_local! {
     /// Slots of larger programs, kept between calls so that evaluation does not allocate.
@@ -250,7 +252,9 @@ impl Tape {
     /// Encloses the outputs along a piece of motion; the caller has checked the lengths.
     pub fn enclose(&self, motion: &dyn Motion, s: &[f64], p: &[f64], out: &mut [Enclosure]) {
         let piece = Piece { motion, s, p };
-        if self.n_slots <= STACK_SLOTS {
+        if self.n_slots <= FEW_SLOTS {
+            self.interpret(&mut [Enclosure::UNKNOWN; FEW_SLOTS], &piece, out);
+        } else if self.n_slots <= STACK_SLOTS {
             self.interpret(&mut [Enclosure::UNKNOWN; STACK_SLOTS], &piece, out);
         } else {
             self.interpret(&mut vec![Enclosure::UNKNOWN; self.n_slots], &piece, out);

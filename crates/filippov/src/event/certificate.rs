@@ -86,6 +86,10 @@ pub enum Proof {
 /// What is proved about a function that is `left` > 0 and `right` at the ends of a step. Halves the step up to
 /// `depth` times.
 pub fn prove(bounds: Bounds, left: f64, right: f64, noise: f64, depth: u32) -> Proof {
+    // A change of sign needs no proof.
+    if right <= 0.0 && bounds(0.0, 1.0).is_some_and(|bound| bound.value.is_bounded()) {
+        return Proof::Open;
+    }
     let ends = (Some(left), Some(right));
     prove_between(bounds, (0.0, 1.0), ends, noise, depth)
 }

@@ -29,6 +29,8 @@ pub struct Bracket {
     pub g_hi: f64,
     /// Where the interpolating polynomial vanishes.
     pub guess: f64,
+    /// Its slope there.
+    pub slope: f64,
 }
 
 impl Bracket {
@@ -117,6 +119,7 @@ pub fn first_zero_sampled(
             g_lo: values[0],
             g_hi: values[0],
             guess: a,
+            slope: f64::NAN,
         };
         return Ok(Isolated {
             zero: Some(Zero::Crossing(here)),
@@ -134,7 +137,8 @@ pub fn first_zero_sampled(
             ..Isolated::default()
         },
     };
-    let zero = search.first(a, b, values, 0)?;
+    let [left, first, middle, third, right] = values;
+    let zero = search.first((a, b), [left, middle, right], Some([first, third]), 0)?;
     Ok(Isolated {
         zero: zero.filter(|_| search.is_certain()),
         ..search.result
@@ -167,25 +171,37 @@ impl Search<'_, '_> {
         Ok(value)
     }
 
-    /// The first zero on [a, b], given the values at its quarters.
+    /// The first zero on [a, b], given the values at its ends and in its middle. Those at the quarters
+    /// between are sampled where they are not given and bounds do not clear the piece without them.
     fn first(
         &mut self,
-        a: f64,
-        b: f64,
-        v: [f64; 5],
+        (a, b): (f64, f64),
+        [left, middle, right]: [f64; 3],
+        quarters: Option<[f64; 2]>,
         depth: u32,
     ) -> Result<Option<Zero>, FieldError> {
         self.result.depth = depth.max(self.result.depth);
         if !self.is_certain() {
             return Ok(None);
         }
-        let verdict = self.verdict(a, b, v[2]);
+        let verdict = self.verdict(a, b, middle);
         match verdict {
             Verdict::Clear => return Ok(None),
-            Verdict::Rising if v[0] >= -self.noise && v[4] > 0.0 => return Ok(None),
-            Verdict::Falling if v[4] > 0.0 => return Ok(None),
+            Verdict::Rising if left >= -self.noise && right > 0.0 => return Ok(None),
+            Verdict::Falling if right > 0.0 => return Ok(None),
             _ => {}
         }
+        let [first, third] = match quarters {
+            Some(quarters) => quarters,
+            None => {
+                let quarter = 0.25 * (b - a);
+                [self.sample(a + quarter)?, self.sample(a + 3.0 * quarter)?]
+            }
+        };
+        if !self.is_certain() {
+            return Ok(None);
+        }
+        let v = [left, first, middle, third, right];
         let coefficients = bernstein(&v);
         if verdict == Verdict::Falling && v[0] > 0.0 {
             return Ok(bracket(a, b, &v, &coefficients, self.noise));
@@ -215,25 +231,10 @@ impl Search<'_, '_> {
         if unresolved || single && self.agrees(a, b, &coefficients, steepness)? {
             return Ok(bracket(a, b, &v, &coefficients, self.noise));
         }
-        let quarter = 0.125 * (b - a);
-        let left = [
-            v[0],
-            self.sample(a + quarter)?,
-            v[1],
-            self.sample(a + 3.0 * quarter)?,
-            v[2],
-        ];
-        if let Some(zero) = self.first(a, m, left, depth + 1)? {
+        if let Some(zero) = self.first((a, m), [v[0], v[1], v[2]], None, depth + 1)? {
             return Ok(Some(zero));
         }
-        let right = [
-            v[2],
-            self.sample(m + quarter)?,
-            v[3],
-            self.sample(m + 3.0 * quarter)?,
-            v[4],
-        ];
-        self.first(m, b, right, depth + 1)
+        self.first((m, b), [v[2], v[3], v[4]], None, depth + 1)
     }
 
     fn patience(&self) -> u32 {
@@ -271,7 +272,7 @@ impl Search<'_, '_> {
         };
         for &probe in probes {
             let value = self.sample(a + (b - a) * probe)?;
-            let close = (value - casteljau(*coefficients, probe)).abs() <= 0.5 * margin;
+            let close = (value - quartic(*coefficients, probe).0).abs() <= 0.5 * margin;
             if !close {
                 return Ok(false);
             }
@@ -296,7 +297,7 @@ fn bracket(a: f64, b: f64, v: &[f64; 5], coefficients: &[f64; 5], noise: f64) ->
         // Regula falsi with the halved retained value; six steps give more digits than the quartic has.
         for _ in 0..6 {
             x = low + (high - low) * p_low / (p_low - p_high);
-            let p = casteljau(*coefficients, x);
+            let p = quartic(*coefficients, x).0;
             if p > 0.0 {
                 (low, p_low) = (x, p);
                 p_high *= 0.5;
@@ -305,13 +306,18 @@ fn bracket(a: f64, b: f64, v: &[f64; 5], coefficients: &[f64; 5], noise: f64) ->
                 p_low *= 0.5;
             }
         }
-        let guess = a + (b - a) * x;
+        let (p, slope) = quartic(*coefficients, x);
+        let newton = x - p / slope;
+        if newton > low && newton < high {
+            x = newton;
+        }
         let crossing = Bracket {
             lo: at(i),
             hi: at(i + 1),
             g_lo: v[i],
             g_hi: v[i + 1],
-            guess,
+            guess: a + (b - a) * x,
+            slope: slope / (b - a),
         };
         return Some(Zero::Crossing(crossing));
     }
@@ -319,14 +325,15 @@ fn bracket(a: f64, b: f64, v: &[f64; 5], coefficients: &[f64; 5], noise: f64) ->
     (v[smallest].abs() <= noise).then(|| Zero::Touch(at(smallest)))
 }
 
-/// The polynomial with these Bernstein coefficients.
-fn casteljau(mut c: [f64; 5], x: f64) -> f64 {
-    for n in (1..5).rev() {
+/// The polynomial with these Bernstein coefficients and its slope, by de Casteljau's scheme.
+fn quartic(mut c: [f64; 5], x: f64) -> (f64, f64) {
+    for n in (2..5).rev() {
         for i in 0..n {
             c[i] += x * (c[i + 1] - c[i]);
         }
     }
-    c[0]
+    let difference = c[1] - c[0];
+    (c[0] + x * difference, 4.0 * difference)
 }
 
 /// Bernstein coefficients of the quartic through values at 0, 1/4, 1/2, 3/4, 1.

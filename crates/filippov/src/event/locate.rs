@@ -4,28 +4,43 @@ use super::isolate::{Bracket, Sampled};
 use crate::error::FieldError;
 use crate::tolerances::EPS;
 
+/// A zero, located.
+#[derive(Clone, Copy, Debug)]
+pub struct Located {
+    /// Where.
+    pub theta: f64,
+    /// How far from zero the function may still be there: large at a pole or a jump.
+    pub residual: f64,
+}
+
 /// The zero of `g` in the bracket, within `width` or to rounding.
 ///
-/// Secant steps from the guess of the isolation (a zero of a quartic, often good to five digits),
-/// kept in the bracket; a bisection whenever a step does not halve the one before. Returns the
-/// evaluated point with the smallest |g|, or the last secant step if it is shorter than `width`.
+/// A Newton step with the slope of the quartic of the isolation, from its zero (often good to five
+/// digits), then secant steps, kept in the bracket; a bisection whenever a step does not halve the one
+/// before. A secant step errs by its length times the relative error of its slope, for which the change
+/// of the slope stands, and at least the length in units of the bracket: if that is below half the
+/// `width` the end of the step is the zero and is not evaluated. Otherwise returns the evaluated point
+/// with the smallest |g|.
 ///
 /// # Errors
 /// If `g` raises.
-pub fn refine(g: Sampled, bracket: Bracket, width: f64) -> Result<f64, FieldError> {
+pub fn refine(g: Sampled, bracket: Bracket, width: f64) -> Result<Located, FieldError> {
     let Bracket {
         mut lo,
         mut hi,
         g_lo,
         g_hi,
         guess,
+        mut slope,
     } = bracket;
-    let (mut best, mut previous) = match g_lo.abs() < g_hi.abs() {
-        true => ((lo, g_lo), (lo, g_lo)),
-        false => ((hi, g_hi), (hi, g_hi)),
+    let mut best = match g_lo.abs() < g_hi.abs() {
+        true => (lo, g_lo),
+        false => (hi, g_hi),
     };
+    let mut previous = None;
     let mut at = guess.clamp(lo, hi);
-    let mut last_move = hi - lo;
+    let length = hi - lo;
+    let mut last_move = length;
     while best.1 != 0.0 && hi - lo > width.max(EPS * hi.abs()) && at > lo && at < hi {
         let value = g(at)?;
         if value.abs() < best.1.abs() {
@@ -37,19 +52,31 @@ pub fn refine(g: Sampled, bracket: Bracket, width: f64) -> Result<f64, FieldErro
         } else {
             hi = at;
         }
-        let secant = at - value * (at - previous.0) / (value - previous.1);
+        let chord = previous.map_or(slope, |(x, v)| (value - v) / (at - x));
+        let secant = at - value / chord;
         let inside = secant > lo && secant < hi;
-        if inside && (secant - at).abs() <= 0.5 * width.max(EPS * hi.abs()) {
-            return Ok(secant);
+        let step = (secant - at).abs();
+        let doubt = match previous {
+            None => 1.0,
+            Some(_) => ((chord - slope) / chord).abs().max(step / length).min(1.0),
+        };
+        if inside && step * doubt <= 0.5 * width.max(EPS * hi.abs()) {
+            return Ok(Located {
+                theta: secant,
+                residual: value.abs() * doubt,
+            });
         }
-        let next = if inside && (secant - at).abs() <= 0.5 * last_move {
+        let next = if inside && step <= 0.5 * last_move {
             secant
         } else {
             0.5 * (lo + hi)
         };
         last_move = (next - at).abs();
-        previous = (at, value);
+        (previous, slope) = (Some((at, value)), chord);
         at = next;
     }
-    Ok(best.0)
+    Ok(Located {
+        theta: best.0,
+        residual: best.1.abs(),
+    })
 }

@@ -23,7 +23,9 @@ fn a_double_crossing_inside_is_found() {
         let Some(Zero::Crossing(bracket)) = find(|x| (x - 0.4) * (x - 0.4 - gap)) else {
             panic!("gap {gap}: no crossing")
         };
-        let zero = refine(&mut |x| Ok((x - 0.4) * (x - 0.4 - gap)), bracket, 0.0).unwrap();
+        let zero = refine(&mut |x| Ok((x - 0.4) * (x - 0.4 - gap)), bracket, 0.0)
+            .unwrap()
+            .theta;
         assert!((zero - 0.4).abs() < 1e-9, "gap {gap}: {zero}");
     }
 }
@@ -53,7 +55,7 @@ fn many_oscillations_are_resolved() {
     let Some(Zero::Crossing(bracket)) = find(g) else {
         panic!("no crossing")
     };
-    let zero = refine(&mut |x| Ok(g(x)), bracket, 0.0).unwrap();
+    let zero = refine(&mut |x| Ok(g(x)), bracket, 0.0).unwrap().theta;
     assert!((zero - (2.0 * std::f64::consts::PI / 3.0) / 60.0).abs() < 1e-15);
 }
 
@@ -68,7 +70,7 @@ proptest! {
         let slope = |x: f64| (g(x + 1e-6) - g(x - 1e-6)) / 2e-6;
         prop_assert!(may_vanish(g(0.0), slope(0.0), g(1.0), slope(1.0)));
         let Some(Zero::Crossing(bracket)) = find(g) else { return Err(TestCaseError::fail("missed")) };
-        let zero = refine(&mut |x| Ok(g(x)), bracket, 0.0).unwrap();
+        let zero = refine(&mut |x| Ok(g(x)), bracket, 0.0).unwrap().theta;
         prop_assert!((zero - a.min(b)).abs() < 1e-9);
     }
 }

@@ -110,6 +110,18 @@ impl<'a> SlidingField<'a> {
         x: &mut [f64],
     ) -> Result<NormalComponents, FieldError> {
         self.project(t, x)?;
+        self.normal_components_at(t, x)
+    }
+
+    /// The normal components at a point (t, x) of the surface.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn normal_components_at(
+        &mut self,
+        t: f64,
+        x: &[f64],
+    ) -> Result<NormalComponents, FieldError> {
         let sides = &mut self.sides;
         self.n_evaluations += self
             .system

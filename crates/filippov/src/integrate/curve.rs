@@ -12,6 +12,8 @@ pub(super) struct Curve<'a, 'b> {
     pub field: &'a mut ModeField<'b>,
     pub signs: &'a [f64],
     pub interpolant: &'a Interpolant,
+    /// The surfaces slid on are affine: the extension stays on them but for rounding.
+    pub is_straight: bool,
     pub h: &'a mut [f64],
     pub x: &'a mut [f64],
     /// Exit functions already known along this step, by theta.
@@ -31,7 +33,12 @@ impl Curve<'_, '_> {
         let at = match known {
             Some(at) => at,
             None => {
-                let exits = self.field.exits(t, self.x)?;
+                let exits = match &mut *self.field {
+                    ModeField::Sliding(field) if self.is_straight => {
+                        field.normal_components_at(t, self.x)?.exits()
+                    }
+                    field => field.exits(t, self.x)?,
+                };
                 self.exits.push((theta, exits));
                 self.exits.len() - 1
             }
@@ -39,12 +46,14 @@ impl Curve<'_, '_> {
         Ok(self.exits[at].1.get(index).copied().unwrap_or(f64::NAN))
     }
 
-    /// A switching function at the projection of the point in `x`.
+    /// A switching function at the point in `x`, projected onto curved surfaces.
     fn surface(&mut self, m: &Monitored, t: f64) -> Result<f64, FieldError> {
         let EventFunction::Surface(j) = m.function else {
             return Ok(f64::NAN);
         };
-        self.field.project(t, self.x)?;
+        if !self.is_straight {
+            self.field.project(t, self.x)?;
+        }
         *self.n_evaluations += 1;
         self.system.surfaces(t, self.x, self.signs, self.h)?;
         Ok(m.orientation * self.h[j])

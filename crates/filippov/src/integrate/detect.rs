@@ -12,7 +12,7 @@ use crate::error::FieldError;
 use crate::event::certificate::Proof;
 use crate::event::filter::{may_vanish, may_vanish_bent, may_vanish_between, may_vanish_deflated};
 use crate::event::isolate::{first_zero_sampled, Evidence, Zero, PROBES};
-use crate::event::locate::refine;
+use crate::event::locate::{refine, Located};
 use crate::event::{Deflation, EventFunction, Monitored};
 use crate::stepper::nested;
 use crate::system::PiecewiseSystem;
@@ -183,6 +183,10 @@ impl Integrator<'_> {
             self.detector.uncertain = true;
             return Ok(None);
         }
+        if self.detector.right.iter().any(|&(value, _)| value <= 0.0) {
+            // There will be a search: the extension that it needs serves the filter too.
+            self.extend()?;
+        }
         self.collect_suspects(dt)?;
         let mut found: Option<Found> = None;
         if !self.detector.suspects.is_empty() {
@@ -277,6 +281,9 @@ impl Integrator<'_> {
 
     /// Raises the continuous extension to order 5.
     fn extend(&mut self) -> Result<(), FieldError> {
+        if self.stepper.has_order5() {
+            return Ok(());
+        }
         self.stats.n_extensions += 1;
         self.detector.enclosed_exits.set(None);
         self.detector.enclosed_root.take();
@@ -324,6 +331,7 @@ impl Integrator<'_> {
             field: &mut self.motion.field,
             signs: &self.motion.signs,
             interpolant,
+            is_straight: self.motion.is_straight,
             h: &mut self.detector.h,
             x: &mut self.detector.x,
             exits: &mut self.detector.exits,
@@ -383,9 +391,9 @@ impl Integrator<'_> {
                 Ok(Some((bracket.lo, false)))
             }
             Some(Zero::Crossing(bracket)) => {
-                let theta = refine(&mut g, bracket, width)?;
+                let Located { theta, residual } = refine(&mut g, bracket, width)?;
                 let scale = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-                if g(theta)?.abs() > POLE * scale {
+                if residual > POLE * scale {
                     // A pole: the sign changes without a zero.
                     self.detector.uncertain = true;
                     return Ok(None);

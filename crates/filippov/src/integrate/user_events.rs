@@ -175,7 +175,7 @@ impl Integrator<'_> {
                     break;
                 };
                 let width = 0.5 * EPS * (t0.abs() / dt).max(1.0);
-                let at = refine(&mut g, bracket, width)?;
+                let at = refine(&mut g, bracket, width)?.theta;
                 let direction = self.user_events.events[index].direction;
                 if direction * sign <= 0.0 {
                     zeros.push((at, index));

@@ -185,6 +185,11 @@ impl Dopri5 {
         })
     }
 
+    /// Is the continuous extension of order 5 already there?
+    pub fn has_order5(&self) -> bool {
+        self.extended == Some(5)
+    }
+
     /// The continuous extension of the attempted step from `y`, of order 4 unless it was raised to
     /// order 5; costs no evaluation.
     pub fn extend_order4(&mut self, y: &[f64]) -> &Interpolant {
@@ -246,7 +251,7 @@ impl Dopri5 {
         field: &mut dyn SmoothField,
         y: &[f64],
     ) -> Result<&Interpolant, FieldError> {
-        if self.extended == Some(5) {
+        if self.has_order5() {
             return Ok(&self.interpolant);
         }
         self.extend_order4(y);
