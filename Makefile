@@ -72,6 +72,7 @@ test-slow: $(BUILD_STAMP) ## the slow tests
 bench: $(BENCH_STAMP) ## run the benchmarks
 	$(PY) benchmarks/disode_tables.py
 	$(PY) benchmarks/speed.py
+	$(PY) benchmarks/friction_chain.py
 
 demo: $(BUILD_STAMP) ## simulate and plot a stick-slip oscillator
 	$(PY) examples/01_stick_slip/stick_slip.py
