@@ -1,6 +1,8 @@
 //! The decision where several surfaces meet, as far as codimension 1 answers it.
 
+use super::codim2::Bilinear;
 use super::lie::{first_nonzero, normal_component, Leading};
+use super::normal_fields::NormalFields;
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::system::PiecewiseSystem;
@@ -134,50 +136,15 @@ fn may_stay(
     x: &[f64],
 ) -> Result<bool, FieldError> {
     let &[i, j] = meeting else { return Ok(true) };
-    // Coefficients of g = a + b x + c y + d x y for both normal components.
-    let mut g = [[0.0; 4]; 2];
-    for (si, sj) in [(-1, -1), (-1, 1), (1, -1), (1, 1)] {
+    let mut values = Vec::with_capacity(8);
+    for (sj, si) in [(-1, -1), (-1, 1), (1, -1), (1, 1)] {
         let signs = mode.with(i, si).with(j, sj).signs();
-        let (p, q) = (f64::from(si), f64::from(sj));
-        for (row, k) in g.iter_mut().zip([i, j]) {
-            let value = normal_component(system, k, j, sj, t, x, &signs)?.value / 4.0;
-            for (entry, factor) in row.iter_mut().zip([1.0, p, q, p * q]) {
-                *entry += factor * value;
-            }
+        for k in [i, j] {
+            values.push(normal_component(system, k, j, sj, t, x, &signs)?.value);
         }
     }
-    Ok(stable_root(g).is_some())
-}
-
-/// The only root of g_1 = g_2 = 0 with positive determinant, if it lies in the square and is stable
-/// for some scaling of the surfaces (`docs/theory/switching.md`, section "Two equations").
-fn stable_root(g: [[f64; 4]; 2]) -> Option<(f64, f64)> {
-    let normalised = g.map(|row| {
-        let largest = row.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-        row.map(|v| v / largest)
-    });
-    let [[a1, b1, c1, d1], [a2, b2, c2, d2]] = normalised;
-    let q2 = b2 * d1 - b1 * d2;
-    let q1 = a2 * d1 + b2 * c1 - a1 * d2 - b1 * c2;
-    let q0 = a2 * c1 - a1 * c2;
-    let s2 = c2 * d1 - c1 * d2;
-    let s1 = a2 * d1 + c2 * b1 - a1 * d2 - c1 * b2;
-    let s0 = a2 * b1 - a1 * b2;
-    let r = (q1 * q1 - 4.0 * q0 * q2).sqrt();
-    if !r.is_finite() {
-        return None;
-    }
-    let x = if q1 > 0.0 {
-        (-q1 - r) / (2.0 * q2)
-    } else {
-        2.0 * q0 / (-q1 + r)
-    };
-    let y = if s1 > 0.0 {
-        -2.0 * s0 / (s1 + r)
-    } else {
-        (-s1 + r) / (2.0 * s2)
-    };
-    let g11 = b1 + d1 * y;
-    let g22 = c2 + d2 * x;
-    (x.abs() < 1.0 && y.abs() < 1.0 && g11.min(g22) < 0.0).then_some((x, y))
+    let fields = NormalFields::new(2, values);
+    Ok(fields.map_or(true, |fields| {
+        Bilinear::of_fields(&fields).sliding_root().is_some()
+    }))
 }
