@@ -240,6 +240,9 @@ impl<'a> Integrator<'a> {
         } else {
             self.t + theta * dt
         };
+        // A switch at the end of the span is there, and not a rounding before.
+        let is_last = t_stop < self.t_end && self.t_end - t_stop < SHORTEST_STEP * self.t_end.abs();
+        let t_stop = if is_last { self.t_end } else { t_stop };
         let Some(zeros) = self.find_user_zeros(theta)? else {
             self.count_rejection(sliding);
             self.halve_step(dt);

@@ -308,7 +308,8 @@ impl Integrator<'_> {
         let signs = beyond.signs();
         let ht = self.system.gradient(j, self.t, &x, &signs, &mut gradient)?;
         let other = ht + dot(&gradient, &velocity);
-        Ok(!(value.abs() <= DEPARTS_TANGENTIALLY * other.abs()))
+        let is_rounding = value.abs() <= DEPARTS_TANGENTIALLY * other.abs();
+        Ok(!is_rounding)
     }
 
     /// The rate of dh_j/dt along the motion in `after`, which has this velocity.
