@@ -74,7 +74,7 @@ impl Interval {
     /// The numbers times a factor.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
-        self * Interval::point(factor)
+        Interval::spanning([self.lo * factor, self.hi * factor], f64::EPSILON)
     }
 
     fn outwards(self, relative: f64) -> Self {
@@ -177,12 +177,15 @@ impl Interval {
 
     /// The smallest interval with some values.
     fn spanning<const N: usize>(values: [f64; N], relative: f64) -> Self {
-        let (mut lo, mut hi) = (values[0], values[0]);
+        let (mut lo, mut hi, mut has_nan) = (values[0], values[0], false);
         for value in values {
-            if value.is_nan() {
-                return Interval::ALL;
-            }
-            (lo, hi) = (lo.min(value), hi.max(value));
+            // Not `f64::min`, which looks for NaN each time.
+            has_nan |= value.is_nan();
+            lo = if value < lo { value } else { lo };
+            hi = if value > hi { value } else { hi };
+        }
+        if has_nan {
+            return Interval::ALL;
         }
         Interval { lo, hi }.outwards(relative)
     }

@@ -13,9 +13,36 @@ pub fn may_vanish(g0: f64, slope0: f64, g1: f64, slope1: f64) -> bool {
     let b2 = g1 - slope1 / 3.0;
     let low = g0.min(g1).min(b1).min(b2);
     let high = g0.max(g1).max(b1).max(b2);
+    let remainder = CUBIC_REMAINDER * (high - low);
     // Written so that a NaN asks for the search.
-    let excluded = low > CUBIC_REMAINDER * (high - low) && (g0 + slope0 + g1 + slope1).is_finite();
-    !excluded
+    let excluded = low > remainder && (g0 + slope0 + g1 + slope1).is_finite();
+    !(excluded || stays_positive([g0, b1, b2, g1], remainder))
+}
+
+/// Is a function positive whose distance to the cubic with these Bernstein coefficients is at most
+/// `remainder`? The error of Hermite's interpolation vanishes twice at both ends, so that the function
+/// lies above the quartic
+///
+///   cubic(theta) - 16 remainder theta^2 (1-theta)^2,
+///
+/// which is positive if its Bernstein coefficients on both halves of the step are.
+fn stays_positive([b0, b1, b2, b3]: [f64; 4], remainder: f64) -> bool {
+    if !(b0 > 0.0 && b3 > 0.0) {
+        return false;
+    }
+    let middle = 0.5 * (b1 + b2) - 16.0 / 6.0 * remainder;
+    let mut c = [b0, 0.25 * b0 + 0.75 * b1, middle, 0.75 * b2 + 0.25 * b3, b3];
+    // De Casteljau's scheme in the middle: the first entries are the coefficients of the left half, the
+    // last ones those of the right half.
+    for last in (1..5).rev() {
+        for i in 0..last {
+            c[i] = 0.5 * (c[i] + c[i + 1]);
+        }
+        if !(c[0] > 0.0 && c[last - 1] > 0.0) {
+            return false;
+        }
+    }
+    true
 }
 
 /// As [`may_vanish`], for a function that is not a polynomial of low degree along the step: four times

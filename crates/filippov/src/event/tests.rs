@@ -74,3 +74,22 @@ proptest! {
         prop_assert!((zero - a.min(b)).abs() < 1e-9);
     }
 }
+
+#[test]
+fn a_rise_from_near_zero_is_excluded() {
+    // The second step after sliding ended: the end values differ much, and both slopes are positive.
+    assert!(!may_vanish(3.08e-3, 8.79e-3, 1.815e-2, 2.13e-2));
+    assert!(may_vanish(3.08e-3, -8.79e-3, 1.815e-2, 2.13e-2));
+}
+
+proptest! {
+    /// The filter lets every sinusoid pass that vanishes, up to two radians a step.
+    #[test]
+    fn sinusoids(phase in 0.0..6.3_f64, rate in 0.1..2.0_f64, shift in -1.0..1.0_f64) {
+        let g = |x: f64| shift + (phase + rate * x).sin();
+        let slope = |x: f64| rate * (phase + rate * x).cos();
+        let lowest = (0..=200).map(|k| g(f64::from(k) / 200.0)).fold(f64::INFINITY, f64::min);
+        prop_assume!(lowest <= 0.0);
+        prop_assert!(may_vanish(g(0.0), slope(0.0), g(1.0), slope(1.0)));
+    }
+}
