@@ -308,3 +308,7 @@ pub const MOST_LISTED: usize = 3;
 
 /// After a touch of an exit function the search goes on from this share of the step behind it.
 pub const BEYOND_TOUCH: f64 = 0.02;
+
+/// Where steps shrink to nothing because multipliers end, their determinant is below this: it falls like the
+/// square root of the time that is left.
+pub const AT_FOLD: f64 = 1e-2;

@@ -68,6 +68,27 @@ impl Integrator<'_> {
         }))
     }
 
+    /// The current point as a limit: crossings of several surfaces follow one another without any progress of
+    /// time, as the last turns of a spiral do that shrinks a thousandfold with each.
+    pub(super) fn limit_here(&self) -> Result<Option<Limit>, FieldError> {
+        let meeting = self.recorder.surfaces_switched_at(self.t);
+        let now = self.recorder.switches().iter().rev();
+        let mut now = now.take_while(|s| s.t == self.t);
+        let only_crosses = now.all(|s| s.kind == Kind::Crossing);
+        if !only_crosses || !(2..=MOST_MEETING).contains(&meeting.len()) {
+            return Ok(None);
+        }
+        let mut x = self.x.clone();
+        let mut projector = Projector::new(x.len(), self.system.n_surfaces());
+        let signs = self.motion.mode.signs();
+        projector.project_onto(self.system, &meeting, self.t, &mut x, &signs)?;
+        Ok(Some(Limit {
+            t: self.t,
+            x,
+            meeting,
+        }))
+    }
+
     /// Moves to the limit and goes on from there.
     pub(super) fn jump_to(
         &mut self,

@@ -19,6 +19,19 @@ impl Integrator<'_> {
         j: usize,
         mut decision: Decision,
     ) -> Decided {
+        // Both fields may turn back to the surface, as at a two-fold that is invisible from both sides.
+        let leading = match decision.entry {
+            -1 => Some(decision.minus),
+            1 => Some(decision.plus),
+            _ => None,
+        };
+        let turns_back = leading.is_some_and(|leading| leading.sign() == -decision.entry);
+        if turns_back {
+            return Err(Stop::NonUnique {
+                surfaces: vec![j],
+                candidates: Vec::new(),
+            });
+        }
         let mut after = mode.with(j, decision.entry);
         if decision.candidates.len() > 1 {
             let candidates = decision.candidates.iter();

@@ -166,6 +166,11 @@ impl<'a> Integrator<'a> {
             dt = remaining;
         }
         if dt < SHORTEST_STEP * self.t.abs() && dt < remaining {
+            if let Some(event) = self.lost_root() {
+                self.dt = f64::NAN;
+                self.one_sided = false;
+                return self.switch(&event);
+            }
             if !self.one_sided {
                 return Ok(Some(Stop::StepTooSmall));
             }

@@ -1,11 +1,14 @@
 //! Steps at the edge of the field: where it ends at a surface, and where it jumps without one.
 
+use smallvec::smallvec;
+
 use super::detect::Found;
 use super::integrator::Integrator;
+use super::motion::ModeField;
 use super::{Warning, WarningCode};
 use crate::error::FieldError;
 use crate::event::{EventFunction, Monitored};
-use crate::tolerances::{ARRIVED, JUMP_SHRINK, ONE_SIDED_AIM};
+use crate::tolerances::{ARRIVED, AT_FOLD, JUMP_SHRINK, ONE_SIDED_AIM};
 
 impl Integrator<'_> {
     /// Where a field was found to end at its surfaces, a step that would pass the next one aims at it
@@ -70,6 +73,21 @@ impl Integrator<'_> {
             }
         }
         Ok(None)
+    }
+
+    /// Sliding on an intersection whose steps shrink to nothing has come to a fold: beyond it there are no
+    /// multipliers.
+    pub(super) fn lost_root(&self) -> Option<Found> {
+        let ModeField::Intersection(field) = &self.motion.field else {
+            return None;
+        };
+        let fold = 2 * field.set().len();
+        let ends = self.detector.stages.get(fold..=fold)?;
+        (ends[0][0].abs() < AT_FOLD).then(|| Found {
+            theta: 0.0,
+            functions: smallvec![EventFunction::Exit(fold)],
+            touch: false,
+        })
     }
 
     /// Warns where the field jumps over a step far shorter than its predecessors.

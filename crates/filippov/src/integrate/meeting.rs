@@ -185,6 +185,14 @@ impl Integrator<'_> {
     ) -> Result<Decided, FieldError> {
         let resolution = match resolution {
             Ok(resolution) if !resolution.degenerate => resolution,
+            // Both say the same, and vanish somewhere in between: higher derivatives do not make them two.
+            Err(Undecided::Proportional) if fields.telling().len() == meeting.len() => {
+                return Ok(Err(Stop::Intersection {
+                    surfaces: meeting.to_vec(),
+                    candidates: Vec::new(),
+                    reason: Undecided::Proportional,
+                }));
+            }
             other => return self.decide_by_higher_order(mode, meeting, other),
         };
         let on_all = |k: &Mode| {

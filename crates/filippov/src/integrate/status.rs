@@ -156,6 +156,14 @@ impl Stop {
             Stop::NonUnique {
                 surfaces,
                 candidates,
+            } if candidates.is_empty() => format!(
+                "Stopped at t = {t:.10}: no motion continues from {}: the fields on both sides turn back to it, and \
+                 orbits wind around this point.",
+                names(surfaces),
+            ),
+            Stop::NonUnique {
+                surfaces,
+                candidates,
             } => format!(
                 "Stopped at t = {t:.10}: the continuation at {} is not unique; candidates: {}. \
                  nonunique=\"regularize\" chooses one.",

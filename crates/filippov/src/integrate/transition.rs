@@ -105,6 +105,10 @@ impl Integrator<'_> {
         };
         self.last_switch = (self.t, repeated);
         if repeated > MOST_SWITCHES_AT_ONE_TIME {
+            if let Some(limit) = self.limit_here()? {
+                let mode = self.motion.mode.clone();
+                return self.jump_to(limit, mode);
+            }
             return Ok(Some(Stop::NoProgress {
                 surfaces: self.recorder.surfaces_switched_at(self.t),
             }));

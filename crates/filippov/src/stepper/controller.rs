@@ -15,6 +15,8 @@ impl ErrorScale {
         } else {
             atol.to_vec()
         };
+        // At rest in 0 an error of 0 is none, also without an absolute tolerance.
+        let atol = atol.into_iter().map(|a| a.max(f64::MIN_POSITIVE)).collect();
         ErrorScale { rtol, atol }
     }
 

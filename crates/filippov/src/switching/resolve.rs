@@ -184,10 +184,11 @@ fn by_hidden_dynamics(
     if has_one_mode_only(fields) && !resolution.oscillates {
         return Ok(resolution);
     }
-    let others = scalings.iter().flat_map(|kappa| {
-        let states = starts.states.iter();
-        states.map(|state| limit(&starts.fields, state, kappa))
-    });
+    // Other offsets with the scaling asked for, other scalings without an offset.
+    let offsets = starts.states.iter().map(|state| (state, &scalings[0]));
+    let scaled = scalings.iter().map(|kappa| (&starts.states[0], kappa));
+    let others = offsets.chain(scaled.skip(1));
+    let others = others.map(|(state, kappa)| limit(&starts.fields, state, kappa));
     for other in others.skip(1) {
         match continuation(&other) {
             Ok(other) => resolution.add_candidates(&[other]),
