@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -66,14 +67,19 @@ MEASUREMENTS = {
 
 
 def fresh_processes(names: Sequence[str], repeats: int) -> dict[str, npt.NDArray[np.float64]]:
-    """Measure in turn, each time in a process of its own; return seconds, shape (repeats,), by name."""
+    """Measure in turn, each time in a process of its own; return seconds, shape (repeats,), by name.
+
+    As of an installed package: the first process of each kind, which is not counted, leaves the compiled bytecode
+    to the others.
+    """
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
     samples: dict[str, list[float]] = {name: [] for name in names}
-    for _ in range(repeats):
+    for turn in range(repeats + 1):
         for name in names:
-            done = subprocess.run(
-                [sys.executable, __file__, name], capture_output=True, text=True, check=True
-            )
-            samples[name].append(float(done.stdout))
+            command = [sys.executable, __file__, name]
+            done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
+            if turn > 0:
+                samples[name].append(float(done.stdout))
     return {name: np.array(values) for name, values in samples.items()}
 
 

@@ -62,7 +62,6 @@ from filippov.functions import (
     tanh,
     where,
 )
-from filippov.hidden import HiddenDynamics, hidden_dynamics
 from filippov.modes import Mode
 from filippov.solution import DenseSolution, Solution
 from filippov.solve import solve_ivp
@@ -71,6 +70,7 @@ from filippov.system import System
 
 if TYPE_CHECKING:
     from filippov import plot, problems
+    from filippov.hidden import HiddenDynamics, hidden_dynamics
 
 __all__ = [
     "Branches",
@@ -135,6 +135,7 @@ __all__ = [
 ]
 
 _LAZY = ("plot", "problems")
+_LAZY_NAMES = frozenset({"HiddenDynamics", "hidden_dynamics"})  # of filippov.hidden
 
 
 def __getattr__(name: str) -> Any:
@@ -143,8 +144,12 @@ def __getattr__(name: str) -> Any:
         from importlib import import_module
 
         return import_module(f"{__name__}.{name}")
+    if name in _LAZY_NAMES:
+        from filippov import hidden
+
+        return getattr(hidden, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_LAZY})
+    return sorted({*globals(), *_LAZY, *_LAZY_NAMES})
