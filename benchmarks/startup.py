@@ -69,8 +69,8 @@ MEASUREMENTS = {
 def fresh_processes(names: Sequence[str], repeats: int) -> dict[str, npt.NDArray[np.float64]]:
     """Measure in turn, each time in a process of its own; return seconds, shape (repeats,), by name.
 
-    As of an installed package: the first process of each kind, which is not counted, leaves the compiled bytecode
-    to the others.
+    As of an installed package: the first process of each kind, which is not counted, leaves the compiled
+    bytecode to the others.
     """
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
     samples: dict[str, list[float]] = {name: [] for name in names}

@@ -41,6 +41,8 @@ pub struct Segment {
     pub mode: Mode,
     /// Index of the first step, and one past the last.
     pub steps: (usize, usize),
+    /// lambda of the surfaces slid on, in their order, at the start.
+    pub multipliers: Vec<f64>,
 }
 
 /// A step, or its part up to an event.
@@ -195,7 +197,7 @@ impl Recorder {
         self.y.extend_from_slice(y);
     }
 
-    pub fn begin_segment(&mut self, t: f64, mode: &Mode) {
+    pub fn begin_segment(&mut self, t: f64, mode: &Mode, multipliers: Vec<f64>) {
         let step = self.steps.len();
         self.close_segment(t);
         self.segments.push(Segment {
@@ -203,6 +205,7 @@ impl Recorder {
             t_end: t,
             mode: mode.clone(),
             steps: (step, step),
+            multipliers,
         });
     }
 
@@ -279,6 +282,16 @@ impl Recorder {
 }
 
 impl Solution {
+    /// The multipliers at the start of the segment that `t` belongs to.
+    fn multipliers_near(&self, t: f64, side: Side) -> &[f64] {
+        let before = match side {
+            Side::Right => self.segments.partition_point(|s| s.t_start <= t),
+            Side::Left => self.segments.partition_point(|s| s.t_start < t),
+        };
+        let segment = self.segments.get(before.saturating_sub(1));
+        segment.map_or(&[], |segment| &segment.multipliers)
+    }
+
     /// The surfaces slid on at `t` and their multipliers; none in a region.
     ///
     /// # Errors
@@ -301,7 +314,9 @@ impl Solution {
                 vec![(j, field.normal_components(t, &mut y)?.multiplier())]
             }
             _ => {
-                let field = IntersectionField::new(system, &set, &mode.signs(), &[]);
+                // Of several roots that which the motion follows.
+                let near = self.multipliers_near(t, side);
+                let field = IntersectionField::new(system, &set, &mode.signs(), near);
                 let mut field = field.with_rule(self.sliding);
                 field.eval(t, &mut y, &mut vec![0.0; self.n_states])?;
                 set.into_iter()

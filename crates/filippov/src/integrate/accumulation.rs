@@ -95,7 +95,7 @@ impl Integrator<'_> {
         limit: Limit,
         before: Mode,
     ) -> Result<Option<Stop>, FieldError> {
-        self.recorder.begin_segment(self.t, &before);
+        self.recorder.begin_segment(self.t, &before, Vec::new());
         self.motion.mode = before.clone();
         self.move_straight(limit.t, limit.x);
         self.stats.n_switches += 1;

@@ -278,7 +278,9 @@ impl Integrator<'_> {
                     .extend(exits.iter().map(|&exit| [exit; 7]));
             }
         }
-        self.recorder.begin_segment(self.t, &self.motion.mode);
+        let multipliers = self.motion.multipliers();
+        self.recorder
+            .begin_segment(self.t, &self.motion.mode, multipliers);
         if let Some(stop) = self.refusal() {
             return Ok(Some(stop));
         }
