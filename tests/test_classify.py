@@ -194,3 +194,23 @@ def test_a_scaling_for_all_surfaces_changes_nothing() -> None:
     system = fl.System(lambda t, x: [0.5 - np.sign(x[0]), -0.2 - np.sign(x[1])], n=2)
     a, b = (system.solve((0, 5), [1.0, 2.0], kappa=kappa) for kappa in (None, 7.0))
     np.testing.assert_array_equal(a.y, b.y)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((float("nan"), [0.0]), "t: a finite time"),
+        (("soon", [0.0]), "t: a finite time"),
+        ((0.0, [np.nan]), "x: must be finite"),
+        ((0.0, 0.0), "x: must be one-dimensional"),
+        ((0.0, [1j]), "x: complex"),
+    ],
+)
+def test_wrong_points_are_named(arguments: Any, message: str) -> None:
+    system = fl.System(lambda t, x: [-np.sign(x[0])], n=1)
+    with pytest.raises(fl.InputError, match=f"^{message}"):
+        system.classify(*arguments)
+    with pytest.raises(fl.InputError, match=f"^{message}"):
+        system.field(*arguments, "0")
+    with pytest.raises(fl.InputError, match="kappa: one entry"):
+        system.classify(0.0, [0.0], kappa=[])

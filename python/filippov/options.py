@@ -145,8 +145,8 @@ def check_t_span(t_span: Any) -> tuple[float, float]:
     return ends[0], ends[1]
 
 
-def check_y0(y0: Any) -> Array:
-    """Return the initial state as a new array of floats, shape (n,).
+def check_y0(y0: Any, name: str = "y0") -> Array:
+    """Return the initial state, or another one of that name, as a new array of floats, shape (n,).
 
     Raises
     ------
@@ -158,23 +158,25 @@ def check_y0(y0: Any) -> Array:
     try:
         state = np.asarray(y0)
     except ValueError as error:
-        raise InputError(f"y0: a sequence of n real numbers is needed ({error})") from None
+        raise InputError(f"{name}: a sequence of n real numbers is needed ({error})") from None
     if state.dtype.kind == "c":
-        raise InputError("y0: complex states are not supported; split them into real and imaginary parts")
+        raise InputError(
+            f"{name}: complex states are not supported; split them into real and imaginary parts"
+        )
     if state.dtype.kind not in "fiub":
         try:
             state = state.astype(float)
         except (TypeError, ValueError):
-            raise InputError(f"y0: a sequence of n real numbers is needed, not {y0!r}") from None
+            raise InputError(f"{name}: a sequence of n real numbers is needed, not {y0!r}") from None
     if state.ndim != 1:
-        hint = "; use [y0]" if state.ndim == 0 else ""
-        raise InputError(f"y0: must be one-dimensional, it has shape {state.shape}{hint}")
+        hint = f"; use [{name}]" if state.ndim == 0 else ""
+        raise InputError(f"{name}: must be one-dimensional, it has shape {state.shape}{hint}")
     if state.size == 0:
-        raise InputError("y0: must have at least one component")
+        raise InputError(f"{name}: must have at least one component")
     state = np.array(state, dtype=np.float64)
     if not np.isfinite(state).all():
         index = int(np.flatnonzero(~np.isfinite(state))[0])
-        raise InputError(f"y0: must be finite, but y0[{index}] is {state[index]}", state=state)
+        raise InputError(f"{name}: must be finite, but {name}[{index}] is {state[index]}", state=state)
     return state
 
 
@@ -255,6 +257,8 @@ def check_kappa(kappa: Any) -> tuple[float, ...]:
         values = (_real(kappa),) if single else tuple(_real(value) for value in kappa)
     except (TypeError, ValueError):
         raise InputError(f"kappa: a positive number, or one per surface, is needed, not {kappa!r}") from None
+    if not values:
+        raise InputError("kappa: one entry per surface is needed, it is empty")
     if not all(0.0 < value < math.inf for value in values):
         raise InputError(f"kappa: must be positive and finite, it is {kappa!r}")
     # One number for all surfaces: only the ratios matter.
@@ -268,6 +272,17 @@ def fit_kappa(kappa: tuple[float, ...], surfaces: Sequence[str]) -> None:
         raise InputError(
             f"kappa: one entry per surface is needed: {len(surfaces)}{names}, it has {len(kappa)}"
         )
+
+
+def check_time(t: Any) -> float:
+    """Return a finite time."""
+    try:
+        value = _real(t)
+    except (TypeError, ValueError):
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(f"t: a finite time is needed, not {t!r}")
+    return value
 
 
 def check_distance(atol: Any) -> float:

@@ -20,6 +20,7 @@ from filippov.options import (
     check_distance,
     check_kappa,
     check_params,
+    check_time,
     check_y0,
     did_you_mean,
     fit_kappa,
@@ -314,7 +315,7 @@ class System:
         >>> bool(abs(system.field(0.0, [0.0], "0")[0]) < 1e-12)
         True
         """
-        state = check_y0(x)
+        t, state = check_time(t), check_y0(x, "x")
         values = self.parameter_values(params)
         prepared = self.prepare(len(state), float(t), state, values)
         entries = Mode([int(mode)] if isinstance(mode, (int, np.integer)) else mode)
@@ -361,7 +362,7 @@ class System:
         intersection at x[0] = 0, x[1] = 0: several surfaces meet
         goes on in mode 00, multipliers 0.5, -0.2 (start/only)
         """
-        state = check_y0(x)
+        t, state = check_time(t), check_y0(x, "x")
         values = self.parameter_values(params)
         prepared = self.prepare(len(state), float(t), state, values)
         scaling, reach = check_kappa(kappa), check_distance(atol)
