@@ -107,18 +107,3 @@ def test_event_of_the_user_in_a_long_step(width: float) -> None:
             events=lambda t, x, c=centre: 1 / (1 + ((x[0] - c) / width) ** 2) - 0.5,
         )
         np.testing.assert_allclose(sol.t_events[0], [centre - width, centre + width], rtol=0, atol=1e-9)
-
-
-# 6 of the first 1000 cases of test_adversarial.test_sum_of_two_frequencies.
-@pytest.mark.parametrize("seed", [287, 347, 438, 701, 835, 858])
-def test_shallow_pair_of_a_sum_of_two_frequencies(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    first = rng.uniform(0.5, 30.0)
-    second, phase, level = first * rng.uniform(0.2, 3.0), rng.uniform(0, 6), rng.uniform(-0.999, 0.999)
-
-    def h(t: Any) -> Any:
-        return np.sin(first * t + phase) + 0.5 * np.sin(second * t) - level
-
-    sol = fl.solve_ivp(lambda t, x: [np.sign(h(t))], (0, 10), [0.0])
-    signs = np.sign(h(np.linspace(0, 10, 100_001)))
-    assert len(sol.switches) == np.count_nonzero(signs[1:] != signs[:-1])

@@ -152,9 +152,4 @@ impl MeetingFields {
             None => dx.fill(f64::NAN),
         }
     }
-
-    /// The gradients of the switching functions, one after the other.
-    pub fn gradients(&self) -> &[f64] {
-        &self.gradients
-    }
 }

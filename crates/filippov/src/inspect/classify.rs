@@ -7,7 +7,7 @@ use crate::switching::{
     decide, decide_intersection, relay_at, resolve, Arrival, Continuation, Incoming, Leading,
     NormalFields, Resolution, Undecided, Uniqueness,
 };
-use crate::system::{dot, dot_magnitude, PiecewiseSystem};
+use crate::system::{dot, dot_magnitude, surfaces_that_matter, PiecewiseSystem};
 use crate::tolerances::{MOST_MEETING, SURFACE_NOISE};
 
 /// The kinds of point.
@@ -113,7 +113,7 @@ pub fn classify(
     let Some((mode, zeros)) = place(system, t, x, reach)? else {
         return Ok(None);
     };
-    let surfaces = that_matter(system, &mode, zeros);
+    let surfaces = surfaces_that_matter(system, &mode, zeros);
     match surfaces.as_slice() {
         [] => in_region(system, t, x, mode),
         &[j] => on_surface(system, t, x, &mode, j),
@@ -153,33 +153,6 @@ fn place(
         }
     }
     Ok(Some((mode, zeros)))
-}
-
-/// Those of the vanishing surfaces that the field depends on, on some of their sides.
-fn that_matter(system: &dyn PiecewiseSystem, mode: &Mode, zeros: Vec<usize>) -> Vec<usize> {
-    let mut matters = vec![false; system.n_surfaces()];
-    let mut active = matters.clone();
-    // Few surfaces: all patterns; many: each alone.
-    let all = zeros.len() <= MOST_MEETING;
-    let patterns = if all {
-        1_usize << zeros.len()
-    } else {
-        zeros.len() + 1
-    };
-    for pattern in 0..patterns {
-        let mut tried = mode.clone();
-        for (bit, &j) in zeros.iter().enumerate() {
-            let up = if all {
-                pattern >> bit & 1 == 1
-            } else {
-                pattern == bit
-            };
-            tried.set(j, if up { 1 } else { -1 });
-        }
-        system.active(&tried.signs(), &[], &mut active);
-        matters.iter_mut().zip(&active).for_each(|(m, a)| *m |= a);
-    }
-    zeros.into_iter().filter(|&j| matters[j]).collect()
 }
 
 impl Classification {

@@ -205,7 +205,7 @@ impl Integrator<'_> {
     pub(super) fn prepare_bounds(&mut self) -> Result<(), FieldError> {
         let (motion, system) = (&mut self.motion, self.system);
         if motion.sliding.len() < 2
-            || motion.has_bounds()
+            || motion.affine_bounds.is_some()
             || self.options.sliding != SlidingRule::Canopy
         {
             return Ok(());
@@ -218,7 +218,7 @@ impl Integrator<'_> {
             self.stats.n_field_evaluations += evaluations;
             bounds = found;
         }
-        motion.set_bounds(bounds);
+        motion.affine_bounds = Some(bounds);
         Ok(())
     }
 

@@ -235,16 +235,6 @@ impl<'a> Motion<'a> {
         self.affine_bounds.as_ref()?.as_ref()
     }
 
-    /// Were they asked for?
-    pub fn has_bounds(&self) -> bool {
-        self.affine_bounds.is_some()
-    }
-
-    /// Keeps the answer.
-    pub fn set_bounds(&mut self, bounds: Option<AffineBounds>) {
-        self.affine_bounds = Some(bounds);
-    }
-
     /// The surfaces slid on.
     pub fn sliding(&self) -> &[usize] {
         &self.sliding

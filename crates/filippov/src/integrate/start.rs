@@ -7,7 +7,7 @@ use crate::error::{Error, FieldError};
 use crate::mode::Mode;
 use crate::options::Options;
 use crate::switching::{decide, Arrival};
-use crate::system::PiecewiseSystem;
+use crate::system::{surfaces_that_matter, PiecewiseSystem};
 use crate::tolerances::SURFACE_NOISE;
 
 /// Checks the arguments of a run.
@@ -105,7 +105,9 @@ impl Integrator<'_> {
                 break;
             }
         }
-        let meeting = self.meeting_at_start(&mode, &on_surface)?;
+        // An inactive surface has the sign of the side that it moves to.
+        let zeros = (0..d).filter(|&j| on_surface[j]).collect();
+        let meeting = surfaces_that_matter(self.system, &mode, zeros);
         let (mode, left) = match meeting.as_slice() {
             [] => (mode, Lefts::new()),
             [j] => match self.start_on_surface(&mode, *j)? {
@@ -118,38 +120,6 @@ impl Integrator<'_> {
             },
         };
         self.begin(mode, &left)
-    }
-
-    /// Surfaces that vanish at the start and matter there. An inactive one gets the sign of the
-    /// side that it moves to.
-    fn meeting_at_start(
-        &mut self,
-        mode: &Mode,
-        on_surface: &[bool],
-    ) -> Result<Vec<usize>, FieldError> {
-        let zeros: Vec<usize> = (0..on_surface.len()).filter(|&j| on_surface[j]).collect();
-        let mut matters = vec![false; on_surface.len()];
-        let mut active = matters.clone();
-        // Few surfaces: all patterns; many: each alone.
-        let patterns = if zeros.len() <= 6 {
-            1_usize << zeros.len()
-        } else {
-            zeros.len() + 1
-        };
-        for pattern in 0..patterns {
-            let mut tried = mode.clone();
-            for (bit, &j) in zeros.iter().enumerate() {
-                let up = if zeros.len() <= 6 {
-                    pattern >> bit & 1 == 1
-                } else {
-                    pattern == bit
-                };
-                tried.set(j, if up { 1 } else { -1 });
-            }
-            self.system.active(&tried.signs(), &[], &mut active);
-            matters.iter_mut().zip(&active).for_each(|(m, a)| *m |= a);
-        }
-        Ok(zeros.into_iter().filter(|&j| matters[j]).collect())
     }
 
     /// The mode of a start on one surface, or the reason to stop.

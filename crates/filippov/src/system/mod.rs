@@ -4,6 +4,7 @@
 //! switching function h_j(t, x). The signs are *data*: the caller says which smooth field it
 //! wants, also slightly beyond a surface, and the field never looks at the sign of h itself.
 
+mod activity;
 mod affine;
 mod affine_model;
 mod both_sides;
@@ -12,6 +13,7 @@ mod compiled;
 mod tiered;
 mod traced;
 
+pub(crate) use activity::surfaces_that_matter;
 pub use affine::{AffineParts, AffineSigns, SingularSliding};
 pub use both_sides::BothSides;
 pub use closures::ClosureSystem;
