@@ -33,8 +33,8 @@
 //!
 //! The crate knows nothing of time stepping. Modules: [`graph`] (construction, with `simplify`),
 //! [`switching`] (surfaces found and merged), `partition` (what depends on which sign), [`derivative`],
-//! `print`, `serial`, [`program`] (native code by Cranelift, or a portable interpreter), and [`enclosure`]
-//! (rigorous bounds along pieces of motions).
+//! `print`, `serial`, [`program`] (native code by Cranelift, or a portable interpreter), [`enclosure`]
+//! (rigorous bounds along pieces of motions) and [`jet`] (Taylor coefficients of motions).
 
 pub mod blend;
 pub mod derivative;
@@ -42,6 +42,7 @@ pub mod enclosure;
 mod error;
 pub mod graph;
 pub mod interval;
+pub mod jet;
 mod linear;
 #[cfg(feature = "native")]
 mod native;
@@ -64,6 +65,7 @@ pub use enclosure::{Enclosure, EnclosureProgram, Motion};
 pub use error::ExprError;
 pub use graph::Graph;
 pub use interval::Interval;
+pub use jet::JetProgram;
 pub use node::{Node, NodeId};
 pub use op::{BinaryOp, UnaryOp};
 pub use print::Names;
