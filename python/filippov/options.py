@@ -18,8 +18,8 @@ __all__ = ["Options", "check_options", "check_t_span", "check_y0"]
 
 Array = npt.NDArray[np.float64]
 
-_METHODS = {"DOPRI5": "DOPRI5", "RK45": "DOPRI5"}
-_PLANNED_METHODS = ("Taylor", "DOP853", "Midpoint", "Rodas5P")
+_METHODS = {"auto": "auto", "DOPRI5": "DOPRI5", "RK45": "DOPRI5", "Taylor": "Taylor"}
+_PLANNED_METHODS = ("DOP853", "Midpoint", "Rodas5P")
 _STIFF_METHODS = ("Radau", "BDF", "LSODA")
 # name -> (available values, values that are planned)
 _POLICIES = {
@@ -60,7 +60,7 @@ class Options(NamedTuple):
 
 # The defaults of `solve_ivp`, checked: a call that changes none of them needs no further check.
 _DEFAULT_OPTIONS = Options(
-    method="DOPRI5",
+    method="auto",
     rtol=1e-6,
     atol=1e-9,
     first_step=None,

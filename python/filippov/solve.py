@@ -48,7 +48,7 @@ def solve_ivp(
     fun: Callable[..., Any] | System,
     t_span: Any,
     y0: npt.ArrayLike,
-    method: str = "DOPRI5",
+    method: str = "auto",
     t_eval: npt.ArrayLike | None = None,
     dense_output: bool = True,
     events: Any = None,

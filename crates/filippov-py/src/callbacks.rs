@@ -154,6 +154,10 @@ impl UserFunction for CompiledEvent {
         Ok(out[0])
     }
 
+    fn has_bounds(&self) -> bool {
+        true
+    }
+
     fn enclose(&self, motion: &dyn Motion) -> Option<Enclosure> {
         let mut out = [Enclosure::UNKNOWN];
         self.expression

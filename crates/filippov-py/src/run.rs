@@ -206,7 +206,13 @@ impl Run {
     fn stats<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let stats = self.solution().stats;
         let dict = PyDict::new(py);
-        dict.set_item("method", "DOPRI5")?;
+        let method = match stats.n_steps_taylor {
+            0 => "DOPRI5",
+            all if all == stats.n_steps => "Taylor",
+            _ => "Taylor, DOPRI5",
+        };
+        dict.set_item("method", method)?;
+        dict.set_item("n_steps_taylor", stats.n_steps_taylor)?;
         dict.set_item("native", self.is_native)?;
         dict.set_item("nfev", stats.n_field_evaluations)?;
         dict.set_item("n_surface_evaluations", stats.n_surface_evaluations)?;

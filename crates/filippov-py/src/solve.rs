@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use filippov::{
-    solve_interruptible, Mode, NonUnique, Options, SlidingRule, UserEvent, UserFunction,
+    solve_interruptible, Method, Mode, NonUnique, Options, SlidingRule, UserEvent, UserFunction,
 };
 use numpy::PyReadonlyArray1;
 use pyo3::exceptions::PyValueError;
@@ -137,7 +137,8 @@ fn read_options(given: &Bound<'_, PyDict>) -> PyResult<(Options, Option<Py<PyAny
             "t_eval" => options.t_eval = value.extract()?,
             "dense_output" => options.dense_output = value.extract()?,
             "progress" if !value.is_none() => progress = Some(value.unbind()),
-            "progress" | "method" | "max_branches" | "keep" => {}
+            "method" => options.method = method(&value.extract::<String>()?)?,
+            "progress" | "max_branches" | "keep" => {}
             other => {
                 return Err(PyValueError::new_err(format!(
                     "options: unknown key {other:?}"
@@ -146,6 +147,17 @@ fn read_options(given: &Bound<'_, PyDict>) -> PyResult<(Options, Option<Py<PyAny
         }
     }
     Ok((options, progress))
+}
+
+fn method(name: &str) -> PyResult<Method> {
+    match name {
+        "auto" => Ok(Method::Auto),
+        "DOPRI5" => Ok(Method::Dopri5),
+        "Taylor" => Ok(Method::Taylor),
+        _ => Err(PyValueError::new_err(format!(
+            "method: unknown method {name:?}"
+        ))),
+    }
 }
 
 fn sliding_rule(name: &str) -> PyResult<SlidingRule> {

@@ -53,7 +53,7 @@ pub use inspect::{
 };
 pub use integrate::{solve, solve_interruptible, Integrator, Stats, Stop, Warning, WarningCode};
 pub use mode::{Mode, Signs};
-pub use options::{NonUnique, Options, SlidingRule};
+pub use options::{Method, NonUnique, Options, SlidingRule};
 pub use solution::{Segment, Side, Solution, Switch, UserZero};
 pub use switching::Kind;
 pub use system::{

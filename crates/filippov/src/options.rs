@@ -40,9 +40,23 @@ impl SlidingRule {
     }
 }
 
+/// How a motion is integrated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Method {
+    /// Taylor series where the system has them and they pay; else DOPRI5.
+    #[default]
+    Auto,
+    /// The Runge-Kutta pair of Dormand and Prince.
+    Dopri5,
+    /// Taylor series wherever the system has them; else DOPRI5.
+    Taylor,
+}
+
 /// Options of [`crate::solve`].
 #[derive(Clone, Debug)]
 pub struct Options {
+    /// How motions are integrated.
+    pub method: Method,
     /// Relative tolerance per component.
     pub rtol: f64,
     /// Absolute tolerance, one entry for all components or one per component.
@@ -76,6 +90,7 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Options {
+            method: Method::default(),
             rtol: 1e-6,
             atol: vec![1e-9],
             first_step: None,

@@ -5,7 +5,7 @@ use crate::field::{IntersectionField, Projector, SlidingField, SmoothField};
 use crate::integrate::{Stats, Stop, Warning};
 use crate::mode::Mode;
 use crate::options::{Options, SlidingRule};
-use crate::stepper::Interpolant;
+use crate::stepper::{Basis, Interpolant};
 use crate::switching::Kind;
 use crate::system::PiecewiseSystem;
 
@@ -51,6 +51,9 @@ struct Step {
     t0: f64,
     dt: f64,
     t_stop: f64,
+    /// Where its coefficients begin, and end.
+    coefficients: (usize, usize),
+    basis: Basis,
 }
 
 /// Which limit is meant at a switch.
@@ -135,10 +138,11 @@ impl Solution {
         };
         let step = self.steps[index];
         let theta = (t - step.t0) / step.dt;
-        let Some(coefficients) = self.coefficients.get(6 * n * index..6 * n * (index + 1)) else {
+        let (from, to) = step.coefficients;
+        let Some(coefficients) = self.coefficients.get(from..to) else {
             return Ok(None);
         };
-        crate::stepper::evaluate(coefficients, n, theta, y);
+        crate::stepper::evaluate(step.basis, coefficients, n, theta, y);
         let segment = self
             .segments
             .partition_point(|s| s.steps.1 <= index)
@@ -224,9 +228,16 @@ impl Recorder {
             return;
         }
         if self.keep_dense {
-            self.steps.push(Step { t0, dt, t_stop });
+            let from = self.coefficients.len();
             self.coefficients
                 .extend_from_slice(interpolant.coefficients());
+            self.steps.push(Step {
+                t0,
+                dt,
+                t_stop,
+                coefficients: (from, self.coefficients.len()),
+                basis: interpolant.basis(),
+            });
         }
         self.t.push(t_stop);
         self.y.extend_from_slice(y);

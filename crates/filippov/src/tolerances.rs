@@ -312,3 +312,17 @@ pub const BEYOND_TOUCH: f64 = 0.02;
 /// Where steps shrink to nothing because multipliers end, their determinant is below this: it falls like the
 /// square root of the time that is left.
 pub const AT_FOLD: f64 = 1e-2;
+
+/// Order of a Taylor step per decimal digit of the relative tolerance. The least work per unit of time takes 1.15
+/// (Jorba and Zou); a step has costs beside its coefficients, and longer ones pay.
+pub const TAYLOR_DIGITS_TO_ORDER: f64 = 1.5;
+
+/// Lowest order of a Taylor step: below it the step is no longer than one of DOPRI5.
+pub const TAYLOR_SMALLEST_ORDER: usize = 8;
+
+/// Highest order of a Taylor step: beyond it rounding limits the error, and not the step.
+pub const TAYLOR_LARGEST_ORDER: usize = 24;
+
+/// A Taylor step that is shorter than this, in units of the rounding of the time, means that the motion comes to a
+/// point where its field has no series.
+pub const TAYLOR_SHORTEST: f64 = 1e4;

@@ -15,7 +15,8 @@ mod unrolled;
 
 use crate::error::ExprError;
 use crate::graph::Graph;
-use crate::node::NodeId;
+use crate::node::{Node, NodeId};
+use crate::op::{BinaryOp, UnaryOp};
 use crate::program::{Backend, Program};
 
 use looped::Looped;
@@ -23,6 +24,32 @@ use plan::Plan;
 
 /// Programs with more nodes than this are not unrolled: they would take longer to compile than they save.
 const MOST_UNROLLED: usize = 6000;
+
+impl Graph {
+    /// Do the values have a Taylor series wherever they are finite? Roots, powers, logarithms and some inverse
+    /// functions do not: they end, or bend sharply, at a finite value.
+    pub fn is_analytic(&self, nodes: &[NodeId]) -> bool {
+        use BinaryOp::{Atan2, Hypot, Pow};
+        use UnaryOp::{Acos, Acosh, Asin, Atanh, Cbrt, Log, Log10, Log1p, Log2, Sqrt};
+        let all = self.reachable_by(nodes.iter().copied(), |id| {
+            self.node(id).operands().collect::<Vec<_>>()
+        });
+        !all.into_iter().any(|id| match *self.node(id) {
+            Node::Unary(op, a) => {
+                let is_edged = matches!(
+                    op,
+                    Sqrt | Cbrt | Log | Log1p | Log2 | Log10 | Asin | Acos | Acosh | Atanh
+                );
+                is_edged && self.facts(a).varies
+            }
+            Node::Binary(op, a, b) => {
+                let is_edged = matches!(op, Pow | Atan2 | Hypot);
+                is_edged && (self.facts(a).varies || self.facts(b).varies)
+            }
+            _ => false,
+        })
+    }
+}
 
 /// Taylor coefficients of the motion of a field, and of other functions along it.
 ///

@@ -107,6 +107,11 @@ pub trait UserFunction {
     /// If the function raises.
     fn value(&self, t: f64, x: &[f64]) -> Result<f64, FieldError>;
 
+    /// Does [`enclose`](Self::enclose) give bounds? Then steps may be long: no zero in them is lost.
+    fn has_bounds(&self) -> bool {
+        false
+    }
+
     /// Rigorous bounds of g and of its rate along a piece of motion; `None` if there are none, and zeros
     /// are then found by sampling.
     fn enclose(&self, motion: &dyn Motion) -> Option<Enclosure> {

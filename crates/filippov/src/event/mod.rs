@@ -11,6 +11,7 @@ pub mod filter;
 pub mod function;
 pub mod isolate;
 pub mod locate;
+pub mod series;
 pub mod tube;
 
 pub use function::{Deflation, EventFunction, Monitored, UserEvent, UserFunction};

@@ -4,22 +4,16 @@ use std::cell::{Cell, RefCell};
 
 use smallvec::{smallvec, SmallVec};
 
-use super::bounds::{BoundedCurve, Piece, RootPiece};
-use super::curve::{grazes, Curve};
+use super::bounds::{Piece, RootPiece};
 use super::integrator::Integrator;
 use super::motion::{Exits, Motion};
 use crate::error::FieldError;
 use crate::event::certificate::Proof;
 use crate::event::filter::{may_vanish, may_vanish_bent, may_vanish_between, may_vanish_deflated};
-use crate::event::isolate::{first_zero_sampled, Evidence, Zero, PROBES};
-use crate::event::locate::{refine, Located};
+use crate::event::isolate::PROBES;
 use crate::event::{Deflation, EventFunction, Monitored};
-use crate::stepper::nested;
 use crate::system::PiecewiseSystem;
-use crate::tolerances::{
-    BEYOND_TOUCH, EPS, EXTRAPOLATION, ONE_SIDED_AIM, POLE, RESOLVED_DEPTH, SURFACE_NOISE,
-    UNBOUNDED_DEPTH, UNPROVED_DEPTH,
-};
+use crate::tolerances::{EPS, EXTRAPOLATION, ONE_SIDED_AIM, SURFACE_NOISE};
 
 /// Scratch space of the event stage, and values at the end of the step.
 pub(super) struct Detector {
@@ -32,8 +26,8 @@ pub(super) struct Detector {
     /// Length of the next step, if the event stage knows better than the error control.
     pub next_dt: Option<f64>,
     /// Exit functions computed in the search of this step, by theta.
-    exits: Vec<(f64, Exits)>,
-    h: Vec<f64>,
+    pub exits: Vec<(f64, Exits)>,
+    pub h: Vec<f64>,
     /// Switching functions at the probes of the step.
     probed: [Vec<f64>; 2],
     rate: Vec<f64>,
@@ -45,7 +39,7 @@ pub(super) struct Detector {
     /// Bounds of the multipliers there, while sliding on an intersection.
     pub enclosed_root: RefCell<Option<RootPiece>>,
     /// Value and rate at the end of the step, per monitored function.
-    right: Vec<(f64, f64)>,
+    pub right: Vec<(f64, f64)>,
     /// Rounding of the exit functions in this step, once it was needed.
     exit_noise: Option<f64>,
     /// Which monitored functions could not be cleared, and whether bounds say anything about them.
@@ -206,8 +200,11 @@ impl Integrator<'_> {
     /// The filter: which functions may vanish within the step?
     fn collect_suspects(&mut self, dt: f64) -> Result<(), FieldError> {
         self.detector.suspects.clear();
-        let is_polynomial =
-            |m: &Monitored| m.affine && matches!(m.function, EventFunction::Surface(_));
+        let is_series = self.stepper.is_taylor();
+        let is_known = !is_series || self.motion.is_straight;
+        let is_polynomial = |m: &Monitored| {
+            m.affine && is_known && matches!(m.function, EventFunction::Surface(_))
+        };
         if !self.motion.monitored.iter().all(is_polynomial) {
             self.stepper.extend_order4(&self.x);
         }
@@ -218,11 +215,7 @@ impl Integrator<'_> {
             let m = self.motion.monitored[index];
             let (value, rate) = self.detector.right[index];
             if m.deflation.is_some() {
-                let step = (self.t, &self.x[..], self.stepper.end());
-                let noise = self
-                    .detector
-                    .noise(self.system, &self.motion, m.function, step)?;
-                self.motion.monitored[index].noise = noise;
+                self.motion.monitored[index].noise = self.noise_of(m.function)?;
             }
             let proof = if is_polynomial(&m) {
                 Proof::Silent
@@ -232,6 +225,10 @@ impl Integrator<'_> {
             let suspect = match (m.function, m.deflation, proof) {
                 (_, _, Proof::Clear) => false,
                 (_, _, Proof::Open) => true,
+                (EventFunction::Surface(j), _, _) if is_series && is_polynomial(&m) => {
+                    !self.is_clear(j, &m, dt)?
+                }
+                _ if is_series => true,
                 (EventFunction::Surface(_), None, _) if m.affine => {
                     may_vanish(m.value, m.rate * dt, value, rate * dt)
                 }
@@ -267,6 +264,13 @@ impl Integrator<'_> {
         Ok(())
     }
 
+    /// Rounding of a monitored function over the step.
+    pub(super) fn noise_of(&mut self, function: EventFunction) -> Result<f64, FieldError> {
+        let step = (self.t, &self.x[..], self.stepper.end());
+        self.detector
+            .noise(self.system, &self.motion, function, step)
+    }
+
     /// All switching functions at the probes of the step.
     fn probe_surfaces(&mut self, dt: f64) -> Result<(), FieldError> {
         for (theta, h) in PROBES.into_iter().zip(&mut self.detector.probed) {
@@ -280,156 +284,19 @@ impl Integrator<'_> {
     }
 
     /// Raises the continuous extension to order 5.
-    fn extend(&mut self) -> Result<(), FieldError> {
-        if self.stepper.has_order5() {
+    pub(super) fn extend(&mut self) -> Result<(), FieldError> {
+        if self.stepper.is_extended() {
             return Ok(());
         }
         self.stats.n_extensions += 1;
         self.detector.enclosed_exits.set(None);
         self.detector.enclosed_root.take();
-        self.stepper
-            .extend_order5(&mut self.motion.field, &self.x)?;
+        self.stepper.extend(&mut self.motion.field, &self.x)?;
         Ok(())
     }
 
-    /// The first zero of one monitored function on [from, to], refined to rounding.
-    fn search(
-        &mut self,
-        (index, has_bounds): (usize, bool),
-        (from, to): (f64, f64),
-        dt: f64,
-    ) -> Result<Option<(f64, bool)>, FieldError> {
-        let m = self.motion.monitored[index];
-        let step = (self.t, &self.x[..], self.stepper.end());
-        let noise = self
-            .detector
-            .noise(self.system, &self.motion, m.function, step)?;
-        self.motion.monitored[index].noise = noise;
-        let width = 0.5 * EPS * (self.t.abs() / dt).max(to);
-        let polynomial = match m.function {
-            EventFunction::Surface(j) if m.affine && self.motion.is_straight => {
-                Some(self.affine_polynomial(j, m, dt)?)
-            }
-            _ => None,
-        };
-        let by_multipliers = !self.slides_by_rule();
-        let interpolant = self.stepper.interpolant();
-        let bounds = BoundedCurve {
-            system: self.system,
-            interpolant,
-            signs: &self.motion.signs,
-            sliding: &self.motion.sliding,
-            margin: &self.detector.margin,
-            stages: &self.detector.stages,
-            affine: self.motion.affine_bounds.as_ref().and_then(Option::as_ref),
-            by_multipliers,
-            last: &self.detector.enclosed_exits,
-            last_root: &self.detector.enclosed_root,
-        };
-        let mut curve = Curve {
-            system: self.system,
-            field: &mut self.motion.field,
-            signs: &self.motion.signs,
-            interpolant,
-            is_straight: self.motion.is_straight,
-            h: &mut self.detector.h,
-            x: &mut self.detector.x,
-            exits: &mut self.detector.exits,
-            n_evaluations: &mut self.stats.n_surface_evaluations,
-        };
-        let (t, dt_step) = (self.t, dt);
-        let mut g = |theta: f64| {
-            let value = match &polynomial {
-                Some(rows) => nested(rows, theta),
-                None => curve.value(&m, theta)?,
-            };
-            Ok(m.deflated(value, t + theta * dt_step, dt_step, noise))
-        };
-        let mut values = [f64::NAN; 5];
-        for (i, value) in values.iter_mut().enumerate() {
-            let theta = from + (to - from) * 0.25 * i as f64;
-            let (start, end) = (m.value, self.detector.right[index].0);
-            *value = match theta {
-                0.0 => m.deflated(start, t, dt, noise),
-                1.0 => m.deflated(end, t + dt, dt, noise),
-                _ => g(theta)?,
-            };
-        }
-        let mut over = |a, b| bounds.over(&m, a, b);
-        let is_bounded = polynomial.is_none() && has_bounds;
-        let evidence = match (m.function, is_bounded) {
-            (_, true) => Evidence::Bounds {
-                bounds: &mut over,
-                divided: m.deflation.is_some(),
-                patience: match m.function {
-                    EventFunction::Exit(_) => UNPROVED_DEPTH,
-                    _ => UNBOUNDED_DEPTH,
-                },
-            },
-            // Along the step an affine surface is a quintic; the quartic and its remainder describe it.
-            (EventFunction::Surface(_), _) if m.affine => Evidence::Probes(&[]),
-            (EventFunction::Surface(_), _) => Evidence::Probes(&PROBES),
-            _ => Evidence::Probes(&PROBES[..1]),
-        };
-        let isolated = first_zero_sampled(&mut g, from, to, values, noise, evidence)?;
-        self.detector.unresolved |= isolated.depth > RESOLVED_DEPTH && !is_bounded;
-        self.detector.uncertain |= isolated.exhausted || isolated.not_finite;
-        match isolated.zero {
-            None => Ok(None),
-            Some(Zero::Touch(theta)) if theta <= from => Ok(None),
-            // A multiplier that touches its end goes on; it may leave later in the step.
-            Some(Zero::Touch(theta)) if matches!(m.function, EventFunction::Exit(_)) => {
-                let rest = theta + BEYOND_TOUCH * (to - from);
-                if rest >= to {
-                    return Ok(None);
-                }
-                self.search((index, has_bounds), (rest, to), dt)
-            }
-            Some(Zero::Touch(theta)) => Ok(Some((theta, true))),
-            // Beyond the surface from the start, by the rounding of what moved the state: the switch is now.
-            Some(Zero::Crossing(bracket)) if bracket.lo >= bracket.hi => {
-                Ok(Some((bracket.lo, false)))
-            }
-            Some(Zero::Crossing(bracket)) => {
-                let Located { theta, residual } = refine(&mut g, bracket, width)?;
-                let scale = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-                if residual > POLE * scale {
-                    // A pole: the sign changes without a zero.
-                    self.detector.uncertain = true;
-                    return Ok(None);
-                }
-                if bracket.is_steep(scale, noise) {
-                    return Ok(Some((theta, false)));
-                }
-                match grazes(&mut g, theta, from, to, noise)? {
-                    Some(vertex) => Ok(Some((vertex, true))),
-                    None => Ok(Some((theta, false))),
-                }
-            }
-        }
-    }
-
-    /// The rows of an affine h along the continuous extension, in the nested form of the extension.
-    fn affine_polynomial(
-        &mut self,
-        j: usize,
-        m: Monitored,
-        dt: f64,
-    ) -> Result<[f64; 6], FieldError> {
-        let (point, signs) = ((self.t, &self.x[..]), &self.motion.signs);
-        let extension = self.stepper.interpolant().coefficients();
-        let mut rows = [0.0; 6];
-        let ht = self
-            .system
-            .gradient_products(j, point, signs, extension, &mut rows)?;
-        rows.iter_mut().for_each(|row| *row *= m.orientation);
-        rows[0] = m.value;
-        rows[1] += m.orientation * ht * dt;
-        Ok(rows)
-    }
-
     /// One-sided fields: the surface just beyond the end of the step, within reach of the continuous extension.
-    fn detect_beyond(&mut self, dt: f64, found: &mut Option<Found>) -> Result<(), FieldError> {
+    pub(super) fn detect_beyond(&mut self, dt: f64, found: &mut Option<Found>) -> Result<(), FieldError> {
         for index in 0..self.motion.monitored.len() {
             let (value, rate) = self.detector.right[index];
             let near = rate < 0.0 && value < -rate * dt * 1.5 * (EXTRAPOLATION - 1.0);
@@ -454,7 +321,7 @@ impl Integrator<'_> {
         Ok(())
     }
 
-    fn keep_earliest(
+    pub(super) fn keep_earliest(
         &self,
         found: &mut Option<Found>,
         index: usize,

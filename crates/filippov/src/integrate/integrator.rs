@@ -23,9 +23,9 @@ use crate::error::{Error, FieldError};
 use crate::event::UserEvent;
 use crate::field::SmoothField;
 use crate::mode::Mode;
-use crate::options::Options;
+use crate::options::{Method, Options};
 use crate::solution::{Recorder, Solution};
-use crate::stepper::{Attempt, Controller, Dopri5, ErrorScale};
+use crate::stepper::{Attempt, Controller, ErrorScale, Stepper, Taylor};
 use crate::system::PiecewiseSystem;
 use crate::tolerances::SHORTEST_STEP;
 
@@ -43,7 +43,7 @@ pub struct Integrator<'a> {
     pub(super) t_end: f64,
     pub(super) x: Vec<f64>,
     pub(super) motion: Motion<'a>,
-    pub(super) stepper: Dopri5,
+    pub(super) stepper: Stepper,
     pub(super) controller: Controller,
     /// Proposed step.
     pub(super) dt: f64,
@@ -80,6 +80,14 @@ impl<'a> Integrator<'a> {
     ) -> Result<Self, Error> {
         super::start::check(system, t_span, y0, options)?;
         let n = system.n_states();
+        let is_bounded = events.iter().all(|event| event.function.has_bounds());
+        let uses_series = match options.method {
+            Method::Dopri5 => false,
+            Method::Taylor => true,
+            // Where a function of the user is sampled, short steps lose fewer of its zeros.
+            Method::Auto => system.is_analytic() && is_bounded,
+        };
+        let taylor = uses_series.then(|| Taylor::new(n, Taylor::order_for(options.rtol)));
         let undecided = Mode::new(vec![1; system.n_surfaces()]);
         Ok(Integrator {
             system,
@@ -89,7 +97,7 @@ impl<'a> Integrator<'a> {
             t_end: t_span.1,
             x: y0.to_vec(),
             motion: Motion::new(system, t_span.0, undecided, options.sliding),
-            stepper: Dopri5::new(n),
+            stepper: Stepper::new(n, taylor),
             controller: Controller::default(),
             dt: f64::NAN,
             paces: FxHashMap::default(),
@@ -160,6 +168,7 @@ impl<'a> Integrator<'a> {
         if remaining <= 0.0 {
             return Ok(Some(Stop::End));
         }
+        self.expand()?;
         let mut dt = self.dt.min(self.options.max_step);
         dt = self.aim_at_surface(dt);
         if dt >= remaining * 0.99 {
@@ -193,7 +202,11 @@ impl<'a> Integrator<'a> {
             }
             Attempt::Error(error) if error > 1.0 => {
                 self.count_rejection(sliding);
-                self.dt = dt * self.controller.reject(error);
+                self.dt = dt
+                    * match &self.stepper.taylor {
+                        Some(taylor) if self.stepper.is_taylor() => taylor.reject(error),
+                        _ => self.controller.reject(error),
+                    };
                 Ok(None)
             }
             Attempt::Error(error) => self.advance(dt, error),
@@ -201,9 +214,13 @@ impl<'a> Integrator<'a> {
     }
 
     fn attempt(&mut self, dt: f64) -> Result<Attempt, FieldError> {
+        if self.stepper.is_taylor() {
+            return self.attempt_series(dt);
+        }
         let (t, x, scale) = (self.t, &self.x, &self.scale);
+        let stepper = &mut self.stepper.dopri5;
         match &mut self.motion.field {
-            ModeField::Region(field) => self.stepper.attempt(field, |_, _| {}, t, x, dt, scale),
+            ModeField::Region(field) => stepper.attempt(field, |_, _| {}, t, x, dt, scale),
             ModeField::Sliding(field) => {
                 let stages = &mut self.detector.stages;
                 let observe = |stage: usize, field: &crate::field::SlidingField| {
@@ -211,7 +228,7 @@ impl<'a> Integrator<'a> {
                     stages[0][stage] = a.minus;
                     stages[1][stage] = -a.plus;
                 };
-                self.stepper.attempt(&mut **field, observe, t, x, dt, scale)
+                stepper.attempt(&mut **field, observe, t, x, dt, scale)
             }
             ModeField::Intersection(field) => {
                 let stages = &mut self.detector.stages;
@@ -220,7 +237,7 @@ impl<'a> Integrator<'a> {
                         exit[stage] = *value;
                     }
                 };
-                self.stepper.attempt(&mut **field, observe, t, x, dt, scale)
+                stepper.attempt(&mut **field, observe, t, x, dt, scale)
             }
         }
     }
@@ -255,7 +272,12 @@ impl<'a> Integrator<'a> {
         };
         self.stats.n_steps += 1;
         self.stats.n_steps_sliding += u64::from(sliding);
-        self.dt = dt * self.controller.accept(error);
+        self.stats.n_steps_taylor += u64::from(self.stepper.is_taylor());
+        self.dt = if self.stepper.is_taylor() {
+            f64::INFINITY
+        } else {
+            dt * self.controller.accept(error)
+        };
         self.note_jump(dt);
         if let Some(event) = self.record_user_zeros(zeros, theta, t_stop)? {
             return Ok(Some(Stop::TerminalEvent(event)));

@@ -13,6 +13,8 @@ mod motion;
 mod pace;
 mod relay;
 mod solve;
+mod search;
+mod series;
 mod spiral;
 mod start;
 mod stats;

@@ -1,5 +1,7 @@
 //! The motion in one mode: its field, its signs, and what is monitored.
 
+use std::sync::Arc;
+
 use smallvec::SmallVec;
 
 use crate::error::FieldError;
@@ -7,7 +9,7 @@ use crate::event::{Deflation, EventFunction, Monitored};
 use crate::field::{AffineBounds, IntersectionField, RegionField, SlidingField, SmoothField};
 use crate::mode::{Mode, Signs};
 use crate::options::SlidingRule;
-use crate::system::PiecewiseSystem;
+use crate::system::{MotionJets, PiecewiseSystem};
 
 /// The smooth field of a mode.
 pub(super) enum ModeField<'a> {
@@ -128,6 +130,8 @@ pub(super) struct Motion<'a> {
     /// Fields of other kinds that earlier motions had, kept for their buffers.
     idle: Vec<ModeField<'a>>,
     pub monitored: Vec<Monitored>,
+    /// Its Taylor series, if it is integrated by them.
+    pub jets: Option<Arc<MotionJets>>,
     /// The sliding field where several surfaces meet.
     rule: SlidingRule,
 }
@@ -150,6 +154,7 @@ impl<'a> Motion<'a> {
             sliding,
             idle: Vec::new(),
             monitored: Vec::new(),
+            jets: None,
             rule,
             signs,
             mode,

@@ -36,7 +36,7 @@ impl Pace {
 impl Integrator<'_> {
     /// Keeps the pace of the motion that ends, for the next one in its mode.
     pub(super) fn remember_pace(&mut self) {
-        if self.dt.is_nan() {
+        if !self.dt.is_finite() {
             return;
         }
         let pace = Pace {
@@ -60,6 +60,10 @@ impl Integrator<'_> {
             return Ok(first.min(remaining));
         }
         let longest = remaining.min(self.options.max_step);
+        if self.motion.jets.is_some() {
+            // The series tells.
+            return Ok(longest);
+        }
         let (t, x, scale, field) = (self.t, &self.x, &self.scale, &mut self.motion.field);
         let derivative = self.stepper.start_derivative();
         let pace = self.paces.get(&self.motion.mode);

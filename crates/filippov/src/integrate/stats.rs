@@ -3,12 +3,15 @@
 /// What a run cost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Stats {
-    /// Evaluations of the right-hand side; one of the sliding field counts two.
+    /// Evaluations of the right-hand side; one of the sliding field counts two, the coefficients of a Taylor step
+    /// count as many as its order.
     pub n_field_evaluations: u64,
     /// Evaluations of the switching functions in the search for events.
     pub n_surface_evaluations: u64,
     /// Accepted steps.
     pub n_steps: u64,
+    /// Accepted steps by Taylor series.
+    pub n_steps_taylor: u64,
     /// Rejected steps.
     pub n_rejected: u64,
     /// Accepted steps while sliding.

@@ -261,6 +261,7 @@ impl Integrator<'_> {
         self.stats.n_field_evaluations += self.motion.field.n_evaluations();
         self.remember_pace();
         self.motion.restart(self.system, self.t, mode, &deflations);
+        self.choose_stepper();
         self.motion.project(self.t, &mut self.x)?;
         let derivative = self.stepper.start_derivative_mut();
         match &mut self.motion.field {

@@ -72,8 +72,7 @@ impl Integrator<'_> {
         if found.as_ref().is_none_or(|zeros| zeros.is_empty()) {
             return Ok(found);
         }
-        self.stepper
-            .extend_order5(&mut self.motion.field, &self.x)?;
+        self.stepper.extend(&mut self.motion.field, &self.x)?;
         let mut found = self.search_user_zeros(theta)?;
         if let Some(zeros) = &mut found {
             zeros.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -1,11 +1,25 @@
 //! The continuous extension of a step.
 
-/// A polynomial in theta = (t - t0) / dt over one step, in the nested form
-///
-///   y0 + theta (r1 + (1-theta) (r2 + theta (r3 + (1-theta) (r4 + theta r5)))),
-///
-/// with r5 = 0 for the free extension of order 4. The first three terms are the cubic Hermite
-/// polynomial of the step, so that the extension joins its neighbours with one derivative.
+use smallvec::SmallVec;
+
+/// How the rows of coefficients make a polynomial.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Basis {
+    /// Six rows of the nested form
+    ///
+    ///   y0 + theta (r1 + (1-theta) (r2 + theta (r3 + (1-theta) (r4 + theta r5)))),
+    ///
+    /// with r5 = 0 for the free extension of order 4 of DOPRI5. The first three terms are the cubic Hermite
+    /// polynomial of the step, so that the extension joins its neighbours with one derivative.
+    Nested,
+    /// Rows for the powers 1, theta, theta^2, .., theta^degree.
+    Powers,
+}
+
+/// Coefficients of one component in powers of theta from some centre.
+pub type Expansion = SmallVec<[f64; 32]>;
+
+/// The continuous extension of a step: a polynomial in theta = (t - t0) / dt.
 #[derive(Clone, Debug)]
 pub struct Interpolant {
     /// Start of the step.
@@ -13,7 +27,8 @@ pub struct Interpolant {
     /// Length of the step.
     pub dt: f64,
     n: usize,
-    /// y0, r1, .., r5, each n long.
+    basis: Basis,
+    /// Rows of n.
     coefficients: Vec<f64>,
 }
 
@@ -23,7 +38,19 @@ impl Interpolant {
             t0: 0.0,
             dt: 0.0,
             n,
+            basis: Basis::Nested,
             coefficients: vec![0.0; 6 * n],
+        }
+    }
+
+    /// Zeros for powers up to `degree`.
+    pub(super) fn powers(n: usize, degree: usize) -> Self {
+        Interpolant {
+            t0: 0.0,
+            dt: 0.0,
+            n,
+            basis: Basis::Powers,
+            coefficients: vec![0.0; (degree + 1) * n],
         }
     }
 
@@ -38,38 +65,45 @@ impl Interpolant {
         [y0, r1, r2, r3, r4, r5]
     }
 
+    pub(super) fn coefficients_mut(&mut self) -> &mut [f64] {
+        &mut self.coefficients
+    }
+
     /// Number of states.
     pub fn n_states(&self) -> usize {
         self.n
     }
 
-    /// The coefficients, six rows of n.
+    /// What the coefficients mean.
+    pub fn basis(&self) -> Basis {
+        self.basis
+    }
+
+    /// The coefficients, rows of n.
     pub fn coefficients(&self) -> &[f64] {
         &self.coefficients
     }
 
     /// Writes the state at theta.
     pub fn at(&self, theta: f64, y: &mut [f64]) {
-        evaluate(&self.coefficients, self.n, theta, y);
+        evaluate(self.basis, &self.coefficients, self.n, theta, y);
     }
 
-    /// The coefficients d0, .., d5 of component `i` in powers of theta - `centre`.
-    pub fn expanded(&self, i: usize, centre: f64) -> [f64; 6] {
+    /// The coefficients d0, d1, .. of component `i` in powers of theta - `centre`.
+    pub fn expanded(&self, i: usize, centre: f64) -> Expansion {
         let r = |k: usize| self.coefficients[k * self.n + i];
-        let mut d = [
-            r(0),
-            r(1) + r(2),
-            r(3) + r(4) - r(2),
-            r(5) - r(3) - 2.0 * r(4),
-            r(4) - 2.0 * r(5),
-            r(5),
-        ];
-        // Horner's scheme, once for every derivative.
-        for first in 0..5 {
-            for k in (first..5).rev() {
-                d[k] += centre * d[k + 1];
-            }
-        }
+        let mut d: Expansion = match self.basis {
+            Basis::Nested => SmallVec::from_slice(&[
+                r(0),
+                r(1) + r(2),
+                r(3) + r(4) - r(2),
+                r(5) - r(3) - 2.0 * r(4),
+                r(4) - 2.0 * r(5),
+                r(5),
+            ]),
+            Basis::Powers => (0..self.coefficients.len() / self.n).map(r).collect(),
+        };
+        shift(&mut d, centre);
         d
     }
 
@@ -77,6 +111,16 @@ impl Interpolant {
     pub fn derivative(&self, theta: f64, dy: &mut [f64]) {
         let n = self.n;
         let r = |i: usize| &self.coefficients[i * n..(i + 1) * n];
+        if self.basis == Basis::Powers {
+            dy.fill(0.0);
+            for k in (1..self.coefficients.len() / n).rev() {
+                for (dy, c) in dy.iter_mut().zip(r(k)) {
+                    *dy = *dy * theta + k as f64 * c;
+                }
+            }
+            dy.iter_mut().for_each(|dy| *dy /= self.dt);
+            return;
+        }
         let u = 1.0 - theta;
         let (w, dw) = ((theta * u).powi(2), 2.0 * theta * u * (u - theta));
         for (i, dy) in dy.iter_mut().enumerate() {
@@ -86,9 +130,39 @@ impl Interpolant {
     }
 }
 
+/// Makes coefficients in powers of theta those in powers of theta - `centre`: Horner's scheme, once for every
+/// derivative.
+pub(crate) fn shift(d: &mut [f64], centre: f64) {
+    if centre == 0.0 {
+        return;
+    }
+    let degree = d.len().saturating_sub(1);
+    for first in 0..degree {
+        for k in (first..degree).rev() {
+            d[k] += centre * d[k + 1];
+        }
+    }
+}
+
+/// Evaluates rows of coefficients.
+#[inline]
+pub(crate) fn evaluate(basis: Basis, coefficients: &[f64], n: usize, theta: f64, y: &mut [f64]) {
+    match basis {
+        Basis::Nested => evaluate_nested(coefficients, n, theta, y),
+        Basis::Powers => {
+            y.fill(0.0);
+            for row in coefficients.chunks_exact(n).rev() {
+                for (y, c) in y.iter_mut().zip(row) {
+                    *y = *y * theta + c;
+                }
+            }
+        }
+    }
+}
+
 /// Evaluates the nested form from its six rows.
 #[inline]
-pub(crate) fn evaluate(coefficients: &[f64], n: usize, theta: f64, y: &mut [f64]) {
+fn evaluate_nested(coefficients: &[f64], n: usize, theta: f64, y: &mut [f64]) {
     let (y0, rest) = coefficients.split_at(n);
     let (r1, rest) = rest.split_at(n);
     let (r2, rest) = rest.split_at(n);

@@ -5,12 +5,16 @@ mod controller;
 mod dense;
 mod dopri5;
 mod initial_step;
+mod method;
+mod taylor;
 
 pub use controller::{Controller, ErrorScale};
-pub use dense::Interpolant;
-pub(crate) use dense::{evaluate, nested};
+pub(crate) use dense::{evaluate, nested, shift};
+pub use dense::{Basis, Expansion, Interpolant};
 pub use dopri5::{Attempt, Dopri5};
 pub use initial_step::{initial_step, restart_step, tiny_step};
+pub use method::Stepper;
+pub use taylor::Taylor;
 
 #[cfg(test)]
 mod tests;

@@ -9,6 +9,7 @@ use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 
 use super::affine_model::AffineModel;
+use super::jets::MotionJets;
 use super::tiered::{compile, TieredProgram};
 use super::Word;
 
@@ -27,11 +28,14 @@ pub(super) struct Model {
     rates_program: OnceLock<TieredProgram>,
     affine_signs: OnceLock<AffineModel>,
     pub affine: Vec<bool>,
+    pub is_analytic: bool,
     gradients: Vec<OnceLock<CompiledGradient>>,
     both_sides: Vec<OnceLock<TieredProgram>>,
     enclosed_surfaces: Vec<OnceLock<Option<EnclosureProgram>>>,
     enclosed_components: Vec<OnceLock<Option<EnclosureProgram>>>,
     lie: Mutex<LieCache>,
+    /// Taylor coefficients of the motions met so far, by surfaces slid on and order.
+    jets: Mutex<FxHashMap<(SmallVec<[usize; 2]>, usize), Option<Arc<MotionJets>>>>,
     /// Active surfaces of the modes met so far; a zero entry is the surface slid on.
     activity: Mutex<FxHashMap<SmallVec<[i8; 16]>, Vec<bool>>>,
 }
@@ -79,12 +83,14 @@ impl Model {
         let surfaces_program = TieredProgram::new(graph.clone(), surfaces.clone(), backend);
         Ok(Model {
             n_states: field.len(),
+            is_analytic: graph.is_analytic(&field) && graph.is_analytic(&surfaces),
             affine: surfaces.iter().map(|&h| graph.is_affine(h)).collect(),
             gradients: surfaces.iter().map(|_| OnceLock::new()).collect(),
             both_sides: surfaces.iter().map(|_| OnceLock::new()).collect(),
             enclosed_surfaces: surfaces.iter().map(|_| OnceLock::new()).collect(),
             enclosed_components: surfaces.iter().map(|_| OnceLock::new()).collect(),
             lie: Mutex::new(LieCache::default()),
+            jets: Mutex::default(),
             activity: Mutex::default(),
             rates_program: OnceLock::new(),
             affine_signs: OnceLock::new(),
@@ -196,6 +202,16 @@ impl Model {
                 },
             }
         })
+    }
+
+    /// Taylor coefficients of the motions on these surfaces.
+    pub fn motion_jets(&self, sliding: &[usize], order: usize) -> Option<Arc<MotionJets>> {
+        let mut known = self.jets.lock().unwrap_or_else(PoisonError::into_inner);
+        let made = known.entry((SmallVec::from_slice(sliding), order));
+        made.or_insert_with(|| {
+            MotionJets::new(&self.graph, &self.field, sliding, order, self.backend).map(Arc::new)
+        })
+        .clone()
     }
 
     /// Marks the surfaces whose sign matters in a mode.

@@ -10,6 +10,7 @@ mod affine_model;
 mod both_sides;
 mod closures;
 mod compiled;
+mod jets;
 mod tiered;
 mod traced;
 
@@ -17,7 +18,10 @@ pub(crate) use activity::surfaces_that_matter;
 pub use affine::{AffineParts, AffineSigns, SingularSliding};
 pub use both_sides::BothSides;
 pub use closures::ClosureSystem;
+pub use jets::MotionJets;
 pub use traced::TracedSystem;
+
+use std::sync::Arc;
 
 use filippov_expr::{Enclosure, Motion};
 
@@ -238,6 +242,25 @@ pub trait PiecewiseSystem: Sync {
     /// sliding follow from a linear system; `None` if it cannot say.
     fn affine_signs(&self) -> Option<&dyn AffineSigns> {
         None
+    }
+
+    /// Do all fields and switching functions have Taylor series wherever they are finite? Square roots and powers
+    /// do not.
+    fn is_analytic(&self) -> bool {
+        false
+    }
+
+    /// Taylor coefficients up to `order` of the motions on these surfaces, in a region if there are none; `None`
+    /// if the system has none.
+    fn motion_jets(&self, sliding: &[usize], order: usize) -> Option<Arc<MotionJets>> {
+        let _ = (sliding, order);
+        None
+    }
+
+    /// Writes the coefficients at a point: (order + 1) rows. Not finite from the order on that does not exist.
+    fn eval_jets(&self, jets: &MotionJets, t: f64, x: &[f64], signs: &[f64], out: &mut [f64]) {
+        let _ = (jets, t, x, signs);
+        out.fill(f64::NAN);
     }
 
     /// A readable name of surface `j` for messages.

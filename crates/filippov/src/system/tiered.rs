@@ -10,22 +10,23 @@ const CALLS_BEFORE_NATIVE: u32 = 2000;
 
 /// An interpreted program that is compiled to native code after [`CALLS_BEFORE_NATIVE`] calls. Both give
 /// the same bits, so the moment of the change does not show in any result.
-pub(super) struct TieredProgram {
-    graph: Graph,
-    outputs: Vec<NodeId>,
+pub(super) struct Tiered<P> {
+    /// Compiles for a backend, falling back to the interpreter.
+    compile: Box<dyn Fn(Backend) -> P + Send + Sync>,
     backend: Backend,
-    interpreted: Program,
-    native: OnceLock<Program>,
+    interpreted: P,
+    native: OnceLock<P>,
     calls: AtomicU32,
 }
 
-impl TieredProgram {
-    /// Takes the graph that the outputs were just made in.
-    pub fn new(graph: Graph, outputs: Vec<NodeId>, backend: Backend) -> Self {
-        TieredProgram {
-            interpreted: compile(&graph, &outputs, Backend::Interpreter),
-            graph,
-            outputs,
+pub(super) type TieredProgram = Tiered<Program>;
+
+impl<P> Tiered<P> {
+    /// A program that `compile` makes.
+    pub fn from(compile: impl Fn(Backend) -> P + Send + Sync + 'static, backend: Backend) -> Self {
+        Tiered {
+            interpreted: compile(Backend::Interpreter),
+            compile: Box::new(compile),
             backend,
             native: OnceLock::new(),
             calls: AtomicU32::new(0),
@@ -34,15 +35,21 @@ impl TieredProgram {
 
     /// The program to call now.
     #[inline]
-    pub fn program(&self) -> &Program {
+    pub fn program(&self) -> &P {
         if let Some(native) = self.native.get() {
             return native;
         }
         if self.calls.fetch_add(1, Ordering::Relaxed) < CALLS_BEFORE_NATIVE {
             return &self.interpreted;
         }
-        self.native
-            .get_or_init(|| compile(&self.graph, &self.outputs, self.backend))
+        self.native.get_or_init(|| (self.compile)(self.backend))
+    }
+}
+
+impl TieredProgram {
+    /// Takes the graph that the outputs were just made in.
+    pub fn new(graph: Graph, outputs: Vec<NodeId>, backend: Backend) -> Self {
+        Tiered::from(move |backend| compile(&graph, &outputs, backend), backend)
     }
 }
 

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use filippov_expr::{Backend, Enclosure, ExprError, Graph, Interval, Motion, Names, NodeId};
 
 use super::compiled::{CompiledGradient, GradientValues, Model};
-use super::{AffineParts, AffineSigns, BothSides, LieValue, PiecewiseSystem, Word};
+use super::{AffineParts, AffineSigns, BothSides, LieValue, MotionJets, PiecewiseSystem, Word};
 use crate::error::FieldError;
 use crate::tolerances::{MAX_LIE_ORDER, TANGENT};
 
@@ -280,6 +280,18 @@ impl PiecewiseSystem for TracedSystem {
 
     fn affine_signs(&self) -> Option<&dyn AffineSigns> {
         Some(self)
+    }
+
+    fn is_analytic(&self) -> bool {
+        self.model.is_analytic
+    }
+
+    fn motion_jets(&self, sliding: &[usize], order: usize) -> Option<Arc<MotionJets>> {
+        self.model.motion_jets(sliding, order)
+    }
+
+    fn eval_jets(&self, jets: &MotionJets, t: f64, x: &[f64], signs: &[f64], out: &mut [f64]) {
+        jets.eval(t, x, signs, &self.parameters, out);
     }
 
     fn surface_name(&self, j: usize) -> String {

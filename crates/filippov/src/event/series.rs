@@ -1,0 +1,120 @@
+//! A monitored function along a step as a power series.
+
+use filippov_expr::Interval;
+
+use super::certificate::Bound;
+use crate::stepper::{shift, Expansion};
+use crate::tolerances::EPS;
+
+/// A polynomial in theta, lowest coefficient first.
+#[derive(Clone, Debug)]
+pub struct Series(Expansion);
+
+impl Series {
+    /// The polynomial with these coefficients.
+    pub fn new(coefficients: Expansion) -> Self {
+        Series(coefficients)
+    }
+
+    /// Divided by theta^order, the lower coefficients being zero.
+    #[must_use]
+    pub fn divided(mut self, order: usize) -> Self {
+        let order = order.min(self.0.len() - 1);
+        self.0.drain(..order);
+        self
+    }
+
+    /// The value at theta.
+    pub fn value(&self, theta: f64) -> f64 {
+        self.0.iter().rev().fold(0.0, |value, c| value * theta + c)
+    }
+
+    /// Is the polynomial greater than `noise` on all of [0, 1]? Looks at the sum of its falling terms, then at
+    /// its Bernstein coefficients; `false` may mean that they do not tell.
+    pub fn is_above(&self, noise: f64) -> bool {
+        let falling: f64 = self.0[1..].iter().map(|c| c.min(0.0)).sum();
+        if self.0[0] + falling > noise {
+            return true;
+        }
+        // The coefficient of degree i is the sum of C(i, k)/C(n, k) c_k: a triangle of differences.
+        let mut b = self.0.clone();
+        let degree = b.len() - 1;
+        let mut binomial = 1.0;
+        for (k, b) in b.iter_mut().enumerate() {
+            *b /= binomial;
+            binomial *= (degree - k) as f64 / (k + 1) as f64;
+        }
+        for first in 0..degree {
+            for k in (first..degree).rev() {
+                b[k + 1] += b[k];
+            }
+            if first == 0 && b[degree] <= noise {
+                return false;
+            }
+        }
+        b.iter().all(|&b| b > noise)
+    }
+
+    /// Bounds of value and slope from theta = `a` to `b`, rounding included.
+    pub fn bound(&self, a: f64, b: f64) -> Bound {
+        let mut d = self.0.clone();
+        shift(&mut d, 0.5 * (a + b));
+        let radius = 0.5 * (b - a);
+        let (mut spread, mut slope_spread, mut power, mut size) = (0.0, 0.0, 1.0, 0.0);
+        for (k, c) in d.iter().enumerate().skip(1) {
+            let magnitude = c.abs();
+            if k > 1 {
+                slope_spread += k as f64 * magnitude * power;
+            }
+            power *= radius;
+            spread += magnitude * power;
+            size += magnitude;
+        }
+        let slope = d.get(1).copied().unwrap_or(0.0);
+        Bound {
+            value: Interval::around(d[0], spread + 8.0 * EPS * (size + d[0].abs())),
+            slope: Interval::around(slope, slope_spread + 16.0 * EPS * size),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Series;
+    use smallvec::smallvec;
+
+    #[test]
+    fn a_polynomial_is_above_what_it_stays_above() {
+        // (theta - 0.4)^2 + d
+        for (d, is_above) in [(0.05, true), (0.0, false), (-0.1, false)] {
+            let series = Series::new(smallvec![0.16 + d, -0.8, 1.0]);
+            let lowest = (0..=100).map(|k| series.value(f64::from(k) * 0.01));
+            assert_eq!(lowest.fold(f64::INFINITY, f64::min) > 1e-9, is_above);
+            assert!(is_above || !series.is_above(1e-9));
+        }
+        // Bernstein coefficients tell where the falling terms do not.
+        assert!(Series::new(smallvec![1.0, -1.5, 1.0, 0.0]).is_above(0.0));
+        assert!(!Series::new(smallvec![1.0, -2.5, 1.0]).is_above(0.0));
+    }
+
+    #[test]
+    fn bounds_hold_the_values_and_slopes_of_a_piece() {
+        let series = Series::new(smallvec![0.3, -1.0, 0.5, 2.0, -1.5]);
+        for (a, b) in [(0.0, 1.0), (0.2, 0.3), (0.9, 1.0)] {
+            let bound = series.bound(a, b);
+            for k in 0..=20 {
+                let (theta, d) = (a + (b - a) * f64::from(k) / 20.0, 1e-6);
+                let slope = (series.value(theta + d) - series.value(theta - d)) / (2.0 * d);
+                let value = series.value(theta);
+                assert!(bound.value.lo <= value && value <= bound.value.hi);
+                assert!(bound.slope.lo - 1e-8 <= slope && slope <= bound.slope.hi + 1e-8);
+            }
+        }
+    }
+
+    #[test]
+    fn a_zero_at_the_start_is_divided_out() {
+        let series = Series::new(smallvec![0.0, 0.0, 2.0, 1.0]).divided(2);
+        assert_eq!((series.value(0.0), series.value(1.0)), (2.0, 3.0));
+    }
+}

@@ -1,0 +1,237 @@
+//! The search of a step for the first zero of one monitored function.
+
+use super::bounds::BoundedCurve;
+use super::curve::{grazes, Curve};
+use super::integrator::Integrator;
+use crate::error::FieldError;
+use crate::event::isolate::{first_zero_sampled, Evidence, Sampled, Zero, PROBES};
+use crate::event::locate::{refine, Located};
+use crate::event::series::Series;
+use crate::event::{EventFunction, Monitored};
+use crate::stepper::nested;
+use crate::tolerances::{BEYOND_TOUCH, EPS, POLE, RESOLVED_DEPTH, UNBOUNDED_DEPTH, UNPROVED_DEPTH};
+
+/// What came of a search.
+pub(super) enum SearchOutcome {
+    /// There is no zero.
+    Nothing,
+    /// The function vanishes at this theta; whether it only touches zero.
+    At(f64, bool),
+    /// A touch that ends nothing: the search goes on from this theta.
+    Beyond(f64),
+    /// The sign changes without a zero.
+    Pole,
+}
+
+/// A piece of a step that was searched.
+pub(super) struct Searched {
+    pub function: EventFunction,
+    pub piece: (f64, f64),
+    /// Largest value among the samples.
+    pub scale: f64,
+    /// Rounding of the function.
+    pub noise: f64,
+    /// How well a zero is to be located.
+    pub width: f64,
+}
+
+impl Searched {
+    /// What an isolated zero of `g` means, located to rounding.
+    pub fn outcome(&self, g: Sampled, zero: Option<Zero>) -> Result<SearchOutcome, FieldError> {
+        let (from, to) = self.piece;
+        Ok(match zero {
+            None => SearchOutcome::Nothing,
+            Some(Zero::Touch(theta)) if theta <= from => SearchOutcome::Nothing,
+            // A multiplier that touches its end goes on; it may leave later in the step.
+            Some(Zero::Touch(theta)) if matches!(self.function, EventFunction::Exit(_)) => {
+                let rest = theta + BEYOND_TOUCH * (to - from);
+                if rest >= to {
+                    SearchOutcome::Nothing
+                } else {
+                    SearchOutcome::Beyond(rest)
+                }
+            }
+            Some(Zero::Touch(theta)) => SearchOutcome::At(theta, true),
+            // Beyond the surface from the start, by the rounding of what moved the state: the switch is now.
+            Some(Zero::Crossing(bracket)) if bracket.lo >= bracket.hi => {
+                SearchOutcome::At(bracket.lo, false)
+            }
+            Some(Zero::Crossing(bracket)) => {
+                let Located { theta, residual } = refine(g, bracket, self.width)?;
+                if residual > POLE * self.scale {
+                    return Ok(SearchOutcome::Pole);
+                }
+                if bracket.is_steep(self.scale, self.noise) {
+                    return Ok(SearchOutcome::At(theta, false));
+                }
+                match grazes(g, theta, from, to, self.noise)? {
+                    Some(vertex) => SearchOutcome::At(vertex, true),
+                    None => SearchOutcome::At(theta, false),
+                }
+            }
+        })
+    }
+}
+
+impl Integrator<'_> {
+    /// The first zero of one monitored function on [from, to], refined to rounding.
+    pub(super) fn search(
+        &mut self,
+        (index, has_bounds): (usize, bool),
+        (from, to): (f64, f64),
+        dt: f64,
+    ) -> Result<Option<(f64, bool)>, FieldError> {
+        let m = self.motion.monitored[index];
+        let noise = self.noise_of(m.function)?;
+        self.motion.monitored[index].noise = noise;
+        let polynomial = match m.function {
+            EventFunction::Surface(j) if m.affine && self.motion.is_straight => {
+                Some(self.affine_polynomial(j, &m, dt)?)
+            }
+            _ => None,
+        };
+        let by_multipliers = !self.slides_by_rule();
+        let interpolant = self.stepper.interpolant();
+        let bounds = BoundedCurve {
+            system: self.system,
+            interpolant,
+            signs: &self.motion.signs,
+            sliding: &self.motion.sliding,
+            margin: &self.detector.margin,
+            stages: &self.detector.stages,
+            affine: self.motion.affine_bounds.as_ref().and_then(Option::as_ref),
+            by_multipliers,
+            last: &self.detector.enclosed_exits,
+            last_root: &self.detector.enclosed_root,
+        };
+        let mut curve = Curve {
+            system: self.system,
+            field: &mut self.motion.field,
+            signs: &self.motion.signs,
+            interpolant,
+            is_straight: self.motion.is_straight,
+            h: &mut self.detector.h,
+            x: &mut self.detector.x,
+            exits: &mut self.detector.exits,
+            n_evaluations: &mut self.stats.n_surface_evaluations,
+        };
+        let (t, dt_step) = (self.t, dt);
+        let mut g = |theta: f64| {
+            let value = match &polynomial {
+                Some(Polynomial::Quotient(series)) => return Ok(series.value(theta)),
+                Some(Polynomial::Powers(series)) => series.value(theta),
+                Some(Polynomial::Nested(rows)) => nested(rows, theta),
+                None => curve.value(&m, theta)?,
+            };
+            Ok(m.deflated(value, t + theta * dt_step, dt_step, noise))
+        };
+        let mut values = [f64::NAN; 5];
+        let (start, end) = (m.value, self.detector.right[index].0);
+        for (i, value) in values.iter_mut().enumerate() {
+            let theta = from + (to - from) * 0.25 * i as f64;
+            *value = match theta {
+                0.0 => m.deflated(start, t, dt, noise),
+                1.0 => m.deflated(end, t + dt, dt, noise),
+                _ => g(theta)?,
+            };
+        }
+        let mut over = |a, b| match &polynomial {
+            Some(Polynomial::Quotient(series) | Polynomial::Powers(series)) => {
+                Some(series.bound(a, b))
+            }
+            _ => bounds.over(&m, a, b),
+        };
+        let is_quotient = matches!(polynomial, Some(Polynomial::Quotient(_)));
+        let is_bounded = match polynomial {
+            Some(Polynomial::Nested(_)) => false,
+            Some(_) => true,
+            None => has_bounds,
+        };
+        let evidence = match (m.function, is_bounded) {
+            (_, true) => Evidence::Bounds {
+                bounds: &mut over,
+                divided: m.deflation.is_some() && !is_quotient,
+                patience: match m.function {
+                    EventFunction::Exit(_) => UNPROVED_DEPTH,
+                    _ => UNBOUNDED_DEPTH,
+                },
+            },
+            // Along the step an affine surface is a quintic; the quartic and its remainder describe it.
+            (EventFunction::Surface(_), _) if m.affine => Evidence::Probes(&[]),
+            (EventFunction::Surface(_), _) => Evidence::Probes(&PROBES),
+            _ => Evidence::Probes(&PROBES[..1]),
+        };
+        let isolated = first_zero_sampled(&mut g, from, to, values, noise, evidence)?;
+        self.detector.unresolved |= isolated.depth > RESOLVED_DEPTH && !is_bounded;
+        self.detector.uncertain |= isolated.exhausted || isolated.not_finite;
+        let searched = Searched {
+            function: m.function,
+            piece: (from, to),
+            scale: values.iter().fold(0.0_f64, |m, v| m.max(v.abs())),
+            noise,
+            width: 0.5 * EPS * (t.abs() / dt).max(to),
+        };
+        match searched.outcome(&mut g, isolated.zero)? {
+            SearchOutcome::Nothing => Ok(None),
+            SearchOutcome::At(theta, touch) => Ok(Some((theta, touch))),
+            SearchOutcome::Beyond(rest) => self.search((index, has_bounds), (rest, to), dt),
+            SearchOutcome::Pole => {
+                self.detector.uncertain = true;
+                Ok(None)
+            }
+        }
+    }
+
+    /// Is an affine h surely positive on the whole of a Taylor step, but for a zero at its start that is divided
+    /// out?
+    pub(super) fn is_clear(&mut self, j: usize, m: &Monitored, dt: f64) -> Result<bool, FieldError> {
+        let is_known = m.deflation.is_none_or(|zero| zero.t == self.t);
+        Ok(is_known && self.affine_polynomial(j, m, dt)?.is_clear())
+    }
+
+    /// An affine h along the continuous extension.
+    fn affine_polynomial(
+        &mut self,
+        j: usize,
+        m: &Monitored,
+        dt: f64,
+    ) -> Result<Polynomial, FieldError> {
+        if self.stepper.is_taylor() {
+            let series = self.affine_series(j, m, dt)?;
+            return Ok(match m.deflation {
+                Some(zero) if zero.t == self.t => {
+                    Polynomial::Quotient(series.divided(zero.order as usize))
+                }
+                _ => Polynomial::Powers(series),
+            });
+        }
+        let (point, signs) = ((self.t, &self.x[..]), &self.motion.signs);
+        let extension = self.stepper.interpolant().coefficients();
+        let mut rows = [0.0; 6];
+        let ht = self
+            .system
+            .gradient_products(j, point, signs, extension, &mut rows)?;
+        rows.iter_mut().for_each(|row| *row *= m.orientation);
+        rows[0] = m.value;
+        rows[1] += m.orientation * ht * dt;
+        Ok(Polynomial::Nested(rows))
+    }
+}
+
+/// An affine function along a step, in the form of the step's continuous extension.
+enum Polynomial {
+    Nested([f64; 6]),
+    Powers(Series),
+    /// The zero at the start of this step is divided out.
+    Quotient(Series),
+}
+
+impl Polynomial {
+    /// Is a series surely positive on the whole step?
+    fn is_clear(&self) -> bool {
+        match self {
+            Polynomial::Quotient(series) | Polynomial::Powers(series) => series.is_above(0.0),
+            Polynomial::Nested(_) => false,
+        }
+    }
+}

@@ -1,0 +1,134 @@
+//! Steps by Taylor series.
+
+use smallvec::smallvec;
+
+use super::integrator::Integrator;
+use crate::error::FieldError;
+use crate::event::series::Series;
+use crate::event::Monitored;
+use crate::options::Method;
+use crate::stepper::{Attempt, Expansion};
+use crate::tolerances::{EPS, TAYLOR_SHORTEST};
+
+impl Integrator<'_> {
+    /// The motion that starts takes Taylor steps if the run may and the motion has series.
+    pub(super) fn choose_stepper(&mut self) {
+        self.motion.jets = match &self.stepper.taylor {
+            Some(taylor) => {
+                let jets = self.system.motion_jets(&self.motion.sliding, taylor.order());
+                let is_auto = self.options.method == Method::Auto;
+                jets.filter(|jets| !is_auto || jets.is_unrolled())
+            }
+            None => None,
+        };
+        self.stepper.use_taylor(self.motion.jets.is_some());
+    }
+
+    /// Makes the proposed step no longer than the series at its start allows. Where the motion has no series, the
+    /// Runge-Kutta method goes on.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub(super) fn expand(&mut self) -> Result<(), FieldError> {
+        let (Some(taylor), Some(jets)) = (&mut self.stepper.taylor, &self.motion.jets) else {
+            return Ok(());
+        };
+        if taylor.is_expanded() {
+            return Ok(());
+        }
+        let (system, t, x, signs) = (self.system, self.t, &self.x, &self.motion.signs);
+        let fill = |rows: &mut [f64]| system.eval_jets(jets, t, x, signs, rows);
+        let mut allowed = taylor.expand(jets.width(), x, &self.scale, fill);
+        self.stats.n_field_evaluations += taylor.order() as u64;
+        if jets.width() > x.len() {
+            allowed = allowed.min(self.longest_for_functions(allowed));
+        }
+        if allowed > TAYLOR_SHORTEST * EPS * self.t.abs() {
+            self.dt = self.dt.min(allowed);
+            return Ok(());
+        }
+        self.stepper.leave_taylor();
+        self.motion.jets = None;
+        self.dt = f64::NAN;
+        self.dt = self.first_step(&[])?;
+        Ok(())
+    }
+
+    /// How long a step the series of the monitored functions suggest: until their last terms reach the tolerance of
+    /// their size over the step, `reach` being what the states allow. Their zeros are found on any step, but on
+    /// one of this length with little work.
+    fn longest_for_functions(&self, reach: f64) -> f64 {
+        let (Some(taylor), Some(jets)) = (&self.stepper.taylor, &self.motion.jets) else {
+            return f64::INFINITY;
+        };
+        let order = taylor.order();
+        let mut longest = f64::INFINITY;
+        for place in self.x.len()..jets.width() {
+            let size = self.function_scale(place, reach);
+            for k in [order - 1, order] {
+                let c = taylor.coefficient(place, k).abs();
+                if c.is_nan() {
+                    return f64::NAN;
+                }
+                if c > 0.0 {
+                    longest = longest.min((size / c).powf(1.0 / k as f64));
+                }
+            }
+        }
+        longest
+    }
+
+    /// The tolerance for a function: relative to what it moves through in a step, exit functions to the larger one.
+    fn function_scale(&self, place: usize, reach: f64) -> f64 {
+        let (Some(taylor), Some(jets)) = (&self.stepper.taylor, &self.motion.jets) else {
+            return f64::INFINITY;
+        };
+        let size = |place: usize| {
+            let slope = taylor.coefficient(place, 1).abs();
+            let moved = if reach.is_finite() { slope * reach } else { slope };
+            taylor.coefficient(place, 0).abs().max(moved)
+        };
+        let exits = [0, 1].map(|index| jets.exit(index));
+        let size = if exits.contains(&Some(place)) {
+            exits.into_iter().flatten().map(size).fold(0.0, f64::max)
+        } else {
+            size(place)
+        };
+        let atol = self.options.atol.iter().copied().fold(f64::INFINITY, f64::min);
+        atol + self.options.rtol * size
+    }
+
+    /// Attempts a Taylor step.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub(super) fn attempt_series(&mut self, dt: f64) -> Result<Attempt, FieldError> {
+        let Some(taylor) = &mut self.stepper.taylor else {
+            return Ok(Attempt::NotFinite);
+        };
+        let field = &mut self.motion.field;
+        let attempt = taylor.attempt(field, self.t, &self.x, dt, &self.scale)?;
+        let exits = self.detector.stages.iter_mut();
+        for (stages, exit) in exits.zip(self.motion.field.last_exits()) {
+            stages[1..].fill(exit);
+        }
+        Ok(attempt)
+    }
+
+    /// An affine switching function along the step, positive inside of the mode.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub(super) fn affine_series(&mut self, j: usize, m: &Monitored, dt: f64) -> Result<Series, FieldError> {
+        let extension = self.stepper.interpolant().coefficients();
+        let mut rows: Expansion = smallvec![0.0; extension.len() / self.x.len()];
+        let (point, signs) = ((self.t, &self.x[..]), &self.motion.signs);
+        let ht = self
+            .system
+            .gradient_products(j, point, signs, extension, &mut rows)?;
+        rows.iter_mut().for_each(|row| *row *= m.orientation);
+        rows[0] = m.value;
+        rows[1] += m.orientation * ht * dt;
+        Ok(Series::new(rows))
+    }
+}

@@ -1,0 +1,204 @@
+//! The Taylor method: the coefficients of the motion are the step, its continuous extension and its error.
+
+use super::{Attempt, ErrorScale, Interpolant};
+use crate::error::FieldError;
+use crate::field::SmoothField;
+use crate::tolerances::{
+    TAYLOR_DIGITS_TO_ORDER, TAYLOR_LARGEST_ORDER, TAYLOR_SMALLEST_ORDER,
+};
+
+/// A Taylor step of variable length.
+///
+/// With coefficients up to order N in units of the tolerance, |c_k|, the step is as long as the last two
+/// allow: |c_k| dt^k <= 1 for k = N - 1 and N. The first term left out is smaller by the ratio of the step to the
+/// radius of convergence. That the series describes the motion is then checked at the end of the step, where
+/// its derivative has to be the field.
+///
+/// Reference: Jorba, Zou, *A software package for the numerical integration of ODEs by means of high-order
+/// Taylor methods*, Exp. Math. 14 (2005).
+pub struct Taylor {
+    n: usize,
+    order: usize,
+    /// Entries of a row: the states, then functions of them.
+    width: usize,
+    /// Coefficients in powers of time at the start of the step, (order + 1) rows.
+    rows: Vec<f64>,
+    /// The rows belong to the current start.
+    is_expanded: bool,
+    start: Vec<f64>,
+    y1: Vec<f64>,
+    end: Vec<f64>,
+    defect: Vec<f64>,
+    interpolant: Interpolant,
+    /// Error of the attempted step in units of the tolerance.
+    error: f64,
+}
+
+impl Taylor {
+    /// The order for a relative tolerance. The higher the order, the longer and dearer the step; where most of
+    /// the cost is that of a step whatever its order, more than the least work per unit of time pays.
+    pub fn order_for(rtol: f64) -> usize {
+        let digits = -rtol.log10();
+        let order = (TAYLOR_DIGITS_TO_ORDER * digits).ceil();
+        (order as usize).clamp(TAYLOR_SMALLEST_ORDER, TAYLOR_LARGEST_ORDER)
+    }
+
+    /// A stepper for n states.
+    pub fn new(n: usize, order: usize) -> Self {
+        Taylor {
+            n,
+            order,
+            width: n,
+            rows: Vec::new(),
+            is_expanded: false,
+            start: vec![0.0; n],
+            y1: vec![0.0; n],
+            end: vec![0.0; n],
+            defect: vec![0.0; n],
+            interpolant: Interpolant::powers(n, order),
+            error: 0.0,
+        }
+    }
+
+    /// The order of the method.
+    pub fn order(&self) -> usize {
+        self.order
+    }
+
+    /// Are the coefficients at the start of the step known?
+    pub fn is_expanded(&self) -> bool {
+        self.is_expanded
+    }
+
+    /// Takes the coefficients at the start `y` of a step, rows of `width`, that `fill` writes; returns the length
+    /// of step that they allow, NaN if they are not finite.
+    pub fn expand(&mut self, width: usize, y: &[f64], scale: &ErrorScale, fill: impl FnOnce(&mut [f64])) -> f64 {
+        self.width = width;
+        self.rows.resize((self.order + 1) * width, 0.0);
+        fill(&mut self.rows);
+        self.is_expanded = true;
+        self.longest_step(y, scale)
+    }
+
+    /// The start of the step has changed.
+    pub fn forget(&mut self) {
+        self.is_expanded = false;
+    }
+
+    /// Coefficient k of column `place`, in powers of time.
+    pub fn coefficient(&self, place: usize, k: usize) -> f64 {
+        self.rows[k * self.width + place]
+    }
+
+    /// Column `place` of the coefficients, in powers of theta.
+    pub fn column(&self, place: usize) -> impl Iterator<Item = f64> + '_ {
+        let rows = self.rows.iter().skip(place).step_by(self.width);
+        let dt = self.interpolant.dt;
+        rows.scan(1.0, move |power, c| {
+            let scaled = c * *power;
+            *power *= dt;
+            Some(scaled)
+        })
+    }
+
+    fn row(&self, k: usize) -> &[f64] {
+        &self.rows[k * self.width..k * self.width + self.n]
+    }
+
+    fn longest_step(&self, y: &[f64], scale: &ErrorScale) -> f64 {
+        if self.rows.iter().any(|c| !c.is_finite()) {
+            return f64::NAN;
+        }
+        let allows = |k: usize| {
+            let size = scale.norm(self.row(k), y);
+            if size == 0.0 {
+                f64::INFINITY
+            } else {
+                size.powf(-1.0 / k as f64)
+            }
+        };
+        allows(self.order).min(allows(self.order - 1))
+    }
+
+    /// The derivative at the start of the step.
+    pub fn start_derivative(&self) -> &[f64] {
+        &self.start
+    }
+
+    /// The derivative at the start of the step, to be replaced.
+    pub fn start_derivative_mut(&mut self) -> &mut [f64] {
+        self.is_expanded = false;
+        &mut self.start
+    }
+
+    /// The end of the attempted step.
+    pub fn end(&self) -> &[f64] {
+        &self.y1
+    }
+
+    /// The derivative at the end of the attempted step.
+    pub fn end_derivative(&self) -> &[f64] {
+        &self.end
+    }
+
+    /// The series of the attempted step.
+    pub fn interpolant(&self) -> &Interpolant {
+        &self.interpolant
+    }
+
+    /// Attempts a step of length `dt` with the coefficients taken last; the field is evaluated at its end.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn attempt(
+        &mut self,
+        field: &mut impl SmoothField,
+        t: f64,
+        y: &[f64],
+        dt: f64,
+        scale: &ErrorScale,
+    ) -> Result<Attempt, FieldError> {
+        let n = self.n;
+        (self.interpolant.t0, self.interpolant.dt) = (t, dt);
+        let mut power = 1.0;
+        let scaled = self.interpolant.coefficients_mut().chunks_exact_mut(n);
+        for (to, from) in scaled.zip(self.rows.chunks_exact(self.width)) {
+            to.iter_mut().zip(from).for_each(|(to, c)| *to = c * power);
+            power *= dt;
+        }
+        self.interpolant.coefficients_mut()[..n].copy_from_slice(y);
+        self.interpolant.at(1.0, &mut self.y1);
+        self.interpolant.derivative(1.0, &mut self.defect);
+        field.eval(t + dt, &mut self.y1, &mut self.end)?;
+        // The defect is the derivative of the first term left out: order + 1 times that term over the step.
+        let share = dt / (self.order + 1) as f64;
+        for (defect, rate) in self.defect.iter_mut().zip(&self.end) {
+            *defect = share * (*defect - rate);
+        }
+        self.error = scale.norm(&self.defect, &self.y1);
+        let is_finite = self.error.is_finite() && self.y1.iter().all(|y| y.is_finite());
+        Ok(if is_finite {
+            Attempt::Error(self.error)
+        } else {
+            Attempt::NotFinite
+        })
+    }
+
+    /// The factor for another attempt after one with this error was rejected.
+    pub fn reject(&self, error: f64) -> f64 {
+        let exponent = -1.0 / (self.order + 1) as f64;
+        (0.9 * error.powf(exponent)).clamp(0.1, 0.9)
+    }
+
+    /// The error of the series at theta > 1 in units of the tolerance.
+    pub fn extrapolation_error(&self, theta: f64) -> f64 {
+        self.error * theta.powi(self.order as i32 + 1)
+    }
+
+    /// Makes the end of the attempted step the start of the next one.
+    pub fn accept(&mut self, y: &mut [f64]) {
+        y.copy_from_slice(&self.y1);
+        self.start.copy_from_slice(&self.end);
+        self.is_expanded = false;
+    }
+}
