@@ -313,9 +313,16 @@ pub const BEYOND_TOUCH: f64 = 0.02;
 /// square root of the time that is left.
 pub const AT_FOLD: f64 = 1e-2;
 
+/// A zero that is expected somewhere is searched for up to this many times the way there: behind it, so that it is
+/// found, and not far, so that bounds are narrow.
+pub const BEYOND_GUESS: f64 = 1.1;
+
+/// Halvings of a step whose bounds have to decide everything; beyond that samples help.
+pub const PROVED_DEPTH: u32 = 6;
+
 /// Order of a Taylor step per decimal digit of the relative tolerance. The least work per unit of time takes 1.15
 /// (Jorba and Zou); a step has costs beside its coefficients, and longer ones pay.
-pub const TAYLOR_DIGITS_TO_ORDER: f64 = 1.5;
+pub const TAYLOR_DIGITS_TO_ORDER: f64 = 2.0;
 
 /// Lowest order of a Taylor step: below it the step is no longer than one of DOPRI5.
 pub const TAYLOR_SMALLEST_ORDER: usize = 8;

@@ -83,15 +83,21 @@ pub enum Proof {
     Silent,
 }
 
-/// What is proved about a function that is `left` > 0 and `right` at the ends of a step. Halves the step up to
-/// `depth` times.
-pub fn prove(bounds: Bounds, left: f64, right: f64, noise: f64, depth: u32) -> Proof {
+/// What is proved about a function that is `left` > 0 at the start of a step, and `right` at its part up to `reach`,
+/// if that is known. Halves the part up to `depth` times.
+pub fn prove(
+    bounds: Bounds,
+    reach: f64,
+    (left, right): (f64, Option<f64>),
+    noise: f64,
+    depth: u32,
+) -> Proof {
     // A change of sign needs no proof.
-    if right <= 0.0 && bounds(0.0, 1.0).is_some_and(|bound| bound.value.is_bounded()) {
+    let is_beyond = right.is_some_and(|right| right <= 0.0);
+    if is_beyond && bounds(0.0, reach).is_some_and(|bound| bound.value.is_bounded()) {
         return Proof::Open;
     }
-    let ends = (Some(left), Some(right));
-    prove_between(bounds, (0.0, 1.0), ends, noise, depth)
+    prove_between(bounds, (0.0, reach), (Some(left), right), noise, depth)
 }
 
 fn prove_between(

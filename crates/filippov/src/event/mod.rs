@@ -11,6 +11,7 @@ pub mod filter;
 pub mod function;
 pub mod isolate;
 pub mod locate;
+pub mod proved;
 pub mod series;
 pub mod tube;
 

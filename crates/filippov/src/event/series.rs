@@ -6,6 +6,10 @@ use super::certificate::Bound;
 use crate::stepper::{shift, Expansion};
 use crate::tolerances::EPS;
 
+/// Samples, and steps of Newton's method, in the search for about where a zero is.
+const GUESS_SAMPLES: u32 = 8;
+const GUESS_STEPS: u32 = 2;
+
 /// A polynomial in theta, lowest coefficient first.
 #[derive(Clone, Debug)]
 pub struct Series(Expansion);
@@ -53,6 +57,36 @@ impl Series {
             }
         }
         b.iter().all(|&b| b > noise)
+    }
+
+    /// About where the polynomial, positive at 0, first falls through zero on [0, 1], found by a few samples and
+    /// Newton's method; none if the samples show no zero.
+    pub fn near_zero(&self) -> Option<f64> {
+        let mut previous = self.0[0];
+        for i in 1..=GUESS_SAMPLES {
+            let theta = f64::from(i) / f64::from(GUESS_SAMPLES);
+            let value = self.value(theta);
+            if value <= 0.0 {
+                let share = previous / (previous - value);
+                let mut at = theta - (1.0 - share) / f64::from(GUESS_SAMPLES);
+                for _ in 0..GUESS_STEPS {
+                    let (value, slope) = self.with_slope(at);
+                    at -= value / slope;
+                }
+                return (at > 0.0 && at <= 1.0).then_some(at);
+            }
+            previous = value;
+        }
+        None
+    }
+
+    fn with_slope(&self, theta: f64) -> (f64, f64) {
+        let (mut value, mut slope) = (0.0, 0.0);
+        for c in self.0.iter().rev() {
+            slope = slope * theta + value;
+            value = value * theta + c;
+        }
+        (value, slope)
     }
 
     /// Bounds of value and slope from theta = `a` to `b`, rounding included.

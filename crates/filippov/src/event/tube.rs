@@ -56,7 +56,7 @@ impl Motion for Tube<'_> {
         Enclosure {
             value: Interval::around(d[0], spread + 8.0 * EPS * size + margin),
             rate: Interval::around(
-                d[1],
+                d.get(1).copied().unwrap_or(0.0),
                 slope_spread + 16.0 * EPS * size + MARGIN_SLOPE * margin,
             )
             .scaled(1.0 / dt),

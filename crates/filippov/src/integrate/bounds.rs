@@ -171,8 +171,8 @@ fn exit_bound(exit: IntersectionExit, root: &EnclosedRoot) -> Option<Interval> {
 }
 
 impl Integrator<'_> {
-    /// What bounds over the step prove about a function.
-    pub(super) fn prove_clear(&self, index: usize, value_at_end: f64) -> Proof {
+    /// What bounds over the step up to `reach` prove about a function.
+    pub(super) fn prove_clear(&self, index: usize, value_at_end: f64, reach: f64) -> Proof {
         let m = self.motion.monitored[index];
         let curve = BoundedCurve {
             system: self.system,
@@ -194,8 +194,8 @@ impl Integrator<'_> {
         };
         prove(
             &mut |a, b| curve.over(&m, a, b),
-            at_start,
-            value_at_end,
+            reach,
+            (at_start, (reach == 1.0).then_some(value_at_end)),
             m.noise,
             PROOF_DEPTH,
         )

@@ -181,6 +181,9 @@ impl Integrator<'_> {
             // There will be a search: the extension that it needs serves the filter too.
             self.extend()?;
         }
+        if self.stepper.is_taylor() {
+            return self.detect_along_series(dt);
+        }
         self.collect_suspects(dt)?;
         let mut found: Option<Found> = None;
         if !self.detector.suspects.is_empty() {
@@ -200,11 +203,8 @@ impl Integrator<'_> {
     /// The filter: which functions may vanish within the step?
     fn collect_suspects(&mut self, dt: f64) -> Result<(), FieldError> {
         self.detector.suspects.clear();
-        let is_series = self.stepper.is_taylor();
-        let is_known = !is_series || self.motion.is_straight;
-        let is_polynomial = |m: &Monitored| {
-            m.affine && is_known && matches!(m.function, EventFunction::Surface(_))
-        };
+        let is_polynomial =
+            |m: &Monitored| m.affine && matches!(m.function, EventFunction::Surface(_));
         if !self.motion.monitored.iter().all(is_polynomial) {
             self.stepper.extend_order4(&self.x);
         }
@@ -220,15 +220,11 @@ impl Integrator<'_> {
             let proof = if is_polynomial(&m) {
                 Proof::Silent
             } else {
-                self.prove_clear(index, value)
+                self.prove_clear(index, value, 1.0)
             };
             let suspect = match (m.function, m.deflation, proof) {
                 (_, _, Proof::Clear) => false,
                 (_, _, Proof::Open) => true,
-                (EventFunction::Surface(j), _, _) if is_series && is_polynomial(&m) => {
-                    !self.is_clear(j, &m, dt)?
-                }
-                _ if is_series => true,
                 (EventFunction::Surface(_), None, _) if m.affine => {
                     may_vanish(m.value, m.rate * dt, value, rate * dt)
                 }
@@ -262,6 +258,30 @@ impl Integrator<'_> {
             }
         }
         Ok(())
+    }
+
+    /// The earliest event of a Taylor step. Functions that are beyond zero at its end come first: the others need not
+    /// be looked at after the first zero.
+    fn detect_along_series(&mut self, dt: f64) -> Result<Option<Found>, FieldError> {
+        self.measure_margin(dt)?;
+        let mut found: Option<Found> = None;
+        // What was searched for the first zero is all that the others are searched for.
+        let mut reach = 1.0;
+        for is_beyond in [true, false] {
+            for index in 0..self.motion.monitored.len() {
+                let (value, _) = self.detector.right[index];
+                if (value <= 0.0) != is_beyond {
+                    continue;
+                }
+                let (zero, searched) = self.search_along_series(index, reach, dt)?;
+                self.keep_earliest(&mut found, index, zero, dt);
+                reach = searched;
+            }
+        }
+        if found.is_none() && self.one_sided {
+            self.detect_beyond(dt, &mut found)?;
+        }
+        Ok(found)
     }
 
     /// Rounding of a monitored function over the step.
@@ -321,6 +341,11 @@ impl Integrator<'_> {
         Ok(())
     }
 
+    /// Zeros that are closer than this, in steps, are one event.
+    pub(super) fn together(&self, dt: f64) -> f64 {
+        4.0 * EPS * (1.0 + self.t.abs() / dt)
+    }
+
     pub(super) fn keep_earliest(
         &self,
         found: &mut Option<Found>,
@@ -330,7 +355,7 @@ impl Integrator<'_> {
     ) {
         let Some((theta, touch)) = zero else { return };
         let function = self.motion.monitored[index].function;
-        let together = 4.0 * EPS * (1.0 + self.t.abs() / dt);
+        let together = self.together(dt);
         match found {
             Some(event) if theta > event.theta + together => {}
             Some(event) if theta >= event.theta - together => {

@@ -4,12 +4,14 @@ use super::bounds::BoundedCurve;
 use super::curve::{grazes, Curve};
 use super::integrator::Integrator;
 use crate::error::FieldError;
+use crate::event::certificate::Proof;
 use crate::event::isolate::{first_zero_sampled, Evidence, Sampled, Zero, PROBES};
 use crate::event::locate::{refine, Located};
+use crate::event::proved::{first_zero_proved, Proved};
 use crate::event::series::Series;
 use crate::event::{EventFunction, Monitored};
 use crate::stepper::nested;
-use crate::tolerances::{BEYOND_TOUCH, EPS, POLE, RESOLVED_DEPTH, UNBOUNDED_DEPTH, UNPROVED_DEPTH};
+use crate::tolerances::{BEYOND_GUESS, BEYOND_TOUCH, EPS, POLE, RESOLVED_DEPTH, UNBOUNDED_DEPTH, UNPROVED_DEPTH};
 
 /// What came of a search.
 pub(super) enum SearchOutcome {
@@ -81,15 +83,64 @@ impl Integrator<'_> {
         (from, to): (f64, f64),
         dt: f64,
     ) -> Result<Option<(f64, bool)>, FieldError> {
+        let polynomial = self.polynomial(index, dt)?;
+        self.search_piece((index, has_bounds), polynomial.as_ref(), (from, to), dt)
+    }
+
+    /// The first zero of one monitored function in a Taylor step up to `reach`, and how far it was searched: to the
+    /// same point, or to one behind a zero.
+    pub(super) fn search_along_series(
+        &mut self,
+        index: usize,
+        reach: f64,
+        dt: f64,
+    ) -> Result<(Option<(f64, bool)>, f64), FieldError> {
+        let m = self.motion.monitored[index];
+        if m.deflation.is_some() {
+            self.motion.monitored[index].noise = self.noise_of(m.function)?;
+        }
+        let polynomial = self.polynomial(index, dt)?;
+        let (value, _) = self.detector.right[index];
+        let proof = match &polynomial {
+            Some(polynomial) if value > 0.0 && polynomial.is_clear() => Proof::Clear,
+            Some(_) => Proof::Open,
+            // Beyond zero at the end: there is a zero, whether there are bounds or not.
+            None if value <= 0.0 && self.exit_series(&m).is_some() => Proof::Open,
+            None => self.prove_clear(index, value, reach),
+        };
+        if proof == Proof::Clear {
+            return Ok((None, reach));
+        }
+        let has_bounds = proof == Proof::Open;
+        let near = match &polynomial {
+            Some(Polynomial::Quotient(series) | Polynomial::Powers(series)) => series.near_zero(),
+            Some(_) => None,
+            None => self.exit_series(&m).and_then(|series| series.near_zero()),
+        };
+        if let Some(near) = near.filter(|near| has_bounds && BEYOND_GUESS * near < reach) {
+            let piece = (0.0, BEYOND_GUESS * near);
+            let zero = self.search_piece((index, true), polynomial.as_ref(), piece, dt)?;
+            if zero.is_some() || self.detector.uncertain {
+                return Ok((zero, piece.1));
+            }
+        }
+        let piece = (0.0, reach);
+        let zero = self.search_piece((index, has_bounds), polynomial.as_ref(), piece, dt)?;
+        let together = self.together(dt);
+        let searched = zero.map_or(reach, |(theta, _)| (theta + together).min(reach));
+        Ok((zero, searched))
+    }
+
+    fn search_piece(
+        &mut self,
+        (index, has_bounds): (usize, bool),
+        polynomial: Option<&Polynomial>,
+        (from, to): (f64, f64),
+        dt: f64,
+    ) -> Result<Option<(f64, bool)>, FieldError> {
         let m = self.motion.monitored[index];
         let noise = self.noise_of(m.function)?;
         self.motion.monitored[index].noise = noise;
-        let polynomial = match m.function {
-            EventFunction::Surface(j) if m.affine && self.motion.is_straight => {
-                Some(self.affine_polynomial(j, &m, dt)?)
-            }
-            _ => None,
-        };
         let by_multipliers = !self.slides_by_rule();
         let interpolant = self.stepper.interpolant();
         let bounds = BoundedCurve {
@@ -117,16 +168,49 @@ impl Integrator<'_> {
         };
         let (t, dt_step) = (self.t, dt);
         let mut g = |theta: f64| {
-            let value = match &polynomial {
+            let value = match polynomial {
                 Some(Polynomial::Quotient(series)) => return Ok(series.value(theta)),
-                Some(Polynomial::Powers(series)) => series.value(theta),
+                Some(Polynomial::Powers(series) | Polynomial::Deflated(series)) => {
+                    series.value(theta)
+                }
                 Some(Polynomial::Nested(rows)) => nested(rows, theta),
                 None => curve.value(&m, theta)?,
             };
             Ok(m.deflated(value, t + theta * dt_step, dt_step, noise))
         };
-        let mut values = [f64::NAN; 5];
         let (start, end) = (m.value, self.detector.right[index].0);
+        let is_quotient = matches!(polynomial, Some(Polynomial::Quotient(_)));
+        let is_divided = m.deflation.is_some() && !is_quotient;
+        let mut over = |a, b| match polynomial {
+            Some(
+                Polynomial::Quotient(series)
+                | Polynomial::Powers(series)
+                | Polynomial::Deflated(series),
+            ) => Some(series.bound(a, b)),
+            _ => bounds.over(&m, a, b),
+        };
+        let width = 0.5 * EPS * (t.abs() / dt).max(to);
+        let is_bounded = match polynomial {
+            Some(Polynomial::Nested(_)) => false,
+            Some(_) => true,
+            None => has_bounds,
+        };
+        if is_bounded && !is_divided && from == 0.0 {
+            let right = if to == 1.0 { end } else { g(to)? };
+            let left = if is_quotient { g(0.0)? } else { start };
+            let proved =
+                first_zero_proved(&mut g, &mut over, (from, to), (left, right), noise)?;
+            let zero = match proved {
+                Proved::Nothing => return Ok(None),
+                Proved::Single(bracket) => Some(bracket),
+                Proved::Unknown => None,
+            };
+            let scale = left.max(right.abs());
+            if let Some(bracket) = zero.filter(|bracket| bracket.is_steep(scale, noise)) {
+                return Ok(Some((refine(&mut g, bracket, width)?.theta, false)));
+            }
+        }
+        let mut values = [f64::NAN; 5];
         for (i, value) in values.iter_mut().enumerate() {
             let theta = from + (to - from) * 0.25 * i as f64;
             *value = match theta {
@@ -135,22 +219,10 @@ impl Integrator<'_> {
                 _ => g(theta)?,
             };
         }
-        let mut over = |a, b| match &polynomial {
-            Some(Polynomial::Quotient(series) | Polynomial::Powers(series)) => {
-                Some(series.bound(a, b))
-            }
-            _ => bounds.over(&m, a, b),
-        };
-        let is_quotient = matches!(polynomial, Some(Polynomial::Quotient(_)));
-        let is_bounded = match polynomial {
-            Some(Polynomial::Nested(_)) => false,
-            Some(_) => true,
-            None => has_bounds,
-        };
         let evidence = match (m.function, is_bounded) {
             (_, true) => Evidence::Bounds {
                 bounds: &mut over,
-                divided: m.deflation.is_some() && !is_quotient,
+                divided: is_divided,
                 patience: match m.function {
                     EventFunction::Exit(_) => UNPROVED_DEPTH,
                     _ => UNBOUNDED_DEPTH,
@@ -169,12 +241,14 @@ impl Integrator<'_> {
             piece: (from, to),
             scale: values.iter().fold(0.0_f64, |m, v| m.max(v.abs())),
             noise,
-            width: 0.5 * EPS * (t.abs() / dt).max(to),
+            width,
         };
         match searched.outcome(&mut g, isolated.zero)? {
             SearchOutcome::Nothing => Ok(None),
             SearchOutcome::At(theta, touch) => Ok(Some((theta, touch))),
-            SearchOutcome::Beyond(rest) => self.search((index, has_bounds), (rest, to), dt),
+            SearchOutcome::Beyond(rest) => {
+                self.search_piece((index, has_bounds), polynomial, (rest, to), dt)
+            }
             SearchOutcome::Pole => {
                 self.detector.uncertain = true;
                 Ok(None)
@@ -182,11 +256,15 @@ impl Integrator<'_> {
         }
     }
 
-    /// Is an affine h surely positive on the whole of a Taylor step, but for a zero at its start that is divided
-    /// out?
-    pub(super) fn is_clear(&mut self, j: usize, m: &Monitored, dt: f64) -> Result<bool, FieldError> {
-        let is_known = m.deflation.is_none_or(|zero| zero.t == self.t);
-        Ok(is_known && self.affine_polynomial(j, m, dt)?.is_clear())
+    /// A monitored function that is affine, along the continuous extension.
+    fn polynomial(&mut self, index: usize, dt: f64) -> Result<Option<Polynomial>, FieldError> {
+        let m = self.motion.monitored[index];
+        Ok(match m.function {
+            EventFunction::Surface(j) if m.affine && self.motion.is_straight => {
+                Some(self.affine_polynomial(j, &m, dt)?)
+            }
+            _ => None,
+        })
     }
 
     /// An affine h along the continuous extension.
@@ -199,10 +277,11 @@ impl Integrator<'_> {
         if self.stepper.is_taylor() {
             let series = self.affine_series(j, m, dt)?;
             return Ok(match m.deflation {
+                None => Polynomial::Powers(series),
                 Some(zero) if zero.t == self.t => {
                     Polynomial::Quotient(series.divided(zero.order as usize))
                 }
-                _ => Polynomial::Powers(series),
+                Some(_) => Polynomial::Deflated(series),
             });
         }
         let (point, signs) = ((self.t, &self.x[..]), &self.motion.signs);
@@ -224,6 +303,8 @@ enum Polynomial {
     Powers(Series),
     /// The zero at the start of this step is divided out.
     Quotient(Series),
+    /// A zero before this step is yet to be divided out.
+    Deflated(Series),
 }
 
 impl Polynomial {
@@ -231,7 +312,7 @@ impl Polynomial {
     fn is_clear(&self) -> bool {
         match self {
             Polynomial::Quotient(series) | Polynomial::Powers(series) => series.is_above(0.0),
-            Polynomial::Nested(_) => false,
+            Polynomial::Nested(_) | Polynomial::Deflated(_) => false,
         }
     }
 }

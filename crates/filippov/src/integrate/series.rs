@@ -7,7 +7,7 @@ use crate::error::FieldError;
 use crate::event::series::Series;
 use crate::event::Monitored;
 use crate::options::Method;
-use crate::stepper::{Attempt, Expansion};
+use crate::stepper::{reach as series_reach, Attempt, Expansion};
 use crate::tolerances::{EPS, TAYLOR_SHORTEST};
 
 impl Integrator<'_> {
@@ -70,9 +70,7 @@ impl Integrator<'_> {
                 if c.is_nan() {
                     return f64::NAN;
                 }
-                if c > 0.0 {
-                    longest = longest.min((size / c).powf(1.0 / k as f64));
-                }
+                longest = longest.min(series_reach(c / size, k));
             }
         }
         longest
@@ -113,6 +111,13 @@ impl Integrator<'_> {
             stages[1..].fill(exit);
         }
         Ok(attempt)
+    }
+
+    /// An exit function along the step, as far as its series describes it.
+    pub(super) fn exit_series(&self, m: &Monitored) -> Option<Series> {
+        let place = self.motion.jets.as_ref()?.exit(m.function.exit_index()?)?;
+        let taylor = self.stepper.taylor.as_ref()?;
+        Some(Series::new(taylor.column(place).collect()))
     }
 
     /// An affine switching function along the step, positive inside of the mode.

@@ -28,6 +28,13 @@ impl ErrorScale {
         self.atol[i] + self.rtol * if b < a { a } else { b }
     }
 
+    /// Largest component of `v` in units of the scale at `y`.
+    pub fn largest(&self, v: &[f64], y: &[f64]) -> f64 {
+        let components = v.iter().zip(y).enumerate();
+        let ratios = components.map(|(i, (v, y))| v.abs() / self.of(i, *y, *y));
+        ratios.fold(0.0, |most, ratio| if ratio > most { ratio } else { most })
+    }
+
     /// Root mean square of `v` in units of the scale at `y`.
     pub fn norm(&self, v: &[f64], y: &[f64]) -> f64 {
         let sum: f64 = v
@@ -91,7 +98,7 @@ impl Controller {
 }
 
 /// log2 of a positive normal number to about 1e-3: exponent, and a cubic in the mantissa.
-fn rough_log2(x: f64) -> f64 {
+pub(super) fn rough_log2(x: f64) -> f64 {
     let bits = x.to_bits();
     let exponent = (bits >> 52) as i64 - 1023;
     let mantissa = f64::from_bits(bits & 0x000f_ffff_ffff_ffff | 0x3ff0_0000_0000_0000);
@@ -100,7 +107,7 @@ fn rough_log2(x: f64) -> f64 {
 }
 
 /// 2^x for |x| < 1000 to about 1e-3: the integer part as exponent, a cubic for the rest.
-fn rough_exp2(x: f64) -> f64 {
+pub(super) fn rough_exp2(x: f64) -> f64 {
     let whole = x.floor();
     let f = x - whole;
     let power = f64::from_bits(((whole as i64 + 1023) as u64) << 52);

@@ -101,7 +101,12 @@ impl Interpolant {
                 r(4) - 2.0 * r(5),
                 r(5),
             ]),
-            Basis::Powers => (0..self.coefficients.len() / self.n).map(r).collect(),
+            Basis::Powers => {
+                let n_rows = self.coefficients.len() / self.n;
+                // What stands still, or moves evenly, has a short series.
+                let used = (0..n_rows).rev().find(|&k| r(k) != 0.0).unwrap_or(0);
+                (0..=used).map(r).collect()
+            }
         };
         shift(&mut d, centre);
         d
@@ -112,13 +117,14 @@ impl Interpolant {
         let n = self.n;
         let r = |i: usize| &self.coefficients[i * n..(i + 1) * n];
         if self.basis == Basis::Powers {
-            dy.fill(0.0);
-            for k in (1..self.coefficients.len() / n).rev() {
-                for (dy, c) in dy.iter_mut().zip(r(k)) {
-                    *dy = *dy * theta + k as f64 * c;
+            for (i, dy) in dy.iter_mut().enumerate() {
+                let (mut slope, mut k) = (0.0, (self.coefficients.len() / n) as f64);
+                for c in self.coefficients[n + i..].iter().step_by(n).rev() {
+                    k -= 1.0;
+                    slope = slope * theta + k * c;
                 }
+                *dy = slope / self.dt;
             }
-            dy.iter_mut().for_each(|dy| *dy /= self.dt);
             return;
         }
         let u = 1.0 - theta;
@@ -149,15 +155,32 @@ pub(crate) fn shift(d: &mut [f64], centre: f64) {
 pub(crate) fn evaluate(basis: Basis, coefficients: &[f64], n: usize, theta: f64, y: &mut [f64]) {
     match basis {
         Basis::Nested => evaluate_nested(coefficients, n, theta, y),
-        Basis::Powers => {
-            y.fill(0.0);
-            for row in coefficients.chunks_exact(n).rev() {
-                for (y, c) in y.iter_mut().zip(row) {
-                    *y = *y * theta + c;
+        Basis::Powers => match n {
+            1 => evaluate_powers::<1>(coefficients, theta, y),
+            2 => evaluate_powers::<2>(coefficients, theta, y),
+            3 => evaluate_powers::<3>(coefficients, theta, y),
+            4 => evaluate_powers::<4>(coefficients, theta, y),
+            _ => {
+                y.fill(0.0);
+                for row in coefficients.chunks_exact(n).rev() {
+                    for (y, c) in y.iter_mut().zip(row) {
+                        *y = *y * theta + c;
+                    }
                 }
             }
+        },
+    }
+}
+
+/// Horner's scheme for few states: the values stay in registers.
+fn evaluate_powers<const N: usize>(coefficients: &[f64], theta: f64, y: &mut [f64]) {
+    let mut value = [0.0; N];
+    for row in coefficients.chunks_exact(N).rev() {
+        for i in 0..N {
+            value[i] = value[i] * theta + row[i];
         }
     }
+    y[..N].copy_from_slice(&value);
 }
 
 /// Evaluates the nested form from its six rows.

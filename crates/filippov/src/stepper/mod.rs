@@ -14,6 +14,7 @@ pub use dense::{Basis, Expansion, Interpolant};
 pub use dopri5::{Attempt, Dopri5};
 pub use initial_step::{initial_step, restart_step, tiny_step};
 pub use method::Stepper;
+pub(crate) use taylor::reach;
 pub use taylor::Taylor;
 
 #[cfg(test)]

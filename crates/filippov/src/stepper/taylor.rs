@@ -1,11 +1,15 @@
 //! The Taylor method: the coefficients of the motion are the step, its continuous extension and its error.
 
+use super::controller::{rough_exp2, rough_log2};
 use super::{Attempt, ErrorScale, Interpolant};
 use crate::error::FieldError;
 use crate::field::SmoothField;
 use crate::tolerances::{
     TAYLOR_DIGITS_TO_ORDER, TAYLOR_LARGEST_ORDER, TAYLOR_SMALLEST_ORDER,
 };
+
+/// Number of states where it is not fixed at compile time.
+const ANY: usize = 0;
 
 /// A Taylor step of variable length.
 ///
@@ -106,17 +110,11 @@ impl Taylor {
     }
 
     fn longest_step(&self, y: &[f64], scale: &ErrorScale) -> f64 {
-        if self.rows.iter().any(|c| !c.is_finite()) {
+        // A coefficient that is not finite makes all of higher order so.
+        if self.rows[self.order * self.width..].iter().any(|c| !c.is_finite()) {
             return f64::NAN;
         }
-        let allows = |k: usize| {
-            let size = scale.norm(self.row(k), y);
-            if size == 0.0 {
-                f64::INFINITY
-            } else {
-                size.powf(-1.0 / k as f64)
-            }
-        };
+        let allows = |k: usize| reach(scale.largest(self.row(k), y), k);
         allows(self.order).min(allows(self.order - 1))
     }
 
@@ -158,22 +156,19 @@ impl Taylor {
         dt: f64,
         scale: &ErrorScale,
     ) -> Result<Attempt, FieldError> {
-        let n = self.n;
         (self.interpolant.t0, self.interpolant.dt) = (t, dt);
-        let mut power = 1.0;
-        let scaled = self.interpolant.coefficients_mut().chunks_exact_mut(n);
-        for (to, from) in scaled.zip(self.rows.chunks_exact(self.width)) {
-            to.iter_mut().zip(from).for_each(|(to, c)| *to = c * power);
-            power *= dt;
+        match self.n {
+            1 => self.sum::<1>(y),
+            2 => self.sum::<2>(y),
+            3 => self.sum::<3>(y),
+            4 => self.sum::<4>(y),
+            _ => self.sum::<ANY>(y),
         }
-        self.interpolant.coefficients_mut()[..n].copy_from_slice(y);
-        self.interpolant.at(1.0, &mut self.y1);
-        self.interpolant.derivative(1.0, &mut self.defect);
         field.eval(t + dt, &mut self.y1, &mut self.end)?;
         // The defect is the derivative of the first term left out: order + 1 times that term over the step.
-        let share = dt / (self.order + 1) as f64;
+        let share = 1.0 / (self.order + 1) as f64;
         for (defect, rate) in self.defect.iter_mut().zip(&self.end) {
-            *defect = share * (*defect - rate);
+            *defect = share * (*defect - dt * rate);
         }
         self.error = scale.norm(&self.defect, &self.y1);
         let is_finite = self.error.is_finite() && self.y1.iter().all(|y| y.is_finite());
@@ -182,6 +177,33 @@ impl Taylor {
         } else {
             Attempt::NotFinite
         })
+    }
+
+    /// Writes the coefficients in powers of theta, their sum, which is the end of the step, and the derivative in
+    /// theta there.
+    #[inline(always)]
+    fn sum<const N: usize>(&mut self, y: &[f64]) {
+        let n = if N == ANY { self.n } else { N };
+        let dt = self.interpolant.dt;
+        let scaled = self.interpolant.coefficients_mut();
+        scaled[..n].copy_from_slice(&y[..n]);
+        let mut power = dt;
+        let rows = self.rows.chunks_exact(self.width).skip(1);
+        for (to, from) in scaled[n..].chunks_exact_mut(n).zip(rows) {
+            for i in 0..n {
+                to[i] = from[i] * power;
+            }
+            power *= dt;
+        }
+        let (y1, slope) = (&mut self.y1[..n], &mut self.defect[..n]);
+        y1.fill(0.0);
+        slope.fill(0.0);
+        for (k, row) in scaled.chunks_exact(n).enumerate().rev() {
+            for i in 0..n {
+                y1[i] += row[i];
+                slope[i] += k as f64 * row[i];
+            }
+        }
     }
 
     /// The factor for another attempt after one with this error was rejected.
@@ -200,5 +222,14 @@ impl Taylor {
         y.copy_from_slice(&self.y1);
         self.start.copy_from_slice(&self.end);
         self.is_expanded = false;
+    }
+}
+
+/// The time after which a term c t^k reaches 1: |c|^(-1/k), to three digits.
+pub(crate) fn reach(c: f64, k: usize) -> f64 {
+    if c < f64::MIN_POSITIVE {
+        f64::INFINITY
+    } else {
+        rough_exp2(-rough_log2(c) / k as f64)
     }
 }

@@ -10,8 +10,11 @@ use smallvec::SmallVec;
 
 use super::affine_model::AffineModel;
 use super::jets::MotionJets;
-use super::tiered::{compile, TieredProgram};
+use super::tiered::{compile, Tiered, TieredProgram};
 use super::Word;
+
+/// Graphs with more nodes are not kept to be compiled anew.
+const LARGEST_COPIED: usize = 500;
 
 /// Surfaces slid on at once whose sign patterns are all looked at.
 const MOST_ENUMERATED: usize = 4;
@@ -62,7 +65,7 @@ struct LieCache {
 /// Output 0 is the derivative, the others its terms.
 pub(super) struct LieProgram {
     node: NodeId,
-    pub program: Program,
+    pub program: TieredProgram,
 }
 
 impl Model {
@@ -315,7 +318,12 @@ impl Model {
         };
         let mut outputs = vec![node];
         outputs.extend(terms);
-        let program = compile(graph, &outputs, Backend::Interpreter);
+        // The first derivatives are asked for at every switch; a large graph is not copied for each of them.
+        let program = if graph.len() <= LARGEST_COPIED && word.len() <= 1 {
+            TieredProgram::new(graph.clone(), outputs, self.backend)
+        } else {
+            Tiered::interpreted(compile(graph, &outputs, Backend::Interpreter))
+        };
         let lie = Arc::new(LieProgram { node, program });
         cache.programs.insert(key, Arc::clone(&lie));
         lie

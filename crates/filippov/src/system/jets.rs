@@ -99,6 +99,11 @@ fn sliding_field(graph: &mut Graph, field: &[NodeId], j: usize) -> (Vec<NodeId>,
     let Gradient { time, states } = graph.gradient(graph.surface(j as u32));
     let (middle, jump) = middle_and_jump(graph, field, j);
     let zero = graph.constant(0.0);
+    // On a surface x_i = constant the state x_i stands still; written out, that would be so up to rounding.
+    let stands_still = match states[..] {
+        [(i, _)] if time == zero => Some(i as usize),
+        _ => None,
+    };
     let mut rates = [time, zero];
     for (i, partial) in states {
         for (rate, values) in rates.iter_mut().zip([&middle, &jump]) {
@@ -109,7 +114,11 @@ fn sliding_field(graph: &mut Graph, field: &[NodeId], j: usize) -> (Vec<NodeId>,
     let [still, change] = rates;
     let opposite = graph.neg(still);
     let multiplier = graph.div(opposite, change);
-    let sliding = middle.iter().zip(&jump).map(|(&middle, &jump)| {
+    let sides = middle.iter().zip(&jump).enumerate();
+    let sliding = sides.map(|(i, (&middle, &jump))| {
+        if stands_still == Some(i) {
+            return zero;
+        }
         let share = graph.mul(multiplier, jump);
         graph.add(middle, share)
     });

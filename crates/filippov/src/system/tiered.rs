@@ -12,7 +12,7 @@ const CALLS_BEFORE_NATIVE: u32 = 2000;
 /// the same bits, so the moment of the change does not show in any result.
 pub(super) struct Tiered<P> {
     /// Compiles for a backend, falling back to the interpreter.
-    compile: Box<dyn Fn(Backend) -> P + Send + Sync>,
+    compile: Option<Box<dyn Fn(Backend) -> P + Send + Sync>>,
     backend: Backend,
     interpreted: P,
     native: OnceLock<P>,
@@ -26,8 +26,19 @@ impl<P> Tiered<P> {
     pub fn from(compile: impl Fn(Backend) -> P + Send + Sync + 'static, backend: Backend) -> Self {
         Tiered {
             interpreted: compile(Backend::Interpreter),
-            compile: Box::new(compile),
+            compile: Some(Box::new(compile)),
             backend,
+            native: OnceLock::new(),
+            calls: AtomicU32::new(0),
+        }
+    }
+
+    /// A program that stays interpreted.
+    pub fn interpreted(program: P) -> Self {
+        Tiered {
+            interpreted: program,
+            compile: None,
+            backend: Backend::Interpreter,
             native: OnceLock::new(),
             calls: AtomicU32::new(0),
         }
@@ -39,10 +50,13 @@ impl<P> Tiered<P> {
         if let Some(native) = self.native.get() {
             return native;
         }
+        let Some(compile) = &self.compile else {
+            return &self.interpreted;
+        };
         if self.calls.fetch_add(1, Ordering::Relaxed) < CALLS_BEFORE_NATIVE {
             return &self.interpreted;
         }
-        self.native.get_or_init(|| (self.compile)(self.backend))
+        self.native.get_or_init(|| compile(self.backend))
     }
 }
 

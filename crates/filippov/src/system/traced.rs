@@ -176,6 +176,13 @@ impl PiecewiseSystem for TracedSystem {
         products: &mut [f64],
     ) -> Result<f64, FieldError> {
         let (compiled, values) = self.gradient_values(j, t, x, signs);
+        if let &[i] = &compiled.states[..] {
+            let components = vectors[i..].iter().step_by(x.len());
+            for (product, component) in products.iter_mut().zip(components) {
+                *product = values[1] * component;
+            }
+            return Ok(values[0]);
+        }
         for (product, vector) in products.iter_mut().zip(vectors.chunks_exact(x.len())) {
             let entries = compiled.states.iter().zip(&values[1..]);
             *product = entries.map(|(&i, value)| value * vector[i]).sum();
@@ -256,14 +263,15 @@ impl PiecewiseSystem for TracedSystem {
         let lie = self.model.lie_derivative(i, j, word);
         let mut small = [0.0; 16];
         let mut large = Vec::new();
-        let count = lie.program.n_outputs();
+        let program = lie.program.program();
+        let count = program.n_outputs();
         let out = if count <= small.len() {
             &mut small[..count]
         } else {
             large.resize(count, 0.0);
             &mut large[..]
         };
-        lie.program.eval(t, x, signs, &self.parameters, &[], out);
+        program.eval(t, x, signs, &self.parameters, &[], out);
         Ok(LieValue {
             value: out[0],
             magnitude: out[1..].iter().map(|v| v.abs()).sum(),

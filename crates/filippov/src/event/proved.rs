@@ -1,0 +1,115 @@
+//! The first zero where bounds decide every piece: few values are needed then.
+
+use super::certificate::{Bounds, Verdict};
+use super::isolate::{Bracket, Sampled};
+use crate::error::FieldError;
+use crate::tolerances::PROVED_DEPTH;
+
+/// What bounds prove about the first zero of a function.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Proved {
+    /// There is none.
+    Nothing,
+    /// It is the only one in the bracket.
+    Single(Bracket),
+    /// They do not decide all pieces in front of it.
+    Unknown,
+}
+
+/// The first zero of `g` on [a, b], `left` > 0 and `right` being its values there. A piece whose bounds say
+/// nothing is halved a few times.
+///
+/// # Errors
+/// If `g` raises.
+pub fn first_zero_proved(
+    g: Sampled,
+    bounds: Bounds,
+    piece: (f64, f64),
+    ends: (f64, f64),
+    noise: f64,
+) -> Result<Proved, FieldError> {
+    let is_decided = ends.0 > noise && ends.1.abs() > noise;
+    if !is_decided {
+        return Ok(Proved::Unknown);
+    }
+    proved(g, bounds, piece, ends, noise, PROVED_DEPTH)
+}
+
+fn proved(
+    g: Sampled,
+    bounds: Bounds,
+    (a, b): (f64, f64),
+    (left, right): (f64, f64),
+    noise: f64,
+    depth: u32,
+) -> Result<Proved, FieldError> {
+    let Some(bound) = bounds(a, b) else {
+        return Ok(Proved::Unknown);
+    };
+    match bound.verdict(b - a, None, noise) {
+        Verdict::Clear if right > 0.0 => return Ok(Proved::Nothing),
+        Verdict::Rising if right > 0.0 => return Ok(Proved::Nothing),
+        Verdict::Falling if right > 0.0 => return Ok(Proved::Nothing),
+        Verdict::Falling => {
+            return Ok(Proved::Single(Bracket {
+                lo: a,
+                hi: b,
+                g_lo: left,
+                g_hi: right,
+                guess: a + (b - a) * left / (left - right),
+                slope: (right - left) / (b - a),
+            }))
+        }
+        _ if depth == 0 => return Ok(Proved::Unknown),
+        _ => {}
+    }
+    let m = 0.5 * (a + b);
+    let middle = g(m)?;
+    // Nothing is proved next to a value within rounding, or that does not exist.
+    if middle.is_nan() || middle.abs() <= noise {
+        return Ok(Proved::Unknown);
+    }
+    let first = proved(g, bounds, (a, m), (left, middle), noise, depth - 1)?;
+    if first != Proved::Nothing {
+        return Ok(first);
+    }
+    proved(g, bounds, (m, b), (middle, right), noise, depth - 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use filippov_expr::Interval;
+
+    use super::{first_zero_proved, Proved};
+    use crate::event::certificate::Bound;
+
+    /// cos(w theta) + shift, with bounds by its slope.
+    fn search(w: f64, shift: f64) -> Proved {
+        let value = |theta: f64| (w * theta).cos() + shift;
+        let mut g = |theta: f64| Ok(value(theta));
+        let mut bounds = |a: f64, b: f64| {
+            let (m, r) = (0.5 * (a + b), 0.5 * (b - a));
+            Some(Bound {
+                value: Interval::around(value(m), w * r),
+                slope: Interval::around(-w * (w * m).sin(), w * w * r),
+            })
+        };
+        let ends = (value(0.0), value(1.0));
+        first_zero_proved(&mut g, &mut bounds, (0.0, 1.0), ends, 1e-14).unwrap()
+    }
+
+    #[test]
+    fn the_first_of_several_zeros_is_bracketed() {
+        let Proved::Single(bracket) = search(8.0, 0.2) else {
+            panic!("not found");
+        };
+        let zero = (-0.2_f64).acos() / 8.0;
+        assert!(bracket.lo < zero && zero < bracket.hi && bracket.hi < 0.5);
+        assert_eq!(search(8.0, 1.5), Proved::Nothing);
+    }
+
+    #[test]
+    fn a_touch_is_not_decided() {
+        assert_eq!(search(8.0, 1.0), Proved::Unknown);
+    }
+}
