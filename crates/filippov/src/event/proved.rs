@@ -17,7 +17,7 @@ pub enum Proved {
 }
 
 /// The first zero of `g` on [a, b], `left` > 0 and `right` being its values there. A piece whose bounds say
-/// nothing is halved a few times.
+/// nothing is halved a few times. `near` is about where a zero is expected, if anywhere, and the slope there.
 ///
 /// # Errors
 /// If `g` raises.
@@ -27,12 +27,25 @@ pub fn first_zero_proved(
     piece: (f64, f64),
     ends: (f64, f64),
     noise: f64,
+    near: Option<(f64, f64)>,
 ) -> Result<Proved, FieldError> {
     let is_decided = ends.0 > noise && ends.1.abs() > noise;
     if !is_decided {
         return Ok(Proved::Unknown);
     }
-    proved(g, bounds, piece, ends, noise, PROVED_DEPTH)
+    let proved = proved(g, bounds, piece, ends, noise, PROVED_DEPTH)?;
+    Ok(match (proved, near) {
+        (Proved::Single(bracket), Some((guess, slope)))
+            if bracket.lo < guess && guess < bracket.hi && slope < 0.0 =>
+        {
+            Proved::Single(Bracket {
+                guess,
+                slope,
+                ..bracket
+            })
+        }
+        _ => proved,
+    })
 }
 
 fn proved(
@@ -95,7 +108,7 @@ mod tests {
             })
         };
         let ends = (value(0.0), value(1.0));
-        first_zero_proved(&mut g, &mut bounds, (0.0, 1.0), ends, 1e-14).unwrap()
+        first_zero_proved(&mut g, &mut bounds, (0.0, 1.0), ends, 1e-14, None).unwrap()
     }
 
     #[test]

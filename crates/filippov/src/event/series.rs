@@ -7,25 +7,23 @@ use crate::stepper::{shift, Expansion};
 use crate::tolerances::EPS;
 
 /// Samples, and steps of Newton's method, in the search for about where a zero is.
-const GUESS_SAMPLES: u32 = 8;
-const GUESS_STEPS: u32 = 2;
+const GUESS_SAMPLES: u32 = 5;
+const GUESS_STEPS: u32 = 3;
 
-/// A polynomial in theta, lowest coefficient first.
-#[derive(Clone, Debug)]
-pub struct Series(Expansion);
+/// A polynomial in theta, lowest coefficient first; there is at least one.
+#[derive(Clone, Copy, Debug)]
+pub struct Series<'a>(&'a [f64]);
 
-impl Series {
+impl<'a> Series<'a> {
     /// The polynomial with these coefficients.
-    pub fn new(coefficients: Expansion) -> Self {
+    pub fn new(coefficients: &'a [f64]) -> Self {
         Series(coefficients)
     }
 
     /// Divided by theta^order, the lower coefficients being zero.
     #[must_use]
-    pub fn divided(mut self, order: usize) -> Self {
-        let order = order.min(self.0.len() - 1);
-        self.0.drain(..order);
-        self
+    pub fn divided(self, order: usize) -> Self {
+        Series(&self.0[order.min(self.0.len() - 1)..])
     }
 
     /// The value at theta.
@@ -41,7 +39,7 @@ impl Series {
             return true;
         }
         // The coefficient of degree i is the sum of C(i, k)/C(n, k) c_k: a triangle of differences.
-        let mut b = self.0.clone();
+        let mut b = Expansion::from_slice(self.0);
         let degree = b.len() - 1;
         let mut binomial = 1.0;
         for (k, b) in b.iter_mut().enumerate() {
@@ -60,8 +58,8 @@ impl Series {
     }
 
     /// About where the polynomial, positive at 0, first falls through zero on [0, 1], found by a few samples and
-    /// Newton's method; none if the samples show no zero.
-    pub fn near_zero(&self) -> Option<f64> {
+    /// Newton's method, and the slope there; none if the samples show no zero.
+    pub fn near_zero(&self) -> Option<(f64, f64)> {
         let mut previous = self.0[0];
         for i in 1..=GUESS_SAMPLES {
             let theta = f64::from(i) / f64::from(GUESS_SAMPLES);
@@ -69,11 +67,13 @@ impl Series {
             if value <= 0.0 {
                 let share = previous / (previous - value);
                 let mut at = theta - (1.0 - share) / f64::from(GUESS_SAMPLES);
+                let mut slope = f64::NAN;
                 for _ in 0..GUESS_STEPS {
-                    let (value, slope) = self.with_slope(at);
+                    let (value, here) = self.with_slope(at);
+                    slope = here;
                     at -= value / slope;
                 }
-                return (at > 0.0 && at <= 1.0).then_some(at);
+                return (at > 0.0 && at <= 1.0).then_some((at, slope));
             }
             previous = value;
         }
@@ -91,7 +91,7 @@ impl Series {
 
     /// Bounds of value and slope from theta = `a` to `b`, rounding included.
     pub fn bound(&self, a: f64, b: f64) -> Bound {
-        let mut d = self.0.clone();
+        let mut d = Expansion::from_slice(self.0);
         shift(&mut d, 0.5 * (a + b));
         let radius = 0.5 * (b - a);
         let (mut spread, mut slope_spread, mut power, mut size) = (0.0, 0.0, 1.0, 0.0);
@@ -115,25 +115,24 @@ impl Series {
 #[cfg(test)]
 mod tests {
     use super::Series;
-    use smallvec::smallvec;
 
     #[test]
     fn a_polynomial_is_above_what_it_stays_above() {
         // (theta - 0.4)^2 + d
         for (d, is_above) in [(0.05, true), (0.0, false), (-0.1, false)] {
-            let series = Series::new(smallvec![0.16 + d, -0.8, 1.0]);
+            let series = Series::new(&[0.16 + d, -0.8, 1.0]);
             let lowest = (0..=100).map(|k| series.value(f64::from(k) * 0.01));
             assert_eq!(lowest.fold(f64::INFINITY, f64::min) > 1e-9, is_above);
             assert!(is_above || !series.is_above(1e-9));
         }
         // Bernstein coefficients tell where the falling terms do not.
-        assert!(Series::new(smallvec![1.0, -1.5, 1.0, 0.0]).is_above(0.0));
-        assert!(!Series::new(smallvec![1.0, -2.5, 1.0]).is_above(0.0));
+        assert!(Series::new(&[1.0, -1.5, 1.0, 0.0]).is_above(0.0));
+        assert!(!Series::new(&[1.0, -2.5, 1.0]).is_above(0.0));
     }
 
     #[test]
     fn bounds_hold_the_values_and_slopes_of_a_piece() {
-        let series = Series::new(smallvec![0.3, -1.0, 0.5, 2.0, -1.5]);
+        let series = Series::new(&[0.3, -1.0, 0.5, 2.0, -1.5]);
         for (a, b) in [(0.0, 1.0), (0.2, 0.3), (0.9, 1.0)] {
             let bound = series.bound(a, b);
             for k in 0..=20 {
@@ -148,7 +147,7 @@ mod tests {
 
     #[test]
     fn a_zero_at_the_start_is_divided_out() {
-        let series = Series::new(smallvec![0.0, 0.0, 2.0, 1.0]).divided(2);
+        let series = Series::new(&[0.0, 0.0, 2.0, 1.0]).divided(2);
         assert_eq!((series.value(0.0), series.value(1.0)), (2.0, 3.0));
     }
 }

@@ -1,6 +1,6 @@
 //! Bounds of monitored functions along pieces of the step.
 
-use std::cell::{Cell, RefCell};
+use std::cell::RefCell;
 
 use filippov_expr::{Enclosure, Interval};
 
@@ -32,8 +32,8 @@ pub(super) struct BoundedCurve<'a> {
     pub affine: Option<&'a AffineBounds>,
     /// Whether the exit functions are those of the multipliers of the canopy.
     pub by_multipliers: bool,
-    /// The normal components on the last piece of this extension: they are asked for one after the other.
-    pub last: &'a Cell<Option<Piece>>,
+    /// The normal components on pieces of this extension: they are asked for one after the other.
+    pub known_exits: &'a RefCell<Vec<Piece>>,
     /// The multipliers on the last piece, while sliding on an intersection.
     pub last_root: &'a RefCell<Option<RootPiece>>,
 }
@@ -108,14 +108,16 @@ impl BoundedCurve<'_> {
     }
 
     fn normal_components(&self, j: usize, a: f64, b: f64) -> Option<[Enclosure; 2]> {
-        if let Some((_, _, known)) = self.last.get().filter(|last| (last.0, last.1) == (a, b)) {
-            return Some(known);
+        let known = self.known_exits.borrow();
+        if let Some(piece) = known.iter().find(|piece| (piece.0, piece.1) == (a, b)) {
+            return Some(piece.2);
         }
+        drop(known);
         let tube = Tube::new(self.interpolant, (a, b), self.margin);
         let components = self
             .system
             .enclose_normal_components(j, &tube, self.signs)?;
-        self.last.set(Some((a, b, components)));
+        self.known_exits.borrow_mut().push((a, b, components));
         Some(components)
     }
 
@@ -183,7 +185,7 @@ impl Integrator<'_> {
             stages: &self.detector.stages,
             affine: self.motion.affine_bounds(),
             by_multipliers: !self.slides_by_rule(),
-            last: &self.detector.enclosed_exits,
+            known_exits: &self.detector.enclosed_exits,
             last_root: &self.detector.enclosed_root,
         };
         // Next to a zero that is divided out the function itself may only rise.

@@ -1,6 +1,6 @@
 //! The event stage of a step: the earliest zero of what the mode monitors.
 
-use std::cell::{Cell, RefCell};
+use std::cell::RefCell;
 
 use smallvec::{smallvec, SmallVec};
 
@@ -34,8 +34,8 @@ pub(super) struct Detector {
     pub x: Vec<f64>,
     /// How far the projection onto a curved surface moves the extension in this step; else empty.
     pub margin: Vec<f64>,
-    /// Bounds of the normal components over the last piece of the extension of this step.
-    pub enclosed_exits: Cell<Option<Piece>>,
+    /// Bounds of the normal components over pieces of the extension of this step.
+    pub enclosed_exits: RefCell<Vec<Piece>>,
     /// Bounds of the multipliers there, while sliding on an intersection.
     pub enclosed_root: RefCell<Option<RootPiece>>,
     /// Value and rate at the end of the step, per monitored function.
@@ -70,7 +70,7 @@ impl Detector {
             rate: vec![0.0; d],
             x: vec![0.0; n],
             margin: Vec::new(),
-            enclosed_exits: Cell::new(None),
+            enclosed_exits: RefCell::default(),
             enclosed_root: RefCell::new(None),
             right: Vec::new(),
             exit_noise: None,
@@ -163,7 +163,7 @@ impl Integrator<'_> {
         self.detector.unresolved = false;
         self.detector.uncertain = false;
         self.detector.exits.clear();
-        self.detector.enclosed_exits.set(None);
+        self.detector.enclosed_exits.get_mut().clear();
         self.detector.enclosed_root.take();
         self.detector.margin.clear();
         self.detector.exit_noise = None;
@@ -309,7 +309,7 @@ impl Integrator<'_> {
             return Ok(());
         }
         self.stats.n_extensions += 1;
-        self.detector.enclosed_exits.set(None);
+        self.detector.enclosed_exits.get_mut().clear();
         self.detector.enclosed_root.take();
         self.stepper.extend(&mut self.motion.field, &self.x)?;
         Ok(())

@@ -10,7 +10,7 @@ use crate::event::locate::{refine, Located};
 use crate::event::proved::{first_zero_proved, Proved};
 use crate::event::series::Series;
 use crate::event::{EventFunction, Monitored};
-use crate::stepper::nested;
+use crate::stepper::{nested, Expansion};
 use crate::tolerances::{BEYOND_GUESS, BEYOND_TOUCH, EPS, POLE, RESOLVED_DEPTH, UNBOUNDED_DEPTH, UNPROVED_DEPTH};
 
 /// What came of a search.
@@ -83,8 +83,22 @@ impl Integrator<'_> {
         (from, to): (f64, f64),
         dt: f64,
     ) -> Result<Option<(f64, bool)>, FieldError> {
-        let polynomial = self.polynomial(index, dt)?;
-        self.search_piece((index, has_bounds), polynomial.as_ref(), (from, to), dt)
+        let m = self.motion.monitored[index];
+        let polynomial = match m.function {
+            EventFunction::Surface(j) if self.is_polynomial(&m) => {
+                if self.stepper.is_taylor() {
+                    return self.search_series(index, (from, to), dt);
+                }
+                Polynomial::Nested(self.affine_rows(j, &m, dt)?)
+            }
+            _ => Polynomial::None,
+        };
+        self.search_piece((index, has_bounds), &polynomial, None, (from, to), dt)
+    }
+
+    /// Is a function a polynomial along the step?
+    fn is_polynomial(&self, m: &Monitored) -> bool {
+        m.affine && self.motion.is_straight && matches!(m.function, EventFunction::Surface(_))
     }
 
     /// The first zero of one monitored function in a Taylor step up to `reach`, and how far it was searched: to the
@@ -99,42 +113,82 @@ impl Integrator<'_> {
         if m.deflation.is_some() {
             self.motion.monitored[index].noise = self.noise_of(m.function)?;
         }
-        let polynomial = self.polynomial(index, dt)?;
         let (value, _) = self.detector.right[index];
-        let proof = match &polynomial {
-            Some(polynomial) if value > 0.0 && polynomial.is_clear() => Proof::Clear,
-            Some(_) => Proof::Open,
-            // Beyond zero at the end: there is a zero, whether there are bounds or not.
-            None if value <= 0.0 && self.exit_series(&m).is_some() => Proof::Open,
-            None => self.prove_clear(index, value, reach),
+        let mut rows = Expansion::new();
+        if let (EventFunction::Surface(j), true) = (m.function, self.is_polynomial(&m)) {
+            self.affine_series(j, &m, dt, &mut rows)?;
+            let polynomial = self.as_polynomial(&m, &rows);
+            if value > 0.0 && polynomial.is_clear() {
+                return Ok((None, reach));
+            }
+            let near = polynomial.near_zero();
+            return self.search_near((index, true), &polynomial, near, reach, dt);
+        }
+        let has_series = self.exit_series(&m, &mut rows);
+        // Beyond zero at the end: there is a zero, whether there are bounds or not.
+        let proof = if value <= 0.0 && has_series {
+            Proof::Open
+        } else {
+            self.prove_clear(index, value, reach)
         };
         if proof == Proof::Clear {
             return Ok((None, reach));
         }
-        let has_bounds = proof == Proof::Open;
-        let near = match &polynomial {
-            Some(Polynomial::Quotient(series) | Polynomial::Powers(series)) => series.near_zero(),
-            Some(_) => None,
-            None => self.exit_series(&m).and_then(|series| series.near_zero()),
+        let near = if has_series {
+            Series::new(&rows).near_zero()
+        } else {
+            None
         };
-        if let Some(near) = near.filter(|near| has_bounds && BEYOND_GUESS * near < reach) {
-            let piece = (0.0, BEYOND_GUESS * near);
-            let zero = self.search_piece((index, true), polynomial.as_ref(), piece, dt)?;
+        let bounded = (index, proof == Proof::Open);
+        self.search_near(bounded, &Polynomial::None, near, reach, dt)
+    }
+
+    /// The first zero up to `reach`, looked for at first not far beyond where it is expected; and how far was
+    /// searched.
+    fn search_near(
+        &mut self,
+        (index, has_bounds): (usize, bool),
+        polynomial: &Polynomial,
+        near: Option<(f64, f64)>,
+        reach: f64,
+        dt: f64,
+    ) -> Result<(Option<(f64, bool)>, f64), FieldError> {
+        let piece = near.map(|(theta, _)| (0.0, BEYOND_GUESS * theta));
+        if let Some(piece) = piece.filter(|piece| has_bounds && piece.1 < reach) {
+            let zero = self.search_piece((index, true), polynomial, near, piece, dt)?;
             if zero.is_some() || self.detector.uncertain {
                 return Ok((zero, piece.1));
             }
         }
         let piece = (0.0, reach);
-        let zero = self.search_piece((index, has_bounds), polynomial.as_ref(), piece, dt)?;
+        let zero = self.search_piece((index, has_bounds), polynomial, near, piece, dt)?;
         let together = self.together(dt);
         let searched = zero.map_or(reach, |(theta, _)| (theta + together).min(reach));
         Ok((zero, searched))
     }
 
+    /// The first zero of an affine h on a piece of a Taylor step.
+    fn search_series(
+        &mut self,
+        index: usize,
+        piece: (f64, f64),
+        dt: f64,
+    ) -> Result<Option<(f64, bool)>, FieldError> {
+        let m = self.motion.monitored[index];
+        let EventFunction::Surface(j) = m.function else {
+            return Ok(None);
+        };
+        let mut rows = Expansion::new();
+        self.affine_series(j, &m, dt, &mut rows)?;
+        let polynomial = self.as_polynomial(&m, &rows);
+        self.search_piece((index, true), &polynomial, None, piece, dt)
+    }
+
     fn search_piece(
         &mut self,
         (index, has_bounds): (usize, bool),
-        polynomial: Option<&Polynomial>,
+        polynomial: &Polynomial,
+        near: Option<(f64, f64)>,
         (from, to): (f64, f64),
         dt: f64,
     ) -> Result<Option<(f64, bool)>, FieldError> {
@@ -152,7 +206,7 @@ impl Integrator<'_> {
             stages: &self.detector.stages,
             affine: self.motion.affine_bounds.as_ref().and_then(Option::as_ref),
             by_multipliers,
-            last: &self.detector.enclosed_exits,
+            known_exits: &self.detector.enclosed_exits,
             last_root: &self.detector.enclosed_root,
         };
         let mut curve = Curve {
@@ -169,37 +223,33 @@ impl Integrator<'_> {
         let (t, dt_step) = (self.t, dt);
         let mut g = |theta: f64| {
             let value = match polynomial {
-                Some(Polynomial::Quotient(series)) => return Ok(series.value(theta)),
-                Some(Polynomial::Powers(series) | Polynomial::Deflated(series)) => {
-                    series.value(theta)
-                }
-                Some(Polynomial::Nested(rows)) => nested(rows, theta),
-                None => curve.value(&m, theta)?,
+                Polynomial::Quotient(series) => return Ok(series.value(theta)),
+                Polynomial::Powers(series) | Polynomial::Deflated(series) => series.value(theta),
+                Polynomial::Nested(rows) => nested(rows, theta),
+                Polynomial::None => curve.value(&m, theta)?,
             };
             Ok(m.deflated(value, t + theta * dt_step, dt_step, noise))
         };
         let (start, end) = (m.value, self.detector.right[index].0);
-        let is_quotient = matches!(polynomial, Some(Polynomial::Quotient(_)));
+        let is_quotient = matches!(polynomial, Polynomial::Quotient(_));
         let is_divided = m.deflation.is_some() && !is_quotient;
         let mut over = |a, b| match polynomial {
-            Some(
-                Polynomial::Quotient(series)
-                | Polynomial::Powers(series)
-                | Polynomial::Deflated(series),
-            ) => Some(series.bound(a, b)),
+            Polynomial::Quotient(series)
+            | Polynomial::Powers(series)
+            | Polynomial::Deflated(series) => Some(series.bound(a, b)),
             _ => bounds.over(&m, a, b),
         };
         let width = 0.5 * EPS * (t.abs() / dt).max(to);
         let is_bounded = match polynomial {
-            Some(Polynomial::Nested(_)) => false,
-            Some(_) => true,
-            None => has_bounds,
+            Polynomial::Nested(_) => false,
+            Polynomial::None => has_bounds,
+            _ => true,
         };
         if is_bounded && !is_divided && from == 0.0 {
             let right = if to == 1.0 { end } else { g(to)? };
             let left = if is_quotient { g(0.0)? } else { start };
-            let proved =
-                first_zero_proved(&mut g, &mut over, (from, to), (left, right), noise)?;
+            let (piece, ends) = ((from, to), (left, right));
+            let proved = first_zero_proved(&mut g, &mut over, piece, ends, noise, near)?;
             let zero = match proved {
                 Proved::Nothing => return Ok(None),
                 Proved::Single(bracket) => Some(bracket),
@@ -247,7 +297,7 @@ impl Integrator<'_> {
             SearchOutcome::Nothing => Ok(None),
             SearchOutcome::At(theta, touch) => Ok(Some((theta, touch))),
             SearchOutcome::Beyond(rest) => {
-                self.search_piece((index, has_bounds), polynomial, (rest, to), dt)
+                self.search_piece((index, has_bounds), polynomial, None, (rest, to), dt)
             }
             SearchOutcome::Pole => {
                 self.detector.uncertain = true;
@@ -256,34 +306,20 @@ impl Integrator<'_> {
         }
     }
 
-    /// A monitored function that is affine, along the continuous extension.
-    fn polynomial(&mut self, index: usize, dt: f64) -> Result<Option<Polynomial>, FieldError> {
-        let m = self.motion.monitored[index];
-        Ok(match m.function {
-            EventFunction::Surface(j) if m.affine && self.motion.is_straight => {
-                Some(self.affine_polynomial(j, &m, dt)?)
+    /// An affine h along a Taylor step.
+    fn as_polynomial<'a>(&self, m: &Monitored, rows: &'a [f64]) -> Polynomial<'a> {
+        let series = Series::new(rows);
+        match m.deflation {
+            None => Polynomial::Powers(series),
+            Some(zero) if zero.t == self.t => {
+                Polynomial::Quotient(series.divided(zero.order as usize))
             }
-            _ => None,
-        })
+            Some(_) => Polynomial::Deflated(series),
+        }
     }
 
-    /// An affine h along the continuous extension.
-    fn affine_polynomial(
-        &mut self,
-        j: usize,
-        m: &Monitored,
-        dt: f64,
-    ) -> Result<Polynomial, FieldError> {
-        if self.stepper.is_taylor() {
-            let series = self.affine_series(j, m, dt)?;
-            return Ok(match m.deflation {
-                None => Polynomial::Powers(series),
-                Some(zero) if zero.t == self.t => {
-                    Polynomial::Quotient(series.divided(zero.order as usize))
-                }
-                Some(_) => Polynomial::Deflated(series),
-            });
-        }
+    /// The rows of an affine h along the extension of a step of DOPRI5, in its nested form.
+    fn affine_rows(&self, j: usize, m: &Monitored, dt: f64) -> Result<[f64; 6], FieldError> {
         let (point, signs) = ((self.t, &self.x[..]), &self.motion.signs);
         let extension = self.stepper.interpolant().coefficients();
         let mut rows = [0.0; 6];
@@ -293,26 +329,38 @@ impl Integrator<'_> {
         rows.iter_mut().for_each(|row| *row *= m.orientation);
         rows[0] = m.value;
         rows[1] += m.orientation * ht * dt;
-        Ok(Polynomial::Nested(rows))
+        Ok(rows)
     }
 }
 
-/// An affine function along a step, in the form of the step's continuous extension.
-enum Polynomial {
+/// A monitored function along a step, in the form of the step's continuous extension.
+enum Polynomial<'a> {
+    /// It is none.
+    None,
+    /// The nested form of DOPRI5.
     Nested([f64; 6]),
-    Powers(Series),
-    /// The zero at the start of this step is divided out.
-    Quotient(Series),
-    /// A zero before this step is yet to be divided out.
-    Deflated(Series),
+    /// A series.
+    Powers(Series<'a>),
+    /// A series; the zero at the start of this step is divided out.
+    Quotient(Series<'a>),
+    /// A series; a zero before this step is yet to be divided out.
+    Deflated(Series<'a>),
 }
 
-impl Polynomial {
+impl Polynomial<'_> {
     /// Is a series surely positive on the whole step?
     fn is_clear(&self) -> bool {
         match self {
             Polynomial::Quotient(series) | Polynomial::Powers(series) => series.is_above(0.0),
-            Polynomial::Nested(_) | Polynomial::Deflated(_) => false,
+            _ => false,
+        }
+    }
+
+    /// About where it vanishes, and its slope there.
+    fn near_zero(&self) -> Option<(f64, f64)> {
+        match self {
+            Polynomial::Quotient(series) | Polynomial::Powers(series) => series.near_zero(),
+            _ => None,
         }
     }
 }

@@ -1,10 +1,7 @@
 //! Steps by Taylor series.
 
-use smallvec::smallvec;
-
 use super::integrator::Integrator;
 use crate::error::FieldError;
-use crate::event::series::Series;
 use crate::event::Monitored;
 use crate::options::Method;
 use crate::stepper::{reach as series_reach, Attempt, Expansion};
@@ -113,27 +110,41 @@ impl Integrator<'_> {
         Ok(attempt)
     }
 
-    /// An exit function along the step, as far as its series describes it.
-    pub(super) fn exit_series(&self, m: &Monitored) -> Option<Series> {
-        let place = self.motion.jets.as_ref()?.exit(m.function.exit_index()?)?;
-        let taylor = self.stepper.taylor.as_ref()?;
-        Some(Series::new(taylor.column(place).collect()))
+    /// An exit function along the step, as far as its series describes it, into `rows`; `false` if there is none.
+    pub(super) fn exit_series(&self, m: &Monitored, rows: &mut Expansion) -> bool {
+        let place = m.function.exit_index().and_then(|index| {
+            let jets = self.motion.jets.as_ref()?;
+            jets.exit(index)
+        });
+        let (Some(place), Some(taylor)) = (place, &self.stepper.taylor) else {
+            return false;
+        };
+        rows.clear();
+        rows.extend(taylor.column(place));
+        true
     }
 
-    /// An affine switching function along the step, positive inside of the mode.
+    /// An affine switching function along the step, positive inside of the mode, into `rows`.
     ///
     /// # Errors
     /// If a function of the user raises.
-    pub(super) fn affine_series(&mut self, j: usize, m: &Monitored, dt: f64) -> Result<Series, FieldError> {
+    pub(super) fn affine_series(
+        &self,
+        j: usize,
+        m: &Monitored,
+        dt: f64,
+        rows: &mut Expansion,
+    ) -> Result<(), FieldError> {
         let extension = self.stepper.interpolant().coefficients();
-        let mut rows: Expansion = smallvec![0.0; extension.len() / self.x.len()];
+        rows.clear();
+        rows.resize(extension.len() / self.x.len(), 0.0);
         let (point, signs) = ((self.t, &self.x[..]), &self.motion.signs);
         let ht = self
             .system
-            .gradient_products(j, point, signs, extension, &mut rows)?;
+            .gradient_products(j, point, signs, extension, rows)?;
         rows.iter_mut().for_each(|row| *row *= m.orientation);
         rows[0] = m.value;
         rows[1] += m.orientation * ht * dt;
-        Ok(Series::new(rows))
+        Ok(())
     }
 }

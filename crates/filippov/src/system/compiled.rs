@@ -319,7 +319,7 @@ impl Model {
         let mut outputs = vec![node];
         outputs.extend(terms);
         // The first derivatives are asked for at every switch; a large graph is not copied for each of them.
-        let program = if graph.len() <= LARGEST_COPIED && word.len() <= 1 {
+        let program = if graph.len() <= LARGEST_COPIED && word.len() <= 2 {
             TieredProgram::new(graph.clone(), outputs, self.backend)
         } else {
             Tiered::interpreted(compile(graph, &outputs, Backend::Interpreter))
