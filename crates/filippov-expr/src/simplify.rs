@@ -16,6 +16,9 @@ const LARGEST_PRODUCT_POWER: f64 = 8.0;
 /// In products of more signs than this they stay where they are: moving one past n others makes n nodes.
 const MOST_MOVED_SIGNS: usize = 6;
 
+/// A factor of a product is looked for that deep.
+const DEEPEST_FACTOR: u32 = 3;
+
 impl Graph {
     /// `op(a)`, simplified.
     pub fn unary(&mut self, op: UnaryOp, a: NodeId) -> NodeId {
@@ -353,13 +356,8 @@ impl Graph {
             return self.negative(quotient);
         }
         // A common factor cancels, as `0*x` is 0: the quotient is not NaN where the factor vanishes.
-        if let Node::Binary(BinaryOp::Mul, left, right) = *self.node(a) {
-            if left == b {
-                return right;
-            }
-            if right == b {
-                return left;
-            }
+        if let Some(rest) = self.divided_by_factor(a, b, DEEPEST_FACTOR) {
+            return rest;
         }
         // A sign is its own reciprocal: it leaves the quotient to the front.
         if !self.have_few_signs(a, b) {
@@ -384,6 +382,25 @@ impl Graph {
             return self.product(sign, inner);
         }
         self.insert(Node::Binary(BinaryOp::Div, a, b))
+    }
+
+    /// The product `a` without its factor `b`; none if it is not one, or further inside than `depth`.
+    fn divided_by_factor(&mut self, a: NodeId, b: NodeId, depth: u32) -> Option<NodeId> {
+        let Node::Binary(BinaryOp::Mul, left, right) = *self.node(a) else {
+            return None;
+        };
+        if left == b {
+            return Some(right);
+        }
+        if right == b {
+            return Some(left);
+        }
+        let depth = depth.checked_sub(1)?;
+        if let Some(rest) = self.divided_by_factor(right, b, depth) {
+            return Some(self.mul(left, rest));
+        }
+        let rest = self.divided_by_factor(left, b, depth)?;
+        Some(self.mul(rest, right))
     }
 
     fn power(&mut self, a: NodeId, b: NodeId) -> NodeId {

@@ -327,6 +327,13 @@ pub const TAYLOR_DIGITS_TO_ORDER: f64 = 2.0;
 /// Lowest order of a Taylor step: below it the step is no longer than one of DOPRI5.
 pub const TAYLOR_SMALLEST_ORDER: usize = 8;
 
+/// The last terms of a Taylor step, times this, may be as large as the tolerance: errors of many steps add up.
+pub const TAYLOR_SHARE: f64 = 10.0;
+
+/// Pieces of a Taylor step in which a user's function without bounds is sampled: about as many steps would DOPRI5
+/// have made.
+pub const PIECES_OF_SERIES: u32 = 8;
+
 /// Highest order of a Taylor step: beyond it rounding limits the error, and not the step.
 pub const TAYLOR_LARGEST_ORDER: usize = 24;
 

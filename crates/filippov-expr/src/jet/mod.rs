@@ -74,6 +74,7 @@ pub struct JetProgram {
     code: Code,
     order: usize,
     width: usize,
+    cost: usize,
 }
 
 #[derive(Debug)]
@@ -98,14 +99,23 @@ impl JetProgram {
     ) -> Result<JetProgram, ExprError> {
         let plan = Plan::new(graph, field, functions)?;
         let width = field.len() + functions.len();
-        let code = if plan.unrolled_size(order) <= MOST_UNROLLED {
+        let single = operations(graph, field);
+        let (code, size) = if plan.unrolled_size(order) <= MOST_UNROLLED {
             let mut graph = graph.clone();
             let outputs = unrolled::unroll(&plan, &mut graph, order);
-            Code::Unrolled(Program::compile(&graph, &outputs, backend)?)
+            let size = operations(&graph, &outputs);
+            let program = Program::compile(&graph, &outputs, backend)?;
+            (Code::Unrolled(program), size)
         } else {
-            Code::Looped(Looped::new(plan, order))
+            let size = plan.unrolled_size(order);
+            (Code::Looped(Looped::new(plan, order)), size)
         };
-        Ok(JetProgram { code, order, width })
+        Ok(JetProgram {
+            code,
+            order,
+            width,
+            cost: size.div_ceil(single.max(1)).max(1),
+        })
     }
 
     /// The highest order.
@@ -116,6 +126,11 @@ impl JetProgram {
     /// How many states and functions there are: as many entries as `out` has for every order.
     pub fn width(&self) -> usize {
         self.width
+    }
+
+    /// How many evaluations of the field take as many operations.
+    pub fn cost(&self) -> usize {
+        self.cost
     }
 
     /// Is the program unrolled?
@@ -132,6 +147,15 @@ impl JetProgram {
             Code::Looped(looped) => looped.eval(t, x, s, p, out),
         }
     }
+}
+
+/// Operations that it takes to compute the values, each once.
+fn operations(graph: &Graph, values: &[NodeId]) -> usize {
+    let nodes = graph.reachable_by(values.iter().copied(), |id| {
+        graph.node(id).operands().collect::<Vec<_>>()
+    });
+    let is_operation = |id: &NodeId| graph.node(*id).operands().next().is_some();
+    nodes.iter().filter(|id| is_operation(id)).count()
 }
 
 #[cfg(test)]

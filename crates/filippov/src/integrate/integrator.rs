@@ -80,12 +80,10 @@ impl<'a> Integrator<'a> {
     ) -> Result<Self, Error> {
         super::start::check(system, t_span, y0, options)?;
         let n = system.n_states();
-        let is_bounded = events.iter().all(|event| event.function.has_bounds());
         let uses_series = match options.method {
             Method::Dopri5 => false,
             Method::Taylor => true,
-            // Where a function of the user is sampled, short steps lose fewer of its zeros.
-            Method::Auto => system.is_analytic() && is_bounded,
+            Method::Auto => system.is_analytic(),
         };
         let taylor = uses_series.then(|| Taylor::new(n, Taylor::order_for(options.rtol)));
         let undecided = Mode::new(vec![1; system.n_surfaces()]);

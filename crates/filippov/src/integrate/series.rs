@@ -36,7 +36,7 @@ impl Integrator<'_> {
         let (system, t, x, signs) = (self.system, self.t, &self.x, &self.motion.signs);
         let fill = |rows: &mut [f64]| system.eval_jets(jets, t, x, signs, rows);
         let mut allowed = taylor.expand(jets.width(), x, &self.scale, fill);
-        self.stats.n_field_evaluations += taylor.order() as u64;
+        self.stats.n_field_evaluations += jets.cost();
         if jets.width() > x.len() {
             allowed = allowed.min(self.longest_for_functions(allowed));
         }

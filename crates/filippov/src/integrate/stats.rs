@@ -4,7 +4,7 @@
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Stats {
     /// Evaluations of the right-hand side; one of the sliding field counts two, the coefficients of a Taylor step
-    /// count as many as its order.
+    /// count as many as take the same number of operations.
     pub n_field_evaluations: u64,
     /// Evaluations of the switching functions in the search for events.
     pub n_surface_evaluations: u64,

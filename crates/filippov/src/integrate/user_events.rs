@@ -9,7 +9,7 @@ use crate::event::locate::refine;
 use crate::event::tube::Tube;
 use crate::event::{UserEvent, UserFunction};
 use crate::stepper::Interpolant;
-use crate::tolerances::{EPS, MOST_ZEROS, UNBOUNDED_DEPTH};
+use crate::tolerances::{EPS, MOST_ZEROS, PIECES_OF_SERIES, UNBOUNDED_DEPTH};
 
 /// A zero of a user's function.
 #[derive(Clone, Debug, PartialEq)]
@@ -113,6 +113,16 @@ impl Integrator<'_> {
         Ok(None)
     }
 
+    /// How many pieces of a step are searched one after the other for zeros of a user's function.
+    fn sampled_pieces(&self, index: usize) -> u32 {
+        let is_sampled = !self.user_events.events[index].function.has_bounds();
+        if is_sampled && self.stepper.is_taylor() {
+            PIECES_OF_SERIES
+        } else {
+            1
+        }
+    }
+
     fn user_value(&mut self, index: usize, theta: f64) -> Result<f64, FieldError> {
         let function = self.user_events.events[index].function;
         value_along(
@@ -134,9 +144,12 @@ impl Integrator<'_> {
             // Rounding of a function whose terms are not known: that of its values.
             let noise = 4.0 * EPS * start.abs().max(self.user_value(index, theta)?.abs());
             let mut sign = if divided { 0.0 } else { start.signum() };
+            let mut pieces = self.sampled_pieces(index);
             loop {
+                // A function without bounds is sampled: on a long step in pieces.
+                let to = theta - (theta - from) * (pieces - 1) as f64 / pieces as f64;
                 if divided {
-                    let probe = from + 1e-7 * (theta - from);
+                    let probe = from + 1e-7 * (to - from);
                     sign = self.user_value(index, probe)?.signum();
                 }
                 if self.user_events.at_start && start == 0.0 && from == 0.0 {
@@ -145,7 +158,7 @@ impl Integrator<'_> {
                         zeros.push((0.0, index));
                     }
                 }
-                let limit = (theta - from) * 1e-7;
+                let limit = (to - from) * 1e-7;
                 let function = self.user_events.events[index].function;
                 let (interpolant, motion) = (self.stepper.interpolant(), &mut self.motion);
                 let mut g = |at: f64| {
@@ -166,12 +179,16 @@ impl Integrator<'_> {
                     divided,
                     patience: UNBOUNDED_DEPTH,
                 };
-                let isolated = first_zero(&mut g, from, theta, noise, evidence)?;
+                let isolated = first_zero(&mut g, from, to, noise, evidence)?;
                 if isolated.exhausted && !isolated.not_finite {
                     return Ok(None);
                 }
                 let Some(Zero::Crossing(bracket)) = isolated.zero else {
-                    break;
+                    if pieces == 1 {
+                        break;
+                    }
+                    (from, divided, pieces) = (to, false, pieces - 1);
+                    continue;
                 };
                 let width = 0.5 * EPS * (t0.abs() / dt).max(1.0);
                 let at = refine(&mut g, bracket, width)?.theta;

@@ -5,7 +5,7 @@ use super::{Attempt, ErrorScale, Interpolant};
 use crate::error::FieldError;
 use crate::field::SmoothField;
 use crate::tolerances::{
-    TAYLOR_DIGITS_TO_ORDER, TAYLOR_LARGEST_ORDER, TAYLOR_SMALLEST_ORDER,
+    TAYLOR_DIGITS_TO_ORDER, TAYLOR_LARGEST_ORDER, TAYLOR_SHARE, TAYLOR_SMALLEST_ORDER,
 };
 
 /// Number of states where it is not fixed at compile time.
@@ -14,7 +14,7 @@ const ANY: usize = 0;
 /// A Taylor step of variable length.
 ///
 /// With coefficients up to order N in units of the tolerance, |c_k|, the step is as long as the last two
-/// allow: |c_k| dt^k <= 1 for k = N - 1 and N. The first term left out is smaller by the ratio of the step to the
+/// allow: |c_k| dt^k <= 1/10 for k = N - 1 and N. The first term left out is smaller by the ratio of the step to the
 /// radius of convergence. That the series describes the motion is then checked at the end of the step, where
 /// its derivative has to be the field.
 ///
@@ -114,7 +114,7 @@ impl Taylor {
         if self.rows[self.order * self.width..].iter().any(|c| !c.is_finite()) {
             return f64::NAN;
         }
-        let allows = |k: usize| reach(scale.largest(self.row(k), y), k);
+        let allows = |k: usize| reach(TAYLOR_SHARE * scale.largest(self.row(k), y), k);
         allows(self.order).min(allows(self.order - 1))
     }
 

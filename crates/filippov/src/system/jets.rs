@@ -51,6 +51,11 @@ impl MotionJets {
         self.order
     }
 
+    /// How many evaluations of the field take as many operations.
+    pub fn cost(&self) -> u64 {
+        self.program.program().cost() as u64
+    }
+
     /// Is the program unrolled? Else it works by loops, for large systems.
     pub fn is_unrolled(&self) -> bool {
         self.program.program().is_unrolled()
