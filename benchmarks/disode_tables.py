@@ -43,7 +43,7 @@ def run(case: Case, reference: Reference, tolerance: float) -> dict[str, Any]:
     """Solve one problem and return the entries of its row."""
     problem = fl.problems.get(case.name)
     sol = fl.solve_ivp(
-        problem.fun, problem.t_span, problem.y0, args=problem.args, rtol=tolerance, atol=tolerance
+        problem.fun, problem.t_span, problem.y0, "DOPRI5", args=problem.args, rtol=tolerance, atol=tolerance
     )
     times, states = sol.switches.t, sol.switches.y_before
     if sol.status == -1 and len(times) + 1 == len(reference.t):

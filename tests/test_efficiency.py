@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 import reference
 
-# Evaluations of the right-hand side, of switching functions, and attempted steps at rtol = atol = 1e-6.
+# Evaluations of the right-hand side, of switching functions, and attempted steps by DOPRI5
+# at rtol = atol = 1e-6.
 COSTS = {
     "disode_planar": (914, 524, 94),
     "structural_pounding": (1589, 205, 251),
@@ -25,12 +26,35 @@ COSTS = {
 }
 
 
+# The same by Taylor series, where an expansion counts as the evaluations that take as many operations.
+COSTS_BY_SERIES = {
+    "relay_feedback": (1711, 193, 137),
+    "dry_friction_autonomous": (2163, 167, 124),
+    "relay_feedback_slow": (1795, 200, 146),
+    "relay_feedback_fast": (3012, 325, 251),
+    "drill_string": (4804, 202, 179),
+    "dieci_lopez_6_1": (1462, 32, 26),
+    "dieci_lopez_6_4_i": (845, 92, 68),
+    "dieci_lopez_6_4_ii": (5804, 887, 447),
+}
+
+
+def cost_of(name: str, method: str) -> tuple[int, ...]:
+    stats = reference.solve(name, 1e-6, method=method).stats
+    return (stats["nfev"], stats["n_surface_evaluations"], stats["n_steps"] + stats["n_rejected"])
+
+
 @pytest.mark.parametrize("name", COSTS)
 def test_cost_of_reference_runs(name: str) -> None:
     """Within a tenth: rounding may differ between platforms, and change a step here and there."""
-    stats = reference.solve(name, 1e-6).stats
-    cost = (stats["nfev"], stats["n_surface_evaluations"], stats["n_steps"] + stats["n_rejected"])
+    cost = cost_of(name, "DOPRI5")
     assert (np.array(cost) <= 1.1 * np.array(COSTS[name]) + 5).all(), cost
+
+
+@pytest.mark.parametrize("name", COSTS_BY_SERIES)
+def test_cost_of_reference_runs_by_series(name: str) -> None:
+    cost = cost_of(name, "Taylor")
+    assert (np.array(cost) <= 1.1 * np.array(COSTS_BY_SERIES[name]) + 5).all(), cost
 
 
 def test_cost_of_a_biased_relay() -> None:

@@ -113,15 +113,15 @@ def check_method(method: Any) -> str:
         if method in _METHODS:
             return _METHODS[method]
         if method in _PLANNED_METHODS:
-            raise InputError(f'method: "{method}" is not available yet; use "DOPRI5"')
+            raise InputError(f'method: "{method}" is not available yet; use "auto"')
         if method in _STIFF_METHODS:
             raise InputError(
                 f'method: "{method}" is not offered; the method for stiff systems is "Rodas5P" '
                 '(not available yet; "DOPRI5" is correct on stiff systems too, only slower)'
             )
         hint = did_you_mean(method, [*_METHODS, *_PLANNED_METHODS])
-        raise InputError(f'method: unknown method {method!r}{hint}; use "DOPRI5"')
-    raise InputError(f'method: a name such as "DOPRI5" is needed, not {type(method).__name__}')
+        raise InputError(f'method: unknown method {method!r}{hint}; use "auto"')
+    raise InputError(f'method: a name such as "auto" is needed, not {type(method).__name__}')
 
 
 def check_t_span(t_span: Any) -> tuple[float, float]:

@@ -87,7 +87,11 @@ def solve_ivp(
     y0 : array_like, shape (n,)
         Initial state, real and finite.
     method : str, optional
-        ``"DOPRI5"`` (default; ``"RK45"`` is the same): the explicit Runge-Kutta pair of Dormand and Prince.
+        ``"auto"`` (default): Taylor series of the motions where the right-hand side is traced and analytic,
+        up to sliding on one surface; else ``"DOPRI5"``. ``"Taylor"``: series wherever there are any,
+        whatever their cost; a motion without goes on with DOPRI5, and a warning says so. ``"DOPRI5"`` (or
+        ``"RK45"``): the explicit Runge-Kutta pair of Dormand and Prince. ``sol.stats["method"]`` says what
+        took the steps.
     t_eval : array_like, shape (k,), optional
         Times at which `y` is given, strictly sorted. It does not influence the steps. Default: the ends of
         the steps.

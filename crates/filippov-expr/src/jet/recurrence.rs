@@ -51,7 +51,12 @@ impl<V: Copy> Table<V> {
 }
 
 /// Fills the table order by order; states beyond the field stand still.
-pub(super) fn fill<A: Arithmetic>(plan: &Plan, table: &mut Table<A::Value>, order: usize, ring: &mut A) {
+pub(super) fn fill<A: Arithmetic>(
+    plan: &Plan,
+    table: &mut Table<A::Value>,
+    order: usize,
+    ring: &mut A,
+) {
     for k in 0..=order {
         for (row, rule) in plan.rules.iter().enumerate() {
             let value = match *rule {
@@ -62,7 +67,13 @@ pub(super) fn fill<A: Arithmetic>(plan: &Plan, table: &mut Table<A::Value>, orde
                     }
                     None => ring.constant(0.0),
                 },
-                rule => Coefficient { table, ring, row, k }.of(rule),
+                rule => Coefficient {
+                    table,
+                    ring,
+                    row,
+                    k,
+                }
+                .of(rule),
             };
             table.set(row, k, value);
         }
@@ -189,7 +200,7 @@ impl<A: Arithmetic> Coefficient<'_, A> {
                 sum = self.add(sum, term);
             }
             sum = self.ring.scaled(sum, 2.0);
-            if self.k % 2 == 0 {
+            if self.k.is_multiple_of(2) {
                 let middle = self.table.at(a, self.k / 2);
                 let term = self.mul(middle, middle);
                 sum = self.add(sum, term);

@@ -120,7 +120,8 @@ mod tests {
     fn a_polynomial_is_above_what_it_stays_above() {
         // (theta - 0.4)^2 + d
         for (d, is_above) in [(0.05, true), (0.0, false), (-0.1, false)] {
-            let series = Series::new(&[0.16 + d, -0.8, 1.0]);
+            let coefficients = [0.16 + d, -0.8, 1.0];
+            let series = Series::new(&coefficients);
             let lowest = (0..=100).map(|k| series.value(f64::from(k) * 0.01));
             assert_eq!(lowest.fold(f64::INFINITY, f64::min) > 1e-9, is_above);
             assert!(is_above || !series.is_above(1e-9));

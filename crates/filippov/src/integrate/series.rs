@@ -1,6 +1,7 @@
 //! Steps by Taylor series.
 
 use super::integrator::Integrator;
+use super::{Warning, WarningCode};
 use crate::error::FieldError;
 use crate::event::Monitored;
 use crate::options::Method;
@@ -12,13 +13,40 @@ impl Integrator<'_> {
     pub(super) fn choose_stepper(&mut self) {
         self.motion.jets = match &self.stepper.taylor {
             Some(taylor) => {
-                let jets = self.system.motion_jets(&self.motion.sliding, taylor.order());
+                let jets = self
+                    .system
+                    .motion_jets(&self.motion.sliding, taylor.order());
                 let is_auto = self.options.method == Method::Auto;
                 jets.filter(|jets| !is_auto || jets.is_unrolled())
             }
             None => None,
         };
         self.stepper.use_taylor(self.motion.jets.is_some());
+        if self.motion.jets.is_none() {
+            self.note_missing_series();
+        }
+    }
+
+    /// Warns, once, that a run that was to use series uses another method.
+    fn note_missing_series(&mut self) {
+        let is_known = self
+            .warnings
+            .iter()
+            .any(|w| w.code == WarningCode::NoSeries);
+        if is_known || self.options.method != Method::Taylor {
+            return;
+        }
+        let (t, mode) = (self.t, &self.motion.mode);
+        let text = format!(
+            "the motion in mode {mode} from t = {t:.10} has no Taylor series (its field is not analytic there, is \
+             not traced, or slides on several surfaces): DOPRI5 integrates it"
+        );
+        self.warnings.push(Warning {
+            t,
+            code: WarningCode::NoSeries,
+            text,
+            candidates: Vec::new(),
+        });
     }
 
     /// Makes the proposed step no longer than the series at its start allows. Where the motion has no series, the
@@ -46,6 +74,7 @@ impl Integrator<'_> {
         }
         self.stepper.leave_taylor();
         self.motion.jets = None;
+        self.note_missing_series();
         self.dt = f64::NAN;
         self.dt = self.first_step(&[])?;
         Ok(())
@@ -80,7 +109,11 @@ impl Integrator<'_> {
         };
         let size = |place: usize| {
             let slope = taylor.coefficient(place, 1).abs();
-            let moved = if reach.is_finite() { slope * reach } else { slope };
+            let moved = if reach.is_finite() {
+                slope * reach
+            } else {
+                slope
+            };
             taylor.coefficient(place, 0).abs().max(moved)
         };
         let exits = [0, 1].map(|index| jets.exit(index));
@@ -89,7 +122,12 @@ impl Integrator<'_> {
         } else {
             size(place)
         };
-        let atol = self.options.atol.iter().copied().fold(f64::INFINITY, f64::min);
+        let atol = self
+            .options
+            .atol
+            .iter()
+            .copied()
+            .fold(f64::INFINITY, f64::min);
         atol + self.options.rtol * size
     }
 

@@ -181,6 +181,8 @@ pub enum WarningCode {
     NonUnique,
     /// The field seems to jump where no surface is declared.
     UndeclaredJump,
+    /// Taylor series were asked for, and a motion has none.
+    NoSeries,
 }
 
 impl WarningCode {
@@ -189,6 +191,7 @@ impl WarningCode {
         match self {
             WarningCode::NonUnique => "non_unique",
             WarningCode::UndeclaredJump => "undeclared_jump",
+            WarningCode::NoSeries => "no_series",
         }
     }
 }

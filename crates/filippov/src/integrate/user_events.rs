@@ -113,6 +113,19 @@ impl Integrator<'_> {
         Ok(None)
     }
 
+    /// Does a function that is wanted come to zero at the end of a piece, up to rounding? A switch may be there, and
+    /// the other side of zero never be seen.
+    fn ends_at_zero(
+        &mut self,
+        index: usize,
+        (from, to): (f64, f64),
+        sign: f64,
+    ) -> Result<bool, FieldError> {
+        let size = self.user_value(index, 0.5 * (from + to))?.abs();
+        let is_wanted = self.user_events.events[index].direction * sign <= 0.0;
+        Ok(is_wanted && sign != 0.0 && self.user_value(index, to)?.abs() <= 4.0 * EPS * size)
+    }
+
     /// How many pieces of a step are searched one after the other for zeros of a user's function.
     fn sampled_pieces(&self, index: usize) -> u32 {
         let is_sampled = !self.user_events.events[index].function.has_bounds();
@@ -185,6 +198,9 @@ impl Integrator<'_> {
                 }
                 let Some(Zero::Crossing(bracket)) = isolated.zero else {
                     if pieces == 1 {
+                        if self.ends_at_zero(index, (from, theta), sign)? {
+                            zeros.push((theta, index));
+                        }
                         break;
                     }
                     (from, divided, pieces) = (to, false, pieces - 1);

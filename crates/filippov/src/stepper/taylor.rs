@@ -29,9 +29,9 @@ pub struct Taylor {
     rows: Vec<f64>,
     /// The rows belong to the current start.
     is_expanded: bool,
-    start: Vec<f64>,
+    start_derivative: Vec<f64>,
     y1: Vec<f64>,
-    end: Vec<f64>,
+    end_derivative: Vec<f64>,
     defect: Vec<f64>,
     interpolant: Interpolant,
     /// Error of the attempted step in units of the tolerance.
@@ -55,9 +55,9 @@ impl Taylor {
             width: n,
             rows: Vec::new(),
             is_expanded: false,
-            start: vec![0.0; n],
+            start_derivative: vec![0.0; n],
             y1: vec![0.0; n],
-            end: vec![0.0; n],
+            end_derivative: vec![0.0; n],
             defect: vec![0.0; n],
             interpolant: Interpolant::powers(n, order),
             error: 0.0,
@@ -76,7 +76,13 @@ impl Taylor {
 
     /// Takes the coefficients at the start `y` of a step, rows of `width`, that `fill` writes; returns the length
     /// of step that they allow, NaN if they are not finite.
-    pub fn expand(&mut self, width: usize, y: &[f64], scale: &ErrorScale, fill: impl FnOnce(&mut [f64])) -> f64 {
+    pub fn expand(
+        &mut self,
+        width: usize,
+        y: &[f64],
+        scale: &ErrorScale,
+        fill: impl FnOnce(&mut [f64]),
+    ) -> f64 {
         self.width = width;
         self.rows.resize((self.order + 1) * width, 0.0);
         fill(&mut self.rows);
@@ -111,7 +117,10 @@ impl Taylor {
 
     fn longest_step(&self, y: &[f64], scale: &ErrorScale) -> f64 {
         // A coefficient that is not finite makes all of higher order so.
-        if self.rows[self.order * self.width..].iter().any(|c| !c.is_finite()) {
+        if self.rows[self.order * self.width..]
+            .iter()
+            .any(|c| !c.is_finite())
+        {
             return f64::NAN;
         }
         let allows = |k: usize| reach(TAYLOR_SHARE * scale.largest(self.row(k), y), k);
@@ -120,13 +129,13 @@ impl Taylor {
 
     /// The derivative at the start of the step.
     pub fn start_derivative(&self) -> &[f64] {
-        &self.start
+        &self.start_derivative
     }
 
     /// The derivative at the start of the step, to be replaced.
     pub fn start_derivative_mut(&mut self) -> &mut [f64] {
         self.is_expanded = false;
-        &mut self.start
+        &mut self.start_derivative
     }
 
     /// The end of the attempted step.
@@ -136,7 +145,7 @@ impl Taylor {
 
     /// The derivative at the end of the attempted step.
     pub fn end_derivative(&self) -> &[f64] {
-        &self.end
+        &self.end_derivative
     }
 
     /// The series of the attempted step.
@@ -164,10 +173,10 @@ impl Taylor {
             4 => self.sum::<4>(y),
             _ => self.sum::<ANY>(y),
         }
-        field.eval(t + dt, &mut self.y1, &mut self.end)?;
+        field.eval(t + dt, &mut self.y1, &mut self.end_derivative)?;
         // The defect is the derivative of the first term left out: order + 1 times that term over the step.
         let share = 1.0 / (self.order + 1) as f64;
-        for (defect, rate) in self.defect.iter_mut().zip(&self.end) {
+        for (defect, rate) in self.defect.iter_mut().zip(&self.end_derivative) {
             *defect = share * (*defect - dt * rate);
         }
         self.error = scale.norm(&self.defect, &self.y1);
@@ -220,7 +229,7 @@ impl Taylor {
     /// Makes the end of the attempted step the start of the next one.
     pub fn accept(&mut self, y: &mut [f64]) {
         y.copy_from_slice(&self.y1);
-        self.start.copy_from_slice(&self.end);
+        self.start_derivative.copy_from_slice(&self.end_derivative);
         self.is_expanded = false;
     }
 }

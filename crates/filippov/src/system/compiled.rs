@@ -19,6 +19,9 @@ const LARGEST_COPIED: usize = 500;
 /// Surfaces slid on at once whose sign patterns are all looked at.
 const MOST_ENUMERATED: usize = 4;
 
+/// Surfaces slid on, and order.
+type JetsKey = (SmallVec<[usize; 2]>, usize);
+
 /// A traced system with everything that was compiled of it so far.
 pub(super) struct Model {
     pub graph: Graph,
@@ -38,7 +41,7 @@ pub(super) struct Model {
     enclosed_components: Vec<OnceLock<Option<EnclosureProgram>>>,
     lie: Mutex<LieCache>,
     /// Taylor coefficients of the motions met so far, by surfaces slid on and order.
-    jets: Mutex<FxHashMap<(SmallVec<[usize; 2]>, usize), Option<Arc<MotionJets>>>>,
+    jets: Mutex<FxHashMap<JetsKey, Option<Arc<MotionJets>>>>,
     /// Active surfaces of the modes met so far; a zero entry is the surface slid on.
     activity: Mutex<FxHashMap<SmallVec<[i8; 16]>, Vec<bool>>>,
 }

@@ -1,0 +1,151 @@
+"""Taylor series: accuracy, where they end, and what they must not lose."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import filippov as fl
+import numpy as np
+import pytest
+
+
+def oscillator(t: float, x: Any) -> Any:
+    return [x[1], -x[0] + np.sin(t / 3) - 0.4 * np.sign(x[1])]
+
+
+def test_auto_takes_series_and_says_so() -> None:
+    sol = fl.solve_ivp(oscillator, (0, 60), [1.0, 2.0])
+    assert sol.stats["method"] == "Taylor"
+    assert sol.stats["n_steps_taylor"] == sol.stats["n_steps"]
+    named = fl.solve_ivp(oscillator, (0, 60), [1.0, 2.0], method="DOPRI5")
+    assert named.stats["method"] == "DOPRI5"
+    assert named.stats["n_steps_taylor"] == 0
+
+
+@pytest.mark.parametrize("name", ["relay_feedback", "dry_friction_autonomous", "dieci_lopez_6_4_i"])
+def test_event_times_to_some_units_of_rounding(name: str) -> None:
+    import reference
+
+    sol = reference.solve(name, 1e-13, method="Taylor")
+    expected = np.array([event.t for event in reference.of_problem(name).switches])
+    units = np.abs(sol.switches.t[: len(expected)] - expected) / np.spacing(expected)
+    assert units.max() < 200  # measured: up to 50; errors of roundings grow from event to event
+
+
+def test_a_motion_without_terms_of_high_order_is_not_overrun() -> None:
+    """All coefficients of x' = t^40 vanish at t = 0: the step is judged at its end."""
+    sol = fl.solve_ivp(
+        lambda t, x: [t**40 - 1e-3 * np.sign(x[0] - 2.0)], (0, 1.4), [0.0], rtol=1e-9, atol=1e-12
+    )
+    exact = 1.4**41 / 41 + 1.4e-3
+    crossing = sol.switches.t[0]
+    assert crossing**41 / 41 + 1e-3 * crossing == pytest.approx(2.0, rel=1e-8)
+    assert sol.y[0, -1] == pytest.approx(exact - 2e-3 * (1.4 - crossing), rel=1e-8)
+
+
+def test_powers_at_their_surface_are_left_to_dopri5() -> None:
+    """x^(3/2) has no series at x = 0: auto does not try; a run that is to use series says that it cannot."""
+
+    def contact(t: float, x: Any) -> Any:
+        return [x[1], -1.0 - np.where(x[0] < 0, -50.0 * np.abs(x[0]) ** 1.5, 0.0)]
+
+    auto = fl.solve_ivp(contact, (0, 10), [1.0, 0.0], rtol=1e-8, atol=1e-8)
+    series = fl.solve_ivp(contact, (0, 10), [1.0, 0.0], rtol=1e-8, atol=1e-8, method="Taylor")
+    assert auto.stats["method"] == "DOPRI5"
+    assert auto.warnings == []
+    assert "DOPRI5" in series.stats["method"]
+    assert [warning.code for warning in series.warnings] == ["no_series"]
+    assert len(auto.switches) == len(series.switches)
+    np.testing.assert_allclose(series.switches.t, auto.switches.t, rtol=0, atol=1e-5)
+
+
+def test_a_black_box_has_no_series() -> None:
+    def called(t: float, x: Any) -> Any:
+        return [float(x[1]), -float(x[0])]
+
+    sol = fl.solve_ivp(called, (0, 1), [1.0, 0.0], surfaces=lambda t, x: x[0] - 5.0, method="Taylor")
+    assert sol.stats["method"] == "DOPRI5"
+    assert [warning.code for warning in sol.warnings] == ["no_series"]
+
+
+def test_long_systems_are_computed_by_loops() -> None:
+    """A ring of 60 pendulums, coupled nonlinearly, with one relay: both methods agree."""
+    n = 60
+
+    def ring(t: float, x: Any) -> Any:
+        q, p = x[:n], x[n:]
+        coupling = np.sin(np.concatenate([q[1:], q[:1]]) - q) - np.sin(q - np.concatenate([q[-1:], q[:-1]]))
+        force = -np.sin(q) + coupling
+        force[0] = force[0] - 0.3 * np.sign(p[0])
+        return np.concatenate([p, force])
+
+    y0 = np.concatenate([np.linspace(-1, 1, n), np.zeros(n)])
+    y0[n] = 0.5
+    series = fl.solve_ivp(ring, (0, 5), y0, rtol=1e-10, atol=1e-10, method="Taylor")
+    steps = fl.solve_ivp(ring, (0, 5), y0, rtol=1e-12, atol=1e-12, method="DOPRI5")
+    assert series.stats["method"] == "Taylor"
+    assert series.switches.kind.tolist() == steps.switches.kind.tolist()
+    np.testing.assert_allclose(series.switches.t, steps.switches.t, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(series.y[:, -1], steps.y[:, -1], rtol=0, atol=1e-8)
+    # What would be long to compile is not unrolled, and not chosen by itself.
+    assert fl.solve_ivp(ring, (0, 0.1), y0).stats["method"] == "DOPRI5"
+
+
+@pytest.mark.parametrize("width", [0.3, 0.03, 1e-3])
+def test_pulses_that_no_coefficient_sees_are_found(width: float) -> None:
+    """From rest at t = 0 the series of the exit function is constant; a blow at t = 5 starts the mass."""
+
+    def mass(t: float, v: Any) -> Any:
+        return [3.0 * np.exp(-(((t - 5.0) / width) ** 2)) - np.sign(v[0])]
+
+    sol = fl.solve_ivp(mass, (0, 10), [0.0], rtol=1e-9, atol=1e-12)
+    start = 5.0 - width * np.sqrt(np.log(3.0))
+    assert sol.switches.kind.tolist() == ["exit_sliding", "enter_sliding"]
+    assert sol.switches.t[0] == pytest.approx(start, abs=1e-10)
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-8, 1e-12])
+def test_dense_output_is_as_accurate_as_the_steps(tolerance: float) -> None:
+    sol = fl.solve_ivp(oscillator, (0, 60), [1.0, 2.0], rtol=tolerance, atol=tolerance)
+    exact = fl.solve_ivp(oscillator, (0, 60), [1.0, 2.0], rtol=1e-13, atol=1e-13)
+    times = np.linspace(0, 60, 2001)
+    assert np.abs(sol.sol(times) - exact.sol(times)).max() < 5 * tolerance + 1e-12
+
+
+def test_a_called_event_is_found_between_the_ends_of_long_steps() -> None:
+    """Sampled in pieces: a double crossing in the middle of a step of a circle."""
+
+    def circle(t: float, x: Any) -> Any:
+        return [x[1], -x[0], np.sign(x[0] - 5.0)]
+
+    def near_top(t: float, x: Any) -> float:
+        return float(x[0]) - 0.95
+
+    sol = fl.solve_ivp(circle, (0, 40), [0.0, 1.0, 0.0], rtol=1e-10, atol=1e-10, events=near_top)
+    turns = np.arange(0, 40, 2 * np.pi)
+    expected = np.sort(np.concatenate([turns + np.arcsin(0.95), turns + np.pi - np.arcsin(0.95)]))
+    np.testing.assert_allclose(sol.t_events[0], expected[expected < 40], rtol=0, atol=1e-8)
+
+
+def test_sliding_on_a_curved_surface_by_series() -> None:
+    """On the circle x^2 + y^2 = 1 the motion turns at the rate of its tangential field."""
+
+    def rotor(t: float, x: Any) -> Any:
+        radius = x[0] ** 2 + x[1] ** 2 - 1.0
+        pull = np.sign(radius)
+        return [-x[1] - x[0] * pull, x[0] - x[1] * pull]
+
+    sol = fl.solve_ivp(rotor, (0, 20), [1.0, 0.0], rtol=1e-10, atol=1e-10)
+    assert sol.stats["method"] == "Taylor"
+    times = np.linspace(0, 20, 101)
+    np.testing.assert_allclose(sol.sol(times), [np.cos(times), np.sin(times)], rtol=0, atol=1e-9)
+
+
+def test_repeated_runs_agree_to_the_bit() -> None:
+    """Also when programs were compiled in between: 2500 expansions are more than are interpreted."""
+    system = fl.System(oscillator, n=2)
+    first = system.solve((0, 60), [1.0, 2.0])
+    for _ in range(80):
+        last = system.solve((0, 60), [1.0, 2.0])
+    np.testing.assert_array_equal(first.y, last.y)
+    np.testing.assert_array_equal(first.switches.t, last.switches.t)
