@@ -261,6 +261,10 @@ impl Integrator<'_> {
         self.stats.n_field_evaluations += self.motion.field.n_evaluations();
         self.remember_pace();
         self.motion.restart(self.system, self.t, mode, &deflations);
+        let multipliers = std::mem::take(&mut self.decided_multipliers);
+        if let ModeField::Intersection(field) = &mut self.motion.field {
+            field.set_multipliers(&multipliers);
+        }
         self.motion.project(self.t, &mut self.x)?;
         let derivative = self.stepper.start_derivative_mut();
         match &mut self.motion.field {

@@ -282,6 +282,10 @@ impl PiecewiseSystem for TracedSystem {
         Some(self)
     }
 
+    fn sign_groups(&self, surfaces: &[usize]) -> Vec<Vec<usize>> {
+        self.model.affine_signs().groups(surfaces)
+    }
+
     fn surface_name(&self, j: usize) -> String {
         self.model
             .graph
