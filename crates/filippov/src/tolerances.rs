@@ -107,8 +107,17 @@ pub const ARRIVED: f64 = 1e-3;
 /// That many switches without any progress of time end a run.
 pub const MOST_SWITCHES_AT_ONE_TIME: u32 = 64;
 
-/// Largest number of surfaces that meet: their 2^m fields are all evaluated, and all 3^m modes looked at.
+/// Largest number of surfaces that meet and whose signs multiply one another: their 2^m fields are all evaluated, and
+/// all 3^m modes looked at.
 pub const MOST_MEETING: usize = 6;
+
+/// Largest matrix whose principal minors are all computed, and whose characteristic polynomial is trusted: 256
+/// eliminations, and coefficients that lose a digit or two.
+pub const LARGEST_BY_MINORS: usize = 8;
+
+/// Squarings that take the norm of a power to the spectral radius: the 2^26-th root of the factor between them, up
+/// to the order of the matrix, is 1 up to 1e-7.
+pub const CAYLEY_SQUARINGS: u32 = 26;
 
 /// Two normalised bilinear equations are the same if all coefficients of their eliminants, sums of
 /// products of coefficients of size 1, are rounding errors below this; so is a component of a null vector.
@@ -157,7 +166,7 @@ pub const SLOWEST_ACCUMULATION: f64 = 0.95;
 
 /// Pieces (corners, strips, steps of a series) that one run of the hidden dynamics may take: some
 /// tenths of a second. Of 830 000 random runs one did not end within, a fold passed at a ratio of
-/// scalings of 27.
+/// scalings of 27. Of more than six surfaces as many fewer as a piece takes longer.
 pub const MOST_PIECES: usize = 100_000;
 
 /// Interval tests in the search for the end of one piece: a zero needs as many as halvings isolate it,
@@ -215,6 +224,10 @@ pub const INJECTIVE: f64 = 0.5;
 /// Boxes looked at in the search for all roots in a cube: for three surfaces it ends within a
 /// millisecond, for six it can take seconds.
 pub const MOST_BOXES: usize = 100_000;
+
+/// Multiplications of m x m matrices in that search, m^3 for each: some seconds for many surfaces, where the number of
+/// boxes alone is no bound. Up to six surfaces it is none.
+pub const MOST_BOX_WORK: usize = MOST_BOXES * 6 * 6 * 6;
 
 /// Boxes narrower than this hold a root that is multiple up to rounding.
 pub const NARROWEST_BOX: f64 = 1e-6;
@@ -305,6 +318,13 @@ pub const LEAST_NORM_STEPS: usize = 100;
 /// Largest number of surfaces at whose intersection all Filippov solutions are listed: there are 3^m modes to look
 /// at, and those of three and more surfaces take a search for all roots.
 pub const MOST_LISTED: usize = 3;
+
+/// Surfaces that know of one another of which each is scaled on its own in the trial for uniqueness; beyond, only all
+/// together are, in two orders.
+pub const MOST_SCALED_SINGLY: usize = 12;
+
+/// Combinations of candidates of the parts of an intersection that are listed.
+pub const MOST_COMBINED: usize = 81;
 
 /// After a touch of an exit function the search goes on from this share of the step behind it.
 pub const BEYOND_TOUCH: f64 = 0.02;

@@ -1,7 +1,7 @@
 //! The law of sliding on many surfaces where the field is affine in their signs.
 
 use crate::error::FieldError;
-use crate::switching::Matrix;
+use crate::switching::{stability_margins, Matrix};
 use crate::system::{AffineParts, AffineSigns, PiecewiseSystem};
 use crate::tolerances::{MOST_MEETING, SURFACE_NOISE};
 
@@ -15,6 +15,8 @@ pub struct AffineLaw<'a> {
     /// The signs of the last evaluation: those of the mode, with the multipliers last found.
     signs: Vec<f64>,
     h: Vec<f64>,
+    /// The scaling of the surfaces, for the stability of the root of three and more.
+    kappa: Vec<f64>,
 }
 
 impl<'a> AffineLaw<'a> {
@@ -28,7 +30,13 @@ impl<'a> AffineLaw<'a> {
             parts: affine.affine_parts(set)?,
             signs,
             h: vec![0.0; system.n_surfaces()],
+            kappa: vec![1.0; set.len()],
         })
+    }
+
+    /// Sets the scaling of the surfaces.
+    pub fn set_scaling(&mut self, kappa: &[f64]) {
+        self.kappa.copy_from_slice(kappa);
     }
 
     /// Writes the sliding field at (t, x); NaN, also in the multipliers, where it is not determined. Returns the
@@ -62,22 +70,18 @@ impl<'a> AffineLaw<'a> {
         }
         let mut jacobian = Matrix::zeros(m);
         for i in 0..m {
-            let size = normal
+            normal.row(i).for_each(|(j, v)| jacobian[(i, j)] = v);
+        }
+        if m > 2 {
+            return stability_margins(&jacobian.with_rows_scaled(&self.kappa));
+        }
+        let size = |i: usize| {
+            normal
                 .row(i)
-                .fold(0.0_f64, |size, (_, v)| size.max(v.abs()));
-            normal.row(i).for_each(|(j, v)| jacobian[(i, j)] = v / size);
-        }
-        if m == 2 {
-            return [
-                jacobian.determinant(),
-                -jacobian[(0, 0)].min(jacobian[(1, 1)]),
-            ];
-        }
-        let sign = if m.is_multiple_of(2) { 1.0 } else { -1.0 };
-        [
-            sign * jacobian.determinant(),
-            jacobian.last_hurwitz_determinant(),
-        ]
+                .fold(0.0_f64, |size, (_, v)| size.max(v.abs()))
+        };
+        let unit = jacobian.with_rows_scaled(&[1.0 / size(0), 1.0 / size(1)]);
+        [unit.determinant(), -unit[(0, 0)].min(unit[(1, 1)])]
     }
 
     /// Moves `x` onto all surfaces, one after the other along their gradients, until all |h| are at the level of

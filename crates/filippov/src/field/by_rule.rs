@@ -27,7 +27,7 @@ impl RuleLaw {
     pub fn new(system: &dyn PiecewiseSystem, set: &[usize], rule: SlidingRule) -> Self {
         RuleLaw {
             rule,
-            fields: MeetingFields::new(system, set),
+            fields: MeetingFields::of_all_patterns(system, set),
             weights: vec![0.0; 1 << set.len()],
             exits: vec![f64::NAN; 2 * set.len() + 2],
             failure: None,

@@ -1,16 +1,17 @@
 //! The law of sliding on a few surfaces: the multilinear combination of all fields around them.
 
-use super::weights::fill_product_weights;
 use super::MeetingFields;
 use crate::error::FieldError;
 use crate::switching::codim2::Bilinear;
-use crate::switching::{least_multipliers, newton, stable_roots, NormalFields};
+use crate::switching::{least_multipliers, newton, stability_margins, stable_roots, NormalFields};
 use crate::system::PiecewiseSystem;
 
 /// The canopy of the 2^m fields around an intersection, and the root that the motion follows.
 pub struct Canopy {
     fields: MeetingFields,
     weights: Vec<f64>,
+    /// The scaling of the surfaces, for the stability of the root of three and more.
+    kappa: Vec<f64>,
 }
 
 impl Canopy {
@@ -18,8 +19,14 @@ impl Canopy {
     pub fn new(system: &dyn PiecewiseSystem, set: &[usize]) -> Self {
         Canopy {
             fields: MeetingFields::new(system, set),
-            weights: vec![0.0; 1 << set.len()],
+            weights: Vec::new(),
+            kappa: vec![1.0; set.len()],
         }
+    }
+
+    /// Sets the scaling of the surfaces.
+    pub fn set_scaling(&mut self, kappa: &[f64]) {
+        self.kappa.copy_from_slice(kappa);
     }
 
     /// Evaluates all fields at a point of the intersection. Returns the number of evaluations.
@@ -48,9 +55,9 @@ impl Canopy {
         } else if fields.m() == 2 {
             solve_two(&fields, lambda)?
         } else {
-            solve_many(&fields, lambda)?
+            solve_many(&fields, lambda, &self.kappa)?
         };
-        fill_product_weights(lambda, &mut self.weights);
+        self.fields.fill_product_weights(lambda, &mut self.weights);
         self.fields.combine(&self.weights, dx);
         Some(ends)
     }
@@ -69,18 +76,13 @@ fn solve_two(fields: &NormalFields, lambda: &mut Vec<f64>) -> Option<[f64; 2]> {
 }
 
 /// More surfaces: Newton's method from the last multipliers; at the start from the only stable root.
-fn solve_many(fields: &NormalFields, lambda: &mut Vec<f64>) -> Option<[f64; 2]> {
+fn solve_many(fields: &NormalFields, lambda: &mut Vec<f64>, kappa: &[f64]) -> Option<[f64; 2]> {
     if lambda.len() != fields.m() {
         *lambda = stable_roots(fields).into_iter().next()?;
     }
     *lambda = newton(fields, lambda)?;
-    // Stable for equal scalings of the surfaces as they are: that is what decides where the motion began.
-    let jacobian = fields.jacobian(lambda);
-    let sign = if fields.m().is_multiple_of(2) {
-        1.0
-    } else {
-        -1.0
-    };
-    let fold = sign * jacobian.determinant();
-    Some([fold, jacobian.last_hurwitz_determinant()])
+    // Stable for the scaling that decides where the motion began.
+    Some(stability_margins(
+        &fields.jacobian(lambda).with_rows_scaled(kappa),
+    ))
 }

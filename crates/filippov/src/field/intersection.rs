@@ -42,7 +42,7 @@ impl IntersectionExit {
 }
 
 /// Filippov's field on an intersection of m >= 2 surfaces: the multilinear combination ("canopy") of the
-/// 2^m fields with the multipliers lambda in [-1, 1]^m that make it tangent to all surfaces,
+/// fields around it with the multipliers lambda in [-1, 1]^m that make it tangent to all surfaces,
 ///
 ///   f_s = sum over k of prod_i (1 + k_i lambda_i)/2 * f^k,   grad h_j . f_s + d_t h_j = 0,
 ///
@@ -67,8 +67,8 @@ pub struct IntersectionField<'a> {
 
 impl<'a> IntersectionField<'a> {
     /// Sliding on the surfaces of `set`, the others with the given signs; the multipliers are tracked from
-    /// `lambda`, or found anew if that is empty. More than [`MOST_MEETING`] surfaces need a field that is
-    /// affine in their signs, else there are no multipliers.
+    /// `lambda`, or found anew if that is empty. If the signs of more than [`MOST_MEETING`] of them multiply one
+    /// another there are no multipliers.
     pub fn new(
         system: &'a dyn PiecewiseSystem,
         set: &[usize],
@@ -80,7 +80,11 @@ impl<'a> IntersectionField<'a> {
             set: set.to_vec(),
             signs: signs.to_vec(),
             affine: AffineLaw::new(system, set, signs),
-            canopy: (set.len() <= MOST_MEETING).then(|| Canopy::new(system, set)),
+            canopy: system
+                .sign_groups(set)
+                .iter()
+                .all(|group| group.len() <= MOST_MEETING)
+                .then(|| Canopy::new(system, set)),
             by_rule: None,
             lambda: lambda.to_vec(),
             exits: vec![f64::NAN; 2 * set.len() + 2],
@@ -95,6 +99,25 @@ impl<'a> IntersectionField<'a> {
         let applies = rule != SlidingRule::Canopy && self.set.len() <= MOST_MEETING;
         self.by_rule = applies.then(|| RuleLaw::new(self.system, &self.set, rule));
         self
+    }
+
+    /// The same with the surfaces of the set scaled by `kappa`: for three and more of them it decides how long the
+    /// root counts as stable.
+    #[must_use]
+    pub fn with_scaling(mut self, kappa: &[f64]) -> Self {
+        if let Some(law) = &mut self.affine {
+            law.set_scaling(kappa);
+        }
+        if let Some(canopy) = &mut self.canopy {
+            canopy.set_scaling(kappa);
+        }
+        self
+    }
+
+    /// The multipliers from which those of the next evaluation are tracked.
+    pub fn set_multipliers(&mut self, lambda: &[f64]) {
+        self.lambda.clear();
+        self.lambda.extend_from_slice(lambda);
     }
 
     /// The combination of the fields.

@@ -1,19 +1,27 @@
 //! All fields that meet at an intersection, with their normal components.
 
 use super::eval_on_side;
+use super::weights::product_weights;
 use crate::error::FieldError;
-use crate::switching::{Matrix, NormalFields, Undecided};
+use crate::switching::{Matrix, NormalFields, SignGroup, Undecided};
 use crate::system::{dot, PiecewiseSystem};
 use crate::tolerances::TANGENT_TO_ALL;
 
-/// The 2^m fields around an intersection of m surfaces, one after the other, and the gradients of the
-/// switching functions. Pattern p has sign +1 at surface i of the set where bit i of p is set.
+/// The fields around an intersection of m surfaces, and the gradients of the switching functions.
+///
+/// Where the field is a sum of functions of groups of signs ([`PiecewiseSystem::sign_groups`]), 2^|group| fields
+/// of each group are evaluated, with the signs of the other groups at -1, and kept as differences to the field with
+/// all signs at -1; only the first group is kept as it is. Then sums over all groups are those of the fields.
 #[derive(Clone, Debug)]
 pub struct MeetingFields {
     set: Vec<usize>,
     n: usize,
+    /// Positions within the set.
+    groups: Vec<Vec<usize>>,
+    /// The fields of all groups, one group after the other. Pattern p of a group has sign +1 at its member b where
+    /// bit b of p is set.
     fields: Vec<f64>,
-    /// Normal components, `[pattern * m + i]`.
+    /// Normal components, `[row * m + i]`.
     components: Vec<f64>,
     gradients: Vec<f64>,
     time_derivatives: Vec<f64>,
@@ -21,14 +29,35 @@ pub struct MeetingFields {
 }
 
 impl MeetingFields {
-    /// Room for the fields around the surfaces of `set`.
+    /// Room for the fields around the surfaces of `set`, in the groups of the system.
     pub fn new(system: &dyn PiecewiseSystem, set: &[usize]) -> Self {
+        let place = |j: usize| set.binary_search(&j).ok();
+        let groups = system.sign_groups(set).into_iter();
+        let groups = groups.map(|group| group.into_iter().filter_map(place).collect());
+        MeetingFields::of_groups(system, set, groups.collect())
+    }
+
+    /// Room for the fields of all 2^m patterns. Pattern p has sign +1 at surface i of the set where bit i of p
+    /// is set.
+    pub fn of_all_patterns(system: &dyn PiecewiseSystem, set: &[usize]) -> Self {
+        MeetingFields::of_groups(system, set, vec![(0..set.len()).collect()])
+    }
+
+    fn of_groups(system: &dyn PiecewiseSystem, set: &[usize], groups: Vec<Vec<usize>>) -> Self {
         let (n, m) = (system.n_states(), set.len());
+        // One and two surfaces have closed forms, for all of their patterns.
+        let groups = if m <= 2 {
+            vec![(0..m).collect()]
+        } else {
+            groups
+        };
+        let rows: usize = groups.iter().map(|group| 1 << group.len()).sum();
         MeetingFields {
             set: set.to_vec(),
             n,
-            fields: vec![0.0; n << m],
-            components: vec![0.0; m << m],
+            groups,
+            fields: vec![0.0; n * rows],
+            components: vec![0.0; m * rows],
             gradients: vec![0.0; n * m],
             time_derivatives: vec![0.0; m],
             signs: Vec::new(),
@@ -59,17 +88,58 @@ impl MeetingFields {
             let gradient = &mut self.gradients[i * n..(i + 1) * n];
             self.time_derivatives[i] = system.gradient(j, t, x, signs, gradient)?;
         }
-        let mut evaluations = 0;
-        for pattern in 0..1_usize << m {
-            for (i, &j) in self.set.iter().enumerate() {
-                self.signs[j] = if pattern >> i & 1 == 1 { 1.0 } else { -1.0 };
+        for &j in &self.set {
+            self.signs[j] = -1.0;
+        }
+        let (mut evaluations, mut row) = (0, 0);
+        for index in 0..self.groups.len() {
+            for pattern in 0..1_usize << self.groups[index].len() {
+                if index > 0 && pattern == 0 {
+                    self.fields[row * n..(row + 1) * n].fill(0.0);
+                    self.components[row * m..(row + 1) * m].fill(0.0);
+                } else {
+                    for (bit, &i) in self.groups[index].iter().enumerate() {
+                        let up = pattern >> bit & 1 == 1;
+                        self.signs[self.set[i]] = if up { 1.0 } else { -1.0 };
+                    }
+                    evaluations += self.evaluate_row(system, (t, x), row, index > 0)?;
+                }
+                row += 1;
             }
-            let field = &mut self.fields[pattern * n..(pattern + 1) * n];
-            evaluations += eval_on_side(system, t, x, &self.signs, field)?;
-            for i in 0..m {
-                let gradient = &self.gradients[i * n..(i + 1) * n];
-                self.components[pattern * m + i] = self.time_derivatives[i] + dot(gradient, field);
+            for &i in &self.groups[index] {
+                self.signs[self.set[i]] = -1.0;
             }
+        }
+        Ok(evaluations)
+    }
+
+    /// Evaluates the field at the present signs, as a difference to the first one if so asked.
+    fn evaluate_row(
+        &mut self,
+        system: &dyn PiecewiseSystem,
+        (t, x): (f64, &[f64]),
+        row: usize,
+        as_difference: bool,
+    ) -> Result<u64, FieldError> {
+        let (n, m) = (self.n, self.set.len());
+        let (first, rest) = self.fields.split_at_mut(if row == 0 { 0 } else { n });
+        let start = row * n - first.len();
+        let field = &mut rest[start..start + n];
+        let evaluations = eval_on_side(system, t, x, &self.signs, field)?;
+        if as_difference {
+            field
+                .iter_mut()
+                .zip(first.iter())
+                .for_each(|(f, base)| *f -= base);
+        }
+        for i in 0..m {
+            let gradient = &self.gradients[i * n..(i + 1) * n];
+            let of_time = if as_difference {
+                0.0
+            } else {
+                self.time_derivatives[i]
+            };
+            self.components[row * m + i] = of_time + dot(gradient, field);
         }
         Ok(evaluations)
     }
@@ -77,9 +147,20 @@ impl MeetingFields {
     /// The normal components as data for a decision.
     ///
     /// # Errors
-    /// If one is not finite, or the surfaces are too many.
+    /// If one is not finite, or the signs of too many surfaces multiply one another.
     pub fn normal_fields(&self) -> Result<NormalFields, Undecided> {
-        NormalFields::new(self.set.len(), self.components.clone())
+        let m = self.set.len();
+        let mut start = 0;
+        let groups = self.groups.iter().map(|members| {
+            let end = start + (m << members.len());
+            let values = self.components[start..end].to_vec();
+            start = end;
+            SignGroup {
+                members: members.clone(),
+                values,
+            }
+        });
+        NormalFields::of_groups(m, groups.collect())
     }
 
     /// The normal components in units of the gradients: those along unit normals.
@@ -96,26 +177,42 @@ impl MeetingFields {
     /// all fields are tangent, up to rounding.
     pub fn telling(&self) -> Vec<usize> {
         let m = self.set.len();
-        let fastest = self
-            .fields
-            .chunks_exact(self.n)
-            .map(|f| dot(f, f))
-            .fold(0.0, f64::max);
+        // Sums over groups of what is largest in each.
+        let over_groups = |largest: &dyn Fn(usize) -> f64| {
+            let mut row = 0;
+            let groups = self.groups.iter().map(|group| {
+                let rows = row..row + (1 << group.len());
+                row = rows.end;
+                rows.map(largest).fold(0.0, f64::max)
+            });
+            groups.sum::<f64>()
+        };
+        let square = |v: &[f64]| dot(v, v);
+        let fastest =
+            over_groups(&|row| square(&self.fields[row * self.n..(row + 1) * self.n]).sqrt());
         let is_telling = |&i: &usize| {
             let gradient = &self.gradients[i * self.n..(i + 1) * self.n];
-            let size = (dot(gradient, gradient) * fastest).sqrt();
-            let components = self.components.iter().skip(i).step_by(m);
-            components.fold(0.0_f64, |largest, c| largest.max(c.abs())) > TANGENT_TO_ALL * size
+            let size = square(gradient).sqrt() * fastest;
+            over_groups(&|row| self.components[row * m + i].abs()) > TANGENT_TO_ALL * size
         };
         (0..m).filter(is_telling).collect()
     }
 
-    /// The field of one pattern.
+    /// Writes the weights prod_i (1 + k_i lambda_i)/2 of the canopy, those of each group after the other.
+    pub fn fill_product_weights(&self, lambda: &[f64], weights: &mut Vec<f64>) {
+        weights.clear();
+        for group in &self.groups {
+            let own: Vec<f64> = group.iter().map(|&i| lambda[i]).collect();
+            weights.extend(product_weights(&own));
+        }
+    }
+
+    /// The field of one pattern of the first group: of two surfaces, or of all patterns, any field.
     pub fn field(&self, pattern: usize) -> &[f64] {
         &self.fields[pattern * self.n..(pattern + 1) * self.n]
     }
 
-    /// Writes the combination of the fields with these weights, one per pattern.
+    /// Writes the combination of the fields with these weights, one per pattern of each group.
     pub fn combine(&self, weights: &[f64], dx: &mut [f64]) {
         dx.fill(0.0);
         for (weight, field) in weights.iter().zip(self.fields.chunks_exact(self.n)) {

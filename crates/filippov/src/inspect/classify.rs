@@ -214,7 +214,7 @@ fn on_surface(
             .collect(),
         unique: candidates.len() == 1,
         candidates,
-        components: fields.values().to_vec(),
+        components: fields.values().into_owned(),
         leading: Some([decision.minus, decision.plus]),
         ..Classification::open(PointKind::of(decision.minus, decision.plus), vec![j])
     }))
@@ -229,10 +229,16 @@ fn at_intersection(
     kappa: &[f64],
 ) -> Result<Option<Classification>, FieldError> {
     let mut point = Classification::open(PointKind::Intersection, surfaces);
-    if point.surfaces.len() > MOST_MEETING {
-        return at_many(system, t, x, mode, point);
-    }
     let meeting = point.surfaces.clone();
+    if meeting.len() > MOST_MEETING && decided_by_relay(system, (t, x), mode, &mut point)? {
+        return Ok(Some(point));
+    }
+    let groups = system.sign_groups(&meeting).into_iter();
+    let largest = groups.map(|group| group.len()).max().unwrap_or(0);
+    if largest > MOST_MEETING {
+        point.undecided = Some(Undecided::TooMany { n: largest });
+        return Ok(Some(point));
+    }
     let Some(fields) = fields_around(system, t, x, mode, &meeting)? else {
         return Ok(None);
     };
@@ -240,7 +246,9 @@ fn at_intersection(
         .iter()
         .map(|&j| kappa.get(j).copied().unwrap_or(1.0));
     let scaling: Vec<f64> = scaling.collect();
-    point.components = fields.values().to_vec();
+    if meeting.len() <= MOST_MEETING {
+        point.components = fields.values().into_owned();
+    }
     let on_all = |k: &Mode| {
         let mut full = mode.clone();
         for (&j, &entry) in meeting.iter().zip(k.entries()) {
@@ -265,35 +273,29 @@ fn at_intersection(
     Ok(Some(point))
 }
 
-/// More surfaces than all of whose fields can be looked at: the relay problem, if the field is affine in the signs.
-fn at_many(
+/// Many surfaces: the relay problem, if the field is affine in the signs and it has a solution that is clear.
+fn decided_by_relay(
     system: &dyn PiecewiseSystem,
-    t: f64,
-    x: &[f64],
+    at: (f64, &[f64]),
     mode: &Mode,
-    mut point: Classification,
-) -> Result<Option<Classification>, FieldError> {
-    let (found, _) = relay_at(system, (t, x), mode, &point.surfaces)?;
-    match found.filter(|found| found.degenerate.is_empty()) {
-        Some(found) => {
-            let mut after = mode.clone();
-            for ((&j, &entry), &sign) in point.surfaces.iter().zip(&found.modes).zip(&found.signs) {
-                after.set(j, entry);
-                if entry == 0 {
-                    point.multipliers.push(sign);
-                }
-            }
-            point.unique = found.uniqueness == Uniqueness::Certain;
-            point.candidates = vec![after.clone()];
-            point.mode = Some(after);
-            point.leaf = "relay";
-        }
-        None => {
-            let m = point.surfaces.len();
-            point.undecided = Some(Undecided::Shape { m, found: 0 });
+    point: &mut Classification,
+) -> Result<bool, FieldError> {
+    let (found, _) = relay_at(system, at, mode, &point.surfaces)?;
+    let Some(found) = found.filter(|found| found.degenerate.is_empty()) else {
+        return Ok(false);
+    };
+    let mut after = mode.clone();
+    for ((&j, &entry), &sign) in point.surfaces.iter().zip(&found.modes).zip(&found.signs) {
+        after.set(j, entry);
+        if entry == 0 {
+            point.multipliers.push(sign);
         }
     }
-    Ok(Some(point))
+    point.unique = found.uniqueness == Uniqueness::Certain;
+    point.candidates = vec![after.clone()];
+    point.mode = Some(after);
+    point.leaf = "relay";
+    Ok(true)
 }
 
 impl Classification {

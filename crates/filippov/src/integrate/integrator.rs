@@ -64,6 +64,8 @@ pub struct Integrator<'a> {
     pub(super) recent_dt: f64,
     /// Time of the last switch, and how many came at that time.
     pub(super) last_switch: (f64, u32),
+    /// The multipliers with which the next motion begins, as its decision found them.
+    pub(super) decided_multipliers: Vec<f64>,
 }
 
 impl<'a> Integrator<'a> {
@@ -94,7 +96,7 @@ impl<'a> Integrator<'a> {
             t: t_span.0,
             t_end: t_span.1,
             x: y0.to_vec(),
-            motion: Motion::new(system, t_span.0, undecided, options.sliding),
+            motion: Motion::new(system, t_span.0, undecided, options.into()),
             stepper: Stepper::new(n, taylor),
             controller: Controller::default(),
             dt: f64::NAN,
@@ -109,6 +111,7 @@ impl<'a> Integrator<'a> {
             meets_edges: false,
             recent_dt: 0.0,
             last_switch: (f64::NAN, 0),
+            decided_multipliers: Vec::new(),
         })
     }
 

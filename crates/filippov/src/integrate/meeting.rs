@@ -4,7 +4,7 @@ use smallvec::smallvec;
 
 use super::detect::Found;
 use super::integrator::Integrator;
-use super::motion::ModeField;
+use super::motion::{Law, ModeField};
 use super::transition::{Decided, Left, Lefts};
 use super::Stop;
 use crate::error::FieldError;
@@ -33,8 +33,8 @@ impl Integrator<'_> {
         if let Some(decided) = self.decide_by_relay(Some(event), mode, meeting)? {
             return Ok(decided);
         }
-        if meeting.len() > MOST_MEETING {
-            return Ok(Err(too_many(meeting)));
+        if let Some(stop) = self.too_many(meeting) {
+            return Ok(Err(stop));
         }
         let corners = self.corners(meeting, mode)?;
         let mut others = Vec::new();
@@ -68,14 +68,27 @@ impl Integrator<'_> {
         if let Some(decided) = self.decide_by_relay(None, mode, meeting)? {
             return Ok(decided);
         }
-        if meeting.len() > MOST_MEETING {
-            return Ok(Err(too_many(meeting)));
+        if let Some(stop) = self.too_many(meeting) {
+            return Ok(Err(stop));
         }
         let corners = self.corners(meeting, mode)?;
         let resolution = corners
             .normal_fields()
             .and_then(|fields| resolve(&fields, &Incoming::Start, &self.kappa(meeting)));
         self.follow(mode, meeting, &corners, resolution, &[])
+    }
+
+    /// More surfaces whose signs multiply one another than all of whose fields can be looked at.
+    fn too_many(&self, meeting: &[usize]) -> Option<Stop> {
+        let groups = self.system.sign_groups(meeting).into_iter();
+        let surfaces = groups
+            .filter(|group| group.len() > MOST_MEETING)
+            .max_by_key(Vec::len)?;
+        Some(Stop::Intersection {
+            reason: Undecided::TooMany { n: surfaces.len() },
+            surfaces,
+            candidates: Vec::new(),
+        })
     }
 
     /// All fields around the current point of an intersection.
@@ -92,11 +105,7 @@ impl Integrator<'_> {
 
     /// The scaling of the surfaces of an intersection in the regularisation that decides.
     pub(super) fn kappa(&self, meeting: &[usize]) -> Vec<f64> {
-        let kappa = &self.options.kappa;
-        meeting
-            .iter()
-            .map(|&j| kappa.get(j).copied().unwrap_or(1.0))
-            .collect()
+        Law::from(self.options).scaling(meeting)
     }
 
     /// How the motion came to the intersection.
@@ -236,6 +245,7 @@ impl Integrator<'_> {
             &[]
         };
         let left = self.departures(&after, &leaving, multipliers)?;
+        self.decided_multipliers = multipliers.to_vec();
         Ok(Ok((after, left)))
     }
 
@@ -365,24 +375,13 @@ impl Integrator<'_> {
             }
             _ => {
                 let field = IntersectionField::new(self.system, &set, &signs, multipliers);
-                let mut field = field.with_rule(self.options.sliding);
+                let field = field.with_rule(self.options.sliding);
+                let mut field = field.with_scaling(&self.kappa(&set));
                 field.eval(t, &mut x, velocity)?;
                 field.n_evaluations()
             }
         };
         Ok(())
-    }
-}
-
-/// More surfaces than all of whose fields can be looked at.
-fn too_many(meeting: &[usize]) -> Stop {
-    Stop::Intersection {
-        surfaces: meeting.to_vec(),
-        candidates: Vec::new(),
-        reason: Undecided::Shape {
-            m: meeting.len(),
-            found: 0,
-        },
     }
 }
 

@@ -8,7 +8,7 @@ use crate::error::FieldError;
 use crate::event::{Deflation, EventFunction, Monitored};
 use crate::field::{AffineBounds, IntersectionField, RegionField, SlidingField, SmoothField};
 use crate::mode::{Mode, Signs};
-use crate::options::SlidingRule;
+use crate::options::{Options, SlidingRule};
 use crate::system::{MotionJets, PiecewiseSystem};
 
 /// The smooth field of a mode.
@@ -16,6 +16,32 @@ pub(super) enum ModeField<'a> {
     Region(RegionField<'a>),
     Sliding(Box<SlidingField<'a>>),
     Intersection(Box<IntersectionField<'a>>),
+}
+
+/// How a motion slides where several surfaces meet.
+#[derive(Clone, Copy)]
+pub(super) struct Law<'a> {
+    /// The combination of the fields.
+    pub rule: SlidingRule,
+    /// The scaling of all surfaces; empty: 1 for each.
+    pub kappa: &'a [f64],
+}
+
+impl<'a> From<&'a Options> for Law<'a> {
+    fn from(options: &'a Options) -> Self {
+        Law {
+            rule: options.sliding,
+            kappa: &options.kappa,
+        }
+    }
+}
+
+impl Law<'_> {
+    /// The scaling of some surfaces.
+    pub fn scaling(&self, surfaces: &[usize]) -> Vec<f64> {
+        let scaling = surfaces.iter().map(|&j| self.kappa.get(j).copied());
+        scaling.map(|kappa| kappa.unwrap_or(1.0)).collect()
+    }
 }
 
 /// The surfaces slid on, in order.
@@ -27,7 +53,7 @@ pub(super) type Exits = SmallVec<[f64; 6]>;
 impl<'a> ModeField<'a> {
     fn new(
         system: &'a dyn PiecewiseSystem,
-        rule: SlidingRule,
+        law: Law<'a>,
         sliding: &[usize],
         signs: &[f64],
     ) -> Self {
@@ -36,7 +62,8 @@ impl<'a> ModeField<'a> {
             [j] => ModeField::Sliding(Box::new(SlidingField::new(system, j, signs))),
             _ => {
                 let field = IntersectionField::new(system, sliding, signs, &[]);
-                ModeField::Intersection(Box::new(field.with_rule(rule)))
+                let field = field.with_rule(law.rule);
+                ModeField::Intersection(Box::new(field.with_scaling(&law.scaling(sliding))))
             }
         }
     }
@@ -132,30 +159,24 @@ pub(super) struct Motion<'a> {
     pub monitored: Vec<Monitored>,
     /// Its Taylor series, if it is integrated by them.
     pub jets: Option<Arc<MotionJets>>,
-    /// The sliding field where several surfaces meet.
-    rule: SlidingRule,
+    law: Law<'a>,
 }
 
 impl<'a> Motion<'a> {
     /// The motion in `mode` from `t_start`.
-    pub fn new(
-        system: &'a dyn PiecewiseSystem,
-        t_start: f64,
-        mode: Mode,
-        rule: SlidingRule,
-    ) -> Self {
+    pub fn new(system: &'a dyn PiecewiseSystem, t_start: f64, mode: Mode, law: Law<'a>) -> Self {
         let (signs, sliding): (_, SlidingSet) = (mode.signs(), mode.sliding_set().collect());
         let mut motion = Motion {
             t_start,
             active: vec![false; signs.len()],
-            field: ModeField::new(system, rule, &sliding, &signs),
+            field: ModeField::new(system, law, &sliding, &signs),
             affine_bounds: None,
             is_straight: sliding.iter().all(|&j| system.is_affine(j)),
             sliding,
             idle: Vec::new(),
             monitored: Vec::new(),
             jets: None,
-            rule,
+            law,
             signs,
             mode,
         };
@@ -179,7 +200,7 @@ impl<'a> Motion<'a> {
                 .position(|f| f.restart(&sliding, &signs));
             let field = match known {
                 Some(index) => self.idle.swap_remove(index),
-                None => ModeField::new(system, self.rule, &sliding, &signs),
+                None => ModeField::new(system, self.law, &sliding, &signs),
             };
             self.idle.push(std::mem::replace(&mut self.field, field));
         }

@@ -262,6 +262,10 @@ impl Integrator<'_> {
         self.remember_pace();
         self.motion.restart(self.system, self.t, mode, &deflations);
         self.choose_stepper();
+        let multipliers = std::mem::take(&mut self.decided_multipliers);
+        if let ModeField::Intersection(field) = &mut self.motion.field {
+            field.set_multipliers(&multipliers);
+        }
         self.motion.project(self.t, &mut self.x)?;
         let derivative = self.stepper.start_derivative_mut();
         match &mut self.motion.field {

@@ -90,11 +90,8 @@ fn corner_states(
     kappa: &[f64],
 ) -> Result<Vec<Vec<f64>>, Undecided> {
     let sides = region.iter().map(|&k| f64::from(k));
-    let f = fields
-        .in_region(region)
-        .iter()
-        .zip(kappa)
-        .map(|(f, k)| f * k);
+    let components = fields.in_region(region);
+    let f = components.iter().zip(kappa).map(|(f, k)| f * k);
     let speeds: Vec<f64> = sides.zip(f).map(|(side, f)| -side * f).collect();
     if let Some(surface) = speeds.iter().position(|&v| v <= 0.0) {
         return Err(Undecided::NotArriving { surface });

@@ -14,6 +14,7 @@ mod intersection;
 mod lie;
 mod normal_fields;
 mod p_matrix;
+mod parts;
 mod redundant;
 mod relay;
 mod relay_at;
@@ -33,8 +34,9 @@ pub use hidden::{
 pub use incoming::{ExitKind, Incoming};
 pub use intersection::{decide_intersection, IntersectionDecision};
 pub use lie::{first_nonzero, normal_component, Leading};
-pub use normal_fields::NormalFields;
+pub use normal_fields::{NormalFields, SignGroup};
 pub use p_matrix::is_p_matrix;
+pub use parts::{independent_parts, of_part};
 pub use redundant::least_multipliers;
 pub use relay::{
     all_relay_modes, solve_relay, RelayError, RelayProblem, RelaySolution, Uniqueness,
@@ -44,7 +46,9 @@ pub use resolution::{Continuation, Resolution, Undecided};
 pub use resolve::{has_one_mode_only, resolve};
 pub use roots::{multiplier_rates, newton, roots_in_cube, stable_roots, Roots};
 pub use small_matrix::Matrix;
-pub use stability::{is_negative_p_matrix, is_scaling_stable, is_stable_for};
+pub use stability::{
+    is_negative_p_matrix, is_scaling_stable, is_stable, is_stable_for, stability_margins,
+};
 
 /// The word for what happened, as the field uses it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,5 +1,7 @@
 //! The normal components of all fields at an intersection, and their multilinear interpolant.
 
+use std::borrow::Cow;
+
 use super::resolution::Undecided;
 use super::small_matrix::Matrix;
 use crate::tolerances::MOST_MEETING;
@@ -25,11 +27,25 @@ use crate::tolerances::MOST_MEETING;
 /// # Ok::<(), filippov::switching::Undecided>(())
 /// ```
 ///
+/// Where only some signs multiply one another, g is a sum of functions of one *group* of multipliers each, and
+/// is kept so ([`NormalFields::of_groups`]): the cost is the sum of 2^|group|, and only a group is limited in size.
+///
 /// Reference: N. Guglielmi, E. Hairer (2022), formula (2.3); `docs/theory/intersections.md`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NormalFields {
     m: usize,
-    values: Vec<f64>,
+    /// Of one or two surfaces there is one group.
+    groups: Vec<SignGroup>,
+}
+
+/// A term of g: a function of the multipliers of some surfaces whose signs multiply one another.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SignGroup {
+    /// The surfaces, increasing.
+    pub members: Vec<usize>,
+    /// Its share of all m components at the patterns of the members' signs, `[pattern * m + j]`; bit b of a
+    /// pattern belongs to `members[b]`.
+    pub values: Vec<f64>,
 }
 
 impl NormalFields {
@@ -39,16 +55,51 @@ impl NormalFields {
     /// [`Undecided::Shape`] if the number of values does not fit, [`Undecided::NotFinite`] if one
     /// of them is not finite.
     pub fn new(m: usize, values: Vec<f64>) -> Result<Self, Undecided> {
-        if m == 0 || m > MOST_MEETING || values.len() != m << m {
+        let members = (0..m).collect();
+        NormalFields::of_groups(m, vec![SignGroup { members, values }])
+    }
+
+    /// Normal components of m surfaces as a sum over groups that hold each surface once.
+    ///
+    /// # Example
+    /// ```
+    /// use filippov::switching::{NormalFields, SignGroup};
+    ///
+    /// // g = (1 - 2 x, 3 - y, -z): three surfaces that do not know of each other.
+    /// let group = |i: usize, minus: f64, plus: f64| {
+    ///     let mut values = vec![0.0; 6];
+    ///     (values[i], values[3 + i]) = (minus, plus);
+    ///     SignGroup { members: vec![i], values }
+    /// };
+    /// let groups = vec![group(0, 3.0, -1.0), group(1, 4.0, 2.0), group(2, 1.0, -1.0)];
+    /// let fields = NormalFields::of_groups(3, groups)?;
+    /// assert_eq!(fields.interpolate(&[0.5, 1.0, 0.25]), [0.0, 2.0, -0.25]);
+    /// # Ok::<(), filippov::switching::Undecided>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Undecided::Shape`] if the groups do not fit, or one has more than 6 surfaces; [`Undecided::NotFinite`]
+    /// if a value is not finite.
+    pub fn of_groups(m: usize, groups: Vec<SignGroup>) -> Result<Self, Undecided> {
+        let mut held: Vec<usize> = groups.iter().flat_map(|g| g.members.clone()).collect();
+        held.sort_unstable();
+        let fits = |g: &SignGroup| {
+            g.members.len() <= MOST_MEETING && g.values.len() == m << g.members.len()
+        };
+        if m == 0 || !held.into_iter().eq(0..m) || !groups.iter().all(fits) {
             return Err(Undecided::Shape {
                 m,
-                found: values.len(),
+                found: groups.iter().map(|g| g.values.len()).sum(),
             });
         }
-        if values.iter().any(|v| !v.is_finite()) {
+        if groups
+            .iter()
+            .flat_map(|g| &g.values)
+            .any(|v| !v.is_finite())
+        {
             return Err(Undecided::NotFinite);
         }
-        Ok(NormalFields { m, values })
+        Ok(NormalFields { m, groups }.with_few_joined())
     }
 
     /// Number of surfaces.
@@ -56,43 +107,82 @@ impl NormalFields {
         self.m
     }
 
-    /// Number of sign patterns, 2^m.
+    /// The groups of surfaces whose signs multiply one another.
+    pub fn groups(&self) -> &[SignGroup] {
+        &self.groups
+    }
+
+    /// Number of sign patterns, 2^m; for as many surfaces as a group may have.
     pub fn n_patterns(&self) -> usize {
         1 << self.m
     }
 
-    /// The values, as they were given.
-    pub fn values(&self) -> &[f64] {
-        &self.values
+    /// The values of all patterns, `[pattern * m + j]`; for as many surfaces as a group may have.
+    pub fn values(&self) -> Cow<'_, [f64]> {
+        match self.groups.as_slice() {
+            [only] => Cow::Borrowed(&only.values),
+            _ => Cow::Owned(
+                (0..self.n_patterns())
+                    .flat_map(|p| self.at(p).into_owned())
+                    .collect(),
+            ),
+        }
     }
 
-    /// The components of one pattern.
-    pub fn at(&self, pattern: usize) -> &[f64] {
-        &self.values[pattern * self.m..(pattern + 1) * self.m]
+    /// The components of one pattern; for as many surfaces as a group may have.
+    pub fn at(&self, pattern: usize) -> Cow<'_, [f64]> {
+        match self.groups.as_slice() {
+            [only] => Cow::Borrowed(only.at(pattern, self.m)),
+            _ => {
+                let sign = |i: usize| if pattern >> i & 1 == 1 { 1 } else { -1 };
+                let signs: Vec<i8> = (0..self.m).map(sign).collect();
+                self.in_region(&signs)
+            }
+        }
     }
 
     /// The components of the region with these signs.
-    pub fn in_region(&self, signs: &[i8]) -> &[f64] {
-        self.at(pattern_of(signs))
+    pub fn in_region(&self, signs: &[i8]) -> Cow<'_, [f64]> {
+        if let [only] = self.groups.as_slice() {
+            return Cow::Borrowed(only.at(only.pattern_of(signs), self.m));
+        }
+        let mut sum = vec![0.0; self.m];
+        for group in &self.groups {
+            let share = group.at(group.pattern_of(signs), self.m);
+            sum.iter_mut().zip(share).for_each(|(s, v)| *s += v);
+        }
+        Cow::Owned(sum)
     }
 
     /// The largest magnitude of all components.
     pub fn size(&self) -> f64 {
-        self.values.iter().fold(0.0, |m, v| m.max(v.abs()))
+        (0..self.m).fold(0.0, |size, j| self.row_size(j).max(size))
     }
 
     /// The largest magnitude of the component normal to surface j.
     pub fn row_size(&self, j: usize) -> f64 {
-        let row = self.values.iter().skip(j).step_by(self.m);
-        row.fold(0.0, |m, v| m.max(v.abs()))
+        let [low, high] = self.row_range(j);
+        high.abs().max(low.abs())
+    }
+
+    /// The least and the largest component normal to surface j, over all patterns, and so over the cube.
+    pub fn row_range(&self, j: usize) -> [f64; 2] {
+        let ranges = self.groups.iter().map(|group| {
+            let row = || group.values.iter().skip(j).step_by(self.m);
+            let low = row().fold(f64::INFINITY, |low, &v| low.min(v));
+            [low, row().fold(f64::NEG_INFINITY, |high, &v| high.max(v))]
+        });
+        ranges.fold([0.0; 2], |[low, high], [l, h]| [low + l, high + h])
     }
 
     /// g(lambda).
     pub fn interpolate(&self, lambda: &[f64]) -> Vec<f64> {
         let mut g = vec![0.0; self.m];
-        for (pattern, weight) in weights(lambda, None).into_iter().enumerate() {
-            for (g, f) in g.iter_mut().zip(self.at(pattern)) {
-                *g += weight * f;
+        for group in &self.groups {
+            for (pattern, weight) in group.weights(lambda, None).into_iter().enumerate() {
+                for (g, f) in g.iter_mut().zip(group.at(pattern, self.m)) {
+                    *g += weight * f;
+                }
             }
         }
         g
@@ -102,54 +192,85 @@ impl NormalFields {
     pub fn jacobian(&self, lambda: &[f64]) -> Matrix {
         let mut jacobian = Matrix::zeros(self.m);
         for p in 0..self.m {
-            for (pattern, weight) in weights(lambda, Some(p)).into_iter().enumerate() {
-                for (j, f) in self.at(pattern).iter().enumerate() {
-                    jacobian[(j, p)] += weight * f;
-                }
+            for (j, derivative) in self.derivative(lambda, p).into_iter().enumerate() {
+                jacobian[(j, p)] = derivative;
             }
         }
         jacobian
+    }
+
+    /// The derivative of g by lambda_p: a column of G.
+    pub(super) fn derivative(&self, lambda: &[f64], p: usize) -> Vec<f64> {
+        let mut column = vec![0.0; self.m];
+        let own = self.groups.iter().find(|group| group.members.contains(&p));
+        if let Some(group) = own {
+            for (pattern, weight) in group.weights(lambda, Some(p)).into_iter().enumerate() {
+                for (entry, f) in column.iter_mut().zip(group.at(pattern, self.m)) {
+                    *entry += weight * f;
+                }
+            }
+        }
+        column
     }
 
     /// The fields on a face of the cube: the non-zero entries of `mode` are held, the zero entries are
     /// the surfaces that are left, in their order.
     pub fn restrict(&self, mode: &[i8]) -> NormalFields {
         let free: Vec<usize> = (0..self.m).filter(|&i| mode[i] == 0).collect();
-        let held = pattern_of(mode);
-        let mut values = Vec::with_capacity(free.len() << free.len());
-        for pattern in 0..1_usize << free.len() {
-            let bits = free.iter().enumerate();
-            let full = bits.fold(held, |full, (bit, &i)| full | (pattern >> bit & 1) << i);
-            values.extend(free.iter().map(|&j| self.at(full)[j]));
+        let mut held = vec![0.0; free.len()];
+        let mut groups = Vec::new();
+        for group in &self.groups {
+            let bits: Vec<usize> = (0..group.members.len())
+                .filter(|&bit| mode[group.members[bit]] == 0)
+                .collect();
+            let fixed = group.pattern_of(mode);
+            let mut values = Vec::with_capacity(free.len() << bits.len());
+            for pattern in 0..1_usize << bits.len() {
+                let bits = bits.iter().enumerate();
+                let full = bits.fold(fixed, |full, (bit, &i)| full | (pattern >> bit & 1) << i);
+                values.extend(free.iter().map(|&j| group.at(full, self.m)[j]));
+            }
+            if bits.is_empty() {
+                held.iter_mut().zip(&values).for_each(|(h, v)| *h += v);
+                continue;
+            }
+            let place = |bit: usize| free.binary_search(&group.members[bit]).unwrap_or(0);
+            let members = bits.into_iter().map(place).collect();
+            groups.push(SignGroup { members, values });
         }
-        NormalFields {
-            m: free.len(),
-            values,
+        let m = free.len();
+        if let Some(first) = groups.first_mut() {
+            for at in first.values.chunks_exact_mut(m) {
+                at.iter_mut().zip(&held).for_each(|(v, h)| *v += h);
+            }
         }
+        NormalFields { m, groups }.with_few_joined()
     }
 
     /// The fields with the components of surface j multiplied by `factors[j]`: another scaling of h_j.
     #[must_use]
     pub fn scaled(&self, factors: &[f64]) -> NormalFields {
-        self.map(|j, value| factors[j] * value)
+        self.map(|_, j, value| factors[j] * value)
     }
 
     /// The fields with `by[j]` added to all components of surface j: what a short time makes of them.
     #[must_use]
     pub fn shifted(&self, by: &[f64]) -> NormalFields {
-        self.map(|j, value| value + by[j])
+        self.map(|group, j, value| if group == 0 { value + by[j] } else { value })
     }
 
     /// Is g affine in lambda, up to rounding? So it is where each sign enters the field by a term of
     /// its own, as friction does.
     pub fn is_affine(&self) -> bool {
-        let corner = self.at(0);
-        (0..self.n_patterns()).all(|pattern| {
-            (0..self.m).all(|j| {
-                let bits = (0..self.m).filter(|i| pattern >> i & 1 == 1);
-                let sum: f64 = bits.map(|i| self.at(1 << i)[j] - corner[j]).sum();
-                let rounding = 16.0 * f64::EPSILON * self.row_size(j);
-                (self.at(pattern)[j] - corner[j] - sum).abs() <= rounding
+        self.groups.iter().all(|group| {
+            let corner = group.at(0, self.m);
+            (0..1_usize << group.members.len()).all(|pattern| {
+                (0..self.m).all(|j| {
+                    let bits = (0..group.members.len()).filter(|i| pattern >> i & 1 == 1);
+                    let sum: f64 = bits.map(|i| group.at(1 << i, self.m)[j] - corner[j]).sum();
+                    let rounding = 16.0 * f64::EPSILON * self.row_size(j);
+                    (group.at(pattern, self.m)[j] - corner[j] - sum).abs() <= rounding
+                })
             })
         })
     }
@@ -158,55 +279,89 @@ impl NormalFields {
     /// lambda_axis on this side of 0.
     #[must_use]
     pub fn half(&self, axis: usize, side: i8) -> NormalFields {
-        let mut values = self.values.clone();
-        for pattern in 0..self.n_patterns() {
-            let inner = (pattern >> axis & 1 == 1) != (side > 0);
-            let opposite = pattern ^ (1 << axis);
+        let mut half = self.clone();
+        for group in &mut half.groups {
+            if let Some(bit) = group.members.iter().position(|&i| i == axis) {
+                group.halve(bit, side, self.m);
+            }
+        }
+        half
+    }
+
+    /// Changes every value: `change(group, surface, value)`.
+    pub(super) fn map(&self, mut change: impl FnMut(usize, usize, f64) -> f64) -> NormalFields {
+        let mut mapped = self.clone();
+        for (index, group) in mapped.groups.iter_mut().enumerate() {
+            for (i, value) in group.values.iter_mut().enumerate() {
+                *value = change(index, i % self.m, *value);
+            }
+        }
+        mapped
+    }
+
+    /// Other surfaces with these groups.
+    pub(super) fn with_groups(&self, m: usize, groups: Vec<SignGroup>) -> NormalFields {
+        NormalFields { m, groups }.with_few_joined()
+    }
+
+    /// One or two surfaces have closed forms, for all of their patterns: their groups joined.
+    fn with_few_joined(self) -> NormalFields {
+        if self.m > 2 || self.groups.len() <= 1 {
+            return self;
+        }
+        let group = SignGroup {
+            members: (0..self.m).collect(),
+            values: self.values().into_owned(),
+        };
+        NormalFields {
+            m: self.m,
+            groups: vec![group],
+        }
+    }
+}
+
+impl SignGroup {
+    /// The share of the m components at one pattern.
+    pub(super) fn at(&self, pattern: usize, m: usize) -> &[f64] {
+        &self.values[pattern * m..(pattern + 1) * m]
+    }
+
+    /// The number of the pattern with these signs of all surfaces; a zero entry leaves its bit unset.
+    pub(super) fn pattern_of(&self, signs: &[i8]) -> usize {
+        let bits = self.members.iter().enumerate();
+        bits.fold(0, |pattern, (bit, &i)| {
+            pattern | usize::from(signs[i] > 0) << bit
+        })
+    }
+
+    /// The weights prod_i (1 + k_i lambda_i)/2 of all patterns, or their derivatives by one multiplier.
+    fn weights(&self, lambda: &[f64], derivative: Option<usize>) -> Vec<f64> {
+        let mut weights = Vec::with_capacity(1 << self.members.len());
+        weights.push(1.0);
+        for (bit, &i) in self.members.iter().enumerate() {
+            let (minus, plus) = match derivative {
+                Some(p) if p == i => (-0.5, 0.5),
+                _ => (0.5 * (1.0 - lambda[i]), 0.5 * (1.0 + lambda[i])),
+            };
+            for pattern in 0..1 << bit {
+                weights.push(plus * weights[pattern]);
+                weights[pattern] *= minus;
+            }
+        }
+        weights
+    }
+
+    /// Takes the values of half of the range of one member.
+    fn halve(&mut self, bit: usize, side: i8, m: usize) {
+        let before = self.clone();
+        for pattern in 0..1_usize << self.members.len() {
+            let inner = (pattern >> bit & 1 == 1) != (side > 0);
             if inner {
-                for j in 0..self.m {
-                    let mean = 0.5 * (self.at(pattern)[j] + self.at(opposite)[j]);
-                    values[pattern * self.m + j] = mean;
+                let opposite = before.at(pattern ^ (1 << bit), m);
+                for (j, (v, o)) in before.at(pattern, m).iter().zip(opposite).enumerate() {
+                    self.values[pattern * m + j] = 0.5 * (v + o);
                 }
             }
         }
-        NormalFields { m: self.m, values }
     }
-
-    /// The same surfaces with other values, as many.
-    pub(super) fn with_values(&self, values: Vec<f64>) -> NormalFields {
-        NormalFields { m: self.m, values }
-    }
-
-    fn map(&self, change: impl Fn(usize, f64) -> f64) -> NormalFields {
-        let values = self.values.iter().enumerate();
-        NormalFields {
-            m: self.m,
-            values: values.map(|(i, &v)| change(i % self.m, v)).collect(),
-        }
-    }
-}
-
-/// The number of the pattern with these signs; a zero entry leaves its bit unset.
-pub(super) fn pattern_of(signs: &[i8]) -> usize {
-    let bits = signs.iter().enumerate();
-    bits.fold(0, |pattern, (i, &sign)| {
-        pattern | usize::from(sign > 0) << i
-    })
-}
-
-/// The weights prod_i (1 + k_i lambda_i)/2 of all patterns, or their derivatives by one multiplier.
-fn weights(lambda: &[f64], derivative: Option<usize>) -> Vec<f64> {
-    let mut weights = Vec::with_capacity(1 << lambda.len());
-    weights.push(1.0);
-    for (i, lam) in lambda.iter().enumerate() {
-        let (minus, plus) = match derivative {
-            Some(p) if p == i => (-0.5, 0.5),
-            _ => (0.5 * (1.0 - lam), 0.5 * (1.0 + lam)),
-        };
-        for pattern in 0..1 << i {
-            weights.push(plus * weights[pattern]);
-            weights[pattern] *= minus;
-        }
-    }
-    weights
 }

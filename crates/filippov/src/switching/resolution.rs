@@ -96,12 +96,18 @@ impl Resolution {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Undecided {
     /// The number of values does not fit the number of surfaces.
-    #[error("{found} normal components do not fit {m} surfaces: m * 2^m are needed, m at most 6")]
+    #[error("{found} normal components do not fit {m} surfaces: each group needs m * 2^(its surfaces), of which it may have 6")]
     Shape {
         /// The number of surfaces.
         m: usize,
         /// The number of values.
         found: usize,
+    },
+    /// The signs of too many surfaces multiply one another.
+    #[error("the signs of {n} of the surfaces that meet multiply one another in the field; at most 6 may")]
+    TooMany {
+        /// How many.
+        n: usize,
     },
     /// The motion before is given for another number of surfaces, or a region by a mode with zeros.
     #[error("the motion before does not fit the {m} surfaces that meet")]
@@ -150,6 +156,22 @@ pub enum Undecided {
         "the hidden dynamics came to no certain outcome; perturb the state or change the scaling"
     )]
     NoOutcome,
+}
+
+impl Undecided {
+    /// The reason for a part of an intersection, with its surfaces counted within the whole.
+    pub(super) fn in_whole(self, part: &[usize]) -> Self {
+        let place = |surface: usize| part.get(surface).copied().unwrap_or(surface);
+        match self {
+            Undecided::Tangent { surface } => Undecided::Tangent {
+                surface: place(surface),
+            },
+            Undecided::NotArriving { surface } => Undecided::NotArriving {
+                surface: place(surface),
+            },
+            other => other,
+        }
+    }
 }
 
 /// The signs of the quantities that a decision rests on, with the smallest of them.

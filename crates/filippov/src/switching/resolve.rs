@@ -4,11 +4,12 @@ use super::codim2::{self, Bilinear, Corners};
 use super::hidden::{admissible, limit, Outcome};
 use super::incoming::{ExitKind, Incoming};
 use super::normal_fields::NormalFields;
+use super::parts::{independent_parts, resolve_parts};
 use super::resolution::{Continuation, Resolution, Undecided};
 use super::roots::{newton, stable_roots};
 use super::single;
 use super::stability::{is_negative_p_matrix, is_stable_for};
-use crate::tolerances::{AFTER_THE_EXIT, DOUBTFUL};
+use crate::tolerances::{AFTER_THE_EXIT, DOUBTFUL, MOST_MEETING, MOST_SCALED_SINGLY};
 
 /// Decides what follows at an intersection of m surfaces, scaled by `kappa`.
 ///
@@ -16,7 +17,7 @@ use crate::tolerances::{AFTER_THE_EXIT, DOUBTFUL};
 /// outcome depends on the scaling, and for three and more surfaces, the hidden dynamics at `kappa`
 /// decides. If a quantity whose sign decided is doubtful (`tolerances.rs`), the decision is
 /// repeated with perturbed fields: if they agree, theirs counts, and if not,
-/// [`Resolution::degenerate`] says so.
+/// [`Resolution::degenerate`] says so. Surfaces in parts that do not know of each other are decided part by part.
 ///
 /// # Example
 /// ```
@@ -45,6 +46,10 @@ pub fn resolve(
         return Err(Undecided::Scaling { m: fields.m() });
     }
     check_lengths(fields.m(), incoming)?;
+    let parts = independent_parts(fields);
+    if parts.len() > 1 && fields.m() > 2 {
+        return resolve_parts(fields, &parts, incoming, kappa);
+    }
     let resolution = decide(fields, incoming, kappa)?;
     if resolution.margin <= DOUBTFUL {
         Ok(in_doubt(resolution, fields, incoming, kappa))
@@ -201,6 +206,12 @@ fn by_hidden_dynamics(
 
 /// Without a past: the only admissible mode, or the one that the hidden dynamics tends to from u = 0.
 fn start(fields: &NormalFields, kappa: &[f64]) -> Result<Resolution, Undecided> {
+    if fields.m() > MOST_MEETING {
+        // Not all 3^m modes can be looked at.
+        let mut resolution = by_hidden_dynamics(fields, &Incoming::Start, &scalings(kappa))?;
+        resolution.unique = has_one_mode_only(fields);
+        return Ok(resolution);
+    }
     let found = admissible(fields);
     let margin = smallest_component(fields);
     let mut resolution = if let [only] = found.as_slice() {
@@ -324,30 +335,42 @@ fn scalings(kappa: &[f64]) -> Vec<Vec<f64>> {
             .collect()
     };
     let mut scalings = vec![kappa.to_vec()];
-    for j in 0..m {
+    let singly = if m <= MOST_SCALED_SINGLY { m } else { 0 };
+    for j in 0..singly {
         for factor in [0.1, 10.0] {
             scalings.push(changed(&|i| if i == j { factor } else { 1.0 }));
         }
     }
-    scalings.push(changed(&|i| 3.0_f64.powi(i as i32)));
-    scalings.push(changed(&|i| 3.0_f64.powi((m - i) as i32)));
+    let factor = |i: usize| 3.0_f64.powf((i * m.min(6)) as f64 / m as f64);
+    scalings.push(changed(&factor));
+    scalings.push(changed(&|i| factor(m - i)));
     scalings
 }
 
-/// The smallest normal component as a fraction of the largest one of its surface.
+/// The smallest normal component as a fraction of the largest one of its surface: of all patterns, or of the ends
+/// of its range where there are too many of them.
 fn smallest_component(fields: &NormalFields) -> f64 {
-    let values = fields.values().iter().enumerate();
-    let relative = values.map(|(i, v)| v.abs() / fields.row_size(i % fields.m()));
+    let m = fields.m();
+    let relative = |j: usize, v: f64| v.abs() / fields.row_size(j);
     // A surface to which all fields are tangent gives NaN, which counts as doubtful.
-    relative.fold(f64::INFINITY, |m, v| {
-        if v < m {
+    let smaller = |least: f64, v: f64| {
+        if v < least {
             v
         } else if v.is_nan() {
             0.0
         } else {
-            m
+            least
         }
-    })
+    };
+    if m > MOST_MEETING {
+        let ends = (0..m).flat_map(|j| fields.row_range(j).map(|v| relative(j, v)));
+        return ends.fold(f64::INFINITY, smaller);
+    }
+    let values = fields.values();
+    let values = values.iter().enumerate();
+    values
+        .map(|(i, v)| relative(i % m, *v))
+        .fold(f64::INFINITY, smaller)
 }
 
 /// The fields moved by up to twice the doubtful amount in four directions and their opposites. The
@@ -358,12 +381,13 @@ fn perturbations(fields: &NormalFields) -> impl Iterator<Item = NormalFields> + 
     let directions = roots
         .into_iter()
         .flat_map(|root| [(root, 1.0), (root, -1.0)]);
-    directions.map(|(root, sign)| {
-        let moved = fields.values().iter().enumerate().map(|(index, value)| {
-            let direction = 2.0 * (root * (index + 1) as f64).fract() - 1.0;
-            let size = fields.row_size(index % fields.m());
-            value + 2.0 * DOUBTFUL * sign * direction * size
-        });
-        fields.with_values(moved.collect())
+    let sizes: Vec<f64> = (0..fields.m()).map(|j| fields.row_size(j)).collect();
+    directions.map(move |(root, sign)| {
+        let mut count = 0;
+        fields.map(|_, j, value| {
+            count += 1;
+            let direction = 2.0 * (root * f64::from(count)).fract() - 1.0;
+            value + 2.0 * DOUBTFUL * sign * direction * sizes[j]
+        })
     })
 }

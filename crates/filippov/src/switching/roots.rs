@@ -1,11 +1,12 @@
 //! Roots of the sliding equations g(lambda) = 0: all of them in the cube, one by Newton's method.
 
 use super::codim2::Bilinear;
-use super::normal_fields::NormalFields;
+use super::normal_fields::{NormalFields, SignGroup};
 use super::small_matrix::Matrix;
 use super::stability::is_scaling_stable;
 use crate::tolerances::{
-    FAR_FROM_THE_CUBE, INJECTIVE, MOST_BOXES, NARROWEST_BOX, NEWTON_DONE, NEWTON_STEPS, SAME_ROOT,
+    FAR_FROM_THE_CUBE, INJECTIVE, MOST_BOXES, MOST_BOX_WORK, NARROWEST_BOX, NEWTON_DONE,
+    NEWTON_STEPS, SAME_ROOT,
 };
 
 /// The roots found in the cube.
@@ -23,7 +24,27 @@ pub struct Roots {
 /// A function that is linear in each multiplier takes its extrema over a box at the vertices, and
 /// so do the entries of G. So a box is discarded rigorously if some g_i has one sign at all of
 /// them, and holds one root at most if |I - G(middle)^-1 G| < 1 there.
+///
+/// Multipliers on which g depends linearly, free of all others, are eliminated first: the search is
+/// exponential in the number of surfaces whose signs multiply, and in no others.
 pub fn roots_in_cube(fields: &NormalFields) -> Roots {
+    if let Some(eliminated) = Eliminated::of(fields) {
+        let inner = search(&eliminated.rest);
+        let complete = inner.complete;
+        let points = inner.points.iter();
+        let mut roots = Roots {
+            points: Vec::new(),
+            complete,
+        };
+        for point in points.filter_map(|point| newton(fields, &eliminated.complete(point))) {
+            roots.add(point);
+        }
+        return roots;
+    }
+    search(fields)
+}
+
+fn search(fields: &NormalFields) -> Roots {
     let m = fields.m();
     let mut roots = Roots {
         points: Vec::new(),
@@ -34,7 +55,7 @@ pub fn roots_in_cube(fields: &NormalFields) -> Roots {
         high: vec![1.0; m],
         fields: fields.clone(),
     }];
-    for _ in 0..MOST_BOXES {
+    for _ in 0..MOST_BOXES.min(MOST_BOX_WORK / (m * m * m)) {
         let Some(region) = pending.pop() else {
             return roots;
         };
@@ -45,7 +66,7 @@ pub fn roots_in_cube(fields: &NormalFields) -> Roots {
             Look::Unclear => pending.extend(region.halves()),
         }
     }
-    roots.complete = false;
+    roots.complete &= pending.is_empty();
     roots
 }
 
@@ -172,24 +193,30 @@ impl SearchBox {
 
     fn some_component_has_one_sign(&self) -> bool {
         (0..self.fields.m()).any(|j| {
-            let values = || (0..self.fields.n_patterns()).map(|p| self.fields.at(p)[j]);
-            values().all(|v| v > 0.0) || values().all(|v| v < 0.0)
+            let [low, high] = self.fields.row_range(j);
+            low > 0.0 || high < 0.0
         })
     }
 
-    /// The largest row sum of |I - inverse G| over the box, entry by entry at the vertices.
+    /// The largest row sum of |I - inverse G| over the box, entry by entry at the vertices. A column of G depends
+    /// on the multipliers of one group.
     fn largest_row_deviation(&self, inverse: &Matrix) -> f64 {
         let m = self.fields.m();
         let mut deviation = Matrix::zeros(m);
-        for pattern in 0..self.fields.n_patterns() {
-            let sign = |i: usize| if pattern >> i & 1 == 1 { 1.0 } else { -1.0 };
-            let vertex: Vec<f64> = (0..m).map(sign).collect();
-            let product = inverse.times(&self.fields.jacobian(&vertex));
-            for i in 0..m {
-                for j in 0..m {
-                    let unit = if i == j { 1.0 } else { 0.0 };
-                    let here = (unit - product[(i, j)]).abs();
-                    deviation[(i, j)] = deviation[(i, j)].max(here);
+        for group in self.fields.groups() {
+            for pattern in 0..1_usize << group.members.len() {
+                let mut vertex = vec![0.0; m];
+                for (bit, &i) in group.members.iter().enumerate() {
+                    vertex[i] = if pattern >> bit & 1 == 1 { 1.0 } else { -1.0 };
+                }
+                for &p in &group.members {
+                    let column = self.fields.derivative(&vertex, p);
+                    for i in 0..m {
+                        let unit = if i == p { 1.0 } else { 0.0 };
+                        let product: f64 = (0..m).map(|k| inverse[(i, k)] * column[k]).sum();
+                        let here = (unit - product).abs();
+                        deviation[(i, p)] = deviation[(i, p)].max(here);
+                    }
                 }
             }
         }
@@ -219,6 +246,78 @@ impl SearchBox {
                 high: self.high,
             },
         ]
+    }
+}
+
+/// The equations without the multipliers a of groups of one: with g = c + N lambda_a + phi(the others) and rows a and
+/// r, lambda_a = -N_aa^-1 (c + phi)_a leaves (c + phi)_r - N_ra N_aa^-1 (c + phi)_a = 0.
+struct Eliminated<'a> {
+    whole: &'a NormalFields,
+    /// The surfaces of the multipliers that are left.
+    left: Vec<usize>,
+    rest: NormalFields,
+}
+
+impl<'a> Eliminated<'a> {
+    /// `None` if there are no such groups, or nothing else, or N_aa is singular.
+    fn of(whole: &'a NormalFields) -> Option<Self> {
+        let m = whole.m();
+        let is_alone = |i: usize| {
+            let mut groups = whole.groups().iter();
+            groups.any(|group| group.members == [i])
+        };
+        let (alone, left): (Vec<usize>, Vec<usize>) = (0..m).partition(|&i| is_alone(i));
+        if alone.is_empty() || left.is_empty() {
+            return None;
+        }
+        let jacobian = whole.jacobian(&vec![0.0; m]);
+        let inverse = jacobian.principal(&alone).inverse()?;
+        // N_ra N_aa^-1.
+        let factor = |r: usize, column: usize| -> f64 {
+            let terms = alone.iter().enumerate();
+            terms
+                .map(|(k, &a)| jacobian[(r, a)] * inverse[(k, column)])
+                .sum()
+        };
+        let reduce = |values: &[f64]| -> Vec<f64> {
+            let row = |&r: &usize| {
+                let terms = alone.iter().enumerate();
+                let taken: f64 = terms.map(|(k, &a)| factor(r, k) * values[a]).sum();
+                values[r] - taken
+            };
+            left.iter().map(row).collect()
+        };
+        // What the groups of one contribute at their multipliers 0.
+        let mut constant = vec![0.0; left.len()];
+        let mut groups = Vec::new();
+        for group in whole.groups() {
+            if let [_] = group.members[..] {
+                let pairs = group.at(0, m).iter().zip(group.at(1, m));
+                let middle: Vec<f64> = pairs.map(|(a, b)| 0.5 * (a + b)).collect();
+                constant
+                    .iter_mut()
+                    .zip(reduce(&middle))
+                    .for_each(|(c, v)| *c += v);
+                continue;
+            }
+            let place = |i: &usize| left.binary_search(i).ok();
+            groups.push(SignGroup {
+                members: group.members.iter().filter_map(place).collect(),
+                values: group.values.chunks_exact(m).flat_map(reduce).collect(),
+            });
+        }
+        let rest = NormalFields::of_groups(left.len(), groups).ok()?;
+        let rest = rest.shifted(&constant);
+        Some(Eliminated { whole, left, rest })
+    }
+
+    /// All multipliers, from those that are left: one step of Newton's method is exact.
+    fn complete(&self, point: &[f64]) -> Vec<f64> {
+        let mut lambda = vec![0.0; self.whole.m()];
+        for (&i, &value) in self.left.iter().zip(point) {
+            lambda[i] = value;
+        }
+        lambda
     }
 }
 

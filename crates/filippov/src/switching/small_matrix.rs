@@ -70,6 +70,41 @@ impl Matrix {
         product
     }
 
+    /// The largest magnitude of its entries.
+    pub fn size(&self) -> f64 {
+        self.entries.iter().fold(0.0, |size, v| v.abs().max(size))
+    }
+
+    /// The matrix with each row multiplied by a factor.
+    #[must_use]
+    pub fn with_rows_scaled(&self, factors: &[f64]) -> Matrix {
+        let mut scaled = self.clone();
+        for (row, factor) in scaled.entries.chunks_exact_mut(self.n.max(1)).zip(factors) {
+            row.iter_mut().for_each(|v| *v *= factor);
+        }
+        scaled
+    }
+
+    /// The sets of indices each of which acts on all others of its set, directly or through others: by rows and
+    /// columns sorted into these sets the matrix is block triangular.
+    pub fn strong_parts(&self) -> Vec<Vec<usize>> {
+        let n = self.n;
+        let mut acts: Vec<bool> = self.entries.iter().map(|&v| v != 0.0).collect();
+        for k in 0..n {
+            for i in (0..n).filter(|&i| i != k) {
+                if acts[i * n + k] {
+                    for j in 0..n {
+                        acts[i * n + j] |= acts[k * n + j];
+                    }
+                }
+            }
+        }
+        let together = |i: usize, j: usize| i == j || acts[i * n + j] && acts[j * n + i];
+        let leads = |i: &usize| (0..*i).all(|j| !together(*i, j));
+        let part = |i: usize| (0..n).filter(|&j| together(i, j)).collect();
+        (0..n).filter(leads).map(part).collect()
+    }
+
     /// Do all eigenvalues have negative real parts?
     ///
     /// The characteristic polynomial by Faddeev and LeVerrier, then the array of Routh: exact

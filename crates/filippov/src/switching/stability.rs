@@ -1,12 +1,31 @@
 //! Is a root of the sliding equations stable under the hidden dynamics?
+//!
+//! All questions are asked of the strongly coupled parts of G: it is block triangular in them, and its eigenvalues
+//! are theirs. With groups of surfaces that do not know of each other the parts are small.
 
+use super::p_matrix::is_p_matrix;
 use super::small_matrix::Matrix;
+use crate::sparse::SparseRows;
+use crate::tolerances::{CAYLEY_SQUARINGS, LARGEST_BY_MINORS};
 
 /// Is there a scaling of the surfaces for which the root with this matrix G is stable?
 ///
 /// Looks for a chain of principal minors, each containing the one before, of orders 1 to m with signs
-/// (-1)^order (Fisher, Fuller 1958). Sufficient; necessary for m <= 2, and nearly so for m = 3.
+/// (-1)^order (Fisher, Fuller 1958). Sufficient; necessary for m <= 2, and nearly so for m = 3. A part of more
+/// than [`LARGEST_BY_MINORS`] surfaces counts as stable if it is for equal scalings.
 pub fn is_scaling_stable(jacobian: &Matrix) -> bool {
+    let parts = jacobian.strong_parts();
+    parts.iter().all(|part| {
+        let block = jacobian.principal(part);
+        if part.len() > LARGEST_BY_MINORS {
+            decay(&block) > 0.0
+        } else {
+            has_chain(&block)
+        }
+    })
+}
+
+fn has_chain(jacobian: &Matrix) -> bool {
     let m = jacobian.n();
     // Bit set of the subsets that end a chain.
     let mut chained = vec![false; 1 << m];
@@ -22,19 +41,89 @@ pub fn is_scaling_stable(jacobian: &Matrix) -> bool {
 
 /// Is the root with this matrix G stable when the surfaces are scaled by kappa?
 pub fn is_stable_for(jacobian: &Matrix, kappa: &[f64]) -> bool {
-    let mut scaled = jacobian.clone();
-    for (row, factor) in kappa.iter().enumerate() {
-        for column in 0..scaled.n() {
-            scaled[(row, column)] *= factor;
+    is_stable(&jacobian.with_rows_scaled(kappa))
+}
+
+/// Do all eigenvalues have negative real parts?
+pub fn is_stable(matrix: &Matrix) -> bool {
+    matrix.strong_parts().iter().all(|part| {
+        let block = matrix.principal(part);
+        if part.len() > LARGEST_BY_MINORS {
+            decay(&block) > 0.0
+        } else {
+            block.is_hurwitz()
+        }
+    })
+}
+
+/// Two functions of G, with its rows scaled, that are positive as long as the root is stable: the first vanishes
+/// where a real eigenvalue does (two roots meet), the second where a pair of them reaches the imaginary axis.
+///
+/// They are the smallest among the parts of (-1)^n det, and of the last but one Hurwitz determinant; for two surfaces
+/// of -min(G11, G22), so that the root is stable for some scaling, and for more than [`LARGEST_BY_MINORS`] of the
+/// decay rate of the Cayley transform.
+pub fn stability_margins(scaled: &Matrix) -> [f64; 2] {
+    let mut margins = [f64::INFINITY; 2];
+    for part in scaled.strong_parts() {
+        let block = scaled.principal(&part);
+        let sign = if part.len().is_multiple_of(2) {
+            1.0
+        } else {
+            -1.0
+        };
+        let fold = sign * block.determinant();
+        let stability = match part.len() {
+            // Of two surfaces no scaling is preferred, as where they meet alone.
+            2 => -block[(0, 0)].min(block[(1, 1)]),
+            n if n > LARGEST_BY_MINORS => decay(&block),
+            _ => block.last_hurwitz_determinant(),
+        };
+        // Not `min`, which forgets NaN.
+        for (least, value) in margins.iter_mut().zip([fold, stability]) {
+            if value.is_nan() || value < *least {
+                *least = value;
+            }
         }
     }
-    scaled.is_hurwitz()
+    margins
+}
+
+/// -ln of the spectral radius of (c + A)(c - A)^-1, c the size of A: positive if and only if all eigenvalues have
+/// negative real parts. By repeated squaring; NaN if A has the eigenvalue c.
+fn decay(matrix: &Matrix) -> f64 {
+    let n = matrix.n();
+    let size = matrix.size();
+    let (mut sum, mut difference) = (matrix.clone(), matrix.with_rows_scaled(&vec![-1.0; n]));
+    for i in 0..n {
+        sum[(i, i)] += size;
+        difference[(i, i)] += size;
+    }
+    let Some(inverse) = difference.inverse() else {
+        return f64::NAN;
+    };
+    let mut power = inverse.times(&sum);
+    let mut logarithm = 0.0;
+    for k in 0..CAYLEY_SQUARINGS {
+        let size = power.size();
+        if size == 0.0 {
+            return f64::INFINITY;
+        }
+        logarithm += size.ln() / f64::from(1_u32 << k);
+        let unit = power.with_rows_scaled(&vec![1.0 / size; n]);
+        power = unit.times(&unit);
+    }
+    -logarithm
 }
 
 /// Are all principal minors of -G positive? If G is constant, as for fields that are affine in the
 /// signs, then exactly one mode is consistent (Gale, Nikaido 1965).
 pub fn is_negative_p_matrix(jacobian: &Matrix) -> bool {
     let m = jacobian.n();
+    if m > LARGEST_BY_MINORS {
+        let rows = (0..m).map(|i| (0..m).map(|j| -jacobian[(i, j)]).collect());
+        let rows: Vec<Vec<f64>> = rows.collect();
+        return is_p_matrix(&SparseRows::from_dense(&rows)) == Some(true);
+    }
     (1..1_usize << m).all(|subset| {
         let members: Vec<usize> = (0..m).filter(|i| subset >> i & 1 == 1).collect();
         let sign = (-1.0_f64).powi(members.len() as i32);

@@ -42,6 +42,10 @@ pub(super) struct AffineModel {
     /// Surfaces that may not be slid on together with this one: their signs multiply, or one is in the
     /// gradient of the other.
     conflicts: Vec<Vec<u32>>,
+    /// Which signs multiply each other in the field; its values are not kept.
+    coupled: SignDependence,
+    /// For each surface the signs in its gradient.
+    in_gradient: Vec<Vec<u32>>,
 }
 
 impl AffineModel {
@@ -58,13 +62,16 @@ impl AffineModel {
         }
         let (mut time_rates, mut gradients) = (Vec::new(), Vec::new());
         let (mut rates, mut is_steady) = (Vec::new(), Vec::new());
+        let mut in_gradient = Vec::new();
         for (j, conflicts) in conflicts.iter_mut().enumerate() {
             let Gradient { time, states } = graph.gradient(graph.surface(j as u32));
             let nodes: Vec<NodeId> = [time]
                 .into_iter()
                 .chain(states.iter().map(|s| s.1))
                 .collect();
-            conflicts.extend(signs_in(&graph, &nodes));
+            let signs = signs_in(&graph, &nodes);
+            conflicts.extend(&signs);
+            in_gradient.push(signs);
             is_steady.push(!nodes[1..].iter().any(|&node| graph.depends_on_motion(node)));
             rates.push(states.iter().fold(time, |sum, &(i, partial)| {
                 let term = graph.mul(partial, dependence.values[i as usize]);
@@ -85,7 +92,13 @@ impl AffineModel {
         for &j in &dependence.surfaces {
             is_blended[j as usize] = true;
         }
+        let coupled = SignDependence {
+            couplings: couplings(&graph, &dependence, &is_blended),
+            ..SignDependence::default()
+        };
         AffineModel {
+            coupled,
+            in_gradient,
             program: TieredProgram::new(graph.clone(), outputs, backend),
             graph,
             enclosing: rates.iter().map(|_| OnceLock::new()).collect(),
@@ -125,6 +138,34 @@ impl AffineModel {
         };
         let (gradients, jumps) = (matrix(&self.gradients), matrix(&self.jumps));
         Some(AffineParts::new(self.n_states, surfaces, gradients, jumps))
+    }
+
+    /// These surfaces in groups whose signs multiply one another in the field.
+    pub fn groups(&self, surfaces: &[usize]) -> Vec<Vec<usize>> {
+        let bends = |&j: &usize| {
+            let mut signs = self.in_gradient[j].iter();
+            signs.any(|&k| surfaces.binary_search(&(k as usize)).is_ok())
+        };
+        if surfaces.iter().any(bends) {
+            return vec![surfaces.to_vec()];
+        }
+        let indices: Vec<u32> = surfaces.iter().map(|&j| j as u32).collect();
+        // Nothing is known of how signs that could not be blended depend on one another.
+        let (mut entangled, mut groups) = (Vec::new(), Vec::new());
+        for group in self.coupled.groups(&indices) {
+            let group = group.into_iter().map(|j| j as usize);
+            let group: Vec<usize> = group.collect();
+            if group.iter().all(|&j| self.is_blended[j]) {
+                groups.push(group);
+            } else {
+                entangled.extend(group);
+            }
+        }
+        if !entangled.is_empty() {
+            entangled.sort_unstable();
+            groups.push(entangled);
+        }
+        groups
     }
 
     /// Are gradient and jump of surface `j` the same all along every motion?
@@ -193,6 +234,22 @@ fn source(graph: &Graph, node: NodeId, outputs: &mut Vec<NodeId>) -> Source {
             Source::Output(outputs.len() - 1)
         }
     }
+}
+
+/// Pairs of signs that are multiplied, those that could not be blended included.
+fn couplings(graph: &Graph, dependence: &SignDependence, is_blended: &[bool]) -> Vec<(u32, u32)> {
+    let mut couplings = dependence.couplings.clone();
+    if is_blended.iter().all(|&blended| blended) {
+        return couplings;
+    }
+    for &(j, derivative) in dependence.derivatives.iter().flatten() {
+        let others = signs_in(graph, &[derivative]).into_iter();
+        let entangled = others.filter(|&k| !is_blended[k as usize]);
+        couplings.extend(entangled.map(|k| (j, k)));
+    }
+    couplings.sort_unstable();
+    couplings.dedup();
+    couplings
 }
 
 /// For each surface the components of the field that jump there.

@@ -263,6 +263,16 @@ pub trait PiecewiseSystem: Sync {
         out.fill(f64::NAN);
     }
 
+    /// These surfaces (increasing) in groups such that the field is a sum of functions of the signs of one group
+    /// each: signs of different groups are nowhere multiplied. One group of all is always right.
+    fn sign_groups(&self, surfaces: &[usize]) -> Vec<Vec<usize>> {
+        let affine = self.affine_signs();
+        match affine.and_then(|affine| affine.affine_parts(surfaces)) {
+            Some(_) => surfaces.iter().map(|&j| vec![j]).collect(),
+            None => vec![surfaces.to_vec()],
+        }
+    }
+
     /// A readable name of surface `j` for messages.
     fn surface_name(&self, j: usize) -> String {
         format!("h{j}")

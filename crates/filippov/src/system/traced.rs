@@ -302,6 +302,10 @@ impl PiecewiseSystem for TracedSystem {
         jets.eval(t, x, signs, &self.parameters, out);
     }
 
+    fn sign_groups(&self, surfaces: &[usize]) -> Vec<Vec<usize>> {
+        self.model.affine_signs().groups(surfaces)
+    }
+
     fn surface_name(&self, j: usize) -> String {
         self.model
             .graph

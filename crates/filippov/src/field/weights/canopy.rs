@@ -6,17 +6,11 @@ use super::sign_of;
 ///
 /// Reference: M. Jeffrey, Dynamics at a switching intersection, *SIAM J. Appl. Dyn. Syst.* 13 (2014).
 pub fn product_weights(lambda: &[f64]) -> Vec<f64> {
-    let mut weights = vec![0.0; 1 << lambda.len()];
-    fill_product_weights(lambda, &mut weights);
-    weights
-}
-
-/// Writes the weights of [`product_weights`].
-pub fn fill_product_weights(lambda: &[f64], weights: &mut [f64]) {
-    for (pattern, weight) in weights.iter_mut().enumerate() {
+    let weight = |pattern: usize| {
         let factors = lambda.iter().enumerate();
-        *weight = factors.fold(1.0, |product, (i, lambda)| {
+        factors.fold(1.0, |product, (i, lambda)| {
             product * 0.5 * (1.0 + sign_of(pattern, i) * lambda)
-        });
-    }
+        })
+    };
+    (0..1 << lambda.len()).map(weight).collect()
 }

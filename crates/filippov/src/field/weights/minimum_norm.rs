@@ -103,7 +103,8 @@ impl Equations {
     fn of(fields: &NormalFields) -> Equations {
         let sizes: Vec<f64> = (0..fields.m()).map(|j| fields.row_size(j)).collect();
         let column = |pattern| {
-            let scaled = fields.at(pattern).iter().zip(&sizes).map(|(f, s)| f / s);
+            let components = fields.at(pattern);
+            let scaled = components.iter().zip(&sizes).map(|(f, s)| f / s);
             scaled.chain([1.0]).collect()
         };
         Equations {

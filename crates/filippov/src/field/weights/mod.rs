@@ -9,7 +9,7 @@ mod minimum_norm;
 mod moments;
 mod neighbours;
 
-pub use canopy::{fill_product_weights, product_weights};
+pub use canopy::product_weights;
 pub use dieci_lopez::{dieci_lopez, smallest_approach};
 pub use minimum_norm::{minimum_norm, Segment};
 pub use moments::moments;
@@ -75,7 +75,7 @@ pub enum RuleFailure {
 /// # Errors
 /// If the rule does not apply; each variant of [`RuleFailure`] says why.
 pub fn weights(rule: SlidingRule, fields: &NormalFields) -> Result<Vec<f64>, RuleFailure> {
-    if let (1, [minus, plus]) = (fields.m(), fields.values()) {
+    if let (1, [minus, plus]) = (fields.m(), &*fields.values()) {
         let weight_plus = minus / (minus - plus);
         return Ok(vec![1.0 - weight_plus, weight_plus]);
     }

@@ -2,7 +2,7 @@
 
 use std::ops::Neg;
 
-use crate::switching::normal_fields::{pattern_of, NormalFields};
+use crate::switching::normal_fields::NormalFields;
 use crate::switching::resolution::Undecided;
 
 /// The normal components of the four fields at an intersection of two surfaces, with each surface
@@ -21,7 +21,7 @@ impl Corners {
         if fields.m() != 2 {
             return Err(Undecided::Shape {
                 m: fields.m(),
-                found: fields.values().len(),
+                found: fields.groups().iter().map(|g| g.values.len()).sum(),
             });
         }
         let sizes = [fields.row_size(0), fields.row_size(1)];
@@ -90,7 +90,7 @@ impl Frame {
         if fields.m() != 2 {
             return Err(Undecided::Shape {
                 m: fields.m(),
-                found: fields.values().len(),
+                found: fields.groups().iter().map(|g| g.values.len()).sum(),
             });
         }
         let seen = REGIONS.map(|k| {
@@ -112,4 +112,9 @@ impl Frame {
         let side = |j: usize| if self.reflect[j] { -v[j] } else { v[j] };
         [side(0), side(1)]
     }
+}
+
+/// The number of the pattern with these signs.
+fn pattern_of(signs: &[i8; 2]) -> usize {
+    usize::from(signs[0] > 0) | usize::from(signs[1] > 0) << 1
 }

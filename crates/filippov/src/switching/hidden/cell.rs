@@ -1,7 +1,7 @@
 //! Hidden dynamics within one cell, by Taylor series.
 
 use super::first_zero::{first_loss, value};
-use crate::switching::normal_fields::{pattern_of, NormalFields};
+use crate::switching::normal_fields::{NormalFields, SignGroup};
 
 /// Order of the series. By Jorba and Zou (2005) the best order for double precision is about
 /// -ln(eps)/2 + 1 = 19, with steps of 1/e^2 of the radius of convergence.
@@ -14,13 +14,20 @@ type Series = [f64; ORDER + 1];
 pub(super) struct Cell {
     /// Which components are clipped, and where: -1, 0 (within the transition), +1.
     pub sides: Vec<i8>,
-    active: Vec<usize>,
-    /// Coefficient of the product of a subset of the active components, by subset and component.
-    coefficients: Vec<f64>,
-    /// Series of these products.
-    products: Vec<Series>,
+    /// What does not depend on the components within the transition.
+    constant: Vec<f64>,
+    terms: Vec<Term>,
     /// Series of the state.
     state: Vec<Series>,
+}
+
+/// The part of the field with the components of one group.
+struct Term {
+    active: Vec<usize>,
+    /// Coefficient of the product of a subset of the active components, by subset and component of the field.
+    coefficients: Vec<f64>,
+    /// Series of these products; the empty one is not used.
+    products: Vec<Series>,
 }
 
 /// Why a step within a cell ended.
@@ -38,30 +45,23 @@ impl Cell {
     /// The cell with these sides.
     pub fn new(fields: &NormalFields, sides: &[i8]) -> Self {
         let m = fields.m();
-        let active: Vec<usize> = (0..m).filter(|&i| sides[i] == 0).collect();
-        let held = pattern_of(sides);
-        let mut coefficients = Vec::with_capacity(m << active.len());
-        for subset in 0..1_usize << active.len() {
-            let bits = active.iter().enumerate();
-            let corner = bits.fold(held, |c, (bit, &i)| c | (subset >> bit & 1) << i);
-            coefficients.extend_from_slice(fields.at(corner));
-        }
-        for bit in 0..active.len() {
-            for subset in (0..1_usize << active.len()).filter(|s| s >> bit & 1 == 1) {
-                for j in 0..m {
-                    let (low, high) = ((subset & !(1 << bit)) * m + j, subset * m + j);
-                    let (minus, plus) = (coefficients[low], coefficients[high]);
-                    coefficients[low] = 0.5 * (plus + minus);
-                    coefficients[high] = 0.5 * (plus - minus);
-                }
+        let mut constant = vec![0.0; m];
+        let mut terms = Vec::new();
+        for group in fields.groups() {
+            let term = Term::new(group, sides, m);
+            constant
+                .iter_mut()
+                .zip(&term.coefficients)
+                .for_each(|(sum, c)| *sum += c);
+            if !term.active.is_empty() {
+                terms.push(term);
             }
         }
         Cell {
             sides: sides.to_vec(),
-            products: vec![[0.0; ORDER + 1]; 1 << active.len()],
+            constant,
+            terms,
             state: vec![[0.0; ORDER + 1]; m],
-            active,
-            coefficients,
         }
     }
 
@@ -126,22 +126,62 @@ impl Cell {
             series[0] = *u;
         }
         for order in 0..ORDER {
-            self.expand_products(order);
+            for term in &mut self.terms {
+                term.expand_products(&self.state, order);
+            }
             for i in 0..m {
-                let terms = self.products.iter().enumerate();
-                let rate: f64 = terms
-                    .map(|(s, p)| self.coefficients[s * m + i] * p[order])
-                    .sum();
+                let constant = if order == 0 { self.constant[i] } else { 0.0 };
+                let rates = self.terms.iter().map(|term| term.rate(i, m, order));
+                let rate: f64 = constant + rates.sum::<f64>();
                 self.state[i][order + 1] = rate / (order + 1) as f64;
             }
         }
     }
 
-    fn expand_products(&mut self, order: usize) {
-        self.products[0][order] = if order == 0 { 1.0 } else { 0.0 };
+    /// The length over which the series is exact to rounding.
+    fn step(&self) -> f64 {
+        let largest = |k: usize| {
+            let at_order = self.state.iter().map(|series| series[k].abs());
+            at_order.fold(f64::MIN_POSITIVE, f64::max)
+        };
+        let radius = |k: usize| largest(k).powf(-1.0 / k as f64);
+        radius(ORDER).min(radius(ORDER - 1)) * (-2.0_f64).exp()
+    }
+}
+
+impl Term {
+    fn new(group: &SignGroup, sides: &[i8], m: usize) -> Self {
+        let bits: Vec<usize> = (0..group.members.len())
+            .filter(|&bit| sides[group.members[bit]] == 0)
+            .collect();
+        let held = group.pattern_of(sides);
+        let mut coefficients = Vec::with_capacity(m << bits.len());
+        for subset in 0..1_usize << bits.len() {
+            let bits = bits.iter().enumerate();
+            let corner = bits.fold(held, |c, (bit, &i)| c | (subset >> bit & 1) << i);
+            coefficients.extend_from_slice(group.at(corner, m));
+        }
+        for bit in 0..bits.len() {
+            for subset in (0..1_usize << bits.len()).filter(|s| s >> bit & 1 == 1) {
+                for j in 0..m {
+                    let (low, high) = ((subset & !(1 << bit)) * m + j, subset * m + j);
+                    let (minus, plus) = (coefficients[low], coefficients[high]);
+                    coefficients[low] = 0.5 * (plus + minus);
+                    coefficients[high] = 0.5 * (plus - minus);
+                }
+            }
+        }
+        Term {
+            products: vec![[0.0; ORDER + 1]; 1 << bits.len()],
+            active: bits.into_iter().map(|bit| group.members[bit]).collect(),
+            coefficients,
+        }
+    }
+
+    fn expand_products(&mut self, state: &[Series], order: usize) {
         for subset in 1..self.products.len() {
             let last = subset.ilog2();
-            let factor = &self.state[self.active[last as usize]];
+            let factor = &state[self.active[last as usize]];
             let rest = subset & !(1 << last);
             let entry = if rest == 0 {
                 factor[order]
@@ -155,13 +195,11 @@ impl Cell {
         }
     }
 
-    /// The length over which the series is exact to rounding.
-    fn step(&self) -> f64 {
-        let largest = |k: usize| {
-            let at_order = self.state.iter().map(|series| series[k].abs());
-            at_order.fold(f64::MIN_POSITIVE, f64::max)
-        };
-        let radius = |k: usize| largest(k).powf(-1.0 / k as f64);
-        radius(ORDER).min(radius(ORDER - 1)) * (-2.0_f64).exp()
+    /// The share of u_i' at this order.
+    fn rate(&self, i: usize, m: usize, order: usize) -> f64 {
+        let terms = self.products.iter().enumerate().skip(1);
+        terms
+            .map(|(s, p)| self.coefficients[s * m + i] * p[order])
+            .sum()
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::switching::normal_fields::NormalFields;
 use crate::switching::roots::newton;
+use crate::switching::stability::is_stable;
 use crate::tolerances::{HIDDEN_OUTWARDS, HIDDEN_REST, HIDDEN_REST_REACH};
 
 /// The multipliers at which the motion comes to rest on the face of these sides, if it is sure to
@@ -31,6 +32,6 @@ pub(super) fn rest_on_face(
     for (&i, &value) in free.iter().zip(&root) {
         full[i] = value;
     }
-    let attracts = face.jacobian(&root).is_hurwitz();
+    let attracts = is_stable(&face.jacobian(&root));
     (near && attracts && clipped_leave(&fields.interpolate(&full))).then_some(root)
 }

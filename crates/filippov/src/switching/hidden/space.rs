@@ -13,7 +13,8 @@ pub(super) fn limit(fields: &NormalFields, u: &[f64]) -> Outcome {
     let mut u = u.to_vec();
     let mut cell: Option<Cell> = None;
     let mut watch = Watch::new(&u);
-    for _ in 0..MOST_PIECES {
+    let work = fields.m() * fields.m();
+    for _ in 0..MOST_PIECES * 36 / work.max(36) {
         let lambda = clipped(&u);
         let velocity = fields.interpolate(&lambda);
         let pairs = u.iter().zip(&velocity);
