@@ -31,6 +31,7 @@
 //! # Ok::<(), filippov::Error>(())
 //! ```
 
+pub mod action;
 mod error;
 pub mod event;
 pub mod field;
@@ -51,7 +52,9 @@ pub use inspect::{
     classify, hidden_dynamics, intersection_field, Classification, HiddenDynamics, HiddenRoot,
     IntersectionValue, PointKind,
 };
-pub use integrate::{solve, solve_interruptible, Integrator, Stats, Stop, Warning, WarningCode};
+pub use integrate::{
+    solve, solve_interruptible, solve_with_actions, Integrator, Stats, Stop, Warning, WarningCode,
+};
 pub use mode::{Mode, Signs};
 pub use options::{NonUnique, Options, SlidingRule};
 pub use solution::{Segment, Side, Solution, Switch, UserZero};

@@ -312,7 +312,7 @@ impl Integrator<'_> {
             }
             _ => None,
         };
-        let by_multipliers = !self.slides_by_rule();
+        let by_multipliers = !self.slides_by_rule() && !self.motion.is_in_contact();
         let interpolant = self.stepper.interpolant();
         let bounds = BoundedCurve {
             system: self.system,
@@ -439,7 +439,7 @@ impl Integrator<'_> {
                 // What lies beyond the end of the step may not exist; that is no reason to shorten it.
                 self.detector.uncertain = false;
                 let Some((theta, _)) = zero else { continue };
-                if self.t + theta * dt > self.t_end {
+                if self.t + theta * dt > self.horizon {
                     continue;
                 }
                 // An extrapolation that is not accurate enough still says how far to go.
