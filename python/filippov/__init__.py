@@ -63,6 +63,7 @@ from filippov.functions import (
     where,
 )
 from filippov.modes import Mode
+from filippov.resets import Reset
 from filippov.solution import DenseSolution, Solution
 from filippov.solve import solve_ivp
 from filippov.switches import RunWarning, Segment, SegmentTable, Switch, SwitchTable
@@ -85,6 +86,7 @@ __all__ = [
     "Mode",
     "ModelError",
     "NonUniqueError",
+    "Reset",
     "RunWarning",
     "Segment",
     "SegmentTable",

@@ -52,6 +52,7 @@ class TracedSystem:
         n_states: int,
         parameters: list[str],
         states: list[str] | None = None,
+        watched: list[int] = ...,
     ) -> Self: ...
     @property
     def n_states(self) -> int: ...
@@ -78,6 +79,7 @@ class OpaqueSystem:
         surfaces: list[Callable[[float, _Array], float]],
         n_states: int,
         names: list[str],
+        n_switching: int | None = None,
     ) -> Self: ...
     @property
     def n_states(self) -> int: ...
@@ -100,6 +102,7 @@ class SignedSystem:
         surfaces: list[Callable[[float, _Array], float]],
         n_states: int,
         names: list[str],
+        n_switching: int | None = None,
     ) -> Self: ...
     @property
     def n_states(self) -> int: ...
@@ -161,6 +164,7 @@ def solve(
     p: _Array,
     options: RunOptions,
     events: list[tuple[Callable[[float, _Array], float] | int, float, int, str]],
+    actions: list[tuple[str, list[float], Any, str]] = ...,
 ) -> Run: ...
 def intersection_field(
     system: TracedSystem | OpaqueSystem | SignedSystem,

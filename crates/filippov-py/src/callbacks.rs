@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use filippov::action::ActionMap;
 use filippov::{FieldError, PiecewiseSystem, UserFunction};
 use filippov_expr::{
     Backend, Enclosure, EnclosureProgram, ExprError, Graph, Motion, NodeId, Program,
@@ -15,6 +16,8 @@ use crate::conversion::{read_scalar, read_vector};
 pub struct Surfaces {
     pub functions: Vec<Py<PyAny>>,
     pub names: Vec<String>,
+    /// The first so many switch the field; those behind them trigger actions.
+    pub n_switching: usize,
 }
 
 impl Surfaces {
@@ -55,7 +58,7 @@ impl PiecewiseSystem for Opaque {
 
     fn field(&self, t: f64, x: &[f64], signs: &[f64], dx: &mut [f64]) -> Result<(), FieldError> {
         Python::attach(|py| {
-            for (j, sign) in signs.iter().enumerate() {
+            for (j, sign) in signs.iter().enumerate().take(self.surfaces.n_switching) {
                 if self.surfaces.value(py, j, t, x)? * sign <= 0.0 {
                     dx.fill(f64::NAN);
                     return Ok(());
@@ -69,6 +72,10 @@ impl PiecewiseSystem for Opaque {
 
     fn surfaces(&self, t: f64, x: &[f64], _signs: &[f64], h: &mut [f64]) -> Result<(), FieldError> {
         self.surfaces.write(t, x, h)
+    }
+
+    fn switches_at(&self, j: usize) -> bool {
+        j < self.surfaces.n_switching
     }
 
     fn surface_name(&self, j: usize) -> String {
@@ -108,8 +115,25 @@ impl PiecewiseSystem for Signed {
         self.surfaces.write(t, x, h)
     }
 
+    fn switches_at(&self, j: usize) -> bool {
+        j < self.surfaces.n_switching
+    }
+
     fn surface_name(&self, j: usize) -> String {
         self.surfaces.names[j].clone()
+    }
+}
+
+/// The map of an action, (t, x) -> x+, as a Python callable.
+pub struct CalledMap(pub Py<PyAny>);
+
+impl ActionMap for CalledMap {
+    fn apply(&self, t: f64, x: &mut [f64], _: &[f64], _: &mut [f64]) -> Result<(), FieldError> {
+        Python::attach(|py| {
+            let value = self.0.bind(py).call1((t, PyArray1::from_slice(py, x)))?;
+            read_vector(&value, x, "the map of a reset")
+        })
+        .map_err(|e: PyErr| FieldError::new(e))
     }
 }
 

@@ -119,7 +119,7 @@ impl Run {
                     PyTuple::new(py, &s.surfaces)?,
                     PyTuple::new(py, s.mode_before.entries())?,
                     PyTuple::new(py, s.mode_after.entries())?,
-                    String::new(),
+                    s.note.clone(),
                 ))
             })
             .collect()

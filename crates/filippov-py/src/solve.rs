@@ -2,15 +2,17 @@
 
 use std::time::{Duration, Instant};
 
+use filippov::action::{Action, ActionMap, Actions, Clock, Trigger};
 use filippov::{
-    solve_interruptible, Mode, NonUnique, Options, SlidingRule, UserEvent, UserFunction,
+    solve_with_actions, Kind, Mode, NonUnique, Options, SlidingRule, TracedMap, UserEvent,
+    UserFunction,
 };
 use numpy::PyReadonlyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::callbacks::{CalledEvent, CompiledEvent};
+use crate::callbacks::{CalledEvent, CalledMap, CompiledEvent};
 use crate::run::Run;
 use crate::systems::{core_of, TracedSystem};
 
@@ -35,7 +37,7 @@ impl RunOptions {
 
 /// Integrates a system; `filippov.solve_ivp` checks the arguments before.
 #[pyfunction]
-#[pyo3(signature = (system, t0, t1, y0, p, options, events))]
+#[pyo3(signature = (system, t0, t1, y0, p, options, events, actions=Vec::new()))]
 #[allow(clippy::too_many_arguments)]
 pub fn solve(
     py: Python<'_>,
@@ -46,6 +48,7 @@ pub fn solve(
     p: PyReadonlyArray1<'_, f64>,
     options: &RunOptions,
     events: Vec<(Py<PyAny>, f64, u64, String)>,
+    actions: Vec<ActionRow>,
 ) -> PyResult<Run> {
     let parameters = p.as_slice()?.to_vec();
     let traced = system.cast::<TracedSystem>().ok();
@@ -68,6 +71,7 @@ pub fn solve(
         };
         functions.push((function, direction, terminal));
     }
+    let given = read_actions(py, actions, &p)?;
     let y0 = y0.as_slice()?.to_vec();
     let RunOptions { options, progress } = options;
     let is_native = traced.is_some_and(|t| t.get().system.is_native());
@@ -81,6 +85,19 @@ pub fn solve(
                     terminal: *terminal,
                 })
                 .collect();
+            let list = given.iter().map(|(map, trigger, name)| Action {
+                kind: Some(match trigger {
+                    Trigger::Surface { .. } => Kind::Reset,
+                    _ => Kind::Clock,
+                }),
+                trigger: trigger.clone(),
+                map: &**map,
+                name: name.clone(),
+            });
+            let actions = Actions {
+                list: list.collect(),
+                discrete: Vec::new(),
+            };
             let mut asked = Instant::now();
             let mut interrupt = |t: f64| {
                 if asked.elapsed() < POLL_EVERY {
@@ -92,10 +109,43 @@ pub fn solve(
                     py.check_signals().is_err() || matches!(reported, Some(Err(_)))
                 })
             };
-            solve_interruptible(&*core, (t0, t1), &y0, options, &events, &mut interrupt)
+            let interrupt = &mut interrupt;
+            solve_with_actions(&*core, (t0, t1), &y0, options, &events, &actions, interrupt)
         })
         .map_err(|e| PyValueError::new_err(e.to_string()))?;
     Ok(Run::new(core, solution, is_native))
+}
+
+/// When, numbers that say so, the map (traced, or a callable), and the name of an action.
+type ActionRow = (String, Vec<f64>, Py<PyAny>, String);
+
+type SharedMap = Box<dyn ActionMap + Send + Sync>;
+
+fn read_actions(
+    py: Python<'_>,
+    rows: Vec<ActionRow>,
+    p: &PyReadonlyArray1<'_, f64>,
+) -> PyResult<Vec<(SharedMap, Trigger, String)>> {
+    let read = |(when, numbers, map, name): ActionRow| {
+        let trigger = match (when.as_str(), &numbers[..]) {
+            ("surface", &[index, direction]) => Trigger::Surface {
+                index: index as usize,
+                direction: direction as i8,
+            },
+            ("times", times) => Trigger::Times(times.to_vec()),
+            ("clock", &[period, phase]) => Trigger::Clock {
+                clock: Clock { period, phase },
+                at_start: true,
+            },
+            _ => return Err(PyValueError::new_err(format!("unknown trigger {when:?}"))),
+        };
+        let map: SharedMap = match map.bind(py).cast::<TracedSystem>() {
+            Ok(traced) => Box::new(TracedMap::new(traced.get().with(p)?)),
+            Err(_) => Box::new(CalledMap(map)),
+        };
+        Ok((map, trigger, name))
+    };
+    rows.into_iter().map(read).collect()
 }
 
 fn read_options(given: &Bound<'_, PyDict>) -> PyResult<(Options, Option<Py<PyAny>>)> {

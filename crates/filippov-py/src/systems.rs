@@ -118,6 +118,8 @@ fn checked<'a>(
 #[pyclass(frozen, module = "filippov._core")]
 pub struct TracedSystem {
     pub system: filippov::TracedSystem,
+    /// Surfaces that trigger actions.
+    watched: Vec<usize>,
     /// Kept for events, which are traced after the system into the same graph.
     builder: Option<Py<Builder>>,
     /// Compiled events with their nodes; the index is the handle.
@@ -129,13 +131,15 @@ impl TracedSystem {
         graph: Graph,
         field: Vec<NodeId>,
         names: Names,
+        watched: Vec<usize>,
         builder: Option<Py<Builder>>,
     ) -> PyResult<Self> {
         let zeros = vec![0.0; names.parameters.len()];
         let system = filippov::TracedSystem::new(graph, field, zeros, names, Backend::Auto)
             .map_err(|e| PyValueError::new_err(e.to_string()))?;
         Ok(TracedSystem {
-            system,
+            system: system.watching(&watched),
+            watched,
             builder,
             events: Mutex::default(),
         })
@@ -150,7 +154,7 @@ impl TracedSystem {
             .map(|(_, program)| Arc::clone(program))
     }
 
-    fn with(&self, p: &Array<'_>) -> PyResult<filippov::TracedSystem> {
+    pub fn with(&self, p: &Array<'_>) -> PyResult<filippov::TracedSystem> {
         Ok(self.system.with_parameters(p.as_slice()?.to_vec()))
     }
 }
@@ -158,7 +162,7 @@ impl TracedSystem {
 #[pymethods]
 impl TracedSystem {
     #[new]
-    #[pyo3(signature = (builder, field, n_states, parameters, states=None))]
+    #[pyo3(signature = (builder, field, n_states, parameters, states=None, watched=Vec::new()))]
     fn new(
         py: Python<'_>,
         builder: Py<Builder>,
@@ -166,6 +170,7 @@ impl TracedSystem {
         n_states: usize,
         parameters: Vec<String>,
         states: Option<Vec<String>>,
+        watched: Vec<usize>,
     ) -> PyResult<Self> {
         if field.len() != n_states {
             let text = format!("{} expressions for {n_states} states", field.len());
@@ -180,7 +185,7 @@ impl TracedSystem {
             states: states.unwrap_or_default(),
             parameters,
         };
-        Self::build(graph, field, names, Some(builder))
+        Self::build(graph, field, names, watched, Some(builder))
     }
 
     #[getter]
@@ -276,6 +281,10 @@ impl TracedSystem {
         for node in self.system.field_nodes() {
             write_number(&mut bytes, node.index());
         }
+        write_number(&mut bytes, self.watched.len());
+        for &surface in &self.watched {
+            write_number(&mut bytes, surface);
+        }
         for list in [&names.states, &names.parameters] {
             write_number(&mut bytes, list.len());
             for name in list {
@@ -295,6 +304,11 @@ impl TracedSystem {
         for _ in 0..count {
             field.push(read_number(&mut rest).ok_or_else(damaged)?);
         }
+        let count = read_number(&mut rest).ok_or_else(damaged)? as usize;
+        let mut watched = Vec::new();
+        for _ in 0..count {
+            watched.push(read_number(&mut rest).ok_or_else(damaged)? as usize);
+        }
         let mut lists = [Vec::new(), Vec::new()];
         for list in &mut lists {
             for _ in 0..read_number(&mut rest).ok_or_else(damaged)? {
@@ -309,7 +323,8 @@ impl TracedSystem {
             .map(|id| Builder::node(&graph, id))
             .collect::<PyResult<Vec<_>>>()?;
         let [states, parameters] = lists;
-        Self::build(graph, field, Names { states, parameters }, None)
+        let names = Names { states, parameters };
+        Self::build(graph, field, names, watched, None)
     }
 }
 
@@ -347,11 +362,13 @@ macro_rules! callable_system {
         #[pymethods]
         impl $name {
             #[new]
-            fn new(fun: Py<PyAny>, surfaces: Vec<Py<PyAny>>, n_states: usize, names: Vec<String>) -> PyResult<Self> {
+            #[pyo3(signature = (fun, surfaces, n_states, names, n_switching=None))]
+            fn new(fun: Py<PyAny>, surfaces: Vec<Py<PyAny>>, n_states: usize, names: Vec<String>, n_switching: Option<usize>) -> PyResult<Self> {
                 if names.len() != surfaces.len() {
                     return Err(PyValueError::new_err("names: one per surface is needed"));
                 }
-                let surfaces = Surfaces { functions: surfaces, names };
+                let n_switching = n_switching.unwrap_or(surfaces.len());
+                let surfaces = Surfaces { functions: surfaces, names, n_switching };
                 Ok($name { system: Arc::new($core { fun, surfaces, n_states }) })
             }
 

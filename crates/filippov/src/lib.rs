@@ -61,5 +61,5 @@ pub use solution::{Segment, Side, Solution, Switch, UserZero};
 pub use switching::Kind;
 pub use system::{
     AffineParts, AffineSigns, BothSides, ClosureSystem, LieValue, PiecewiseSystem, SingularSliding,
-    TracedSystem, Word,
+    TracedMap, TracedSystem, Word,
 };

@@ -50,6 +50,8 @@ class Trace:
         The field, compiled.
     declared : tuple of int
         Index of each surface that was given, in their order.
+    triggers : tuple of (int, float)
+        For each trigger the index of its surface, and the sign by which it differs from that.
     tracer : Tracer
         What `trace_event` needs of the trace.
     events : Recent
@@ -64,6 +66,7 @@ class Trace:
     guards: tuple[Guard, ...]
     system: TracedSystem
     declared: tuple[int, ...]
+    triggers: tuple[tuple[int, float], ...]
     tracer: Tracer
     events: Recent[tuple[int | None]] = member(default_factory=lambda: Recent(32))
 
@@ -75,6 +78,7 @@ def trace(
     args: tuple[Any, ...] = (),
     parameters: Mapping[str, float] | None = None,
     surfaces: Sequence[Callable[..., Any]] | None = None,
+    triggers: Sequence[Callable[..., Any]] = (),
     t0: float,
     y0: NDArray[Any] | None,
     max_paths: int = 256,
@@ -96,6 +100,8 @@ def trace(
     surfaces : sequence of callables, optional
         Switching functions ``h(t, x, *args)``, with the parameters that their signature names. They come
         first, in this order and with their sign.
+    triggers : sequence of callables, optional
+        Functions ``h(t, x, *args)`` whose zeros are monitored like surfaces, whether the field switches there or not.
     t0 : float
         Initial time.
     y0 : ndarray, shape (n,), or None
@@ -135,7 +141,9 @@ def trace(
         _declare(tracer, surface, args, f"surfaces[{idx}]") for idx, surface in enumerate(surfaces or ())
     )
     field = _explore(tracer, fun, args, "fun", n)
-    system = TracedSystem(tracer.builder, field, n, tracer.parameters, tracer.states)
+    watched = tuple(_watch(tracer, h, args, f"resets[{idx}].h") for idx, h in enumerate(triggers))
+    indices = [index for index, _ in watched]
+    system = TracedSystem(tracer.builder, field, n, tracer.parameters, tracer.states, indices)
     keywords = dict(parameters or {})
     verify(system, lambda t, x: fun(t, x, *args, **keywords), tracer.t0, start, tracer.values)
     return Trace(
@@ -147,6 +155,7 @@ def trace(
         guards=tuple(tracer.guards.values()),
         system=system,
         declared=declared,
+        triggers=watched,
         tracer=tracer,
     )
 
@@ -215,6 +224,15 @@ def _declare(tracer: Tracer, surface: Callable[..., Any], args: tuple[Any, ...],
     if tracer.builder.as_constant(node) is not None:
         raise ModelError(f"{role} is constant: a switching function must depend on t or x")
     return tracer.builder.declare_surface(node)
+
+
+def _watch(tracer: Tracer, h: Callable[..., Any], args: tuple[Any, ...], role: str) -> tuple[int, float]:
+    """Return the surface on which a function switches, a new one if it is not known, and the sign between them."""
+    node = _explore(tracer, h, args, role, None)[0]
+    surface, orientation = tracer.builder.switch(node)
+    if surface < 0:
+        raise ModelError(f"{role} never changes its sign: nothing would ever be reset")
+    return surface, orientation
 
 
 def _explore(

@@ -11,6 +11,7 @@ mod both_sides;
 mod closures;
 mod compiled;
 mod discrete;
+mod map;
 mod tiered;
 mod traced;
 
@@ -18,6 +19,7 @@ pub(crate) use activity::surfaces_that_matter;
 pub use affine::{AffineParts, AffineSigns, SingularSliding};
 pub use both_sides::BothSides;
 pub use closures::ClosureSystem;
+pub use map::TracedMap;
 pub use traced::TracedSystem;
 
 use filippov_expr::{Enclosure, Motion};
