@@ -203,7 +203,7 @@ def _actions(
     t0: float,
     y0: Array,
 ) -> tuple[tuple[CoreAction, ...], bool]:
-    """Return the resets for the core, maps traced where possible, and whether they hold for these values only."""
+    """Return the resets for the core, traced if possible, and whether they hold for these values only."""
     surfaces = iter(triggers)
     actions, is_pinned = [], False
     for k, reset in enumerate(source.resets):
@@ -230,8 +230,8 @@ def _prepare_opaque(
     actions: list[CoreAction] = []
     for reset in source.resets:
         n_found = sum(action.when == "surface" for action in actions)
-        surface = None if reset.h is None else (n_switching + n_found, 1.0)
-        actions.append(reset.action(surface, bind_function(reset.map, source.args, values)))
+        trigger = None if reset.h is None else (n_switching + n_found, 1.0)
+        actions.append(reset.action(trigger, bind_function(reset.map, source.args, values)))
     core: CoreSystem
     if source.signed is not None:
         signed = source.signed

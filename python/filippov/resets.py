@@ -53,8 +53,9 @@ class Reset:
     Notes
     -----
     A reset that leaves the position alone and acts on the velocity is an impact. Impacts that come faster and
-    faster are followed to their limit; then the body stays *in contact*, ``h = 0`` and ``h' = 0``, with mode entry
-    0, until the free acceleration pulls it away. The force of the contact has the direction of the impact.
+    faster are followed to their limit; then the body stays *in contact*, ``h = 0`` and ``h' = 0``, with mode
+    entry 0, until the free acceleration pulls it away. The force of the contact has the direction of the
+    impact.
 
     Several resets at one instant are done in the order in which they are given, then those that the jump
     triggers; see ``docs/theory/order_of_outcomes.md``.

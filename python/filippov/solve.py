@@ -104,8 +104,8 @@ def solve_ivp(
         Switching functions ``h_j(t, y, *args)``. Needed only for functions that cannot be traced (a black
         box); otherwise they fix the order and the sign of the surfaces.
     resets : Reset or sequence of Reset, optional
-        Jumps of the state at surfaces, at known times, or at the ticks of a clock, in the order in which they are
-        done where several happen at one instant.
+        Jumps of the state at surfaces, at known times, or at the ticks of a clock, in the order in which
+        they are done where several happen at one instant.
     rtol : float, optional
         Relative tolerance; the local error is kept below ``atol + rtol * abs(y)``. Default 1e-6.
     atol : float or array_like, shape (n,), optional

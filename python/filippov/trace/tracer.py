@@ -101,7 +101,8 @@ def trace(
         Switching functions ``h(t, x, *args)``, with the parameters that their signature names. They come
         first, in this order and with their sign.
     triggers : sequence of callables, optional
-        Functions ``h(t, x, *args)`` whose zeros are monitored like surfaces, whether the field switches there or not.
+        Functions ``h(t, x, *args)`` that are monitored like surfaces, whether the field switches there or
+        not.
     t0 : float
         Initial time.
     y0 : ndarray, shape (n,), or None
@@ -227,7 +228,7 @@ def _declare(tracer: Tracer, surface: Callable[..., Any], args: tuple[Any, ...],
 
 
 def _watch(tracer: Tracer, h: Callable[..., Any], args: tuple[Any, ...], role: str) -> tuple[int, float]:
-    """Return the surface on which a function switches, a new one if it is not known, and the sign between them."""
+    """Return the surface on which a function switches, known or new, and the sign between them."""
     node = _explore(tracer, h, args, role, None)[0]
     surface, orientation = tracer.builder.switch(node)
     if surface < 0:
