@@ -13,6 +13,7 @@ from filippov._core import OpaqueSystem, SignedSystem, TracedSystem
 from filippov.errors import InputError, ModelError, TraceError
 from filippov.events import bind_function, check_scalar_function, function_name, selective
 from filippov.forms import Source
+from filippov.laws import without_memory
 from filippov.resets import CoreAction, check_map_value
 from filippov.trace import Trace, trace
 from filippov.trace.fingerprint import fingerprint
@@ -240,7 +241,8 @@ def _prepare_opaque(
         fun = bind_function(source.fun, source.args, values)
         core = OpaqueSystem(fun, surfaces, n, names, n_switching)
         if y0 is not None:
-            check_components(fun(t0, y0.copy()), n)
+            with without_memory():
+                check_components(fun(t0, y0.copy()), n)
     if y0 is not None:
         for j, surface in enumerate(surfaces):
             what = f"surfaces: entry {j}" if j < n_switching else f"resets: h of {names[j]}"

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use filippov::action::ActionMap;
-use filippov::{FieldError, PiecewiseSystem, UserFunction};
+use filippov::{FieldError, PiecewiseSystem, TracedSystem, UserFunction};
 use filippov_expr::{
     Backend, Enclosure, EnclosureProgram, ExprError, Graph, Motion, NodeId, Program,
 };
@@ -166,23 +166,24 @@ impl EventExpression {
 /// events, so no signs are needed.
 pub struct CompiledEvent {
     pub expression: Arc<EventExpression>,
-    pub parameters: Vec<f64>,
+    /// Knows the parameters, and the discrete states of the run.
+    pub system: Arc<TracedSystem>,
 }
 
 impl UserFunction for CompiledEvent {
     fn value(&self, t: f64, x: &[f64]) -> Result<f64, FieldError> {
         let mut out = [0.0];
-        self.expression
-            .program
-            .eval(t, x, &[], &self.parameters, &[], &mut out);
+        let program = &self.expression.program;
+        self.system
+            .with_values(|p| program.eval(t, x, &[], p, &[], &mut out));
         Ok(out[0])
     }
 
     fn enclose(&self, motion: &dyn Motion) -> Option<Enclosure> {
         let mut out = [Enclosure::UNKNOWN];
-        self.expression
-            .enclosing
-            .eval(motion, &[], &self.parameters, &mut out);
+        let program = &self.expression.enclosing;
+        self.system
+            .with_values(|p| program.eval(motion, &[], p, &mut out));
         Some(out[0])
     }
 }

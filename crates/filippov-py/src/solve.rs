@@ -1,5 +1,6 @@
 //! The call of the integrator.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use filippov::action::{Action, ActionMap, Actions, Clock, Trigger};
@@ -14,7 +15,7 @@ use pyo3::types::PyDict;
 
 use crate::callbacks::{CalledEvent, CalledMap, CompiledEvent};
 use crate::run::Run;
-use crate::systems::{core_of, TracedSystem};
+use crate::systems::{core_of, n_visible_of, raised, CoreSystem, TracedSystem};
 
 /// How often the interpreter is asked for signals and told the progress.
 const POLL_EVERY: Duration = Duration::from_millis(20);
@@ -50,21 +51,34 @@ pub fn solve(
     events: Vec<(Py<PyAny>, f64, u64, String)>,
     actions: Vec<ActionRow>,
 ) -> PyResult<Run> {
-    let parameters = p.as_slice()?.to_vec();
     let traced = system.cast::<TracedSystem>().ok();
-    let core = core_of(&system, &p)?;
+    let y0 = y0.as_slice()?.to_vec();
+    let mut laws = Vec::new();
+    let mut discrete = Vec::new();
+    let mut compiled = None;
+    let core = match traced {
+        Some(traced) => {
+            let own = Arc::new(traced.get().with(&p)?);
+            discrete = traced.get().laws.start(&own, t0, &y0).map_err(raised)?;
+            laws = traced.get().laws.actions(y0.len(), own.parameters());
+            compiled = Some(Arc::clone(&own));
+            own as CoreSystem
+        }
+        None => core_of(&system, &p, t0, &y0)?,
+    };
+    let n_visible = n_visible_of(&system, &*core);
     let mut functions: Vec<(Box<dyn UserFunction + Send + Sync>, f64, u64)> = Vec::new();
     for (g, direction, terminal, _name) in events {
         let handle: Option<usize> = g.extract(py).ok();
-        let function: Box<dyn UserFunction + Send + Sync> = match (handle, traced) {
-            (Some(handle), Some(traced)) => {
+        let function: Box<dyn UserFunction + Send + Sync> = match (handle, traced, &compiled) {
+            (Some(handle), Some(traced), Some(own)) => {
                 let expression = traced
                     .get()
                     .event_expression(handle)
                     .ok_or_else(|| PyValueError::new_err(format!("no event {handle}")))?;
                 Box::new(CompiledEvent {
                     expression,
-                    parameters: parameters.clone(),
+                    system: Arc::clone(own),
                 })
             }
             _ => Box::new(CalledEvent(g)),
@@ -72,8 +86,18 @@ pub fn solve(
         functions.push((function, direction, terminal));
     }
     let given = read_actions(py, actions, &p)?;
-    let y0 = y0.as_slice()?.to_vec();
     let RunOptions { options, progress } = options;
+    let mut completed = None;
+    if !options.choices.is_empty() && n_visible < core.n_surfaces() {
+        let options = completed.insert(options.clone());
+        for choice in &mut options.choices {
+            let mut entries = choice.entries().to_vec();
+            entries.resize(core.n_surfaces(), 1);
+            *choice = Mode::new(entries);
+        }
+    }
+    let options = completed.as_ref().unwrap_or(options);
+    let names = traced.map_or_else(Vec::new, |t| t.get().law_names());
     let is_native = traced.is_some_and(|t| t.get().system.is_native());
     let solution = py
         .detach(|| {
@@ -94,10 +118,15 @@ pub fn solve(
                 map: &**map,
                 name: name.clone(),
             });
-            let actions = Actions {
-                list: list.collect(),
-                discrete: Vec::new(),
-            };
+            // What the user gives comes first: a sample at a tick sees the ramp before it drops.
+            let mut list: Vec<Action> = list.collect();
+            list.extend(laws.iter().map(|law| Action {
+                trigger: law.trigger.clone(),
+                map: &law.map,
+                name: names.get(law.index).cloned().unwrap_or_default(),
+                kind: law.kind,
+            }));
+            let actions = Actions { list, discrete };
             let mut asked = Instant::now();
             let mut interrupt = |t: f64| {
                 if asked.elapsed() < POLL_EVERY {
@@ -113,7 +142,7 @@ pub fn solve(
             solve_with_actions(&*core, (t0, t1), &y0, options, &events, &actions, interrupt)
         })
         .map_err(|e| PyValueError::new_err(e.to_string()))?;
-    Ok(Run::new(core, solution, is_native))
+    Ok(Run::new(core, solution, is_native, n_visible))
 }
 
 /// When, numbers that say so, the map (traced, or a callable), and the name of an action.

@@ -60,6 +60,6 @@ pub use options::{NonUnique, Options, SlidingRule};
 pub use solution::{Segment, Side, Solution, Switch, UserZero};
 pub use switching::Kind;
 pub use system::{
-    AffineParts, AffineSigns, BothSides, ClosureSystem, LieValue, PiecewiseSystem, SingularSliding,
-    TracedMap, TracedSystem, Word,
+    AffineParts, AffineSigns, BothSides, ClosureSystem, Law, LawAction, LawMap, Laws, LieValue,
+    PiecewiseSystem, SingularSliding, TracedMap, TracedSystem, Word,
 };

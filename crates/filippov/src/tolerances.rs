@@ -335,3 +335,6 @@ pub const MOST_IN_CONTACT: usize = 6;
 
 /// At an exit a multiplier vanishes to this fraction of the largest one: the event is located to better than that.
 pub const VANISHING_MULTIPLIER: f64 = 1e-9;
+
+/// An expression of whole numbers is one itself within this: a few roundings.
+pub const WHOLE_NUMBER: f64 = 1e-12;

@@ -23,8 +23,7 @@ use crate::event::EventFunction;
 use crate::field::SmoothField;
 use crate::mode::Mode;
 use crate::solution::Switch;
-use crate::switching::Kind;
-use crate::system::LieValue;
+use crate::switching::{first_nonzero, Kind};
 use crate::tolerances::MOST_ACTIONS_AT_ONE_TIME;
 
 /// The surfaces in one instant, as far as they trigger actions.
@@ -52,11 +51,7 @@ impl Integrator<'_> {
         for j in (0..on_surface.len()).filter(|&j| on_surface[j] && self.is_only_trigger(j)) {
             let side = self.trigger_side(j, None);
             mode.set(j, side);
-            let signs = mode.signs();
-            let LieValue { value, magnitude } =
-                self.system
-                    .lie_derivative(j, j, &[side], self.t, &self.x, &signs)?;
-            if value * f64::from(side) < -self.system.lie_tolerance(1) * magnitude {
+            if self.goes_through(j, side, &mode)? {
                 due.extend(self.triggered_at(j, side));
             }
         }
@@ -236,7 +231,6 @@ impl Integrator<'_> {
         let Some(Sides { mode, on_surface }) = self.sides(Some(&self.motion.mode.clone()))? else {
             return Ok(Vec::new());
         };
-        let signs = mode.signs();
         let mut due = Vec::new();
         for (j, on_surface) in on_surface.into_iter().enumerate() {
             let side = approach.side[j];
@@ -251,11 +245,7 @@ impl Integrator<'_> {
                 (approach.side[j], approach.passes[j]) = (now, false);
                 continue;
             }
-            let LieValue { value, magnitude } =
-                self.system
-                    .lie_derivative(j, j, &[side], self.t, &self.x, &signs)?;
-            let goes_on = value * f64::from(side) < -self.system.lie_tolerance(1) * magnitude;
-            if !goes_on {
+            if !self.goes_through(j, side, &mode)? {
                 approach.passes[j] = false;
             } else if self
                 .triggered_at(j, side)
@@ -269,6 +259,14 @@ impl Integrator<'_> {
         due.sort_unstable();
         due.dedup();
         Ok(due)
+    }
+
+    /// Does the motion lead from this side through a surface that the point lies on? A body that is pressed on
+    /// without velocity does not: it stays.
+    fn goes_through(&self, j: usize, side: i8, mode: &Mode) -> Result<bool, FieldError> {
+        let mode = mode.with(j, side);
+        let leading = first_nonzero(self.system, j, side, 0, self.t, &self.x, &mode.signs())?;
+        Ok(leading.sign() == -side && (leading.order == 1 || !self.can_stay(j, &mode)?))
     }
 
     /// The sides of a mode; where it is in contact, the free side.

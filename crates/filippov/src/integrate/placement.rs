@@ -164,7 +164,7 @@ impl Integrator<'_> {
     }
 
     /// Can a body stay in contact at h_j = 0? The action there leaves the point alone and acts on the velocity.
-    fn can_stay(&mut self, j: usize, mode: &Mode) -> Result<bool, FieldError> {
+    pub(super) fn can_stay(&self, j: usize, mode: &Mode) -> Result<bool, FieldError> {
         let Some((action, _)) = self.actions.at_surface(j) else {
             return Ok(false);
         };

@@ -15,6 +15,10 @@ impl DiscreteStates {
         self.bits.is_empty()
     }
 
+    pub fn len(&self) -> usize {
+        self.bits.len()
+    }
+
     /// Sets all values; their number was fixed when the system was made.
     pub fn set(&self, values: &[f64]) {
         for (slot, value) in self.bits.iter().zip(values) {

@@ -11,6 +11,7 @@ mod both_sides;
 mod closures;
 mod compiled;
 mod discrete;
+mod laws;
 mod map;
 mod tiered;
 mod traced;
@@ -19,6 +20,7 @@ pub(crate) use activity::surfaces_that_matter;
 pub use affine::{AffineParts, AffineSigns, SingularSliding};
 pub use both_sides::BothSides;
 pub use closures::ClosureSystem;
+pub use laws::{Law, LawAction, LawMap, Laws};
 pub use map::TracedMap;
 pub use traced::TracedSystem;
 

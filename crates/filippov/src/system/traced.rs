@@ -76,6 +76,11 @@ impl TracedSystem {
         }
     }
 
+    /// How many discrete states its functions read.
+    pub fn n_discrete(&self) -> usize {
+        self.discrete.len()
+    }
+
     /// The parameter values.
     pub fn parameters(&self) -> &[f64] {
         &self.parameters
@@ -105,7 +110,7 @@ impl TracedSystem {
 impl TracedSystem {
     /// Calls a function with the parameters, the discrete states behind them.
     #[inline(always)]
-    pub(super) fn with_values<R>(&self, f: impl FnOnce(&[f64]) -> R) -> R {
+    pub fn with_values<R>(&self, f: impl FnOnce(&[f64]) -> R) -> R {
         if self.discrete.is_empty() {
             f(&self.parameters)
         } else {
