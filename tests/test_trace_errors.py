@@ -35,8 +35,8 @@ def by_math_atan2(t: Any, x: Any) -> Any:
     return x[1], math.atan2(x[0], x[1])
 
 
-def by_math_floor(t: Any, x: Any) -> Any:
-    return x[1], math.floor(t)
+def by_math_trunc(t: Any, x: Any) -> Any:
+    return x[1], math.trunc(t)
 
 
 def by_float(t: Any, x: Any) -> Any:
@@ -102,24 +102,20 @@ def by_lookup(t: Any, x: Any) -> Any:
     return x[1], TABLE[int(x[0])]
 
 
-def by_floor(t: Any, x: Any) -> Any:
-    return x[1], np.floor(t)
+def by_trunc(t: Any, x: Any) -> Any:
+    return x[1], np.trunc(t)
 
 
-def by_mod(t: Any, x: Any) -> Any:
-    return x[1], t % 1.0
+def by_fmod(t: Any, x: Any) -> Any:
+    return x[1], np.fmod(t, 1.0)
 
 
-def by_array_mod(t: Any, x: Any) -> Any:
-    return x % 2
+def by_array_fmod(t: Any, x: Any) -> Any:
+    return np.fmod(x, 2)
 
 
-def by_floordiv(t: Any, x: Any) -> Any:
-    return x[1], 1 // x[0]
-
-
-def by_round(t: Any, x: Any) -> Any:
-    return x[1], round(x[0])
+def by_modf(t: Any, x: Any) -> Any:
+    return x[1], np.modf(x[0])[0]
 
 
 def by_equality(t: Any, x: Any) -> Any:
@@ -171,7 +167,7 @@ def by_condition_order(t: Any, x: Any) -> Any:
         (by_math, "return x[1], -math.sin(x[0])", "write np.sin instead of math.sin"),
         (by_imported_math, "return x[1], -root(x[0])", "write np.sqrt instead of root"),
         (by_math_atan2, "math.atan2(x[0], x[1])", "write np.arctan2 instead of math.atan2"),
-        (by_math_floor, "math.floor(t)", "for a clock in time"),
+        (by_math_trunc, "math.trunc(t)", "np.floor"),
         (by_float, "y = float(x[0])", "leave out the conversion"),
         (by_int, "int(x[0])", "jumps at every integer"),
         (by_complex, "abs(x[0] + 1j * x[1])", "real and imaginary parts"),
@@ -185,11 +181,10 @@ def by_condition_order(t: Any, x: Any) -> Any:
         (by_mask, "x[x > 0].sum()", "np.where(mask, a, b)"),
         (by_masked_values, "x[x > 0] = x[:1]", "np.where(mask, a, b)"),
         (by_lookup, "TABLE[int(x[0])]", "write the pieces with np.where"),
-        (by_floor, "np.floor(t)", "for a clock in time"),
-        (by_mod, "t % 1.0", "for a clock in time"),
-        (by_array_mod, "return x % 2", "for a clock in time"),
-        (by_floordiv, "1 // x[0]", "for a clock in time"),
-        (by_round, "round(x[0])", "for a clock in time"),
+        (by_trunc, "np.trunc(t)", "np.floor"),
+        (by_fmod, "np.fmod(t, 1.0)", "np.floor"),
+        (by_array_fmod, "return np.fmod(x, 2)", "np.floor"),
+        (by_modf, "np.modf(x[0])", "np.floor"),
         (by_equality, "0.0 if x[1] == 0 else -x[0]", "write `>`, `>=`, `<` or `<=`"),
         (by_array_inequality, "np.where(x != 0, 1 / x, 0)", "write `>`, `>=`, `<` or `<=`"),
         (by_truth, "1.0 if x[0] else 2.0", "write a comparison"),

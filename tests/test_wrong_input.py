@@ -129,7 +129,7 @@ def test_unknown_method(method: Any) -> None:
         ("max_branches", 0),
         ("nonunique", None),
         ("zeno", "stop"),
-        ("resets", []),
+        ("resets", 3),
         ("progress", 3),
     ],
 )

@@ -60,7 +60,7 @@ class Event:
         if not callable(g):
             raise InputError(f"events: an event is a function g(t, y), not {type(g).__name__}")
         self.g = g
-        self.direction = _check_direction(direction)
+        self.direction = check_direction(direction, "events")
         self.terminal = _check_terminal(terminal)
         self.name = name if name is not None else function_name(g, "event")
 
@@ -162,17 +162,18 @@ def function_name(function: Any, default: str) -> str:
     return default if name == "<lambda>" else name
 
 
-def _check_direction(direction: Any) -> float:
+def check_direction(direction: Any, role: str) -> float:
+    """Return the direction of passage as -1, 0 or 1; `role` is the argument that it belongs to."""
     if isinstance(direction, str):
         if direction not in _DIRECTIONS:
-            raise InputError(f'events: direction is a number, "up", "down" or "both", not {direction!r}')
+            raise InputError(f'{role}: direction is a number, "up", "down" or "both", not {direction!r}')
         return _DIRECTIONS[direction]
     try:
         number = float(direction)
     except (TypeError, ValueError):
         number = math.nan
     if math.isnan(number):
-        raise InputError(f'events: direction is a number, "up", "down" or "both", not {direction!r}')
+        raise InputError(f'{role}: direction is a number, "up", "down" or "both", not {direction!r}')
     return float(np.sign(number))
 
 

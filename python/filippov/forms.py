@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from filippov.errors import InputError, ModelError
 from filippov.events import accepted_names
+from filippov.resets import Reset
 
 __all__ = ["Source", "base_source", "fields_source", "relay_source"]
 
@@ -40,6 +41,8 @@ class Source(NamedTuple):
         The same field as ``signed(t, x, s, **params)`` with the sign vector `s` as data.
     branching : callable or None
         `fun` with the signs turned into numbers by `if`, tried if `fun` cannot be traced.
+    resets : tuple of Reset
+        Jumps of the state.
     black_box : bool
         Whether surfaces were declared, even none at all (``surfaces=[]``): `fun` may then be a black box.
     """
@@ -50,6 +53,7 @@ class Source(NamedTuple):
     signed: SignedField | None = None
     branching: Callable[..., Any] | None = None
     black_box: bool = False
+    resets: tuple[Reset, ...] = ()
 
 
 def fields_source(fields: Any, surfaces: Any) -> Source:

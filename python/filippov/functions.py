@@ -26,6 +26,7 @@ __all__ = [
     "arctan2",
     "arctanh",
     "cbrt",
+    "ceil",
     "clip",
     "copysign",
     "cos",
@@ -33,6 +34,7 @@ __all__ = [
     "exp",
     "exp2",
     "expm1",
+    "floor",
     "heaviside",
     "hypot",
     "log",
@@ -41,6 +43,8 @@ __all__ = [
     "log10",
     "maximum",
     "minimum",
+    "mod",
+    "rint",
     "sign",
     "sin",
     "sinh",
@@ -83,12 +87,14 @@ arctan = _twin("arctan", 1)
 arctan2 = _twin("arctan2", 2)
 arctanh = _twin("arctanh", 1)
 cbrt = _twin("cbrt", 1)
+ceil = _twin("ceil", 1)
 copysign = _twin("copysign", 2)
 cos = _twin("cos", 1)
 cosh = _twin("cosh", 1)
 exp = _twin("exp", 1)
 exp2 = _twin("exp2", 1)
 expm1 = _twin("expm1", 1)
+floor = _twin("floor", 1)
 hypot = _twin("hypot", 2)
 log = _twin("log", 1)
 log1p = _twin("log1p", 1)
@@ -96,6 +102,8 @@ log2 = _twin("log2", 1)
 log10 = _twin("log10", 1)
 maximum = _twin("maximum", 2)
 minimum = _twin("minimum", 2)
+mod = _twin("mod", 2)
+rint = _twin("rint", 1)
 sign = _twin("sign", 1)
 sin = _twin("sin", 1)
 sinh = _twin("sinh", 1)

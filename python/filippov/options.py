@@ -103,7 +103,6 @@ def check_options(given: Mapping[str, Any], t_span: tuple[float, float], n: int)
     checked: dict[str, Any] = {}
     for name, value in given.items():
         checked[name] = _CHECKS[name](value, t_span, n)
-    checked.pop("resets", None)
     return _DEFAULT_OPTIONS._replace(**checked) if checked else _DEFAULT_OPTIONS
 
 
@@ -296,11 +295,6 @@ def check_distance(atol: Any) -> float:
     return value
 
 
-def _check_resets(resets: Any) -> None:
-    if resets is not None:
-        raise InputError("resets: not available yet; stop with a terminal event, map the state, and go on")
-
-
 def _check_rtol(rtol: Any) -> float:
     if type(rtol) is float and _SMALLEST_RTOL <= rtol < math.inf:
         return rtol
@@ -429,7 +423,6 @@ _CHECKS: dict[str, Callable[[Any, tuple[float, float], int], Any]] = {
     "nonunique": lambda value, t_span, n: _check_policy("nonunique", value),
     "kappa": lambda value, t_span, n: check_kappa(value),
     "zeno": lambda value, t_span, n: _check_policy("zeno", value),
-    "resets": lambda value, t_span, n: _check_resets(value),
     "method": lambda value, t_span, n: check_method(value),
     "rtol": lambda value, t_span, n: _check_rtol(value),
     "atol": lambda value, t_span, n: _check_atol(value, n),

@@ -13,6 +13,8 @@ from filippov._core import OpaqueSystem, SignedSystem, TracedSystem
 from filippov.errors import InputError, ModelError, TraceError
 from filippov.events import bind_function, check_scalar_function, function_name, selective
 from filippov.forms import Source
+from filippov.laws import without_memory
+from filippov.resets import CoreAction, check_map_value
 from filippov.trace import Trace, trace
 from filippov.trace.fingerprint import fingerprint
 from filippov.trace.reuse import Recent
@@ -39,6 +41,8 @@ class Prepared(NamedTuple):
         Values of the parameters that this form is valid for; ``None`` if it is valid for all.
     why_opaque : str
         Why the function could not be traced; empty if it was.
+    actions : tuple of CoreAction
+        The resets, as the core takes them.
     """
 
     core: CoreSystem
@@ -46,6 +50,7 @@ class Prepared(NamedTuple):
     surfaces: tuple[str, ...]
     pinned: dict[str, float] | None
     why_opaque: str
+    actions: tuple[CoreAction, ...] = ()
 
     @property
     def backend(self) -> str:
@@ -110,8 +115,9 @@ def prepare(
             return _prepare_opaque(source, n, values, t0, y0, error)
         else:
             raise
-    pinned = dict(values) if traced.guards else None
-    prepared = Prepared(traced.system, traced, tuple(traced.system.surfaces()), pinned, "")
+    actions, is_pinned = _actions(source, traced.triggers, n, values, states, t0, start)
+    pinned = dict(values) if traced.guards or is_pinned else None
+    prepared = Prepared(traced.system, traced, tuple(traced.system.surfaces()), pinned, "", actions)
     # A function that has changed what it reads, a counter for instance, is traced again at the next call.
     if key is not None and key == _key(source, n, values, states):
         _KEPT.keep(key, _Kept(prepared, {_point(values, t0, start)}))
@@ -158,7 +164,8 @@ def _key(
     """Return what a trace follows from; None if that cannot be known."""
     if source.signed is not None:  # built once for a System, around functions of this package
         return None
-    read = fingerprint(source.fun, source.args, source.surfaces)
+    resets = [reset.parts() for reset in source.resets]
+    read = fingerprint(source.fun, source.args, source.surfaces, resets)
     return None if read is None else (n, tuple(values), states and tuple(states), read)
 
 
@@ -181,30 +188,69 @@ def _trace(
         args=source.args,
         parameters=values or None,
         surfaces=[selective(surface, values) for surface in source.surfaces] or None,
+        triggers=[selective(reset.h, values) for reset in source.resets if reset.h is not None],
         t0=t0,
         y0=y0,
         states=states,
     )
 
 
+def _actions(
+    source: Source,
+    triggers: Sequence[tuple[int, float]],
+    n: int,
+    values: dict[str, float],
+    states: Sequence[str] | None,
+    t0: float,
+    y0: Array,
+) -> tuple[tuple[CoreAction, ...], bool]:
+    """Return the resets for the core, traced if possible, and whether they hold for these values only."""
+    surfaces = iter(triggers)
+    actions, is_pinned = [], False
+    for k, reset in enumerate(source.resets):
+        bound = bind_function(reset.map, source.args, values)
+        check_map_value(bound(t0, y0.copy()), n, f"resets: entry {k} ({reset.name})")
+        own = selective(reset.map, values)
+        try:
+            traced = trace(own, n, args=source.args, parameters=values or None, t0=t0, y0=y0, states=states)
+            core_map: Any = traced.system
+            is_pinned |= bool(traced.guards)
+        except (TraceError, ModelError):
+            core_map, is_pinned = bound, True
+        actions.append(reset.action(None if reset.h is None else next(surfaces), core_map))
+    return tuple(actions), is_pinned
+
+
 def _prepare_opaque(
     source: Source, n: int, values: dict[str, float], t0: float, y0: Array | None, reason: TraceError
 ) -> Prepared:
-    surfaces = [bind_function(surface, source.args, values) for surface in source.surfaces]
-    names = [function_name(surface, f"h{j + 1}") for j, surface in enumerate(source.surfaces)]
+    n_switching = len(source.surfaces)
+    functions = [*source.surfaces, *(reset.h for reset in source.resets if reset.h is not None)]
+    surfaces = [bind_function(surface, source.args, values) for surface in functions]
+    names = [function_name(surface, f"h{j + 1}") for j, surface in enumerate(functions)]
+    actions: list[CoreAction] = []
+    for reset in source.resets:
+        n_found = sum(action.when == "surface" for action in actions)
+        trigger = None if reset.h is None else (n_switching + n_found, 1.0)
+        actions.append(reset.action(trigger, bind_function(reset.map, source.args, values)))
     core: CoreSystem
     if source.signed is not None:
         signed = source.signed
-        core = SignedSystem(lambda t, x, s: signed(t, x, s, **values), surfaces, n, names)
+        core = SignedSystem(lambda t, x, s: signed(t, x, s, **values), surfaces, n, names, n_switching)
     else:
         fun = bind_function(source.fun, source.args, values)
-        core = OpaqueSystem(fun, surfaces, n, names)
+        core = OpaqueSystem(fun, surfaces, n, names, n_switching)
         if y0 is not None:
-            check_components(fun(t0, y0.copy()), n)
+            with without_memory():
+                check_components(fun(t0, y0.copy()), n)
     if y0 is not None:
         for j, surface in enumerate(surfaces):
-            check_scalar_function(surface, t0, y0, f"surfaces: entry {j}")
-    return Prepared(core, None, tuple(names), dict(values), str(reason))
+            what = f"surfaces: entry {j}" if j < n_switching else f"resets: h of {names[j]}"
+            check_scalar_function(surface, t0, y0, what)
+        for k, reset in enumerate(source.resets):
+            value = actions[k].map(t0, y0.copy())
+            check_map_value(value, n, f"resets: entry {k} ({reset.name})")
+    return Prepared(core, None, tuple(names), dict(values), str(reason), tuple(actions))
 
 
 def check_components(value: Any, n: int) -> None:
@@ -239,3 +285,25 @@ def check_n(n: Any) -> int | None:
     if isinstance(n, bool) or int(n) != n or n < 1:
         raise InputError(f"n: a positive whole number of states is needed, not {n!r}")
     return int(n)
+
+
+def packed(prepared: Prepared) -> tuple[Any, ...]:
+    """Return a traced system in a form that can be pickled."""
+    assert isinstance(prepared.core, TracedSystem)
+    maps = [
+        action._replace(map=action.map.to_bytes() if isinstance(action.map, TracedSystem) else action.map)
+        for action in prepared.actions
+    ]
+    return prepared.core.to_bytes(), prepared.surfaces, prepared.pinned, maps
+
+
+def unpacked(data: tuple[Any, ...]) -> Prepared:
+    """Return the system that was packed."""
+    core, surfaces, pinned, maps = data
+    actions = tuple(
+        action._replace(
+            map=TracedSystem.from_bytes(action.map) if isinstance(action.map, bytes) else action.map
+        )
+        for action in maps
+    )
+    return Prepared(TracedSystem.from_bytes(core), None, surfaces, pinned, "", actions)

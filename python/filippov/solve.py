@@ -107,8 +107,9 @@ def solve_ivp(
     surfaces : callable or sequence of callable, optional
         Switching functions ``h_j(t, y, *args)``. Needed only for functions that cannot be traced (a black
         box); otherwise they fix the order and the sign of the surfaces.
-    resets : None
-        Not available yet.
+    resets : Reset or sequence of Reset, optional
+        Jumps of the state at surfaces, at known times, or at the ticks of a clock, in the order in which
+        they are done where several happen at one instant.
     rtol : float, optional
         Relative tolerance; the local error is kept below ``atol + rtol * abs(y)``. Default 1e-6.
     atol : float or array_like, shape (n,), optional
@@ -190,7 +191,6 @@ def solve_ivp(
         "method": method,
         "t_eval": t_eval,
         "dense_output": dense_output,
-        "resets": resets,
         "rtol": rtol,
         "atol": atol,
         "first_step": first_step,
@@ -206,7 +206,7 @@ def solve_ivp(
         "progress": progress,
     }
     changed = {name: value for name, value in given.items() if value is not _DEFAULTS[name]}
-    return _solve(fun, t_span, y0, changed, events, args, params, surfaces)
+    return _solve(fun, t_span, y0, changed, events, args, params, surfaces, resets)
 
 
 # Most calls change none of the options, or a few: only those are checked.
@@ -224,6 +224,7 @@ def _solve(
     args: Any,
     params: Mapping[str, float] | None,
     surfaces: Any,
+    resets: Any,
 ) -> Solution:
     """Solve with the options that differ from their defaults; all arguments as in `solve_ivp`."""
     t0, t1 = check_t_span(t_span)
@@ -232,7 +233,7 @@ def _solve(
     options = check_options(changed, (t0, t1), n)
     constants = check_args(args)
     specs = normalise_events(events)
-    system, values = _as_system(fun, n, constants, params, surfaces)
+    system, values = _as_system(fun, n, constants, params, surfaces, resets)
     prepared = system.prepare(n, t0, state, values)
     fit_kappa(options.kappa, prepared.surfaces)
     if t1 < t0:
@@ -276,17 +277,20 @@ def _as_system(
     args: tuple[Any, ...],
     params: Mapping[str, float] | None,
     surfaces: Any,
+    resets: Any,
 ) -> tuple[System, dict[str, float]]:
     """Return the system to run and the values of all its parameters."""
     if isinstance(fun, System):
         if surfaces is not None:
             raise InputError("surfaces: they belong to the System; give them to it")
+        if resets is not None:
+            raise InputError("resets: they belong to the System; give them to it")
         if args:
             raise InputError("args: they belong to the System; give them to it, or use params=")
         return fun, fun.parameter_values(params)
     if not callable(fun):
         raise InputError(f"fun: a function fun(t, y) or a System is needed, not {type(fun).__name__}")
-    system = System(fun, n=n, params=params, surfaces=surfaces, args=args)
+    system = System(fun, n=n, params=params, surfaces=surfaces, args=args, resets=resets)
     return system, system.parameter_values(None)
 
 
@@ -304,6 +308,8 @@ def _backward(
             "t_span: t1 < t0 is refused for a system with surfaces: Filippov flow is not reversible "
             f"(surfaces: {', '.join(prepared.surfaces)})"
         )
+    if prepared.actions:
+        raise InputError("t_span: t1 < t0 is refused for a system with resets: they cannot be undone")
     if specs is not None:
         specs = [spec._replace(g=reversed_function(spec.g)) for spec in specs]
     return system.prepare_backward(len(y0), -t0, y0, values), specs
@@ -323,7 +329,8 @@ def _run(
     if t1 == t0:
         return StandingRun(t0, y0, len(prepared.surfaces), len(events), options.t_eval)
     if t1 > t0:
-        return run_core(prepared.core, t0, t1, y0, p, options.for_core(choices), events)
+        core_options = options.for_core(choices)
+        return run_core(prepared.core, t0, t1, y0, p, core_options, events, list(prepared.actions))
     if options.t_eval is not None:
         options = options._replace(t_eval=-options.t_eval)
     return ReversedRun(run_core(prepared.core, -t0, -t1, y0, p, options.for_core(), events))

@@ -25,7 +25,8 @@ from filippov.options import (
     did_you_mean,
     fit_kappa,
 )
-from filippov.prepare import Prepared, check_n, numbered_states, parameter_vector, prepare
+from filippov.prepare import Prepared, check_n, numbered_states, packed, parameter_vector, prepare, unpacked
+from filippov.resets import check_resets
 from filippov.sliding import sliding_field
 from filippov.solution import Solution
 
@@ -55,7 +56,9 @@ class System:
         Switching functions ``h_j(t, x, *args, **params)``. Needed only for functions that cannot be
         traced; otherwise they fix the order and the sign of the surfaces.
     args : tuple, optional
-        Constants handed to `fun` and `surfaces` after `x`.
+        Constants handed to `fun`, `surfaces` and `resets` after `x`.
+    resets : Reset or sequence of Reset, optional
+        Jumps of the state.
 
     Raises
     ------
@@ -87,11 +90,14 @@ class System:
         states: Sequence[str] | None = None,
         surfaces: Any = None,
         args: Any = (),
+        resets: Any = None,
     ) -> None:
         if not callable(fun):
             raise InputError(f"fun: a function fun(t, x) is needed, not {type(fun).__name__}")
         declared = surfaces is not None
-        source = Source(fun, check_surfaces(surfaces), check_args(args), black_box=declared)
+        source = Source(
+            fun, check_surfaces(surfaces), check_args(args), black_box=declared, resets=check_resets(resets)
+        )
         self._setup(source, n, params, states)
         if not self._params:
             return
@@ -167,15 +173,6 @@ class System:
             The switching functions ``h_j(t, x)``.
         n, params, states
             As for `from_fields`.
-
-        Returns
-        -------
-        System
-
-        Raises
-        ------
-        ModelError
-            If the numbers of `deltas` and `surfaces` differ.
 
         References
         ----------
@@ -471,15 +468,14 @@ class System:
         state["_prepared"] = None
         if prepared is not None and isinstance(prepared.core, TracedSystem):
             state["_source"] = None
-            state["_traced"] = (prepared.core.to_bytes(), prepared.surfaces, prepared.pinned)
+            state["_traced"] = packed(prepared)
         return state
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         traced = state.pop("_traced", None)
         self.__dict__.update(state)
         if traced is not None:
-            data, surfaces, pinned = traced
-            self._prepared = Prepared(TracedSystem.from_bytes(data), None, surfaces, pinned, "")
+            self._prepared = unpacked(traced)
 
     def __repr__(self) -> str:
         parts = [f"n={self._n}"] if self._n is not None else []

@@ -12,6 +12,20 @@ impl Graph {
         self.facts(id).varies
     }
 
+    /// Whether the value contains a state variable.
+    pub fn depends_on_state(&self, id: NodeId) -> bool {
+        self.facts(id).has_state
+    }
+
+    /// Whether the value contains a parameter with this index or a higher one.
+    pub fn depends_on_parameters_from(&self, id: NodeId, first: u32) -> bool {
+        let operands = |id: NodeId| self.node(id).operands().collect::<Vec<_>>();
+        let nodes = self.reachable_by([id], operands);
+        nodes
+            .into_iter()
+            .any(|id| matches!(*self.node(id), Node::Parameter(i) if i >= first))
+    }
+
     /// Whether the value is affine in (t, x) with coefficients made of constants and parameters.
     ///
     /// This is read off the structure: `x*y - x*y` simplifies to 0 and is affine, `(x + 1)**2 - x**2` is not.

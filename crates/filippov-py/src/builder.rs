@@ -127,6 +127,21 @@ impl Builder {
         Ok(graph.depends_on_motion(Self::node(&graph, a)?))
     }
 
+    fn depends_on_state(&self, a: u32) -> PyResult<bool> {
+        let graph = self.graph();
+        Ok(graph.depends_on_state(Self::node(&graph, a)?))
+    }
+
+    fn depends_on_parameters_from(&self, a: u32, first: u32) -> PyResult<bool> {
+        let graph = self.graph();
+        Ok(graph.depends_on_parameters_from(Self::node(&graph, a)?, first))
+    }
+
+    fn is_affine(&self, a: u32) -> PyResult<bool> {
+        let graph = self.graph();
+        Ok(graph.is_affine(Self::node(&graph, a)?))
+    }
+
     fn n_surfaces(&self) -> usize {
         self.graph().n_surfaces()
     }

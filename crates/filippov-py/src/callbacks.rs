@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use filippov::{FieldError, PiecewiseSystem, UserFunction};
+use filippov::action::ActionMap;
+use filippov::{FieldError, PiecewiseSystem, TracedSystem, UserFunction};
 use filippov_expr::{
     Backend, Enclosure, EnclosureProgram, ExprError, Graph, Motion, NodeId, Program,
 };
@@ -15,6 +16,8 @@ use crate::conversion::{read_scalar, read_vector};
 pub struct Surfaces {
     pub functions: Vec<Py<PyAny>>,
     pub names: Vec<String>,
+    /// The first so many switch the field; those behind them trigger actions.
+    pub n_switching: usize,
 }
 
 impl Surfaces {
@@ -55,7 +58,7 @@ impl PiecewiseSystem for Opaque {
 
     fn field(&self, t: f64, x: &[f64], signs: &[f64], dx: &mut [f64]) -> Result<(), FieldError> {
         Python::attach(|py| {
-            for (j, sign) in signs.iter().enumerate() {
+            for (j, sign) in signs.iter().enumerate().take(self.surfaces.n_switching) {
                 if self.surfaces.value(py, j, t, x)? * sign <= 0.0 {
                     dx.fill(f64::NAN);
                     return Ok(());
@@ -69,6 +72,10 @@ impl PiecewiseSystem for Opaque {
 
     fn surfaces(&self, t: f64, x: &[f64], _signs: &[f64], h: &mut [f64]) -> Result<(), FieldError> {
         self.surfaces.write(t, x, h)
+    }
+
+    fn switches_at(&self, j: usize) -> bool {
+        j < self.surfaces.n_switching
     }
 
     fn surface_name(&self, j: usize) -> String {
@@ -108,8 +115,25 @@ impl PiecewiseSystem for Signed {
         self.surfaces.write(t, x, h)
     }
 
+    fn switches_at(&self, j: usize) -> bool {
+        j < self.surfaces.n_switching
+    }
+
     fn surface_name(&self, j: usize) -> String {
         self.surfaces.names[j].clone()
+    }
+}
+
+/// The map of an action, (t, x) -> x+, as a Python callable.
+pub struct CalledMap(pub Py<PyAny>);
+
+impl ActionMap for CalledMap {
+    fn apply(&self, t: f64, x: &mut [f64], _: &[f64], _: &mut [f64]) -> Result<(), FieldError> {
+        Python::attach(|py| {
+            let value = self.0.bind(py).call1((t, PyArray1::from_slice(py, x)))?;
+            read_vector(&value, x, "the map of a reset")
+        })
+        .map_err(|e: PyErr| FieldError::new(e))
     }
 }
 
@@ -142,15 +166,16 @@ impl EventExpression {
 /// events, so no signs are needed.
 pub struct CompiledEvent {
     pub expression: Arc<EventExpression>,
-    pub parameters: Vec<f64>,
+    /// Knows the parameters, and the discrete states of the run.
+    pub system: Arc<TracedSystem>,
 }
 
 impl UserFunction for CompiledEvent {
     fn value(&self, t: f64, x: &[f64]) -> Result<f64, FieldError> {
         let mut out = [0.0];
-        self.expression
-            .program
-            .eval(t, x, &[], &self.parameters, &[], &mut out);
+        let program = &self.expression.program;
+        self.system
+            .with_values(|p| program.eval(t, x, &[], p, &[], &mut out));
         Ok(out[0])
     }
 
@@ -160,9 +185,9 @@ impl UserFunction for CompiledEvent {
 
     fn enclose(&self, motion: &dyn Motion) -> Option<Enclosure> {
         let mut out = [Enclosure::UNKNOWN];
-        self.expression
-            .enclosing
-            .eval(motion, &[], &self.parameters, &mut out);
+        let program = &self.expression.enclosing;
+        self.system
+            .with_values(|p| program.eval(motion, &[], p, &mut out));
         Some(out[0])
     }
 }

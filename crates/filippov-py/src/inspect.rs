@@ -7,7 +7,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
-use crate::systems::{core_of, raised};
+use crate::systems::{core_of, n_visible_of, raised};
 
 type Array<'py> = PyReadonlyArray1<'py, f64>;
 type FieldAndMultipliers<'py> = (Bound<'py, PyArray1<f64>>, Vec<f64>);
@@ -24,11 +24,13 @@ pub fn intersection_field<'py>(
     p: Array<'py>,
     near: Vec<f64>,
 ) -> PyResult<Option<FieldAndMultipliers<'py>>> {
-    let core = core_of(system, &p)?;
     let x = x.as_slice()?;
-    if x.len() != core.n_states() || mode.len() != core.n_surfaces() {
+    let core = core_of(system, &p, t, x)?;
+    let mut mode = mode;
+    if x.len() != core.n_states() || mode.len() != n_visible_of(system, &*core) {
         return Err(PyValueError::new_err("x or mode has a wrong length"));
     }
+    mode.resize(core.n_surfaces(), 1);
     let value = filippov::intersection_field(&*core, t, x, &Mode::new(mode), &near);
     let value = value.map_err(raised)?;
     Ok(value.map(|value| (PyArray1::from_vec(py, value.dx), value.multipliers)))
@@ -46,18 +48,19 @@ pub fn classify<'py>(
     reach: f64,
     kappa: Vec<f64>,
 ) -> PyResult<Option<Bound<'py, PyDict>>> {
-    let core = core_of(system, &p)?;
     let x = x.as_slice()?;
+    let core = core_of(system, &p, t, x)?;
+    let n_visible = n_visible_of(system, &*core);
     if x.len() != core.n_states() {
         return Err(PyValueError::new_err("x has a wrong length"));
     }
     let point = filippov::classify(&*core, t, x, reach, &kappa).map_err(raised)?;
-    point.map(|point| as_dict(py, point)).transpose()
+    point.map(|point| as_dict(py, point, n_visible)).transpose()
 }
 
-fn as_dict(py: Python<'_>, point: Classification) -> PyResult<Bound<'_, PyDict>> {
+fn as_dict(py: Python<'_>, point: Classification, n_visible: usize) -> PyResult<Bound<'_, PyDict>> {
     let dict = PyDict::new(py);
-    let mode = |mode: &Mode| PyTuple::new(py, mode.entries());
+    let mode = |mode: &Mode| PyTuple::new(py, &mode.entries()[..n_visible]);
     dict.set_item("kind", point.kind.name())?;
     dict.set_item("surfaces", PyTuple::new(py, &point.surfaces)?)?;
     dict.set_item("mode", point.mode.as_ref().map(mode).transpose()?)?;

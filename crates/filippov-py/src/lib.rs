@@ -4,6 +4,7 @@ mod builder;
 mod callbacks;
 mod conversion;
 mod inspect;
+mod laws;
 mod run;
 mod solve;
 mod systems;

@@ -34,13 +34,6 @@ type SegmentRow<'py> = (
 
 type WarningRow<'py> = (f64, &'static str, String, Vec<Bound<'py, PyTuple>>);
 
-fn modes<'py>(py: Python<'py>, modes: &[Mode]) -> PyResult<Vec<Bound<'py, PyTuple>>> {
-    modes
-        .iter()
-        .map(|mode| PyTuple::new(py, mode.entries()))
-        .collect()
-}
-
 /// What a run computed.
 #[pyclass(frozen, module = "filippov._core")]
 pub struct Run {
@@ -48,6 +41,8 @@ pub struct Run {
     solution: Mutex<Solution>,
     error: Option<PyErr>,
     is_native: bool,
+    /// The surfaces that a user sees are the first so many.
+    n_visible: usize,
 }
 
 impl Run {
@@ -55,6 +50,7 @@ impl Run {
         system: Arc<dyn PiecewiseSystem + Send + Sync>,
         mut solution: Solution,
         is_native: bool,
+        n_visible: usize,
     ) -> Self {
         let mut error = None;
         if let Stop::FieldRaised(payload) = &mut solution.stop {
@@ -66,6 +62,7 @@ impl Run {
             solution: Mutex::new(solution),
             error,
             is_native,
+            n_visible,
         }
     }
 
@@ -73,13 +70,22 @@ impl Run {
         self.solution.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// A mode as a user sees it.
+    fn mode<'py>(&self, py: Python<'py>, mode: &Mode) -> PyResult<Bound<'py, PyTuple>> {
+        PyTuple::new(py, &mode.entries()[..self.n_visible])
+    }
+
+    fn modes<'py>(&self, py: Python<'py>, modes: &[Mode]) -> PyResult<Vec<Bound<'py, PyTuple>>> {
+        modes.iter().map(|mode| self.mode(py, mode)).collect()
+    }
+
     /// The multiplier vector at a time; NaN for surfaces not slid on.
     fn multiplier_vector(&self, solution: &Solution, t: f64, side: Side) -> PyResult<Vec<f64>> {
-        let mut out = vec![f64::NAN; self.system.n_surfaces()];
+        let mut out = vec![f64::NAN; self.n_visible];
         let values = solution
             .multipliers(&*self.system, t, side)
             .map_err(raised)?;
-        for (j, value) in values {
+        for (j, value) in values.into_iter().filter(|(j, _)| *j < self.n_visible) {
             out[j] = value;
         }
         Ok(out)
@@ -111,15 +117,17 @@ impl Run {
             .switches
             .iter()
             .map(|s| {
+                let visible = s.surfaces.iter().filter(|&&j| j < self.n_visible);
+                let visible: Vec<usize> = visible.copied().collect();
                 Ok((
                     s.t,
                     PyArray1::from_slice(py, &s.y_before),
                     PyArray1::from_slice(py, &s.y_after),
                     s.kind.name(),
-                    PyTuple::new(py, &s.surfaces)?,
-                    PyTuple::new(py, s.mode_before.entries())?,
-                    PyTuple::new(py, s.mode_after.entries())?,
-                    String::new(),
+                    PyTuple::new(py, visible)?,
+                    self.mode(py, &s.mode_before)?,
+                    self.mode(py, &s.mode_after)?,
+                    s.note.clone(),
                 ))
             })
             .collect()
@@ -137,7 +145,7 @@ impl Run {
                 Ok((
                     s.t_start,
                     s.t_end,
-                    PyTuple::new(py, s.mode.entries())?,
+                    self.mode(py, &s.mode)?,
                     s.steps.0,
                     s.steps.1,
                     PyArray1::from_vec(py, start),
@@ -190,9 +198,10 @@ impl Run {
     #[getter]
     fn message(&self) -> String {
         let solution = self.solution();
-        solution.stop.message(solution.t_last, &solution.mode, |j| {
-            self.system.surface_name(j)
-        })
+        let mode = Mode::new(solution.mode.entries()[..self.n_visible].to_vec());
+        solution
+            .stop
+            .message(solution.t_last, &mode, |j| self.system.surface_name(j))
     }
 
     #[getter]
@@ -231,7 +240,7 @@ impl Run {
             .warnings
             .iter()
             .map(|w| {
-                let candidates = modes(py, &w.candidates)?;
+                let candidates = self.modes(py, &w.candidates)?;
                 Ok((w.t, w.code.name(), w.text.clone(), candidates))
             })
             .collect()
@@ -241,7 +250,7 @@ impl Run {
     #[getter]
     fn candidates<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyTuple>>> {
         match &self.solution().stop {
-            Stop::NonUnique { candidates, .. } => modes(py, candidates),
+            Stop::NonUnique { candidates, .. } => self.modes(py, candidates),
             _ => Ok(Vec::new()),
         }
     }
@@ -286,6 +295,6 @@ impl Run {
         for &t in t.as_slice()? {
             out.extend(self.multiplier_vector(&solution, t, Side::Right)?);
         }
-        Ok(columns(py, &out, self.system.n_surfaces()))
+        Ok(columns(py, &out, self.n_visible))
     }
 }

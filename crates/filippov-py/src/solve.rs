@@ -1,18 +1,21 @@
 //! The call of the integrator.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use filippov::action::{Action, ActionMap, Actions, Clock, Trigger};
 use filippov::{
-    solve_interruptible, Method, Mode, NonUnique, Options, SlidingRule, UserEvent, UserFunction,
+    solve_with_actions, Kind, Method, Mode, NonUnique, Options, SlidingRule, TracedMap, UserEvent,
+    UserFunction,
 };
 use numpy::PyReadonlyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::callbacks::{CalledEvent, CompiledEvent};
+use crate::callbacks::{CalledEvent, CalledMap, CompiledEvent};
 use crate::run::Run;
-use crate::systems::{core_of, TracedSystem};
+use crate::systems::{core_of, n_visible_of, raised, CoreSystem, TracedSystem};
 
 /// How often the interpreter is asked for signals and told the progress.
 const POLL_EVERY: Duration = Duration::from_millis(20);
@@ -35,7 +38,7 @@ impl RunOptions {
 
 /// Integrates a system; `filippov.solve_ivp` checks the arguments before.
 #[pyfunction]
-#[pyo3(signature = (system, t0, t1, y0, p, options, events))]
+#[pyo3(signature = (system, t0, t1, y0, p, options, events, actions=Vec::new()))]
 #[allow(clippy::too_many_arguments)]
 pub fn solve(
     py: Python<'_>,
@@ -46,30 +49,55 @@ pub fn solve(
     p: PyReadonlyArray1<'_, f64>,
     options: &RunOptions,
     events: Vec<(Py<PyAny>, f64, u64, String)>,
+    actions: Vec<ActionRow>,
 ) -> PyResult<Run> {
-    let parameters = p.as_slice()?.to_vec();
     let traced = system.cast::<TracedSystem>().ok();
-    let core = core_of(&system, &p)?;
+    let y0 = y0.as_slice()?.to_vec();
+    let mut laws = Vec::new();
+    let mut discrete = Vec::new();
+    let mut compiled = None;
+    let core = match traced {
+        Some(traced) => {
+            let own = Arc::new(traced.get().with(&p)?);
+            discrete = traced.get().laws.start(&own, t0, &y0).map_err(raised)?;
+            laws = traced.get().laws.actions(y0.len(), own.parameters());
+            compiled = Some(Arc::clone(&own));
+            own as CoreSystem
+        }
+        None => core_of(&system, &p, t0, &y0)?,
+    };
+    let n_visible = n_visible_of(&system, &*core);
     let mut functions: Vec<(Box<dyn UserFunction + Send + Sync>, f64, u64)> = Vec::new();
     for (g, direction, terminal, _name) in events {
         let handle: Option<usize> = g.extract(py).ok();
-        let function: Box<dyn UserFunction + Send + Sync> = match (handle, traced) {
-            (Some(handle), Some(traced)) => {
+        let function: Box<dyn UserFunction + Send + Sync> = match (handle, traced, &compiled) {
+            (Some(handle), Some(traced), Some(own)) => {
                 let expression = traced
                     .get()
                     .event_expression(handle)
                     .ok_or_else(|| PyValueError::new_err(format!("no event {handle}")))?;
                 Box::new(CompiledEvent {
                     expression,
-                    parameters: parameters.clone(),
+                    system: Arc::clone(own),
                 })
             }
             _ => Box::new(CalledEvent(g)),
         };
         functions.push((function, direction, terminal));
     }
-    let y0 = y0.as_slice()?.to_vec();
+    let given = read_actions(py, actions, &p)?;
     let RunOptions { options, progress } = options;
+    let mut completed = None;
+    if !options.choices.is_empty() && n_visible < core.n_surfaces() {
+        let options = completed.insert(options.clone());
+        for choice in &mut options.choices {
+            let mut entries = choice.entries().to_vec();
+            entries.resize(core.n_surfaces(), 1);
+            *choice = Mode::new(entries);
+        }
+    }
+    let options = completed.as_ref().unwrap_or(options);
+    let names = traced.map_or_else(Vec::new, |t| t.get().law_names());
     let is_native = traced.is_some_and(|t| t.get().system.is_native());
     let solution = py
         .detach(|| {
@@ -81,6 +109,24 @@ pub fn solve(
                     terminal: *terminal,
                 })
                 .collect();
+            let list = given.iter().map(|(map, trigger, name)| Action {
+                kind: Some(match trigger {
+                    Trigger::Surface { .. } => Kind::Reset,
+                    _ => Kind::Clock,
+                }),
+                trigger: trigger.clone(),
+                map: &**map,
+                name: name.clone(),
+            });
+            // What the user gives comes first: a sample at a tick sees the ramp before it drops.
+            let mut list: Vec<Action> = list.collect();
+            list.extend(laws.iter().map(|law| Action {
+                trigger: law.trigger.clone(),
+                map: &law.map,
+                name: names.get(law.index).cloned().unwrap_or_default(),
+                kind: law.kind,
+            }));
+            let actions = Actions { list, discrete };
             let mut asked = Instant::now();
             let mut interrupt = |t: f64| {
                 if asked.elapsed() < POLL_EVERY {
@@ -92,10 +138,43 @@ pub fn solve(
                     py.check_signals().is_err() || matches!(reported, Some(Err(_)))
                 })
             };
-            solve_interruptible(&*core, (t0, t1), &y0, options, &events, &mut interrupt)
+            let interrupt = &mut interrupt;
+            solve_with_actions(&*core, (t0, t1), &y0, options, &events, &actions, interrupt)
         })
         .map_err(|e| PyValueError::new_err(e.to_string()))?;
-    Ok(Run::new(core, solution, is_native))
+    Ok(Run::new(core, solution, is_native, n_visible))
+}
+
+/// When, numbers that say so, the map (traced, or a callable), and the name of an action.
+type ActionRow = (String, Vec<f64>, Py<PyAny>, String);
+
+type SharedMap = Box<dyn ActionMap + Send + Sync>;
+
+fn read_actions(
+    py: Python<'_>,
+    rows: Vec<ActionRow>,
+    p: &PyReadonlyArray1<'_, f64>,
+) -> PyResult<Vec<(SharedMap, Trigger, String)>> {
+    let read = |(when, numbers, map, name): ActionRow| {
+        let trigger = match (when.as_str(), &numbers[..]) {
+            ("surface", &[index, direction]) => Trigger::Surface {
+                index: index as usize,
+                direction: direction as i8,
+            },
+            ("times", times) => Trigger::Times(times.to_vec()),
+            ("clock", &[period, phase]) => Trigger::Clock {
+                clock: Clock { period, phase },
+                at_start: true,
+            },
+            _ => return Err(PyValueError::new_err(format!("unknown trigger {when:?}"))),
+        };
+        let map: SharedMap = match map.bind(py).cast::<TracedSystem>() {
+            Ok(traced) => Box::new(TracedMap::new(traced.get().with(p)?)),
+            Err(_) => Box::new(CalledMap(map)),
+        };
+        Ok((map, trigger, name))
+    };
+    rows.into_iter().map(read).collect()
 }
 
 fn read_options(given: &Bound<'_, PyDict>) -> PyResult<(Options, Option<Py<PyAny>>)> {

@@ -3,15 +3,16 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use filippov::field::{SlidingField, SmoothField};
-use filippov::{FieldError, PiecewiseSystem};
-use filippov_expr::{Backend, Graph, Names, NodeId};
-use numpy::{PyArray1, PyReadonlyArray1};
+use filippov::{FieldError, Laws, PiecewiseSystem};
+use filippov_expr::{Backend, ExprError, Graph, Names, NodeId};
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::builder::Builder;
 use crate::callbacks::{EventExpression, Opaque, Signed, Surfaces};
+use crate::laws::{read_law, Extra, LawRow};
 
 type Array<'py> = PyReadonlyArray1<'py, f64>;
 type Output<'py> = Bound<'py, PyArray1<f64>>;
@@ -27,10 +28,16 @@ pub fn raised(error: FieldError) -> PyErr {
 /// A system of the core that can be run by threads.
 pub type CoreSystem = Arc<dyn PiecewiseSystem + Send + Sync>;
 
-/// The system of the core behind a Python object, with these parameter values.
-pub fn core_of(system: &Bound<'_, PyAny>, p: &Array<'_>) -> PyResult<CoreSystem> {
+/// The system of the core behind a Python object, with these parameter values and its discrete states as at a start
+/// at (t, x).
+pub fn core_of(
+    system: &Bound<'_, PyAny>,
+    p: &Array<'_>,
+    t: f64,
+    x: &[f64],
+) -> PyResult<CoreSystem> {
     if let Ok(traced) = system.cast::<TracedSystem>() {
-        return Ok(Arc::new(traced.get().with(p)?));
+        return Ok(Arc::new(traced.get().at(p, t, x)?));
     }
     if let Ok(opaque) = system.cast::<OpaqueSystem>() {
         return Ok(Arc::clone(&opaque.get().system) as _);
@@ -41,6 +48,14 @@ pub fn core_of(system: &Bound<'_, PyAny>, p: &Array<'_>) -> PyResult<CoreSystem>
     Err(PyTypeError::new_err(
         "system: a TracedSystem, OpaqueSystem or SignedSystem is needed",
     ))
+}
+
+/// How many of the surfaces of a system a user sees.
+pub fn n_visible_of(system: &Bound<'_, PyAny>, core: &dyn PiecewiseSystem) -> usize {
+    match system.cast::<TracedSystem>() {
+        Ok(traced) => traced.get().n_visible(),
+        Err(_) => core.n_surfaces(),
+    }
 }
 
 fn field_of<'py>(
@@ -118,6 +133,10 @@ fn checked<'a>(
 #[pyclass(frozen, module = "filippov._core")]
 pub struct TracedSystem {
     pub system: filippov::TracedSystem,
+    /// What it has beside the field.
+    extra: Extra,
+    /// The laws of its discrete states, whose number is that of the last parameters' names.
+    pub laws: Arc<Laws>,
     /// Kept for events, which are traced after the system into the same graph.
     builder: Option<Py<Builder>>,
     /// Compiled events with their nodes; the index is the handle.
@@ -129,13 +148,26 @@ impl TracedSystem {
         graph: Graph,
         field: Vec<NodeId>,
         names: Names,
+        extra: Extra,
         builder: Option<Py<Builder>>,
     ) -> PyResult<Self> {
-        let zeros = vec![0.0; names.parameters.len()];
+        let n_laws = extra.laws.len();
+        let zeros = vec![0.0; names.parameters.len().saturating_sub(n_laws)];
+        let refused = |e: ExprError| PyValueError::new_err(e.to_string());
+        let laws = extra
+            .laws
+            .iter()
+            .map(|row| read_law(&graph, row))
+            .collect::<PyResult<Vec<_>>>()?;
+        let laws = Laws::new(&graph, laws).map_err(refused)?;
         let system = filippov::TracedSystem::new(graph, field, zeros, names, Backend::Auto)
-            .map_err(|e| PyValueError::new_err(e.to_string()))?;
+            .map_err(refused)?;
+        let hidden = system.n_surfaces() - extra.n_hidden..system.n_surfaces();
+        let watched: Vec<usize> = extra.watched.iter().copied().chain(hidden).collect();
         Ok(TracedSystem {
-            system,
+            system: system.watching(&watched).with_discrete(n_laws),
+            laws: Arc::new(laws),
+            extra,
             builder,
             events: Mutex::default(),
         })
@@ -150,15 +182,44 @@ impl TracedSystem {
             .map(|(_, program)| Arc::clone(program))
     }
 
-    fn with(&self, p: &Array<'_>) -> PyResult<filippov::TracedSystem> {
+    /// The system with these parameter values.
+    pub fn with(&self, p: &Array<'_>) -> PyResult<filippov::TracedSystem> {
         Ok(self.system.with_parameters(p.as_slice()?.to_vec()))
+    }
+
+    /// The system with these parameter values, its discrete states as at a start at (t, x).
+    pub fn at(&self, p: &Array<'_>, t: f64, x: &[f64]) -> PyResult<filippov::TracedSystem> {
+        let system = self.with(p)?;
+        if x.len() == system.n_states() {
+            self.laws.start(&system, t, x).map_err(raised)?;
+        }
+        Ok(system)
+    }
+
+    /// The names of the discrete states.
+    pub fn law_names(&self) -> Vec<String> {
+        let names = &self.system.names().parameters;
+        names[names.len() - self.extra.laws.len()..].to_vec()
+    }
+
+    /// How many surfaces a user sees: those of the laws come after them.
+    pub fn n_visible(&self) -> usize {
+        self.system.n_surfaces() - self.extra.n_hidden
+    }
+
+    /// Signs for all surfaces from those that a user sees.
+    fn all_signs<'py>(&self, py: Python<'py>, signs: &Array<'py>) -> PyResult<Array<'py>> {
+        let mut all = signs.as_slice()?.to_vec();
+        all.extend(vec![1.0; self.extra.n_hidden]);
+        Ok(PyArray1::from_vec(py, all).readonly())
     }
 }
 
 #[pymethods]
 impl TracedSystem {
     #[new]
-    #[pyo3(signature = (builder, field, n_states, parameters, states=None))]
+    #[pyo3(signature = (builder, field, n_states, parameters, states=None, watched=Vec::new(), laws=Vec::new(), n_hidden=0))]
+    #[allow(clippy::too_many_arguments)]
     fn new(
         py: Python<'_>,
         builder: Py<Builder>,
@@ -166,6 +227,9 @@ impl TracedSystem {
         n_states: usize,
         parameters: Vec<String>,
         states: Option<Vec<String>>,
+        watched: Vec<usize>,
+        laws: Vec<LawRow>,
+        n_hidden: usize,
     ) -> PyResult<Self> {
         if field.len() != n_states {
             let text = format!("{} expressions for {n_states} states", field.len());
@@ -180,7 +244,17 @@ impl TracedSystem {
             states: states.unwrap_or_default(),
             parameters,
         };
-        Self::build(graph, field, names, Some(builder))
+        if n_hidden > graph.n_surfaces() || laws.len() > names.parameters.len() {
+            return Err(PyValueError::new_err(
+                "laws: more than there are surfaces or names",
+            ));
+        }
+        let extra = Extra {
+            watched,
+            laws,
+            n_hidden,
+        };
+        Self::build(graph, field, names, extra, Some(builder))
     }
 
     #[getter]
@@ -190,11 +264,16 @@ impl TracedSystem {
 
     #[getter]
     fn n_surfaces(&self) -> usize {
-        self.system.n_surfaces()
+        self.n_visible()
+    }
+
+    #[getter]
+    fn n_laws(&self) -> usize {
+        self.laws.list().len()
     }
 
     fn surfaces(&self) -> Vec<String> {
-        (0..self.system.n_surfaces())
+        (0..self.n_visible())
             .map(|j| self.system.surface_name(j))
             .collect()
     }
@@ -207,7 +286,8 @@ impl TracedSystem {
         signs: Array<'py>,
         p: Array<'py>,
     ) -> PyResult<Output<'py>> {
-        field_of(py, &self.with(&p)?, t, &x, &signs)
+        let system = self.at(&p, t, x.as_slice()?)?;
+        field_of(py, &system, t, &x, &self.all_signs(py, &signs)?)
     }
 
     fn surface_values<'py>(
@@ -218,7 +298,10 @@ impl TracedSystem {
         signs: Array<'py>,
         p: Array<'py>,
     ) -> PyResult<Output<'py>> {
-        surface_values_of(py, &self.with(&p)?, t, &x, &signs)
+        let system = self.at(&p, t, x.as_slice()?)?;
+        let all = surface_values_of(py, &system, t, &x, &self.all_signs(py, &signs)?)?;
+        let visible = all.readonly().as_slice()?[..self.n_visible()].to_vec();
+        Ok(PyArray1::from_vec(py, visible))
     }
 
     #[allow(clippy::too_many_arguments)]
@@ -231,17 +314,21 @@ impl TracedSystem {
         p: Array<'py>,
         surface: usize,
     ) -> PyResult<(Output<'py>, f64, f64)> {
-        sliding_field_of(py, &self.with(&p)?, t, &x, &signs, surface)
+        let system = self.at(&p, t, x.as_slice()?)?;
+        sliding_field_of(py, &system, t, &x, &self.all_signs(py, &signs)?, surface)
     }
 
     fn active(&self, signs: Array<'_>) -> PyResult<Vec<bool>> {
         let mut active = vec![true; self.system.n_surfaces()];
-        if signs.as_slice()?.len() != active.len() {
+        if signs.as_slice()?.len() != self.n_visible() {
             return Err(PyValueError::new_err(
                 "signs: one entry per surface is needed",
             ));
         }
-        self.system.active(signs.as_slice()?, &[], &mut active);
+        let mut all = signs.as_slice()?.to_vec();
+        all.resize(active.len(), 1.0);
+        self.system.active(&all, &[], &mut active);
+        active.truncate(self.n_visible());
         Ok(active)
     }
 
@@ -276,6 +363,7 @@ impl TracedSystem {
         for node in self.system.field_nodes() {
             write_number(&mut bytes, node.index());
         }
+        self.extra.write(&mut bytes);
         for list in [&names.states, &names.parameters] {
             write_number(&mut bytes, list.len());
             for name in list {
@@ -295,6 +383,7 @@ impl TracedSystem {
         for _ in 0..count {
             field.push(read_number(&mut rest).ok_or_else(damaged)?);
         }
+        let extra = Extra::read(&mut rest).ok_or_else(damaged)?;
         let mut lists = [Vec::new(), Vec::new()];
         for list in &mut lists {
             for _ in 0..read_number(&mut rest).ok_or_else(damaged)? {
@@ -309,26 +398,27 @@ impl TracedSystem {
             .map(|id| Builder::node(&graph, id))
             .collect::<PyResult<Vec<_>>>()?;
         let [states, parameters] = lists;
-        Self::build(graph, field, Names { states, parameters }, None)
+        let names = Names { states, parameters };
+        Self::build(graph, field, names, extra, None)
     }
 }
 
-fn write_number(bytes: &mut Vec<u8>, number: usize) {
+pub fn write_number(bytes: &mut Vec<u8>, number: usize) {
     bytes.extend((number as u32).to_le_bytes());
 }
 
-fn write_block(bytes: &mut Vec<u8>, block: &[u8]) {
+pub fn write_block(bytes: &mut Vec<u8>, block: &[u8]) {
     write_number(bytes, block.len());
     bytes.extend(block);
 }
 
-fn read_number(rest: &mut &[u8]) -> Option<u32> {
+pub fn read_number(rest: &mut &[u8]) -> Option<u32> {
     let (head, tail) = rest.split_first_chunk::<4>()?;
     *rest = tail;
     Some(u32::from_le_bytes(*head))
 }
 
-fn read_block<'a>(rest: &mut &'a [u8]) -> Option<&'a [u8]> {
+pub fn read_block<'a>(rest: &mut &'a [u8]) -> Option<&'a [u8]> {
     let length = read_number(rest)? as usize;
     let (head, tail) = rest.split_at_checked(length)?;
     *rest = tail;
@@ -347,11 +437,13 @@ macro_rules! callable_system {
         #[pymethods]
         impl $name {
             #[new]
-            fn new(fun: Py<PyAny>, surfaces: Vec<Py<PyAny>>, n_states: usize, names: Vec<String>) -> PyResult<Self> {
+            #[pyo3(signature = (fun, surfaces, n_states, names, n_switching=None))]
+            fn new(fun: Py<PyAny>, surfaces: Vec<Py<PyAny>>, n_states: usize, names: Vec<String>, n_switching: Option<usize>) -> PyResult<Self> {
                 if names.len() != surfaces.len() {
                     return Err(PyValueError::new_err("names: one per surface is needed"));
                 }
-                let surfaces = Surfaces { functions: surfaces, names };
+                let n_switching = n_switching.unwrap_or(surfaces.len());
+                let surfaces = Surfaces { functions: surfaces, names, n_switching };
                 Ok($name { system: Arc::new($core { fun, surfaces, n_states }) })
             }
 

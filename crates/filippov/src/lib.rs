@@ -31,6 +31,7 @@
 //! # Ok::<(), filippov::Error>(())
 //! ```
 
+pub mod action;
 mod error;
 pub mod event;
 pub mod field;
@@ -51,12 +52,14 @@ pub use inspect::{
     classify, hidden_dynamics, intersection_field, Classification, HiddenDynamics, HiddenRoot,
     IntersectionValue, PointKind,
 };
-pub use integrate::{solve, solve_interruptible, Integrator, Stats, Stop, Warning, WarningCode};
+pub use integrate::{
+    solve, solve_interruptible, solve_with_actions, Integrator, Stats, Stop, Warning, WarningCode,
+};
 pub use mode::{Mode, Signs};
 pub use options::{Method, NonUnique, Options, SlidingRule};
 pub use solution::{Segment, Side, Solution, Switch, UserZero};
 pub use switching::Kind;
 pub use system::{
-    AffineParts, AffineSigns, BothSides, ClosureSystem, LieValue, PiecewiseSystem, SingularSliding,
-    TracedSystem, Word,
+    AffineParts, AffineSigns, BothSides, ClosureSystem, Law, LawAction, LawMap, Laws, LieValue,
+    PiecewiseSystem, SingularSliding, TracedMap, TracedSystem, Word,
 };

@@ -28,6 +28,8 @@ pub struct Switch {
     pub mode_before: Mode,
     /// Mode after.
     pub mode_after: Mode,
+    /// The name of the action, if it was one.
+    pub note: String,
 }
 
 /// A piece of constant mode.
@@ -41,8 +43,10 @@ pub struct Segment {
     pub mode: Mode,
     /// Index of the first step, and one past the last.
     pub steps: (usize, usize),
-    /// lambda of the surfaces slid on, in their order, at the start.
+    /// lambda of the surfaces slid on, in their order, at the start; NaN for those in contact.
     pub multipliers: Vec<f64>,
+    /// The discrete states.
+    pub discrete: Vec<f64>,
 }
 
 /// A step, or its part up to an event.
@@ -95,6 +99,8 @@ pub struct Solution {
     steps: Vec<Step>,
     coefficients: Vec<f64>,
     y0: Vec<f64>,
+    /// The state at the end, if it jumped there.
+    y_end: Option<Vec<f64>>,
 }
 
 impl Solution {
@@ -125,7 +131,14 @@ impl Solution {
         if !(t >= first.t_start && t <= last.t_end) {
             return Ok(None);
         }
-        if self.steps.is_empty() {
+        match &self.y_end {
+            Some(y_end) if side == Side::Right && t == last.t_end => {
+                y.copy_from_slice(y_end);
+                return Ok(Some(&self.mode));
+            }
+            _ => {}
+        }
+        if self.steps.is_empty() || side == Side::Left && t == first.t_start {
             y.copy_from_slice(&self.y0);
             return Ok((t == first.t_start).then_some(&first.mode));
         }
@@ -147,8 +160,9 @@ impl Solution {
             .segments
             .partition_point(|s| s.steps.1 <= index)
             .min(self.segments.len() - 1);
-        let mode = &self.segments[segment].mode;
+        let Segment { mode, discrete, .. } = &self.segments[segment];
         if mode.codimension() > 0 {
+            system.set_discrete(discrete);
             let set: Vec<usize> = mode.sliding_set().collect();
             Projector::new(n, system.n_surfaces()).project_onto(
                 system,
@@ -173,6 +187,8 @@ pub(crate) struct Recorder {
     coefficients: Vec<f64>,
     segments: Vec<Segment>,
     switches: Vec<Switch>,
+    /// The last jump of the state.
+    jump: Option<(f64, Vec<f64>)>,
 }
 
 impl Recorder {
@@ -187,6 +203,7 @@ impl Recorder {
             coefficients: Vec::new(),
             segments: Vec::new(),
             switches: Vec::new(),
+            jump: None,
         }
     }
 
@@ -201,7 +218,21 @@ impl Recorder {
         self.y.extend_from_slice(y);
     }
 
-    pub fn begin_segment(&mut self, t: f64, mode: &Mode, multipliers: Vec<f64>) {
+    /// The state just recorded has jumped: the limit from the right is kept.
+    pub fn jump(&mut self, y: &[f64]) {
+        let start = self.y.len() - self.n;
+        self.y[start..].copy_from_slice(y);
+        self.jump = self.t.last().map(|&t| (t, y.to_vec()));
+    }
+
+    /// The mode after the switches of this instant, of which `first` is the first.
+    pub fn set_last_mode(&mut self, first: usize, after: &Mode) {
+        if let Some(last) = self.switches[first..].last_mut() {
+            last.mode_after = after.clone();
+        }
+    }
+
+    pub fn begin_segment(&mut self, t: f64, mode: &Mode, multipliers: Vec<f64>, discrete: &[f64]) {
         let step = self.steps.len();
         self.close_segment(t);
         self.segments.push(Segment {
@@ -210,6 +241,7 @@ impl Recorder {
             mode: mode.clone(),
             steps: (step, step),
             multipliers,
+            discrete: discrete.to_vec(),
         });
     }
 
@@ -272,7 +304,9 @@ impl Recorder {
         user_zeros: Vec<Vec<UserZero>>,
     ) -> Solution {
         self.close_segment(t_last);
+        let jump = self.jump.filter(|(t, _)| *t == t_last);
         Solution {
+            y_end: jump.map(|(_, y)| y),
             n_states: self.n,
             t: self.t,
             y: self.y,
@@ -318,6 +352,11 @@ impl Solution {
             return Ok(Vec::new());
         };
         let set: Vec<usize> = mode.sliding_set().collect();
+        let near = self.multipliers_near(t, side);
+        if near.iter().any(|lambda| lambda.is_nan()) {
+            // Contact: the forces depend on the actions of the run.
+            return Ok(set.into_iter().zip(near.iter().copied()).collect());
+        }
         Ok(match set.as_slice() {
             [] => Vec::new(),
             &[j] => {
@@ -326,7 +365,6 @@ impl Solution {
             }
             _ => {
                 // Of several roots that which the motion follows.
-                let near = self.multipliers_near(t, side);
                 let field = IntersectionField::new(system, &set, &mode.signs(), near);
                 let mut field = field.with_rule(self.sliding);
                 field.eval(t, &mut y, &mut vec![0.0; self.n_states])?;

@@ -360,3 +360,29 @@ pub const TAYLOR_LARGEST_ORDER: usize = 24;
 /// A Taylor step that is shorter than this, in units of the rounding of the time, means that the motion comes to a
 /// point where its field has no series.
 pub const TAYLOR_SHORTEST: f64 = 1e4;
+
+/// A tick of a clock counts as at a time within this multiple of the size of both in periods: a few roundings.
+pub const SAME_TICK: f64 = 8.0 * EPS;
+
+/// A map changes a velocity if the derivative is above this fraction of the sizes that make it up: differences
+/// of black boxes have an error of 1e-10.
+pub const NO_IMPULSE: f64 = 1e-8;
+
+/// Actions in one instant at most. A chain of bodies that pass an impulse on needs about the square of their number.
+pub const MOST_ACTIONS_AT_ONE_TIME: usize = 1000;
+
+/// The ratios of the last intervals between impacts agree within this share of their distance to 1: the time of rest
+/// is then known to that share of the time until then.
+pub const IMPACTS_AGREE: f64 = 0.1;
+
+/// Impacts whose flights rise less than this multiple of the rounding of the surface are not resolved.
+pub const UNRESOLVED_FLIGHT: f64 = 64.0;
+
+/// Largest number of surfaces in contact and slid on at once, whose combinations are all looked at.
+pub const MOST_IN_CONTACT: usize = 6;
+
+/// At an exit a multiplier vanishes to this fraction of the largest one: the event is located to better than that.
+pub const VANISHING_MULTIPLIER: f64 = 1e-9;
+
+/// An expression of whole numbers is one itself within this: a few roundings.
+pub const WHOLE_NUMBER: f64 = 1e-12;

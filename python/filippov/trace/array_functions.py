@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from filippov.trace.array import TracedArray, multiply_matrices, plain, where, wrap
-from filippov.trace.explain import CLOCKS, MASK, TABLE, NotTraceable
+from filippov.trace.explain import MASK, TABLE, NotTraceable
 from filippov.trace.scalar import Scalar
 from filippov.trace.ufuncs import ELEMENTS, choose, is_traced
 
@@ -213,6 +213,13 @@ def _count_nonzero(a: Any, axis: Any = None, **kwargs: Any) -> Any:
     return np.sum(wrap(np.asarray(loop(plain(a)), dtype=object)), axis=axis, **kwargs)
 
 
+def _round(a: Any, decimals: int = 0, **kwargs: Any) -> Any:
+    scale = 10.0**decimals
+    if isinstance(a, Scalar):
+        return np.rint(a * scale) / scale
+    return np.rint(wrap(plain(a)) * scale) / scale
+
+
 def _sinc(x: Any) -> Any:
     if isinstance(x, Scalar):
         return np.sin(np.pi * x) / (np.pi * x)
@@ -238,6 +245,8 @@ _FUNCTIONS: dict[Any, Callable[..., Any]] = {
     np.any: _any,
     np.all: _all,
     np.count_nonzero: _count_nonzero,
+    np.round: _round,
+    np.around: _round,
     np.sinc: _sinc,
     **{
         getattr(np, name): _scalar_or_array(name)
@@ -247,8 +256,6 @@ _FUNCTIONS: dict[Any, Callable[..., Any]] = {
 
 _REFUSED: dict[Any, str] = {
     np.interp: TABLE,
-    np.round: CLOCKS,
-    np.around: CLOCKS,
     np.nonzero: MASK,
     np.flatnonzero: MASK,
     np.extract: MASK,

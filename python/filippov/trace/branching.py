@@ -20,6 +20,7 @@ from filippov.trace.array import TracedArray, apply_ufunc
 from filippov.trace.array_functions import apply_function
 from filippov.trace.condition import Comparison, Condition
 from filippov.trace.explain import BLACK_BOX, NotTraceable, UserLine, calling_line
+from filippov.trace.laws import Laws
 from filippov.trace.scalar import Scalar
 
 if TYPE_CHECKING:
@@ -69,6 +70,8 @@ class Tracer:
         Names of the states in messages.
     max_paths : int
         Largest number of combinations of answers.
+    laws : Laws, optional
+        Laws of the trace that this one continues.
     """
 
     apply_ufunc = staticmethod(apply_ufunc)
@@ -83,6 +86,7 @@ class Tracer:
         parameters: dict[str, float],
         states: Sequence[str] | None,
         max_paths: int,
+        laws: Laws | None = None,
     ) -> None:
         self.builder = builder
         self.t0 = t0
@@ -92,6 +96,7 @@ class Tracer:
         self.values = np.array(list(parameters.values()), dtype=float)
         self.states = None if states is None else list(states)
         self.max_paths = max_paths
+        self.laws = Laws(len(parameters)) if laws is None else laws
         self.n_paths = 0
         self.guards: dict[int, Guard] = {}
         self._path: list[tuple[int, float]] = []
@@ -125,7 +130,11 @@ class Tracer:
 
     def text(self, node: int) -> str:
         """Return the printed expression of a node."""
-        return self.builder.text(node, self.states, self.parameters or None)
+        return self.builder.text(node, self.states, self.names() or None)
+
+    def names(self) -> list[str]:
+        """Return the names of the parameters and of the discrete states behind them."""
+        return [*self.parameters, *self.laws.names]
 
     def operand(self, value: Any) -> int | None:
         """Return the node of a number, traced or not; None if `value` is no number."""
@@ -164,7 +173,14 @@ class Tracer:
     def sign(self, node: int) -> int:
         """Return the node of the sign of an expression."""
         known = self.known_sign(node) if self.parameters else None
-        return self.builder.sign(node) if known is None else self.builder.constant(known)
+        if known is not None:
+            return self.builder.constant(known)
+        if self.laws.is_held(self, node):
+            # Whole numbers may be zero for a while, where the sign is 0.
+            sides = [self.builder.sign(self.laws.beside(self, node, side)) for side in (-1.0, 1.0)]
+            both = self.builder.binary("add", *sides)
+            return self.builder.binary("multiply", self.builder.constant(0.5), both)
+        return self.builder.sign(node)
 
     def absolute(self, node: int) -> int:
         """Return the node of the absolute value of an expression."""
@@ -185,6 +201,8 @@ class Tracer:
         """Return the condition ``expression > 0`` (``>= 0`` unless strict); its answer if it is known."""
         known = self.known_sign(node) if self.parameters else None
         if known is None:
+            if self.laws.is_held(self, node):
+                node = self.laws.beside(self, node, -1.0 if strict else 1.0)
             surface, orientation = self.builder.switch(node)
             if surface >= 0:
                 return Comparison(self, surface, orientation)
@@ -193,7 +211,7 @@ class Tracer:
 
     def known_sign(self, node: int) -> float | None:
         """Return the sign of an expression of constants and parameters; None if it depends on the motion."""
-        value = self._known_value(node)
+        value = self.known_value(node)
         if value is None:
             return None
         sign = float(np.sign(value))
@@ -203,15 +221,16 @@ class Tracer:
 
     def known_integer(self, node: int) -> int | None:
         """Return the value of an expression of constants and parameters that is an integer, else None."""
-        value = self._known_value(node)
+        value = self.known_value(node)
         if value is None or value != np.rint(value):
             return None
         self.known_sign(self.builder.binary("subtract", node, self.builder.constant(value)))
         return int(value)
 
-    def _known_value(self, node: int) -> float | None:
+    def known_value(self, node: int) -> float | None:
+        """Return the value of an expression of constants and parameters; None if it changes in a run."""
         constant = self.builder.as_constant(node)
-        if constant is not None or self.builder.depends_on_motion(node):
+        if constant is not None or self.builder.depends_on_motion(node) or self.laws.is_held(self, node):
             return constant
         from filippov._core import TracedSystem
 

@@ -31,10 +31,7 @@ BLACK_BOX = (
     "declare the switching functions yourself, surfaces=[h1, h2, ...] with h(t, x, *args): the function is "
     "then called as it is, as a black box (slower)"
 )
-CLOCKS = (
-    "rounding and remainders jump infinitely often; for a clock in time declare its switching function, for "
-    "example surfaces=[lambda t, x: np.sin(2*np.pi*t/T)]"
-)
+CLOCKS = "rounding towards zero is not traced; write np.floor, np.ceil, np.rint, np.mod or fl.sawtooth(t, T)"
 ZEROS = (
     "make the array with np.zeros_like(x) (or np.zeros(n, dtype=object)), so that it can hold traced values; "
     "np.zeros(n) and np.empty(n) hold only plain numbers"

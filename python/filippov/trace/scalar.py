@@ -229,32 +229,50 @@ class Scalar:
     def __iter__(self) -> NoReturn:
         raise TypeError("a traced number is not iterable")
 
-    def __round__(self, ndigits: int | None = None) -> NoReturn:
-        raise NotTraceable("round(v)", CLOCKS)
+    def __round__(self, ndigits: int | None = None) -> Any:
+        if ndigits:
+            scale = 10.0**ndigits
+            return (self * scale).rint() / scale
+        return self.rint()
 
-    def __floor__(self) -> NoReturn:
-        raise NotTraceable("floor(v)", CLOCKS)
+    def __floor__(self) -> Scalar:
+        return Scalar(self.tracer, self.tracer.laws.floor(self.tracer, self.node))
 
-    def __ceil__(self) -> NoReturn:
-        raise NotTraceable("ceil(v)", CLOCKS)
+    def __ceil__(self) -> Any:
+        return -(-self).__floor__()
 
     def __trunc__(self) -> NoReturn:
         raise NotTraceable("trunc(v)", CLOCKS)
 
-    def __floordiv__(self, other: Any) -> NoReturn:
-        raise NotTraceable("`//` of a traced value", CLOCKS)
+    def floor(self) -> Scalar:
+        """Return the largest whole number that is not above the number."""
+        return self.__floor__()
 
-    __rfloordiv__ = __floordiv__
+    def ceil(self) -> Any:
+        """Return the smallest whole number that is not below the number."""
+        return self.__ceil__()
 
-    def __mod__(self, other: Any) -> NoReturn:
-        raise NotTraceable("`%` of a traced value", CLOCKS)
+    def rint(self) -> Any:
+        """Return the nearest whole number."""
+        return (self + 0.5).floor()
 
-    __rmod__ = __mod__
+    def __floordiv__(self, other: Any) -> Any:
+        return np.floor(self / other)
 
-    def __divmod__(self, other: Any) -> NoReturn:
-        raise NotTraceable("divmod of a traced value", CLOCKS)
+    def __rfloordiv__(self, other: Any) -> Any:
+        return np.floor(other / self)
 
-    __rdivmod__ = __divmod__
+    def __mod__(self, other: Any) -> Any:
+        return self - other * np.floor(self / other)
+
+    def __rmod__(self, other: Any) -> Any:
+        return other - self * np.floor(other / self)
+
+    def __divmod__(self, other: Any) -> tuple[Any, Any]:
+        return self // other, self % other
+
+    def __rdivmod__(self, other: Any) -> tuple[Any, Any]:
+        return other // self, other % self
 
     # --------------------------------------------- methods of a NumPy number
 
@@ -307,7 +325,6 @@ for _name in [
     "log2",
     "rad2deg",
     "radians",
-    "rint",
     "sin",
     "sinh",
     "sqrt",

@@ -15,6 +15,7 @@ from filippov.events import accepted_names
 from filippov.trace.branching import Guard, Tracer
 from filippov.trace.condition import Condition
 from filippov.trace.explain import explain_failure, explain_raise
+from filippov.trace.laws import Laws
 from filippov.trace.reuse import Recent
 from filippov.trace.scalar import Scalar
 from filippov.trace.verify import verify
@@ -50,6 +51,8 @@ class Trace:
         The field, compiled.
     declared : tuple of int
         Index of each surface that was given, in their order.
+    triggers : tuple of (int, float)
+        For each trigger the index of its surface, and the sign by which it differs from that.
     tracer : Tracer
         What `trace_event` needs of the trace.
     events : Recent
@@ -64,6 +67,7 @@ class Trace:
     guards: tuple[Guard, ...]
     system: TracedSystem
     declared: tuple[int, ...]
+    triggers: tuple[tuple[int, float], ...]
     tracer: Tracer
     events: Recent[tuple[int | None]] = member(default_factory=lambda: Recent(32))
 
@@ -75,6 +79,7 @@ def trace(
     args: tuple[Any, ...] = (),
     parameters: Mapping[str, float] | None = None,
     surfaces: Sequence[Callable[..., Any]] | None = None,
+    triggers: Sequence[Callable[..., Any]] = (),
     t0: float,
     y0: NDArray[Any] | None,
     max_paths: int = 256,
@@ -96,6 +101,9 @@ def trace(
     surfaces : sequence of callables, optional
         Switching functions ``h(t, x, *args)``, with the parameters that their signature names. They come
         first, in this order and with their sign.
+    triggers : sequence of callables, optional
+        Functions ``h(t, x, *args)`` that are monitored like surfaces, whether the field switches there or
+        not.
     t0 : float
         Initial time.
     y0 : ndarray, shape (n,), or None
@@ -125,7 +133,7 @@ def trace(
     >>> result.system.surfaces()
     ['x[1]']
     """
-    from filippov._core import Builder, TracedSystem
+    from filippov._core import Builder
 
     start = np.zeros(n) if y0 is None else np.array(y0, dtype=float)
     tracer = Tracer(
@@ -135,7 +143,9 @@ def trace(
         _declare(tracer, surface, args, f"surfaces[{idx}]") for idx, surface in enumerate(surfaces or ())
     )
     field = _explore(tracer, fun, args, "fun", n)
-    system = TracedSystem(tracer.builder, field, n, tracer.parameters, tracer.states)
+    watched = tuple(_watch(tracer, h, args, f"resets[{idx}].h") for idx, h in enumerate(triggers))
+    tracer.laws.complete(tracer)
+    system = _system(tracer, field, [index for index, _ in watched])
     keywords = dict(parameters or {})
     verify(system, lambda t, x: fun(t, x, *args, **keywords), tracer.t0, start, tracer.values)
     return Trace(
@@ -147,6 +157,7 @@ def trace(
         guards=tuple(tracer.guards.values()),
         system=system,
         declared=declared,
+        triggers=watched,
         tracer=tracer,
     )
 
@@ -180,34 +191,53 @@ def trace_event(
         Node of ``g`` in ``traced.builder``. None if `g` cannot be traced, or uses a switching function that
         the field has not: it must then be called as a Python function.
     """
-    from filippov._core import Builder, TracedSystem
+    from filippov._core import Builder
 
     own = traced.tracer
     values = dict(zip(own.parameters, own.values.tolist(), strict=True)) if parameters is None else parameters
     t_start = own.t0 if t0 is None else t0
     start = own.y0 if y0 is None else y0
 
-    def tracer_into(builder: Builder) -> Tracer:
+    def tracer_into(builder: Builder, laws: Laws | None = None) -> Tracer:
+        named = dict(values)
         return Tracer(
-            builder, t_start, start, parameters=dict(values), states=own.states, max_paths=own.max_paths
+            builder, t_start, start, parameters=named, states=own.states, max_paths=own.max_paths, laws=laws
         )
 
     scratch = tracer_into(Builder())
     n = traced.n_states
     try:
         node = _explore(scratch, g, args, "event", None)[0]
-        system = TracedSystem(scratch.builder, [node] * n, n, scratch.parameters, scratch.states)
+        scratch.laws.complete(scratch)
+        system = _system(scratch, [node] * n)
         # Traced apart first: a switching function of its own must not enter the builder of the field.
         if not set(system.surfaces()) <= set(traced.system.surfaces()):
             return None
         keywords = _named(g, dict(values), "event")
         repeated = lambda t, x: [g(t, x, *args, **keywords)] * n  # noqa: E731
         verify(system, repeated, t_start, start, scratch.values, role="event")
-        tracer = tracer_into(traced.builder)
+        tracer = tracer_into(traced.builder, own.laws)
         tracer.guards.update(own.guards)
         return _explore(tracer, g, args, "event", None)[0]
     except (TraceError, ModelError):
         return None
+
+
+def _system(tracer: Tracer, field: list[int], watched: Sequence[int] = ()) -> TracedSystem:
+    """Compile a field of the trace, with its laws."""
+    from filippov._core import TracedSystem
+
+    laws = tracer.laws
+    return TracedSystem(
+        tracer.builder,
+        field,
+        len(field),
+        tracer.names(),
+        tracer.states,
+        list(watched),
+        laws.rows,
+        laws.n_guards,
+    )
 
 
 def _declare(tracer: Tracer, surface: Callable[..., Any], args: tuple[Any, ...], role: str) -> int:
@@ -215,6 +245,15 @@ def _declare(tracer: Tracer, surface: Callable[..., Any], args: tuple[Any, ...],
     if tracer.builder.as_constant(node) is not None:
         raise ModelError(f"{role} is constant: a switching function must depend on t or x")
     return tracer.builder.declare_surface(node)
+
+
+def _watch(tracer: Tracer, h: Callable[..., Any], args: tuple[Any, ...], role: str) -> tuple[int, float]:
+    """Return the surface on which a function switches, known or new, and the sign between them."""
+    node = _explore(tracer, h, args, role, None)[0]
+    surface, orientation = tracer.builder.switch(node)
+    if surface < 0:
+        raise ModelError(f"{role} never changes its sign: nothing would ever be reset")
+    return surface, orientation
 
 
 def _explore(

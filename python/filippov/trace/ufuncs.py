@@ -148,6 +148,21 @@ def _square(a: Any) -> Any:
     return a * a
 
 
+def _floor(a: Any) -> Any:
+    a = _scalar(a)
+    return a.floor() if type(a) is Scalar else float(np.floor(a))
+
+
+def _ceil(a: Any) -> Any:
+    a = _scalar(a)
+    return a.ceil() if type(a) is Scalar else float(np.ceil(a))
+
+
+def _rint(a: Any) -> Any:
+    a = _scalar(a)
+    return a.rint() if type(a) is Scalar else float(np.rint(a))
+
+
 def _scaled(factor: float) -> Element:
     return lambda a: _scalar(a) * factor
 
@@ -198,6 +213,13 @@ ELEMENTS: dict[str, Element] = {
     "radians": _scaled(math.pi / 180.0),
     "rad2deg": _scaled(180.0 / math.pi),
     "degrees": _scaled(180.0 / math.pi),
+    "floor": _floor,
+    "ceil": _ceil,
+    "rint": _rint,
+    "floor_divide": _operator(operator.floordiv),
+    "remainder": _operator(operator.mod),
+    "mod": _operator(operator.mod),
+    "divmod": _operator(divmod),
     "absolute": _operator(abs),
     "fabs": _operator(abs),
     "sign": _sign,
@@ -230,7 +252,7 @@ ELEMENTS: dict[str, Element] = {
 }
 
 REFUSED: dict[str, str] = dict.fromkeys(
-    ["floor", "ceil", "trunc", "rint", "round", "floor_divide", "remainder", "mod", "fmod", "divmod", "modf"],
+    ["trunc", "fmod", "modf"],
     CLOCKS,
 )
 

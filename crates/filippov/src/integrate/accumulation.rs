@@ -52,7 +52,7 @@ impl Integrator<'_> {
         let Some(limit) = accumulate(&returns, self.reach()) else {
             return Ok(None);
         };
-        if limit.time > self.t_end || limit.time <= self.t {
+        if limit.time > self.horizon || limit.time <= self.t {
             return Ok(None);
         }
         let share = limit.ratio / (1.0 - limit.ratio);
@@ -95,7 +95,8 @@ impl Integrator<'_> {
         limit: Limit,
         before: Mode,
     ) -> Result<Option<Stop>, FieldError> {
-        self.recorder.begin_segment(self.t, &before, Vec::new());
+        self.recorder
+            .begin_segment(self.t, &before, Vec::new(), &self.motion.discrete);
         self.motion.mode = before.clone();
         self.move_straight(limit.t, limit.x);
         self.stats.n_switches += 1;
@@ -111,6 +112,7 @@ impl Integrator<'_> {
             surfaces: limit.meeting,
             mode_before: before,
             mode_after: after.clone(),
+            note: String::new(),
         });
         self.begin(after, &left)
     }
@@ -154,7 +156,7 @@ impl Integrator<'_> {
     }
 
     /// From where the limit is known to the tolerance: its error is a multiple of the square of the distance.
-    fn reach(&self) -> f64 {
+    pub(super) fn reach(&self) -> f64 {
         let scales = self
             .x
             .iter()
@@ -172,7 +174,7 @@ fn turn_of(switches: &[Switch]) -> Option<usize> {
     let last = switches.last()?;
     let earlier = switches.iter().rev().skip(1).take(LONGEST_TURN);
     let turn = earlier
-        .take_while(|s| s.kind != Kind::Accumulation)
+        .take_while(|s| !matches!(s.kind, Kind::Accumulation | Kind::Reset | Kind::Clock))
         .position(|s| repeats(s, last))?
         + 1;
     let index = switches.len() - 1;

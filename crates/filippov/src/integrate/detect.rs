@@ -330,7 +330,7 @@ impl Integrator<'_> {
                 // What lies beyond the end of the step may not exist; that is no reason to shorten it.
                 self.detector.uncertain = false;
                 let Some((theta, _)) = zero else { continue };
-                if self.t + theta * dt > self.t_end {
+                if self.t + theta * dt > self.horizon {
                     continue;
                 }
                 // An extrapolation that is not accurate enough still says how far to go.

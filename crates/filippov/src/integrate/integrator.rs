@@ -9,6 +9,10 @@
 //!    the run does so before a switch at the same time.
 //! 4. A switch at the end of the time span is recorded.
 //! 5. A zero that the motion has just left is divided out until the next step end.
+//! 6. Actions at one instant are done in their order, then those that they trigger; where the motion goes on is
+//!    decided after the last one. A known time is the end of a step.
+//!
+//! `docs/theory/order_of_outcomes.md` has all of it, with the tests.
 
 use std::time::Instant;
 
@@ -17,8 +21,10 @@ use rustc_hash::FxHashMap;
 use super::detect::Detector;
 use super::motion::{ModeField, Motion};
 use super::pace::Pace;
+use super::timetable::Timetable;
 use super::user_events::UserEvents;
 use super::{Stats, Stop, Warning};
+use crate::action::Actions;
 use crate::error::{Error, FieldError};
 use crate::event::UserEvent;
 use crate::field::SmoothField;
@@ -41,6 +47,14 @@ pub struct Integrator<'a> {
     pub(super) scale: ErrorScale,
     pub(super) t: f64,
     pub(super) t_end: f64,
+    pub(super) actions: &'a Actions<'a>,
+    pub(super) timetable: Timetable,
+    /// The next known time of an action, or the end: no step goes beyond it.
+    pub(super) horizon: f64,
+    /// How far the point of an event lies off the surfaces that vanish there, by rounding; else empty.
+    pub(super) residuals: Vec<f64>,
+    /// The step that was proposed where the horizon shortened it, else 0.
+    wanted_dt: f64,
     pub(super) x: Vec<f64>,
     pub(super) motion: Motion<'a>,
     pub(super) stepper: Stepper,
@@ -79,8 +93,9 @@ impl<'a> Integrator<'a> {
         y0: &[f64],
         options: &'a Options,
         events: &'a [UserEvent<'a>],
+        actions: &'a Actions<'a>,
     ) -> Result<Self, Error> {
-        super::start::check(system, t_span, y0, options)?;
+        super::start::check(system, t_span, y0, options, actions)?;
         let n = system.n_states();
         let uses_series = match options.method {
             Method::Dopri5 => false,
@@ -95,8 +110,13 @@ impl<'a> Integrator<'a> {
             scale: ErrorScale::new(options.rtol, &options.atol, n),
             t: t_span.0,
             t_end: t_span.1,
+            actions,
+            timetable: Timetable::new(actions, t_span.0),
+            horizon: t_span.1,
+            residuals: Vec::new(),
+            wanted_dt: 0.0,
             x: y0.to_vec(),
-            motion: Motion::new(system, t_span.0, undecided, options.into()),
+            motion: Motion::new(system, t_span.0, undecided, options.into(), actions),
             stepper: Stepper::new(n, taylor),
             controller: Controller::default(),
             dt: f64::NAN,
@@ -165,14 +185,18 @@ impl<'a> Integrator<'a> {
     /// # Errors
     /// If a function of the user raises.
     pub fn step(&mut self) -> Result<Option<Stop>, FieldError> {
-        let remaining = self.t_end - self.t;
+        let remaining = self.horizon - self.t;
         if remaining <= 0.0 {
-            return Ok(Some(Stop::End));
+            return self.reach_horizon();
         }
         self.expand()?;
         let mut dt = self.dt.min(self.options.max_step);
         dt = self.aim_at_surface(dt);
+        self.wanted_dt = 0.0;
         if dt >= remaining * 0.99 {
+            if self.horizon < self.t_end {
+                self.wanted_dt = dt;
+            }
             dt = remaining;
         }
         if dt < SHORTEST_STEP * self.t.abs() && dt < remaining {
@@ -240,14 +264,23 @@ impl<'a> Integrator<'a> {
                 };
                 stepper.attempt(&mut **field, observe, t, x, dt, scale)
             }
+            ModeField::Contact(field) => {
+                let stages = &mut self.detector.stages;
+                let observe = |stage: usize, field: &crate::field::ContactField| {
+                    for (exit, value) in stages.iter_mut().zip(field.exits()) {
+                        exit[stage] = value;
+                    }
+                };
+                stepper.attempt(&mut **field, observe, t, x, dt, scale)
+            }
         }
     }
 
     /// Accepts the step, or its part up to the first event.
     fn advance(&mut self, dt: f64, error: f64) -> Result<Option<Stop>, FieldError> {
         let sliding = !self.motion.sliding().is_empty();
-        let t1 = if dt == self.t_end - self.t {
-            self.t_end
+        let t1 = if dt == self.horizon - self.t {
+            self.horizon
         } else {
             self.t + dt
         };
@@ -263,9 +296,10 @@ impl<'a> Integrator<'a> {
         } else {
             self.t + theta * dt
         };
-        // A switch at the end of the span is there, and not a rounding before.
-        let is_last = t_stop < self.t_end && self.t_end - t_stop < SHORTEST_STEP * self.t_end.abs();
-        let t_stop = if is_last { self.t_end } else { t_stop };
+        // A switch at the end of the span, or at a known time, is there, and not a rounding before.
+        let last = self.horizon;
+        let is_last = t_stop < last && last - t_stop < SHORTEST_STEP * last.abs();
+        let t_stop = if is_last { last } else { t_stop };
         let Some(zeros) = self.find_user_zeros(theta)? else {
             self.count_rejection(sliding);
             self.halve_step(dt);
@@ -277,7 +311,7 @@ impl<'a> Integrator<'a> {
         self.dt = if self.stepper.is_taylor() {
             f64::INFINITY
         } else {
-            dt * self.controller.accept(error)
+            (dt * self.controller.accept(error)).max(self.wanted_dt)
         };
         self.note_jump(dt);
         if let Some(event) = self.record_user_zeros(zeros, theta, t_stop)? {

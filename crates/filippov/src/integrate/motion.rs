@@ -4,9 +4,12 @@ use std::sync::Arc;
 
 use smallvec::SmallVec;
 
+use crate::action::Actions;
 use crate::error::FieldError;
 use crate::event::{Deflation, EventFunction, Monitored};
-use crate::field::{AffineBounds, IntersectionField, RegionField, SlidingField, SmoothField};
+use crate::field::{
+    AffineBounds, ContactField, IntersectionField, RegionField, SlidingField, SmoothField,
+};
 use crate::mode::{Mode, Signs};
 use crate::options::{Options, SlidingRule};
 use crate::system::{MotionJets, PiecewiseSystem};
@@ -16,6 +19,7 @@ pub(super) enum ModeField<'a> {
     Region(RegionField<'a>),
     Sliding(Box<SlidingField<'a>>),
     Intersection(Box<IntersectionField<'a>>),
+    Contact(Box<ContactField<'a>>),
 }
 
 /// How a motion slides where several surfaces meet.
@@ -51,6 +55,12 @@ pub(super) type SlidingSet = SmallVec<[usize; 4]>;
 pub(super) type Exits = SmallVec<[f64; 6]>;
 
 impl<'a> ModeField<'a> {
+    /// The field of a mode without contact.
+    pub fn of(system: &'a dyn PiecewiseSystem, law: Law<'a>, mode: &Mode) -> Self {
+        let sliding: SlidingSet = mode.sliding_set().collect();
+        ModeField::new(system, law, &sliding, &mode.signs())
+    }
+
     fn new(
         system: &'a dyn PiecewiseSystem,
         law: Law<'a>,
@@ -74,6 +84,7 @@ impl<'a> ModeField<'a> {
             ModeField::Region(_) => 0,
             ModeField::Sliding(_) => 2,
             ModeField::Intersection(field) => field.n_exits(),
+            ModeField::Contact(field) => field.n_exits(),
         }
     }
 
@@ -83,6 +94,7 @@ impl<'a> ModeField<'a> {
             ModeField::Region(_) => Exits::new(),
             ModeField::Sliding(field) => field.last().exits(),
             ModeField::Intersection(field) => Exits::from_slice(field.exits()),
+            ModeField::Contact(field) => field.exits().collect(),
         }
     }
 
@@ -93,9 +105,9 @@ impl<'a> ModeField<'a> {
             ModeField::Sliding(field) => {
                 field.normal_components(t, x)?;
             }
-            ModeField::Intersection(field) => {
+            ModeField::Intersection(_) | ModeField::Contact(_) => {
                 let mut rates = vec![0.0; x.len()];
-                field.eval(t, x, &mut rates)?;
+                self.eval(t, x, &mut rates)?;
             }
         }
         Ok(self.last_exits())
@@ -107,6 +119,7 @@ impl<'a> ModeField<'a> {
             ModeField::Region(_) => Ok(()),
             ModeField::Sliding(field) => field.project(t, x),
             ModeField::Intersection(field) => field.project(t, x),
+            ModeField::Contact(field) => field.project(t, x),
         }
     }
 
@@ -127,6 +140,7 @@ impl SmoothField for ModeField<'_> {
             ModeField::Region(field) => field.eval(t, x, dx),
             ModeField::Sliding(field) => field.eval(t, x, dx),
             ModeField::Intersection(field) => field.eval(t, x, dx),
+            ModeField::Contact(field) => field.eval(t, x, dx),
         }
     }
 
@@ -135,6 +149,7 @@ impl SmoothField for ModeField<'_> {
             ModeField::Region(field) => field.n_evaluations(),
             ModeField::Sliding(field) => field.n_evaluations(),
             ModeField::Intersection(field) => field.n_evaluations(),
+            ModeField::Contact(field) => field.n_evaluations(),
         }
     }
 }
@@ -160,11 +175,20 @@ pub(super) struct Motion<'a> {
     /// Its Taylor series, if it is integrated by them.
     pub jets: Option<Arc<MotionJets>>,
     law: Law<'a>,
+    actions: &'a Actions<'a>,
+    /// The discrete states.
+    pub discrete: Vec<f64>,
 }
 
 impl<'a> Motion<'a> {
     /// The motion in `mode` from `t_start`.
-    pub fn new(system: &'a dyn PiecewiseSystem, t_start: f64, mode: Mode, law: Law<'a>) -> Self {
+    pub fn new(
+        system: &'a dyn PiecewiseSystem,
+        t_start: f64,
+        mode: Mode,
+        law: Law<'a>,
+        actions: &'a Actions<'a>,
+    ) -> Self {
         let (signs, sliding): (_, SlidingSet) = (mode.signs(), mode.sliding_set().collect());
         let mut motion = Motion {
             t_start,
@@ -177,6 +201,8 @@ impl<'a> Motion<'a> {
             monitored: Vec::new(),
             jets: None,
             law,
+            actions,
+            discrete: actions.discrete.clone(),
             signs,
             mode,
         };
@@ -193,7 +219,14 @@ impl<'a> Motion<'a> {
         deflations: &[(EventFunction, Deflation)],
     ) {
         let (signs, sliding): (_, SlidingSet) = (mode.signs(), mode.sliding_set().collect());
-        if !self.field.restart(&sliding, &signs) {
+        let contact = if self.actions.list.is_empty() || sliding.is_empty() {
+            None
+        } else {
+            ContactField::new(system, self.actions, &mode, &self.discrete)
+        };
+        if let Some(contact) = contact {
+            self.replace_field(ModeField::Contact(Box::new(contact)));
+        } else if !self.field.restart(&sliding, &signs) {
             let known = self
                 .idle
                 .iter_mut()
@@ -202,12 +235,20 @@ impl<'a> Motion<'a> {
                 Some(index) => self.idle.swap_remove(index),
                 None => ModeField::new(system, self.law, &sliding, &signs),
             };
-            self.idle.push(std::mem::replace(&mut self.field, field));
+            self.replace_field(field);
         }
         self.affine_bounds = None;
         self.is_straight = sliding.iter().all(|&j| system.is_affine(j));
         (self.mode, self.t_start, self.signs, self.sliding) = (mode, t_start, signs, sliding);
         self.find_monitored(system, deflations);
+    }
+
+    /// Takes another field and keeps the one before, if it can be used again.
+    fn replace_field(&mut self, field: ModeField<'a>) {
+        let before = std::mem::replace(&mut self.field, field);
+        if matches!(before, ModeField::Region(_) | ModeField::Sliding(_)) {
+            self.idle.push(before);
+        }
     }
 
     fn find_monitored(
@@ -235,9 +276,10 @@ impl<'a> Motion<'a> {
         self.monitored.extend(
             surfaces.map(|j| monitor(EventFunction::Surface(j), signs[j], system.is_affine(j))),
         );
-        let exits = (0..self.field.n_exits()).map(|index| match (sliding.len(), index) {
-            (1, 0) => EventFunction::ExitMinus,
-            (1, _) => EventFunction::ExitPlus,
+        let one = matches!(self.field, ModeField::Sliding(_));
+        let exits = (0..self.field.n_exits()).map(|index| match (one, index) {
+            (true, 0) => EventFunction::ExitMinus,
+            (true, _) => EventFunction::ExitPlus,
             _ => EventFunction::Exit(index),
         });
         self.monitored
@@ -256,6 +298,11 @@ impl<'a> Motion<'a> {
         }
     }
 
+    /// Is the motion in contact at some surface?
+    pub fn is_in_contact(&self) -> bool {
+        matches!(self.field, ModeField::Contact(_))
+    }
+
     /// Bounds of the multipliers, if there are any.
     pub fn affine_bounds(&self) -> Option<&AffineBounds> {
         self.affine_bounds.as_ref()?.as_ref()
@@ -272,6 +319,7 @@ impl<'a> Motion<'a> {
             ModeField::Region(_) => Vec::new(),
             ModeField::Sliding(field) => vec![field.last().multiplier()],
             ModeField::Intersection(field) => field.multipliers().to_vec(),
+            ModeField::Contact(field) => field.lambdas(),
         }
     }
 

@@ -12,14 +12,14 @@ impl Integrator<'_> {
     /// The motion that starts takes Taylor steps if the run may and the motion has series.
     pub(super) fn choose_stepper(&mut self) {
         self.motion.jets = match &self.stepper.taylor {
-            Some(taylor) => {
+            Some(taylor) if !self.motion.is_in_contact() => {
                 let jets = self
                     .system
                     .motion_jets(&self.motion.sliding, taylor.order());
                 let is_auto = self.options.method == Method::Auto;
                 jets.filter(|jets| !is_auto || jets.is_unrolled())
             }
-            None => None,
+            _ => None,
         };
         self.stepper.use_taylor(self.motion.jets.is_some());
         if self.motion.jets.is_none() {
@@ -39,7 +39,7 @@ impl Integrator<'_> {
         let (t, mode) = (self.t, &self.motion.mode);
         let text = format!(
             "the motion in mode {mode} from t = {t:.10} has no Taylor series (its field is not analytic there, is \
-             not traced, or slides on several surfaces): DOPRI5 integrates it"
+             not traced, slides on several surfaces, or is in contact): DOPRI5 integrates it"
         );
         self.warnings.push(Warning {
             t,

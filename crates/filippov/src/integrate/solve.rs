@@ -1,6 +1,7 @@
 //! Runs from start to end.
 
 use super::{Integrator, Stop};
+use crate::action::Actions;
 use crate::error::Error;
 use crate::event::UserEvent;
 use crate::options::Options;
@@ -35,7 +36,64 @@ pub fn solve_interruptible(
     events: &[UserEvent],
     interrupt: &mut dyn FnMut(f64) -> bool,
 ) -> Result<Solution, Error> {
-    let mut integrator = Integrator::new(system, t_span, y0, options, events)?;
+    solve_with_actions(
+        system,
+        t_span,
+        y0,
+        options,
+        events,
+        &Actions::none(),
+        interrupt,
+    )
+}
+
+/// As [`solve_interruptible`], with actions that change the state in instants.
+///
+/// # Example
+///
+/// A ball that falls on a table, and loses half of its speed at each impact, comes to rest.
+///
+/// ```
+/// use filippov::action::{Action, Actions, Trigger};
+/// use filippov::{solve_with_actions, ClosureSystem, Kind, Options};
+///
+/// let ball = ClosureSystem::new(
+///     2,
+///     1,
+///     |_, x, _, dx| (dx[0], dx[1]) = (x[1], -9.81),
+///     |_, x, h| h[0] = x[0],
+/// );
+/// let ball = ball.with_smooth_surfaces(&[0]);
+/// let bounce = |_t: f64, x: &mut [f64], _q: &mut [f64]| x[1] *= -0.5;
+/// let impact = Action {
+///     trigger: Trigger::Surface { index: 0, direction: -1 },
+///     map: &bounce,
+///     name: "impact".into(),
+///     kind: Some(Kind::Reset),
+/// };
+/// let actions = Actions { list: vec![impact], discrete: Vec::new() };
+/// let options = Options::default();
+/// let solution =
+///     solve_with_actions(&ball, (0.0, 5.0), &[1.0, 0.0], &options, &[], &actions, &mut |_| false)?;
+/// let rest = solution.switches.last().expect("the impacts accumulate");
+/// assert_eq!(rest.kind, Kind::Accumulation);
+/// assert!((rest.t - 3.0 * (2.0_f64 / 9.81).sqrt()).abs() < 1e-9);
+/// assert_eq!(solution.mode.entries(), [0]);
+/// # Ok::<(), filippov::Error>(())
+/// ```
+///
+/// # Errors
+/// As [`solve`].
+pub fn solve_with_actions(
+    system: &dyn PiecewiseSystem,
+    t_span: (f64, f64),
+    y0: &[f64],
+    options: &Options,
+    events: &[UserEvent],
+    actions: &Actions,
+    interrupt: &mut dyn FnMut(f64) -> bool,
+) -> Result<Solution, Error> {
+    let mut integrator = Integrator::new(system, t_span, y0, options, events, actions)?;
     let stop = match integrator.run(interrupt) {
         Ok(stop) => stop,
         Err(raised) => Stop::FieldRaised(raised),

@@ -1,14 +1,11 @@
 //! Where a run starts: arguments checked, the mode of the initial state found.
 
 use super::integrator::Integrator;
-use super::transition::{Decided, Lefts};
 use super::Stop;
+use crate::action::{Actions, Trigger};
 use crate::error::{Error, FieldError};
-use crate::mode::Mode;
 use crate::options::Options;
-use crate::switching::{decide, Arrival};
-use crate::system::{surfaces_that_matter, PiecewiseSystem};
-use crate::tolerances::SURFACE_NOISE;
+use crate::system::PiecewiseSystem;
 
 /// Checks the arguments of a run.
 pub(super) fn check(
@@ -16,6 +13,7 @@ pub(super) fn check(
     (t0, t1): (f64, f64),
     y0: &[f64],
     options: &Options,
+    actions: &Actions,
 ) -> Result<(), Error> {
     let n = system.n_states();
     if y0.len() != n {
@@ -68,6 +66,27 @@ pub(super) fn check(
         options.max_step > 0.0,
         "must be positive",
     )?;
+    for action in &actions.list {
+        if let Trigger::Clock { clock, .. } = action.trigger {
+            let is_clock = clock.period > 0.0 && clock.period.is_finite();
+            require("period", clock.period, is_clock, "must be positive")?;
+            require(
+                "phase",
+                clock.phase,
+                clock.phase.is_finite(),
+                "must be finite",
+            )?;
+        }
+        if let Trigger::Surface { index, .. } = action.trigger {
+            if index >= system.n_surfaces() {
+                return Err(Error::OutOfRange {
+                    name: "actions",
+                    value: index as f64,
+                    requirement: "must be the index of a surface",
+                });
+            }
+        }
+    }
     if let Some(first) = options.first_step {
         require(
             "first_step",
@@ -83,49 +102,13 @@ impl Integrator<'_> {
     /// Finds the mode of the initial state and starts the motion.
     pub(super) fn start(&mut self) -> Result<Option<Stop>, FieldError> {
         self.recorder.start(self.t, &self.x);
-        let d = self.system.n_surfaces();
-        let mut mode = Mode::new(vec![1; d]);
-        // Switching functions may contain signs of others: repeat until nothing changes.
-        let mut on_surface = vec![false; d];
-        for _ in 0..=d {
-            let before = mode.clone();
-            let signs = mode.signs();
-            let h = self.surface_values(&signs)?;
-            if h.iter().any(|h| h.is_nan()) {
-                return Ok(Some(Stop::NotFinite));
-            }
-            for j in 0..d {
-                let size = self.system.surface_size(j, self.t, &self.x, &signs)?;
-                let noise = SURFACE_NOISE * size;
-                on_surface[j] = h[j].abs() <= noise;
-                let entry = if h[j] < 0.0 { -1 } else { 1 };
-                mode.set(j, entry);
-            }
-            if mode == before {
-                break;
-            }
+        if !self.actions.list.is_empty() {
+            return self.start_with_actions();
         }
-        // An inactive surface has the sign of the side that it moves to.
-        let zeros = (0..d).filter(|&j| on_surface[j]).collect();
-        let meeting = surfaces_that_matter(self.system, &mode, zeros);
-        let (mode, left) = match meeting.as_slice() {
-            [] => (mode, Lefts::new()),
-            [j] => match self.start_on_surface(&mode, *j)? {
-                Ok(placed) => placed,
-                Err(stop) => return Ok(Some(stop)),
-            },
-            _ => match self.decide_at_start(&mode, &meeting)? {
-                Ok(placed) => placed,
-                Err(stop) => return Ok(Some(stop)),
-            },
+        let (mode, left) = match self.place(None)? {
+            Ok(placed) => placed,
+            Err(stop) => return Ok(Some(stop)),
         };
         self.begin(mode, &left)
-    }
-
-    /// The mode of a start on one surface, or the reason to stop.
-    fn start_on_surface(&mut self, mode: &Mode, j: usize) -> Result<Decided, FieldError> {
-        let signs = mode.signs();
-        let decision = decide(self.system, j, Arrival::Start, self.t, &self.x, &signs)?;
-        Ok(self.follow_at_surface(mode, j, decision))
     }
 }

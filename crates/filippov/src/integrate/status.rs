@@ -28,6 +28,21 @@ pub enum Stop {
         /// The surfaces they happen on.
         surfaces: Vec<usize>,
     },
+    /// Actions trigger one another without end in one instant.
+    ActionsDoNotEnd {
+        /// Their names.
+        actions: Vec<String>,
+    },
+    /// The map of an action gave a state that is not finite.
+    ActionNotFinite {
+        /// Its name.
+        action: String,
+    },
+    /// Bodies touch, and no combination of contact and separation has admissible forces.
+    Contact {
+        /// The surfaces.
+        surfaces: Vec<usize>,
+    },
     /// The field, or a switching function, is not finite.
     NotFinite,
     /// A function of the user raised.
@@ -77,6 +92,9 @@ impl Stop {
             Stop::Interrupted => "interrupted",
             Stop::StepTooSmall => "step_too_small",
             Stop::NoProgress { .. } => "no_progress",
+            Stop::ActionsDoNotEnd { .. } => "resets_do_not_end",
+            Stop::ActionNotFinite { .. } => "reset_not_finite",
+            Stop::Contact { .. } => "contact",
             Stop::NotFinite => "field_not_finite",
             Stop::FieldRaised(_) => "field_raised",
             Stop::Intersection { .. } => "intersection",
@@ -121,6 +139,19 @@ impl Stop {
             Stop::NoProgress { surfaces } => format!(
                 "Stopped at t = {t:.10} in mode ({mode}): switches at {} follow one another without any progress of \
                  time. They accumulate here, or the field on one side is not defined up to its surface.",
+                names(surfaces)
+            ),
+            Stop::ActionsDoNotEnd { actions } => format!(
+                "Stopped at t = {t:.10} in mode ({mode}): resets trigger one another without end in one instant: {}. \
+                 Look at where their maps lead.",
+                actions.join(", ")
+            ),
+            Stop::ActionNotFinite { action } => format!(
+                "Stopped at t = {t:.10} in mode ({mode}): the map of the reset {action} gave NaN or infinity."
+            ),
+            Stop::Contact { surfaces } => format!(
+                "Stopped at t = {t:.10} in mode ({mode}): bodies touch at {}, and no combination of contact and \
+                 separation has forces that push. The reset may not act in the direction of the surface.",
                 names(surfaces)
             ),
             Stop::NotFinite => format!(

@@ -115,6 +115,11 @@ impl Integrator<'_> {
         }
         let signs = self.motion.signs.clone();
         let h = self.surface_values(&signs)?;
+        if !self.actions.list.is_empty() {
+            if let Some(done) = self.act_at_event(event, &h)? {
+                return Ok(done);
+            }
+        }
         let mut mode = self.motion.mode.clone();
         for (j, h) in h.iter().enumerate() {
             if !self.motion.active[j] && *h != 0.0 {
@@ -166,7 +171,7 @@ impl Integrator<'_> {
 
     /// Surfaces that vanish at the event: those that were located, and all others that matter, are
     /// not being left tangentially and lie within rounding of zero.
-    fn vanishing_surfaces(
+    pub(super) fn vanishing_surfaces(
         &mut self,
         event: &Found,
         h: &[f64],
@@ -251,6 +256,7 @@ impl Integrator<'_> {
             surfaces,
             mode_before: before,
             mode_after: after,
+            note: String::new(),
         });
     }
 
@@ -284,8 +290,12 @@ impl Integrator<'_> {
             }
         }
         let multipliers = self.motion.multipliers();
-        self.recorder
-            .begin_segment(self.t, &self.motion.mode, multipliers);
+        self.recorder.begin_segment(
+            self.t,
+            &self.motion.mode,
+            multipliers,
+            &self.motion.discrete,
+        );
         if let Some(stop) = self.refusal() {
             return Ok(Some(stop));
         }

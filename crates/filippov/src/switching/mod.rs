@@ -65,6 +65,10 @@ pub enum Kind {
     Grazing,
     /// Infinitely many switches in finite time, up to their limit.
     Accumulation,
+    /// An action at a surface.
+    Reset,
+    /// An action at a known time.
+    Clock,
 }
 
 impl Kind {
@@ -77,6 +81,8 @@ impl Kind {
             Kind::SwitchSliding => "switch_sliding",
             Kind::Grazing => "grazing",
             Kind::Accumulation => "accumulation",
+            Kind::Reset => "reset",
+            Kind::Clock => "clock",
         }
     }
 

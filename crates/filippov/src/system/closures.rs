@@ -1,6 +1,6 @@
 //! A system given by Rust closures.
 
-use super::{dot, dot_magnitude, AffineSigns, LieValue, PiecewiseSystem, Word};
+use super::{dot, dot_magnitude, AffineSigns, LieValue, PiecewiseSystem, RatePartials, Word};
 use crate::error::FieldError;
 use crate::tolerances::EPS;
 
@@ -28,6 +28,8 @@ pub struct ClosureSystem<F, H> {
     field: F,
     surfaces: H,
     is_affine_in_signs: bool,
+    /// Surfaces that trigger actions and switch nothing.
+    smooth: Vec<usize>,
 }
 
 impl<F, H> ClosureSystem<F, H>
@@ -44,7 +46,15 @@ where
             field,
             surfaces,
             is_affine_in_signs: false,
+            smooth: Vec::new(),
         }
+    }
+
+    /// Declares that the field does not depend on the signs of these surfaces: they trigger actions.
+    #[must_use]
+    pub fn with_smooth_surfaces(mut self, surfaces: &[usize]) -> Self {
+        self.smooth = surfaces.to_vec();
+        self
     }
 
     /// Declares that the field is affine in the signs, f = a(t, x) + B(t, x) s, and that the gradients of the
@@ -79,6 +89,10 @@ where
         Ok(())
     }
 
+    fn switches_at(&self, j: usize) -> bool {
+        !self.smooth.contains(&j)
+    }
+
     fn affine_signs(&self) -> Option<&dyn AffineSigns> {
         if self.is_affine_in_signs {
             Some(self)
@@ -93,6 +107,41 @@ where
     F: Fn(f64, &[f64], &[f64], &mut [f64]) + Sync,
     H: Fn(f64, &[f64], &mut [f64]) + Sync,
 {
+}
+
+/// The gradient of L_f h_j by central differences.
+pub(super) fn rate_gradient_by_differences<S: PiecewiseSystem + ?Sized>(
+    system: &S,
+    j: usize,
+    t: f64,
+    x: &[f64],
+    signs: &[f64],
+    gradient: &mut [f64],
+) -> Result<RatePartials, FieldError> {
+    let side = if signs[j] < 0.0 { -1 } else { 1 };
+    let at = |t: f64, x: &[f64]| system.lie_derivative(j, j, &[side], t, x, signs);
+    let LieValue {
+        value: rate,
+        magnitude,
+    } = at(t, x)?;
+    let mut moved = x.to_vec();
+    for (i, out) in gradient.iter_mut().enumerate() {
+        let d = EPS.cbrt() * (1.0 + x[i].abs());
+        let (up, down) = (x[i] + d, x[i] - d);
+        moved[i] = up;
+        let above = at(t, &moved)?.value;
+        moved[i] = down;
+        let below = at(t, &moved)?.value;
+        moved[i] = x[i];
+        *out = (above - below) / (up - down);
+    }
+    let d = EPS.cbrt() * (1.0 + t.abs());
+    let time = (at(t + d, x)?.value - at(t - d, x)?.value) / (2.0 * d);
+    Ok(RatePartials {
+        rate,
+        magnitude,
+        time,
+    })
 }
 
 /// Lie derivatives by differences: order one from the gradient, each further order by a difference

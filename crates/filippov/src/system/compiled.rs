@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use filippov_expr::{
-    Backend, EnclosureProgram, ExprError, Gradient, Graph, Names, NodeId, Program,
+    Backend, BinaryOp, EnclosureProgram, ExprError, Gradient, Graph, Names, NodeId, Program,
 };
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
@@ -39,9 +39,14 @@ pub(super) struct Model {
     both_sides: Vec<OnceLock<TieredProgram>>,
     enclosed_surfaces: Vec<OnceLock<Option<EnclosureProgram>>>,
     enclosed_components: Vec<OnceLock<Option<EnclosureProgram>>>,
+    rate_gradients: Vec<OnceLock<TieredProgram>>,
     lie: Mutex<LieCache>,
     /// Taylor coefficients of the motions met so far, by surfaces slid on and order.
     jets: Mutex<FxHashMap<JetsKey, Option<Arc<MotionJets>>>>,
+    /// Surfaces that are monitored in every mode.
+    watched: Vec<usize>,
+    /// Surfaces whose sign something depends on: the field, or another surface that matters.
+    switching: OnceLock<Vec<bool>>,
     /// Active surfaces of the modes met so far; a zero entry is the surface slid on.
     activity: Mutex<FxHashMap<SmallVec<[i8; 16]>, Vec<bool>>>,
 }
@@ -95,6 +100,9 @@ impl Model {
             both_sides: surfaces.iter().map(|_| OnceLock::new()).collect(),
             enclosed_surfaces: surfaces.iter().map(|_| OnceLock::new()).collect(),
             enclosed_components: surfaces.iter().map(|_| OnceLock::new()).collect(),
+            rate_gradients: surfaces.iter().map(|_| OnceLock::new()).collect(),
+            watched: Vec::new(),
+            switching: OnceLock::new(),
             lie: Mutex::new(LieCache::default()),
             jets: Mutex::default(),
             activity: Mutex::default(),
@@ -107,6 +115,50 @@ impl Model {
             names,
             backend,
         })
+    }
+
+    /// Monitors these surfaces in every mode.
+    pub fn watch(&mut self, surfaces: &[usize]) {
+        self.watched = surfaces.to_vec();
+    }
+
+    /// Does anything but the trigger of an action depend on the sign of surface `j`?
+    pub fn switches_at(&self, j: usize) -> bool {
+        // No sign is given: both branches of every choice count.
+        self.switching.get_or_init(|| {
+            let mut depends = self.depend_on(&[], Vec::new());
+            for &watched in &self.watched {
+                let others = self
+                    .graph
+                    .sign_dependencies(&[self.graph.surface(watched as u32)], &[]);
+                depends.iter_mut().zip(others).for_each(|(d, o)| *d |= o);
+            }
+            depends
+        })[j]
+    }
+
+    /// L_f h_j, its derivative in t, the size of its terms, then its derivatives in the states.
+    pub fn rate_gradient(&self, j: usize) -> &Program {
+        let made = self.rate_gradients[j].get_or_init(|| {
+            let mut graph = self.graph.clone();
+            let h = graph.surface(j as u32);
+            let Gradient { time, states } = graph.gradient(h);
+            let (mut rate, mut magnitude) = (time, time);
+            for (i, partial) in states {
+                let term = graph.mul(partial, self.field[i as usize]);
+                rate = graph.add(rate, term);
+                magnitude = graph.binary(BinaryOp::Hypot, magnitude, term);
+            }
+            let Gradient { time, states } = graph.gradient(rate);
+            let zero = graph.constant(0.0);
+            let mut outputs = vec![zero; 3 + self.n_states];
+            (outputs[0], outputs[1], outputs[2]) = (rate, time, magnitude);
+            states
+                .iter()
+                .for_each(|(i, partial)| outputs[3 + *i as usize] = *partial);
+            TieredProgram::new(graph, outputs, self.backend)
+        });
+        made.program()
     }
 
     /// h_j, then their rates along the input vector.
@@ -262,8 +314,17 @@ impl Model {
 
     /// The surfaces that matter for one sign pattern.
     fn active_at(&self, signs: &[f64]) -> Vec<bool> {
-        let mut active = vec![false; signs.len()];
+        self.depend_on(signs, self.watched.clone())
+    }
+
+    /// The surfaces on which the field depends, or one of `also`, or one found so.
+    fn depend_on(&self, signs: &[f64], also: Vec<usize>) -> Vec<bool> {
+        let mut active = vec![false; self.affine.len()];
         let mut outputs = self.field.clone();
+        for j in also {
+            active[j] = true;
+            outputs.push(self.graph.surface(j as u32));
+        }
         loop {
             let found = self.graph.sign_dependencies(&outputs, signs);
             let fresh: Vec<usize> = (0..found.len())

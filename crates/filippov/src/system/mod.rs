@@ -10,7 +10,10 @@ mod affine_model;
 mod both_sides;
 mod closures;
 mod compiled;
+mod discrete;
 mod jets;
+mod laws;
+mod map;
 mod tiered;
 mod traced;
 
@@ -19,6 +22,8 @@ pub use affine::{AffineParts, AffineSigns, SingularSliding};
 pub use both_sides::BothSides;
 pub use closures::ClosureSystem;
 pub use jets::MotionJets;
+pub use laws::{Law, LawAction, LawMap, Laws};
+pub use map::TracedMap;
 pub use traced::TracedSystem;
 
 use std::sync::Arc;
@@ -35,6 +40,17 @@ pub struct LieValue {
     pub value: f64,
     /// Sum of the absolute values of the terms; `value` counts as zero far below it.
     pub magnitude: f64,
+}
+
+/// The rate of a switching function along a field, with what it depends on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RatePartials {
+    /// L_f h.
+    pub rate: f64,
+    /// The size of its terms; `rate` counts as zero far below it.
+    pub magnitude: f64,
+    /// Its derivative in t.
+    pub time: f64,
 }
 
 /// Which sides a step of differentiation takes: +1 for f+, -1 for f- of the surface concerned.
@@ -271,6 +287,35 @@ pub trait PiecewiseSystem: Sync {
             Some(_) => surfaces.iter().map(|&j| vec![j]).collect(),
             None => vec![surfaces.to_vec()],
         }
+    }
+
+    /// Does the field, or a switching function, depend on the sign of h_j? If not, h_j only triggers actions, and
+    /// motion that stays on it is contact.
+    fn switches_at(&self, j: usize) -> bool {
+        let _ = j;
+        true
+    }
+
+    /// Writes the gradient in x of the rate L_f h_j along the field with these signs; by central differences
+    /// unless overridden.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    fn rate_gradient(
+        &self,
+        j: usize,
+        t: f64,
+        x: &[f64],
+        signs: &[f64],
+        gradient: &mut [f64],
+    ) -> Result<RatePartials, FieldError> {
+        closures::rate_gradient_by_differences(self, j, t, x, signs, gradient)
+    }
+
+    /// Gives the discrete states, which the functions read from now on, new values. Called between evaluations,
+    /// by one run at a time.
+    fn set_discrete(&self, q: &[f64]) {
+        let _ = q;
     }
 
     /// A readable name of surface `j` for messages.

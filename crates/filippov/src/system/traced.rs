@@ -6,7 +6,10 @@ use std::sync::Arc;
 use filippov_expr::{Backend, Enclosure, ExprError, Graph, Interval, Motion, Names, NodeId};
 
 use super::compiled::{CompiledGradient, GradientValues, Model};
-use super::{AffineParts, AffineSigns, BothSides, LieValue, MotionJets, PiecewiseSystem, Word};
+use super::discrete::DiscreteStates;
+use super::{
+    AffineParts, AffineSigns, BothSides, LieValue, MotionJets, PiecewiseSystem, RatePartials, Word,
+};
 use crate::error::FieldError;
 use crate::tolerances::{MAX_LIE_ORDER, TANGENT};
 
@@ -23,6 +26,8 @@ const FUSED_STATES: usize = 12;
 pub struct TracedSystem {
     model: Arc<Model>,
     parameters: Vec<f64>,
+    /// Read by the functions behind the parameters.
+    discrete: DiscreteStates,
 }
 
 impl TracedSystem {
@@ -41,7 +46,26 @@ impl TracedSystem {
         Ok(TracedSystem {
             model: Arc::new(model),
             parameters,
+            discrete: DiscreteStates::default(),
         })
+    }
+
+    /// The same system with these surfaces monitored in every mode, whether the field depends on them or not:
+    /// they trigger actions. For a system that was just made.
+    #[must_use]
+    pub fn watching(mut self, surfaces: &[usize]) -> Self {
+        if let Some(model) = Arc::get_mut(&mut self.model) {
+            model.watch(surfaces);
+        }
+        self
+    }
+
+    /// The same system, whose functions read `count` discrete states behind the parameters. Every copy has its
+    /// own.
+    #[must_use]
+    pub fn with_discrete(mut self, count: usize) -> Self {
+        self.discrete = (0..count).map(|_| f64::NAN).collect();
+        self
     }
 
     /// The same system with other parameter values.
@@ -50,7 +74,13 @@ impl TracedSystem {
         TracedSystem {
             model: Arc::clone(&self.model),
             parameters,
+            discrete: self.discrete.clone(),
         }
+    }
+
+    /// How many discrete states its functions read.
+    pub fn n_discrete(&self) -> usize {
+        self.discrete.len()
     }
 
     /// The parameter values.
@@ -80,6 +110,16 @@ impl TracedSystem {
 }
 
 impl TracedSystem {
+    /// Calls a function with the parameters, the discrete states behind them.
+    #[inline(always)]
+    pub fn with_values<R>(&self, f: impl FnOnce(&[f64]) -> R) -> R {
+        if self.discrete.is_empty() {
+            f(&self.parameters)
+        } else {
+            f(&self.discrete.behind(&self.parameters))
+        }
+    }
+
     /// The derivative of h_j in t, then those by the states that it depends on.
     fn gradient_values(
         &self,
@@ -94,7 +134,7 @@ impl TracedSystem {
             GradientValues::Computed(tiered) => {
                 let program = tiered.program();
                 let mut computed = vec![0.0; program.n_outputs()];
-                program.eval(t, x, signs, &self.parameters, &[], &mut computed);
+                self.with_values(|p| program.eval(t, x, signs, p, &[], &mut computed));
                 Cow::Owned(computed)
             }
         };
@@ -113,17 +153,14 @@ impl PiecewiseSystem for TracedSystem {
 
     #[inline]
     fn field(&self, t: f64, x: &[f64], signs: &[f64], dx: &mut [f64]) -> Result<(), FieldError> {
-        self.model
-            .field_program
-            .eval(t, x, signs, &self.parameters, &[], dx);
+        let program = &self.model.field_program;
+        self.with_values(|p| program.eval(t, x, signs, p, &[], dx));
         Ok(())
     }
 
     fn surfaces(&self, t: f64, x: &[f64], signs: &[f64], h: &mut [f64]) -> Result<(), FieldError> {
-        self.model
-            .surfaces_program
-            .program()
-            .eval(t, x, signs, &self.parameters, &[], h);
+        let program = self.model.surfaces_program.program();
+        self.with_values(|p| program.eval(t, x, signs, p, &[], h));
         Ok(())
     }
 
@@ -140,11 +177,11 @@ impl PiecewiseSystem for TracedSystem {
         let program = self.model.rates();
         if d == 1 {
             let mut out = [0.0; 2];
-            program.eval(t, x, signs, &self.parameters, v, &mut out);
+            self.with_values(|p| program.eval(t, x, signs, p, v, &mut out));
             (h[0], rate[0]) = (out[0], out[1]);
         } else {
             let mut out = vec![0.0; 2 * d];
-            program.eval(t, x, signs, &self.parameters, v, &mut out);
+            self.with_values(|p| program.eval(t, x, signs, p, v, &mut out));
             h.copy_from_slice(&out[..d]);
             rate.copy_from_slice(&out[d..]);
         }
@@ -210,7 +247,7 @@ impl PiecewiseSystem for TracedSystem {
             return out.both_sides_by_parts(self, j, t, x, signs);
         }
         let program = self.model.both_sides(j);
-        program.eval(t, x, signs, &self.parameters, &[], &mut out.outputs);
+        self.with_values(|p| program.eval(t, x, signs, p, &[], &mut out.outputs));
         let (head, rest) = out.outputs.split_at(2);
         (out.normal_minus, out.normal_plus) = (head[0], head[1]);
         out.f_minus.copy_from_slice(&rest[..n]);
@@ -235,7 +272,7 @@ impl PiecewiseSystem for TracedSystem {
     fn enclose_surface(&self, j: usize, motion: &dyn Motion, signs: &[f64]) -> Option<Enclosure> {
         let mut out = [Enclosure::UNKNOWN];
         let program = self.model.enclosed_surface(j)?;
-        program.eval(motion, signs, &self.parameters, &mut out);
+        self.with_values(|p| program.eval(motion, signs, p, &mut out));
         Some(out[0])
     }
 
@@ -247,7 +284,7 @@ impl PiecewiseSystem for TracedSystem {
     ) -> Option<[Enclosure; 2]> {
         let mut out = [Enclosure::UNKNOWN; 2];
         let program = self.model.enclosed_normal_components(j)?;
-        program.eval(motion, signs, &self.parameters, &mut out);
+        self.with_values(|p| program.eval(motion, signs, p, &mut out));
         Some(out)
     }
 
@@ -271,7 +308,7 @@ impl PiecewiseSystem for TracedSystem {
             large.resize(count, 0.0);
             &mut large[..]
         };
-        program.eval(t, x, signs, &self.parameters, &[], out);
+        self.with_values(|p| program.eval(t, x, signs, p, &[], out));
         Ok(LieValue {
             value: out[0],
             magnitude: out[1..].iter().map(|v| v.abs()).sum(),
@@ -299,11 +336,38 @@ impl PiecewiseSystem for TracedSystem {
     }
 
     fn eval_jets(&self, jets: &MotionJets, t: f64, x: &[f64], signs: &[f64], out: &mut [f64]) {
-        jets.eval(t, x, signs, &self.parameters, out);
+        self.with_values(|p| jets.eval(t, x, signs, p, out));
     }
 
     fn sign_groups(&self, surfaces: &[usize]) -> Vec<Vec<usize>> {
         self.model.affine_signs().groups(surfaces)
+    }
+
+    fn switches_at(&self, j: usize) -> bool {
+        self.model.switches_at(j)
+    }
+
+    fn rate_gradient(
+        &self,
+        j: usize,
+        t: f64,
+        x: &[f64],
+        signs: &[f64],
+        gradient: &mut [f64],
+    ) -> Result<RatePartials, FieldError> {
+        let program = self.model.rate_gradient(j);
+        let mut out = vec![0.0; program.n_outputs()];
+        self.with_values(|p| program.eval(t, x, signs, p, &[], &mut out));
+        gradient.copy_from_slice(&out[3..]);
+        Ok(RatePartials {
+            rate: out[0],
+            magnitude: out[2],
+            time: out[1],
+        })
+    }
+
+    fn set_discrete(&self, q: &[f64]) {
+        self.discrete.set(q);
     }
 
     fn surface_name(&self, j: usize) -> String {
@@ -326,7 +390,7 @@ impl AffineSigns for TracedSystem {
         parts: &mut AffineParts,
     ) -> Result<u64, FieldError> {
         let compiled = self.model.affine_signs();
-        compiled.fill(t, x, signs, &self.parameters, parts);
+        self.with_values(|p| compiled.fill(t, x, signs, p, parts));
         Ok(1)
     }
 
@@ -336,6 +400,6 @@ impl AffineSigns for TracedSystem {
 
     fn enclose_rate(&self, j: usize, motion: &dyn Motion, signs: &[f64]) -> Option<Interval> {
         let model = self.model.affine_signs();
-        model.enclose_rate(j, motion, signs, &self.parameters)
+        self.with_values(|p| model.enclose_rate(j, motion, signs, p))
     }
 }

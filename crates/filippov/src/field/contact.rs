@@ -1,0 +1,228 @@
+//! The field of a body in contact: h = 0 and h' = 0 at unilateral constraints, with sliding on other surfaces.
+
+use super::{eval_on_side, SmoothField};
+use crate::action::Actions;
+use crate::error::FieldError;
+use crate::mode::{Mode, Signs};
+use crate::switching::Matrix;
+use crate::system::{dot, PiecewiseSystem};
+use crate::tolerances::{NO_IMPULSE, SURFACE_NOISE};
+
+/// The field of contact,
+///
+///   f_s = f + sum_c nu_c W_c + sum_k mu_k B_k,
+///
+/// W_c the direction of the impulse of the impact at h_c = 0, in units of the acceleration h_c'' that it gives;
+/// B_k the change of f from one side of h_k = 0 to the other. The multipliers make h_c'' and h_k' vanish: one
+/// linear system. One contact alone gives f_s = f - (L_f^2 h / L_W L_f h) W.
+///
+/// Contact c lasts while nu_c > 0 (it pushes and does not pull), sliding while 0 < mu_k < 1.
+pub struct ContactField<'a> {
+    system: &'a dyn PiecewiseSystem,
+    actions: &'a Actions<'a>,
+    /// The surfaces in contact, each with the side (+1 or -1) on which the body is free.
+    contacts: Vec<(usize, f64)>,
+    sliding: Vec<usize>,
+    signs: Signs,
+    discrete: Vec<f64>,
+    n_evaluations: u64,
+    /// nu, then mu, of the last evaluation.
+    multipliers: Vec<f64>,
+}
+
+impl<'a> ContactField<'a> {
+    /// Contact at those zero entries of the mode whose surface triggers an action and switches nothing, sliding
+    /// on the others; `discrete` are the discrete states. `None` without any contact.
+    pub fn new(
+        system: &'a dyn PiecewiseSystem,
+        actions: &'a Actions<'a>,
+        mode: &Mode,
+        discrete: &[f64],
+    ) -> Option<Self> {
+        let (mut contacts, mut sliding) = (Vec::new(), Vec::new());
+        for j in mode.sliding_set() {
+            match actions.at_surface(j) {
+                Some((_, direction)) if !system.switches_at(j) => {
+                    let side = if direction > 0 { -1.0 } else { 1.0 };
+                    contacts.push((j, side));
+                }
+                _ => sliding.push(j),
+            }
+        }
+        let mut signs = mode.signs();
+        contacts.iter().for_each(|&(j, side)| signs[j] = side);
+        (!contacts.is_empty()).then(|| ContactField {
+            system,
+            actions,
+            contacts,
+            sliding,
+            signs,
+            discrete: discrete.to_vec(),
+            n_evaluations: 0,
+            multipliers: Vec::new(),
+        })
+    }
+
+    /// The surfaces in contact.
+    pub fn contacts(&self) -> impl Iterator<Item = usize> + '_ {
+        self.contacts.iter().map(|(j, _)| *j)
+    }
+
+    /// The surfaces slid on.
+    pub fn sliding(&self) -> &[usize] {
+        &self.sliding
+    }
+
+    /// Number of exit functions.
+    pub fn n_exits(&self) -> usize {
+        self.contacts.len() + 2 * self.sliding.len()
+    }
+
+    /// The exit functions of the last evaluation, positive inside: nu of each contact, then 1 + lambda and
+    /// 1 - lambda of each surface slid on.
+    pub fn exits(&self) -> impl Iterator<Item = f64> + '_ {
+        let (nu, mu) = self.multipliers.split_at(self.contacts.len());
+        let sides = mu.iter().flat_map(|mu| [2.0 * mu, 2.0 - 2.0 * mu]);
+        nu.iter().copied().chain(sides)
+    }
+
+    /// lambda of each surface slid on, NaN for those in contact, in the order of the surfaces.
+    pub fn lambdas(&self) -> Vec<f64> {
+        let mut all: Vec<(usize, f64)> = self.contacts().map(|j| (j, f64::NAN)).collect();
+        let mu = &self.multipliers[self.contacts.len()..];
+        all.extend(
+            self.sliding
+                .iter()
+                .zip(mu)
+                .map(|(&j, m)| (j, 2.0 * m - 1.0)),
+        );
+        all.sort_by_key(|(j, _)| *j);
+        all.into_iter().map(|(_, lambda)| lambda).collect()
+    }
+
+    /// Moves `x` onto all surfaces, by their gradients, and the velocities of the contacts to zero, along their
+    /// impulses.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn project(&mut self, t: f64, x: &mut [f64]) -> Result<(), FieldError> {
+        let set: Vec<usize> = self
+            .contacts()
+            .chain(self.sliding.iter().copied())
+            .collect();
+        let mut projector = super::Projector::new(x.len(), self.system.n_surfaces());
+        projector.project_onto(self.system, &set, t, x, &self.signs)?;
+        let n = x.len();
+        for _ in 0..2 {
+            let (mut rows, mut rates) = (Vec::new(), Vec::new());
+            let mut is_still = true;
+            for &(j, _) in &self.contacts {
+                let mut row = vec![0.0; n];
+                let rate = self.system.rate_gradient(j, t, x, &self.signs, &mut row)?;
+                is_still &= rate.rate.abs() <= SURFACE_NOISE * rate.magnitude;
+                rates.push(rate.rate);
+                rows.push(row);
+            }
+            if is_still {
+                break;
+            }
+            let impulses = self.impulses(t, x, &rows)?;
+            let Some(shifts) = gram(&rows, &impulses).solve(&rates) else {
+                break;
+            };
+            for (impulse, shift) in impulses.iter().zip(shifts) {
+                x.iter_mut().zip(impulse).for_each(|(x, w)| *x -= shift * w);
+            }
+        }
+        Ok(())
+    }
+
+    /// The directions W, in units of the acceleration that they give on the free side; NaN where the map has no
+    /// effect on the velocity.
+    fn impulses(&self, t: f64, x: &[f64], rows: &[Vec<f64>]) -> Result<Vec<Vec<f64>>, FieldError> {
+        let mut impulses = Vec::with_capacity(rows.len());
+        for (&(j, side), row) in self.contacts.iter().zip(rows) {
+            let mut w = vec![0.0; x.len()];
+            if let Some((action, _)) = self.actions.at_surface(j) {
+                let map = action.map;
+                map.impulse(t, x, row, &self.signs, &self.discrete, &mut w)?;
+            }
+            let strength = dot(row, &w);
+            let size = (dot(row, row) * dot(&w, &w)).sqrt();
+            let scale = if strength.abs() > NO_IMPULSE * size {
+                side / strength
+            } else {
+                f64::NAN
+            };
+            w.iter_mut().for_each(|w| *w *= scale);
+            impulses.push(w);
+        }
+        Ok(impulses)
+    }
+
+    /// The field where every surface slid on has the sign -1, and its changes to the other side of each.
+    fn sides(&mut self, t: f64, x: &[f64]) -> Result<(Vec<f64>, Vec<Vec<f64>>), FieldError> {
+        let n = x.len();
+        let mut signs = self.signs.clone();
+        self.sliding.iter().for_each(|&j| signs[j] = -1.0);
+        let mut base = vec![0.0; n];
+        self.n_evaluations += eval_on_side(self.system, t, x, &signs, &mut base)?;
+        let mut changes = Vec::with_capacity(self.sliding.len());
+        for &j in &self.sliding {
+            signs[j] = 1.0;
+            let mut change = vec![0.0; n];
+            self.n_evaluations += eval_on_side(self.system, t, x, &signs, &mut change)?;
+            signs[j] = -1.0;
+            change.iter_mut().zip(&base).for_each(|(c, b)| *c -= b);
+            changes.push(change);
+        }
+        Ok((base, changes))
+    }
+}
+
+/// Products of the rows with the directions.
+fn gram(rows: &[Vec<f64>], directions: &[Vec<f64>]) -> Matrix {
+    let mut matrix = Matrix::zeros(rows.len());
+    for (i, row) in rows.iter().enumerate() {
+        for (k, direction) in directions.iter().enumerate() {
+            matrix[(i, k)] = dot(row, direction);
+        }
+    }
+    matrix
+}
+
+impl SmoothField for ContactField<'_> {
+    fn eval(&mut self, t: f64, x: &mut [f64], dx: &mut [f64]) -> Result<(), FieldError> {
+        self.project(t, x)?;
+        let (base, changes) = self.sides(t, x)?;
+        let n = x.len();
+        let (mut rows, mut rates) = (Vec::new(), Vec::new());
+        for &(j, _) in &self.contacts {
+            let mut row = vec![0.0; n];
+            let rate = self.system.rate_gradient(j, t, x, &self.signs, &mut row)?;
+            rates.push(-(rate.time + dot(&row, &base)));
+            rows.push(row);
+        }
+        let mut directions = self.impulses(t, x, &rows)?;
+        for &j in &self.sliding {
+            let mut row = vec![0.0; n];
+            let time = self.system.gradient(j, t, x, &self.signs, &mut row)?;
+            rates.push(-(time + dot(&row, &base)));
+            rows.push(row);
+        }
+        directions.extend(changes);
+        let solved = gram(&rows, &directions).solve(&rates);
+        self.multipliers = solved.unwrap_or_else(|| vec![f64::NAN; rows.len()]);
+        dx.copy_from_slice(&base);
+        for (multiplier, direction) in self.multipliers.iter().zip(&directions) {
+            dx.iter_mut()
+                .zip(direction)
+                .for_each(|(dx, d)| *dx += multiplier * d);
+        }
+        Ok(())
+    }
+
+    fn n_evaluations(&self) -> u64 {
+        self.n_evaluations
+    }
+}

@@ -1,0 +1,303 @@
+//! Actions in an instant: which are done, in which order, and what they trigger.
+//!
+//! Specification:
+//!
+//! 1. At one instant the actions whose time has come and those whose surface was reached in their direction are
+//!    done in the order of the list, each on the state that the one before it left.
+//! 2. Then those are done that the jump triggered: it led across their surface in their direction, or onto it with
+//!    a motion that approaches it. This is repeated until there are none.
+//! 3. An action whose state still moves through its surface is not done again in that instant: the motion
+//!    crosses. (A count, or a phase that is set back, at a section.)
+//! 4. The mode is decided for the last state ([`super::placement`]).
+
+use smallvec::smallvec;
+
+use super::detect::Found;
+use super::integrator::Integrator;
+use super::placement::Sides;
+use super::transition::Values;
+use super::Stop;
+use crate::action::Trigger;
+use crate::error::FieldError;
+use crate::event::EventFunction;
+use crate::field::SmoothField;
+use crate::mode::Mode;
+use crate::solution::Switch;
+use crate::switching::{first_nonzero, Kind};
+use crate::tolerances::MOST_ACTIONS_AT_ONE_TIME;
+
+/// The surfaces in one instant, as far as they trigger actions.
+struct Approach {
+    /// The side that the state is on, or comes from while it is on the surface.
+    side: Vec<i8>,
+    /// The motion goes on through the surface after its action.
+    passes: Vec<bool>,
+}
+
+impl Integrator<'_> {
+    /// A start with actions: those of this time, and those whose surface the motion leads through from here.
+    #[cold]
+    pub(super) fn start_with_actions(&mut self) -> Result<Option<Stop>, FieldError> {
+        self.system.set_discrete(&self.motion.discrete);
+        let Some(Sides {
+            mut mode,
+            on_surface,
+        }) = self.sides(None)?
+        else {
+            return Ok(Some(Stop::NotFinite));
+        };
+        let mut due = self.timetable.take(self.actions, self.t);
+        self.update_horizon();
+        for j in (0..on_surface.len()).filter(|&j| on_surface[j] && self.is_only_trigger(j)) {
+            let side = self.trigger_side(j, None);
+            mode.set(j, side);
+            if self.goes_through(j, side, &mode)? {
+                due.extend(self.triggered_at(j, side));
+            }
+        }
+        if due.is_empty() {
+            let (mode, left) = match self.place(None)? {
+                Ok(placed) => placed,
+                Err(stop) => return Ok(Some(stop)),
+            };
+            return self.begin(mode, &left);
+        }
+        self.motion.restart(self.system, self.t, mode, &[]);
+        due.sort_unstable();
+        due.dedup();
+        self.act(due)
+    }
+
+    /// The end of the span, or a known time of actions.
+    #[cold]
+    pub(super) fn reach_horizon(&mut self) -> Result<Option<Stop>, FieldError> {
+        let due = self.timetable.take(self.actions, self.t);
+        self.update_horizon();
+        if !due.is_empty() {
+            let signs = self.motion.signs.clone();
+            let h = self.surface_values(&signs)?;
+            self.note_residuals(&h, &[]);
+            return self.act(due);
+        }
+        Ok((self.t >= self.t_end).then_some(Stop::End))
+    }
+
+    /// The next known time up to the end.
+    pub(super) fn update_horizon(&mut self) {
+        let next = self.timetable.next(self.actions);
+        self.horizon = next.map_or(self.t_end, |next| next.max(self.t).min(self.t_end));
+    }
+
+    /// Does what an event triggers; `None` if that is nothing and the decision is an ordinary one.
+    pub(super) fn act_at_event(
+        &mut self,
+        event: &Found,
+        h: &Values,
+    ) -> Result<Option<Option<Stop>>, FieldError> {
+        if event.touch {
+            return Ok(None);
+        }
+        let surfaces = self.vanishing_surfaces(event, h)?;
+        let located = |j: usize| event.functions.contains(&EventFunction::Surface(j));
+        let rates = self.rates_here()?;
+        let entries = self.motion.mode.entries();
+        let reached = surfaces.iter().copied().filter(|&j| {
+            let approaches = rates[j] * f64::from(entries[j]) < 0.0;
+            entries[j] != 0 && (located(j) || approaches)
+        });
+        let mut due: Vec<usize> = Vec::new();
+        for j in reached {
+            due.extend(self.triggered_at(j, entries[j]));
+        }
+        if !due.is_empty() {
+            if self.t >= self.horizon {
+                due.extend(self.timetable.take(self.actions, self.t));
+                self.update_horizon();
+            }
+            due.sort_unstable();
+            due.dedup();
+            self.note_residuals(h, &surfaces);
+            return self.act(due).map(Some);
+        }
+        if self.motion.is_in_contact() {
+            return self.decide_in_contact(event, &surfaces).map(Some);
+        }
+        let is_smooth = |&j: &usize| !self.system.switches_at(j);
+        if surfaces.len() > 1 && surfaces.iter().any(is_smooth) {
+            self.note_residuals(h, &surfaces);
+            return self.cross_beside_triggers(&surfaces).map(Some);
+        }
+        Ok(None)
+    }
+
+    /// Notes how far the point lies off the surfaces that vanish there, and those that the motion stays on.
+    fn note_residuals(&mut self, h: &Values, surfaces: &[usize]) {
+        self.residuals.clear();
+        self.residuals.resize(h.len(), 0.0);
+        for &j in surfaces.iter().chain(self.motion.sliding()) {
+            self.residuals[j] = h[j].abs();
+        }
+    }
+
+    /// The actions at surface `j` for a motion that comes from `side`.
+    fn triggered_at(&self, j: usize, side: i8) -> impl Iterator<Item = usize> + '_ {
+        let fires = move |trigger: &Trigger| match trigger {
+            Trigger::Surface { index, direction } => {
+                *index == j && (*direction == 0 || *direction == -side)
+            }
+            _ => false,
+        };
+        let list = self.actions.list.iter().enumerate();
+        list.filter(move |(_, action)| fires(&action.trigger))
+            .map(|(index, _)| index)
+    }
+
+    /// Does these actions and those that they trigger, and goes on with the motion that follows.
+    pub(super) fn act(&mut self, mut due: Vec<usize>) -> Result<Option<Stop>, FieldError> {
+        let before = self.motion.mode.clone();
+        let first = self.recorder.switches().len();
+        let mut approach = Approach {
+            side: self.free_sides(&before),
+            passes: vec![false; before.entries().len()],
+        };
+        let mut count = 0;
+        while !due.is_empty() {
+            for &index in &due {
+                count += 1;
+                if count > MOST_ACTIONS_AT_ONE_TIME {
+                    let names = due.iter().map(|&k| self.actions.list[k].name.clone());
+                    return Ok(Some(Stop::ActionsDoNotEnd {
+                        actions: names.collect(),
+                    }));
+                }
+                if let Some(stop) = self.do_action(index, &before)? {
+                    return Ok(Some(stop));
+                }
+            }
+            due = self.triggered_by_jump(&due, &mut approach)?;
+        }
+        self.recorder.jump(&self.x);
+        let (after, left) = match self.place(Some(&before))? {
+            Ok(placed) => placed,
+            Err(stop) => return Ok(Some(stop)),
+        };
+        self.residuals.clear();
+        self.recorder.set_last_mode(first, &after);
+        if let Some(rest) = self.impacts_end(first, &after)? {
+            return self.come_to_rest(rest, after);
+        }
+        self.begin(after, &left)
+    }
+
+    /// Does one action and records it.
+    fn do_action(&mut self, index: usize, before: &Mode) -> Result<Option<Stop>, FieldError> {
+        let action = &self.actions.list[index];
+        let y_before = self.x.clone();
+        let mut q = std::mem::take(&mut self.motion.discrete);
+        let signs = self.motion.signs.clone();
+        let done = action.map.apply(self.t, &mut self.x, &signs, &mut q);
+        self.motion.discrete = q;
+        done?;
+        self.system.set_discrete(&self.motion.discrete);
+        if let Some(kind) = action.kind {
+            self.stats.n_switches += 1;
+            let surfaces = match action.trigger {
+                Trigger::Surface { index, .. } => vec![index],
+                _ => Vec::new(),
+            };
+            self.recorder.switch(Switch {
+                t: self.t,
+                y_before,
+                y_after: self.x.clone(),
+                kind,
+                surfaces,
+                mode_before: before.clone(),
+                mode_after: before.clone(),
+                note: action.name.clone(),
+            });
+        }
+        let is_finite = self.x.iter().all(|v| v.is_finite());
+        Ok((!is_finite).then(|| Stop::ActionNotFinite {
+            action: action.name.clone(),
+        }))
+    }
+
+    /// The actions that the jump of the state triggered, after `done`.
+    fn triggered_by_jump(
+        &mut self,
+        done: &[usize],
+        approach: &mut Approach,
+    ) -> Result<Vec<usize>, FieldError> {
+        let Some(Sides { mode, on_surface }) = self.sides(Some(&self.motion.mode.clone()))? else {
+            return Ok(Vec::new());
+        };
+        let mut due = Vec::new();
+        for (j, on_surface) in on_surface.into_iter().enumerate() {
+            let side = approach.side[j];
+            if side == 0 || self.actions.at_surface(j).is_none() {
+                continue;
+            }
+            if !on_surface {
+                let now = mode.entries()[j];
+                if now != side {
+                    due.extend(self.triggered_at(j, side));
+                }
+                (approach.side[j], approach.passes[j]) = (now, false);
+                continue;
+            }
+            if !self.goes_through(j, side, &mode)? {
+                approach.passes[j] = false;
+            } else if self
+                .triggered_at(j, side)
+                .any(|index| done.contains(&index))
+            {
+                approach.passes[j] = true;
+            } else if !approach.passes[j] {
+                due.extend(self.triggered_at(j, side));
+            }
+        }
+        due.sort_unstable();
+        due.dedup();
+        Ok(due)
+    }
+
+    /// Does the motion lead from this side through a surface that the point lies on? A body that is pressed on
+    /// without velocity does not: it stays.
+    fn goes_through(&self, j: usize, side: i8, mode: &Mode) -> Result<bool, FieldError> {
+        let mode = mode.with(j, side);
+        let leading = first_nonzero(self.system, j, side, 0, self.t, &self.x, &mode.signs())?;
+        Ok(leading.sign() == -side && (leading.order == 1 || !self.can_stay(j, &mode)?))
+    }
+
+    /// The sides of a mode; where it is in contact, the free side.
+    fn free_sides(&self, mode: &Mode) -> Vec<i8> {
+        let mut sides = mode.entries().to_vec();
+        for (j, side) in sides.iter_mut().enumerate() {
+            match self.actions.at_surface(j) {
+                Some((_, direction)) if *side == 0 && !self.system.switches_at(j) => {
+                    *side = if direction > 0 { -1 } else { 1 };
+                }
+                _ => {}
+            }
+        }
+        sides
+    }
+
+    /// The rates of all switching functions along the motion that arrives here.
+    fn rates_here(&mut self) -> Result<Values, FieldError> {
+        let d = self.system.n_surfaces();
+        let (mut h, mut rates): (Values, Values) = (smallvec![0.0; d], smallvec![0.0; d]);
+        let mut velocity = vec![0.0; self.x.len()];
+        let mut x = self.x.clone();
+        self.motion.field.eval(self.t, &mut x, &mut velocity)?;
+        let signs = &self.motion.signs;
+        self.system
+            .surface_rates(self.t, &self.x, signs, &velocity, &mut h, &mut rates)?;
+        Ok(rates)
+    }
+}
+
+/// Is this the kind of an impact, or of another action at a surface?
+pub(super) fn is_reset(switch: &Switch) -> bool {
+    switch.kind == Kind::Reset && switch.surfaces.len() == 1
+}

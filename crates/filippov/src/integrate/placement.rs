@@ -1,0 +1,190 @@
+//! Where a motion starts: the mode at a given point, at the start of a run and after actions.
+
+use super::integrator::Integrator;
+use super::transition::{Decided, Left, Lefts};
+use super::Stop;
+use crate::error::FieldError;
+use crate::field::{ContactField, SmoothField};
+use crate::mode::Mode;
+use crate::switching::{decide, first_nonzero, Arrival, Leading};
+use crate::system::{dot, surfaces_that_matter};
+use crate::tolerances::SURFACE_NOISE;
+
+/// The sides that a point is on.
+pub(super) struct Sides {
+    /// No entry is 0.
+    pub mode: Mode,
+    /// Which surfaces the point lies on, to rounding.
+    pub on_surface: Vec<bool>,
+}
+
+/// A surface that triggers actions and switches nothing, on which the point lies.
+struct Touched {
+    surface: usize,
+    /// The side from which the action is triggered.
+    side: i8,
+    /// The first derivative of h that does not vanish.
+    leading: Leading,
+}
+
+impl Integrator<'_> {
+    /// The mode in which a motion goes on from the current point, and what vanishes there. `memory` is the mode
+    /// before.
+    pub(super) fn place(&mut self, memory: Option<&Mode>) -> Result<Decided, FieldError> {
+        let Some(Sides { mode, on_surface }) = self.sides(memory)? else {
+            return Ok(Err(Stop::NotFinite));
+        };
+        let zeros = (0..on_surface.len()).filter(|&j| on_surface[j]);
+        let (smooth, zeros): (Vec<usize>, Vec<usize>) =
+            zeros.partition(|&j| self.is_only_trigger(j));
+        // An inactive surface has the sign of the side that it moves to.
+        let meeting = surfaces_that_matter(self.system, &mode, zeros);
+        if !smooth.is_empty() {
+            return self.place_on_triggers(mode, &smooth, meeting, memory);
+        }
+        self.place_on(mode, &meeting, memory)
+    }
+
+    /// The mode where these surfaces matter and vanish.
+    fn place_on(
+        &mut self,
+        mode: Mode,
+        meeting: &[usize],
+        memory: Option<&Mode>,
+    ) -> Result<Decided, FieldError> {
+        match meeting {
+            [] => Ok(Ok((mode, Lefts::new()))),
+            [j] => {
+                // Of several continuations that which stays on its side.
+                let arrival = match memory.map(|before| before.entries()[*j]) {
+                    Some(side) if side != 0 => Arrival::Region(side),
+                    _ => Arrival::Start,
+                };
+                let signs = mode.signs();
+                let decision = decide(self.system, *j, arrival, self.t, &self.x, &signs)?;
+                Ok(self.follow_at_surface(&mode, *j, decision))
+            }
+            _ => self.decide_at_start(&mode, meeting),
+        }
+    }
+
+    /// Does the surface trigger actions and switch nothing?
+    pub(super) fn is_only_trigger(&self, j: usize) -> bool {
+        self.actions.at_surface(j).is_some() && !self.system.switches_at(j)
+    }
+
+    /// The side of every surface at the current point; a surface that the point lies on has the side of the mode
+    /// before, or that which rounding says. `None` if a switching function is not a number.
+    pub(super) fn sides(&mut self, memory: Option<&Mode>) -> Result<Option<Sides>, FieldError> {
+        let d = self.system.n_surfaces();
+        let mut mode = Mode::new(vec![1; d]);
+        // Switching functions may contain signs of others: repeat until nothing changes.
+        let mut on_surface = vec![false; d];
+        for _ in 0..=d {
+            let before = mode.clone();
+            let signs = mode.signs();
+            let h = self.surface_values(&signs)?;
+            if h.iter().any(|h| h.is_nan()) {
+                return Ok(None);
+            }
+            for j in 0..d {
+                let size = self.system.surface_size(j, self.t, &self.x, &signs)?;
+                let residual = self.residuals.get(j).copied().unwrap_or(0.0);
+                let noise = (SURFACE_NOISE * size).max(2.0 * residual);
+                on_surface[j] = h[j].abs() <= noise;
+                let known = memory.map_or(0, |memory| memory.entries()[j]);
+                let entry = match known {
+                    side if on_surface[j] && side != 0 => side,
+                    _ if h[j] < 0.0 => -1,
+                    _ => 1,
+                };
+                mode.set(j, entry);
+            }
+            if mode == before {
+                break;
+            }
+        }
+        Ok(Some(Sides { mode, on_surface }))
+    }
+
+    /// The mode on surfaces of which some trigger actions and switch nothing: contact, where the impact has no
+    /// velocity left and the motion would go through; else the side that the motion leads to.
+    fn place_on_triggers(
+        &mut self,
+        mut mode: Mode,
+        smooth: &[usize],
+        meeting: Vec<usize>,
+        memory: Option<&Mode>,
+    ) -> Result<Decided, FieldError> {
+        let mut touched = Vec::with_capacity(smooth.len());
+        let mut contacts = Vec::new();
+        for &j in smooth {
+            let side = self.trigger_side(j, memory);
+            mode.set(j, side);
+            let signs = mode.signs();
+            let leading = first_nonzero(self.system, j, side, 0, self.t, &self.x, &signs)?;
+            let is_still = leading.order != 1;
+            let stays = leading.sign() != side;
+            if is_still && stays && self.can_stay(j, &mode)? {
+                contacts.push(j);
+                continue;
+            }
+            if leading.order > 0 {
+                mode.set(j, leading.sign());
+            }
+            touched.push(Touched {
+                surface: j,
+                side,
+                leading,
+            });
+        }
+        let decided = if contacts.is_empty() {
+            self.place_on(mode, &meeting, memory)?
+        } else {
+            self.place_in_contact(mode, &contacts, &meeting, &[])?
+        };
+        Ok(decided.map(|(mode, mut left)| {
+            let departing = touched.iter().filter(|touched| {
+                let entry = mode.entries()[touched.surface];
+                touched.leading.sign() == entry || touched.side == entry
+            });
+            left.extend(departing.map(|t| Left::Surface(t.surface, t.leading)));
+            (mode, left)
+        }))
+    }
+
+    /// The side from which the action at surface `j` is triggered.
+    pub(super) fn trigger_side(&self, j: usize, memory: Option<&Mode>) -> i8 {
+        let known = memory.map_or(0, |memory| memory.entries()[j]);
+        match self.actions.at_surface(j) {
+            Some((_, direction)) if direction != 0 => -direction,
+            _ if known != 0 => known,
+            _ => 1,
+        }
+    }
+
+    /// Can a body stay in contact at h_j = 0? The action there leaves the point alone and acts on the velocity.
+    pub(super) fn can_stay(&self, j: usize, mode: &Mode) -> Result<bool, FieldError> {
+        let Some((action, _)) = self.actions.at_surface(j) else {
+            return Ok(false);
+        };
+        let (mut moved, mut q) = (self.x.clone(), self.motion.discrete.clone());
+        action
+            .map
+            .apply(self.t, &mut moved, &mode.signs(), &mut q)?;
+        let size = dot(&self.x, &self.x).sqrt();
+        let shift: Vec<f64> = moved.iter().zip(&self.x).map(|(m, x)| m - x).collect();
+        if q != self.motion.discrete || dot(&shift, &shift).sqrt() > 1e-9 * (1.0 + size) {
+            return Ok(false);
+        }
+        let resting = mode.with(j, 0);
+        let Some(mut field) =
+            ContactField::new(self.system, self.actions, &resting, &self.motion.discrete)
+        else {
+            return Ok(false);
+        };
+        let (mut x, mut dx) = (self.x.clone(), vec![0.0; self.x.len()]);
+        field.eval(self.t, &mut x, &mut dx)?;
+        Ok(dx.iter().all(|v| v.is_finite()))
+    }
+}

@@ -1,0 +1,307 @@
+//! Laws with memory: discrete states that follow an expression, with the actions that change them.
+//!
+//! | law | q is | changes where |
+//! |---|---|---|
+//! | clock | the floor of a g that is affine in t | g is a whole number: known times |
+//! | level | the whole number nearest to g | \|g - q\| reaches 1/2 |
+//! | held | the floor of a g made of other discrete states | one of those changes |
+//! | hysteresis | +1 above `high`, -1 below `low`, between them as it was | h reaches `high` at -1, `low` at +1 |
+//!
+//! The floor of a g that depends on the state is q - 1/2 + sign(g - q)/2, which is the same before and after a change
+//! of q: its jumps are those of an ordinary surface g - q = 0, on which the motion may slide.
+
+use std::sync::Arc;
+
+use filippov_expr::{Backend, ExprError, Graph, NodeId, Program, Wrt};
+
+use super::{PiecewiseSystem, TracedSystem};
+use crate::action::{ActionMap, Clock, Trigger};
+use crate::error::FieldError;
+use crate::switching::Kind;
+use crate::tolerances::WHOLE_NUMBER;
+
+/// What a discrete state follows; the expressions may contain discrete states of laws before it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Law {
+    /// The floor of an expression that is affine in t and contains no state.
+    Clock {
+        /// The expression g.
+        argument: NodeId,
+    },
+    /// The whole number nearest to an expression.
+    Level {
+        /// The expression g.
+        argument: NodeId,
+        /// The surface g - q = 0.
+        surface: usize,
+        /// The sign by which the switching function of that surface differs from g - q.
+        orientation: f64,
+        /// The surface 1/2 - |g - q| = 0.
+        guard: usize,
+    },
+    /// The floor of an expression of other discrete states.
+    Held {
+        /// The expression g.
+        argument: NodeId,
+    },
+    /// A relay with two thresholds.
+    Hysteresis {
+        /// The expression h.
+        argument: NodeId,
+        /// The thresholds.
+        thresholds: [NodeId; 2],
+        /// The value at a start between the thresholds.
+        initial: f64,
+        /// The surface q (h - middle) + half of the width = 0.
+        guard: usize,
+    },
+}
+
+impl Law {
+    /// The expressions that the law evaluates: the argument, and two more.
+    fn expressions(&self, graph: &mut Graph) -> [NodeId; 3] {
+        match *self {
+            Law::Clock { argument } => [argument, graph.partial(argument, Wrt::Time), argument],
+            Law::Level { argument, .. } | Law::Held { argument } => [argument; 3],
+            Law::Hysteresis {
+                argument,
+                thresholds: [low, high],
+                ..
+            } => [argument, low, high],
+        }
+    }
+}
+
+/// The laws of a system, one per discrete state.
+#[derive(Debug)]
+pub struct Laws {
+    laws: Vec<Law>,
+    program: Option<Program>,
+}
+
+/// What triggers a change of a discrete state, what it does, and how it is recorded.
+pub struct LawAction {
+    /// When.
+    pub trigger: Trigger,
+    /// What.
+    pub map: LawMap,
+    /// The index of the discrete state.
+    pub index: usize,
+    /// The kind of switch; none where only the way changes in which the same field is written.
+    pub kind: Option<Kind>,
+}
+
+/// The change of one discrete state, and of those that are made of it.
+pub struct LawMap {
+    laws: Arc<Laws>,
+    parameters: Vec<f64>,
+    index: usize,
+    /// What a clock adds.
+    step: f64,
+}
+
+impl Laws {
+    /// The laws of the discrete states of a graph, in their order.
+    ///
+    /// # Errors
+    /// If an expression cannot be compiled.
+    pub fn new(graph: &Graph, laws: Vec<Law>) -> Result<Self, ExprError> {
+        let mut graph = graph.clone();
+        let expressions = laws.iter().flat_map(|law| law.expressions(&mut graph));
+        let expressions: Vec<NodeId> = expressions.collect();
+        let program = if laws.is_empty() {
+            None
+        } else {
+            Some(Program::compile(
+                &graph,
+                &expressions,
+                Backend::Interpreter,
+            )?)
+        };
+        Ok(Laws { laws, program })
+    }
+
+    /// The laws.
+    pub fn list(&self) -> &[Law] {
+        &self.laws
+    }
+
+    fn eval(&self, t: f64, x: &[f64], signs: &[f64], parameters: &[f64], q: &[f64]) -> Vec<f64> {
+        let mut out = vec![0.0; 3 * self.laws.len()];
+        if let Some(program) = &self.program {
+            let all: Vec<f64> = parameters.iter().chain(q).copied().collect();
+            program.eval(t, x, signs, &all, &[], &mut out);
+        }
+        out
+    }
+
+    /// The discrete states at a start at (t, x), given to the system too.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn start(&self, system: &TracedSystem, t: f64, x: &[f64]) -> Result<Vec<f64>, FieldError> {
+        let mut q = vec![0.0; self.laws.len()];
+        if q.is_empty() {
+            return Ok(q);
+        }
+        let mut signs = vec![1.0; system.n_surfaces()];
+        let mut h = signs.clone();
+        // Expressions may contain discrete states and signs of others.
+        for _ in 0..=q.len() + signs.len() {
+            let before = (q.clone(), signs.clone());
+            for index in 0..q.len() {
+                let out = self.eval(t, x, &signs, system.parameters(), &q);
+                let values = [out[3 * index], out[3 * index + 1], out[3 * index + 2]];
+                q[index] = match &self.laws[index] {
+                    Law::Clock { .. } => self.ticking(index, x.len(), system.parameters()).start(t),
+                    Law::Level { .. } => values[0].round(),
+                    Law::Held { .. } => floor(values[0]),
+                    Law::Hysteresis { initial, .. } => relay(values, *initial),
+                };
+            }
+            system.set_discrete(&q);
+            system.surfaces(t, x, &signs, &mut h)?;
+            let sides = h.iter().map(|&h| if h < 0.0 { -1.0 } else { 1.0 });
+            signs = sides.collect();
+            if before == (q.clone(), signs.clone()) {
+                break;
+            }
+        }
+        Ok(q)
+    }
+
+    /// The actions that change the discrete states in a run with these parameters.
+    pub fn actions(self: &Arc<Self>, n_states: usize, parameters: &[f64]) -> Vec<LawAction> {
+        let mut actions = Vec::new();
+        for (index, law) in self.laws.iter().enumerate() {
+            let mut step = 0.0;
+            let (trigger, kind) = match *law {
+                Law::Held { .. } => continue,
+                Law::Clock { .. } => {
+                    let ticking = self.ticking(index, n_states, parameters);
+                    let Some(clock) = ticking.clock() else {
+                        continue;
+                    };
+                    step = ticking.rate.signum();
+                    let trigger = Trigger::Clock {
+                        clock,
+                        at_start: false,
+                    };
+                    (trigger, Some(Kind::Clock))
+                }
+                Law::Level { guard, .. } => (falling(guard), None),
+                Law::Hysteresis { guard, .. } => (falling(guard), Some(Kind::Reset)),
+            };
+            actions.push(LawAction {
+                trigger,
+                map: LawMap {
+                    laws: Arc::clone(self),
+                    parameters: parameters.to_vec(),
+                    index,
+                    step,
+                },
+                index,
+                kind,
+            });
+        }
+        actions
+    }
+
+    /// The affine function of a clock.
+    fn ticking(&self, index: usize, n_states: usize, parameters: &[f64]) -> Ticking {
+        let n_signs = self.program.as_ref().map_or(0, |p| p.lengths().signs);
+        let (zeros, signs, q) = (
+            vec![0.0; n_states],
+            vec![1.0; n_signs],
+            vec![0.0; self.laws.len()],
+        );
+        let at_zero = self.eval(0.0, &zeros, &signs, parameters, &q);
+        Ticking {
+            offset: at_zero[3 * index],
+            rate: at_zero[3 * index + 1],
+        }
+    }
+}
+
+/// The function offset + rate t, whose floor is wanted.
+#[derive(Clone, Copy)]
+struct Ticking {
+    offset: f64,
+    rate: f64,
+}
+
+impl Ticking {
+    /// It is a whole number at the ticks of this clock.
+    fn clock(self) -> Option<Clock> {
+        (self.rate != 0.0).then(|| Clock {
+            period: 1.0 / self.rate.abs(),
+            phase: -self.offset / self.rate,
+        })
+    }
+
+    /// Its floor just after t.
+    fn start(self, t: f64) -> f64 {
+        match self.clock() {
+            None => floor(self.offset),
+            Some(clock) if self.rate > 0.0 => clock.last_up_to(t),
+            Some(clock) => -clock.last_up_to(t) - 1.0,
+        }
+    }
+}
+
+/// The state of a relay at a start: what the thresholds say, between them `initial`.
+fn relay([h, low, high]: [f64; 3], initial: f64) -> f64 {
+    if h >= high {
+        1.0
+    } else if h <= low {
+        -1.0
+    } else {
+        initial
+    }
+}
+
+fn falling(index: usize) -> Trigger {
+    Trigger::Surface {
+        index,
+        direction: -1,
+    }
+}
+
+/// The floor; a value within rounding of a whole number is that number.
+fn floor(value: f64) -> f64 {
+    let nearest = value.round();
+    if (value - nearest).abs() <= WHOLE_NUMBER * (1.0 + value.abs()) {
+        nearest
+    } else {
+        value.floor()
+    }
+}
+
+impl ActionMap for LawMap {
+    fn apply(&self, t: f64, x: &mut [f64], signs: &[f64], q: &mut [f64]) -> Result<(), FieldError> {
+        let index = self.index;
+        match self.laws.laws[index] {
+            Law::Clock { .. } => q[index] += self.step,
+            Law::Hysteresis { .. } => q[index] = -q[index],
+            Law::Held { .. } => {}
+            Law::Level { .. } => {
+                let out = self.laws.eval(t, x, signs, &self.parameters, q);
+                let distance = out[3 * index] - q[index];
+                // At 1/2 exactly rounding may not move it.
+                let next = q[index] + distance.round();
+                q[index] = if next == q[index] {
+                    q[index] + distance.signum()
+                } else {
+                    next
+                };
+            }
+        }
+        for (k, law) in self.laws.laws.iter().enumerate() {
+            if matches!(law, Law::Held { .. }) {
+                let out = self.laws.eval(t, x, signs, &self.parameters, q);
+                q[k] = floor(out[3 * k]);
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,134 @@
+"""Laws with a memory or a clock, for use inside a right-hand side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import Any
+
+import numpy as np
+
+from filippov.errors import InputError, ModelError
+from filippov.trace import Scalar
+
+__all__ = ["Hysteresis", "hysteresis", "sawtooth", "without_memory"]
+
+_refused: ContextVar[bool] = ContextVar("_refused", default=False)
+
+
+@contextmanager
+def without_memory() -> Iterator[None]:
+    """Refuse laws with a memory: a black box is called with plain numbers, which remember nothing."""
+    token = _refused.set(True)
+    try:
+        yield
+    finally:
+        _refused.reset(token)
+
+
+def sawtooth(t: Any, period: Any) -> Any:
+    """Return the fractional part of ``t / period``, a ramp from 0 to 1 that drops at its multiples.
+
+    Parameters
+    ----------
+    t : number or traced value
+        Usually the time; then the drops are ticks of a clock, ends of steps that are never searched for.
+    period : number or parameter
+
+    Examples
+    --------
+    >>> import filippov as fl
+    >>> fl.sawtooth(2.25, 0.5)
+    0.5
+    >>> sol = fl.solve_ivp(lambda t, x: [fl.sawtooth(t, 0.5)], (0, 2), [0.0])
+    >>> sol.switches.kind.tolist(), sol.y[0, -1].round(12)
+    (['clock', 'clock', 'clock', 'clock'], np.float64(1.0))
+    """
+    phase = t / period
+    return phase - np.floor(phase)
+
+
+def hysteresis(value: Any, low: Any, high: Any, initial: float = -1) -> Any:
+    """Return the state of a relay with two thresholds: +1 once `value` has reached `high`, -1 once `low`.
+
+    Between the thresholds it is what it was; see `Hysteresis`, which is the same for a function of t and x.
+
+    Parameters
+    ----------
+    value : traced value
+        What the relay follows.
+    low, high : number or traced value
+        The thresholds, ``low < high``.
+    initial : {-1, 1}, optional
+        The state at a start between the thresholds.
+
+    Returns
+    -------
+    traced value, +1 or -1
+    """
+    if initial not in (-1, 1):
+        raise InputError(f"initial: -1 or 1 is needed, not {initial!r}")
+    plain = not any(isinstance(part, Scalar) for part in (low, high))
+    if plain and not float(low) < float(high):
+        raise InputError(f"low, high: low must be below high, they are {low!r} and {high!r}")
+    if isinstance(value, Scalar):
+        tracer = value.tracer
+        bounds = (tracer.node(low), tracer.node(high))
+        return tracer.scalar(tracer.laws.hysteresis(tracer, value.node, *bounds, float(initial)))
+    if _refused.get():
+        raise ModelError("a law with a memory cannot be part of a black box: the function must be traced")
+    # At a point alone, without the past.
+    return 1.0 if value >= high else -1.0 if value <= low else float(initial)
+
+
+class Hysteresis:
+    """A relay with two thresholds, usable inside a right-hand side as a number, +1 or -1.
+
+    It becomes +1 where ``h(t, x)`` reaches `high` from below, and -1 where it reaches `low` from above;
+    between the thresholds it is what it was.
+
+    Parameters
+    ----------
+    h : callable
+        ``h(t, x) -> float``.
+    low, high : float
+        The thresholds.
+    initial : {-1, 1}, optional
+        The state at a start between the thresholds; beyond them `h` says it.
+
+    Raises
+    ------
+    InputError
+        If an argument has another form.
+
+    Notes
+    -----
+    ``fl.hysteresis(value, low, high)`` is the same for a value that is at hand.
+
+    Examples
+    --------
+    >>> import filippov as fl
+    >>> warm = fl.Hysteresis(lambda t, x: x[0], 19.0, 21.0)
+    >>> def room(t, x):
+    ...     return [0.1 * (10.0 - x[0]) + (1.0 - warm(t, x))]
+    >>> sol = fl.solve_ivp(room, (0, 20), [15.0])
+    >>> sol.switches.y_before[:3, 0].round(9).tolist()
+    [21.0, 19.0, 21.0]
+    """
+
+    def __init__(self, h: Callable[..., Any], low: float, high: float, initial: float = -1) -> None:
+        if not callable(h):
+            raise InputError(f"h: a function h(t, x) is needed, not {type(h).__name__}; see fl.hysteresis")
+        if not float(low) < float(high):
+            raise InputError(f"low, high: low must be below high, they are {low!r} and {high!r}")
+        if initial not in (-1, 1):
+            raise InputError(f"initial: -1 or 1 is needed, not {initial!r}")
+        self.h, self.low, self.high, self.initial = h, low, high, initial
+
+    def __call__(self, t: Any, x: Any) -> Any:
+        """Return the state of the relay, +1 or -1."""
+        return hysteresis(self.h(t, x), self.low, self.high, self.initial)
+
+    def __repr__(self) -> str:
+        return f"Hysteresis({self.low:g}, {self.high:g}, initial={self.initial:g})"

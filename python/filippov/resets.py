@@ -1,0 +1,187 @@
+"""Resets: jumps of the state at surfaces, at known times, or at the ticks of a clock."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from filippov.errors import InputError
+from filippov.events import check_direction, function_name
+
+__all__ = ["CoreAction", "Reset", "check_map_value", "check_resets"]
+
+Array = npt.NDArray[np.float64]
+
+
+class CoreAction(NamedTuple):
+    """An action in the form that the core takes."""
+
+    when: str
+    numbers: list[float]
+    map: Any
+    name: str
+
+
+class Reset:
+    """A jump of the state, ``x+ = map(t, x-)``: an impact, an impulse, a sample.
+
+    Parameters
+    ----------
+    h : callable, optional
+        ``h(t, y, *args) -> float``: the reset happens where ``h`` reaches zero.
+    map : callable
+        ``map(t, y, *args) -> y_after``, `n` numbers. Parameters of the system that it names in its signature
+        are handed over by name, as to `h`.
+    direction : {-1, 1, 0, "down", "up", "both"}, optional
+        -1, the default: where `h` falls to zero; 1: where it rises to zero; 0: both.
+    name : str, optional
+        Name in tables and messages. Default: the name of `map`.
+    times : array_like, optional
+        Times of the reset, instead of `h`. They are ends of steps, and never searched for.
+    period, phase : float, optional
+        The reset happens at the times ``phase + k * period``, k any whole number, instead of at `h`.
+
+    Raises
+    ------
+    InputError
+        If an argument has another form.
+
+    Notes
+    -----
+    A reset that leaves the position alone and acts on the velocity is an impact. Impacts that come faster and
+    faster are followed to their limit; then the body stays *in contact*, ``h = 0`` and ``h' = 0``, with mode
+    entry 0, until the free acceleration pulls it away. The force of the contact has the direction of the
+    impact.
+
+    Several resets at one instant are done in the order in which they are given, then those that the jump
+    triggers; see ``docs/theory/order_of_outcomes.md``.
+
+    Examples
+    --------
+    >>> import filippov as fl
+    >>> bounce = fl.Reset(lambda t, x: x[0], lambda t, x: [x[0], -0.9 * x[1]])
+    >>> sol = fl.solve_ivp(lambda t, x: [x[1], -9.8], (0, 30), [10.0, 0.0], resets=bounce)
+    >>> sol.switches[-1].kind, round(sol.switches[-1].t, 9), str(sol.mode_at(30.0))
+    ('accumulation', 27.142857143, '0')
+    """
+
+    __slots__ = ("direction", "h", "map", "name", "period", "phase", "times")
+
+    def __init__(
+        self,
+        h: Callable[..., Any] | None = None,
+        map: Callable[..., Any] | None = None,
+        direction: float | str = -1,
+        name: str | None = None,
+        *,
+        times: npt.ArrayLike | None = None,
+        period: float | None = None,
+        phase: float = 0.0,
+    ) -> None:
+        if not callable(map):
+            raise InputError(f"resets: map is a function map(t, y), not {type(map).__name__}")
+        if sum(given is not None for given in (h, times, period)) != 1:
+            raise InputError("resets: one of h, times and period says when the reset happens")
+        if h is not None and not callable(h):
+            raise InputError(f"resets: h is a function h(t, y), not {type(h).__name__}")
+        self.h = h
+        self.map = map
+        self.direction = check_direction(direction, "resets")
+        self.name = name if name is not None else function_name(map, "reset")
+        self.times = None if times is None else _check_times(times)
+        self.period = None if period is None else _finite("period", period, positive=True)
+        self.phase = _finite("phase", phase)
+
+    def __repr__(self) -> str:
+        if self.h is not None:
+            when = f"h={function_name(self.h, 'h')}, direction={self.direction:g}"
+        elif self.times is not None:
+            when = f"{len(self.times)} times"
+        else:
+            when = f"period={self.period:g}, phase={self.phase:g}"
+        return f"Reset({self.name}, {when})"
+
+    def parts(self) -> tuple[Any, ...]:
+        """Everything that the reset is made of."""
+        return tuple(getattr(self, name) for name in self.__slots__)
+
+    def action(self, surface: tuple[int, float] | None, core_map: Any) -> CoreAction:
+        """Return the reset as the core takes it.
+
+        Parameters
+        ----------
+        surface : (int, float) or None
+            Index of the surface of `h`, and the sign by which `h` differs from it.
+        core_map : TracedSystem or callable
+            The map.
+        """
+        if surface is not None:
+            index, orientation = surface
+            return CoreAction("surface", [float(index), orientation * self.direction], core_map, self.name)
+        if self.times is not None:
+            return CoreAction("times", self.times.tolist(), core_map, self.name)
+        assert self.period is not None
+        return CoreAction("clock", [self.period, self.phase], core_map, self.name)
+
+
+def check_resets(resets: Any) -> tuple[Reset, ...]:
+    """Return the argument `resets` as a tuple; a single `Reset` is wrapped.
+
+    Raises
+    ------
+    InputError
+        If an entry is not a `Reset`.
+    """
+    if resets is None:
+        return ()
+    if isinstance(resets, Reset):
+        return (resets,)
+    if callable(resets) or not isinstance(resets, Iterable):
+        raise InputError(f"resets: fl.Reset(h, map) is needed, not {type(resets).__name__}")
+    entries = tuple(resets)
+    for k, entry in enumerate(entries):
+        if not isinstance(entry, Reset):
+            raise InputError(f"resets: entry {k} is not a fl.Reset but {type(entry).__name__}")
+    return entries
+
+
+def check_map_value(value: Any, n: int, what: str) -> None:
+    """Refuse the value of a map that is not `n` real numbers."""
+    if value is None:
+        raise InputError(f"{what}: map returned None: is a `return` missing?")
+    try:
+        components = np.asarray(value)
+    except ValueError:
+        raise InputError(f"{what}: map must return {n} numbers, one per state") from None
+    if components.shape not in ((n,), (n, 1)) or components.dtype.kind not in "fiub":
+        raise InputError(
+            f"{what}: map must return {n} real numbers, as many as y0 has; it returned "
+            f"{components.dtype.name} of shape {components.shape}"
+        )
+
+
+def _check_times(times: Any) -> Array:
+    try:
+        values = np.atleast_1d(np.array(times, dtype=np.float64))
+    except (TypeError, ValueError):
+        raise InputError("resets: times is a sequence of real numbers") from None
+    if values.ndim != 1 or not np.isfinite(values).all():
+        raise InputError("resets: times is a sequence of finite numbers")
+    if (np.diff(values) <= 0.0).any():
+        raise InputError("resets: times must be strictly increasing")
+    return values
+
+
+def _finite(name: str, value: Any, positive: bool = False) -> float:
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    if not math.isfinite(number) or (positive and number <= 0.0):
+        kind = "a positive number" if positive else "a finite number"
+        raise InputError(f"resets: {name} is {kind}, not {value!r}")
+    return number

@@ -1,0 +1,113 @@
+"""Laws with memory in a trace: floors, and relays with hysteresis, each with a discrete state of its own.
+
+A discrete state is a number that the expressions read like a parameter and that changes in instants only. The
+core knows the rule by which it changes (``crates/filippov/src/system/laws.rs``).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+from filippov.trace.explain import NotTraceable
+
+if TYPE_CHECKING:
+    from filippov.trace.branching import Tracer
+
+__all__ = ["Laws"]
+
+# Whole numbers are told apart by less.
+_BETWEEN = 1e-6
+
+
+class _Law(NamedTuple):
+    kind: str
+    nodes: tuple[int, ...]
+    numbers: tuple[float, ...]
+
+
+class Laws:
+    """The laws of one trace: equal ones share their discrete state.
+
+    Parameters
+    ----------
+    first : int
+        Index of the first discrete state among the parameters.
+    """
+
+    def __init__(self, first: int) -> None:
+        self.first = first
+        self.names: list[str] = []
+        self.rows: list[tuple[str, list[int], list[float]]] = []
+        self.n_guards = 0
+        self._known: dict[_Law, int] = {}
+        self._is_complete = False
+
+    def floor(self, tracer: Tracer, node: int) -> int:
+        """Return the node of the floor of an expression."""
+        builder = tracer.builder
+        known = tracer.known_value(node)
+        if known is not None:
+            whole = math.floor(known)
+            for bound in (whole, whole + 1):
+                tracer.known_sign(builder.binary("subtract", node, builder.constant(bound)))
+            return builder.constant(whole)
+        reads = builder.depends_on_parameters_from(node, self.first)
+        if not builder.depends_on_motion(node):
+            return self._state(tracer, _Law("held", (node,), ()), "floor")
+        if not reads and builder.is_affine(node) and not builder.depends_on_state(node):
+            return self._state(tracer, _Law("clock", (node,), ()), "floor")
+        level = self._state(tracer, _Law("level", (node,), ()), "nearest")
+        half = builder.constant(0.5)
+        step = builder.binary("multiply", half, builder.sign(builder.binary("subtract", node, level)))
+        return builder.binary("add", builder.binary("subtract", level, half), step)
+
+    def hysteresis(self, tracer: Tracer, node: int, low: int, high: int, initial: float) -> int:
+        """Return the node of the state, +1 or -1, of a relay with two thresholds."""
+        return self._state(tracer, _Law("hysteresis", (node, low, high), (initial,)), "hysteresis")
+
+    def is_held(self, tracer: Tracer, node: int) -> bool:
+        """Whether an expression contains discrete states and is constant between their changes."""
+        builder = tracer.builder
+        return (
+            bool(self.names)
+            and not builder.depends_on_motion(node)
+            and builder.depends_on_parameters_from(node, self.first)
+        )
+
+    def beside(self, tracer: Tracer, node: int, side: float) -> int:
+        """Return an expression of whole numbers moved off them, so that it is never zero."""
+        return tracer.builder.binary("add", node, tracer.builder.constant(side * _BETWEEN))
+
+    def complete(self, tracer: Tracer) -> None:
+        """Declare the surfaces at which discrete states change; no law can be added after that."""
+        builder = tracer.builder
+        half = builder.constant(0.5)
+        before = builder.n_surfaces()
+        for index, law in enumerate(list(self._known)):
+            state = builder.parameter(self.first + index)
+            numbers = list(law.numbers)
+            if law.kind == "level":
+                distance = builder.binary("subtract", law.nodes[0], state)
+                surface, orientation = builder.switch(distance)
+                guard = builder.declare_surface(builder.binary("subtract", half, builder.abs(distance)))
+                numbers = [float(surface), orientation, float(guard)]
+            elif law.kind == "hysteresis":
+                value, low, high = law.nodes
+                middle = builder.binary("multiply", half, builder.binary("add", low, high))
+                width = builder.binary("multiply", half, builder.binary("subtract", high, low))
+                inside = builder.binary("multiply", state, builder.binary("subtract", value, middle))
+                numbers.append(float(builder.declare_surface(builder.binary("add", inside, width))))
+            self.rows.append((law.kind, list(law.nodes), numbers))
+        self.n_guards = builder.n_surfaces() - before
+        self._is_complete = True
+
+    def _state(self, tracer: Tracer, law: _Law, name: str) -> int:
+        index = self._known.get(law)
+        if index is None:
+            if self._is_complete:
+                raise NotTraceable(f"{name}(...) of an expression that the right-hand side does not have")
+            index = len(self.names)
+            self._known[law] = index
+            self.names.append(f"{name}({tracer.text(law.nodes[0])})")
+        return tracer.builder.parameter(self.first + index)
