@@ -181,6 +181,8 @@ pub enum WarningCode {
     NonUnique,
     /// The field seems to jump where no surface is declared.
     UndeclaredJump,
+    /// Sliding goes on at a root that is not stable for the scaling of the surfaces.
+    Oscillation,
 }
 
 impl WarningCode {
@@ -189,6 +191,7 @@ impl WarningCode {
         match self {
             WarningCode::NonUnique => "non_unique",
             WarningCode::UndeclaredJump => "undeclared_jump",
+            WarningCode::Oscillation => "oscillation",
         }
     }
 }
