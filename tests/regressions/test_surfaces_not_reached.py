@@ -1,4 +1,4 @@
-"""Where a field has ended at a surface, steps aim at the next one, also if it is approached and not reached."""
+"""Where a field has ended at a surface, steps aim at the next one, also if it turns back before it."""
 
 from __future__ import annotations
 
