@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
 import pytest
 from regularised import T_END, random_case
 
-WIDTHS = (1e-4, 1e-5)
+WIDTHS = (1e-3, 1e-4, 1e-5)
 TIMES = np.linspace(0.0, T_END, 31)
 
 
@@ -27,15 +28,15 @@ def distances(seed: int) -> tuple[Any, list[float]]:
 
 
 def approaches(found: list[float]) -> bool:
-    """Whether the distance falls like the width: their ratio grows by no more than a fifth."""
-    return found[1] <= 1.2 * found[0] + 0.1
+    """Whether the distance falls like the width: their ratio grows by a fifth at most from width to width."""
+    return all(finer <= 1.2 * coarser + 0.1 for coarser, finer in itertools.pairwise(found))
 
 
 @pytest.mark.parametrize("seed", range(24))
 def test_regularised_motion_approaches_the_solution(seed: int) -> None:
     _, found = distances(seed)
     assert approaches(found)
-    assert found[1] < 50.0
+    assert found[-1] < 50.0
 
 
 def test_spiral_that_shrinks_a_thousandfold_with_each_turn() -> None:
@@ -57,22 +58,41 @@ def loses_its_root(run: Any) -> bool:
 
 
 def test_many_regularised_motions() -> None:
-    """All of 200 systems approach the solution, 199 at the rate of the width.
+    """All of 200 systems approach the solution: 197 at the rate of the width from 1e-3 on, 199 from 1e-4 on.
 
-    In one of them a root is lost, and there the regularised motion leaves late, by a power of the width
-    below 1: 0.8 from 1e-3 to 1e-7. No other one is an exception.
+    The exceptions, with distances divided by the width from 1e-3 to 1e-7:
+
+    - 37: 20, 30, 30.2, 30.3, 30.3, and 52: 14, 24, 26, 27, 26. The width 1e-3 is too coarse for them; in
+      52 two surfaces are reached within a time of 9e-4.
+    - 136: 14, 18, 24, 37, 60. Two roots meet at a fold, which a regularised motion passes late by
+      eps^(2/3), as soon as eps^(1/3) is small against the distance 0.03 of the merged root from the side of
+      the square: the exponent falls from 0.9 to 0.78 here.
     """
-    exceptions, roots_lost, sliding = [], [], {0: 0, 1: 0, 2: 0, 3: 0}
+    exceptions, roots_lost, coarse, sliding = [], [], [], {0: 0, 1: 0, 2: 0, 3: 0}
     for seed in range(200):
         run, found = distances(seed)
         sliding[max(segment.mode.codimension for segment in run.segments)] += 1
-        if not approaches(found):
-            assert found[1] < 3.0 * found[0]
-            (roots_lost if loses_its_root(run) else exceptions).append(seed)
+        if approaches(found):
+            continue
+        assert found[2] < 3.0 * found[0]
+        if loses_its_root(run):
+            roots_lost.append(seed)
+        else:
+            (coarse if approaches(found[1:]) else exceptions).append(seed)
     assert exceptions == []
+    assert coarse == [37, 52]
     assert roots_lost == [136]
     assert min(sliding.values()) >= 10
     assert sliding[2] >= 60
+
+
+@pytest.mark.parametrize(("seed", "limit"), [(37, 30.3), (52, 26.6)])
+def test_exceptions_at_the_coarsest_width_are_regular_at_finer_ones(seed: int, limit: float) -> None:
+    case = random_case(seed)
+    exact = case.system().solve((0.0, T_END), case.y0, rtol=1e-9, atol=1e-9).sol(TIMES)
+    states = case.regularised(1e-6, TIMES)
+    assert states is not None
+    np.testing.assert_allclose(np.abs(states - exact).max() / 1e-6, limit, rtol=0.02)
 
 
 def test_the_check_sees_a_wrong_solution() -> None:

@@ -80,6 +80,10 @@ pub const EXTRAPOLATION: f64 = 1.3;
 /// time to the surface, so that the surface lies at 1.15 steps, well inside the extrapolation.
 pub const ONE_SIDED_AIM: f64 = 0.87;
 
+/// A surface is not aimed at if its function, continued as a parabola, falls to no less than this share of its value: an
+/// error of the curvature by a factor of two leaves it positive.
+pub const TURNS_BACK: f64 = 0.5;
+
 /// First offset into its own side for a field that is not finite on its surface, in units of
 /// `EPS` times the size of the state; grown by 16 up to five times.
 pub const SIDE_OFFSET: f64 = 8.0;
@@ -142,6 +146,10 @@ pub const DOUBTFUL: f64 = 1e-8;
 
 /// Where an exit leaves several ways open, the hidden dynamics starts beside the root by this much.
 pub const BESIDE_THE_ROOT: f64 = 1e-6;
+
+/// Distance from a root of three and more surfaces that loses stability at which the hidden dynamics starts: the pair
+/// of eigenvalues that vanishes there says nothing, and what decides grows like the square of the distance.
+pub const UNSTABLE_START: f64 = 0.1;
 
 /// Drift of the normal components after an exit, as a fraction of their size: small enough to leave
 /// all signs as they are, large enough to pass the fold in some thousands of units of time.
@@ -243,6 +251,17 @@ pub const NEWTON_STEPS: usize = 30;
 
 /// An iterate beyond this does not come back to a root in the cube that is worth tracking.
 pub const FAR_FROM_THE_CUBE: f64 = 10.0;
+
+/// A root that Newton's method finds farther than this from the last multipliers is another one: steps are shortened
+/// until they move less.
+pub const TRACKED_REACH: f64 = 0.5;
+
+/// Two roots that meet farther than this from the multipliers tracked last are others: these are known up to the square
+/// root of the last step.
+pub const FOLD_REACH: f64 = 0.2;
+
+/// Evaluations of which the multipliers are kept to track from: those of a step and its rejected attempts.
+pub const MOST_TRACKED: usize = 16;
 
 /// A motion of that many times the last step shows which step suits its mode.
 pub const MANY: f64 = 8.0;

@@ -3,6 +3,7 @@
 use filippov_expr::{Enclosure, Motion};
 
 use crate::error::FieldError;
+use crate::tolerances::TURNS_BACK;
 
 /// A function whose zeros end a piece of motion, or are reported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,9 +75,15 @@ impl Monitored {
             return f64::INFINITY;
         }
         let discriminant = rate * rate - 2.0 * curvature * value;
-        // No zero of the parabola: its lowest point is the nearest approach.
+        // No zero of the parabola: its lowest point is the nearest approach. Where that is not much lower than here the
+        // function turns back, and steps that aim at it would shrink to nothing.
         if discriminant < 0.0 {
-            -rate / curvature
+            let lowest = value - rate * rate / (2.0 * curvature);
+            if lowest > TURNS_BACK * value {
+                f64::INFINITY
+            } else {
+                -rate / curvature
+            }
         } else {
             2.0 * value / (-rate + discriminant.sqrt())
         }

@@ -1,7 +1,8 @@
 //! The law of sliding on many surfaces where the field is affine in their signs.
 
+use super::canopy::root_ends;
 use crate::error::FieldError;
-use crate::switching::{stability_margins, Matrix};
+use crate::switching::Matrix;
 use crate::system::{AffineParts, AffineSigns, PiecewiseSystem};
 use crate::tolerances::{MOST_MEETING, SURFACE_NOISE};
 
@@ -62,8 +63,8 @@ impl<'a> AffineLaw<'a> {
     }
 
     /// The exit functions of the root, as those of the canopy: the determinant of N with the sign of a stable one,
-    /// and the stability. Only for a few surfaces; the friction of many bodies is stable for good.
-    pub fn ends(&self) -> [f64; 2] {
+    /// and the stability ([`root_ends`]). Only for a few surfaces; the friction of many bodies is stable for good.
+    pub fn ends(&self, oscillates: &mut Option<bool>) -> [f64; 2] {
         let (normal, m) = (self.parts.normal(), self.parts.surfaces().len());
         if m > MOST_MEETING {
             return [1.0, 1.0];
@@ -73,7 +74,7 @@ impl<'a> AffineLaw<'a> {
             normal.row(i).for_each(|(j, v)| jacobian[(i, j)] = v);
         }
         if m > 2 {
-            return stability_margins(&jacobian.with_rows_scaled(&self.kappa));
+            return root_ends((&jacobian, false), &self.kappa, oscillates);
         }
         let size = |i: usize| {
             normal

@@ -3,8 +3,12 @@
 use super::MeetingFields;
 use crate::error::FieldError;
 use crate::switching::codim2::Bilinear;
-use crate::switching::{least_multipliers, newton, stability_margins, stable_roots, NormalFields};
+use crate::switching::{
+    least_multipliers, newton, scaling_margin, stability_margins, stable_roots, Matrix,
+    NormalFields,
+};
 use crate::system::PiecewiseSystem;
+use crate::tolerances::TRACKED_REACH;
 
 /// The canopy of the 2^m fields around an intersection, and the root that the motion follows.
 pub struct Canopy {
@@ -43,46 +47,80 @@ impl Canopy {
         self.fields.evaluate(system, t, x, signs)
     }
 
-    /// Finds the multipliers, near those in `lambda` if there are any, and writes the field. Returns the exit
-    /// functions of the root, fold and stability; `None` if there is no root.
-    pub fn solve(&mut self, lambda: &mut Vec<f64>, dx: &mut [f64]) -> Option<[f64; 2]> {
+    /// Are all fields finite that were evaluated last?
+    pub fn is_finite(&self) -> bool {
+        self.fields.normal_fields().is_ok()
+    }
+
+    /// Finds the multipliers, near those in `tracked` if there are any, and writes the field. Returns the
+    /// multipliers with the exit functions of the root ([`root_ends`]); `None` if there is no root.
+    pub fn solve(
+        &mut self,
+        tracked: &[f64],
+        oscillates: &mut Option<bool>,
+        dx: &mut [f64],
+    ) -> Option<(Vec<f64>, [f64; 2])> {
         let fields = self.fields.normal_fields().ok()?;
         let telling = self.fields.telling();
-        let ends = if telling.len() < fields.m() {
+        let (lambda, ends) = if telling.len() < fields.m() {
             // Sliding of higher order: some equations hold for all multipliers, and only their ends end it.
-            *lambda = least_multipliers(&fields, &telling)?;
-            [1.0, 1.0]
+            (least_multipliers(&fields, &telling)?, [1.0, 1.0])
         } else if fields.m() == 2 {
-            solve_two(&fields, lambda)?
+            solve_two(&fields)?
         } else {
-            solve_many(&fields, lambda, &self.kappa)?
+            let lambda = solve_many(&fields, tracked)?;
+            let jacobian = (fields.jacobian(&lambda), fields.groups().len() > 1);
+            let ends = root_ends((&jacobian.0, jacobian.1), &self.kappa, oscillates);
+            // Beyond a fold Newton's method may find the other root, which is never followed.
+            (ends[0] > 0.0).then_some((lambda, ends))?
         };
-        self.fields.fill_product_weights(lambda, &mut self.weights);
+        self.fields.fill_product_weights(&lambda, &mut self.weights);
         self.fields.combine(&self.weights, dx);
-        Some(ends)
+        Some((lambda, ends))
     }
 }
 
 /// Two surfaces: the root with det G > 0 in closed form, extended slightly beyond a fold.
-fn solve_two(fields: &NormalFields, lambda: &mut Vec<f64>) -> Option<[f64; 2]> {
+fn solve_two(fields: &NormalFields) -> Option<(Vec<f64>, [f64; 2])> {
     let canopy = Bilinear::of_fields(fields);
     let root = canopy.extended_root()?;
     let jacobian = canopy.jacobian(root);
-    lambda.clear();
-    lambda.extend(root);
     let sizes = [fields.row_size(0), fields.row_size(1)];
     let stability = -(jacobian[0][0] / sizes[0]).min(jacobian[1][1] / sizes[1]);
-    Some([canopy.discriminant(), stability])
+    Some((root.to_vec(), [canopy.discriminant(), stability]))
 }
 
 /// More surfaces: Newton's method from the last multipliers; at the start from the only stable root.
-fn solve_many(fields: &NormalFields, lambda: &mut Vec<f64>, kappa: &[f64]) -> Option<[f64; 2]> {
-    if lambda.len() != fields.m() {
-        *lambda = stable_roots(fields).into_iter().next()?;
+fn solve_many(fields: &NormalFields, tracked: &[f64]) -> Option<Vec<f64>> {
+    if tracked.len() != fields.m() {
+        let root = stable_roots(fields).into_iter().next()?;
+        return newton(fields, &root);
     }
-    *lambda = newton(fields, lambda)?;
-    // Stable for the scaling that decides where the motion began.
-    Some(stability_margins(
-        &fields.jacobian(lambda).with_rows_scaled(kappa),
-    ))
+    // A root that is far away is another one.
+    let root = newton(fields, tracked)?;
+    let mut moves = root.iter().zip(tracked).map(|(a, b)| (a - b).abs());
+    moves.all(|by| by <= TRACKED_REACH).then_some(root)
+}
+
+/// The exit functions of a root of three and more surfaces with this matrix G: that two roots meet, and that it is no
+/// longer stable with the surfaces scaled by `kappa` ([`stability_margins`]).
+///
+/// Where the motion begins at a root that is not stable so, the regularised motion oscillates around it. Then the second
+/// function ends it where the root is not stable for any scaling. `oscillates` is found out if it is not known.
+pub fn root_ends(
+    (jacobian, in_parts): (&Matrix, bool),
+    kappa: &[f64],
+    oscillates: &mut Option<bool>,
+) -> [f64; 2] {
+    let [fold, stability] = stability_margins(&jacobian.with_rows_scaled(kappa), in_parts);
+    if *oscillates.get_or_insert(stability <= 0.0) {
+        let size = |i: usize| (0..kappa.len()).fold(0.0_f64, |s, j| s.max(jacobian[(i, j)].abs()));
+        let units: Vec<f64> = (0..kappa.len()).map(|i| 1.0 / size(i)).collect();
+        [
+            fold,
+            scaling_margin(&jacobian.with_rows_scaled(&units)).max(stability),
+        ]
+    } else {
+        [fold, stability]
+    }
 }

@@ -6,7 +6,7 @@ use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::options::SlidingRule;
 use crate::system::PiecewiseSystem;
-use crate::tolerances::MOST_MEETING;
+use crate::tolerances::{MOST_MEETING, MOST_TRACKED};
 
 /// What ends sliding on an intersection of m surfaces: functions that are positive until then.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,8 +22,8 @@ pub enum IntersectionExit {
     /// Two roots meet: (-1)^m det G, for two surfaces the discriminant. For a rule other than the canopy: a
     /// premise of the rule fails.
     Fold,
-    /// No scaling of the surfaces makes the root stable any longer: -min(G11, G22), or the last Hurwitz
-    /// determinant. For a rule other than the canopy: the fields begin to wind outwards.
+    /// No scaling of the surfaces makes the root stable any longer: -min(G11, G22). For more than two surfaces, it is
+    /// not stable for the given scaling: the last Hurwitz determinant. For a rule other than the canopy: the fields begin to wind outwards.
     Stability,
 }
 
@@ -59,8 +59,14 @@ pub struct IntersectionField<'a> {
     canopy: Option<Canopy>,
     /// Another combination of the fields, if that was chosen.
     by_rule: Option<RuleLaw>,
+    /// At the last evaluation; none where there is no root.
     lambda: Vec<f64>,
+    /// Those that were found lately, with their times: from the nearest ones the next are tracked.
+    tracked: Vec<(f64, Vec<f64>)>,
     exits: Vec<f64>,
+    is_rootless: bool,
+    /// Whether the regularised motion oscillates around the root of three and more surfaces, once it is known.
+    oscillates: Option<bool>,
     projector: Projector,
     n_evaluations: u64,
 }
@@ -86,8 +92,11 @@ impl<'a> IntersectionField<'a> {
                 .all(|group| group.len() <= MOST_MEETING)
                 .then(|| Canopy::new(system, set)),
             by_rule: None,
-            lambda: lambda.to_vec(),
+            lambda: Vec::new(),
+            tracked: vec![(f64::INFINITY, lambda.to_vec())],
             exits: vec![f64::NAN; 2 * set.len() + 2],
+            is_rootless: false,
+            oscillates: None,
             projector: Projector::new(system.n_states(), system.n_surfaces()),
             n_evaluations: 0,
         }
@@ -114,10 +123,32 @@ impl<'a> IntersectionField<'a> {
         self
     }
 
-    /// The multipliers from which those of the next evaluation are tracked.
-    pub fn set_multipliers(&mut self, lambda: &[f64]) {
-        self.lambda.clear();
-        self.lambda.extend_from_slice(lambda);
+    /// Begins a motion: its multipliers are tracked from these, if there are any. `oscillates` says that the
+    /// regularised motion goes around the root, so that it need not be stable.
+    pub fn begin(&mut self, lambda: &[f64], oscillates: bool) {
+        self.tracked = vec![(f64::INFINITY, lambda.to_vec())];
+        self.oscillates = oscillates.then_some(true);
+    }
+
+    /// Does the regularised motion oscillate around the root, for three and more surfaces?
+    pub fn oscillates(&self) -> bool {
+        self.oscillates == Some(true)
+    }
+
+    /// The multipliers at the last evaluation, or if there are none those that were found nearest to time t.
+    pub fn tracked(&self, t: f64) -> &[f64] {
+        if self.lambda.is_empty() {
+            nearest(&self.tracked, t)
+        } else {
+            &self.lambda
+        }
+    }
+
+    fn track(&mut self, t: f64) {
+        if self.tracked.len() >= MOST_TRACKED {
+            self.tracked.remove(0);
+        }
+        self.tracked.push((t, self.lambda.clone()));
     }
 
     /// The combination of the fields.
@@ -159,6 +190,11 @@ impl<'a> IntersectionField<'a> {
         &self.lambda
     }
 
+    /// Were all fields there at the last evaluation, but no multipliers?
+    pub fn is_rootless(&self) -> bool {
+        self.is_rootless
+    }
+
     /// The exit functions at the last evaluation.
     pub fn exits(&self) -> &[f64] {
         &self.exits
@@ -181,6 +217,7 @@ impl<'a> IntersectionField<'a> {
     /// no root they are NaN.
     fn solve(&mut self, t: f64, x: &mut [f64], dx: &mut [f64]) -> Result<(), FieldError> {
         self.project(t, x)?;
+        self.is_rootless = false;
         if let Some(law) = &mut self.by_rule {
             let evaluated = (self.system, &self.signs[..]);
             self.n_evaluations += law.eval(evaluated, t, x, &mut self.lambda, dx)?;
@@ -192,7 +229,7 @@ impl<'a> IntersectionField<'a> {
             if law.multipliers().iter().all(|l| l.is_finite()) {
                 self.lambda.clear();
                 self.lambda.extend(law.multipliers());
-                let ends = law.ends();
+                let ends = law.ends(&mut self.oscillates);
                 self.fill_exits(ends);
                 return Ok(());
             }
@@ -200,13 +237,19 @@ impl<'a> IntersectionField<'a> {
         let found = match &mut self.canopy {
             Some(canopy) => {
                 self.n_evaluations += canopy.evaluate(self.system, t, x, &self.signs)?;
-                canopy.solve(&mut self.lambda, dx)
+                canopy.solve(nearest(&self.tracked, t), &mut self.oscillates, dx)
             }
             None => None,
         };
         match found {
-            Some(ends) => self.fill_exits(ends),
+            Some((lambda, ends)) => {
+                self.lambda = lambda;
+                self.track(t);
+                self.fill_exits(ends);
+            }
             None => {
+                let canopy = self.canopy.as_ref();
+                self.is_rootless = canopy.is_some_and(Canopy::is_finite);
                 self.exits.fill(f64::NAN);
                 self.lambda.clear();
                 dx.fill(f64::NAN);
@@ -223,6 +266,20 @@ impl<'a> IntersectionField<'a> {
         let m = self.lambda.len();
         (self.exits[2 * m], self.exits[2 * m + 1]) = (fold, stability);
     }
+}
+
+/// The multipliers with the nearest time; of several the last.
+fn nearest(tracked: &[(f64, Vec<f64>)], t: f64) -> &[f64] {
+    let distance = |found: &&(f64, Vec<f64>)| (found.0 - t).abs();
+    let mut all = tracked.iter().rev();
+    let first = all.next();
+    let least = first.map(|first| {
+        all.fold(
+            first,
+            |a, b| if distance(&b) < distance(&a) { b } else { a },
+        )
+    });
+    least.map_or(&[], |found| &found.1)
 }
 
 impl SmoothField for IntersectionField<'_> {

@@ -19,6 +19,7 @@ use std::time::Instant;
 use rustc_hash::FxHashMap;
 
 use super::detect::Detector;
+use super::meeting::DecidedRoot;
 use super::motion::{ModeField, Motion};
 use super::pace::Pace;
 use super::timetable::Timetable;
@@ -78,8 +79,8 @@ pub struct Integrator<'a> {
     pub(super) recent_dt: f64,
     /// Time of the last switch, and how many came at that time.
     pub(super) last_switch: (f64, u32),
-    /// The multipliers with which the next motion begins, as its decision found them.
-    pub(super) decided_multipliers: Vec<f64>,
+    /// What its decision found of the root that the next motion begins at.
+    pub(super) decided: DecidedRoot,
 }
 
 impl<'a> Integrator<'a> {
@@ -131,7 +132,7 @@ impl<'a> Integrator<'a> {
             meets_edges: false,
             recent_dt: 0.0,
             last_switch: (f64::NAN, 0),
-            decided_multipliers: Vec::new(),
+            decided: DecidedRoot::default(),
         })
     }
 

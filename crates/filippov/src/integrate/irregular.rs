@@ -8,6 +8,7 @@ use super::motion::ModeField;
 use super::{Warning, WarningCode};
 use crate::error::FieldError;
 use crate::event::{EventFunction, Monitored};
+use crate::field::IntersectionExit;
 use crate::tolerances::{ARRIVED, AT_FOLD, JUMP_SHRINK, ONE_SIDED_AIM};
 
 impl Integrator<'_> {
@@ -28,6 +29,14 @@ impl Integrator<'_> {
     /// After a step that was not finite: aims at the surface that the motion approaches, or shortens
     /// the step if it did so already.
     pub(super) fn shorten_to_surface(&mut self, dt: f64) {
+        if let ModeField::Intersection(field) = &self.motion.field {
+            if field.is_rootless() {
+                // No edge of the field: the multipliers end, or move fast.
+                self.dt = 0.5 * dt;
+                self.controller.not_finite();
+                return;
+            }
+        }
         let aim = ONE_SIDED_AIM * self.nearest_surface();
         let aims = !self.one_sided && aim < dt;
         self.dt = if aims { aim } else { 0.5 * dt };
@@ -83,11 +92,49 @@ impl Integrator<'_> {
         };
         let fold = 2 * field.set().len();
         let ends = self.detector.stages.get(fold..=fold)?;
-        (ends[0][0].abs() < AT_FOLD).then(|| Found {
+        let is_lost = field.set().len() > 2 && field.is_rootless();
+        (is_lost || ends[0][0].abs() < AT_FOLD).then(|| Found {
             theta: 0.0,
             functions: smallvec![EventFunction::Exit(fold)],
             touch: false,
         })
+    }
+
+    /// Is it the root of three and more surfaces that is no longer stable?
+    pub(super) fn loses_stability(&self, event: &Found) -> bool {
+        let ModeField::Intersection(field) = &self.motion.field else {
+            return false;
+        };
+        let is_stability = |f: &EventFunction| match f {
+            EventFunction::Exit(index) => field.exit(*index) == IntersectionExit::Stability,
+            _ => false,
+        };
+        field.set().len() > 2 && event.functions.iter().any(is_stability)
+    }
+
+    /// Warns where a motion begins at a root around which the regularised motion oscillates.
+    pub(super) fn note_oscillation(&mut self) {
+        let ModeField::Intersection(field) = &self.motion.field else {
+            return;
+        };
+        if !field.oscillates() {
+            return;
+        }
+        let names = field
+            .set()
+            .iter()
+            .map(|&j| self.system.surface_name(j) + " = 0");
+        let names: Vec<String> = names.collect();
+        self.warnings.push(Warning {
+            t: self.t,
+            code: WarningCode::Oscillation,
+            text: format!(
+                "sliding at the intersection of {} is not stable for this scaling of the surfaces: the regularised \
+                 motion oscillates around it, and its mean may differ; another kappa= may be stable",
+                names.join(", ")
+            ),
+            candidates: Vec::new(),
+        });
     }
 
     /// Warns where the field jumps over a step far shorter than its predecessors.

@@ -12,11 +12,20 @@ use crate::event::EventFunction;
 use crate::field::{IntersectionExit, IntersectionField, MeetingFields, SlidingField, SmoothField};
 use crate::mode::Mode;
 use crate::switching::{
-    admissible, decide_intersection, first_nonzero, has_one_mode_only, resolve, Continuation,
-    ExitKind, Incoming, Leading, NormalFields, Resolution, Undecided,
+    admissible, decide_intersection, first_nonzero, has_one_mode_only, merged_root, resolve,
+    Continuation, ExitKind, Incoming, Leading, NormalFields, Resolution, Undecided,
 };
 use crate::system::{dot, dot_magnitude};
-use crate::tolerances::{DEPARTS_TANGENTIALLY, DRIFT_SHARE, MOST_LISTED, MOST_MEETING};
+use crate::tolerances::{DEPARTS_TANGENTIALLY, DRIFT_SHARE, EPS, MOST_LISTED, MOST_MEETING};
+
+/// The root at which a motion on an intersection begins.
+#[derive(Default)]
+pub(super) struct DecidedRoot {
+    /// The multipliers; none if they are not known.
+    pub multipliers: Vec<f64>,
+    /// The regularised motion oscillates around it.
+    pub oscillates: bool,
+}
 
 impl Integrator<'_> {
     /// What follows where the surfaces of `meeting` vanish; `fresh` are those among them that were reached now.
@@ -40,7 +49,7 @@ impl Integrator<'_> {
         let mut others = Vec::new();
         let resolution = match corners.normal_fields() {
             Ok(fields) => {
-                let incoming = self.incoming(event, mode, meeting, fresh, &fields)?;
+                let incoming = self.incoming(event, mode, fresh, (&corners, &fields))?;
                 others = other_solutions(&fields, &incoming);
                 let kappa = self.kappa(meeting);
                 match resolve(&fields, &incoming, &kappa) {
@@ -113,16 +122,19 @@ impl Integrator<'_> {
         &mut self,
         event: &Found,
         mode: &Mode,
-        meeting: &[usize],
         fresh: &[usize],
-        fields: &NormalFields,
+        (corners, fields): (&MeetingFields, &NormalFields),
     ) -> Result<Incoming, FieldError> {
+        let meeting = corners.set();
         let entries: Vec<i8> = meeting.iter().map(|&j| mode.entries()[j]).collect();
         if self.motion.sliding().is_empty() {
             return Ok(Incoming::Corner { region: entries });
         }
         self.motion.field.exits(self.t, &mut self.x)?;
-        let multipliers = self.motion.multipliers();
+        let multipliers = match &self.motion.field {
+            ModeField::Intersection(field) => field.tracked(self.t).to_vec(),
+            _ => self.motion.multipliers(),
+        };
         let exit = event.functions.iter().find_map(|function| match function {
             EventFunction::Exit(index) => Some(*index),
             _ => None,
@@ -138,7 +150,11 @@ impl Integrator<'_> {
                 if let IntersectionExit::Side { position, end } = field.exit(index) {
                     lambda[position] = f64::from(end);
                 }
-                let drift = self.drift(mode, meeting, fields, &lambda)?;
+                if kind == ExitKind::Fold && meeting.len() > 2 {
+                    let merged = merged_root(fields, &lambda);
+                    lambda = merged.map_or(lambda, |merged| merged.lambda);
+                }
+                let drift = self.drift(mode, corners, fields, &lambda)?;
                 Ok(Incoming::Exit {
                     kind,
                     lambda,
@@ -156,19 +172,19 @@ impl Integrator<'_> {
     fn drift(
         &mut self,
         mode: &Mode,
-        meeting: &[usize],
+        corners: &MeetingFields,
         fields: &NormalFields,
         lambda: &[f64],
     ) -> Result<Vec<f64>, FieldError> {
-        let mut velocity = vec![0.0; self.x.len()];
-        self.motion.field.eval(self.t, &mut self.x, &mut velocity)?;
-        let dt = DRIFT_SHARE * self.stepper.interpolant().dt;
-        let ahead: Vec<f64> = self
-            .x
-            .iter()
-            .zip(&velocity)
-            .map(|(x, v)| x + dt * v)
-            .collect();
+        let meeting = corners.set();
+        let (mut velocity, mut weights) = (vec![0.0; self.x.len()], Vec::new());
+        corners.fill_product_weights(lambda, &mut weights);
+        corners.combine(&weights, &mut velocity);
+        // Towards a fold steps shrink to nothing.
+        let shortest = EPS.sqrt() * self.t.abs().max(self.t_end - self.t);
+        let dt = (DRIFT_SHARE * self.stepper.interpolant().dt).max(shortest);
+        let pairs = self.x.iter().zip(&velocity);
+        let ahead: Vec<f64> = pairs.map(|(x, v)| x + dt * v).collect();
         let mut corners = MeetingFields::new(self.system, meeting);
         self.stats.n_field_evaluations +=
             corners.evaluate(self.system, self.t + dt, &ahead, &mode.signs())?;
@@ -245,7 +261,10 @@ impl Integrator<'_> {
             &[]
         };
         let left = self.departures(&after, &leaving, multipliers)?;
-        self.decided_multipliers = multipliers.to_vec();
+        self.decided = DecidedRoot {
+            multipliers: multipliers.to_vec(),
+            oscillates: after == preferred && resolution.oscillates,
+        };
         Ok(Ok((after, left)))
     }
 

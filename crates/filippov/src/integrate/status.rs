@@ -214,6 +214,8 @@ pub enum WarningCode {
     UndeclaredJump,
     /// Taylor series were asked for, and a motion has none.
     NoSeries,
+    /// Sliding goes on at a root that is not stable for the scaling of the surfaces.
+    Oscillation,
 }
 
 impl WarningCode {
@@ -223,6 +225,7 @@ impl WarningCode {
             WarningCode::NonUnique => "non_unique",
             WarningCode::UndeclaredJump => "undeclared_jump",
             WarningCode::NoSeries => "no_series",
+            WarningCode::Oscillation => "oscillation",
         }
     }
 }

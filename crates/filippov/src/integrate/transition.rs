@@ -146,6 +146,11 @@ impl Integrator<'_> {
             Ok(decided) => decided,
             Err(stop) => return Ok(Some(stop)),
         };
+        // Stability is lost, and the motion stays all the same: it oscillates around the root from now on.
+        let slides_on = after
+            .sliding_set()
+            .eq(self.motion.sliding().iter().copied());
+        self.decided.oscillates |= slides_on && self.loses_stability(event);
         let is_changed = |j: &usize| mode.entries()[*j] != after.entries()[*j];
         let mut changed: Vec<usize> = surfaces.iter().copied().filter(is_changed).collect();
         if changed.is_empty() {
@@ -268,9 +273,9 @@ impl Integrator<'_> {
         self.remember_pace();
         self.motion.restart(self.system, self.t, mode, &deflations);
         self.choose_stepper();
-        let multipliers = std::mem::take(&mut self.decided_multipliers);
+        let decided = std::mem::take(&mut self.decided);
         if let ModeField::Intersection(field) = &mut self.motion.field {
-            field.set_multipliers(&multipliers);
+            field.begin(&decided.multipliers, decided.oscillates);
         }
         self.motion.project(self.t, &mut self.x)?;
         let derivative = self.stepper.start_derivative_mut();
@@ -289,6 +294,7 @@ impl Integrator<'_> {
                     .extend(exits.iter().map(|&exit| [exit; 7]));
             }
         }
+        self.note_oscillation();
         let multipliers = self.motion.multipliers();
         self.recorder.begin_segment(
             self.t,

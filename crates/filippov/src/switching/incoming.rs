@@ -1,9 +1,10 @@
 //! How a motion comes to an intersection, and where its hidden dynamics starts.
 
+use super::fold::merged_root;
 use super::normal_fields::NormalFields;
 use super::resolution::Undecided;
 use super::roots::{multiplier_rates, newton, stable_roots};
-use crate::tolerances::{AFTER_THE_EXIT, BESIDE_THE_ROOT, CORNER_OFFSETS};
+use crate::tolerances::{AFTER_THE_EXIT, BESIDE_THE_ROOT, CORNER_OFFSETS, UNSTABLE_START};
 
 /// What the motion did before.
 #[derive(Clone, Debug, PartialEq)]
@@ -177,8 +178,8 @@ fn polished(
     root.ok_or(not_sliding)
 }
 
-/// The root itself, in fields that have drifted for a short time; where stability is lost, a little
-/// beside it.
+/// The root itself, in fields that have drifted for a short time. Where two roots meet, in fields that have been moved
+/// to the point where they do; where stability is lost, a little beside it.
 fn exit_state(
     fields: &NormalFields,
     kind: ExitKind,
@@ -188,7 +189,7 @@ fn exit_state(
     if lambda.len() != fields.m() {
         return Err(Undecided::NotAnExit);
     }
-    if kind == ExitKind::Stability {
+    if kind == ExitKind::Stability && fields.m() == 2 {
         return Ok(Starts {
             fields: fields.clone(),
             states: vec![beside(fields, lambda, drift)],
@@ -200,11 +201,38 @@ fn exit_state(
     if !factor.is_finite() {
         return Err(Undecided::NoDrift { m: fields.m() });
     }
-    let shift: Vec<f64> = drift.iter().map(|d| factor * d).collect();
+    let mut shift: Vec<f64> = drift.iter().map(|d| factor * d).collect();
+    let states = match kind {
+        ExitKind::Fold => {
+            let merged = merged_root(fields, lambda).ok_or(Undecided::NotAnExit)?;
+            shift
+                .iter_mut()
+                .zip(&merged.residual)
+                .for_each(|(shift, g)| *shift -= g);
+            vec![merged.lambda]
+        }
+        ExitKind::Stability => around(lambda),
+        ExitKind::Side => vec![lambda.to_vec()],
+    };
     Ok(Starts {
         fields: fields.shifted(&shift),
-        states: vec![lambda.to_vec()],
+        states,
     })
+}
+
+/// States around a root that is no longer stable, in the directions of all axes.
+fn around(lambda: &[f64]) -> Vec<Vec<f64>> {
+    let room = lambda.iter().map(|l| 1.0 - l.abs());
+    let distance = room.fold(2.0 * UNSTABLE_START, f64::min) * 0.5;
+    let mut states = Vec::with_capacity(2 * lambda.len());
+    for i in 0..lambda.len() {
+        for side in [1.0, -1.0] {
+            let mut state = lambda.to_vec();
+            state[i] += side * distance;
+            states.push(state);
+        }
+    }
+    states
 }
 
 /// The root, displaced in the direction in which it moves; along the diagonal if that is not known.

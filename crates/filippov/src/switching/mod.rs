@@ -8,6 +8,7 @@ mod accumulation;
 mod codim1;
 pub mod codim2;
 mod enclosed_root;
+mod fold;
 mod hidden;
 mod incoming;
 mod intersection;
@@ -28,6 +29,7 @@ mod stability;
 pub use accumulation::{accumulate, Accumulation, Return};
 pub use codim1::{decide, Arrival, Decision};
 pub use enclosed_root::{enclose_root, EnclosedRoot, RootBounds};
+pub use fold::{merged_root, MergedRoot};
 pub use hidden::{
     admissible, limit as limit_of_hidden_dynamics, Admissible, Outcome as HiddenOutcome,
 };
@@ -47,7 +49,8 @@ pub use resolve::{has_one_mode_only, resolve};
 pub use roots::{multiplier_rates, newton, roots_in_cube, stable_roots, Roots};
 pub use small_matrix::Matrix;
 pub use stability::{
-    is_negative_p_matrix, is_scaling_stable, is_stable, is_stable_for, stability_margins,
+    is_negative_p_matrix, is_scaling_stable, is_stable, is_stable_for, scaling_margin,
+    stability_margins,
 };
 
 /// The word for what happened, as the field uses it.

@@ -161,7 +161,7 @@ fn leaves(
         let own = of_part(fields, part);
         let at: Vec<f64> = part.iter().map(|&i| lambda[i]).collect();
         let unit: Vec<f64> = (0..part.len()).map(|j| 1.0 / own.row_size(j)).collect();
-        let [fold, stability] = stability_margins(&own.jacobian(&at).with_rows_scaled(&unit));
+        let [fold, stability] = stability_margins(&own.jacobian(&at).with_rows_scaled(&unit), true);
         match kind {
             ExitKind::Fold => fold,
             _ if part.len() > 1 => stability,

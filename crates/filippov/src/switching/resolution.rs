@@ -151,6 +151,12 @@ pub enum Undecided {
     /// The hidden dynamics rests at a point that does not attract.
     #[error("the hidden dynamics rests at a point that does not attract; perturb the state")]
     AtRest,
+    /// The hidden dynamics stays within the intersection and goes around no root.
+    #[error(
+        "the hidden dynamics goes around in a cycle with no stable root: the regularised motion slides with a mean \
+         that depends on how it is regularised; another kappa= may have a root"
+    )]
+    Cycle,
     /// The hidden dynamics came to no certain outcome.
     #[error(
         "the hidden dynamics came to no certain outcome; perturb the state or change the scaling"

@@ -271,7 +271,8 @@ fn continuation(outcome: &Outcome) -> Result<Continuation, Undecided> {
         Outcome::Sliding {
             mode, multipliers, ..
         } if !multipliers.is_empty() => Ok(Continuation::Mode(mode.clone())),
-        Outcome::Sliding { .. } | Outcome::Unknown => Err(Undecided::NoOutcome),
+        Outcome::Sliding { .. } => Err(Undecided::Cycle),
+        Outcome::Unknown => Err(Undecided::NoOutcome),
         Outcome::OutwardSpiral { .. } => Ok(Continuation::OutwardSpiral),
         Outcome::AtRest => Err(Undecided::AtRest),
     }

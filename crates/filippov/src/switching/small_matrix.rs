@@ -70,6 +70,18 @@ impl Matrix {
         product
     }
 
+    /// The matrix with rows and columns exchanged.
+    #[must_use]
+    pub fn transposed(&self) -> Matrix {
+        let mut transposed = Matrix::zeros(self.n);
+        for i in 0..self.n {
+            for j in 0..self.n {
+                transposed[(i, j)] = self[(j, i)];
+            }
+        }
+        transposed
+    }
+
     /// The largest magnitude of its entries.
     pub fn size(&self) -> f64 {
         self.entries.iter().fold(0.0, |size, v| v.abs().max(size))

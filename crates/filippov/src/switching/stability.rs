@@ -20,23 +20,36 @@ pub fn is_scaling_stable(jacobian: &Matrix) -> bool {
         if part.len() > LARGEST_BY_MINORS {
             decay(&block) > 0.0
         } else {
-            has_chain(&block)
+            chain_margin(&block) > 0.0
         }
     })
 }
 
-fn has_chain(jacobian: &Matrix) -> bool {
+/// A continuous function that is positive where [`is_scaling_stable`] finds a chain: the smallest minor of the best
+/// chain, with its sign changed for odd orders; 1 for more than [`LARGEST_BY_MINORS`] surfaces.
+pub fn scaling_margin(jacobian: &Matrix) -> f64 {
+    let margins = jacobian.strong_parts().into_iter().map(|part| {
+        if part.len() > LARGEST_BY_MINORS {
+            1.0
+        } else {
+            chain_margin(&jacobian.principal(&part))
+        }
+    });
+    margins.fold(1.0, f64::min)
+}
+
+fn chain_margin(jacobian: &Matrix) -> f64 {
     let m = jacobian.n();
-    // Bit set of the subsets that end a chain.
-    let mut chained = vec![false; 1 << m];
-    chained[0] = true;
+    // By the subset that ends a chain.
+    let mut margins = vec![1.0; 1 << m];
     for subset in 1..1_usize << m {
         let members: Vec<usize> = (0..m).filter(|i| subset >> i & 1 == 1).collect();
-        let follows = members.iter().any(|i| chained[subset & !(1 << i)]);
+        let before = members.iter().map(|i| margins[subset & !(1 << i)]);
         let sign = (-1.0_f64).powi(members.len() as i32);
-        chained[subset] = follows && sign * jacobian.principal(&members).determinant() > 0.0;
+        let minor = sign * jacobian.principal(&members).determinant();
+        margins[subset] = before.fold(f64::NEG_INFINITY, f64::max).min(minor);
     }
-    chained[(1 << m) - 1]
+    margins[(1 << m) - 1]
 }
 
 /// Is the root with this matrix G stable when the surfaces are scaled by kappa?
@@ -59,12 +72,18 @@ pub fn is_stable(matrix: &Matrix) -> bool {
 /// Two functions of G, with its rows scaled, that are positive as long as the root is stable: the first vanishes
 /// where a real eigenvalue does (two roots meet), the second where a pair of them reaches the imaginary axis.
 ///
-/// They are the smallest among the parts of (-1)^n det, and of the last but one Hurwitz determinant; for two surfaces
-/// of -min(G11, G22), so that the root is stable for some scaling, and for more than [`LARGEST_BY_MINORS`] of the
-/// decay rate of the Cayley transform.
-pub fn stability_margins(scaled: &Matrix) -> [f64; 2] {
+/// They are (-1)^m det, and the last but one Hurwitz determinant (for more than [`LARGEST_BY_MINORS`] surfaces the decay
+/// rate of the Cayley transform). `in_parts` says that the zeros of G are those of the structure, and not of rounding:
+/// then each is the smallest among the strongly coupled parts, and for a part of two surfaces the second is
+/// -min(G11, G22), so that it is stable for some scaling.
+pub fn stability_margins(scaled: &Matrix, in_parts: bool) -> [f64; 2] {
+    let parts = if in_parts {
+        scaled.strong_parts()
+    } else {
+        vec![(0..scaled.n()).collect()]
+    };
     let mut margins = [f64::INFINITY; 2];
-    for part in scaled.strong_parts() {
+    for part in parts {
         let block = scaled.principal(&part);
         let sign = if part.len().is_multiple_of(2) {
             1.0
