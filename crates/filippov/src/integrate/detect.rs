@@ -312,7 +312,7 @@ impl Integrator<'_> {
             }
             _ => None,
         };
-        let by_multipliers = !self.slides_by_rule() && !self.motion.is_in_contact();
+        let by_multipliers = !self.slides_by_rule() && self.motion.has_bounds(self.system);
         let interpolant = self.stepper.interpolant();
         let bounds = BoundedCurve {
             system: self.system,
