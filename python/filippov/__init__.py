@@ -66,7 +66,7 @@ from filippov.functions import (
     tanh,
     where,
 )
-from filippov.laws import Hysteresis, hysteresis, sawtooth
+from filippov.laws import Hysteresis, Stick, hysteresis, sawtooth, stick
 from filippov.modes import Mode
 from filippov.resets import Reset
 from filippov.solution import DenseSolution, Solution
@@ -98,6 +98,7 @@ __all__ = [
     "SegmentTable",
     "Solution",
     "StepSizeError",
+    "Stick",
     "Switch",
     "SwitchTable",
     "System",
@@ -142,6 +143,7 @@ __all__ = [
     "solve_ivp",
     "sqrt",
     "square",
+    "stick",
     "system",
     "tan",
     "tanh",

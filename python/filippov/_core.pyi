@@ -58,6 +58,7 @@ class TracedSystem:
         watched: list[int] = ...,
         laws: list[tuple[str, list[int], list[float]]] = ...,
         n_hidden: int = 0,
+        sticking: list[tuple[int, int]] = ...,
     ) -> Self: ...
     @property
     def n_states(self) -> int: ...

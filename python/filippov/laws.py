@@ -12,7 +12,7 @@ import numpy as np
 from filippov.errors import InputError, ModelError
 from filippov.trace import Scalar
 
-__all__ = ["Hysteresis", "hysteresis", "sawtooth", "without_memory"]
+__all__ = ["Hysteresis", "Stick", "hysteresis", "sawtooth", "stick", "without_memory"]
 
 _refused: ContextVar[bool] = ContextVar("_refused", default=False)
 
@@ -132,3 +132,84 @@ class Hysteresis:
 
     def __repr__(self) -> str:
         return f"Hysteresis({self.low:g}, {self.high:g}, initial={self.initial:g})"
+
+
+def stick(v: Any, static: Any) -> Any:
+    """Return the sign of a sliding velocity `v` whose friction is larger at rest by the factor `static`.
+
+    It is ``np.sign(v)`` while the motion slips. At ``v = 0`` the motion sticks as long as a number in
+    ``[-static, static]`` in its place keeps it at rest; see `Stick`, which is the same for a function of t
+    and x.
+
+    Parameters
+    ----------
+    v : number or traced value
+        The sliding velocity.
+    static : number, parameter or traced value
+        Ratio of static to kinetic friction, at least 1.
+
+    Returns
+    -------
+    number or traced value
+    """
+    if not isinstance(static, Scalar) and not 1.0 <= float(static) < np.inf:
+        raise InputError(f"static: a ratio of at least 1 is needed, not {static!r}")
+    if isinstance(v, Scalar):
+        tracer = v.tracer
+        return tracer.scalar(tracer.laws.stick(tracer, v.node, tracer.node(static)))
+    if _refused.get():
+        raise ModelError("static friction cannot be part of a black box: the function must be traced")
+    return float(np.sign(v))
+
+
+class Stick:
+    """Dry friction whose static limit is above the kinetic one, usable inside a right-hand side like a sign.
+
+    Parameters
+    ----------
+    v : callable
+        Sliding velocity ``v(t, x)``.
+    static : float or callable
+        Ratio of static to kinetic friction, at least 1, or a function ``static(t, x)``.
+
+    Raises
+    ------
+    InputError
+        If an argument has another form.
+
+    Notes
+    -----
+    The force in the right-hand side is the kinetic one, ``-mu * N * stick(t, x)``; a Stribeck curve is an
+    expression of ``abs(v)`` in the place of ``mu``. The motion sticks when it comes to rest, if a force
+    within the static limit holds it, and breaks away exactly at that limit. Multipliers in tables are in
+    units of the limit.
+
+    This is not a Filippov system: between the kinetic and the static force the motion could go on to slip as
+    well.
+
+    ``fl.stick(v, static)`` is the same for a velocity that is at hand.
+
+    Examples
+    --------
+    A block on a belt with static friction 1.2, kinetic friction 1, and a spring: it breaks away at 1.2.
+
+    >>> import filippov as fl
+    >>> friction = fl.Stick(lambda t, x: x[1] - 0.2, 1.2)
+    >>> sol = fl.solve_ivp(lambda t, x: [x[1], -x[0] - friction(t, x)], (0, 10), [0.0, 0.2])
+    >>> sol.switches[0].kind, round(sol.switches[0].y_after[0], 9)
+    ('exit_sliding', 1.2)
+    """
+
+    def __init__(self, v: Callable[..., Any], static: Any) -> None:
+        if not callable(v):
+            raise InputError(f"v: a function v(t, x) is needed, not {type(v).__name__}; see fl.stick")
+        if not callable(static) and not 1.0 <= float(static) < np.inf:
+            raise InputError(f"static: a ratio of at least 1 is needed, not {static!r}")
+        self.v, self.static = v, static
+
+    def __call__(self, t: Any, x: Any) -> Any:
+        """Return the sign of the velocity; while sticking, what holds the motion at rest."""
+        return stick(self.v(t, x), self.static(t, x) if callable(self.static) else self.static)
+
+    def __repr__(self) -> str:
+        return f"Stick(static={self.static})"

@@ -19,6 +19,8 @@ pub struct Extra {
     pub laws: Vec<LawRow>,
     /// The last so many surfaces are those of laws, and not shown.
     pub n_hidden: usize,
+    /// Surfaces with static friction above kinetic, and the nodes of the ratios.
+    pub sticking: Vec<(usize, u32)>,
 }
 
 impl Extra {
@@ -27,6 +29,11 @@ impl Extra {
         write_number(bytes, self.watched.len());
         for &surface in &self.watched {
             write_number(bytes, surface);
+        }
+        write_number(bytes, self.sticking.len());
+        for &(surface, ratio) in &self.sticking {
+            write_number(bytes, surface);
+            write_number(bytes, ratio as usize);
         }
         write_number(bytes, self.laws.len());
         for (kind, nodes, numbers) in &self.laws {
@@ -46,6 +53,11 @@ impl Extra {
         for _ in 0..read_number(rest)? {
             watched.push(read_number(rest)? as usize);
         }
+        let mut sticking = Vec::new();
+        for _ in 0..read_number(rest)? {
+            let surface = read_number(rest)? as usize;
+            sticking.push((surface, read_number(rest)?));
+        }
         let mut laws = Vec::new();
         for _ in 0..read_number(rest)? {
             let kind = String::from_utf8(read_block(rest)?.to_vec()).ok()?;
@@ -61,8 +73,20 @@ impl Extra {
             watched,
             laws,
             n_hidden,
+            sticking,
         })
     }
+}
+
+/// The ratios of static to kinetic friction, by surface.
+pub fn read_ratios(graph: &Graph, rows: &[(usize, u32)]) -> PyResult<Vec<(usize, NodeId)>> {
+    let read = |&(surface, node): &(usize, u32)| {
+        if surface >= graph.n_surfaces() {
+            return Err(PyValueError::new_err(format!("no surface {surface}")));
+        }
+        Ok((surface, Builder::node(graph, node)?))
+    };
+    rows.iter().map(read).collect()
 }
 
 /// The law that a row describes.

@@ -1,5 +1,6 @@
 //! The Python binding: converts arguments, calls the core, converts results. No mathematics.
 
+mod black_boxes;
 mod builder;
 mod callbacks;
 mod conversion;
@@ -15,6 +16,8 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _core {
     #[pymodule_export]
+    use super::black_boxes::{OpaqueSystem, SignedSystem};
+    #[pymodule_export]
     use super::builder::Builder;
     #[pymodule_export]
     use super::inspect::{classify, hidden_dynamics, intersection_field};
@@ -23,5 +26,5 @@ mod _core {
     #[pymodule_export]
     use super::solve::{solve, RunOptions};
     #[pymodule_export]
-    use super::systems::{OpaqueSystem, SignedSystem, TracedSystem};
+    use super::systems::TracedSystem;
 }

@@ -10,12 +10,13 @@ use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
+use crate::black_boxes::{OpaqueSystem, SignedSystem};
 use crate::builder::Builder;
-use crate::callbacks::{EventExpression, Opaque, Signed, Surfaces};
-use crate::laws::{read_law, Extra, LawRow};
+use crate::callbacks::EventExpression;
+use crate::laws::{read_law, read_ratios, Extra, LawRow};
 
-type Array<'py> = PyReadonlyArray1<'py, f64>;
-type Output<'py> = Bound<'py, PyArray1<f64>>;
+pub type Array<'py> = PyReadonlyArray1<'py, f64>;
+pub type Output<'py> = Bound<'py, PyArray1<f64>>;
 
 /// Hands an exception of a user's function back.
 pub fn raised(error: FieldError) -> PyErr {
@@ -58,7 +59,7 @@ pub fn n_visible_of(system: &Bound<'_, PyAny>, core: &dyn PiecewiseSystem) -> us
     }
 }
 
-fn field_of<'py>(
+pub fn field_of<'py>(
     py: Python<'py>,
     system: &dyn PiecewiseSystem,
     t: f64,
@@ -72,7 +73,7 @@ fn field_of<'py>(
 }
 
 /// The sliding field on one surface, and the normal components of both sides.
-fn sliding_field_of<'py>(
+pub fn sliding_field_of<'py>(
     py: Python<'py>,
     system: &dyn PiecewiseSystem,
     t: f64,
@@ -91,7 +92,7 @@ fn sliding_field_of<'py>(
     Ok((PyArray1::from_vec(py, dx), a.minus, a.plus))
 }
 
-fn surface_values_of<'py>(
+pub fn surface_values_of<'py>(
     py: Python<'py>,
     system: &dyn PiecewiseSystem,
     t: f64,
@@ -162,10 +163,14 @@ impl TracedSystem {
         let laws = Laws::new(&graph, laws).map_err(refused)?;
         let system = filippov::TracedSystem::new(graph, field, zeros, names, Backend::Auto)
             .map_err(refused)?;
+        let ratios = read_ratios(system.graph(), &extra.sticking)?;
         let hidden = system.n_surfaces() - extra.n_hidden..system.n_surfaces();
         let watched: Vec<usize> = extra.watched.iter().copied().chain(hidden).collect();
         Ok(TracedSystem {
-            system: system.watching(&watched).with_discrete(n_laws),
+            system: system
+                .watching(&watched)
+                .sticking(&ratios)
+                .with_discrete(n_laws),
             laws: Arc::new(laws),
             extra,
             builder,
@@ -218,7 +223,7 @@ impl TracedSystem {
 #[pymethods]
 impl TracedSystem {
     #[new]
-    #[pyo3(signature = (builder, field, n_states, parameters, states=None, watched=Vec::new(), laws=Vec::new(), n_hidden=0))]
+    #[pyo3(signature = (builder, field, n_states, parameters, states=None, watched=Vec::new(), laws=Vec::new(), n_hidden=0, sticking=Vec::new()))]
     #[allow(clippy::too_many_arguments)]
     fn new(
         py: Python<'_>,
@@ -230,6 +235,7 @@ impl TracedSystem {
         watched: Vec<usize>,
         laws: Vec<LawRow>,
         n_hidden: usize,
+        sticking: Vec<(usize, u32)>,
     ) -> PyResult<Self> {
         if field.len() != n_states {
             let text = format!("{} expressions for {n_states} states", field.len());
@@ -253,6 +259,7 @@ impl TracedSystem {
             watched,
             laws,
             n_hidden,
+            sticking,
         };
         Self::build(graph, field, names, extra, Some(builder))
     }
@@ -423,76 +430,4 @@ pub fn read_block<'a>(rest: &mut &'a [u8]) -> Option<&'a [u8]> {
     let (head, tail) = rest.split_at_checked(length)?;
     *rest = tail;
     Some(head)
-}
-
-/// The Python methods that both kinds of callable system share.
-macro_rules! callable_system {
-    ($(#[$doc:meta])* $name:ident, $core:ident) => {
-        $(#[$doc])*
-        #[pyclass(frozen, module = "filippov._core")]
-        pub struct $name {
-            pub system: Arc<$core>,
-        }
-
-        #[pymethods]
-        impl $name {
-            #[new]
-            #[pyo3(signature = (fun, surfaces, n_states, names, n_switching=None))]
-            fn new(fun: Py<PyAny>, surfaces: Vec<Py<PyAny>>, n_states: usize, names: Vec<String>, n_switching: Option<usize>) -> PyResult<Self> {
-                if names.len() != surfaces.len() {
-                    return Err(PyValueError::new_err("names: one per surface is needed"));
-                }
-                let n_switching = n_switching.unwrap_or(surfaces.len());
-                let surfaces = Surfaces { functions: surfaces, names, n_switching };
-                Ok($name { system: Arc::new($core { fun, surfaces, n_states }) })
-            }
-
-            #[getter]
-            fn n_states(&self) -> usize {
-                self.system.n_states
-            }
-
-            #[getter]
-            fn n_surfaces(&self) -> usize {
-                self.system.n_surfaces()
-            }
-
-            fn surfaces(&self) -> Vec<String> {
-                self.system.surfaces.names.clone()
-            }
-
-            fn field<'py>(&self, py: Python<'py>, t: f64, x: Array<'py>, signs: Array<'py>, p: Array<'py>) -> PyResult<Output<'py>> {
-                let _ = p;
-                field_of(py, &*self.system, t, &x, &signs)
-            }
-
-            fn surface_values<'py>(&self, py: Python<'py>, t: f64, x: Array<'py>, signs: Array<'py>, p: Array<'py>) -> PyResult<Output<'py>> {
-                let _ = p;
-                surface_values_of(py, &*self.system, t, &x, &signs)
-            }
-
-            #[allow(clippy::too_many_arguments)]
-            fn sliding_field<'py>(&self, py: Python<'py>, t: f64, x: Array<'py>, signs: Array<'py>, p: Array<'py>, surface: usize) -> PyResult<(Output<'py>, f64, f64)> {
-                let _ = p;
-                sliding_field_of(py, &*self.system, t, &x, &signs, surface)
-            }
-
-            fn active(&self, signs: Array<'_>) -> PyResult<Vec<bool>> {
-                Ok(vec![true; signs.as_slice()?.len()])
-            }
-
-            fn is_native(&self) -> bool {
-                false
-            }
-        }
-    };
-}
-
-callable_system! {
-    /// A black box f(t, x) with declared switching functions.
-    OpaqueSystem, Opaque
-}
-callable_system! {
-    /// A callable f(t, x, s) with the sign vector as data.
-    SignedSystem, Signed
 }

@@ -40,6 +40,7 @@ class Laws:
         self.names: list[str] = []
         self.rows: list[tuple[str, list[int], list[float]]] = []
         self.n_guards = 0
+        self.sticking: dict[int, int] = {}
         self._known: dict[_Law, int] = {}
         self._is_complete = False
 
@@ -65,6 +66,18 @@ class Laws:
     def hysteresis(self, tracer: Tracer, node: int, low: int, high: int, initial: float) -> int:
         """Return the node of the state, +1 or -1, of a relay with two thresholds."""
         return self._state(tracer, _Law("hysteresis", (node, low, high), (initial,)), "hysteresis")
+
+    def stick(self, tracer: Tracer, node: int, ratio: int) -> int:
+        """Return the node of the sign of an expression at whose zero static friction is above kinetic."""
+        surface, _ = tracer.builder.switch(node)
+        if surface >= 0 and self.sticking.get(surface, ratio) != ratio:
+            raise NotTraceable(
+                f"two ratios of static to kinetic friction at {tracer.text(node)} = 0",
+                "give one ratio for all friction at the same contact",
+            )
+        if surface >= 0:
+            self.sticking[surface] = ratio
+        return tracer.builder.sign(node)
 
     def is_held(self, tracer: Tracer, node: int) -> bool:
         """Whether an expression contains discrete states and is constant between their changes."""

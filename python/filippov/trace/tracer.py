@@ -237,6 +237,7 @@ def _system(tracer: Tracer, field: list[int], watched: Sequence[int] = ()) -> Tr
         list(watched),
         laws.rows,
         laws.n_guards,
+        list(laws.sticking.items()),
     )
 
 

@@ -16,7 +16,8 @@ use crate::tolerances::{NO_IMPULSE, SURFACE_NOISE};
 /// B_k the change of f from one side of h_k = 0 to the other. The multipliers make h_c'' and h_k' vanish: one
 /// linear system. One contact alone gives f_s = f - (L_f^2 h / L_W L_f h) W.
 ///
-/// Contact c lasts while nu_c > 0 (it pushes and does not pull), sliding while 0 < mu_k < 1.
+/// Contact c lasts while nu_c > 0 (it pushes and does not pull), sliding while lambda_k = 2 mu_k - 1 lies in [-r, r],
+/// r the ratio of static to kinetic friction, 1 for a Filippov system.
 pub struct ContactField<'a> {
     system: &'a dyn PiecewiseSystem,
     actions: &'a Actions<'a>,
@@ -28,6 +29,8 @@ pub struct ContactField<'a> {
     n_evaluations: u64,
     /// nu, then mu, of the last evaluation.
     multipliers: Vec<f64>,
+    /// Ratio of static to kinetic friction at the surfaces slid on, at the last evaluation.
+    ratios: Vec<f64>,
 }
 
 impl<'a> ContactField<'a> {
@@ -60,6 +63,7 @@ impl<'a> ContactField<'a> {
             discrete: discrete.to_vec(),
             n_evaluations: 0,
             multipliers: Vec::new(),
+            ratios: Vec::new(),
         })
     }
 
@@ -78,24 +82,21 @@ impl<'a> ContactField<'a> {
         self.contacts.len() + 2 * self.sliding.len()
     }
 
-    /// The exit functions of the last evaluation, positive inside: nu of each contact, then 1 + lambda and
-    /// 1 - lambda of each surface slid on.
+    /// The exit functions of the last evaluation, positive inside: nu of each contact, then r + lambda and
+    /// r - lambda of each surface slid on.
     pub fn exits(&self) -> impl Iterator<Item = f64> + '_ {
         let (nu, mu) = self.multipliers.split_at(self.contacts.len());
-        let sides = mu.iter().flat_map(|mu| [2.0 * mu, 2.0 - 2.0 * mu]);
+        let lambdas = mu.iter().map(|mu| 2.0 * mu - 1.0);
+        let sides = lambdas.zip(&self.ratios).flat_map(|(l, r)| [r + l, r - l]);
         nu.iter().copied().chain(sides)
     }
 
-    /// lambda of each surface slid on, NaN for those in contact, in the order of the surfaces.
+    /// lambda / r of each surface slid on, NaN for those in contact, in the order of the surfaces.
     pub fn lambdas(&self) -> Vec<f64> {
         let mut all: Vec<(usize, f64)> = self.contacts().map(|j| (j, f64::NAN)).collect();
-        let mu = &self.multipliers[self.contacts.len()..];
-        all.extend(
-            self.sliding
-                .iter()
-                .zip(mu)
-                .map(|(&j, m)| (j, 2.0 * m - 1.0)),
-        );
+        let mu = self.multipliers[self.contacts.len()..].iter();
+        let lambdas = mu.zip(&self.ratios).map(|(mu, r)| (2.0 * mu - 1.0) / r);
+        all.extend(self.sliding.iter().copied().zip(lambdas));
         all.sort_by_key(|(j, _)| *j);
         all.into_iter().map(|(_, lambda)| lambda).collect()
     }
@@ -211,6 +212,10 @@ impl SmoothField for ContactField<'_> {
             rows.push(row);
         }
         directions.extend(changes);
+        let ratios = self.sliding.iter();
+        self.ratios = ratios
+            .map(|&j| self.system.stick_ratio(j, t, x, &self.signs))
+            .collect();
         let solved = gram(&rows, &directions).solve(&rates);
         self.multipliers = solved.unwrap_or_else(|| vec![f64::NAN; rows.len()]);
         dx.copy_from_slice(&base);

@@ -110,6 +110,11 @@ impl MeetingFields {
                 self.signs[self.set[i]] = -1.0;
             }
         }
+        for i in (0..m).filter(|&i| system.sticks_at(self.set[i])) {
+            let ratio = system.stick_ratio(self.set[i], t, x, signs);
+            stretch(&mut self.fields, 1 << i, n, ratio);
+            stretch(&mut self.components, 1 << i, m, ratio);
+        }
         Ok(evaluations)
     }
 
@@ -247,6 +252,20 @@ impl MeetingFields {
                 }
             }
             None => dx.fill(f64::NAN),
+        }
+    }
+}
+
+/// Moves rows of `width` numbers, one per pattern, from the signs -1 and +1 of one surface to -ratio and +ratio; `bit` is
+/// that of the surface in the pattern.
+fn stretch(rows: &mut [f64], bit: usize, width: usize, ratio: f64) {
+    let (near, far) = (0.5 * (1.0 + ratio), 0.5 * (1.0 - ratio));
+    let patterns = rows.len() / width;
+    for pattern in (0..patterns).filter(|pattern| pattern & bit == 0) {
+        for k in 0..width {
+            let (minus, plus) = (pattern * width + k, (pattern | bit) * width + k);
+            let (a, b) = (rows[minus], rows[plus]);
+            (rows[minus], rows[plus]) = (near * a + far * b, far * a + near * b);
         }
     }
 }

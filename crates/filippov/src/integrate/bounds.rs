@@ -184,7 +184,7 @@ impl Integrator<'_> {
             margin: &self.detector.margin,
             stages: &self.detector.stages,
             affine: self.motion.affine_bounds(),
-            by_multipliers: !self.slides_by_rule() && !self.motion.is_in_contact(),
+            by_multipliers: !self.slides_by_rule() && self.motion.has_bounds(self.system),
             known_exits: &self.detector.enclosed_exits,
             last_root: &self.detector.enclosed_root,
         };
@@ -207,7 +207,7 @@ impl Integrator<'_> {
     pub(super) fn prepare_bounds(&mut self) -> Result<(), FieldError> {
         let (motion, system) = (&mut self.motion, self.system);
         if motion.sliding.len() < 2
-            || motion.is_in_contact()
+            || !motion.has_bounds(system)
             || motion.affine_bounds.is_some()
             || self.options.sliding != SlidingRule::Canopy
         {

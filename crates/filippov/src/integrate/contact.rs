@@ -140,9 +140,16 @@ impl<'a> Integrator<'a> {
         known: &[Known],
         velocity: &[f64],
     ) -> Result<Option<Lefts>, FieldError> {
-        let is_known = |j: usize| known.iter().any(|(surface, _)| *surface == j);
+        // Above the static limit the slipping motion has an acceleration at once.
+        let is_known =
+            |j: usize| known.iter().any(|(surface, _)| *surface == j) && !self.system.sticks_at(j);
+        let vanishes: Vec<bool> = contacts
+            .iter()
+            .chain(meeting)
+            .map(|&j| is_known(j))
+            .collect();
         let mut left = Lefts::new();
-        for &j in contacts.iter().chain(meeting) {
+        for (&j, vanishes) in contacts.iter().chain(meeting).zip(vanishes) {
             let entry = mode.entries()[j];
             if entry == 0 {
                 continue;
@@ -152,7 +159,7 @@ impl<'a> Integrator<'a> {
                 order,
                 value: self.derivative_along(j, order, mode, velocity, 0.0)?,
             };
-            if is_known(j) {
+            if vanishes {
                 // This derivative just vanished: the next one.
                 let dt = DRIFT_SHARE * self.stepper.interpolant().dt;
                 let later = self.derivative_along(j, order, mode, velocity, dt)?;

@@ -298,6 +298,12 @@ impl<'a> Motion<'a> {
         }
     }
 
+    /// Do bounds of the multipliers hold for the exit functions?
+    pub fn has_bounds(&self, system: &dyn PiecewiseSystem) -> bool {
+        let sticks = self.sliding.len() > 1 && self.sliding.iter().any(|&j| system.sticks_at(j));
+        !self.is_in_contact() && !sticks
+    }
+
     /// Is the motion in contact at some surface?
     pub fn is_in_contact(&self) -> bool {
         matches!(self.field, ModeField::Contact(_))

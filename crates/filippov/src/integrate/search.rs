@@ -197,7 +197,7 @@ impl Integrator<'_> {
         let m = self.motion.monitored[index];
         let noise = self.noise_of(m.function)?;
         self.motion.monitored[index].noise = noise;
-        let by_multipliers = !self.slides_by_rule() && !self.motion.is_in_contact();
+        let by_multipliers = !self.slides_by_rule() && self.motion.has_bounds(self.system);
         let interpolant = self.stepper.interpolant();
         let bounds = BoundedCurve {
             system: self.system,

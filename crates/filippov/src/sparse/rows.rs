@@ -55,6 +55,14 @@ impl SparseRows {
         self.columns.len()
     }
 
+    /// Multiplies every row by its factor.
+    pub fn scale_rows(&mut self, factors: &[f64]) {
+        for (bounds, factor) in self.starts.windows(2).zip(factors) {
+            let row = &mut self.values[bounds[0]..bounds[1]];
+            row.iter_mut().for_each(|value| *value *= factor);
+        }
+    }
+
     /// Column and value of the entries of a row.
     pub fn row(&self, i: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let range = self.starts[i]..self.starts[i + 1];

@@ -1,6 +1,7 @@
 //! The decision at one surface.
 
 use super::lie::{first_nonzero, normal_component, Leading};
+use super::stick::decide_sticking;
 use crate::error::FieldError;
 use crate::field::eval_on_side;
 use crate::system::PiecewiseSystem;
@@ -60,6 +61,9 @@ pub fn decide(
     x: &[f64],
     signs: &[f64],
 ) -> Result<Decision, FieldError> {
+    if system.sticks_at(j) {
+        return decide_sticking(system, j, arrival, (t, x), signs);
+    }
     let vanishing = |known: Arrival| usize::from(arrival == known);
     let minus = first_nonzero(system, j, -1, vanishing(Arrival::ExitMinus), t, x, signs)?;
     let plus = first_nonzero(system, j, 1, vanishing(Arrival::ExitPlus), t, x, signs)?;

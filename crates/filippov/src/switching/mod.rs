@@ -25,6 +25,7 @@ mod roots;
 mod single;
 mod small_matrix;
 mod stability;
+mod stick;
 
 pub use accumulation::{accumulate, Accumulation, Return};
 pub use codim1::{decide, Arrival, Decision};

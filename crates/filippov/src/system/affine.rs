@@ -164,6 +164,11 @@ impl AffineParts {
         }
     }
 
+    /// Moves the jumps from signs of size 1 to these sizes, one per surface.
+    pub(super) fn stretch(&mut self, ratios: &[f64]) {
+        self.jumps.scale_rows(ratios);
+    }
+
     /// Evaluates everything at a point. Entries of `signs` on the surfaces are any numbers: the nearer to the
     /// multipliers, the less cancels. Returns the number of evaluations of the right-hand side.
     ///

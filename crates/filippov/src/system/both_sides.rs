@@ -70,6 +70,18 @@ impl BothSides {
         Ok(evaluations)
     }
 
+    /// Moves the fields from the signs -1 and +1 to -ratio and +ratio.
+    pub(super) fn stretch(&mut self, ratio: f64) {
+        let (near, far) = (0.5 * (1.0 + ratio), 0.5 * (1.0 - ratio));
+        let apart = |minus: &mut f64, plus: &mut f64| {
+            (*minus, *plus) = (near * *minus + far * *plus, far * *minus + near * *plus);
+        };
+        apart(&mut self.normal_minus, &mut self.normal_plus);
+        for (minus, plus) in self.f_minus.iter_mut().zip(&mut self.f_plus) {
+            apart(minus, plus);
+        }
+    }
+
     /// Are both normal components finite?
     pub fn is_finite(&self) -> bool {
         self.normal_minus.is_finite() && self.normal_plus.is_finite()

@@ -43,6 +43,10 @@ pub(super) struct Model {
     lie: Mutex<LieCache>,
     /// Taylor coefficients of the motions met so far, by surfaces slid on and order.
     jets: Mutex<FxHashMap<JetsKey, Option<Arc<MotionJets>>>>,
+    /// Ratio of static to kinetic friction, where it is not 1.
+    sticking: FxHashMap<usize, TieredProgram>,
+    /// The nodes of these ratios.
+    ratios: FxHashMap<usize, NodeId>,
     /// Surfaces that are monitored in every mode.
     watched: Vec<usize>,
     /// Surfaces whose sign something depends on: the field, or another surface that matters.
@@ -101,6 +105,8 @@ impl Model {
             enclosed_surfaces: surfaces.iter().map(|_| OnceLock::new()).collect(),
             enclosed_components: surfaces.iter().map(|_| OnceLock::new()).collect(),
             rate_gradients: surfaces.iter().map(|_| OnceLock::new()).collect(),
+            sticking: FxHashMap::default(),
+            ratios: FxHashMap::default(),
             watched: Vec::new(),
             switching: OnceLock::new(),
             lie: Mutex::new(LieCache::default()),
@@ -115,6 +121,27 @@ impl Model {
             names,
             backend,
         })
+    }
+
+    /// Gives surfaces a ratio of static to kinetic friction.
+    pub fn stick(&mut self, ratios: &[(usize, NodeId)]) {
+        for &(j, node) in ratios {
+            let program = TieredProgram::new(self.graph.clone(), vec![node], self.backend);
+            self.sticking.insert(j, program);
+            self.ratios.insert(j, node);
+        }
+    }
+
+    pub fn has_sticking(&self) -> bool {
+        !self.sticking.is_empty()
+    }
+
+    pub fn sticks_at(&self, j: usize) -> bool {
+        !self.sticking.is_empty() && self.sticking.contains_key(&j)
+    }
+
+    pub fn stick_ratio(&self, j: usize) -> Option<&Program> {
+        self.sticking.get(&j).map(TieredProgram::program)
     }
 
     /// Monitors these surfaces in every mode.
@@ -215,7 +242,10 @@ impl Model {
     pub fn enclosed_normal_components(&self, j: usize) -> Option<&EnclosureProgram> {
         let program = self.enclosed_components[j].get_or_init(|| {
             let mut graph = self.graph.clone();
-            let components = [-1.0, 1.0].map(|side| self.normal_component(&mut graph, j, side));
+            let mut components = [-1.0, 1.0].map(|side| self.normal_component(&mut graph, j, side));
+            if let Some(&ratio) = self.ratios.get(&j) {
+                components = stretched(&mut graph, components, ratio);
+            }
             EnclosureProgram::compile(&graph, &components).ok()
         });
         program.as_ref()
@@ -392,4 +422,13 @@ impl Model {
         cache.programs.insert(key, Arc::clone(&lie));
         lie
     }
+}
+
+/// Components at the signs -1 and +1 moved to -ratio and +ratio.
+fn stretched(graph: &mut Graph, [minus, plus]: [NodeId; 2], ratio: NodeId) -> [NodeId; 2] {
+    let half = graph.constant(0.5);
+    let (sum, difference) = (graph.add(minus, plus), graph.sub(plus, minus));
+    let (middle, half_jump) = (graph.mul(half, sum), graph.mul(half, difference));
+    let reach = graph.mul(ratio, half_jump);
+    [graph.sub(middle, reach), graph.add(middle, reach)]
 }

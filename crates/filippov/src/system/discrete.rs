@@ -32,6 +32,7 @@ impl DiscreteStates {
     }
 
     /// The parameters with the discrete states behind them.
+    #[cold]
     pub fn behind(&self, parameters: &[f64]) -> SmallVec<[f64; 16]> {
         let mut all = SmallVec::from_slice(parameters);
         all.extend(self.values());

@@ -296,6 +296,20 @@ pub trait PiecewiseSystem: Sync {
         true
     }
 
+    /// Is static friction above kinetic at h_j = 0? Then the motion sticks there while the sign that it needs lies in
+    /// [-r, r] with the ratio r of [`stick_ratio`](Self::stick_ratio), and [`both_sides`](Self::both_sides) has the
+    /// fields at the signs -r and +r.
+    fn sticks_at(&self, j: usize) -> bool {
+        let _ = j;
+        false
+    }
+
+    /// The ratio of static to kinetic friction at h_j = 0, at least 1.
+    fn stick_ratio(&self, j: usize, t: f64, x: &[f64], signs: &[f64]) -> f64 {
+        let _ = (j, t, x, signs);
+        1.0
+    }
+
     /// Writes the gradient in x of the rate L_f h_j along the field with these signs; by central differences
     /// unless overridden.
     ///

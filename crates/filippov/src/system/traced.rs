@@ -60,6 +60,16 @@ impl TracedSystem {
         self
     }
 
+    /// The same system with static friction above kinetic on some surfaces, given by the ratios of the two. For a
+    /// system that was just made.
+    #[must_use]
+    pub fn sticking(mut self, ratios: &[(usize, NodeId)]) -> Self {
+        if let Some(model) = Arc::get_mut(&mut self.model) {
+            model.stick(ratios);
+        }
+        self
+    }
+
     /// The same system, whose functions read `count` discrete states behind the parameters. Every copy has its
     /// own.
     #[must_use]
@@ -113,11 +123,29 @@ impl TracedSystem {
     /// Calls a function with the parameters, the discrete states behind them.
     #[inline(always)]
     pub fn with_values<R>(&self, f: impl FnOnce(&[f64]) -> R) -> R {
-        if self.discrete.is_empty() {
-            f(&self.parameters)
+        // Filled only where there are discrete states.
+        let values;
+        f(if self.discrete.is_empty() {
+            &self.parameters
         } else {
-            f(&self.discrete.behind(&self.parameters))
-        }
+            values = self.discrete.behind(&self.parameters);
+            &values
+        })
+    }
+
+    /// The field where there are discrete states: apart, so that the way without them is short.
+    #[cold]
+    #[inline(never)]
+    fn field_with_discrete(
+        &self,
+        t: f64,
+        x: &[f64],
+        signs: &[f64],
+        dx: &mut [f64],
+    ) -> Result<(), FieldError> {
+        let program = &self.model.field_program;
+        self.with_values(|p| program.eval(t, x, signs, p, &[], dx));
+        Ok(())
     }
 
     /// The derivative of h_j in t, then those by the states that it depends on.
@@ -153,8 +181,12 @@ impl PiecewiseSystem for TracedSystem {
 
     #[inline]
     fn field(&self, t: f64, x: &[f64], signs: &[f64], dx: &mut [f64]) -> Result<(), FieldError> {
-        let program = &self.model.field_program;
-        self.with_values(|p| program.eval(t, x, signs, p, &[], dx));
+        if !self.discrete.is_empty() {
+            return self.field_with_discrete(t, x, signs, dx);
+        }
+        self.model
+            .field_program
+            .eval(t, x, signs, &self.parameters, &[], dx);
         Ok(())
     }
 
@@ -243,6 +275,11 @@ impl PiecewiseSystem for TracedSystem {
         out: &mut BothSides,
     ) -> Result<u64, FieldError> {
         let n = self.model.n_states;
+        if self.model.sticks_at(j) {
+            let evaluations = out.both_sides_by_parts(self, j, t, x, signs)?;
+            out.stretch(self.stick_ratio(j, t, x, signs));
+            return Ok(evaluations);
+        }
         if n > FUSED_STATES || out.meets_edges {
             return out.both_sides_by_parts(self, j, t, x, signs);
         }
@@ -347,6 +384,19 @@ impl PiecewiseSystem for TracedSystem {
         self.model.switches_at(j)
     }
 
+    fn sticks_at(&self, j: usize) -> bool {
+        self.model.sticks_at(j)
+    }
+
+    fn stick_ratio(&self, j: usize, t: f64, x: &[f64], signs: &[f64]) -> f64 {
+        let Some(program) = self.model.stick_ratio(j) else {
+            return 1.0;
+        };
+        let mut ratio = [1.0];
+        self.with_values(|p| program.eval(t, x, signs, p, &[], &mut ratio));
+        ratio[0].max(1.0)
+    }
+
     fn rate_gradient(
         &self,
         j: usize,
@@ -390,12 +440,26 @@ impl AffineSigns for TracedSystem {
         parts: &mut AffineParts,
     ) -> Result<u64, FieldError> {
         let compiled = self.model.affine_signs();
-        self.with_values(|p| compiled.fill(t, x, signs, p, parts));
+        if !self.model.has_sticking() {
+            self.with_values(|p| compiled.fill(t, x, signs, p, parts));
+            return Ok(1);
+        }
+        let mut stretched = signs.to_vec();
+        let ratios: Vec<f64> = parts
+            .surfaces()
+            .iter()
+            .map(|&j| self.stick_ratio(j, t, x, signs))
+            .collect();
+        for (&j, ratio) in parts.surfaces().iter().zip(&ratios) {
+            stretched[j] *= ratio;
+        }
+        self.with_values(|p| compiled.fill(t, x, &stretched, p, parts));
+        parts.stretch(&ratios);
         Ok(1)
     }
 
     fn is_steady(&self, j: usize) -> bool {
-        self.model.affine_signs().is_steady(j)
+        !self.model.sticks_at(j) && self.model.affine_signs().is_steady(j)
     }
 
     fn enclose_rate(&self, j: usize, motion: &dyn Motion, signs: &[f64]) -> Option<Interval> {

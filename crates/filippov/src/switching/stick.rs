@@ -1,0 +1,46 @@
+//! The decision at a surface with static friction above kinetic.
+//!
+//! Not Filippov's law: while the motion sticks, the sign may be any number in [-r, r], r the ratio of static to
+//! kinetic friction, and while it slips it is -1 or +1. With F- and F+ the fields at the signs -r and +r, sticking is
+//! sliding between F- and F+, which [`crate::PiecewiseSystem::both_sides`] gives for such a surface. Where the motion
+//! can stick and slip, as at a force between the two limits, it sticks: it has come to rest. It breaks away where the
+//! force reaches the static limit, and then slips under the fields f- and f+ of the regions.
+
+use super::codim1::{Arrival, Decision};
+use super::lie::{first_nonzero, Leading};
+use crate::error::FieldError;
+use crate::system::{BothSides, PiecewiseSystem};
+
+/// What follows where the motion is on such a surface.
+pub(super) fn decide_sticking(
+    system: &dyn PiecewiseSystem,
+    j: usize,
+    arrival: Arrival,
+    (t, x): (f64, &[f64]),
+    signs: &[f64],
+) -> Result<Decision, FieldError> {
+    let mut sides = BothSides::new(x.len(), signs.len());
+    system.both_sides(j, t, x, signs, &mut sides)?;
+    let holds = sides.normal_minus > 0.0 && sides.normal_plus < 0.0;
+    let entry = match arrival {
+        Arrival::ExitMinus => -1,
+        Arrival::ExitPlus => 1,
+        _ if holds => 0,
+        // The force is beyond the static limit, to one side.
+        _ if sides.normal_plus + sides.normal_minus < 0.0 => -1,
+        _ => 1,
+    };
+    let (minus, plus) = if entry == 0 {
+        let first = |value: f64| Leading { order: 1, value };
+        (first(sides.normal_minus), first(sides.normal_plus))
+    } else {
+        let along = |side: i8| first_nonzero(system, j, side, 0, t, x, signs);
+        (along(-1)?, along(1)?)
+    };
+    Ok(Decision {
+        entry,
+        candidates: vec![entry],
+        minus,
+        plus,
+    })
+}
