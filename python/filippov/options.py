@@ -26,6 +26,7 @@ _POLICIES = {
     "sliding": (("canopy", "moments", "dieci-lopez", "minimum-norm"), ()),
     "nonunique": (("regularize", "error", "branch"), ()),
     "zeno": (("accumulate",), ()),
+    "keep": (("steps", "switches", "last"), ()),
 }
 _SCIPY_ONLY = ("jac", "jac_sparsity", "lband", "uband", "min_step")
 _SMALLEST_RTOL = float(100 * np.finfo(float).eps)
@@ -47,6 +48,7 @@ class Options(NamedTuple):
     kappa: tuple[float, ...]
     t_eval: Array | None
     dense_output: bool
+    keep: str
     progress: Callable[..., Any] | None
     max_branches: int
 
@@ -54,8 +56,7 @@ class Options(NamedTuple):
         """Return the options as the core takes them; `choices` are modes to take at non-unique points."""
         if self is _DEFAULT_OPTIONS and not choices:
             return _DEFAULT_FOR_CORE
-        keep = "t_eval" if self.t_eval is not None and not self.dense_output else "steps"
-        return RunOptions({**self._asdict(), "keep": keep, "choices": choices})
+        return RunOptions({**self._asdict(), "choices": choices})
 
 
 # The defaults of `solve_ivp`, checked: a call that changes none of them needs no further check.
@@ -73,6 +74,7 @@ _DEFAULT_OPTIONS = Options(
     kappa=(),
     t_eval=None,
     dense_output=True,
+    keep="steps",
     progress=None,
     max_branches=64,
 )
@@ -423,6 +425,7 @@ _CHECKS: dict[str, Callable[[Any, tuple[float, float], int], Any]] = {
     "nonunique": lambda value, t_span, n: _check_policy("nonunique", value),
     "kappa": lambda value, t_span, n: check_kappa(value),
     "zeno": lambda value, t_span, n: _check_policy("zeno", value),
+    "keep": lambda value, t_span, n: _check_policy("keep", value),
     "method": lambda value, t_span, n: check_method(value),
     "rtol": lambda value, t_span, n: _check_rtol(value),
     "atol": lambda value, t_span, n: _check_atol(value, n),

@@ -65,6 +65,7 @@ def solve_ivp(
     nonunique: str = "regularize",
     kappa: npt.ArrayLike | None = None,
     zeno: str = "accumulate",
+    keep: str = "steps",
     max_branches: int = 64,
     max_events: int = 10**7,
     max_steps: int = 10**8,
@@ -136,6 +137,10 @@ def solve_ivp(
         the order of ``system.surfaces``. Only their ratios matter. Default: 1 for all.
     zeno : {"accumulate"}, optional
         What to do where switches accumulate: go on from the limit point.
+    keep : {"steps", "switches", "last"}, optional
+        What is kept: every step; the switches and the segments between them (`t` are their times and the
+        ends); or the last state only, so that the memory of a run does not grow with its length. Zeros of
+        `events` and the times in `t_eval` are kept in any case. ``sol.sol`` is there with ``"steps"`` only.
     max_branches : int, optional
         Largest number of solutions with ``nonunique="branch"``; a warning tells if there are more.
     max_events, max_steps : int, optional
@@ -199,6 +204,7 @@ def solve_ivp(
         "nonunique": nonunique,
         "kappa": kappa,
         "zeno": zeno,
+        "keep": keep,
         "max_branches": max_branches,
         "max_events": max_events,
         "max_steps": max_steps,
@@ -250,7 +256,7 @@ def _solve(
             t0=t0,
             states=system.state_names(n),
             has_events=specs is not None,
-            dense_output=options.dense_output,
+            dense_output=options.dense_output and options.keep == "steps",
         )
         if run.status < 0:
             _raise_if_asked(run, solution, options)

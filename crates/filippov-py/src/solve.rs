@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use filippov::action::{Action, ActionMap, Actions, Clock, Trigger};
 use filippov::{
-    solve_with_actions, Kind, Method, Mode, NonUnique, Options, SlidingRule, TracedMap, UserEvent,
-    UserFunction,
+    solve_with_actions, Keep, Kind, Method, Mode, NonUnique, Options, SlidingRule, TracedMap,
+    UserEvent, UserFunction,
 };
 use numpy::PyReadonlyArray1;
 use pyo3::exceptions::PyValueError;
@@ -217,7 +217,8 @@ fn read_options(given: &Bound<'_, PyDict>) -> PyResult<(Options, Option<Py<PyAny
             "dense_output" => options.dense_output = value.extract()?,
             "progress" if !value.is_none() => progress = Some(value.unbind()),
             "method" => options.method = method(&value.extract::<String>()?)?,
-            "progress" | "max_branches" | "keep" => {}
+            "keep" => options.keep = keep(&value.extract::<String>()?)?,
+            "progress" | "max_branches" => {}
             other => {
                 return Err(PyValueError::new_err(format!(
                     "options: unknown key {other:?}"
@@ -236,6 +237,15 @@ fn method(name: &str) -> PyResult<Method> {
         _ => Err(PyValueError::new_err(format!(
             "method: unknown method {name:?}"
         ))),
+    }
+}
+
+fn keep(name: &str) -> PyResult<Keep> {
+    match name {
+        "steps" => Ok(Keep::Steps),
+        "switches" => Ok(Keep::Switches),
+        "last" => Ok(Keep::Last),
+        _ => Err(PyValueError::new_err(format!("keep: unknown {name:?}"))),
     }
 }
 

@@ -39,6 +39,7 @@ mod inspect;
 mod integrate;
 mod mode;
 mod options;
+mod recorder;
 mod solution;
 pub mod sparse;
 pub mod stepper;
@@ -56,7 +57,7 @@ pub use integrate::{
     solve, solve_interruptible, solve_with_actions, Integrator, Stats, Stop, Warning, WarningCode,
 };
 pub use mode::{Mode, Signs};
-pub use options::{Method, NonUnique, Options, SlidingRule};
+pub use options::{Keep, Method, NonUnique, Options, SlidingRule};
 pub use solution::{Segment, Side, Solution, Switch, UserZero};
 pub use switching::Kind;
 pub use system::{

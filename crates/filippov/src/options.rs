@@ -40,6 +40,18 @@ impl SlidingRule {
     }
 }
 
+/// What is kept of a run. Zeros of the user's events are kept in any case.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Keep {
+    /// Every step, and with [`Options::dense_output`] the continuous extensions.
+    #[default]
+    Steps,
+    /// The switches, and the segments between them.
+    Switches,
+    /// The last state: the memory does not grow with the run.
+    Last,
+}
+
 /// How a motion is integrated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
@@ -83,7 +95,9 @@ pub struct Options {
     pub kappa: Vec<f64>,
     /// Times at which the state is wanted; every step end if `None`.
     pub t_eval: Option<Vec<f64>>,
-    /// Keep the interpolants, so that the solution can be evaluated anywhere.
+    /// What is kept.
+    pub keep: Keep,
+    /// Keep the interpolants of all steps, so that the solution can be evaluated anywhere.
     pub dense_output: bool,
 }
 
@@ -103,6 +117,7 @@ impl Default for Options {
             sliding: SlidingRule::default(),
             kappa: Vec::new(),
             t_eval: None,
+            keep: Keep::default(),
             dense_output: true,
         }
     }

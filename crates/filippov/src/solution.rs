@@ -4,8 +4,8 @@ use crate::error::FieldError;
 use crate::field::{IntersectionField, Projector, SlidingField, SmoothField};
 use crate::integrate::{Stats, Stop, Warning};
 use crate::mode::Mode;
-use crate::options::{Options, SlidingRule};
-use crate::stepper::{Basis, Interpolant};
+use crate::options::SlidingRule;
+use crate::stepper::Basis;
 use crate::switching::Kind;
 use crate::system::PiecewiseSystem;
 
@@ -51,13 +51,13 @@ pub struct Segment {
 
 /// A step, or its part up to an event.
 #[derive(Clone, Copy, Debug)]
-struct Step {
-    t0: f64,
-    dt: f64,
-    t_stop: f64,
+pub(crate) struct Step {
+    pub t0: f64,
+    pub dt: f64,
+    pub t_stop: f64,
     /// Where its coefficients begin, and end.
-    coefficients: (usize, usize),
-    basis: Basis,
+    pub coefficients: (usize, usize),
+    pub basis: Basis,
 }
 
 /// Which limit is meant at a switch.
@@ -96,11 +96,11 @@ pub struct Solution {
     pub stats: Stats,
     /// Warnings.
     pub warnings: Vec<Warning>,
-    steps: Vec<Step>,
-    coefficients: Vec<f64>,
-    y0: Vec<f64>,
+    pub(crate) steps: Vec<Step>,
+    pub(crate) coefficients: Vec<f64>,
+    pub(crate) y0: Vec<f64>,
     /// The state at the end, if it jumped there.
-    y_end: Option<Vec<f64>>,
+    pub(crate) y_end: Option<Vec<f64>>,
 }
 
 impl Solution {
@@ -176,156 +176,6 @@ impl Solution {
     }
 }
 
-/// Keeps what a run produces.
-pub(crate) struct Recorder {
-    n: usize,
-    t: Vec<f64>,
-    y: Vec<f64>,
-    y0: Vec<f64>,
-    keep_dense: bool,
-    steps: Vec<Step>,
-    coefficients: Vec<f64>,
-    segments: Vec<Segment>,
-    switches: Vec<Switch>,
-    /// The last jump of the state.
-    jump: Option<(f64, Vec<f64>)>,
-}
-
-impl Recorder {
-    pub fn new(n: usize, options: &Options) -> Self {
-        Recorder {
-            n,
-            t: Vec::new(),
-            y: Vec::new(),
-            y0: vec![0.0; n],
-            keep_dense: options.dense_output || options.t_eval.is_some(),
-            steps: Vec::new(),
-            coefficients: Vec::new(),
-            segments: Vec::new(),
-            switches: Vec::new(),
-            jump: None,
-        }
-    }
-
-    /// Are the continuous extensions kept?
-    pub fn keeps_dense(&self) -> bool {
-        self.keep_dense
-    }
-
-    pub fn start(&mut self, t: f64, y: &[f64]) {
-        self.y0.copy_from_slice(y);
-        self.t.push(t);
-        self.y.extend_from_slice(y);
-    }
-
-    /// The state just recorded has jumped: the limit from the right is kept.
-    pub fn jump(&mut self, y: &[f64]) {
-        let start = self.y.len() - self.n;
-        self.y[start..].copy_from_slice(y);
-        self.jump = self.t.last().map(|&t| (t, y.to_vec()));
-    }
-
-    /// The mode after the switches of this instant, of which `first` is the first.
-    pub fn set_last_mode(&mut self, first: usize, after: &Mode) {
-        if let Some(last) = self.switches[first..].last_mut() {
-            last.mode_after = after.clone();
-        }
-    }
-
-    pub fn begin_segment(&mut self, t: f64, mode: &Mode, multipliers: Vec<f64>, discrete: &[f64]) {
-        let step = self.steps.len();
-        self.close_segment(t);
-        self.segments.push(Segment {
-            t_start: t,
-            t_end: t,
-            mode: mode.clone(),
-            steps: (step, step),
-            multipliers,
-            discrete: discrete.to_vec(),
-        });
-    }
-
-    fn close_segment(&mut self, t: f64) {
-        let n_steps = self.steps.len();
-        if let Some(segment) = self.segments.last_mut() {
-            segment.t_end = t;
-            segment.steps.1 = n_steps;
-        }
-    }
-
-    /// A step up to `t_stop`, where the state is `y`.
-    pub fn step(&mut self, interpolant: &Interpolant, t_stop: f64, y: &[f64]) {
-        let (t0, dt) = (interpolant.t0, interpolant.dt);
-        if t_stop <= t0 {
-            return;
-        }
-        if self.keep_dense {
-            let from = self.coefficients.len();
-            self.coefficients
-                .extend_from_slice(interpolant.coefficients());
-            self.steps.push(Step {
-                t0,
-                dt,
-                t_stop,
-                coefficients: (from, self.coefficients.len()),
-                basis: interpolant.basis(),
-            });
-        }
-        self.t.push(t_stop);
-        self.y.extend_from_slice(y);
-    }
-
-    pub fn switch(&mut self, switch: Switch) {
-        self.switches.push(switch);
-    }
-
-    /// The switches so far.
-    pub fn switches(&self) -> &[Switch] {
-        &self.switches
-    }
-
-    /// The surfaces of the switches recorded at this time.
-    pub fn surfaces_switched_at(&self, t: f64) -> Vec<usize> {
-        let latest = self.switches.iter().rev().take_while(|s| s.t == t);
-        let mut surfaces: Vec<usize> = latest.flat_map(|s| s.surfaces.iter().copied()).collect();
-        surfaces.sort_unstable();
-        surfaces.dedup();
-        surfaces
-    }
-
-    #[allow(clippy::too_many_arguments)]
-    pub fn finish(
-        mut self,
-        (t_last, sliding): (f64, SlidingRule),
-        mode: Mode,
-        stop: Stop,
-        stats: Stats,
-        warnings: Vec<Warning>,
-        user_zeros: Vec<Vec<UserZero>>,
-    ) -> Solution {
-        self.close_segment(t_last);
-        let jump = self.jump.filter(|(t, _)| *t == t_last);
-        Solution {
-            y_end: jump.map(|(_, y)| y),
-            n_states: self.n,
-            t: self.t,
-            y: self.y,
-            switches: self.switches,
-            segments: self.segments,
-            user_zeros,
-            stop,
-            t_last,
-            sliding,
-            mode,
-            stats,
-            warnings,
-            steps: self.steps,
-            coefficients: self.coefficients,
-            y0: self.y0,
-        }
-    }
-}
-
 impl Solution {
     /// The multipliers at the start of the segment that `t` belongs to.
     fn multipliers_near(&self, t: f64, side: Side) -> &[f64] {
@@ -375,6 +225,11 @@ impl Solution {
         })
     }
 
+    /// Are the continuous extensions kept?
+    pub(crate) fn is_dense(&self) -> bool {
+        !self.steps.is_empty()
+    }
+
     /// Replaces the step ends by the wanted times, as far as the run came.
     ///
     /// # Errors
@@ -394,10 +249,5 @@ impl Solution {
         }
         (self.t, self.y) = (t_out, y_out);
         Ok(())
-    }
-
-    /// Forgets the continuous extensions.
-    pub(crate) fn forget_dense(&mut self) {
-        self.coefficients.clear();
     }
 }

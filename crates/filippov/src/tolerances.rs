@@ -387,6 +387,9 @@ pub const SAME_TICK: f64 = 8.0 * EPS;
 /// of black boxes have an error of 1e-10.
 pub const NO_IMPULSE: f64 = 1e-8;
 
+/// Switches that are kept where only the last state is wanted: several turns of the longest accumulation.
+pub const LATEST_SWITCHES: usize = 8 * LONGEST_TURN;
+
 /// Actions in one instant at most. A chain of bodies that pass an impulse on needs about the square of their number.
 pub const MOST_ACTIONS_AT_ONE_TIME: usize = 1000;
 

@@ -98,7 +98,7 @@ impl Integrator<'_> {
         self.recorder
             .begin_segment(self.t, &before, Vec::new(), &self.motion.discrete);
         self.motion.mode = before.clone();
-        self.move_straight(limit.t, limit.x);
+        self.move_straight(limit.t, limit.x)?;
         self.stats.n_switches += 1;
         let (after, left) = match self.decide_at_limit(&before, &limit.meeting)? {
             Ok(decided) => decided,

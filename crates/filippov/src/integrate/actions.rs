@@ -176,7 +176,7 @@ impl Integrator<'_> {
             }
             due = self.triggered_by_jump(&due, &mut approach)?;
         }
-        self.recorder.jump(&self.x);
+        self.recorder.jump(self.t, &self.x);
         let (after, left) = match self.place(Some(&before))? {
             Ok(placed) => placed,
             Err(stop) => return Ok(Some(stop)),

@@ -111,10 +111,10 @@ impl Integrator<'_> {
         self.motion.mode = before.clone();
         let y_before = x.clone();
         if t > self.t {
-            self.move_straight(t, x);
+            self.move_straight(t, x)?;
         } else {
             self.x = x;
-            self.recorder.jump(&self.x);
+            self.recorder.jump(self.t, &self.x);
         }
         self.stats.n_switches += 1;
         let (after, left) = match self.place(Some(&before))? {

@@ -31,7 +31,8 @@ use crate::event::UserEvent;
 use crate::field::SmoothField;
 use crate::mode::Mode;
 use crate::options::{Method, Options};
-use crate::solution::{Recorder, Solution};
+use crate::recorder::Recorder;
+use crate::solution::Solution;
 use crate::stepper::{Attempt, Controller, ErrorScale, Stepper, Taylor};
 use crate::system::PiecewiseSystem;
 use crate::tolerances::SHORTEST_STEP;
@@ -326,6 +327,7 @@ impl<'a> Integrator<'a> {
         if self.recorder.keeps_dense() {
             self.stepper.extend_order4(&self.x);
         }
+        self.sample(t_stop)?;
         let Some(event) = found else {
             self.recorder
                 .step(self.stepper.interpolant(), t1, self.stepper.end());
@@ -355,7 +357,7 @@ impl<'a> Integrator<'a> {
         self.stats.n_field_evaluations += self.motion.field.n_evaluations();
         let (zeros, recorder) = (self.user_events.into_zeros(), self.recorder);
         recorder.finish(
-            (self.t, self.options.sliding),
+            (self.t, &self.x, self.options.sliding),
             self.motion.mode,
             stop,
             self.stats,

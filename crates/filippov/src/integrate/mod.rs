@@ -16,6 +16,7 @@ mod motion;
 mod pace;
 mod placement;
 mod relay;
+mod sampling;
 mod search;
 mod series;
 mod solve;

@@ -102,12 +102,10 @@ pub fn solve_with_actions(
     let resampled = options
         .t_eval
         .as_ref()
+        .filter(|_| solution.is_dense())
         .map(|times| solution.resample(system, times));
     if let Some(Err(raised)) = resampled {
         solution.stop = Stop::FieldRaised(raised);
-    }
-    if !options.dense_output {
-        solution.forget_dense();
     }
     Ok(solution)
 }

@@ -35,7 +35,7 @@ impl Integrator<'_> {
         let t = self.t + jump.duration();
         let mut projector = Projector::new(end.len(), self.system.n_surfaces());
         projector.project(self.system, border, t, &mut end, &region.signs())?;
-        self.move_straight(t, end);
+        self.move_straight(t, end)?;
         Ok(Some((region, border)))
     }
 
@@ -50,9 +50,14 @@ impl Integrator<'_> {
     }
 
     /// Records a straight line to a later point: the motion in between has more switches than can be listed.
-    pub(super) fn move_straight(&mut self, t: f64, end: Vec<f64>) {
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub(super) fn move_straight(&mut self, t: f64, end: Vec<f64>) -> Result<(), FieldError> {
         self.stepper.set_straight(self.t, t - self.t, &self.x, &end);
+        self.sample(t)?;
         self.recorder.step(self.stepper.interpolant(), t, &end);
         (self.t, self.x) = (t, end);
+        Ok(())
     }
 }

@@ -100,6 +100,7 @@ impl Integrator<'_> {
             self.user_events.zeros[index].push(UserZero { t, y: y.clone() });
             let terminal = self.user_events.events[index].terminal;
             if terminal > 0 && self.user_events.zeros[index].len() as u64 >= terminal {
+                self.sample(t)?;
                 self.recorder.step(self.stepper.interpolant(), t, &y);
                 self.t = t;
                 self.x = y;
