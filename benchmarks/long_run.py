@@ -29,7 +29,8 @@ growth = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
 assert sol.success, sol.message
 # Once more over its last periods, with every step kept.
 tail = system.solve((0.0, 200.0), sol.y[:, -1])
-off = [np.abs(tail.sol(np.linspace(s.t_start, s.t_end, 50))[1]).max() for s in tail.segments if s.mode.is_sliding]
+sticks = [s for s in tail.segments if s.mode.is_sliding]
+off = [np.abs(tail.sol(np.linspace(s.t_start, s.t_end, 50))[1]).max() for s in sticks]
 print(sol.stats["n_events"], seconds, growth, max(off))
 """
 

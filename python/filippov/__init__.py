@@ -76,12 +76,14 @@ from filippov.system import System
 
 if TYPE_CHECKING:
     from filippov import plot, problems
+    from filippov.ensemble import Ensemble
     from filippov.hidden import HiddenDynamics, hidden_dynamics
 
 __all__ = [
     "Branches",
     "Classification",
     "DenseSolution",
+    "Ensemble",
     "Event",
     "FilippovError",
     "HiddenDynamics",
@@ -151,7 +153,7 @@ __all__ = [
 ]
 
 _LAZY = ("plot", "problems")
-_LAZY_NAMES = frozenset({"HiddenDynamics", "hidden_dynamics"})  # of filippov.hidden
+_LAZY_NAMES = {"HiddenDynamics": "hidden", "hidden_dynamics": "hidden", "Ensemble": "ensemble"}
 
 
 def __getattr__(name: str) -> Any:
@@ -161,9 +163,9 @@ def __getattr__(name: str) -> Any:
 
         return import_module(f"{__name__}.{name}")
     if name in _LAZY_NAMES:
-        from filippov import hidden
+        from importlib import import_module
 
-        return getattr(hidden, name)
+        return getattr(import_module(f"{__name__}.{_LAZY_NAMES[name]}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

@@ -134,6 +134,8 @@ class Run:
     @property
     def t_last(self) -> float: ...
     @property
+    def y_last(self) -> _Array: ...
+    @property
     def switches(
         self,
     ) -> list[tuple[float, _Array, _Array, str, tuple[int, ...], tuple[int, ...], tuple[int, ...], str]]: ...
@@ -174,6 +176,17 @@ def solve(
     events: list[tuple[Callable[[float, _Array], float] | int, float, int, str]],
     actions: list[tuple[str, list[float], Any, str]] = ...,
 ) -> Run: ...
+def solve_many(
+    system: TracedSystem | OpaqueSystem | SignedSystem,
+    t0: float,
+    t1: float,
+    y0: _Array,
+    p: _Array,
+    options: RunOptions,
+    events: list[tuple[Callable[[float, _Array], float] | int, float, int, str]],
+    actions: list[tuple[str, list[float], Any, str]],
+    threads: int,
+) -> list[Run]: ...
 def intersection_field(
     system: TracedSystem | OpaqueSystem | SignedSystem,
     t: float,

@@ -181,6 +181,25 @@ def check_y0(y0: Any, name: str = "y0") -> Array:
     return state
 
 
+def finite_array(value: Any, name: str) -> Array:
+    """Return an array of finite floats of any shape.
+
+    Raises
+    ------
+    InputError
+        If `value` is none.
+    """
+    try:
+        array = np.array(value)
+        if array.dtype.kind not in "fiub":
+            array = array.astype(float)
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: an array of real numbers is needed, not {value!r}") from None
+    if not np.isfinite(array).all():
+        raise InputError(f"{name}: must be finite")
+    return array.astype(np.float64)
+
+
 def check_args(args: Any) -> tuple[Any, ...]:
     """Return `args` as a tuple; a single value that is not a sequence is wrapped."""
     if args is None:

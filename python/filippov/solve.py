@@ -244,10 +244,10 @@ def _solve(
     fit_kappa(options.kappa, prepared.surfaces)
     if t1 < t0:
         prepared, specs = _backward(system, prepared, specs, state, values, t0)
-    core_events = _core_events(specs or [], prepared, t0 if t1 >= t0 else -t0, state, constants, values)
+    found = core_events(specs or [], prepared, t0 if t1 >= t0 else -t0, state, constants, values)
 
     def follow(choices: tuple[Mode, ...]) -> Solution:
-        run = _run(prepared, t0, t1, state, values, options, core_events, choices)
+        run = _run(prepared, t0, t1, state, values, options, found, choices)
         if options.progress is not None and len(run.t):
             options.progress(float(run.t[-1]))
         solution = Solution.from_run(
@@ -342,7 +342,7 @@ def _run(
     return ReversedRun(run_core(prepared.core, -t0, -t1, y0, p, options.for_core(), events))
 
 
-def _core_events(
+def core_events(
     specs: list[EventSpec],
     prepared: Prepared,
     t0: float,

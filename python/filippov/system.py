@@ -3,39 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from filippov._core import TracedSystem
 from filippov.backward import reversed_source
-from filippov.classification import Classification, classify
 from filippov.errors import InputError, ModelError
 from filippov.events import accepted_names, function_name
 from filippov.forms import Source, base_source, check_surfaces, fields_source, relay_source
-from filippov.modes import Mode
 from filippov.options import (
     check_args,
-    check_distance,
-    check_kappa,
     check_params,
-    check_time,
-    check_y0,
     did_you_mean,
-    fit_kappa,
 )
-from filippov.prepare import Prepared, check_n, numbered_states, packed, parameter_vector, prepare, unpacked
+from filippov.points import Points
+from filippov.prepare import Prepared, check_n, numbered_states, packed, prepare, unpacked
 from filippov.resets import check_resets
-from filippov.sliding import sliding_field
 from filippov.solution import Solution
+
+if TYPE_CHECKING:
+    from filippov.ensemble import Ensemble
 
 __all__ = ["System"]
 
 Array = npt.NDArray[np.float64]
 
 
-class System:
+class System(Points):
     """A piecewise-smooth system ``x' = f_sigma(t, x, p)`` with ``sigma_j = sign h_j(t, x, p)``.
 
     The function is traced once, at the first use; solving again with other parameter values or
@@ -274,98 +270,6 @@ class System:
         """How the field is evaluated: ``"native"``, ``"interpreter"`` or ``"black box"``."""
         return self._prepared_now().backend
 
-    def field(self, t: float, x: npt.ArrayLike, mode: Any, **params: float) -> Array:
-        """Return the field of a mode.
-
-        The mode selects the field, whatever the signs of ``h_j`` at the point are. With one entry 0 it is the
-        sliding field ``(1 + lam)/2 f_plus + (1 - lam)/2 f_minus``, with `lam` from ``dh/dt = 0``. With
-        several it is the combination of the fields around that is linear in each multiplier (*canopy*).
-
-        Parameters
-        ----------
-        t : float
-            Time.
-        x : array_like, shape (n,)
-            State.
-        mode : Mode, tuple of int, or str
-            Entries over {-1, 0, +1}, one per surface.
-        **params : float
-            Parameter values other than the defaults.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-
-        Raises
-        ------
-        InputError
-            If `x`, `mode` or a parameter name does not fit.
-        ModelError
-            If there is no sliding motion at the point.
-
-        Examples
-        --------
-        >>> import numpy as np, filippov as fl
-        >>> system = fl.System(lambda t, x: [-np.sign(x[0]) + 0.3], n=1)
-        >>> [round(float(system.field(0.0, [0.0], mode)[0]), 12) for mode in "+-"]
-        [-0.7, 1.3]
-        >>> bool(abs(system.field(0.0, [0.0], "0")[0]) < 1e-12)
-        True
-        """
-        t, state = check_time(t), check_y0(x, "x")
-        values = self.parameter_values(params)
-        prepared = self.prepare(len(state), float(t), state, values)
-        entries = Mode([int(mode)] if isinstance(mode, (int, np.integer)) else mode)
-        if len(entries) != len(prepared.surfaces):
-            raise InputError(
-                f"mode: one entry per surface is needed: {len(prepared.surfaces)}, it has {len(entries)}"
-            )
-        return sliding_field(prepared, float(t), state, entries, parameter_vector(values))
-
-    def classify(
-        self, t: float, x: npt.ArrayLike, atol: float = 0.0, kappa: Any = None, **params: float
-    ) -> Classification:
-        """Return what happens at a point: which surfaces vanish there, and how a motion goes on.
-
-        Parameters
-        ----------
-        t : float
-            Time.
-        x : array_like, shape (n,)
-            State.
-        atol : float, optional
-            A surface nearer than this counts as met; by default only one that vanishes to rounding.
-        kappa : float or array_like, shape (n_surfaces,), optional
-            Scaling of the surfaces, as for `solve_ivp`.
-        **params : float
-            Parameter values other than the defaults.
-
-        Returns
-        -------
-        Classification
-
-        Raises
-        ------
-        InputError
-            If an argument or a parameter name does not fit.
-        ModelError
-            If a field or a switching function is not finite at the point.
-
-        Examples
-        --------
-        >>> import numpy as np, filippov as fl
-        >>> relays = fl.System(lambda t, x: [0.5 - np.sign(x[0]), -0.2 - np.sign(x[1])], n=2)
-        >>> relays.classify(0.0, [0.0, 0.0])
-        intersection at x[0] = 0, x[1] = 0: several surfaces meet
-        goes on in mode 00, multipliers 0.5, -0.2 (start/only)
-        """
-        t, state = check_time(t), check_y0(x, "x")
-        values = self.parameter_values(params)
-        prepared = self.prepare(len(state), float(t), state, values)
-        scaling, reach = check_kappa(kappa), check_distance(atol)
-        fit_kappa(scaling, prepared.surfaces)
-        return classify(prepared, float(t), state, parameter_vector(values), reach, scaling)
-
     def solve(
         self, t_span: Any, y0: npt.ArrayLike, params: Mapping[str, float] | None = None, **options: Any
     ) -> Solution:
@@ -392,6 +296,51 @@ class System:
             named = {name: options.pop(name) for name in self._params if name in options}
             params = {**(params or {}), **named}
         return solve_ivp(self, t_span, y0, params=params, **options)
+
+    def ensemble(
+        self,
+        t_span: Any,
+        y0: npt.ArrayLike,
+        params: Mapping[str, npt.ArrayLike] | None = None,
+        *,
+        events: Any = None,
+        threads: int | None = None,
+        **options: Any,
+    ) -> Ensemble:
+        """Solve many initial value problems on native threads.
+
+        Parameters
+        ----------
+        t_span : (float, float)
+            Interval of integration, the same for all members.
+        y0 : array_like, shape (n_members, n) or (n,)
+            Initial states, one row per member, or one for all.
+        params : dict, optional
+            Parameter values, each a number or one per member.
+        events : callable, Event, or a sequence of these, optional
+            As for `solve_ivp`; events that are traced need no Python while the runs go on.
+        threads : int, optional
+            Number of threads; by default one per core. The results do not depend on it, to the bit.
+        **options
+            Options of `solve_ivp`; `keep` is ``"last"`` by default.
+
+        Returns
+        -------
+        Ensemble
+            Last states, a status per member, and the members as solutions. A member that fails does not stop
+            the others.
+
+        Examples
+        --------
+        >>> import numpy as np, filippov as fl
+        >>> relay = fl.System(lambda t, x, a: [a - np.sign(x[0])], n=1, params={"a": 0.5})
+        >>> runs = relay.ensemble((0, 4), [[1.0], [2.0], [3.0]], {"a": [0.5, 0.5, 2.0]})
+        >>> runs.y[:, 0].round(12).tolist(), runs[0].message == runs[2].message
+        ([0.0, 0.0, 7.0], True)
+        """
+        from filippov.ensemble import run_ensemble
+
+        return run_ensemble(self, t_span, y0, params, events, threads, options)
 
     def parameter_values(self, given: Mapping[str, float] | None) -> dict[str, float]:
         """Return the values of all parameters, the defaults overridden by `given`.

@@ -25,7 +25,7 @@ pub fn intersection_field<'py>(
     near: Vec<f64>,
 ) -> PyResult<Option<FieldAndMultipliers<'py>>> {
     let x = x.as_slice()?;
-    let core = core_of(system, &p, t, x)?;
+    let core = core_of(system, p.as_slice()?, t, x)?;
     let mut mode = mode;
     if x.len() != core.n_states() || mode.len() != n_visible_of(system, &*core) {
         return Err(PyValueError::new_err("x or mode has a wrong length"));
@@ -49,7 +49,7 @@ pub fn classify<'py>(
     kappa: Vec<f64>,
 ) -> PyResult<Option<Bound<'py, PyDict>>> {
     let x = x.as_slice()?;
-    let core = core_of(system, &p, t, x)?;
+    let core = core_of(system, p.as_slice()?, t, x)?;
     let n_visible = n_visible_of(system, &*core);
     if x.len() != core.n_states() {
         return Err(PyValueError::new_err("x has a wrong length"));

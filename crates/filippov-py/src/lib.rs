@@ -6,6 +6,7 @@ mod callbacks;
 mod conversion;
 mod inspect;
 mod laws;
+mod prepared_run;
 mod run;
 mod solve;
 mod systems;
@@ -24,7 +25,7 @@ mod _core {
     #[pymodule_export]
     use super::run::Run;
     #[pymodule_export]
-    use super::solve::{solve, RunOptions};
+    use super::solve::{solve, solve_many, RunOptions};
     #[pymodule_export]
     use super::systems::TracedSystem;
 }

@@ -111,6 +111,12 @@ impl Run {
         self.solution().t_last
     }
 
+    /// The state there.
+    #[getter]
+    fn y_last<'py>(&self, py: Python<'py>) -> Vector<'py> {
+        PyArray1::from_slice(py, self.solution().last_state())
+    }
+
     #[getter]
     fn switches<'py>(&self, py: Python<'py>) -> PyResult<Vec<SwitchRow<'py>>> {
         self.solution()

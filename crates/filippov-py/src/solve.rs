@@ -1,24 +1,23 @@
 //! The call of the integrator.
 
-use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use filippov::action::{Action, ActionMap, Actions, Clock, Trigger};
-use filippov::{
-    solve_with_actions, Keep, Kind, Method, Mode, NonUnique, Options, SlidingRule, TracedMap,
-    UserEvent, UserFunction,
-};
-use numpy::PyReadonlyArray1;
+use filippov::{Keep, Method, Mode, NonUnique, Options, SlidingRule, Solution};
+use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::callbacks::{CalledEvent, CalledMap, CompiledEvent};
+use crate::prepared_run::{ActionRow, EventRow, PreparedRun};
 use crate::run::Run;
-use crate::systems::{core_of, n_visible_of, raised, CoreSystem, TracedSystem};
 
 /// How often the interpreter is asked for signals and told the progress.
 const POLL_EVERY: Duration = Duration::from_millis(20);
+
+/// Runs that one thread takes before signals are looked at and results handed over.
+const CHUNK_PER_THREAD: usize = 256;
 
 /// The options of a run, read once; `filippov.solve_ivp` checks them before.
 #[pyclass(frozen, module = "filippov._core")]
@@ -48,85 +47,14 @@ pub fn solve(
     y0: PyReadonlyArray1<'_, f64>,
     p: PyReadonlyArray1<'_, f64>,
     options: &RunOptions,
-    events: Vec<(Py<PyAny>, f64, u64, String)>,
+    events: Vec<EventRow>,
     actions: Vec<ActionRow>,
 ) -> PyResult<Run> {
-    let traced = system.cast::<TracedSystem>().ok();
-    let y0 = y0.as_slice()?.to_vec();
-    let mut laws = Vec::new();
-    let mut discrete = Vec::new();
-    let mut compiled = None;
-    let core = match traced {
-        Some(traced) => {
-            let own = Arc::new(traced.get().with(&p)?);
-            discrete = traced.get().laws.start(&own, t0, &y0).map_err(raised)?;
-            laws = traced.get().laws.actions(y0.len(), own.parameters());
-            compiled = Some(Arc::clone(&own));
-            own as CoreSystem
-        }
-        None => core_of(&system, &p, t0, &y0)?,
-    };
-    let n_visible = n_visible_of(&system, &*core);
-    let mut functions: Vec<(Box<dyn UserFunction + Send + Sync>, f64, u64)> = Vec::new();
-    for (g, direction, terminal, _name) in events {
-        let handle: Option<usize> = g.extract(py).ok();
-        let function: Box<dyn UserFunction + Send + Sync> = match (handle, traced, &compiled) {
-            (Some(handle), Some(traced), Some(own)) => {
-                let expression = traced
-                    .get()
-                    .event_expression(handle)
-                    .ok_or_else(|| PyValueError::new_err(format!("no event {handle}")))?;
-                Box::new(CompiledEvent {
-                    expression,
-                    system: Arc::clone(own),
-                })
-            }
-            _ => Box::new(CalledEvent(g)),
-        };
-        functions.push((function, direction, terminal));
-    }
-    let given = read_actions(py, actions, &p)?;
+    let (y0, p) = (y0.as_slice()?.to_vec(), p.as_slice()?.to_vec());
+    let prepared = PreparedRun::new(&system, t0, y0, p, &events, &actions)?;
     let RunOptions { options, progress } = options;
-    let mut completed = None;
-    if !options.choices.is_empty() && n_visible < core.n_surfaces() {
-        let options = completed.insert(options.clone());
-        for choice in &mut options.choices {
-            let mut entries = choice.entries().to_vec();
-            entries.resize(core.n_surfaces(), 1);
-            *choice = Mode::new(entries);
-        }
-    }
-    let options = completed.as_ref().unwrap_or(options);
-    let names = traced.map_or_else(Vec::new, |t| t.get().law_names());
-    let is_native = traced.is_some_and(|t| t.get().system.is_native());
     let solution = py
         .detach(|| {
-            let events: Vec<UserEvent> = functions
-                .iter()
-                .map(|(function, direction, terminal)| UserEvent {
-                    function: &**function,
-                    direction: *direction,
-                    terminal: *terminal,
-                })
-                .collect();
-            let list = given.iter().map(|(map, trigger, name)| Action {
-                kind: Some(match trigger {
-                    Trigger::Surface { .. } => Kind::Reset,
-                    _ => Kind::Clock,
-                }),
-                trigger: trigger.clone(),
-                map: &**map,
-                name: name.clone(),
-            });
-            // What the user gives comes first: a sample at a tick sees the ramp before it drops.
-            let mut list: Vec<Action> = list.collect();
-            list.extend(laws.iter().map(|law| Action {
-                trigger: law.trigger.clone(),
-                map: &law.map,
-                name: names.get(law.index).cloned().unwrap_or_default(),
-                kind: law.kind,
-            }));
-            let actions = Actions { list, discrete };
             let mut asked = Instant::now();
             let mut interrupt = |t: f64| {
                 if asked.elapsed() < POLL_EVERY {
@@ -138,43 +66,94 @@ pub fn solve(
                     py.check_signals().is_err() || matches!(reported, Some(Err(_)))
                 })
             };
-            let interrupt = &mut interrupt;
-            solve_with_actions(&*core, (t0, t1), &y0, options, &events, &actions, interrupt)
+            prepared.run((t0, t1), options, &mut interrupt)
         })
         .map_err(|e| PyValueError::new_err(e.to_string()))?;
-    Ok(Run::new(core, solution, is_native, n_visible))
+    Ok(prepared.result(solution))
 }
 
-/// When, numbers that say so, the map (traced, or a callable), and the name of an action.
-type ActionRow = (String, Vec<f64>, Py<PyAny>, String);
-
-type SharedMap = Box<dyn ActionMap + Send + Sync>;
-
-fn read_actions(
+/// Integrates a system from many initial states, the rows of `y0`, with the parameters in the rows of `p`, on some
+/// threads. The result of each is that of a run of its own.
+#[pyfunction]
+#[pyo3(signature = (system, t0, t1, y0, p, options, events, actions, threads))]
+#[allow(clippy::too_many_arguments)]
+pub fn solve_many(
     py: Python<'_>,
-    rows: Vec<ActionRow>,
-    p: &PyReadonlyArray1<'_, f64>,
-) -> PyResult<Vec<(SharedMap, Trigger, String)>> {
-    let read = |(when, numbers, map, name): ActionRow| {
-        let trigger = match (when.as_str(), &numbers[..]) {
-            ("surface", &[index, direction]) => Trigger::Surface {
-                index: index as usize,
-                direction: direction as i8,
-            },
-            ("times", times) => Trigger::Times(times.to_vec()),
-            ("clock", &[period, phase]) => Trigger::Clock {
-                clock: Clock { period, phase },
-                at_start: true,
-            },
-            _ => return Err(PyValueError::new_err(format!("unknown trigger {when:?}"))),
+    system: Bound<'_, PyAny>,
+    t0: f64,
+    t1: f64,
+    y0: PyReadonlyArray2<'_, f64>,
+    p: PyReadonlyArray2<'_, f64>,
+    options: &RunOptions,
+    events: Vec<EventRow>,
+    actions: Vec<ActionRow>,
+    threads: usize,
+) -> PyResult<Vec<Run>> {
+    let (y0, p) = (y0.as_array(), p.as_array());
+    let mut runs = Vec::with_capacity(y0.nrows());
+    let rows: Vec<usize> = (0..y0.nrows()).collect();
+    for chunk in rows.chunks(CHUNK_PER_THREAD * threads.max(1)) {
+        let prepare = |&row: &usize| {
+            let (y0, p) = (y0.row(row).to_vec(), p.row(row).to_vec());
+            PreparedRun::new(&system, t0, y0, p, &events, &actions)
         };
-        let map: SharedMap = match map.bind(py).cast::<TracedSystem>() {
-            Ok(traced) => Box::new(TracedMap::new(traced.get().with(p)?)),
-            Err(_) => Box::new(CalledMap(map)),
+        let prepared = chunk.iter().map(prepare).collect::<PyResult<Vec<_>>>()?;
+        let solutions = py.detach(|| run_all(&prepared, (t0, t1), &options.options, threads));
+        for (prepared, solution) in prepared.into_iter().zip(solutions) {
+            let solution = solution.map_err(|e| PyValueError::new_err(e.to_string()))?;
+            runs.push(prepared.result(solution));
+        }
+        py.check_signals()?;
+    }
+    Ok(runs)
+}
+
+/// Runs everything on some threads, each of which takes the next run that is left.
+fn run_all(
+    prepared: &[PreparedRun],
+    t_span: (f64, f64),
+    options: &Options,
+    threads: usize,
+) -> Vec<Result<Solution, filippov::Error>> {
+    let next = AtomicUsize::new(0);
+    let is_interrupted = AtomicBool::new(false);
+    let results: Vec<Mutex<Option<_>>> = prepared.iter().map(|_| Mutex::new(None)).collect();
+    let work = |asks: bool| {
+        let mut asked = Instant::now();
+        let mut interrupt = |_: f64| {
+            if asks && asked.elapsed() >= POLL_EVERY {
+                asked = Instant::now();
+                if Python::attach(|py| py.check_signals().is_err()) {
+                    is_interrupted.store(true, Ordering::Relaxed);
+                }
+            }
+            is_interrupted.load(Ordering::Relaxed)
         };
-        Ok((map, trigger, name))
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let Some(run) = prepared.get(index) else {
+                break;
+            };
+            let solution = run.run(t_span, options, &mut interrupt);
+            *results[index]
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner) = Some(solution);
+        }
     };
-    rows.into_iter().map(read).collect()
+    std::thread::scope(|scope| {
+        for _ in 1..threads {
+            scope.spawn(|| work(false));
+        }
+        // Signals are for the thread that called.
+        work(true);
+    });
+    let taken = results.into_iter().map(|result| {
+        result
+            .into_inner()
+            .unwrap_or_else(PoisonError::into_inner)
+            .expect("every run was taken by a thread")
+    });
+    taken.collect()
 }
 
 fn read_options(given: &Bound<'_, PyDict>) -> PyResult<(Options, Option<Py<PyAny>>)> {

@@ -31,12 +31,7 @@ pub type CoreSystem = Arc<dyn PiecewiseSystem + Send + Sync>;
 
 /// The system of the core behind a Python object, with these parameter values and its discrete states as at a start
 /// at (t, x).
-pub fn core_of(
-    system: &Bound<'_, PyAny>,
-    p: &Array<'_>,
-    t: f64,
-    x: &[f64],
-) -> PyResult<CoreSystem> {
+pub fn core_of(system: &Bound<'_, PyAny>, p: &[f64], t: f64, x: &[f64]) -> PyResult<CoreSystem> {
     if let Ok(traced) = system.cast::<TracedSystem>() {
         return Ok(Arc::new(traced.get().at(p, t, x)?));
     }
@@ -188,13 +183,13 @@ impl TracedSystem {
     }
 
     /// The system with these parameter values.
-    pub fn with(&self, p: &Array<'_>) -> PyResult<filippov::TracedSystem> {
-        Ok(self.system.with_parameters(p.as_slice()?.to_vec()))
+    pub fn with(&self, p: &[f64]) -> filippov::TracedSystem {
+        self.system.with_parameters(p.to_vec())
     }
 
     /// The system with these parameter values, its discrete states as at a start at (t, x).
-    pub fn at(&self, p: &Array<'_>, t: f64, x: &[f64]) -> PyResult<filippov::TracedSystem> {
-        let system = self.with(p)?;
+    pub fn at(&self, p: &[f64], t: f64, x: &[f64]) -> PyResult<filippov::TracedSystem> {
+        let system = self.with(p);
         if x.len() == system.n_states() {
             self.laws.start(&system, t, x).map_err(raised)?;
         }
@@ -293,7 +288,7 @@ impl TracedSystem {
         signs: Array<'py>,
         p: Array<'py>,
     ) -> PyResult<Output<'py>> {
-        let system = self.at(&p, t, x.as_slice()?)?;
+        let system = self.at(p.as_slice()?, t, x.as_slice()?)?;
         field_of(py, &system, t, &x, &self.all_signs(py, &signs)?)
     }
 
@@ -305,7 +300,7 @@ impl TracedSystem {
         signs: Array<'py>,
         p: Array<'py>,
     ) -> PyResult<Output<'py>> {
-        let system = self.at(&p, t, x.as_slice()?)?;
+        let system = self.at(p.as_slice()?, t, x.as_slice()?)?;
         let all = surface_values_of(py, &system, t, &x, &self.all_signs(py, &signs)?)?;
         let visible = all.readonly().as_slice()?[..self.n_visible()].to_vec();
         Ok(PyArray1::from_vec(py, visible))
@@ -321,7 +316,7 @@ impl TracedSystem {
         p: Array<'py>,
         surface: usize,
     ) -> PyResult<(Output<'py>, f64, f64)> {
-        let system = self.at(&p, t, x.as_slice()?)?;
+        let system = self.at(p.as_slice()?, t, x.as_slice()?)?;
         sliding_field_of(py, &system, t, &x, &self.all_signs(py, &signs)?, surface)
     }
 

@@ -228,6 +228,7 @@ impl Recorder {
             steps: self.steps,
             coefficients: self.coefficients,
             y0: self.y0,
+            y_last: x.to_vec(),
         }
     }
 }

@@ -99,6 +99,8 @@ pub struct Solution {
     pub(crate) steps: Vec<Step>,
     pub(crate) coefficients: Vec<f64>,
     pub(crate) y0: Vec<f64>,
+    /// The state at `t_last`.
+    pub(crate) y_last: Vec<f64>,
     /// The state at the end, if it jumped there.
     pub(crate) y_end: Option<Vec<f64>>,
 }
@@ -106,10 +108,7 @@ pub struct Solution {
 impl Solution {
     /// The state at the last time.
     pub fn last_state(&self) -> &[f64] {
-        match self.t.len() {
-            0 => &self.y0,
-            points => &self.y[(points - 1) * self.n_states..],
-        }
+        &self.y_last
     }
 
     /// Writes the state at `t` from the continuous extension; on the surface while sliding.

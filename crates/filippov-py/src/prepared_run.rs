@@ -1,0 +1,183 @@
+//! Everything that one run needs, taken from Python objects once; the run itself needs no Python.
+
+use std::sync::Arc;
+
+use filippov::action::{Action, ActionMap, Actions, Clock, Trigger};
+use filippov::{
+    solve_with_actions, Error, Kind, LawAction, Mode, Options, Solution, TracedMap, UserEvent,
+    UserFunction,
+};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::callbacks::{CalledEvent, CalledMap, CompiledEvent};
+use crate::run::Run;
+use crate::systems::{core_of, n_visible_of, raised, CoreSystem, TracedSystem};
+
+/// The function of an event (a handle of the traced system, or a callable), its direction, how many zeros end the
+/// run, and its name.
+pub type EventRow = (Py<PyAny>, f64, u64, String);
+
+type SharedFunction = Box<dyn UserFunction + Send + Sync>;
+
+/// One run: a copy of the system with its parameters, the state to start from, events and actions.
+pub struct PreparedRun {
+    core: CoreSystem,
+    y0: Vec<f64>,
+    events: Vec<(SharedFunction, f64, u64)>,
+    given: Vec<(SharedMap, Trigger, String)>,
+    laws: Vec<LawAction>,
+    law_names: Vec<String>,
+    discrete: Vec<f64>,
+    n_visible: usize,
+    is_native: bool,
+}
+
+impl PreparedRun {
+    pub fn new(
+        system: &Bound<'_, PyAny>,
+        t0: f64,
+        y0: Vec<f64>,
+        p: Vec<f64>,
+        events: &[EventRow],
+        actions: &[ActionRow],
+    ) -> PyResult<Self> {
+        let py = system.py();
+        let traced = system.cast::<TracedSystem>().ok();
+        let (mut laws, mut discrete, mut compiled) = (Vec::new(), Vec::new(), None);
+        let given = read_actions(py, actions, &p)?;
+        let core = match traced {
+            Some(traced) => {
+                let own = Arc::new(traced.get().with(&p));
+                discrete = traced.get().laws.start(&own, t0, &y0).map_err(raised)?;
+                laws = traced.get().laws.actions(y0.len(), own.parameters());
+                compiled = Some(Arc::clone(&own));
+                own as CoreSystem
+            }
+            None => core_of(system, &p, t0, &y0)?,
+        };
+        let mut functions = Vec::with_capacity(events.len());
+        for (g, direction, terminal, _name) in events {
+            let handle: Option<usize> = g.extract(py).ok();
+            let function: SharedFunction = match (handle, traced, &compiled) {
+                (Some(handle), Some(traced), Some(own)) => {
+                    let expression = traced.get().event_expression(handle);
+                    let missing = || PyValueError::new_err(format!("no event {handle}"));
+                    Box::new(CompiledEvent {
+                        expression: expression.ok_or_else(missing)?,
+                        system: Arc::clone(own),
+                    })
+                }
+                _ => Box::new(CalledEvent(g.clone_ref(py))),
+            };
+            functions.push((function, *direction, *terminal));
+        }
+        Ok(PreparedRun {
+            n_visible: n_visible_of(system, &*core),
+            law_names: traced.map_or_else(Vec::new, |t| t.get().law_names()),
+            is_native: traced.is_some_and(|t| t.get().system.is_native()),
+            core,
+            y0,
+            events: functions,
+            given,
+            laws,
+            discrete,
+        })
+    }
+
+    /// Runs; `interrupt` is asked now and then with the time reached.
+    pub fn run(
+        &self,
+        t_span: (f64, f64),
+        options: &Options,
+        interrupt: &mut dyn FnMut(f64) -> bool,
+    ) -> Result<Solution, Error> {
+        let mut completed = None;
+        if !options.choices.is_empty() && self.n_visible < self.core.n_surfaces() {
+            let options = completed.insert(options.clone());
+            for choice in &mut options.choices {
+                let mut entries = choice.entries().to_vec();
+                entries.resize(self.core.n_surfaces(), 1);
+                *choice = Mode::new(entries);
+            }
+        }
+        let options = completed.as_ref().unwrap_or(options);
+        let events = self.events.iter();
+        let events = events.map(|(function, direction, terminal)| UserEvent {
+            function: &**function,
+            direction: *direction,
+            terminal: *terminal,
+        });
+        let events: Vec<UserEvent> = events.collect();
+        let actions = self.actions();
+        solve_with_actions(
+            &*self.core,
+            t_span,
+            &self.y0,
+            options,
+            &events,
+            &actions,
+            interrupt,
+        )
+    }
+
+    /// What the user gives comes first: a sample at a tick sees the ramp before it drops.
+    fn actions(&self) -> Actions<'_> {
+        let given = self.given.iter().map(|(map, trigger, name)| Action {
+            kind: Some(match trigger {
+                Trigger::Surface { .. } => Kind::Reset,
+                _ => Kind::Clock,
+            }),
+            trigger: trigger.clone(),
+            map: &**map,
+            name: name.clone(),
+        });
+        let laws = self.laws.iter().map(|law| Action {
+            trigger: law.trigger.clone(),
+            map: &law.map,
+            name: self.law_names.get(law.index).cloned().unwrap_or_default(),
+            kind: law.kind,
+        });
+        Actions {
+            list: given.chain(laws).collect(),
+            discrete: self.discrete.clone(),
+        }
+    }
+
+    /// The result of the run as a Python object.
+    pub fn result(self, solution: Solution) -> Run {
+        Run::new(self.core, solution, self.is_native, self.n_visible)
+    }
+}
+
+/// When, numbers that say so, the map (traced, or a callable), and the name of an action.
+pub type ActionRow = (String, Vec<f64>, Py<PyAny>, String);
+
+type SharedMap = Box<dyn ActionMap + Send + Sync>;
+
+fn read_actions(
+    py: Python<'_>,
+    rows: &[ActionRow],
+    p: &[f64],
+) -> PyResult<Vec<(SharedMap, Trigger, String)>> {
+    let read = |(when, numbers, map, name): &ActionRow| {
+        let trigger = match (when.as_str(), &numbers[..]) {
+            ("surface", &[index, direction]) => Trigger::Surface {
+                index: index as usize,
+                direction: direction as i8,
+            },
+            ("times", times) => Trigger::Times(times.to_vec()),
+            ("clock", &[period, phase]) => Trigger::Clock {
+                clock: Clock { period, phase },
+                at_start: true,
+            },
+            _ => return Err(PyValueError::new_err(format!("unknown trigger {when:?}"))),
+        };
+        let map: SharedMap = match map.bind(py).cast::<TracedSystem>() {
+            Ok(traced) => Box::new(TracedMap::new(traced.get().with(p))),
+            Err(_) => Box::new(CalledMap(map.clone_ref(py))),
+        };
+        Ok((map, trigger, name.clone()))
+    };
+    rows.iter().map(read).collect()
+}

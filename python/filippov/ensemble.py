@@ -1,0 +1,177 @@
+"""Many runs of one system: from many initial states, with many parameter values, on all cores."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from filippov._core import Run, solve_many
+from filippov.errors import InputError
+from filippov.events import normalise_events
+from filippov.options import check_options, check_t_span, finite_array
+from filippov.prepare import Prepared
+from filippov.solution import Solution
+from filippov.solve import core_events
+
+if TYPE_CHECKING:
+    from filippov.system import System
+
+Array = npt.NDArray[np.float64]
+
+
+class Ensemble(Sequence[Solution]):
+    """The results of an ensemble, in the order of its members.
+
+    Attributes
+    ----------
+    t : ndarray, shape (n_members,)
+        The last time that each run reached.
+    y : ndarray, shape (n_members, n)
+        The state there.
+    status : ndarray of int, shape (n_members,)
+        As `Solution.status`: 0 at the end, 1 at a terminal event, -1 where a run failed.
+    success : ndarray of bool, shape (n_members,)
+        Whether ``status >= 0``.
+
+    An index gives the `Solution` of a member, with what `keep` left of it; its `message` says why it ended.
+    """
+
+    def __init__(self, runs: Sequence[Run], prepared: Prepared, **origin: Any) -> None:
+        self._runs = runs
+        self._prepared = prepared
+        self._origin = origin
+
+    def __len__(self) -> int:
+        return len(self._runs)
+
+    @overload
+    def __getitem__(self, index: int) -> Solution: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Solution]: ...
+    def __getitem__(self, index: int | slice) -> Solution | list[Solution]:
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        return Solution.from_run(self._runs[index], self._prepared, **self._origin)
+
+    def __iter__(self) -> Iterator[Solution]:
+        return (self[i] for i in range(len(self)))
+
+    @cached_property
+    def t(self) -> Array:
+        """The last time that each run reached, shape (n_members,)."""
+        return np.array([run.t_last for run in self._runs])
+
+    @cached_property
+    def y(self) -> Array:
+        """The last state of each run, shape (n_members, n)."""
+        return np.array([run.y_last for run in self._runs])
+
+    @cached_property
+    def status(self) -> npt.NDArray[np.int64]:
+        """0 at the end, 1 at a terminal event, -1 where a run failed, shape (n_members,)."""
+        return np.array([run.status for run in self._runs])
+
+    @cached_property
+    def success(self) -> npt.NDArray[np.bool_]:
+        """Whether each run came to its end, shape (n_members,)."""
+        result: npt.NDArray[np.bool_] = self.status >= 0
+        return result
+
+    def __repr__(self) -> str:
+        failed = int(np.count_nonzero(~self.success))
+        return f"Ensemble of {len(self)} runs, {failed} of them failed"
+
+
+def run_ensemble(
+    system: System,
+    t_span: Any,
+    y0: npt.ArrayLike,
+    params: Mapping[str, npt.ArrayLike] | None,
+    events: Any,
+    threads: int | None,
+    options: Mapping[str, Any],
+) -> Ensemble:
+    """Run an ensemble; all arguments as in `System.ensemble`."""
+    t0, t1 = check_t_span(t_span)
+    if t1 <= t0:
+        raise InputError("t_span: an ensemble runs forward, t1 > t0")
+    states, values = _members(system, y0, params)
+    n = states.shape[1]
+    for name in ("nonunique", "progress"):
+        if options.get(name) in ("branch", True) or callable(options.get(name)):
+            raise InputError(f"{name}: {options[name]!r} is not for an ensemble")
+    checked = check_options({"keep": "last", **options}, (t0, t1), n)
+    first = dict(zip(values, values_of_row(values, 0), strict=True))
+    prepared = system.prepare(n, t0, states[0], first)
+    for row in range(1, len(states)):
+        if not prepared.is_valid_for(n, dict(zip(values, values_of_row(values, row), strict=True))):
+            raise InputError(
+                "params: the function branches on parameter values, and members differ in that; run an "
+                "ensemble for each side"
+            )
+    specs = normalise_events(events)
+    found = core_events(specs or [], prepared, t0, states[0], (), first)
+    table = np.column_stack(list(values.values())) if values else np.empty((len(states), 0))
+    runs = solve_many(
+        prepared.core,
+        t0,
+        t1,
+        np.ascontiguousarray(states),
+        np.ascontiguousarray(table, dtype=float),
+        checked.for_core(),
+        found,
+        list(prepared.actions),
+        _check_threads(threads),
+    )
+    return Ensemble(
+        runs,
+        prepared,
+        t0=t0,
+        states=system.state_names(n),
+        has_events=specs is not None,
+        dense_output=checked.dense_output and checked.keep == "steps",
+    )
+
+
+def values_of_row(values: Mapping[str, Array], row: int) -> list[float]:
+    """Return the parameter values of one member."""
+    return [float(column[row]) for column in values.values()]
+
+
+def _members(
+    system: System, y0: npt.ArrayLike, params: Mapping[str, npt.ArrayLike] | None
+) -> tuple[Array, dict[str, Array]]:
+    """Return the initial states (one row per member) and the parameter columns, all of one length."""
+    states = finite_array(y0, "y0")
+    if states.ndim not in (1, 2) or 0 in states.shape:
+        raise InputError(f"y0: shape (n_members, n) or (n,) is needed, not {states.shape}")
+    given = {name: finite_array(value, f"params[{name!r}]") for name, value in (params or {}).items()}
+    for name, value in given.items():
+        if value.ndim > 1:
+            raise InputError(f"params: {name} is a number, or one per member; its shape is {value.shape}")
+    lengths = {name: len(value) for name, value in given.items() if value.ndim == 1}
+    if states.ndim == 2:
+        lengths = {"y0": len(states), **lengths}
+    count = next(iter(lengths.values()), 1)
+    for name, length in lengths.items():
+        if length != count:
+            raise InputError(f"{name}: {length} members, but {next(iter(lengths))} has {count}")
+    base = system.parameter_values({name: float(value.flat[0]) for name, value in given.items()} or None)
+    columns = {
+        name: np.broadcast_to(given.get(name, np.float64(value)), count) for name, value in base.items()
+    }
+    rows = states if states.ndim == 2 else np.broadcast_to(states, (count, len(states)))
+    return np.array(rows, dtype=float), columns
+
+
+def _check_threads(threads: int | None) -> int:
+    if threads is None:
+        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    if isinstance(threads, bool) or not isinstance(threads, int | np.integer) or threads < 1:
+        raise InputError(f"threads: a positive integer is needed, not {threads!r}")
+    return int(threads)

@@ -1,0 +1,125 @@
+"""What a system says of one point: the field of a mode, and what happens there."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from filippov.classification import Classification, classify
+from filippov.errors import InputError
+from filippov.modes import Mode
+from filippov.options import check_distance, check_kappa, check_time, check_y0, fit_kappa
+from filippov.prepare import Prepared, parameter_vector
+from filippov.sliding import sliding_field
+
+__all__ = ["Points"]
+
+Array = npt.NDArray[np.float64]
+
+
+class Points(ABC):
+    """Questions about points, for a class that knows its parameters and can be traced."""
+
+    @abstractmethod
+    def parameter_values(self, given: Mapping[str, float] | None) -> dict[str, float]:
+        """Return the values of all parameters."""
+
+    @abstractmethod
+    def prepare(self, n: int, t0: float, y0: Array | None, values: dict[str, float]) -> Prepared:
+        """Return the system of the core."""
+
+    def field(self, t: float, x: npt.ArrayLike, mode: Any, **params: float) -> Array:
+        """Return the field of a mode.
+
+        The mode selects the field, whatever the signs of ``h_j`` at the point are. With one entry 0 it is the
+        sliding field ``(1 + lam)/2 f_plus + (1 - lam)/2 f_minus``, with `lam` from ``dh/dt = 0``. With
+        several it is the combination of the fields around that is linear in each multiplier (*canopy*).
+
+        Parameters
+        ----------
+        t : float
+            Time.
+        x : array_like, shape (n,)
+            State.
+        mode : Mode, tuple of int, or str
+            Entries over {-1, 0, +1}, one per surface.
+        **params : float
+            Parameter values other than the defaults.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+
+        Raises
+        ------
+        InputError
+            If `x`, `mode` or a parameter name does not fit.
+        ModelError
+            If there is no sliding motion at the point.
+
+        Examples
+        --------
+        >>> import numpy as np, filippov as fl
+        >>> system = fl.System(lambda t, x: [-np.sign(x[0]) + 0.3], n=1)
+        >>> [round(float(system.field(0.0, [0.0], mode)[0]), 12) for mode in "+-"]
+        [-0.7, 1.3]
+        >>> bool(abs(system.field(0.0, [0.0], "0")[0]) < 1e-12)
+        True
+        """
+        t, state = check_time(t), check_y0(x, "x")
+        values = self.parameter_values(params)
+        prepared = self.prepare(len(state), float(t), state, values)
+        entries = Mode([int(mode)] if isinstance(mode, (int, np.integer)) else mode)
+        if len(entries) != len(prepared.surfaces):
+            raise InputError(
+                f"mode: one entry per surface is needed: {len(prepared.surfaces)}, it has {len(entries)}"
+            )
+        return sliding_field(prepared, float(t), state, entries, parameter_vector(values))
+
+    def classify(
+        self, t: float, x: npt.ArrayLike, atol: float = 0.0, kappa: Any = None, **params: float
+    ) -> Classification:
+        """Return what happens at a point: which surfaces vanish there, and how a motion goes on.
+
+        Parameters
+        ----------
+        t : float
+            Time.
+        x : array_like, shape (n,)
+            State.
+        atol : float, optional
+            A surface nearer than this counts as met; by default only one that vanishes to rounding.
+        kappa : float or array_like, shape (n_surfaces,), optional
+            Scaling of the surfaces, as for `solve_ivp`.
+        **params : float
+            Parameter values other than the defaults.
+
+        Returns
+        -------
+        Classification
+
+        Raises
+        ------
+        InputError
+            If an argument or a parameter name does not fit.
+        ModelError
+            If a field or a switching function is not finite at the point.
+
+        Examples
+        --------
+        >>> import numpy as np, filippov as fl
+        >>> relays = fl.System(lambda t, x: [0.5 - np.sign(x[0]), -0.2 - np.sign(x[1])], n=2)
+        >>> relays.classify(0.0, [0.0, 0.0])
+        intersection at x[0] = 0, x[1] = 0: several surfaces meet
+        goes on in mode 00, multipliers 0.5, -0.2 (start/only)
+        """
+        t, state = check_time(t), check_y0(x, "x")
+        values = self.parameter_values(params)
+        prepared = self.prepare(len(state), float(t), state, values)
+        scaling, reach = check_kappa(kappa), check_distance(atol)
+        fit_kappa(scaling, prepared.surfaces)
+        return classify(prepared, float(t), state, parameter_vector(values), reach, scaling)
