@@ -65,6 +65,8 @@ pub struct IntersectionField<'a> {
     tracked: Vec<(f64, Vec<f64>)>,
     exits: Vec<f64>,
     is_rootless: bool,
+    /// How far multipliers may go beyond their ends, by exit function.
+    slack: Vec<f64>,
     /// Whether the regularised motion oscillates around the root of three and more surfaces, once it is known.
     oscillates: Option<bool>,
     projector: Projector,
@@ -96,6 +98,7 @@ impl<'a> IntersectionField<'a> {
             tracked: vec![(f64::INFINITY, lambda.to_vec())],
             exits: vec![f64::NAN; 2 * set.len() + 2],
             is_rootless: false,
+            slack: vec![0.0; 2 * set.len()],
             oscillates: None,
             projector: Projector::new(system.n_states(), system.n_surfaces()),
             n_evaluations: 0,
@@ -128,6 +131,11 @@ impl<'a> IntersectionField<'a> {
     pub fn begin(&mut self, lambda: &[f64], oscillates: bool) {
         self.tracked = vec![(f64::INFINITY, lambda.to_vec())];
         self.oscillates = oscillates.then_some(true);
+    }
+
+    /// Lets the multiplier of an exit function go beyond its end by this much.
+    pub fn set_slack(&mut self, index: usize, slack: f64) {
+        self.slack[index] = slack;
     }
 
     /// Does the regularised motion oscillate around the root, for three and more surfaces?
@@ -260,8 +268,12 @@ impl<'a> IntersectionField<'a> {
 
     /// The ends of the multipliers, then those of the root.
     fn fill_exits(&mut self, [fold, stability]: [f64; 2]) {
-        for (pair, lambda) in self.exits.chunks_exact_mut(2).zip(&self.lambda) {
-            (pair[0], pair[1]) = (1.0 + lambda, 1.0 - lambda);
+        let pairs = self
+            .exits
+            .chunks_exact_mut(2)
+            .zip(self.slack.chunks_exact(2));
+        for ((pair, slack), lambda) in pairs.zip(&self.lambda) {
+            (pair[0], pair[1]) = (1.0 + lambda + slack[0], 1.0 - lambda + slack[1]);
         }
         let m = self.lambda.len();
         (self.exits[2 * m], self.exits[2 * m + 1]) = (fold, stability);
