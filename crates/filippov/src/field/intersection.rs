@@ -59,6 +59,8 @@ pub struct IntersectionField<'a> {
     canopy: Option<Canopy>,
     /// Another combination of the fields, if that was chosen.
     by_rule: Option<RuleLaw>,
+    /// Why there is none, if one was chosen.
+    refused: Option<RuleFailure>,
     /// At the last evaluation; none where there is no root.
     lambda: Vec<f64>,
     /// Those that were found lately, with their times: from the nearest ones the next are tracked.
@@ -94,6 +96,7 @@ impl<'a> IntersectionField<'a> {
                 .all(|group| group.len() <= MOST_MEETING)
                 .then(|| Canopy::new(system, set)),
             by_rule: None,
+            refused: None,
             lambda: Vec::new(),
             tracked: vec![(f64::INFINITY, lambda.to_vec())],
             exits: vec![f64::NAN; 2 * set.len() + 2],
@@ -105,11 +108,22 @@ impl<'a> IntersectionField<'a> {
         }
     }
 
-    /// The same with another combination of the fields; up to [`MOST_MEETING`] surfaces.
+    /// The same with another combination of the fields, of up to [`MOST_MEETING`] surfaces; of more there is one only
+    /// where the field is affine in the signs, so that all rules but that of Dieci and Lopez are the canopy.
     #[must_use]
     pub fn with_rule(mut self, rule: SlidingRule) -> Self {
-        let applies = rule != SlidingRule::Canopy && self.set.len() <= MOST_MEETING;
-        self.by_rule = applies.then(|| RuleLaw::new(self.system, &self.set, rule));
+        let m = self.set.len();
+        if rule == SlidingRule::Canopy {
+            return self;
+        }
+        if m <= MOST_MEETING {
+            self.by_rule = Some(RuleLaw::new(self.system, &self.set, rule));
+        } else if self.affine.is_none() || rule == SlidingRule::DieciLopez {
+            self.refused = Some(match rule {
+                SlidingRule::Moments => RuleFailure::NotTwoSurfaces { m },
+                _ => RuleFailure::TooManySurfaces { m },
+            });
+        }
         self
     }
 
@@ -169,7 +183,9 @@ impl<'a> IntersectionField<'a> {
     /// Why the chosen rule does not give the field at the last evaluation ([`RuleLaw::refusal`]). The canopy
     /// has its own decisions.
     pub fn refusal(&self, tolerance: f64) -> Option<RuleFailure> {
-        self.by_rule.as_ref()?.refusal(tolerance)
+        let by_rule = self.by_rule.as_ref();
+        let refused = self.refused.clone();
+        refused.or_else(|| by_rule?.refusal(tolerance))
     }
 
     /// The motions that leave the intersection under the chosen rule ([`RuleLaw::leaving`]).

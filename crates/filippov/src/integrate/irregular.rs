@@ -155,7 +155,7 @@ impl Integrator<'_> {
             code: WarningCode::Oscillation,
             text: format!(
                 "sliding at the intersection of {} is not stable for this scaling of the surfaces: the regularised \
-                 motion oscillates around it, and its mean may differ; another kappa= may be stable",
+                 motion goes around it, with another mean, or away from it; another kappa= may be stable",
                 names.join(", ")
             ),
             candidates: Vec::new(),
