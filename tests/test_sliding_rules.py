@@ -327,3 +327,27 @@ def test_base_and_deltas_on_one_and_on_three_surfaces(seed: int) -> None:
 def test_unknown_rule_is_refused() -> None:
     with pytest.raises(fl.InputError, match=r"^sliding:"):
         fl.solve_ivp(lambda t, x: -np.sign(x), (0, 1), [1.0], sliding="utkin")
+
+
+@pytest.mark.parametrize(
+    ("sliding", "m", "reason"),
+    [
+        ("moments", 3, 'defined where two surfaces meet, here 3 do; sliding="canopy" slides on any number'),
+        ("moments", 8, "defined where two surfaces meet, here 8 do"),
+        ("minimum-norm", 8, "up to 6 surfaces, here 8 meet"),
+        ("dieci-lopez", 8, "up to 6 surfaces, here 8 meet"),
+    ],
+)
+def test_rules_are_refused_for_more_surfaces_than_they_are_made_for(
+    sliding: Any, m: int, reason: str
+) -> None:
+    """The canopy goes on; no other rule is replaced by it in silence."""
+
+    def field(t: float, x: Any) -> Any:
+        signs = [np.sign(x[i]) for i in range(m)]
+        return [-signs[i] + 0.3 * signs[0] * signs[1] for i in range(m)]
+
+    assert fl.solve_ivp(field, (0, 1), np.zeros(m)).success
+    sol = fl.solve_ivp(field, (0, 1), np.zeros(m), sliding=sliding)
+    assert not sol.success
+    assert reason in sol.message

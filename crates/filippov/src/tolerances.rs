@@ -135,6 +135,10 @@ pub const DOUBLE_ROOT: f64 = 1e-14;
 /// than that.
 pub const AT_SIDE: f64 = 1e-6;
 
+/// How far a multiplier may go beyond its end at first where forces balance to rounding: clear of the rounding of exit
+/// functions. It grows up to `AT_SIDE`.
+pub const FIRST_SLACK: f64 = 1e-12;
+
 /// The diagonal entry that vanishes at an exit by loss of stability is below this fraction of the
 /// other one. Only the kind of event is confirmed by it, so it may be coarse.
 pub const VANISHING_DIAGONAL: f64 = 1e-2;

@@ -59,12 +59,16 @@ pub struct IntersectionField<'a> {
     canopy: Option<Canopy>,
     /// Another combination of the fields, if that was chosen.
     by_rule: Option<RuleLaw>,
+    /// Why there is none, if one was chosen.
+    refused: Option<RuleFailure>,
     /// At the last evaluation; none where there is no root.
     lambda: Vec<f64>,
     /// Those that were found lately, with their times: from the nearest ones the next are tracked.
     tracked: Vec<(f64, Vec<f64>)>,
     exits: Vec<f64>,
     is_rootless: bool,
+    /// How far multipliers may go beyond their ends, by exit function.
+    slack: Vec<f64>,
     /// Whether the regularised motion oscillates around the root of three and more surfaces, once it is known.
     oscillates: Option<bool>,
     projector: Projector,
@@ -92,21 +96,34 @@ impl<'a> IntersectionField<'a> {
                 .all(|group| group.len() <= MOST_MEETING)
                 .then(|| Canopy::new(system, set)),
             by_rule: None,
+            refused: None,
             lambda: Vec::new(),
             tracked: vec![(f64::INFINITY, lambda.to_vec())],
             exits: vec![f64::NAN; 2 * set.len() + 2],
             is_rootless: false,
+            slack: vec![0.0; 2 * set.len()],
             oscillates: None,
             projector: Projector::new(system.n_states(), system.n_surfaces()),
             n_evaluations: 0,
         }
     }
 
-    /// The same with another combination of the fields; up to [`MOST_MEETING`] surfaces.
+    /// The same with another combination of the fields, of up to [`MOST_MEETING`] surfaces; of more there is one only
+    /// where the field is affine in the signs, so that all rules but that of Dieci and Lopez are the canopy.
     #[must_use]
     pub fn with_rule(mut self, rule: SlidingRule) -> Self {
-        let applies = rule != SlidingRule::Canopy && self.set.len() <= MOST_MEETING;
-        self.by_rule = applies.then(|| RuleLaw::new(self.system, &self.set, rule));
+        let m = self.set.len();
+        if rule == SlidingRule::Canopy {
+            return self;
+        }
+        if m <= MOST_MEETING {
+            self.by_rule = Some(RuleLaw::new(self.system, &self.set, rule));
+        } else if self.affine.is_none() || rule == SlidingRule::DieciLopez {
+            self.refused = Some(match rule {
+                SlidingRule::Moments => RuleFailure::NotTwoSurfaces { m },
+                _ => RuleFailure::TooManySurfaces { m },
+            });
+        }
         self
     }
 
@@ -128,6 +145,11 @@ impl<'a> IntersectionField<'a> {
     pub fn begin(&mut self, lambda: &[f64], oscillates: bool) {
         self.tracked = vec![(f64::INFINITY, lambda.to_vec())];
         self.oscillates = oscillates.then_some(true);
+    }
+
+    /// Lets the multiplier of an exit function go beyond its end by this much.
+    pub fn set_slack(&mut self, index: usize, slack: f64) {
+        self.slack[index] = slack;
     }
 
     /// Does the regularised motion oscillate around the root, for three and more surfaces?
@@ -161,7 +183,9 @@ impl<'a> IntersectionField<'a> {
     /// Why the chosen rule does not give the field at the last evaluation ([`RuleLaw::refusal`]). The canopy
     /// has its own decisions.
     pub fn refusal(&self, tolerance: f64) -> Option<RuleFailure> {
-        self.by_rule.as_ref()?.refusal(tolerance)
+        let by_rule = self.by_rule.as_ref();
+        let refused = self.refused.clone();
+        refused.or_else(|| by_rule?.refusal(tolerance))
     }
 
     /// The motions that leave the intersection under the chosen rule ([`RuleLaw::leaving`]).
@@ -260,8 +284,12 @@ impl<'a> IntersectionField<'a> {
 
     /// The ends of the multipliers, then those of the root.
     fn fill_exits(&mut self, [fold, stability]: [f64; 2]) {
-        for (pair, lambda) in self.exits.chunks_exact_mut(2).zip(&self.lambda) {
-            (pair[0], pair[1]) = (1.0 + lambda, 1.0 - lambda);
+        let pairs = self
+            .exits
+            .chunks_exact_mut(2)
+            .zip(self.slack.chunks_exact(2));
+        for ((pair, slack), lambda) in pairs.zip(&self.lambda) {
+            (pair[0], pair[1]) = (1.0 + lambda + slack[0], 1.0 - lambda + slack[1]);
         }
         let m = self.lambda.len();
         (self.exits[2 * m], self.exits[2 * m + 1]) = (fold, stability);

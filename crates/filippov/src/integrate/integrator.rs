@@ -82,6 +82,8 @@ pub struct Integrator<'a> {
     pub(super) last_switch: (f64, u32),
     /// What its decision found of the root that the next motion begins at.
     pub(super) decided: DecidedRoot,
+    /// Exit functions of this mode whose multipliers were held at their ends, with what they may go beyond.
+    pub(super) slacks: Vec<(usize, f64)>,
 }
 
 impl<'a> Integrator<'a> {
@@ -134,6 +136,7 @@ impl<'a> Integrator<'a> {
             recent_dt: 0.0,
             last_switch: (f64::NAN, 0),
             decided: DecidedRoot::default(),
+            slacks: Vec::new(),
         })
     }
 

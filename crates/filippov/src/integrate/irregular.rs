@@ -9,7 +9,7 @@ use super::{Warning, WarningCode};
 use crate::error::FieldError;
 use crate::event::{EventFunction, Monitored};
 use crate::field::IntersectionExit;
-use crate::tolerances::{ARRIVED, AT_FOLD, JUMP_SHRINK, ONE_SIDED_AIM};
+use crate::tolerances::{ARRIVED, AT_FOLD, AT_SIDE, FIRST_SLACK, JUMP_SHRINK, ONE_SIDED_AIM};
 
 impl Integrator<'_> {
     /// Where a field was found to end at its surfaces, a step that would pass the next one aims at it
@@ -112,6 +112,31 @@ impl Integrator<'_> {
         field.set().len() > 2 && event.functions.iter().any(is_stability)
     }
 
+    /// Where a multiplier reaches its end and the decision is that it slides on, forces balance to rounding: the
+    /// multiplier may go a little beyond, ten times as far each time, so that the motion gets on.
+    pub(super) fn loosen(&mut self, event: &Found, stays: bool) {
+        let ModeField::Intersection(field) = &self.motion.field else {
+            self.slacks.clear();
+            return;
+        };
+        if !stays {
+            self.slacks.clear();
+            return;
+        }
+        for function in &event.functions {
+            let EventFunction::Exit(index) = *function else {
+                continue;
+            };
+            if !matches!(field.exit(index), IntersectionExit::Side { .. }) {
+                continue;
+            }
+            match self.slacks.iter_mut().find(|held| held.0 == index) {
+                Some(held) => held.1 = (10.0 * held.1).min(AT_SIDE),
+                None => self.slacks.push((index, FIRST_SLACK)),
+            }
+        }
+    }
+
     /// Warns where a motion begins at a root around which the regularised motion oscillates.
     pub(super) fn note_oscillation(&mut self) {
         let ModeField::Intersection(field) = &self.motion.field else {
@@ -130,7 +155,7 @@ impl Integrator<'_> {
             code: WarningCode::Oscillation,
             text: format!(
                 "sliding at the intersection of {} is not stable for this scaling of the surfaces: the regularised \
-                 motion oscillates around it, and its mean may differ; another kappa= may be stable",
+                 motion goes around it, with another mean, or away from it; another kappa= may be stable",
                 names.join(", ")
             ),
             candidates: Vec::new(),

@@ -151,6 +151,7 @@ impl Integrator<'_> {
             .sliding_set()
             .eq(self.motion.sliding().iter().copied());
         self.decided.oscillates |= slides_on && self.loses_stability(event);
+        self.loosen(event, mode == after);
         let is_changed = |j: &usize| mode.entries()[*j] != after.entries()[*j];
         let mut changed: Vec<usize> = surfaces.iter().copied().filter(is_changed).collect();
         if changed.is_empty() {
@@ -276,6 +277,9 @@ impl Integrator<'_> {
         let decided = std::mem::take(&mut self.decided);
         if let ModeField::Intersection(field) = &mut self.motion.field {
             field.begin(&decided.multipliers, decided.oscillates);
+            for &(index, slack) in &self.slacks {
+                field.set_slack(index, slack);
+            }
         }
         self.motion.project(self.t, &mut self.x)?;
         let derivative = self.stepper.start_derivative_mut();

@@ -23,8 +23,14 @@ use crate::switching::{stable_roots, NormalFields};
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RuleFailure {
     /// The equations of the moments are those of two surfaces.
-    #[error("the moments are defined where two surfaces meet, here {m} do; take another rule")]
+    #[error("the moments are defined where two surfaces meet, here {m} do; sliding=\"canopy\" slides on any number")]
     NotTwoSurfaces {
+        /// The number of surfaces.
+        m: usize,
+    },
+    /// The rules look at the fields of all sign patterns.
+    #[error("this rule looks at all 2^m fields of up to 6 surfaces, here {m} meet; sliding=\"canopy\" slides on any number")]
+    TooManySurfaces {
         /// The number of surfaces.
         m: usize,
     },
