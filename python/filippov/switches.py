@@ -87,7 +87,7 @@ class RunWarning(NamedTuple):
     t : float
         Time at which it was noticed.
     code : str
-        Short name: ``"non_unique"``, ``"undeclared_jump"`` or ``"max_branches"``.
+        Short name: ``"non_unique"``, ``"undeclared_jump"``, ``"zero_surface"`` or ``"max_branches"``.
     message : str
         What was found, in words.
     candidates : tuple of Mode

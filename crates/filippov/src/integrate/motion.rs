@@ -143,6 +143,8 @@ pub(super) struct Motion<'a> {
     /// Fields of other kinds that earlier motions had, kept for their buffers.
     idle: Vec<ModeField<'a>>,
     pub monitored: Vec<Monitored>,
+    /// Surfaces that the motion stays on by either field, so that h is zero all along: not monitored.
+    pub resting: SmallVec<[usize; 2]>,
     /// The sliding field where several surfaces meet.
     rule: SlidingRule,
     actions: &'a Actions<'a>,
@@ -169,6 +171,7 @@ impl<'a> Motion<'a> {
             sliding,
             idle: Vec::new(),
             monitored: Vec::new(),
+            resting: SmallVec::new(),
             rule,
             actions,
             discrete: actions.discrete.clone(),
@@ -241,7 +244,9 @@ impl<'a> Motion<'a> {
             noise: 0.0,
         };
         self.monitored.clear();
-        let surfaces = (0..signs.len()).filter(|&j| self.active[j] && self.mode.entries()[j] != 0);
+        let surfaces = (0..signs.len()).filter(|&j| {
+            self.active[j] && self.mode.entries()[j] != 0 && !self.resting.contains(&j)
+        });
         self.monitored.extend(
             surfaces.map(|j| monitor(EventFunction::Surface(j), signs[j], system.is_affine(j))),
         );

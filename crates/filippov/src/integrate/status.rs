@@ -212,6 +212,8 @@ pub enum WarningCode {
     NonUnique,
     /// The field seems to jump where no surface is declared.
     UndeclaredJump,
+    /// A switching function is zero all along a motion.
+    ZeroSurface,
 }
 
 impl WarningCode {
@@ -220,6 +222,7 @@ impl WarningCode {
         match self {
             WarningCode::NonUnique => "non_unique",
             WarningCode::UndeclaredJump => "undeclared_jump",
+            WarningCode::ZeroSurface => "zero_surface",
         }
     }
 }
