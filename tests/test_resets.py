@@ -113,6 +113,46 @@ def test_a_phase_is_set_back_at_a_section():
     assert np.abs(sol.y[:2, -1] - plain.y[:2, -1]).max() < 1e-8
 
 
+def test_a_phase_that_is_set_back_at_a_section_leaves_stick_slip_as_it_is():
+    # The forced oscillator of Piiroinen and Kuznetsov with the phase of the force as a state.
+    force, omega = 0.4, 1 / 3
+
+    def with_phase(t, x):
+        return [x[1], -x[0] + np.sin(x[2]) - force * np.sign(x[1]), omega]
+
+    def with_time(t, x):
+        return [x[1], -x[0] + np.sin(omega * t) - force * np.sign(x[1])]
+
+    wrap = fl.Reset(lambda t, x: x[2] - 2 * np.pi, lambda t, x: [x[0], x[1], x[2] - 2 * np.pi], direction=1)
+    options = {"rtol": 1e-11, "atol": 1e-11}
+    sol = fl.solve_ivp(with_phase, (0, 180), [1.0, 2.0, 0.0], resets=wrap, **options)
+    plain = fl.solve_ivp(with_time, (0, 180), [1.0, 2.0], **options)
+    own = sol.switches.t[sol.switches.kind != "reset"]
+    assert (sol.switches.kind == "reset").sum() == 9
+    assert len(own) == len(plain.switches)
+    assert np.abs(own - plain.switches.t).max() < 1e-7
+    assert np.abs(sol.y[:2, -1] - plain.y[:, -1]).max() < 1e-8
+    # The mode outlives the section: a block that sticks there goes on to stick.
+    sticks = [s for s in sol.switches if s.kind == "reset" and s.mode_before[0] == 0]
+    assert all(s.mode_after[0] == 0 for s in sticks)
+
+
+def test_temperature_control_by_impulses():
+    # A heater as a state that impulses switch, as problems with a switching vector field are written for
+    # DISODE45.
+    def room(t, x):
+        return [0.1 * (10.0 - x[0]) + 2.0 * x[1], 0.0]
+
+    off = fl.Reset(lambda t, x: x[0] - 21.0, lambda t, x: [x[0], 0.0], direction="up", name="off")
+    on = fl.Reset(lambda t, x: x[0] - 19.0, lambda t, x: [x[0], 1.0], direction="down", name="on")
+    sol = fl.solve_ivp(room, (0, 40), [15.0, 1.0], resets=[off, on], rtol=1e-10, atol=1e-10)
+    resets = [switch for switch in sol.switches if switch.kind == "reset"]
+    first = 10 * math.log((30 - 15) / (30 - 21))
+    expected = first + 10 * math.log(11 / 9) * np.arange(len(resets))
+    assert np.abs([switch.t for switch in resets] - expected).max() < 1e-8
+    assert [switch.note for switch in resets] == [("off", "on")[k % 2] for k in range(len(resets))]
+
+
 def test_impulses_at_given_times():
     kicks = fl.Reset(times=[1.0, 2.5], map=lambda t, x: [x[0], x[1] + 1.0], name="kick")
     sol = fl.solve_ivp(lambda t, x: [x[1], 0.0], (0, 4), [0.0, 0.0], resets=kicks, t_eval=[1.0, 2.0, 4.0])

@@ -412,3 +412,7 @@ pub const VANISHING_MULTIPLIER: f64 = 1e-9;
 
 /// An expression of whole numbers is one itself within this: a few roundings.
 pub const WHOLE_NUMBER: f64 = 1e-12;
+
+/// A motion that was to stay on a surface has left it where h is above this multiple of the tolerance: errors of many
+/// steps add up.
+pub const LEFT_RESTING: f64 = 1e3;

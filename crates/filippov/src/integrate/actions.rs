@@ -24,7 +24,7 @@ use crate::field::SmoothField;
 use crate::mode::Mode;
 use crate::solution::Switch;
 use crate::switching::{first_nonzero, Kind};
-use crate::tolerances::MOST_ACTIONS_AT_ONE_TIME;
+use crate::tolerances::{MOST_ACTIONS_AT_ONE_TIME, SURFACE_NOISE};
 
 /// The surfaces in one instant, as far as they trigger actions.
 struct Approach {
@@ -71,12 +71,20 @@ impl Integrator<'_> {
     /// The end of the span, or a known time of actions.
     #[cold]
     pub(super) fn reach_horizon(&mut self) -> Result<Option<Stop>, FieldError> {
-        let due = self.timetable.take(self.actions, self.t);
+        let mut due = self.timetable.take(self.actions, self.t);
         self.update_horizon();
-        if !due.is_empty() {
+        if !self.actions.list.is_empty() {
             let signs = self.motion.signs.clone();
             let h = self.surface_values(&signs)?;
-            self.note_residuals(&h, &[]);
+            let reached = self.triggers_reached(&h)?;
+            self.note_residuals(&h, &reached);
+            for j in reached {
+                due.extend(self.triggered_at(j, self.motion.mode.entries()[j]));
+            }
+            due.sort_unstable();
+            due.dedup();
+        }
+        if !due.is_empty() {
             return self.act(due);
         }
         Ok((self.t >= self.t_end).then_some(Stop::End))
@@ -130,6 +138,21 @@ impl Integrator<'_> {
         Ok(None)
     }
 
+    /// The triggers that the motion reaches here up to rounding.
+    fn triggers_reached(&mut self, h: &Values) -> Result<Vec<usize>, FieldError> {
+        let rates = self.rates_here()?;
+        let mut reached = Vec::new();
+        for j in (0..h.len()).filter(|&j| self.actions.at_surface(j).is_some()) {
+            let signs = &self.motion.signs;
+            let size = self.system.surface_size(j, self.t, &self.x, signs)?;
+            let approaches = rates[j] * f64::from(self.motion.mode.entries()[j]) < 0.0;
+            if approaches && h[j].abs() <= SURFACE_NOISE * size {
+                reached.push(j);
+            }
+        }
+        Ok(reached)
+    }
+
     /// Notes how far the point lies off the surfaces that vanish there, and those that the motion stays on.
     fn note_residuals(&mut self, h: &Values, surfaces: &[usize]) {
         self.residuals.clear();
@@ -154,6 +177,9 @@ impl Integrator<'_> {
 
     /// Does these actions and those that they trigger, and goes on with the motion that follows.
     pub(super) fn act(&mut self, mut due: Vec<usize>) -> Result<Option<Stop>, FieldError> {
+        if let Some(event) = self.record_zeros_here() {
+            return Ok(Some(Stop::TerminalEvent(event)));
+        }
         let before = self.motion.mode.clone();
         let first = self.recorder.switches().len();
         let mut approach = Approach {
@@ -237,9 +263,13 @@ impl Integrator<'_> {
             if side == 0 || self.actions.at_surface(j).is_none() {
                 continue;
             }
+            let was_done = self
+                .triggered_at(j, side)
+                .any(|index| done.contains(&index));
             if !on_surface {
                 let now = mode.entries()[j];
-                if now != side {
+                // The jump of its own action may complete the passage that triggered it.
+                if now != side && !was_done {
                     due.extend(self.triggered_at(j, side));
                 }
                 (approach.side[j], approach.passes[j]) = (now, false);
@@ -247,10 +277,7 @@ impl Integrator<'_> {
             }
             if !self.goes_through(j, side, &mode)? {
                 approach.passes[j] = false;
-            } else if self
-                .triggered_at(j, side)
-                .any(|index| done.contains(&index))
-            {
+            } else if was_done {
                 approach.passes[j] = true;
             } else if !approach.passes[j] {
                 due.extend(self.triggered_at(j, side));

@@ -339,6 +339,9 @@ impl<'a> Integrator<'a> {
             if self.detector.accept(&mut self.motion.monitored, dt) {
                 self.motion.note_departure();
             }
+            if !self.motion.resting.is_empty() && self.has_left_resting()? {
+                return self.go_on_from_here();
+            }
             return Ok(None);
         };
         self.stepper.interpolant().at(theta, &mut self.x);

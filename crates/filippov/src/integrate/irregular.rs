@@ -5,11 +5,14 @@ use smallvec::smallvec;
 use super::detect::Found;
 use super::integrator::Integrator;
 use super::motion::ModeField;
+use super::transition::Left;
 use super::{Warning, WarningCode};
 use crate::error::FieldError;
 use crate::event::{EventFunction, Monitored};
 use crate::field::IntersectionExit;
-use crate::tolerances::{ARRIVED, AT_FOLD, AT_SIDE, FIRST_SLACK, JUMP_SHRINK, ONE_SIDED_AIM};
+use crate::tolerances::{
+    ARRIVED, AT_FOLD, AT_SIDE, FIRST_SLACK, JUMP_SHRINK, LEFT_RESTING, ONE_SIDED_AIM,
+};
 
 impl Integrator<'_> {
     /// Where a field was found to end at its surfaces, a step that would pass the next one aims at it
@@ -160,6 +163,53 @@ impl Integrator<'_> {
             ),
             candidates: Vec::new(),
         });
+    }
+
+    /// Notes the surfaces that neither field leaves, and names those about which nothing was said yet.
+    pub(super) fn note_resting(&mut self, left: &[Left]) {
+        let resting = left.iter().filter_map(|left| match left {
+            Left::Surface(j, leading) if leading.order == 0 => Some(*j),
+            _ => None,
+        });
+        self.motion.resting = resting.collect();
+        for &j in &self.motion.resting {
+            let name = self.system.surface_name(j);
+            if self
+                .warnings
+                .iter()
+                .any(|warning| warning.text.contains(&name))
+            {
+                continue;
+            }
+            self.warnings.push(Warning {
+                t: self.t,
+                code: WarningCode::ZeroSurface,
+                text: format!(
+                    "{name} is zero all along the motion from here: its sign means nothing, and that of the mode is \
+                     taken"
+                ),
+                candidates: Vec::new(),
+            });
+        }
+    }
+
+    /// Has the motion left a surface that it was to stay on, by more than the tolerance?
+    pub(super) fn has_left_resting(&mut self) -> Result<bool, FieldError> {
+        let signs = self.motion.signs.clone();
+        let h = self.surface_values(&signs)?;
+        let mut gradient = vec![0.0; self.x.len()];
+        for &j in &self.motion.resting {
+            self.system
+                .gradient(j, self.t, &self.x, &signs, &mut gradient)?;
+            let components = gradient.iter().zip(&self.x).enumerate();
+            let tolerance: f64 = components
+                .map(|(i, (g, x))| g.abs() * self.scale.of(i, *x, *x))
+                .sum();
+            if h[j].abs() > LEFT_RESTING * tolerance {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 
     /// Warns where the field jumps over a step far shorter than its predecessors.

@@ -175,6 +175,8 @@ pub(super) struct Motion<'a> {
     /// Its Taylor series, if it is integrated by them.
     pub jets: Option<Arc<MotionJets>>,
     law: Law<'a>,
+    /// Surfaces that the motion stays on by either field, so that h is zero all along: not monitored.
+    pub resting: SmallVec<[usize; 2]>,
     actions: &'a Actions<'a>,
     /// The discrete states.
     pub discrete: Vec<f64>,
@@ -201,6 +203,7 @@ impl<'a> Motion<'a> {
             monitored: Vec::new(),
             jets: None,
             law,
+            resting: SmallVec::new(),
             actions,
             discrete: actions.discrete.clone(),
             signs,
@@ -272,7 +275,9 @@ impl<'a> Motion<'a> {
             noise: 0.0,
         };
         self.monitored.clear();
-        let surfaces = (0..signs.len()).filter(|&j| self.active[j] && self.mode.entries()[j] != 0);
+        let surfaces = (0..signs.len()).filter(|&j| {
+            self.active[j] && self.mode.entries()[j] != 0 && !self.resting.contains(&j)
+        });
         self.monitored.extend(
             surfaces.map(|j| monitor(EventFunction::Surface(j), signs[j], system.is_affine(j))),
         );

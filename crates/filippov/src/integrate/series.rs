@@ -12,7 +12,8 @@ impl Integrator<'_> {
     /// The motion that starts takes Taylor steps if the run may and the motion has series.
     pub(super) fn choose_stepper(&mut self) {
         self.motion.jets = match &self.stepper.taylor {
-            Some(taylor) if !self.motion.is_in_contact() => {
+            // Whether a surface is left that h = 0 all along was expected of is seen at the ends of steps only.
+            Some(taylor) if !self.motion.is_in_contact() && self.motion.resting.is_empty() => {
                 let jets = self
                     .system
                     .motion_jets(&self.motion.sliding, taylor.order());

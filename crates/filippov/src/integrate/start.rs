@@ -99,6 +99,22 @@ pub(super) fn check(
 }
 
 impl Integrator<'_> {
+    /// Decides the mode anew at the current point and goes on.
+    pub(super) fn go_on_from_here(&mut self) -> Result<Option<Stop>, FieldError> {
+        let before = self.motion.mode.clone();
+        let (after, left) = match self.place(None)? {
+            Ok(placed) => placed,
+            Err(stop) => return Ok(Some(stop)),
+        };
+        let changed =
+            (0..before.entries().len()).filter(|&j| before.entries()[j] != after.entries()[j]);
+        let changed: Vec<usize> = changed.collect();
+        if !changed.is_empty() {
+            self.record(before, after.clone(), changed);
+        }
+        self.begin(after, &left)
+    }
+
     /// Finds the mode of the initial state and starts the motion.
     pub(super) fn start(&mut self) -> Result<Option<Stop>, FieldError> {
         self.recorder.start(self.t, &self.x);

@@ -216,6 +216,8 @@ pub enum WarningCode {
     NoSeries,
     /// Sliding goes on at a root that is not stable for the scaling of the surfaces.
     Oscillation,
+    /// A switching function is zero all along a motion.
+    ZeroSurface,
 }
 
 impl WarningCode {
@@ -226,6 +228,7 @@ impl WarningCode {
             WarningCode::UndeclaredJump => "undeclared_jump",
             WarningCode::NoSeries => "no_series",
             WarningCode::Oscillation => "oscillation",
+            WarningCode::ZeroSurface => "zero_surface",
         }
     }
 }

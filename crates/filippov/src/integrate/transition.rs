@@ -272,6 +272,7 @@ impl Integrator<'_> {
             left.iter().filter_map(|l| l.deflation(self.t)).collect();
         self.stats.n_field_evaluations += self.motion.field.n_evaluations();
         self.remember_pace();
+        self.note_resting(left);
         self.motion.restart(self.system, self.t, mode, &deflations);
         self.choose_stepper();
         let decided = std::mem::take(&mut self.decided);

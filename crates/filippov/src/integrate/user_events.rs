@@ -25,6 +25,8 @@ pub(super) struct UserEvents<'a> {
     events: &'a [UserEvent<'a>],
     /// Value at the start of the step, per event.
     left: Vec<f64>,
+    /// Value at the start of the step before, per event.
+    before: Vec<f64>,
     /// Time of the last zero, per event: divided out while it is the start of the search.
     last: Vec<f64>,
     zeros: Vec<Vec<UserZero>>,
@@ -38,6 +40,7 @@ impl<'a> UserEvents<'a> {
         UserEvents {
             events,
             left: vec![f64::NAN; d],
+            before: vec![f64::NAN; d],
             last: vec![f64::NAN; d],
             zeros: vec![Vec::new(); d],
             at_start: true,
@@ -109,6 +112,7 @@ impl Integrator<'_> {
         }
         self.user_events.at_start = false;
         for k in 0..self.user_events.events.len() {
+            self.user_events.before[k] = self.user_events.left[k];
             self.user_events.left[k] = self.user_value(k, theta)?;
         }
         Ok(None)
@@ -135,6 +139,31 @@ impl Integrator<'_> {
         } else {
             1
         }
+    }
+
+    /// Records the zeros of functions that are within rounding of zero where the state is about to jump; returns the
+    /// index of one that ends the run.
+    pub(super) fn record_zeros_here(&mut self) -> Option<usize> {
+        let (t, events) = (self.t, &mut self.user_events);
+        if events.at_start {
+            return None;
+        }
+        for (k, event) in events.events.iter().enumerate() {
+            let (before, here) = (events.before[k], events.left[k]);
+            let is_zero = here.abs() <= 4.0 * EPS * before.abs();
+            if !is_zero || events.last[k] == t || event.direction * before > 0.0 {
+                continue;
+            }
+            events.last[k] = t;
+            events.zeros[k].push(UserZero {
+                t,
+                y: self.x.clone(),
+            });
+            if event.terminal > 0 && events.zeros[k].len() as u64 >= event.terminal {
+                return Some(k);
+            }
+        }
+        None
     }
 
     fn user_value(&mut self, index: usize, theta: f64) -> Result<f64, FieldError> {
