@@ -27,14 +27,20 @@ impl Looped {
     pub fn eval(&self, t: f64, x: &[f64], s: &[f64], p: &[f64], out: &mut [f64]) {
         let Looped { plan, order } = self;
         let needed = plan.lengths;
-        let is_short = x.len() < needed.states || s.len() < needed.signs || p.len() < needed.parameters;
+        let is_short =
+            x.len() < needed.states || s.len() < needed.signs || p.len() < needed.parameters;
         if is_short {
             out.fill(f64::NAN);
             return;
         }
-        let known = TABLE.try_with(|table| table.borrow_mut().take()).ok().flatten();
+        let known = TABLE
+            .try_with(|table| table.borrow_mut().take())
+            .ok()
+            .flatten();
         let fits = |table: &Table<f64>| table.holds(plan.rules.len(), *order);
-        let mut table = known.filter(fits).unwrap_or_else(|| Table::new(plan.rules.len(), *order, 0.0));
+        let mut table = known
+            .filter(fits)
+            .unwrap_or_else(|| Table::new(plan.rules.len(), *order, 0.0));
         let mut numbers = Numbers { plan, t, x, s, p };
         fill(plan, &mut table, *order, &mut numbers);
         let rows = out.chunks_exact_mut(plan.field.len() + plan.functions.len());

@@ -264,7 +264,9 @@ impl Plan {
                 let weight = self.function(UnaryOp::Exp, a);
                 self.chain(a, weight, 1.0, head)
             }
-            UnaryOp::Sin | UnaryOp::Cos => return self.pair((op, UnaryOp::Sin, UnaryOp::Cos), -1.0, a),
+            UnaryOp::Sin | UnaryOp::Cos => {
+                return self.pair((op, UnaryOp::Sin, UnaryOp::Cos), -1.0, a)
+            }
             UnaryOp::Sinh | UnaryOp::Cosh => {
                 return self.pair((op, UnaryOp::Sinh, UnaryOp::Cosh), 1.0, a)
             }
@@ -327,7 +329,12 @@ impl Plan {
     }
 
     /// Two functions with `first`' = `second` a' and `second`' = `factor` `first` a'; returns the wanted one.
-    fn pair(&mut self, (wanted, first, second): (UnaryOp, UnaryOp, UnaryOp), factor: f64, a: Row) -> Row {
+    fn pair(
+        &mut self,
+        (wanted, first, second): (UnaryOp, UnaryOp, UnaryOp),
+        factor: f64,
+        a: Row,
+    ) -> Row {
         let row = self.rules.len();
         self.chain(a, row + 1, 1.0, Head::Unary(first, a));
         self.chain(a, row, factor, Head::Unary(second, a));

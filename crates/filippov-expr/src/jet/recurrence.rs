@@ -51,7 +51,12 @@ impl<V: Copy> Table<V> {
 }
 
 /// Fills the table order by order; states beyond the field stand still.
-pub(super) fn fill<A: Arithmetic>(plan: &Plan, table: &mut Table<A::Value>, order: usize, ring: &mut A) {
+pub(super) fn fill<A: Arithmetic>(
+    plan: &Plan,
+    table: &mut Table<A::Value>,
+    order: usize,
+    ring: &mut A,
+) {
     for k in 0..=order {
         for (row, rule) in plan.rules.iter().enumerate() {
             let value = match *rule {
@@ -62,7 +67,13 @@ pub(super) fn fill<A: Arithmetic>(plan: &Plan, table: &mut Table<A::Value>, orde
                     }
                     None => ring.constant(0.0),
                 },
-                rule => Coefficient { table, ring, row, k }.of(rule),
+                rule => Coefficient {
+                    table,
+                    ring,
+                    row,
+                    k,
+                }
+                .of(rule),
             };
             table.set(row, k, value);
         }

@@ -46,11 +46,18 @@ fn check(make: impl Fn(&mut Graph, NodeId, NodeId) -> NodeId) {
     unrolled.eval(0.3, &point, &[-1.0], &[1.7], &mut b);
     for (k, (a, b)) in a.chunks(3).zip(b.chunks(3)).enumerate() {
         for (a, b) in a.iter().zip(b) {
-            assert!((a - b).abs() <= 1e-12 * (1.0 + a.abs()), "order {k}: {a} and {b}");
+            assert!(
+                (a - b).abs() <= 1e-12 * (1.0 + a.abs()),
+                "order {k}: {a} and {b}"
+            );
         }
         if let Some(expected) = expected.get(k) {
             let scale = 1.0 + expected.abs();
-            assert!((a[2] - expected).abs() < 1e-11 * scale, "order {k}: {} for {expected}", a[2]);
+            assert!(
+                (a[2] - expected).abs() < 1e-11 * scale,
+                "order {k}: {} for {expected}",
+                a[2]
+            );
         }
     }
 }

@@ -316,7 +316,11 @@ impl Integrator<'_> {
     }
 
     /// One-sided fields: the surface just beyond the end of the step, within reach of the continuous extension.
-    pub(super) fn detect_beyond(&mut self, dt: f64, found: &mut Option<Found>) -> Result<(), FieldError> {
+    pub(super) fn detect_beyond(
+        &mut self,
+        dt: f64,
+        found: &mut Option<Found>,
+    ) -> Result<(), FieldError> {
         for index in 0..self.motion.monitored.len() {
             let (value, rate) = self.detector.right[index];
             let near = rate < 0.0 && value < -rate * dt * 1.5 * (EXTRAPOLATION - 1.0);

@@ -11,7 +11,9 @@ use crate::event::proved::{first_zero_proved, Proved};
 use crate::event::series::Series;
 use crate::event::{EventFunction, Monitored};
 use crate::stepper::{nested, Expansion};
-use crate::tolerances::{BEYOND_GUESS, BEYOND_TOUCH, EPS, POLE, RESOLVED_DEPTH, UNBOUNDED_DEPTH, UNPROVED_DEPTH};
+use crate::tolerances::{
+    BEYOND_GUESS, BEYOND_TOUCH, EPS, POLE, RESOLVED_DEPTH, UNBOUNDED_DEPTH, UNPROVED_DEPTH,
+};
 
 /// What came of a search.
 pub(super) enum SearchOutcome {

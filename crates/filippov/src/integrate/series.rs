@@ -12,7 +12,9 @@ impl Integrator<'_> {
     pub(super) fn choose_stepper(&mut self) {
         self.motion.jets = match &self.stepper.taylor {
             Some(taylor) => {
-                let jets = self.system.motion_jets(&self.motion.sliding, taylor.order());
+                let jets = self
+                    .system
+                    .motion_jets(&self.motion.sliding, taylor.order());
                 let is_auto = self.options.method == Method::Auto;
                 jets.filter(|jets| !is_auto || jets.is_unrolled())
             }
@@ -80,7 +82,11 @@ impl Integrator<'_> {
         };
         let size = |place: usize| {
             let slope = taylor.coefficient(place, 1).abs();
-            let moved = if reach.is_finite() { slope * reach } else { slope };
+            let moved = if reach.is_finite() {
+                slope * reach
+            } else {
+                slope
+            };
             taylor.coefficient(place, 0).abs().max(moved)
         };
         let exits = [0, 1].map(|index| jets.exit(index));
@@ -89,7 +95,12 @@ impl Integrator<'_> {
         } else {
             size(place)
         };
-        let atol = self.options.atol.iter().copied().fold(f64::INFINITY, f64::min);
+        let atol = self
+            .options
+            .atol
+            .iter()
+            .copied()
+            .fold(f64::INFINITY, f64::min);
         atol + self.options.rtol * size
     }
 

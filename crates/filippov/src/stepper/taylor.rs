@@ -4,9 +4,7 @@ use super::controller::{rough_exp2, rough_log2};
 use super::{Attempt, ErrorScale, Interpolant};
 use crate::error::FieldError;
 use crate::field::SmoothField;
-use crate::tolerances::{
-    TAYLOR_DIGITS_TO_ORDER, TAYLOR_LARGEST_ORDER, TAYLOR_SMALLEST_ORDER,
-};
+use crate::tolerances::{TAYLOR_DIGITS_TO_ORDER, TAYLOR_LARGEST_ORDER, TAYLOR_SMALLEST_ORDER};
 
 /// Number of states where it is not fixed at compile time.
 const ANY: usize = 0;
@@ -76,7 +74,13 @@ impl Taylor {
 
     /// Takes the coefficients at the start `y` of a step, rows of `width`, that `fill` writes; returns the length
     /// of step that they allow, NaN if they are not finite.
-    pub fn expand(&mut self, width: usize, y: &[f64], scale: &ErrorScale, fill: impl FnOnce(&mut [f64])) -> f64 {
+    pub fn expand(
+        &mut self,
+        width: usize,
+        y: &[f64],
+        scale: &ErrorScale,
+        fill: impl FnOnce(&mut [f64]),
+    ) -> f64 {
         self.width = width;
         self.rows.resize((self.order + 1) * width, 0.0);
         fill(&mut self.rows);
@@ -111,7 +115,10 @@ impl Taylor {
 
     fn longest_step(&self, y: &[f64], scale: &ErrorScale) -> f64 {
         // A coefficient that is not finite makes all of higher order so.
-        if self.rows[self.order * self.width..].iter().any(|c| !c.is_finite()) {
+        if self.rows[self.order * self.width..]
+            .iter()
+            .any(|c| !c.is_finite())
+        {
             return f64::NAN;
         }
         let allows = |k: usize| reach(scale.largest(self.row(k), y), k);
