@@ -4,12 +4,12 @@ use super::integrator::Integrator;
 use super::motion::Motion;
 use crate::error::FieldError;
 use crate::event::certificate::Bound;
-use crate::event::isolate::{first_zero, Evidence, Zero};
+use crate::event::isolate::{first_zero_sampled, Evidence, Zero};
 use crate::event::locate::refine;
 use crate::event::tube::Tube;
 use crate::event::{UserEvent, UserFunction};
 use crate::stepper::Interpolant;
-use crate::tolerances::{EPS, MOST_ZEROS, UNBOUNDED_DEPTH};
+use crate::tolerances::{EPS, MOST_ZEROS, SURFACE_NOISE, UNBOUNDED_DEPTH};
 
 /// A zero of a user's function.
 #[derive(Clone, Debug, PartialEq)]
@@ -131,8 +131,6 @@ impl Integrator<'_> {
             let start = self.user_events.left[index];
             let mut from = 0.0;
             let mut divided = self.user_events.last[index] == t0 || start == 0.0;
-            // Rounding of a function whose terms are not known: that of its values.
-            let noise = 4.0 * EPS * start.abs().max(self.user_value(index, theta)?.abs());
             let mut sign = if divided { 0.0 } else { start.signum() };
             loop {
                 if divided {
@@ -166,15 +164,26 @@ impl Integrator<'_> {
                     divided,
                     patience: UNBOUNDED_DEPTH,
                 };
-                let isolated = first_zero(&mut g, from, theta, noise, evidence)?;
+                let mut values = [0.0; 5];
+                for (i, value) in values.iter_mut().enumerate() {
+                    *value = g(from + (theta - from) * 0.25 * i as f64)?;
+                }
+                // Rounding of a function whose terms are not known: that of its values.
+                let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+                let noise = SURFACE_NOISE * largest;
+                let isolated = first_zero_sampled(&mut g, from, theta, values, noise, evidence)?;
                 if isolated.exhausted && !isolated.not_finite {
                     return Ok(None);
                 }
-                let Some(Zero::Crossing(bracket)) = isolated.zero else {
-                    break;
+                let at = match isolated.zero {
+                    Some(Zero::Crossing(bracket)) => {
+                        let width = 0.5 * EPS * (t0.abs() / dt).max(1.0);
+                        refine(&mut g, bracket, width)?.theta
+                    }
+                    // Zero up to rounding where the motion may end, as a switching function at its switch.
+                    Some(Zero::Touch(at)) if at == theta => at,
+                    _ => break,
                 };
-                let width = 0.5 * EPS * (t0.abs() / dt).max(1.0);
-                let at = refine(&mut g, bracket, width)?.theta;
                 let direction = self.user_events.events[index].direction;
                 if direction * sign <= 0.0 {
                     zeros.push((at, index));
