@@ -200,7 +200,7 @@ impl<A: Arithmetic> Coefficient<'_, A> {
                 sum = self.add(sum, term);
             }
             sum = self.ring.scaled(sum, 2.0);
-            if self.k % 2 == 0 {
+            if self.k.is_multiple_of(2) {
                 let middle = self.table.at(a, self.k / 2);
                 let term = self.mul(middle, middle);
                 sum = self.add(sum, term);
