@@ -1,5 +1,7 @@
 //! The record of a run: steps, segments, switches.
 
+use smallvec::SmallVec;
+
 use crate::error::FieldError;
 use crate::field::{IntersectionField, Projector, SlidingField, SmoothField};
 use crate::integrate::{Stats, Stop, Warning};
@@ -11,19 +13,19 @@ use crate::system::PiecewiseSystem;
 
 pub use crate::integrate::UserZero;
 
-/// A switch: the end of one motion and the start of the next.
+/// A switch: the end of one motion and the start of the next. Few states are kept without allocation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Switch {
     /// Its time.
     pub t: f64,
     /// State before.
-    pub y_before: Vec<f64>,
+    pub y_before: SmallVec<[f64; 4]>,
     /// State after.
-    pub y_after: Vec<f64>,
+    pub y_after: SmallVec<[f64; 4]>,
     /// What happened.
     pub kind: Kind,
     /// The surfaces that it happened on.
-    pub surfaces: Vec<usize>,
+    pub surfaces: SmallVec<[usize; 2]>,
     /// Mode before.
     pub mode_before: Mode,
     /// Mode after.
@@ -42,7 +44,7 @@ pub struct Segment {
     /// Index of the first step, and one past the last.
     pub steps: (usize, usize),
     /// lambda of the surfaces slid on, in their order, at the start.
-    pub multipliers: Vec<f64>,
+    pub multipliers: SmallVec<[f64; 2]>,
 }
 
 /// A step, or its part up to an event.
@@ -162,6 +164,10 @@ impl Solution {
     }
 }
 
+/// Room for so many switches, and steps, is made at the start of a run: more only costs its growth.
+const USUAL_SWITCHES: usize = 32;
+const USUAL_STEPS: usize = 64;
+
 /// Keeps what a run produces.
 pub(crate) struct Recorder {
     n: usize,
@@ -179,14 +185,14 @@ impl Recorder {
     pub fn new(n: usize, options: &Options) -> Self {
         Recorder {
             n,
-            t: Vec::new(),
-            y: Vec::new(),
+            t: Vec::with_capacity(USUAL_STEPS),
+            y: Vec::with_capacity(n * USUAL_STEPS),
             y0: vec![0.0; n],
             keep_dense: options.dense_output || options.t_eval.is_some(),
             steps: Vec::new(),
             coefficients: Vec::new(),
-            segments: Vec::new(),
-            switches: Vec::new(),
+            segments: Vec::with_capacity(USUAL_SWITCHES),
+            switches: Vec::with_capacity(USUAL_SWITCHES),
         }
     }
 
@@ -201,7 +207,7 @@ impl Recorder {
         self.y.extend_from_slice(y);
     }
 
-    pub fn begin_segment(&mut self, t: f64, mode: &Mode, multipliers: Vec<f64>) {
+    pub fn begin_segment(&mut self, t: f64, mode: &Mode, multipliers: SmallVec<[f64; 2]>) {
         let step = self.steps.len();
         self.close_segment(t);
         self.segments.push(Segment {

@@ -113,7 +113,7 @@ impl Integrator<'_> {
             return Ok(Incoming::Corner { region: entries });
         }
         self.motion.field.exits(self.t, &mut self.x)?;
-        let multipliers = self.motion.multipliers();
+        let multipliers = self.motion.multipliers().into_vec();
         let exit = event.functions.iter().find_map(|function| match function {
             EventFunction::Exit(index) => Some(*index),
             _ => None,

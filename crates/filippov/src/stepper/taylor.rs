@@ -6,9 +6,6 @@ use crate::error::FieldError;
 use crate::field::SmoothField;
 use crate::tolerances::{TAYLOR_DIGITS_TO_ORDER, TAYLOR_LARGEST_ORDER, TAYLOR_SMALLEST_ORDER};
 
-/// Number of states where it is not fixed at compile time.
-const ANY: usize = 0;
-
 /// A Taylor step of variable length.
 ///
 /// With coefficients up to order N in units of the tolerance, |c_k|, the step is as long as the last two
@@ -29,7 +26,7 @@ pub struct Taylor {
     is_expanded: bool,
     start: Vec<f64>,
     y1: Vec<f64>,
-    end: Vec<f64>,
+    end_derivative: Vec<f64>,
     defect: Vec<f64>,
     interpolant: Interpolant,
     /// Error of the attempted step in units of the tolerance.
@@ -55,7 +52,7 @@ impl Taylor {
             is_expanded: false,
             start: vec![0.0; n],
             y1: vec![0.0; n],
-            end: vec![0.0; n],
+            end_derivative: vec![0.0; n],
             defect: vec![0.0; n],
             interpolant: Interpolant::powers(n, order),
             error: 0.0,
@@ -143,7 +140,7 @@ impl Taylor {
 
     /// The derivative at the end of the attempted step.
     pub fn end_derivative(&self) -> &[f64] {
-        &self.end
+        &self.end_derivative
     }
 
     /// The series of the attempted step.
@@ -165,16 +162,16 @@ impl Taylor {
     ) -> Result<Attempt, FieldError> {
         (self.interpolant.t0, self.interpolant.dt) = (t, dt);
         match self.n {
-            1 => self.sum::<1>(y),
-            2 => self.sum::<2>(y),
-            3 => self.sum::<3>(y),
-            4 => self.sum::<4>(y),
-            _ => self.sum::<ANY>(y),
+            1 => self.sum_few::<1>(y),
+            2 => self.sum_few::<2>(y),
+            3 => self.sum_few::<3>(y),
+            4 => self.sum_few::<4>(y),
+            _ => self.sum(y),
         }
-        field.eval(t + dt, &mut self.y1, &mut self.end)?;
+        field.eval(t + dt, &mut self.y1, &mut self.end_derivative)?;
         // The defect is the derivative of the first term left out: order + 1 times that term over the step.
         let share = 1.0 / (self.order + 1) as f64;
-        for (defect, rate) in self.defect.iter_mut().zip(&self.end) {
+        for (defect, rate) in self.defect.iter_mut().zip(&self.end_derivative) {
             *defect = share * (*defect - dt * rate);
         }
         self.error = scale.norm(&self.defect, &self.y1);
@@ -188,29 +185,54 @@ impl Taylor {
 
     /// Writes the coefficients in powers of theta, their sum, which is the end of the step, and the derivative in
     /// theta there.
-    #[inline(always)]
-    fn sum<const N: usize>(&mut self, y: &[f64]) {
-        let n = if N == ANY { self.n } else { N };
-        let dt = self.interpolant.dt;
-        let scaled = self.interpolant.coefficients_mut();
-        scaled[..n].copy_from_slice(&y[..n]);
+    fn sum(&mut self, y: &[f64]) {
+        let (n, dt) = (self.n, self.interpolant.dt);
+        let (first, rest) = self.interpolant.coefficients_mut().split_at_mut(n);
+        first.copy_from_slice(y);
         let mut power = dt;
         let rows = self.rows.chunks_exact(self.width).skip(1);
-        for (to, from) in scaled[n..].chunks_exact_mut(n).zip(rows) {
-            for i in 0..n {
+        for (to, from) in rest.chunks_exact_mut(n).zip(rows) {
+            for (to, from) in to.iter_mut().zip(from) {
+                *to = from * power;
+            }
+            power *= dt;
+        }
+        self.y1.fill(0.0);
+        self.defect.fill(0.0);
+        let rows = self.interpolant.coefficients().chunks_exact(n);
+        for (k, row) in rows.enumerate().rev() {
+            let sums = self.y1.iter_mut().zip(&mut self.defect);
+            for ((y1, slope), c) in sums.zip(row) {
+                *y1 += c;
+                *slope += k as f64 * c;
+            }
+        }
+    }
+
+    /// As [`sum`](Self::sum), for few states: the sums stay in registers.
+    fn sum_few<const N: usize>(&mut self, y: &[f64]) {
+        let dt = self.interpolant.dt;
+        let (scaled, _) = self.interpolant.coefficients_mut().as_chunks_mut::<N>();
+        scaled[0].copy_from_slice(y);
+        let mut power = dt;
+        let rows = self.rows.chunks_exact(self.width).skip(1);
+        for (to, from) in scaled[1..].iter_mut().zip(rows) {
+            let from = &from[..N];
+            for i in 0..N {
                 to[i] = from[i] * power;
             }
             power *= dt;
         }
-        let (y1, slope) = (&mut self.y1[..n], &mut self.defect[..n]);
-        y1.fill(0.0);
-        slope.fill(0.0);
-        for (k, row) in scaled.chunks_exact(n).enumerate().rev() {
-            for i in 0..n {
+        let (mut y1, mut slope, mut k) = ([0.0; N], [0.0; N], self.order as f64);
+        for row in scaled.iter().rev() {
+            for i in 0..N {
                 y1[i] += row[i];
-                slope[i] += k as f64 * row[i];
+                slope[i] += k * row[i];
             }
+            k -= 1.0;
         }
+        self.y1.copy_from_slice(&y1);
+        self.defect.copy_from_slice(&slope);
     }
 
     /// The factor for another attempt after one with this error was rejected.
@@ -227,7 +249,7 @@ impl Taylor {
     /// Makes the end of the attempted step the start of the next one.
     pub fn accept(&mut self, y: &mut [f64]) {
         y.copy_from_slice(&self.y1);
-        self.start.copy_from_slice(&self.end);
+        self.start.copy_from_slice(&self.end_derivative);
         self.is_expanded = false;
     }
 }
