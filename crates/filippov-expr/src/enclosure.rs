@@ -103,6 +103,15 @@ impl Enclosure {
         }
     }
 
+    /// What is in either of two enclosures.
+    #[must_use]
+    pub fn hull(self, other: Self) -> Self {
+        Enclosure {
+            value: self.value.joined(other.value),
+            rate: self.rate.joined(other.rate),
+        }
+    }
+
     /// The time itself.
     pub const fn time(times: Interval) -> Self {
         Enclosure {
@@ -149,12 +158,24 @@ impl Number for Enclosure {
     }
 
     fn unary(self, op: UnaryOp) -> Self {
-        let value = self.value.unary(op);
-        let rate = if self.rate.is_zero() {
-            Interval::ZERO
-        } else {
-            self.slope(op, value) * self.rate
+        if self.rate.is_zero() {
+            return Enclosure {
+                value: self.value.unary(op),
+                rate: Interval::ZERO,
+            };
+        }
+        let (value, slope) = match op {
+            UnaryOp::Sin => self.value.sine_and_cosine(),
+            UnaryOp::Cos => {
+                let (sine, cosine) = self.value.sine_and_cosine();
+                (cosine, -sine)
+            }
+            _ => {
+                let value = self.value.unary(op);
+                (value, self.slope(op, value))
+            }
         };
+        let rate = slope * self.rate;
         Enclosure { value, rate }
     }
 
@@ -169,8 +190,14 @@ impl Number for Enclosure {
         let value = self.value.binary(op, b.value);
         let (da, db) = (self.rate, b.rate);
         let rate = match op {
+            // What stands still adds nothing: most operands do.
+            BinaryOp::Add | BinaryOp::Sub if db.is_zero() => da,
+            BinaryOp::Add if da.is_zero() => db,
+            BinaryOp::Sub if da.is_zero() => -db,
             BinaryOp::Add => da + db,
             BinaryOp::Sub => da - db,
+            BinaryOp::Mul if db.is_zero() && self.value.is_bounded() => da * b.value,
+            BinaryOp::Mul if da.is_zero() && b.value.is_bounded() => self.value * db,
             BinaryOp::Mul => da * b.value + self.value * db,
             _ if da.is_zero() && db.is_zero() => Interval::ZERO,
             BinaryOp::Div => (da - value * db) / b.value,

@@ -47,6 +47,18 @@ impl Interval {
         }
     }
 
+    /// The smallest interval that contains two; everything if one of them is not known.
+    #[must_use]
+    pub fn joined(self, other: Self) -> Self {
+        if !self.is_bounded() || !other.is_bounded() {
+            return Interval::ALL;
+        }
+        Interval {
+            lo: self.lo.min(other.lo),
+            hi: self.hi.max(other.hi),
+        }
+    }
+
     /// The numbers within `radius` of `centre`.
     pub fn around(centre: f64, radius: f64) -> Self {
         Interval {
@@ -198,31 +210,40 @@ impl Interval {
         self.wave(0.5, [self.lo.sin(), self.hi.sin()])
     }
 
+    /// Sine and cosine, which take little more together than one of them.
+    pub(crate) fn sine_and_cosine(self) -> (Self, Self) {
+        if !self.is_bounded() {
+            return (Interval::ALL, Interval::ALL);
+        }
+        let ((sin_lo, cos_lo), (sin_hi, cos_hi)) = (self.lo.sin_cos(), self.hi.sin_cos());
+        let (sine, cosine) = ([sin_lo, sin_hi], [cos_lo, cos_hi]);
+        (self.wave(0.5, sine), self.wave(0.0, cosine))
+    }
+
     /// A sine wave with extrema at (k + offset) pi, maxima for even k, given its values at the ends.
     fn wave(self, offset: f64, ends: [f64; 2]) -> Self {
-        use std::f64::consts::PI;
-        if !(self.lo.abs() < LARGEST_ANGLE && self.hi.abs() < LARGEST_ANGLE) {
+        use std::f64::consts::FRAC_1_PI;
+        let size = self.lo.abs().max(self.hi.abs());
+        if size >= LARGEST_ANGLE {
             return Interval::hull(-1.0, 1.0);
         }
-        // The slack covers the rounding of the quotients.
-        let slack = LIBRARY * (1.0 + self.lo.abs().max(self.hi.abs()));
-        let first = ((self.lo - slack) / PI - offset).ceil();
-        let last = ((self.hi + slack) / PI - offset).floor();
-        let mut range = Interval::spanning(ends, LIBRARY);
-        if last > first {
-            return Interval::hull(-1.0, 1.0);
-        }
-        if last >= first {
-            if first.rem_euclid(2.0) == 0.0 {
-                range.hi = 1.0;
-            } else {
-                range.lo = -1.0;
+        // The slack covers the rounding of the products.
+        let slack = LIBRARY * (1.0 + size);
+        let before = floor((self.lo - slack) * FRAC_1_PI - offset);
+        let last = floor((self.hi + slack) * FRAC_1_PI - offset);
+        let range = Interval::spanning(ends, LIBRARY);
+        let (mut lo, mut hi) = (range.lo.max(-1.0), range.hi.min(1.0));
+        // The extrema in between: two are of both kinds.
+        if last > before {
+            let both = last > before + 1;
+            if both || last % 2 == 0 {
+                hi = 1.0;
+            }
+            if both || last % 2 != 0 {
+                lo = -1.0;
             }
         }
-        Interval {
-            lo: range.lo.max(-1.0),
-            hi: range.hi.min(1.0),
-        }
+        Interval { lo, hi }
     }
 
     fn tangent(self) -> Self {
@@ -272,6 +293,12 @@ impl Interval {
         ];
         Interval::spanning(corners, LIBRARY)
     }
+}
+
+/// The largest integer up to a number of moderate size: `f64::floor` is a call on many machines.
+fn floor(x: f64) -> i64 {
+    let k = x as i64;
+    k - i64::from(k as f64 > x)
 }
 
 impl Add for Interval {

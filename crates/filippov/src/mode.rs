@@ -8,7 +8,7 @@ use smallvec::SmallVec;
 pub type Signs = SmallVec<[f64; 8]>;
 
 /// A mode: one entry per surface, +1 where h > 0, -1 where h < 0, 0 while sliding on h = 0.
-#[derive(Clone, PartialEq, Eq, Hash)]
+#[derive(PartialEq, Eq, Hash)]
 pub struct Mode {
     /// Few are kept without allocation: modes are copied at every switch.
     entries: SmallVec<[i8; 16]>,
@@ -55,15 +55,27 @@ impl Mode {
 
     /// The signs handed to the field: +1.0 or -1.0 per surface, a zero entry as +1.0.
     pub fn signs(&self) -> Signs {
-        self.entries
-            .iter()
-            .map(|&e| if e < 0 { -1.0 } else { 1.0 })
-            .collect()
+        let mut signs = Signs::from_elem(1.0, self.entries.len());
+        for (sign, &entry) in signs.iter_mut().zip(&self.entries) {
+            if entry < 0 {
+                *sign = -1.0;
+            }
+        }
+        signs
     }
 
     /// Sets entry `j`.
     pub(crate) fn set(&mut self, j: usize, entry: i8) {
         self.entries[j] = entry;
+    }
+}
+
+impl Clone for Mode {
+    /// As a whole, not entry by entry.
+    fn clone(&self) -> Self {
+        Mode {
+            entries: SmallVec::from_slice(&self.entries),
+        }
     }
 }
 

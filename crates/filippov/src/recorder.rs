@@ -1,5 +1,7 @@
 //! What is kept of a run while it goes on.
 
+use smallvec::SmallVec;
+
 use crate::integrate::{Stats, Stop, Warning};
 use crate::mode::Mode;
 use crate::options::{Keep, Options, SlidingRule};
@@ -103,7 +105,13 @@ impl Recorder {
         }
     }
 
-    pub fn begin_segment(&mut self, t: f64, mode: &Mode, multipliers: Vec<f64>, discrete: &[f64]) {
+    pub fn begin_segment(
+        &mut self,
+        t: f64,
+        mode: &Mode,
+        multipliers: SmallVec<[f64; 2]>,
+        discrete: &[f64],
+    ) {
         let step = self.steps.len();
         self.close_segment(t);
         if self.keep == Keep::Last {

@@ -1,5 +1,7 @@
 //! The record of a run: steps, segments, switches.
 
+use smallvec::SmallVec;
+
 use crate::error::FieldError;
 use crate::field::{IntersectionField, Projector, SlidingField, SmoothField};
 use crate::integrate::{Stats, Stop, Warning};
@@ -11,19 +13,19 @@ use crate::system::PiecewiseSystem;
 
 pub use crate::integrate::UserZero;
 
-/// A switch: the end of one motion and the start of the next.
+/// A switch: the end of one motion and the start of the next. Few states are kept without allocation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Switch {
     /// Its time.
     pub t: f64,
     /// State before.
-    pub y_before: Vec<f64>,
+    pub y_before: SmallVec<[f64; 4]>,
     /// State after.
-    pub y_after: Vec<f64>,
+    pub y_after: SmallVec<[f64; 4]>,
     /// What happened.
     pub kind: Kind,
     /// The surfaces that it happened on.
-    pub surfaces: Vec<usize>,
+    pub surfaces: SmallVec<[usize; 2]>,
     /// Mode before.
     pub mode_before: Mode,
     /// Mode after.
@@ -44,7 +46,7 @@ pub struct Segment {
     /// Index of the first step, and one past the last.
     pub steps: (usize, usize),
     /// lambda of the surfaces slid on, in their order, at the start; NaN for those in contact.
-    pub multipliers: Vec<f64>,
+    pub multipliers: SmallVec<[f64; 2]>,
     /// The discrete states.
     pub discrete: Vec<f64>,
 }

@@ -34,6 +34,18 @@ pub struct Bracket {
 }
 
 impl Bracket {
+    /// A zero that is known to be here.
+    fn at(theta: f64, value: f64) -> Self {
+        Bracket {
+            lo: theta,
+            hi: theta,
+            g_lo: value,
+            g_hi: value,
+            guess: theta,
+            slope: f64::NAN,
+        }
+    }
+
     /// Does the function fall too steeply to turn back within the noise? With the slope c in the
     /// bracket and second derivatives of at most 1e3 times the `scale` of its values, the lowest
     /// point ahead is c^2 / (2e3 scale) below zero.
@@ -112,17 +124,11 @@ pub fn first_zero_sampled(
     if values.iter().all(|v| v.abs() <= noise) {
         return Ok(Isolated::default());
     }
-    if values[0] < -noise {
-        let here = Bracket {
-            lo: a,
-            hi: a,
-            g_lo: values[0],
-            g_hi: values[0],
-            guess: a,
-            slope: f64::NAN,
-        };
+    // Below zero, or there up to rounding and falling from there on.
+    let falls = values[0] <= 0.0 && values[1..].iter().all(|&v| v < 0.0) && values[4] < -noise;
+    if values[0] < -noise || falls {
         return Ok(Isolated {
-            zero: Some(Zero::Crossing(here)),
+            zero: Some(Zero::Crossing(Bracket::at(a, values[0]))),
             ..Isolated::default()
         });
     }

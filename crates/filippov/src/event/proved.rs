@@ -1,7 +1,8 @@
 //! The first zero where bounds decide every piece: few values are needed then.
 
-use super::certificate::{Bounds, Verdict};
+use super::certificate::{Bound, Bounds, Verdict};
 use super::isolate::{Bracket, Sampled};
+use super::series::Near;
 use crate::error::FieldError;
 use crate::tolerances::PROVED_DEPTH;
 
@@ -17,7 +18,7 @@ pub enum Proved {
 }
 
 /// The first zero of `g` on [a, b], `left` > 0 and `right` being its values there. A piece whose bounds say
-/// nothing is halved a few times. `near` is about where a zero is expected, if anywhere, and the slope there.
+/// nothing is halved a few times. `near` is where a zero is expected, if anywhere.
 ///
 /// # Errors
 /// If `g` raises.
@@ -27,7 +28,7 @@ pub fn first_zero_proved(
     piece: (f64, f64),
     ends: (f64, f64),
     noise: f64,
-    near: Option<(f64, f64)>,
+    near: Option<Near>,
 ) -> Result<Proved, FieldError> {
     let is_decided = ends.0 > noise && ends.1.abs() > noise;
     if !is_decided {
@@ -35,17 +36,62 @@ pub fn first_zero_proved(
     }
     let proved = proved(g, bounds, piece, ends, noise, PROVED_DEPTH)?;
     Ok(match (proved, near) {
-        (Proved::Single(bracket), Some((guess, slope)))
-            if bracket.lo < guess && guess < bracket.hi && slope < 0.0 =>
+        (Proved::Single(bracket), Some(Near { theta, slope, .. }))
+            if bracket.lo < theta && theta < bracket.hi && slope < 0.0 =>
         {
             Proved::Single(Bracket {
-                guess,
+                guess: theta,
                 slope,
                 ..bracket
             })
         }
         _ => proved,
     })
+}
+
+/// The first zero of `g` on [a, b] where it is expected, if bounds prove that `g` falls through zero around there and
+/// has no zero before; `left` > 0 is the value at a. One value and two bounds do; the values at the ends of the
+/// bracket are those that the slope allows at most and at least.
+///
+/// # Errors
+/// If `g` raises.
+pub fn expected_zero_proved(
+    g: Sampled,
+    bounds: Bounds,
+    (a, b): (f64, f64),
+    left: f64,
+    noise: f64,
+    near: Near,
+) -> Result<Option<Bracket>, FieldError> {
+    // A function that rises at first does not fall throughout.
+    let falls = near.slope_at_start < 0.0;
+    let m = if falls { a } else { 0.5 * (a + b) };
+    let Some(last) = bounds(m, b).filter(|_| left > noise && m < near.theta && near.theta < b)
+    else {
+        return Ok(None);
+    };
+    if last.verdict(b - m, None, noise) != Verdict::Falling {
+        return Ok(None);
+    }
+    let value = g(near.theta)?;
+    let least_slope = -last.slope.hi;
+    let g_lo = value + least_slope * (near.theta - m);
+    let g_hi = value - least_slope * (b - near.theta);
+    if !(g_lo > noise && g_hi < -noise) {
+        return Ok(None);
+    }
+    let is_clear = |first: Bound| first.verdict(m - a, None, noise) == Verdict::Clear;
+    if !falls && !bounds(a, m).is_some_and(is_clear) {
+        return Ok(None);
+    }
+    Ok(Some(Bracket {
+        lo: m,
+        hi: b,
+        g_lo,
+        g_hi,
+        guess: near.theta,
+        slope: near.slope,
+    }))
 }
 
 fn proved(

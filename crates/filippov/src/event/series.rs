@@ -4,15 +4,56 @@ use filippov_expr::Interval;
 
 use super::certificate::Bound;
 use crate::stepper::{shift, Expansion};
-use crate::tolerances::EPS;
+use crate::tolerances::{EPS, TAYLOR_LARGEST_ORDER};
 
 /// Samples, and steps of Newton's method, in the search for about where a zero is.
 const GUESS_SAMPLES: u32 = 5;
 const GUESS_STEPS: u32 = 3;
 
-/// A polynomial in theta, lowest coefficient first; there is at least one.
+/// Room for the coefficients of a step of the highest order.
+pub type LongestSeries = [f64; MOST_COEFFICIENTS];
+const MOST_COEFFICIENTS: usize = TAYLOR_LARGEST_ORDER + 1;
+
+/// 1 / C(n, k) for every degree n.
+const INVERSE_BINOMIALS: [LongestSeries; MOST_COEFFICIENTS] = {
+    let mut table = [[1.0; MOST_COEFFICIENTS]; MOST_COEFFICIENTS];
+    let mut n = 0;
+    while n < MOST_COEFFICIENTS {
+        let mut k = 0;
+        while k < n {
+            table[n][k + 1] = table[n][k] * (k + 1) as f64 / (n - k) as f64;
+            k += 1;
+        }
+        n += 1;
+    }
+    table
+};
+
+/// A polynomial in theta, lowest coefficient first; there is at least one, and no more than of a step.
 #[derive(Clone, Copy, Debug)]
 pub struct Series<'a>(&'a [f64]);
+
+/// What is known about the zeros of a polynomial on [0, 1].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Zeros {
+    /// There is none: it is positive.
+    Nowhere,
+    /// There is exactly one, where it falls from positive to negative values; very roughly here.
+    One(f64),
+    /// Nothing.
+    Unknown,
+}
+
+/// Where a zero is expected.
+#[derive(Clone, Copy, Debug)]
+pub struct Near {
+    /// About here.
+    pub theta: f64,
+    /// The slope there.
+    pub slope: f64,
+    /// The slope at 0.
+    pub slope_at_start: f64,
+}
 
 impl<'a> Series<'a> {
     /// The polynomial with these coefficients.
@@ -31,53 +72,70 @@ impl<'a> Series<'a> {
         self.0.iter().rev().fold(0.0, |value, c| value * theta + c)
     }
 
-    /// Is the polynomial greater than `noise` on all of [0, 1]? Looks at the sum of its falling terms, then at
-    /// its Bernstein coefficients; `false` may mean that they do not tell.
-    pub fn is_above(&self, noise: f64) -> bool {
+    /// What is known about the zeros on [0, 1]. Looks at the sum of the falling terms, then at the signs of the
+    /// Bernstein coefficients, which change at least as often as those of the polynomial (Descartes' rule).
+    pub fn zeros(&self) -> Zeros {
         let falling: f64 = self.0[1..].iter().map(|c| c.min(0.0)).sum();
-        if self.0[0] + falling > noise {
-            return true;
+        if self.0[0] + falling > 0.0 {
+            return Zeros::Nowhere;
         }
-        // The coefficient of degree i is the sum of C(i, k)/C(n, k) c_k: a triangle of differences.
-        let mut b = Expansion::from_slice(self.0);
+        let mut coefficients = LongestSeries::default();
+        let b = &mut coefficients[..self.0.len()];
+        // The coefficient of degree i is the sum of C(i, k)/C(n, k) c_k.
         let degree = b.len() - 1;
-        let mut binomial = 1.0;
-        for (k, b) in b.iter_mut().enumerate() {
-            *b /= binomial;
-            binomial *= (degree - k) as f64 / (k + 1) as f64;
+        let mut size = 0.0;
+        let weights = &INVERSE_BINOMIALS[degree];
+        for ((b, c), weight) in b.iter_mut().zip(self.0).zip(weights) {
+            size += c.abs();
+            *b = weight * c;
         }
-        for first in 0..degree {
-            for k in (first..degree).rev() {
-                b[k + 1] += b[k];
-            }
-            if first == 0 && b[degree] <= noise {
-                return false;
-            }
+        sum_binomially(b);
+        if b.iter().all(|&b| b > 0.0) {
+            return Zeros::Nowhere;
         }
-        b.iter().all(|&b| b > noise)
+        // Of the coefficient between the positive and the negative ones the sign may be lost in rounding.
+        let noise = 16.0 * EPS * size;
+        let positive = b.iter().take_while(|&&b| b > noise).count();
+        let negative = b.iter().rev().take_while(|&&b| b < -noise).count();
+        if positive == 0 || negative == 0 || positive + negative < degree {
+            return Zeros::Unknown;
+        }
+        // Where the polygon of the coefficients falls through zero.
+        let (left, right) = (positive - 1, degree + 1 - negative);
+        let share = b[left] / (b[left] - b[right]) * (right - left) as f64;
+        Zeros::One((left as f64 + share) / degree as f64)
     }
 
     /// About where the polynomial, positive at 0, first falls through zero on [0, 1], found by a few samples and
-    /// Newton's method, and the slope there; none if the samples show no zero.
-    pub fn near_zero(&self) -> Option<(f64, f64)> {
+    /// Newton's method; none if the samples show no zero.
+    pub fn near_zero(&self) -> Option<Near> {
         let mut previous = self.0[0];
         for i in 1..=GUESS_SAMPLES {
             let theta = f64::from(i) / f64::from(GUESS_SAMPLES);
             let value = self.value(theta);
             if value <= 0.0 {
                 let share = previous / (previous - value);
-                let mut at = theta - (1.0 - share) / f64::from(GUESS_SAMPLES);
-                let mut slope = f64::NAN;
-                for _ in 0..GUESS_STEPS {
-                    let (value, here) = self.with_slope(at);
-                    slope = here;
-                    at -= value / slope;
-                }
-                return (at > 0.0 && at <= 1.0).then_some((at, slope));
+                let guess = theta - (1.0 - share) / f64::from(GUESS_SAMPLES);
+                return self.newton(guess).map(|(theta, slope)| Near {
+                    theta,
+                    slope,
+                    slope_at_start: self.0.get(1).copied().unwrap_or(0.0),
+                });
             }
             previous = value;
         }
         None
+    }
+
+    /// The zero on [0, 1] that a few steps of Newton's method lead to, and the slope there.
+    pub fn newton(&self, mut at: f64) -> Option<(f64, f64)> {
+        let mut slope = f64::NAN;
+        for _ in 0..GUESS_STEPS {
+            let (value, here) = self.with_slope(at);
+            slope = here;
+            at -= value / slope;
+        }
+        (at > 0.0 && at <= 1.0).then_some((at, slope))
     }
 
     fn with_slope(&self, theta: f64) -> (f64, f64) {
@@ -91,8 +149,9 @@ impl<'a> Series<'a> {
 
     /// Bounds of value and slope from theta = `a` to `b`, rounding included.
     pub fn bound(&self, a: f64, b: f64) -> Bound {
-        let mut d = Expansion::from_slice(self.0);
-        shift(&mut d, 0.5 * (a + b));
+        let mut coefficients = Expansion::from_slice(self.0);
+        let d = &mut coefficients[..];
+        shift(d, 0.5 * (a + b));
         let radius = 0.5 * (b - a);
         let (mut spread, mut slope_spread, mut power, mut size) = (0.0, 0.0, 1.0, 0.0);
         for (k, c) in d.iter().enumerate().skip(1) {
@@ -112,9 +171,25 @@ impl<'a> Series<'a> {
     }
 }
 
+/// Makes entry i the sum of C(i, k) b_k: a triangle of sums of neighbours, two rows of it at a time.
+fn sum_binomially(mut b: &mut [f64]) {
+    while let [first, second, rest @ ..] = b {
+        let mut before = *second;
+        *second += *first;
+        let mut above = *second;
+        for entry in rest.iter_mut() {
+            let sum = *entry + before;
+            before = *entry;
+            *entry = sum + above;
+            above = sum;
+        }
+        b = rest;
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::Series;
+    use super::{Series, Zeros};
 
     #[test]
     fn a_polynomial_is_above_what_it_stays_above() {
@@ -124,11 +199,27 @@ mod tests {
             let series = Series::new(&coefficients);
             let lowest = (0..=100).map(|k| series.value(f64::from(k) * 0.01));
             assert_eq!(lowest.fold(f64::INFINITY, f64::min) > 1e-9, is_above);
-            assert!(is_above || !series.is_above(1e-9));
+            assert_eq!(series.zeros(), Zeros::Unknown);
         }
         // Bernstein coefficients tell where the falling terms do not.
-        assert!(Series::new(&[1.0, -1.5, 1.0, 0.0]).is_above(0.0));
-        assert!(!Series::new(&[1.0, -2.5, 1.0]).is_above(0.0));
+        assert_eq!(Series::new(&[1.0, -1.5, 1.0, 0.0]).zeros(), Zeros::Nowhere);
+        assert_eq!(Series::new(&[1.0, -2.5, 1.6]).zeros(), Zeros::Unknown);
+    }
+
+    #[test]
+    fn one_change_of_sign_is_one_zero() {
+        // (1 - 2 theta) (1 + theta + theta^2)
+        let series = Series::new(&[1.0, -1.0, -1.0, -2.0]);
+        let Zeros::One(guess) = series.zeros() else {
+            panic!("not found");
+        };
+        let (zero, slope) = series.newton(guess).unwrap();
+        // Three steps of Newton's method; the slope is that before the last.
+        assert!((zero - 0.5).abs() < 1e-6 && (slope + 3.5).abs() < 1e-2);
+        // Touching zero, or vanishing at an end, is not decided.
+        for coefficients in [[0.25, -1.0, 1.0], [1.0, -1.0, 0.0], [0.0, 1.0, -2.0]] {
+            assert_eq!(Series::new(&coefficients).zeros(), Zeros::Unknown);
+        }
     }
 
     #[test]

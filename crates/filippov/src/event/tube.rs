@@ -40,6 +40,14 @@ impl Motion for Tube<'_> {
     ///
     /// so that its bounds are d0 +- sum |dk| radius^k, and those of its slope d1 +- sum k |dk| radius^(k-1).
     fn state(&self, index: usize) -> Enclosure {
+        let margin = self.margin.get(index).copied().unwrap_or(0.0);
+        let dt = self.interpolant.dt;
+        if let Some(value) = self.interpolant.constant(index) {
+            return Enclosure {
+                value: Interval::around(value, margin),
+                rate: Interval::around(0.0, MARGIN_SLOPE * margin).scaled(1.0 / dt),
+            };
+        }
         let d = self.interpolant.expanded(index, self.middle);
         let (mut spread, mut slope_spread, mut power) = (0.0, 0.0, 1.0);
         for (k, coefficient) in d.iter().enumerate().skip(1) {
@@ -51,8 +59,6 @@ impl Motion for Tube<'_> {
         }
         // A state that stands still stays a point: the rounding is a fraction of what moves.
         let size: f64 = d.iter().skip(1).map(|c| c.abs()).sum();
-        let margin = self.margin.get(index).copied().unwrap_or(0.0);
-        let dt = self.interpolant.dt;
         Enclosure {
             value: Interval::around(d[0], spread + 8.0 * EPS * size + margin),
             rate: Interval::around(

@@ -1,5 +1,7 @@
 //! Accumulations: infinitely many switches in finite time, jumped to their limit.
 
+use smallvec::SmallVec;
+
 use super::integrator::Integrator;
 use super::transition::Decided;
 use super::Stop;
@@ -28,6 +30,10 @@ impl Integrator<'_> {
     /// The limit that the last switches tend to: turns of equally many switches, each turn shorter and nearer to
     /// an intersection than the one before by the same ratio (`docs/theory/intersections.md`).
     pub(super) fn accumulation(&self) -> Result<Option<Limit>, FieldError> {
+        if self.system.n_surfaces() < 2 {
+            // Nothing can meet.
+            return Ok(None);
+        }
         let switches = self.recorder.switches();
         let Some(turn) = turn_of(switches) else {
             return Ok(None);
@@ -96,7 +102,7 @@ impl Integrator<'_> {
         before: Mode,
     ) -> Result<Option<Stop>, FieldError> {
         self.recorder
-            .begin_segment(self.t, &before, Vec::new(), &self.motion.discrete);
+            .begin_segment(self.t, &before, SmallVec::new(), &self.motion.discrete);
         self.motion.mode = before.clone();
         self.move_straight(limit.t, limit.x)?;
         self.stats.n_switches += 1;
@@ -106,10 +112,10 @@ impl Integrator<'_> {
         };
         self.recorder.switch(Switch {
             t: self.t,
-            y_before: self.x.clone(),
-            y_after: self.x.clone(),
+            y_before: SmallVec::from_slice(&self.x),
+            y_after: SmallVec::from_slice(&self.x),
             kind: Kind::Accumulation,
-            surfaces: limit.meeting,
+            surfaces: limit.meeting.into(),
             mode_before: before,
             mode_after: after.clone(),
             note: String::new(),

@@ -10,12 +10,12 @@
 //!    crosses. (A count, or a phase that is set back, at a section.)
 //! 4. The mode is decided for the last state ([`super::placement`]).
 
-use smallvec::smallvec;
+use smallvec::{smallvec, SmallVec};
 
 use super::detect::Found;
 use super::integrator::Integrator;
 use super::placement::Sides;
-use super::transition::Values;
+use super::transition::{located_surfaces, Values};
 use super::Stop;
 use crate::action::Trigger;
 use crate::error::FieldError;
@@ -105,7 +105,8 @@ impl Integrator<'_> {
         if event.touch {
             return Ok(None);
         }
-        let surfaces = self.vanishing_surfaces(event, h)?;
+        let mut surfaces = located_surfaces(event);
+        self.add_vanishing_surfaces(&mut surfaces, h)?;
         let located = |j: usize| event.functions.contains(&EventFunction::Surface(j));
         let rates = self.rates_here()?;
         let entries = self.motion.mode.entries();
@@ -218,7 +219,7 @@ impl Integrator<'_> {
     /// Does one action and records it.
     fn do_action(&mut self, index: usize, before: &Mode) -> Result<Option<Stop>, FieldError> {
         let action = &self.actions.list[index];
-        let y_before = self.x.clone();
+        let y_before = SmallVec::from_slice(&self.x);
         let mut q = std::mem::take(&mut self.motion.discrete);
         let signs = self.motion.signs.clone();
         let done = action.map.apply(self.t, &mut self.x, &signs, &mut q);
@@ -234,9 +235,9 @@ impl Integrator<'_> {
             self.recorder.switch(Switch {
                 t: self.t,
                 y_before,
-                y_after: self.x.clone(),
+                y_after: SmallVec::from_slice(&self.x),
                 kind,
-                surfaces,
+                surfaces: surfaces.into(),
                 mode_before: before.clone(),
                 mode_after: before.clone(),
                 note: action.name.clone(),

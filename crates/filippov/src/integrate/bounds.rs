@@ -108,11 +108,9 @@ impl BoundedCurve<'_> {
     }
 
     fn normal_components(&self, j: usize, a: f64, b: f64) -> Option<[Enclosure; 2]> {
-        let known = self.known_exits.borrow();
-        if let Some(piece) = known.iter().find(|piece| (piece.0, piece.1) == (a, b)) {
-            return Some(piece.2);
+        if let Some(known) = known_components(&self.known_exits.borrow(), a, b) {
+            return Some(known);
         }
-        drop(known);
         let tube = Tube::new(self.interpolant, (a, b), self.margin);
         let components = self
             .system
@@ -153,6 +151,18 @@ impl BoundedCurve<'_> {
         }
         Some(found)
     }
+}
+
+/// The bounds over a piece that was looked at, or over two that make it up.
+fn known_components(known: &[Piece], a: f64, b: f64) -> Option<[Enclosure; 2]> {
+    if let Some(piece) = known.iter().find(|piece| (piece.0, piece.1) == (a, b)) {
+        return Some(piece.2);
+    }
+    let first = known.iter().find(|piece| piece.0 == a && piece.1 < b)?;
+    let second = known
+        .iter()
+        .find(|piece| (piece.0, piece.1) == (first.1, b))?;
+    Some([0, 1].map(|k| first.2[k].hull(second.2[k])))
 }
 
 /// Bounds of an exit function where the multipliers are bounded; none for the stability of three and more.

@@ -51,7 +51,7 @@ impl<'a> Integrator<'a> {
         if concerned.is_empty() {
             concerned = surfaces.to_vec();
         }
-        self.record(before, after.clone(), concerned);
+        self.record(before, after.clone(), &concerned);
         self.begin(after, &left)
     }
 
@@ -222,7 +222,7 @@ impl<'a> Integrator<'a> {
         self.residuals.clear();
         let changed = |j: &usize| before.entries()[*j] != after.entries()[*j];
         let concerned: Vec<usize> = (0..before.entries().len()).filter(changed).collect();
-        self.record(before, after.clone(), concerned);
+        self.record(before, after.clone(), &concerned);
         self.begin(after, &left)
     }
 }

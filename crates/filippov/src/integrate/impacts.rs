@@ -1,5 +1,7 @@
 //! Impacts that come faster and faster: their limit, and rest after it.
 
+use smallvec::{smallvec, SmallVec};
+
 use super::actions::is_reset;
 use super::integrator::Integrator;
 use super::Stop;
@@ -107,7 +109,7 @@ impl Integrator<'_> {
             return Ok(Some(Stop::NotFinite));
         }
         self.recorder
-            .begin_segment(self.t, &before, Vec::new(), &self.motion.discrete);
+            .begin_segment(self.t, &before, SmallVec::new(), &self.motion.discrete);
         self.motion.mode = before.clone();
         let y_before = x.clone();
         if t > self.t {
@@ -123,10 +125,10 @@ impl Integrator<'_> {
         };
         self.recorder.switch(Switch {
             t: self.t,
-            y_before,
-            y_after: self.x.clone(),
+            y_before: y_before.into(),
+            y_after: SmallVec::from_slice(&self.x),
             kind: Kind::Accumulation,
-            surfaces: vec![surface],
+            surfaces: smallvec![surface],
             mode_before: before,
             mode_after: after.clone(),
             note: String::new(),

@@ -133,7 +133,7 @@ impl Integrator<'_> {
         self.motion.field.exits(self.t, &mut self.x)?;
         let multipliers = match &self.motion.field {
             ModeField::Intersection(field) => field.tracked(self.t).to_vec(),
-            _ => self.motion.multipliers(),
+            _ => self.motion.multipliers().into_vec(),
         };
         let exit = event.functions.iter().find_map(|function| match function {
             EventFunction::Exit(index) => Some(*index),

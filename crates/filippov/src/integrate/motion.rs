@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use smallvec::SmallVec;
+use smallvec::{smallvec, SmallVec};
 
 use crate::action::Actions;
 use crate::error::FieldError;
@@ -154,6 +154,17 @@ impl SmoothField for ModeField<'_> {
     }
 }
 
+/// Modes that are remembered: in a run that meets more of them, what follows from a mode is found anew now and then.
+const MOST_KNOWN: usize = 8;
+
+/// What follows from a mode alone, wherever its motion starts.
+struct KnownMode {
+    mode: Mode,
+    active: SmallVec<[bool; 8]>,
+    /// Its Taylor series, once they were asked for and if there are any.
+    jets: Option<Option<Arc<MotionJets>>>,
+}
+
 /// One piece of constant mode.
 pub(super) struct Motion<'a> {
     pub mode: Mode,
@@ -161,7 +172,7 @@ pub(super) struct Motion<'a> {
     /// Signs handed to the field; the surfaces slid on count as +1.
     pub signs: Signs,
     /// Surfaces whose sign matters in this mode.
-    pub active: Vec<bool>,
+    pub active: SmallVec<[bool; 8]>,
     pub field: ModeField<'a>,
     /// The surfaces slid on, in increasing order.
     pub sliding: SlidingSet,
@@ -171,6 +182,7 @@ pub(super) struct Motion<'a> {
     pub is_straight: bool,
     /// Fields of other kinds that earlier motions had, kept for their buffers.
     idle: Vec<ModeField<'a>>,
+    known: Vec<KnownMode>,
     pub monitored: Vec<Monitored>,
     /// Its Taylor series, if it is integrated by them.
     pub jets: Option<Arc<MotionJets>>,
@@ -194,12 +206,13 @@ impl<'a> Motion<'a> {
         let (signs, sliding): (_, SlidingSet) = (mode.signs(), mode.sliding_set().collect());
         let mut motion = Motion {
             t_start,
-            active: vec![false; signs.len()],
+            active: SmallVec::new(),
             field: ModeField::new(system, law, &sliding, &signs),
             affine_bounds: None,
             is_straight: sliding.iter().all(|&j| system.is_affine(j)),
             sliding,
             idle: Vec::new(),
+            known: Vec::with_capacity(MOST_KNOWN),
             monitored: Vec::new(),
             jets: None,
             law,
@@ -254,13 +267,44 @@ impl<'a> Motion<'a> {
         }
     }
 
+    /// What is known of the present mode.
+    fn known(&mut self, system: &dyn PiecewiseSystem) -> &mut KnownMode {
+        let place = self.known.iter().position(|known| known.mode == self.mode);
+        let place = place.unwrap_or_else(|| {
+            if self.known.len() == MOST_KNOWN {
+                self.known.clear();
+            }
+            let mut active = SmallVec::from_elem(false, self.signs.len());
+            system.active(&self.signs, &self.sliding, &mut active);
+            self.known.push(KnownMode {
+                mode: self.mode.clone(),
+                active,
+                jets: None,
+            });
+            self.known.len() - 1
+        });
+        &mut self.known[place]
+    }
+
+    /// Takes the Taylor series of the mode; `find` looks for them the first time.
+    pub fn take_jets(
+        &mut self,
+        system: &dyn PiecewiseSystem,
+        find: impl FnOnce(&[usize]) -> Option<Arc<MotionJets>>,
+    ) {
+        let sliding = self.sliding.clone();
+        let known = self.known(system);
+        let jets = known.jets.get_or_insert_with(|| find(&sliding));
+        self.jets = jets.clone();
+    }
+
     fn find_monitored(
         &mut self,
         system: &dyn PiecewiseSystem,
         deflations: &[(EventFunction, Deflation)],
     ) {
-        let (signs, sliding) = (&self.signs, &self.sliding);
-        system.active(signs, sliding, &mut self.active);
+        self.active = SmallVec::from_slice(&self.known(system).active);
+        let signs = &self.signs;
         let monitor = |function, orientation, affine| Monitored {
             function,
             orientation,
@@ -325,12 +369,12 @@ impl<'a> Motion<'a> {
     }
 
     /// The multipliers at the last evaluation, in the order of the surfaces slid on.
-    pub fn multipliers(&self) -> Vec<f64> {
+    pub fn multipliers(&self) -> SmallVec<[f64; 2]> {
         match &self.field {
-            ModeField::Region(_) => Vec::new(),
-            ModeField::Sliding(field) => vec![field.last().multiplier()],
-            ModeField::Intersection(field) => field.multipliers().to_vec(),
-            ModeField::Contact(field) => field.lambdas(),
+            ModeField::Region(_) => SmallVec::new(),
+            ModeField::Sliding(field) => smallvec![field.last().multiplier()],
+            ModeField::Intersection(field) => SmallVec::from_slice(field.multipliers()),
+            ModeField::Contact(field) => field.lambdas().into(),
         }
     }
 

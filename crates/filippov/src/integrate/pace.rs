@@ -36,7 +36,8 @@ impl Pace {
 impl Integrator<'_> {
     /// Keeps the pace of the motion that ends, for the next one in its mode.
     pub(super) fn remember_pace(&mut self) {
-        if !self.dt.is_finite() {
+        // A motion that ended where it began tells nothing.
+        if !self.dt.is_finite() || self.t == self.motion.t_start {
             return;
         }
         let pace = Pace {

@@ -5,12 +5,12 @@ use super::curve::{grazes, Curve};
 use super::integrator::Integrator;
 use crate::error::FieldError;
 use crate::event::certificate::Proof;
-use crate::event::isolate::{first_zero_sampled, Evidence, Sampled, Zero, PROBES};
+use crate::event::isolate::{first_zero_sampled, Bracket, Evidence, Sampled, Zero, PROBES};
 use crate::event::locate::{refine, Located};
-use crate::event::proved::{first_zero_proved, Proved};
-use crate::event::series::Series;
+use crate::event::proved::{expected_zero_proved, first_zero_proved, Proved};
+use crate::event::series::{LongestSeries, Near, Series, Zeros};
 use crate::event::{EventFunction, Monitored};
-use crate::stepper::{nested, Expansion};
+use crate::stepper::nested;
 use crate::tolerances::{
     BEYOND_GUESS, BEYOND_TOUCH, EPS, POLE, RESOLVED_DEPTH, UNBOUNDED_DEPTH, UNPROVED_DEPTH,
 };
@@ -116,17 +116,28 @@ impl Integrator<'_> {
             self.motion.monitored[index].noise = self.noise_of(m.function)?;
         }
         let (value, _) = self.detector.right[index];
-        let mut rows = Expansion::new();
+        let mut buffer = LongestSeries::default();
+        let rows = &mut buffer[..self.n_rows()];
         if let (EventFunction::Surface(j), true) = (m.function, self.is_polynomial(&m)) {
-            self.affine_series(j, &m, dt, &mut rows)?;
-            let polynomial = self.as_polynomial(&m, &rows);
-            if value > 0.0 && polynomial.is_clear() {
-                return Ok((None, reach));
+            self.affine_series(j, &m, dt, rows)?;
+            let polynomial = self.as_polynomial(&m, rows);
+            let mut near = None;
+            if let Polynomial::Quotient(series) | Polynomial::Powers(series) = &polynomial {
+                match series.zeros() {
+                    Zeros::Nowhere if value > 0.0 => return Ok((None, reach)),
+                    Zeros::One(guess) if value < 0.0 => {
+                        if let Some(theta) = self.only_zero(index, series, guess, dt)? {
+                            let searched = (theta + self.together(dt)).min(reach);
+                            return Ok((Some((theta, false)), searched));
+                        }
+                    }
+                    _ => {}
+                }
+                near = series.near_zero();
             }
-            let near = polynomial.near_zero();
             return self.search_near((index, true), &polynomial, near, reach, dt);
         }
-        let has_series = self.exit_series(&m, &mut rows);
+        let has_series = self.exit_series(&m, rows);
         // Beyond zero at the end: there is a zero, whether there are bounds or not.
         let proof = if value <= 0.0 && has_series {
             Proof::Open
@@ -137,12 +148,40 @@ impl Integrator<'_> {
             return Ok((None, reach));
         }
         let near = if has_series {
-            Series::new(&rows).near_zero()
+            Series::new(rows).near_zero()
         } else {
             None
         };
         let bounded = (index, proof == Proof::Open);
         self.search_near(bounded, &Polynomial::None, near, reach, dt)
+    }
+
+    /// The only zero of a series, to rounding; `None` if rounding matters for whether it is one.
+    fn only_zero(
+        &mut self,
+        index: usize,
+        series: &Series,
+        guess: f64,
+        dt: f64,
+    ) -> Result<Option<f64>, FieldError> {
+        let noise = self.noise_of(self.motion.monitored[index].function)?;
+        self.motion.monitored[index].noise = noise;
+        let (g_lo, g_hi) = (series.value(0.0), self.detector.right[index].0);
+        let (guess, slope) = series.newton(guess).unwrap_or((guess, g_hi - g_lo));
+        let bracket = Bracket {
+            lo: 0.0,
+            hi: 1.0,
+            g_lo,
+            g_hi,
+            guess,
+            slope,
+        };
+        if g_lo <= noise || g_hi >= -noise || !bracket.is_steep(g_lo.max(-g_hi), noise) {
+            return Ok(None);
+        }
+        let width = 0.5 * EPS * (self.t.abs() / dt).max(1.0);
+        let mut g = |theta: f64| Ok(series.value(theta));
+        Ok(Some(refine(&mut g, bracket, width)?.theta))
     }
 
     /// The first zero up to `reach`, looked for at first not far beyond where it is expected; and how far was
@@ -151,11 +190,11 @@ impl Integrator<'_> {
         &mut self,
         (index, has_bounds): (usize, bool),
         polynomial: &Polynomial,
-        near: Option<(f64, f64)>,
+        near: Option<Near>,
         reach: f64,
         dt: f64,
     ) -> Result<(Option<(f64, bool)>, f64), FieldError> {
-        let piece = near.map(|(theta, _)| (0.0, BEYOND_GUESS * theta));
+        let piece = near.map(|near| (0.0, BEYOND_GUESS * near.theta));
         if let Some(piece) = piece.filter(|piece| has_bounds && piece.1 < reach) {
             let zero = self.search_piece((index, true), polynomial, near, piece, dt)?;
             if zero.is_some() || self.detector.uncertain {
@@ -180,9 +219,10 @@ impl Integrator<'_> {
         let EventFunction::Surface(j) = m.function else {
             return Ok(None);
         };
-        let mut rows = Expansion::new();
-        self.affine_series(j, &m, dt, &mut rows)?;
-        let polynomial = self.as_polynomial(&m, &rows);
+        let mut buffer = LongestSeries::default();
+        let rows = &mut buffer[..self.n_rows()];
+        self.affine_series(j, &m, dt, rows)?;
+        let polynomial = self.as_polynomial(&m, rows);
         self.search_piece((index, true), &polynomial, None, piece, dt)
     }
 
@@ -190,7 +230,7 @@ impl Integrator<'_> {
         &mut self,
         (index, has_bounds): (usize, bool),
         polynomial: &Polynomial,
-        near: Option<(f64, f64)>,
+        near: Option<Near>,
         (from, to): (f64, f64),
         dt: f64,
     ) -> Result<Option<(f64, bool)>, FieldError> {
@@ -248,9 +288,17 @@ impl Integrator<'_> {
             _ => true,
         };
         if is_bounded && !is_divided && from == 0.0 {
-            let right = if to == 1.0 { end } else { g(to)? };
+            let piece = (from, to);
             let left = if is_quotient { g(0.0)? } else { start };
-            let (piece, ends) = ((from, to), (left, right));
+            if let Some(near) = near {
+                let expected = expected_zero_proved(&mut g, &mut over, piece, left, noise, near)?;
+                let is_steep = |b: &Bracket| b.is_steep(left.max(-b.g_hi), noise);
+                if let Some(bracket) = expected.filter(is_steep) {
+                    return Ok(Some((refine(&mut g, bracket, width)?.theta, false)));
+                }
+            }
+            let right = if to == 1.0 { end } else { g(to)? };
+            let ends = (left, right);
             let proved = first_zero_proved(&mut g, &mut over, piece, ends, noise, near)?;
             let zero = match proved {
                 Proved::Nothing => return Ok(None),
@@ -347,22 +395,4 @@ enum Polynomial<'a> {
     Quotient(Series<'a>),
     /// A series; a zero before this step is yet to be divided out.
     Deflated(Series<'a>),
-}
-
-impl Polynomial<'_> {
-    /// Is a series surely positive on the whole step?
-    fn is_clear(&self) -> bool {
-        match self {
-            Polynomial::Quotient(series) | Polynomial::Powers(series) => series.is_above(0.0),
-            _ => false,
-        }
-    }
-
-    /// About where it vanishes, and its slope there.
-    fn near_zero(&self) -> Option<(f64, f64)> {
-        match self {
-            Polynomial::Quotient(series) | Polynomial::Powers(series) => series.near_zero(),
-            _ => None,
-        }
-    }
 }

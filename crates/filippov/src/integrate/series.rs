@@ -5,23 +5,23 @@ use super::{Warning, WarningCode};
 use crate::error::FieldError;
 use crate::event::Monitored;
 use crate::options::Method;
-use crate::stepper::{reach as series_reach, Attempt, Expansion};
+use crate::stepper::{reach as series_reach, Attempt};
 use crate::tolerances::{EPS, TAYLOR_SHORTEST};
 
 impl Integrator<'_> {
     /// The motion that starts takes Taylor steps if the run may and the motion has series.
     pub(super) fn choose_stepper(&mut self) {
-        self.motion.jets = match &self.stepper.taylor {
-            // Whether a surface is left that h = 0 all along was expected of is seen at the ends of steps only.
-            Some(taylor) if !self.motion.is_in_contact() && self.motion.resting.is_empty() => {
-                let jets = self
-                    .system
-                    .motion_jets(&self.motion.sliding, taylor.order());
-                let is_auto = self.options.method == Method::Auto;
+        self.motion.jets = None;
+        // Whether a surface is left that h = 0 all along was expected of is seen at the ends of steps only.
+        let may = !self.motion.is_in_contact() && self.motion.resting.is_empty();
+        if let (Some(taylor), true) = (&self.stepper.taylor, may) {
+            let (system, order) = (self.system, taylor.order());
+            let is_auto = self.options.method == Method::Auto;
+            self.motion.take_jets(system, |sliding| {
+                let jets = system.motion_jets(sliding, order);
                 jets.filter(|jets| !is_auto || jets.is_unrolled())
-            }
-            _ => None,
-        };
+            });
+        }
         self.stepper.use_taylor(self.motion.jets.is_some());
         if self.motion.jets.is_none() {
             self.note_missing_series();
@@ -149,8 +149,13 @@ impl Integrator<'_> {
         Ok(attempt)
     }
 
+    /// Coefficients of the step.
+    pub(super) fn n_rows(&self) -> usize {
+        self.stepper.interpolant().coefficients().len() / self.x.len()
+    }
+
     /// An exit function along the step, as far as its series describes it, into `rows`; `false` if there is none.
-    pub(super) fn exit_series(&self, m: &Monitored, rows: &mut Expansion) -> bool {
+    pub(super) fn exit_series(&self, m: &Monitored, rows: &mut [f64]) -> bool {
         let place = m.function.exit_index().and_then(|index| {
             let jets = self.motion.jets.as_ref()?;
             jets.exit(index)
@@ -158,8 +163,9 @@ impl Integrator<'_> {
         let (Some(place), Some(taylor)) = (place, &self.stepper.taylor) else {
             return false;
         };
-        rows.clear();
-        rows.extend(taylor.column(place));
+        for (row, c) in rows.iter_mut().zip(taylor.column(place)) {
+            *row = c;
+        }
         true
     }
 
@@ -172,16 +178,16 @@ impl Integrator<'_> {
         j: usize,
         m: &Monitored,
         dt: f64,
-        rows: &mut Expansion,
+        rows: &mut [f64],
     ) -> Result<(), FieldError> {
         let extension = self.stepper.interpolant().coefficients();
-        rows.clear();
-        rows.resize(extension.len() / self.x.len(), 0.0);
         let (point, signs) = ((self.t, &self.x[..]), &self.motion.signs);
         let ht = self
             .system
             .gradient_products(j, point, signs, extension, rows)?;
-        rows.iter_mut().for_each(|row| *row *= m.orientation);
+        if m.orientation < 0.0 {
+            rows.iter_mut().for_each(|row| *row = -*row);
+        }
         rows[0] = m.value;
         rows[1] += m.orientation * ht * dt;
         Ok(())

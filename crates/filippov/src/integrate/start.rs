@@ -110,7 +110,7 @@ impl Integrator<'_> {
             (0..before.entries().len()).filter(|&j| before.entries()[j] != after.entries()[j]);
         let changed: Vec<usize> = changed.collect();
         if !changed.is_empty() {
-            self.record(before, after.clone(), changed);
+            self.record(before, after.clone(), &changed);
         }
         self.begin(after, &left)
     }

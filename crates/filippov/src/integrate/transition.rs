@@ -86,6 +86,18 @@ impl Left {
     }
 }
 
+/// The surfaces among the functions of an event, in order.
+pub(super) fn located_surfaces(event: &Found) -> SmallVec<[usize; 4]> {
+    let mut surfaces = SmallVec::new();
+    for function in &event.functions {
+        if let EventFunction::Surface(j) = *function {
+            surfaces.push(j);
+        }
+    }
+    surfaces.sort_unstable();
+    surfaces
+}
+
 impl Integrator<'_> {
     /// Values of all switching functions at the current point.
     pub(super) fn surface_values(&mut self, signs: &[f64]) -> Result<Values, FieldError> {
@@ -113,20 +125,25 @@ impl Integrator<'_> {
                 surfaces: self.recorder.surfaces_switched_at(self.t),
             }));
         }
-        let signs = self.motion.signs.clone();
-        let h = self.surface_values(&signs)?;
         if !self.actions.list.is_empty() {
+            let signs = self.motion.signs.clone();
+            let h = self.surface_values(&signs)?;
             if let Some(done) = self.act_at_event(event, &h)? {
                 return Ok(done);
             }
         }
         let mut mode = self.motion.mode.clone();
-        for (j, h) in h.iter().enumerate() {
-            if !self.motion.active[j] && *h != 0.0 {
-                mode.set(j, if *h < 0.0 { -1 } else { 1 });
+        let mut surfaces = located_surfaces(event);
+        if !self.only_located_matter(&surfaces) {
+            let signs = self.motion.signs.clone();
+            let h = self.surface_values(&signs)?;
+            for (j, h) in h.iter().enumerate() {
+                if !self.motion.active[j] && *h != 0.0 {
+                    mode.set(j, if *h < 0.0 { -1 } else { 1 });
+                }
             }
+            self.add_vanishing_surfaces(&mut surfaces, &h)?;
         }
-        let mut surfaces = self.vanishing_surfaces(event, &h)?;
         if event.touch {
             return self.graze(&mode, &surfaces);
         }
@@ -153,11 +170,10 @@ impl Integrator<'_> {
         self.decided.oscillates |= slides_on && self.loses_stability(event);
         self.loosen(event, mode == after);
         let is_changed = |j: &usize| mode.entries()[*j] != after.entries()[*j];
-        let mut changed: Vec<usize> = surfaces.iter().copied().filter(is_changed).collect();
-        if changed.is_empty() {
-            changed = surfaces.to_vec();
+        if surfaces.iter().any(is_changed) {
+            surfaces.retain(|j| is_changed(j));
         }
-        self.record(mode, after.clone(), changed);
+        self.record(mode, after.clone(), &surfaces);
         if let Some(limit) = self.accumulation()? {
             return self.jump_to(limit, after);
         }
@@ -175,21 +191,20 @@ impl Integrator<'_> {
         Ok(self.follow_at_surface(mode, j, decision))
     }
 
-    /// Surfaces that vanish at the event: those that were located, and all others that matter, are
-    /// not being left tangentially and lie within rounding of zero.
-    pub(super) fn vanishing_surfaces(
+    /// Are all surfaces slid on or located, so that the values of none are needed?
+    fn only_located_matter(&self, located: &[usize]) -> bool {
+        let entries = self.motion.mode.entries().iter().enumerate();
+        let mut settled = entries.map(|(j, &e)| e == 0 || located.contains(&j));
+        settled.all(|settled| settled) && self.motion.active.iter().all(|active| *active)
+    }
+
+    /// Adds to the surfaces that were located all others that vanish at the event: they matter, are not being left
+    /// tangentially and lie within rounding of zero.
+    pub(super) fn add_vanishing_surfaces(
         &mut self,
-        event: &Found,
+        surfaces: &mut SmallVec<[usize; 4]>,
         h: &[f64],
-    ) -> Result<SmallVec<[usize; 4]>, FieldError> {
-        let mut surfaces: SmallVec<[usize; 4]> = event
-            .functions
-            .iter()
-            .filter_map(|f| match f {
-                EventFunction::Surface(j) => Some(*j),
-                _ => None,
-            })
-            .collect();
+    ) -> Result<(), FieldError> {
         for (j, h) in h.iter().enumerate() {
             let slides = self.motion.mode.entries()[j] == 0;
             if !self.motion.active[j] || slides || surfaces.contains(&j) {
@@ -210,7 +225,7 @@ impl Integrator<'_> {
             }
         }
         surfaces.sort_unstable();
-        Ok(surfaces)
+        Ok(())
     }
 
     /// How the motion arrived, if one surface decides.
@@ -233,7 +248,7 @@ impl Integrator<'_> {
                 let candidates = vec![mode.clone(), beyond.clone()];
                 match self.choose(&[j], mode.clone(), candidates) {
                     Ok(after) if after == beyond => {
-                        self.record(mode.clone(), after.clone(), vec![j]);
+                        self.record(mode.clone(), after.clone(), &[j]);
                         return self.begin(after, &[Left::Surface(j, leading)]);
                     }
                     Ok(_) => {}
@@ -248,18 +263,18 @@ impl Integrator<'_> {
                 left.push(Left::Surface(j, leading));
             }
         }
-        self.record(mode.clone(), mode.clone(), surfaces.to_vec());
+        self.record(mode.clone(), mode.clone(), surfaces);
         self.begin(mode.clone(), &left)
     }
 
-    pub(super) fn record(&mut self, before: Mode, after: Mode, surfaces: Vec<usize>) {
+    pub(super) fn record(&mut self, before: Mode, after: Mode, surfaces: &[usize]) {
         let kind = Kind::between(&before, &after);
         self.recorder.switch(Switch {
             t: self.t,
-            y_before: self.x.clone(),
-            y_after: self.x.clone(),
+            y_before: SmallVec::from_slice(&self.x),
+            y_after: SmallVec::from_slice(&self.x),
             kind,
-            surfaces,
+            surfaces: SmallVec::from_slice(surfaces),
             mode_before: before,
             mode_after: after,
             note: String::new(),

@@ -108,9 +108,10 @@ pub(super) fn rough_log2(x: f64) -> f64 {
 
 /// 2^x for |x| < 1000 to about 1e-3: the integer part as exponent, a cubic for the rest.
 pub(super) fn rough_exp2(x: f64) -> f64 {
-    let whole = x.floor();
-    let f = x - whole;
-    let power = f64::from_bits(((whole as i64 + 1023) as u64) << 52);
+    // Rounded down by a conversion of a positive number: `f64::floor` is a call on many machines.
+    let exponent = (x + 1023.0) as i64;
+    let f = x + 1023.0 - exponent as f64;
+    let power = f64::from_bits((exponent as u64) << 52);
     power * (1.0 + f * (0.6951 + f * (0.2276 + f * 0.0773)))
 }
 

@@ -112,6 +112,13 @@ impl Interpolant {
         d
     }
 
+    /// The value of component `i` if it stands still.
+    pub fn constant(&self, i: usize) -> Option<f64> {
+        let moves = |row: &[f64]| row[i] != 0.0;
+        let (first, rest) = self.coefficients.split_at(self.n);
+        (!rest.chunks_exact(self.n).any(moves)).then_some(first[i])
+    }
+
     /// Writes the derivative of the state in t at theta.
     pub fn derivative(&self, theta: f64, dy: &mut [f64]) {
         let n = self.n;
@@ -142,10 +149,14 @@ pub(crate) fn shift(d: &mut [f64], centre: f64) {
     if centre == 0.0 {
         return;
     }
-    let degree = d.len().saturating_sub(1);
-    for first in 0..degree {
-        for k in (first..degree).rev() {
-            d[k] += centre * d[k + 1];
+    let Some((&mut highest, lower)) = d.split_last_mut() else {
+        return;
+    };
+    for first in 0..lower.len() {
+        let mut above = highest;
+        for c in lower[first..].iter_mut().rev() {
+            *c += centre * above;
+            above = *c;
         }
     }
 }

@@ -8,9 +8,6 @@ use crate::tolerances::{
     TAYLOR_DIGITS_TO_ORDER, TAYLOR_LARGEST_ORDER, TAYLOR_SHARE, TAYLOR_SMALLEST_ORDER,
 };
 
-/// Number of states where it is not fixed at compile time.
-const ANY: usize = 0;
-
 /// A Taylor step of variable length.
 ///
 /// With coefficients up to order N in units of the tolerance, |c_k|, the step is as long as the last two
@@ -167,11 +164,11 @@ impl Taylor {
     ) -> Result<Attempt, FieldError> {
         (self.interpolant.t0, self.interpolant.dt) = (t, dt);
         match self.n {
-            1 => self.sum::<1>(y),
-            2 => self.sum::<2>(y),
-            3 => self.sum::<3>(y),
-            4 => self.sum::<4>(y),
-            _ => self.sum::<ANY>(y),
+            1 => self.sum_few::<1>(y),
+            2 => self.sum_few::<2>(y),
+            3 => self.sum_few::<3>(y),
+            4 => self.sum_few::<4>(y),
+            _ => self.sum(y),
         }
         field.eval(t + dt, &mut self.y1, &mut self.end_derivative)?;
         // The defect is the derivative of the first term left out: order + 1 times that term over the step.
@@ -190,29 +187,54 @@ impl Taylor {
 
     /// Writes the coefficients in powers of theta, their sum, which is the end of the step, and the derivative in
     /// theta there.
-    #[inline(always)]
-    fn sum<const N: usize>(&mut self, y: &[f64]) {
-        let n = if N == ANY { self.n } else { N };
-        let dt = self.interpolant.dt;
-        let scaled = self.interpolant.coefficients_mut();
-        scaled[..n].copy_from_slice(&y[..n]);
+    fn sum(&mut self, y: &[f64]) {
+        let (n, dt) = (self.n, self.interpolant.dt);
+        let (first, rest) = self.interpolant.coefficients_mut().split_at_mut(n);
+        first.copy_from_slice(y);
         let mut power = dt;
         let rows = self.rows.chunks_exact(self.width).skip(1);
-        for (to, from) in scaled[n..].chunks_exact_mut(n).zip(rows) {
-            for i in 0..n {
+        for (to, from) in rest.chunks_exact_mut(n).zip(rows) {
+            for (to, from) in to.iter_mut().zip(from) {
+                *to = from * power;
+            }
+            power *= dt;
+        }
+        self.y1.fill(0.0);
+        self.defect.fill(0.0);
+        let rows = self.interpolant.coefficients().chunks_exact(n);
+        for (k, row) in rows.enumerate().rev() {
+            let sums = self.y1.iter_mut().zip(&mut self.defect);
+            for ((y1, slope), c) in sums.zip(row) {
+                *y1 += c;
+                *slope += k as f64 * c;
+            }
+        }
+    }
+
+    /// As [`sum`](Self::sum), for few states: the sums stay in registers.
+    fn sum_few<const N: usize>(&mut self, y: &[f64]) {
+        let dt = self.interpolant.dt;
+        let (scaled, _) = self.interpolant.coefficients_mut().as_chunks_mut::<N>();
+        scaled[0].copy_from_slice(y);
+        let mut power = dt;
+        let rows = self.rows.chunks_exact(self.width).skip(1);
+        for (to, from) in scaled[1..].iter_mut().zip(rows) {
+            let from = &from[..N];
+            for i in 0..N {
                 to[i] = from[i] * power;
             }
             power *= dt;
         }
-        let (y1, slope) = (&mut self.y1[..n], &mut self.defect[..n]);
-        y1.fill(0.0);
-        slope.fill(0.0);
-        for (k, row) in scaled.chunks_exact(n).enumerate().rev() {
-            for i in 0..n {
+        let (mut y1, mut slope, mut k) = ([0.0; N], [0.0; N], self.order as f64);
+        for row in scaled.iter().rev() {
+            for i in 0..N {
                 y1[i] += row[i];
-                slope[i] += k as f64 * row[i];
+                slope[i] += k * row[i];
             }
+            k -= 1.0;
         }
+        self.y1.copy_from_slice(&y1);
+        self.defect.copy_from_slice(&slope);
     }
 
     /// The factor for another attempt after one with this error was rejected.

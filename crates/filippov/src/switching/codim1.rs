@@ -1,6 +1,8 @@
 //! The decision at one surface.
 
-use super::lie::{first_nonzero, normal_component, Leading};
+use smallvec::{smallvec, SmallVec};
+
+use super::lie::{first_nonzero_of_both, normal_component, Leading};
 use super::stick::decide_sticking;
 use crate::error::FieldError;
 use crate::field::eval_on_side;
@@ -26,7 +28,7 @@ pub struct Decision {
     /// The new entry of the mode: -1, 0 (sliding) or +1.
     pub entry: i8,
     /// All entries that are Filippov continuations; more than one where the point is not unique.
-    pub candidates: Vec<i8>,
+    pub candidates: SmallVec<[i8; 3]>,
     /// First non-vanishing derivative of h along f-.
     pub minus: Leading,
     /// First non-vanishing derivative of h along f+.
@@ -64,10 +66,10 @@ pub fn decide(
     if system.sticks_at(j) {
         return decide_sticking(system, j, arrival, (t, x), signs);
     }
-    let vanishing = |known: Arrival| usize::from(arrival == known);
-    let minus = first_nonzero(system, j, -1, vanishing(Arrival::ExitMinus), t, x, signs)?;
-    let plus = first_nonzero(system, j, 1, vanishing(Arrival::ExitPlus), t, x, signs)?;
-    let mut candidates = Vec::new();
+    let exits = [Arrival::ExitMinus, Arrival::ExitPlus];
+    let vanishing = exits.map(|known| usize::from(arrival == known));
+    let [minus, plus] = first_nonzero_of_both(system, j, vanishing, t, x, signs)?;
+    let mut candidates = SmallVec::new();
     if minus.sign() < 0 {
         candidates.push(-1);
     }
@@ -81,7 +83,7 @@ pub fn decide(
         // Neither field leaves the surface: the motion stays on it, and if they differ, any combination
         // of them is a Filippov solution.
         let agree = fields_agree(system, j, t, x, signs)?;
-        candidates = if agree { Vec::new() } else { vec![-1, 1] };
+        candidates = if agree { smallvec![] } else { smallvec![-1, 1] };
     }
     let entry = choose(system, j, arrival, &candidates, t, x, signs)?;
     if candidates.is_empty() {

@@ -65,6 +65,33 @@ pub fn first_nonzero(
     })
 }
 
+/// As [`first_nonzero`] for both sides, f- and f+, at once: where neither is tangent one evaluation may do.
+///
+/// # Errors
+/// If a function of the user raises.
+pub(super) fn first_nonzero_of_both(
+    system: &dyn PiecewiseSystem,
+    j: usize,
+    vanishing: [usize; 2],
+    t: f64,
+    x: &[f64],
+    signs: &[f64],
+) -> Result<[Leading; 2], FieldError> {
+    let firsts = system.first_lie_derivatives(j, t, x, signs);
+    let tolerance = system.lie_tolerance(1);
+    let leading = |index: usize, side: i8| match firsts.map(|firsts| firsts[index]) {
+        Some(LieValue { value, magnitude })
+            if vanishing[index] == 0
+                && value.is_finite()
+                && value.abs() > tolerance * magnitude =>
+        {
+            Ok(Leading { order: 1, value })
+        }
+        _ => first_nonzero(system, j, side, vanishing[index], t, x, signs),
+    };
+    Ok([leading(0, -1)?, leading(1, 1)?])
+}
+
 /// As [`first_nonzero`] at this very point; `None` where a derivative is not finite.
 fn scan(
     system: &dyn PiecewiseSystem,

@@ -39,7 +39,7 @@ pub(super) fn decide_sticking(
     };
     Ok(Decision {
         entry,
-        candidates: vec![entry],
+        candidates: smallvec::smallvec![entry],
         minus,
         plus,
     })

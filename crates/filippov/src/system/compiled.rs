@@ -19,9 +19,6 @@ const LARGEST_COPIED: usize = 500;
 /// Surfaces slid on at once whose sign patterns are all looked at.
 const MOST_ENUMERATED: usize = 4;
 
-/// Surfaces slid on, and order.
-type JetsKey = (SmallVec<[usize; 2]>, usize);
-
 /// A traced system with everything that was compiled of it so far.
 pub(super) struct Model {
     pub graph: Graph,
@@ -37,12 +34,11 @@ pub(super) struct Model {
     pub is_analytic: bool,
     gradients: Vec<OnceLock<CompiledGradient>>,
     both_sides: Vec<OnceLock<TieredProgram>>,
+    first_lie: Vec<OnceLock<TieredProgram>>,
     enclosed_surfaces: Vec<OnceLock<Option<EnclosureProgram>>>,
     enclosed_components: Vec<OnceLock<Option<EnclosureProgram>>>,
     rate_gradients: Vec<OnceLock<TieredProgram>>,
     lie: Mutex<LieCache>,
-    /// Taylor coefficients of the motions met so far, by surfaces slid on and order.
-    jets: Mutex<FxHashMap<JetsKey, Option<Arc<MotionJets>>>>,
     /// Ratio of static to kinetic friction, where it is not 1.
     sticking: FxHashMap<usize, TieredProgram>,
     /// The nodes of these ratios.
@@ -51,6 +47,7 @@ pub(super) struct Model {
     watched: Vec<usize>,
     /// Surfaces whose sign something depends on: the field, or another surface that matters.
     switching: OnceLock<Vec<bool>>,
+    jets: Mutex<JetsCache>,
     /// Active surfaces of the modes met so far; a zero entry is the surface slid on.
     activity: Mutex<FxHashMap<SmallVec<[i8; 16]>, Vec<bool>>>,
 }
@@ -73,6 +70,9 @@ struct LieCache {
     graph: Option<Graph>,
     programs: FxHashMap<(usize, usize, u32), Arc<LieProgram>>,
 }
+
+/// Taylor coefficients of the motions met so far, by surfaces slid on and order.
+type JetsCache = FxHashMap<(SmallVec<[usize; 2]>, usize), Option<Arc<MotionJets>>>;
 
 /// Output 0 is the derivative, the others its terms.
 pub(super) struct LieProgram {
@@ -102,6 +102,7 @@ impl Model {
             affine: surfaces.iter().map(|&h| graph.is_affine(h)).collect(),
             gradients: surfaces.iter().map(|_| OnceLock::new()).collect(),
             both_sides: surfaces.iter().map(|_| OnceLock::new()).collect(),
+            first_lie: surfaces.iter().map(|_| OnceLock::new()).collect(),
             enclosed_surfaces: surfaces.iter().map(|_| OnceLock::new()).collect(),
             enclosed_components: surfaces.iter().map(|_| OnceLock::new()).collect(),
             rate_gradients: surfaces.iter().map(|_| OnceLock::new()).collect(),
@@ -242,7 +243,10 @@ impl Model {
     pub fn enclosed_normal_components(&self, j: usize) -> Option<&EnclosureProgram> {
         let program = self.enclosed_components[j].get_or_init(|| {
             let mut graph = self.graph.clone();
-            let mut components = [-1.0, 1.0].map(|side| self.normal_component(&mut graph, j, side));
+            let mut components = [-1.0, 1.0].map(|side| {
+                let h = graph.surface(j as u32);
+                self.derivative_terms(&mut graph, h, j, side).0
+            });
             if let Some(&ratio) = self.ratios.get(&j) {
                 components = stretched(&mut graph, components, ratio);
             }
@@ -251,21 +255,43 @@ impl Model {
         program.as_ref()
     }
 
-    /// dh_j/dt along the field with sign `side` at surface `j`, from the components of the field that matter.
-    fn normal_component(&self, graph: &mut Graph, j: usize, side: f64) -> NodeId {
+    /// The first Lie derivative of h_j along f- with its terms, then that along f+.
+    pub fn first_lie_derivatives(&self, j: usize) -> &Program {
+        let both = self.first_lie[j].get_or_init(|| {
+            let mut graph = self.graph.clone();
+            let mut outputs = Vec::new();
+            for side in [-1.0, 1.0] {
+                let h = graph.surface(j as u32);
+                let (sum, terms) = self.derivative_terms(&mut graph, h, j, side);
+                outputs.push(sum);
+                outputs.extend(terms);
+            }
+            TieredProgram::new(graph, outputs, self.backend)
+        });
+        both.program()
+    }
+
+    /// The derivative of a node along the field with sign `side` at surface `j`, and its terms: that in t, then one
+    /// per state that moves the node.
+    fn derivative_terms(
+        &self,
+        graph: &mut Graph,
+        node: NodeId,
+        j: usize,
+        side: f64,
+    ) -> (NodeId, Vec<NodeId>) {
         let mut signs = vec![None; graph.n_surfaces()];
         signs[j] = Some(side);
-        let Gradient { time, states } = graph.gradient(graph.surface(j as u32));
-        let moving: Vec<NodeId> = states
+        let Gradient { time, states } = graph.gradient(node);
+        let moving = states.iter().map(|(i, _)| self.field[*i as usize]);
+        let field = graph.at_signs(&moving.collect::<Vec<_>>(), &signs);
+        let mut terms = vec![time];
+        let velocities = states.iter().zip(field);
+        terms.extend(velocities.map(|(&(_, partial), v)| graph.mul(partial, v)));
+        let sum = terms[1..]
             .iter()
-            .map(|(i, _)| self.field[*i as usize])
-            .collect();
-        let field = graph.at_signs(&moving, &signs);
-        let terms = states.iter().zip(field);
-        terms.fold(time, |sum, (&(_, partial), velocity)| {
-            let term = graph.mul(partial, velocity);
-            graph.add(sum, term)
-        })
+            .fold(time, |sum, &term| graph.add(sum, term));
+        (sum, terms)
     }
 
     pub fn gradient(&self, j: usize) -> &CompiledGradient {
@@ -394,21 +420,7 @@ impl Model {
         let graph = cache.graph.get_or_insert_with(|| self.graph.clone());
         let (node, terms) = match word.split_last() {
             None => (inner, vec![inner]),
-            Some((&side, _)) => {
-                let mut signs = vec![None; graph.n_surfaces()];
-                signs[j] = Some(f64::from(side));
-                let field = graph.at_signs(&self.field, &signs);
-                let Gradient { time, states } = graph.gradient(inner);
-                let mut terms = vec![time];
-                for (state, partial) in states {
-                    terms.push(graph.mul(partial, field[state as usize]));
-                }
-                let sum = terms
-                    .iter()
-                    .skip(1)
-                    .fold(time, |sum, &term| graph.add(sum, term));
-                (sum, terms)
-            }
+            Some((&side, _)) => self.derivative_terms(graph, inner, j, f64::from(side)),
         };
         let mut outputs = vec![node];
         outputs.extend(terms);

@@ -240,6 +240,18 @@ pub trait PiecewiseSystem: Sync {
         closures::lie_by_differences(self, i, j, word, t, x, signs)
     }
 
+    /// The first Lie derivatives of h_j along f- and f+, where one evaluation gives both; `signs[j]` is ignored.
+    fn first_lie_derivatives(
+        &self,
+        j: usize,
+        t: f64,
+        x: &[f64],
+        signs: &[f64],
+    ) -> Option<[LieValue; 2]> {
+        let _ = (j, t, x, signs);
+        None
+    }
+
     /// Below this fraction of its magnitude a Lie derivative of this order counts as zero.
     fn lie_tolerance(&self, order: usize) -> f64 {
         match order {

@@ -17,6 +17,9 @@ use crate::tolerances::{MAX_LIE_ORDER, TANGENT};
 /// larger systems would take longer to compile than they save.
 const FUSED_STATES: usize = 12;
 
+/// Lie derivatives of up to that many terms, and their sum, are computed on the stack.
+const MOST_TERMS: usize = 16;
+
 /// A system whose field and switching functions are expressions: compiled, with exact derivatives.
 ///
 /// Field, surfaces and rates are compiled once for all modes, the signs being data. Gradients and
@@ -246,9 +249,10 @@ impl PiecewiseSystem for TracedSystem {
     ) -> Result<f64, FieldError> {
         let (compiled, values) = self.gradient_values(j, t, x, signs);
         if let &[i] = &compiled.states[..] {
-            let components = vectors[i..].iter().step_by(x.len());
-            for (product, component) in products.iter_mut().zip(components) {
-                *product = values[1] * component;
+            let (slope, n) = (values[1], x.len());
+            let vectors = &vectors[..n * products.len()];
+            for (k, product) in products.iter_mut().enumerate() {
+                *product = slope * vectors[k * n + i];
             }
             return Ok(values[0]);
         }
@@ -335,7 +339,7 @@ impl PiecewiseSystem for TracedSystem {
         signs: &[f64],
     ) -> Result<LieValue, FieldError> {
         let lie = self.model.lie_derivative(i, j, word);
-        let mut small = [0.0; 16];
+        let mut small = [0.0; MOST_TERMS];
         let mut large = Vec::new();
         let program = lie.program.program();
         let count = program.n_outputs();
@@ -350,6 +354,24 @@ impl PiecewiseSystem for TracedSystem {
             value: out[0],
             magnitude: out[1..].iter().map(|v| v.abs()).sum(),
         })
+    }
+
+    fn first_lie_derivatives(
+        &self,
+        j: usize,
+        t: f64,
+        x: &[f64],
+        signs: &[f64],
+    ) -> Option<[LieValue; 2]> {
+        let program = self.model.first_lie_derivatives(j);
+        let mut values = [0.0; 2 * MOST_TERMS];
+        let out = values.get_mut(..program.n_outputs())?;
+        program.eval(t, x, signs, &self.parameters, &[], out);
+        let (minus, plus) = out.split_at(out.len() / 2);
+        Some([minus, plus].map(|side| LieValue {
+            value: side[0],
+            magnitude: side[1..].iter().map(|v| v.abs()).sum(),
+        }))
     }
 
     fn lie_tolerance(&self, _order: usize) -> f64 {
