@@ -175,13 +175,14 @@ impl Integrator<'_> {
                 if isolated.exhausted && !isolated.not_finite {
                     return Ok(None);
                 }
+                // Zero up to rounding where the motion may end, as a switching function at its switch.
+                let ends_there = largest > 0.0 && values[4].abs() <= noise;
                 let at = match isolated.zero {
                     Some(Zero::Crossing(bracket)) => {
                         let width = 0.5 * EPS * (t0.abs() / dt).max(1.0);
                         refine(&mut g, bracket, width)?.theta
                     }
-                    // Zero up to rounding where the motion may end, as a switching function at its switch.
-                    Some(Zero::Touch(at)) if at == theta => at,
+                    _ if ends_there => theta,
                     _ => break,
                 };
                 let direction = self.user_events.events[index].direction;
@@ -191,7 +192,7 @@ impl Integrator<'_> {
                 if zeros.len() > MOST_ZEROS {
                     return Ok(None);
                 }
-                if at <= from || at >= theta {
+                if at <= from || at >= theta - self.together(dt) {
                     break;
                 }
                 (from, divided) = (at, true);
