@@ -28,14 +28,14 @@ COSTS = {
 
 # The same by Taylor series, where an expansion counts as the evaluations that take as many operations.
 COSTS_BY_SERIES = {
-    "relay_feedback": (1711, 193, 137),
-    "dry_friction_autonomous": (2163, 167, 124),
-    "relay_feedback_slow": (1795, 200, 146),
-    "relay_feedback_fast": (3012, 325, 251),
-    "drill_string": (4804, 202, 179),
-    "dieci_lopez_6_1": (1462, 32, 26),
-    "dieci_lopez_6_4_i": (845, 92, 68),
-    "dieci_lopez_6_4_ii": (5804, 887, 447),
+    "relay_feedback": (1644, 103, 102),
+    "dry_friction_autonomous": (1945, 84, 83),
+    "relay_feedback_slow": (1657, 96, 95),
+    "relay_feedback_fast": (2293, 147, 146),
+    "drill_string": (5917, 174, 151),
+    "dieci_lopez_6_1": (1716, 22, 21),
+    "dieci_lopez_6_4_i": (714, 48, 47),
+    "dieci_lopez_6_4_ii": (7085, 444, 443),
 }
 
 

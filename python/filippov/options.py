@@ -54,8 +54,9 @@ class Options(NamedTuple):
 
     def for_core(self, choices: Sequence[tuple[int, ...]] = ()) -> RunOptions:
         """Return the options as the core takes them; `choices` are modes to take at non-unique points."""
-        if self is _DEFAULT_OPTIONS and not choices:
-            return _DEFAULT_FOR_CORE
+        known = _FOR_CORE.get(id(self))
+        if known is not None and not choices:
+            return known
         return RunOptions({**self._asdict(), "choices": choices})
 
 
@@ -78,7 +79,17 @@ _DEFAULT_OPTIONS = Options(
     progress=None,
     max_branches=64,
 )
-_DEFAULT_FOR_CORE = RunOptions(_DEFAULT_OPTIONS._asdict())
+# What the core takes of options that are kept, by identity.
+_FOR_CORE = {id(_DEFAULT_OPTIONS): RunOptions(_DEFAULT_OPTIONS._asdict())}
+# Options whose checks depend on nothing but their values: calls that repeat them are not checked again.
+_REPEATABLE = frozenset(
+    (
+        *("method", "rtol", "atol", "max_step", "max_steps", "max_events", "max_wall_time"),
+        *("sliding", "nonunique", "keep", "dense_output"),
+    )
+)
+_KNOWN: dict[tuple[Any, ...], Options] = {}
+_MOST_KNOWN = 64
 
 
 def check_options(given: Mapping[str, Any], t_span: tuple[float, float], n: int) -> Options:
@@ -102,10 +113,21 @@ def check_options(given: Mapping[str, Any], t_span: tuple[float, float], n: int)
     InputError
         If an option has a wrong type, value or shape; `ToleranceError` for `rtol` and `atol`.
     """
+    if not given:
+        return _DEFAULT_OPTIONS
+    values = given.values()
+    is_repeatable = _REPEATABLE.issuperset(given) and {*map(type, values)} <= {str, float, int, bool}
+    key = (*given, *values, *map(type, values)) if is_repeatable else None
+    if key is not None and key in _KNOWN:
+        return _KNOWN[key]
     checked: dict[str, Any] = {}
     for name, value in given.items():
         checked[name] = _CHECKS[name](value, t_span, n)
-    return _DEFAULT_OPTIONS._replace(**checked) if checked else _DEFAULT_OPTIONS
+    options = _DEFAULT_OPTIONS._replace(**checked)
+    if key is not None and len(_KNOWN) < _MOST_KNOWN:
+        _KNOWN[key] = options
+        _FOR_CORE[id(options)] = RunOptions({**options._asdict(), "choices": ()})
+    return options
 
 
 def check_method(method: Any) -> str:
@@ -135,8 +157,8 @@ def check_t_span(t_span: Any) -> tuple[float, float]:
     """
     if type(t_span) is tuple and len(t_span) == 2:
         t0, t1 = t_span
-        if type(t0) is float and type(t1) is float and math.isfinite(t0) and math.isfinite(t1):
-            return t0, t1
+        if {type(t0), type(t1)} <= {float, int} and math.isfinite(t0) and math.isfinite(t1):
+            return float(t0), float(t1)
     try:
         ends = [_real(end) for end in t_span]
     except (TypeError, ValueError):

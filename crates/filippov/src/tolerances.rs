@@ -365,7 +365,7 @@ pub const PROVED_DEPTH: u32 = 6;
 
 /// Order of a Taylor step per decimal digit of the relative tolerance. The least work per unit of time takes 1.15
 /// (Jorba and Zou); a step has costs beside its coefficients, and longer ones pay.
-pub const TAYLOR_DIGITS_TO_ORDER: f64 = 2.0;
+pub const TAYLOR_DIGITS_TO_ORDER: f64 = 2.5;
 
 /// Lowest order of a Taylor step: below it the step is no longer than one of DOPRI5.
 pub const TAYLOR_SMALLEST_ORDER: usize = 8;

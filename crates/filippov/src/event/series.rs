@@ -7,7 +7,7 @@ use crate::stepper::{shift, Expansion};
 use crate::tolerances::{EPS, TAYLOR_LARGEST_ORDER};
 
 /// Samples, and steps of Newton's method, in the search for about where a zero is.
-const GUESS_SAMPLES: u32 = 5;
+const GUESS_SAMPLES: u32 = 3;
 const GUESS_STEPS: u32 = 3;
 
 /// Room for the coefficients of a step of the highest order.

@@ -183,6 +183,8 @@ pub(super) struct Motion<'a> {
     /// Fields of other kinds that earlier motions had, kept for their buffers.
     idle: Vec<ModeField<'a>>,
     known: Vec<KnownMode>,
+    /// The place of the present mode among them.
+    current: usize,
     pub monitored: Vec<Monitored>,
     /// Its Taylor series, if it is integrated by them.
     pub jets: Option<Arc<MotionJets>>,
@@ -213,6 +215,7 @@ impl<'a> Motion<'a> {
             sliding,
             idle: Vec::new(),
             known: Vec::with_capacity(MOST_KNOWN),
+            current: 0,
             monitored: Vec::new(),
             jets: None,
             law,
@@ -267,10 +270,10 @@ impl<'a> Motion<'a> {
         }
     }
 
-    /// What is known of the present mode.
-    fn known(&mut self, system: &dyn PiecewiseSystem) -> &mut KnownMode {
+    /// Finds what is known of the present mode.
+    fn recall(&mut self, system: &dyn PiecewiseSystem) {
         let place = self.known.iter().position(|known| known.mode == self.mode);
-        let place = place.unwrap_or_else(|| {
+        self.current = place.unwrap_or_else(|| {
             if self.known.len() == MOST_KNOWN {
                 self.known.clear();
             }
@@ -283,19 +286,13 @@ impl<'a> Motion<'a> {
             });
             self.known.len() - 1
         });
-        &mut self.known[place]
+        self.active = SmallVec::from_slice(&self.known[self.current].active);
     }
 
     /// Takes the Taylor series of the mode; `find` looks for them the first time.
-    pub fn take_jets(
-        &mut self,
-        system: &dyn PiecewiseSystem,
-        find: impl FnOnce(&[usize]) -> Option<Arc<MotionJets>>,
-    ) {
-        let sliding = self.sliding.clone();
-        let known = self.known(system);
-        let jets = known.jets.get_or_insert_with(|| find(&sliding));
-        self.jets = jets.clone();
+    pub fn take_jets(&mut self, find: impl FnOnce(&[usize]) -> Option<Arc<MotionJets>>) {
+        let known = &mut self.known[self.current].jets;
+        self.jets = known.get_or_insert_with(|| find(&self.sliding)).clone();
     }
 
     fn find_monitored(
@@ -303,7 +300,7 @@ impl<'a> Motion<'a> {
         system: &dyn PiecewiseSystem,
         deflations: &[(EventFunction, Deflation)],
     ) {
-        self.active = SmallVec::from_slice(&self.known(system).active);
+        self.recall(system);
         let signs = &self.signs;
         let monitor = |function, orientation, affine| Monitored {
             function,

@@ -281,7 +281,7 @@ impl Integrator<'_> {
             | Polynomial::Deflated(series) => Some(series.bound(a, b)),
             _ => bounds.over(&m, a, b),
         };
-        let width = 0.5 * EPS * (t.abs() / dt).max(to);
+        let width = EPS * (t.abs() / dt).max(0.5 * to);
         let is_bounded = match polynomial {
             Polynomial::Nested(_) => false,
             Polynomial::None => has_bounds,

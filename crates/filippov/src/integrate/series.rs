@@ -17,7 +17,7 @@ impl Integrator<'_> {
         if let (Some(taylor), true) = (&self.stepper.taylor, may) {
             let (system, order) = (self.system, taylor.order());
             let is_auto = self.options.method == Method::Auto;
-            self.motion.take_jets(system, |sliding| {
+            self.motion.take_jets(|sliding| {
                 let jets = system.motion_jets(sliding, order);
                 jets.filter(|jets| !is_auto || jets.is_unrolled())
             });
@@ -92,13 +92,11 @@ impl Integrator<'_> {
         let mut longest = f64::INFINITY;
         for place in self.x.len()..jets.width() {
             let size = self.function_scale(place, reach);
-            for k in [order - 1, order] {
-                let c = taylor.coefficient(place, k).abs();
-                if c.is_nan() {
-                    return f64::NAN;
-                }
-                longest = longest.min(series_reach(c / size, k));
+            let terms = [order - 1, order].map(|k| (taylor.coefficient(place, k).abs(), k));
+            if terms.iter().any(|(c, _)| c.is_nan()) {
+                return f64::NAN;
             }
+            longest = longest.min(series_reach(terms.map(|(c, k)| (c / size, k))));
         }
         longest
     }

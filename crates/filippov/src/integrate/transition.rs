@@ -148,7 +148,7 @@ impl Integrator<'_> {
             return self.graze(&mode, &surfaces);
         }
         let arrival = self.arrival(event, &surfaces);
-        let fresh = surfaces.clone();
+        let fresh = SmallVec::<[usize; 4]>::from_slice(&surfaces);
         for &j in self.motion.sliding() {
             if !surfaces.contains(&j) {
                 surfaces.push(j);
@@ -170,7 +170,7 @@ impl Integrator<'_> {
         self.decided.oscillates |= slides_on && self.loses_stability(event);
         self.loosen(event, mode == after);
         let is_changed = |j: &usize| mode.entries()[*j] != after.entries()[*j];
-        if surfaces.iter().any(is_changed) {
+        if surfaces.len() > 1 && surfaces.iter().any(is_changed) {
             surfaces.retain(|j| is_changed(j));
         }
         self.record(mode, after.clone(), &surfaces);

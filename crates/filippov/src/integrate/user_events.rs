@@ -4,12 +4,12 @@ use super::integrator::Integrator;
 use super::motion::Motion;
 use crate::error::FieldError;
 use crate::event::certificate::Bound;
-use crate::event::isolate::{first_zero, Evidence, Zero};
+use crate::event::isolate::{first_zero_sampled, Evidence, Zero};
 use crate::event::locate::refine;
 use crate::event::tube::Tube;
 use crate::event::{UserEvent, UserFunction};
 use crate::stepper::Interpolant;
-use crate::tolerances::{EPS, MOST_ZEROS, PIECES_OF_SERIES, UNBOUNDED_DEPTH};
+use crate::tolerances::{EPS, MOST_ZEROS, PIECES_OF_SERIES, SURFACE_NOISE, UNBOUNDED_DEPTH};
 
 /// A zero of a user's function.
 #[derive(Clone, Debug, PartialEq)]
@@ -118,19 +118,6 @@ impl Integrator<'_> {
         Ok(None)
     }
 
-    /// Does a function that is wanted come to zero at the end of a piece, up to rounding? A switch may be there, and
-    /// the other side of zero never be seen.
-    fn ends_at_zero(
-        &mut self,
-        index: usize,
-        (from, to): (f64, f64),
-        sign: f64,
-    ) -> Result<bool, FieldError> {
-        let size = self.user_value(index, 0.5 * (from + to))?.abs();
-        let is_wanted = self.user_events.events[index].direction * sign <= 0.0;
-        Ok(is_wanted && sign != 0.0 && self.user_value(index, to)?.abs() <= 4.0 * EPS * size)
-    }
-
     /// How many pieces of a step are searched one after the other for zeros of a user's function.
     fn sampled_pieces(&self, index: usize) -> u32 {
         let is_sampled = !self.user_events.events[index].function.has_bounds();
@@ -184,8 +171,6 @@ impl Integrator<'_> {
             let start = self.user_events.left[index];
             let mut from = 0.0;
             let mut divided = self.user_events.last[index] == t0 || start == 0.0;
-            // Rounding of a function whose terms are not known: that of its values.
-            let noise = 4.0 * EPS * start.abs().max(self.user_value(index, theta)?.abs());
             let mut sign = if divided { 0.0 } else { start.signum() };
             let mut pieces = self.sampled_pieces(index);
             loop {
@@ -222,22 +207,34 @@ impl Integrator<'_> {
                     divided,
                     patience: UNBOUNDED_DEPTH,
                 };
-                let isolated = first_zero(&mut g, from, to, noise, evidence)?;
+                let mut values = [0.0; 5];
+                for (i, value) in values.iter_mut().enumerate() {
+                    *value = g(from + (to - from) * 0.25 * i as f64)?;
+                }
+                // Rounding of a function whose terms are not known: that of its values.
+                let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+                let noise = SURFACE_NOISE * largest;
+                let isolated = first_zero_sampled(&mut g, from, to, values, noise, evidence)?;
                 if isolated.exhausted && !isolated.not_finite {
                     return Ok(None);
                 }
-                let Some(Zero::Crossing(bracket)) = isolated.zero else {
-                    if pieces == 1 {
-                        if self.ends_at_zero(index, (from, theta), sign)? {
-                            zeros.push((theta, index));
-                        }
-                        break;
+                // Zero up to rounding where the motion may end, as a switching function at its switch.
+                let ends_there = pieces == 1 && largest > 0.0 && values[4].abs() <= noise;
+                let at = match isolated.zero {
+                    Some(Zero::Crossing(bracket)) => {
+                        let width = 0.5 * EPS * (t0.abs() / dt).max(1.0);
+                        refine(&mut g, bracket, width)?.theta
                     }
-                    (from, divided, pieces) = (to, false, pieces - 1);
-                    continue;
+                    _ if ends_there => theta,
+                    _ if pieces == 1 => break,
+                    _ => {
+                        (from, divided, pieces) = (to, false, pieces - 1);
+                        continue;
+                    }
                 };
-                let width = 0.5 * EPS * (t0.abs() / dt).max(1.0);
-                let at = refine(&mut g, bracket, width)?.theta;
+                // A zero at the end of the step is there to the bit: the next step knows it.
+                let is_last = at >= theta - self.together(dt);
+                let at = if is_last { theta } else { at };
                 let direction = self.user_events.events[index].direction;
                 if direction * sign <= 0.0 {
                     zeros.push((at, index));
@@ -245,7 +242,7 @@ impl Integrator<'_> {
                 if zeros.len() > MOST_ZEROS {
                     return Ok(None);
                 }
-                if at <= from || at >= theta {
+                if at <= from || is_last {
                     break;
                 }
                 (from, divided) = (at, true);

@@ -120,8 +120,8 @@ impl Taylor {
         {
             return f64::NAN;
         }
-        let allows = |k: usize| reach(TAYLOR_SHARE * scale.largest(self.row(k), y), k);
-        allows(self.order).min(allows(self.order - 1))
+        let size = |k: usize| TAYLOR_SHARE * scale.largest(self.row(k), y);
+        reach([self.order, self.order - 1].map(|k| (size(k), k)))
     }
 
     /// The derivative at the start of the step.
@@ -256,11 +256,14 @@ impl Taylor {
     }
 }
 
-/// The time after which a term c t^k reaches 1: |c|^(-1/k), to three digits.
-pub(crate) fn reach(c: f64, k: usize) -> f64 {
-    if c < f64::MIN_POSITIVE {
-        f64::INFINITY
-    } else {
-        rough_exp2(-rough_log2(c) / k as f64)
+/// The time after which the first of two terms c t^k reaches 1: the least |c|^(-1/k), to three digits.
+pub(crate) fn reach(terms: [(f64, usize); 2]) -> f64 {
+    let exponents = terms.map(|(c, k)| match c < f64::MIN_POSITIVE {
+        true => f64::INFINITY,
+        false => -rough_log2(c) / k as f64,
+    });
+    match exponents[0].min(exponents[1]) {
+        f64::INFINITY => f64::INFINITY,
+        least => rough_exp2(least),
     }
 }
