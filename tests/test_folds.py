@@ -49,6 +49,17 @@ def test_random_products_are_decided() -> None:
         assert sol.success, (seed, sol.message)
 
 
+@pytest.mark.parametrize("seed", [491, 739])
+def test_a_root_is_not_mistaken_for_another_one_beyond_its_end(seed: int) -> None:
+    """Beyond the fold of 739, and far ahead in 491, there are other roots with the right sign of det G."""
+    case = random_products(seed)
+    sol = case.system().solve((0.0, T_END), case.y0, rtol=1e-8, atol=1e-9)
+    assert sol.success, sol.message
+    coarse, fine = (np.abs(case.regularised_end(eps) - sol.y[:, -1]).max() for eps in (1e-4, 1e-5))
+    assert fine < 0.4 * coarse + 1e-6
+    assert fine < 2e-2
+
+
 def hopf(t: float, x: Any) -> Any:
     """A ring of three: the root is 0, with eigenvalues -1 + (b/2)(1 +- i sqrt(3)) and -1 - b, b = 1.5 + t."""
     s = [np.sign(v) for v in x]

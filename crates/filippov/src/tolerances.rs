@@ -256,9 +256,10 @@ pub const NEWTON_STEPS: usize = 30;
 /// An iterate beyond this does not come back to a root in the cube that is worth tracking.
 pub const FAR_FROM_THE_CUBE: f64 = 10.0;
 
-/// A root that Newton's method finds farther than this from the last multipliers is another one: steps are shortened
-/// until they move less.
-pub const TRACKED_REACH: f64 = 0.5;
+/// The matrix of the sliding equations changes by less than this fraction of itself from the last multipliers to the root
+/// that continues them; below 1 there is one root only, and steps are shortened until it is so. Towards a
+/// fold the distance to it shrinks by a factor of four at most from one evaluation to the next.
+pub const TRACKED_CHANGE: f64 = 0.75;
 
 /// Two roots that meet farther than this from the multipliers tracked last are others: these are known up to the square
 /// root of the last step.

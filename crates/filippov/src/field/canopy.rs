@@ -8,7 +8,7 @@ use crate::switching::{
     NormalFields,
 };
 use crate::system::PiecewiseSystem;
-use crate::tolerances::TRACKED_REACH;
+use crate::tolerances::TRACKED_CHANGE;
 
 /// The canopy of the 2^m fields around an intersection, and the root that the motion follows.
 pub struct Canopy {
@@ -52,11 +52,11 @@ impl Canopy {
         self.fields.normal_fields().is_ok()
     }
 
-    /// Finds the multipliers, near those in `tracked` if there are any, and writes the field. Returns the
+    /// Finds the multipliers that continue the first of those in `tracked` that can be continued, and writes the field. Returns the
     /// multipliers with the exit functions of the root ([`root_ends`]); `None` if there is no root.
     pub fn solve(
         &mut self,
-        tracked: &[f64],
+        tracked: &[&[f64]],
         oscillates: &mut Option<bool>,
         dx: &mut [f64],
     ) -> Option<(Vec<f64>, [f64; 2])> {
@@ -91,15 +91,30 @@ fn solve_two(fields: &NormalFields) -> Option<(Vec<f64>, [f64; 2])> {
 }
 
 /// More surfaces: Newton's method from the last multipliers; at the start from the only stable root.
-fn solve_many(fields: &NormalFields, tracked: &[f64]) -> Option<Vec<f64>> {
-    if tracked.len() != fields.m() {
+fn solve_many(fields: &NormalFields, tracked: &[&[f64]]) -> Option<Vec<f64>> {
+    let mut known = tracked
+        .iter()
+        .filter(|last| last.len() == fields.m())
+        .peekable();
+    if known.peek().is_none() {
         let root = stable_roots(fields).into_iter().next()?;
         return newton(fields, &root);
     }
-    // A root that is far away is another one.
-    let root = newton(fields, tracked)?;
-    let mut moves = root.iter().zip(tracked).map(|(a, b)| (a - b).abs());
-    moves.all(|by| by <= TRACKED_REACH).then_some(root)
+    known.find_map(|last| newton(fields, last).filter(|root| is_continued(fields, last, root)))
+}
+
+/// Is it the root that the last multipliers belong to? Between them G changes by less than itself, so that there is no
+/// other one: |1 - G(last)^-1 G(root)| is below [`TRACKED_CHANGE`].
+fn is_continued(fields: &NormalFields, last: &[f64], root: &[f64]) -> bool {
+    let Some(inverse) = fields.jacobian(last).inverse() else {
+        return false;
+    };
+    let (product, m) = (inverse.times(&fields.jacobian(root)), last.len());
+    let deviation = |i: usize, j: usize| {
+        let unit = if i == j { 1.0 } else { 0.0 };
+        (unit - product[(i, j)]).abs()
+    };
+    (0..m).all(|i| (0..m).map(|j| deviation(i, j)).sum::<f64>() < TRACKED_CHANGE)
 }
 
 /// The exit functions of a root of three and more surfaces with this matrix G: that two roots meet, and that it is no

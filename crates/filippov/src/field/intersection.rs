@@ -160,7 +160,10 @@ impl<'a> IntersectionField<'a> {
     /// The multipliers at the last evaluation, or if there are none those that were found nearest to time t.
     pub fn tracked(&self, t: f64) -> &[f64] {
         if self.lambda.is_empty() {
-            nearest(&self.tracked, t)
+            by_distance(&self.tracked, t)
+                .first()
+                .copied()
+                .unwrap_or(&[])
         } else {
             &self.lambda
         }
@@ -168,7 +171,12 @@ impl<'a> IntersectionField<'a> {
 
     fn track(&mut self, t: f64) {
         if self.tracked.len() >= MOST_TRACKED {
-            self.tracked.remove(0);
+            // Every other one is dropped: they stay spread over the times that were asked for.
+            let mut index = 0;
+            self.tracked.retain(|_| {
+                index += 1;
+                index % 2 == 0
+            });
         }
         self.tracked.push((t, self.lambda.clone()));
     }
@@ -261,7 +269,7 @@ impl<'a> IntersectionField<'a> {
         let found = match &mut self.canopy {
             Some(canopy) => {
                 self.n_evaluations += canopy.evaluate(self.system, t, x, &self.signs)?;
-                canopy.solve(nearest(&self.tracked, t), &mut self.oscillates, dx)
+                canopy.solve(&by_distance(&self.tracked, t), &mut self.oscillates, dx)
             }
             None => None,
         };
@@ -296,18 +304,11 @@ impl<'a> IntersectionField<'a> {
     }
 }
 
-/// The multipliers with the nearest time; of several the last.
-fn nearest(tracked: &[(f64, Vec<f64>)], t: f64) -> &[f64] {
-    let distance = |found: &&(f64, Vec<f64>)| (found.0 - t).abs();
-    let mut all = tracked.iter().rev();
-    let first = all.next();
-    let least = first.map(|first| {
-        all.fold(
-            first,
-            |a, b| if distance(&b) < distance(&a) { b } else { a },
-        )
-    });
-    least.map_or(&[], |found| &found.1)
+/// The multipliers, those with the nearest times first; of several the last.
+fn by_distance(tracked: &[(f64, Vec<f64>)], t: f64) -> Vec<&[f64]> {
+    let mut all: Vec<&(f64, Vec<f64>)> = tracked.iter().rev().collect();
+    all.sort_by(|a, b| (a.0 - t).abs().total_cmp(&(b.0 - t).abs()));
+    all.into_iter().map(|found| &found.1[..]).collect()
 }
 
 impl SmoothField for IntersectionField<'_> {
