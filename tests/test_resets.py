@@ -318,6 +318,14 @@ def test_wrong_resets_are_refused_before_the_first_step(resets, error, message):
         fl.solve_ivp(fall, (0, 1), [1.0, 0.0], resets=resets)
 
 
+def test_a_point_of_contact_can_be_looked_at():
+    ball = fl.System(fall, n=2, resets=bounce())
+    assert ball.classify(0.0, [0.0, 0.0]).kind == "region"
+    assert ball.field(0.0, [0.0, 0.0], "+").tolist() == [0.0, -G]
+    with pytest.raises(fl.ModelError, match="contact"):
+        ball.field(0.0, [0.0, 0.0], "0")
+
+
 def test_resets_are_refused_in_backward_time():
     reset = fl.Reset(times=[0.5], map=lambda t, x: x)
     with pytest.raises(fl.InputError, match="t_span"):

@@ -109,9 +109,15 @@ impl Integrator<'_> {
                 let mode = self.motion.mode.clone();
                 return self.jump_to(limit, mode);
             }
-            return Ok(Some(Stop::NoProgress {
-                surfaces: self.recorder.surfaces_switched_at(self.t),
-            }));
+            let mut surfaces = self.recorder.surfaces_switched_at(self.t);
+            if surfaces.is_empty() {
+                let named = event.functions.iter().filter_map(|f| match f {
+                    EventFunction::Surface(j) => Some(*j),
+                    _ => None,
+                });
+                surfaces.extend(named);
+            }
+            return Ok(Some(Stop::NoProgress { surfaces }));
         }
         let signs = self.motion.signs.clone();
         let h = self.surface_values(&signs)?;
