@@ -248,6 +248,31 @@ def test_balls_at_rest_pass_an_impulse_on():
     assert sol.switches.t[0] == pytest.approx(1.0, abs=1e-14)
 
 
+STACKS = [(e1, e2, m) for e1 in (0.0, 0.3, 0.5) for e2 in (0.0, 0.5) for m in (0.5, 1.0, 2.0)]
+
+
+@pytest.mark.parametrize(("e1", "e2", "m"), STACKS)
+def test_bodies_of_a_stack_never_pass_through_one_another_unnoticed(e1, e2, m):
+    def bodies(t, x):
+        return [x[1], -G, x[3], -G]
+
+    def meet(t, x):
+        p = -(1 + e2) * (x[3] - x[1]) / (1 + 1 / m)
+        return [x[0], x[1] - p, x[2], x[3] + p / m]
+
+    table = fl.Reset(lambda t, x: x[0], lambda t, x: [x[0], -e1 * x[1], x[2], x[3]], name="table")
+    other = fl.Reset(lambda t, x: x[2] - x[0] - 0.2, meet, name="bodies")
+    sol = fl.solve_ivp(
+        bodies, (0, 3), [0.5, 0.0, 1.5, 0.0], resets=[table, other], rtol=1e-8, atol=1e-8, max_events=20_000
+    )
+    x = sol.sol(np.linspace(0, sol.t[-1], 2000))
+    if sol.success:
+        assert x[0].min() > -1e-7
+        assert (x[2] - x[0] - 0.2).min() > -1e-7
+    else:
+        assert "Stopped at" in sol.message
+
+
 def test_resets_that_trigger_each_other_for_ever_end_the_run():
     resets = [
         fl.Reset(lambda t, x: x[0] - 1.0, lambda t, x: [-2.0], direction=1, name="down"),
@@ -291,6 +316,14 @@ def test_wrong_arguments_of_a_reset_are_named(arguments, message):
 def test_wrong_resets_are_refused_before_the_first_step(resets, error, message):
     with pytest.raises(error, match=message):
         fl.solve_ivp(fall, (0, 1), [1.0, 0.0], resets=resets)
+
+
+def test_a_point_of_contact_can_be_looked_at():
+    ball = fl.System(fall, n=2, resets=bounce())
+    assert ball.classify(0.0, [0.0, 0.0]).kind == "region"
+    assert ball.field(0.0, [0.0, 0.0], "+").tolist() == [0.0, -G]
+    with pytest.raises(fl.ModelError, match="contact"):
+        ball.field(0.0, [0.0, 0.0], "0")
 
 
 def test_resets_are_refused_in_backward_time():

@@ -47,6 +47,18 @@ def sliding_field(prepared: Prepared, t: float, x: Array, mode: Mode, p: Array) 
     ModelError
         If no combination of the fields is tangent, or too many surfaces meet.
     """
+    triggers = {int(action.numbers[0]) for action in prepared.actions if action.when == "surface"}
+    for j in mode.sliding:
+        if j in triggers and not prepared.core.switches_at(j):
+            name = prepared.surfaces[j]
+            raise ModelError(
+                f"the motion on {name} = 0 is contact, not sliding: its force is that of the reset there; "
+                "the free field is that of mode entry +1 or -1",
+                t=t,
+                state=x,
+                surface=name,
+                mode=mode,
+            )
     if mode.codimension == 0:
         return prepared.core.field(t, x, np.array(mode, dtype=np.float64), p)
     if mode.codimension == 1:

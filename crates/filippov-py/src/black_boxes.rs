@@ -65,6 +65,10 @@ macro_rules! callable_system {
                 Ok(vec![true; signs.as_slice()?.len()])
             }
 
+            fn switches_at(&self, surface: usize) -> bool {
+                self.system.switches_at(surface)
+            }
+
             fn is_native(&self) -> bool {
                 false
             }

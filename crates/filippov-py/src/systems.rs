@@ -334,6 +334,10 @@ impl TracedSystem {
         Ok(active)
     }
 
+    fn switches_at(&self, surface: usize) -> bool {
+        surface < self.system.n_surfaces() && self.system.switches_at(surface)
+    }
+
     fn is_native(&self) -> bool {
         self.system.is_native()
     }

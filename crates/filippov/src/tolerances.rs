@@ -417,3 +417,20 @@ pub const WHOLE_NUMBER: f64 = 1e-12;
 /// A motion that was to stay on a surface has left it where h is above this multiple of the tolerance: errors of many
 /// steps add up.
 pub const LEFT_RESTING: f64 = 1e3;
+
+/// Static friction above the kinetic one by less than this fraction makes no jump of the acceleration that could be told
+/// from the error of the time at which the motion breaks away.
+pub const NO_GAP: f64 = 1e-6;
+
+/// A body that touches another is in contact if the force exceeds this fraction of the accelerations around.
+pub const NO_FORCE: f64 = 1e-10;
+
+/// A body touches without speed if that is below this fraction of the tolerance.
+pub const SLOW: f64 = 0.1;
+
+/// A point beyond a surface at which bodies touch by less than this multiple of the tolerance is on it.
+pub const SLIPPED: f64 = 10.0;
+
+/// Bodies that overlap by less than this fraction of their positions touch; an action that moves them changes h by more
+/// than this fraction.
+pub const PENETRATION: f64 = 1e-6;

@@ -6,7 +6,7 @@ use crate::error::FieldError;
 use crate::mode::{Mode, Signs};
 use crate::switching::Matrix;
 use crate::system::{dot, PiecewiseSystem};
-use crate::tolerances::{NO_IMPULSE, SURFACE_NOISE};
+use crate::tolerances::{NO_FORCE, NO_IMPULSE, SURFACE_NOISE};
 
 /// The field of contact,
 ///
@@ -29,6 +29,8 @@ pub struct ContactField<'a> {
     n_evaluations: u64,
     /// nu, then mu, of the last evaluation.
     multipliers: Vec<f64>,
+    /// The largest nu that would be rounding of the forces.
+    noise: Vec<f64>,
     /// Ratio of static to kinetic friction at the surfaces slid on, at the last evaluation.
     ratios: Vec<f64>,
 }
@@ -63,6 +65,7 @@ impl<'a> ContactField<'a> {
             discrete: discrete.to_vec(),
             n_evaluations: 0,
             multipliers: Vec::new(),
+            noise: Vec::new(),
             ratios: Vec::new(),
         })
     }
@@ -89,6 +92,12 @@ impl<'a> ContactField<'a> {
         let lambdas = mu.iter().map(|mu| 2.0 * mu - 1.0);
         let sides = lambdas.zip(&self.ratios).flat_map(|(l, r)| [r + l, r - l]);
         nu.iter().copied().chain(sides)
+    }
+
+    /// Does every contact push, clearly?
+    pub fn presses(&self) -> bool {
+        let mut forces = self.multipliers.iter().zip(&self.noise);
+        forces.all(|(nu, noise)| nu > noise)
     }
 
     /// lambda / r of each surface slid on, NaN for those in contact, in the order of the surfaces.
@@ -198,10 +207,13 @@ impl SmoothField for ContactField<'_> {
         let (base, changes) = self.sides(t, x)?;
         let n = x.len();
         let (mut rows, mut rates) = (Vec::new(), Vec::new());
+        self.noise.clear();
         for &(j, _) in &self.contacts {
             let mut row = vec![0.0; n];
             let rate = self.system.rate_gradient(j, t, x, &self.signs, &mut row)?;
             rates.push(-(rate.time + dot(&row, &base)));
+            let size = rate.time.abs() + (dot(&row, &row) * dot(&base, &base)).sqrt();
+            self.noise.push(NO_FORCE * size);
             rows.push(row);
         }
         let mut directions = self.impulses(t, x, &rows)?;

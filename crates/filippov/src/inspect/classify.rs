@@ -113,6 +113,11 @@ pub fn classify(
     let Some((mode, zeros)) = place(system, t, x, reach)? else {
         return Ok(None);
     };
+    // What only triggers an action changes nothing here.
+    let zeros = zeros
+        .into_iter()
+        .filter(|&j| system.switches_at(j))
+        .collect();
     let surfaces = surfaces_that_matter(system, &mode, zeros);
     match surfaces.as_slice() {
         [] => in_region(system, t, x, mode),

@@ -24,7 +24,7 @@ use crate::field::SmoothField;
 use crate::mode::Mode;
 use crate::solution::Switch;
 use crate::switching::{first_nonzero, Kind};
-use crate::tolerances::{MOST_ACTIONS_AT_ONE_TIME, SURFACE_NOISE};
+use crate::tolerances::{MOST_ACTIONS_AT_ONE_TIME, PENETRATION, SURFACE_NOISE};
 
 /// The surfaces in one instant, as far as they trigger actions.
 struct Approach {
@@ -112,7 +112,9 @@ impl Integrator<'_> {
         let entries = self.motion.mode.entries();
         let reached = surfaces.iter().copied().filter(|&j| {
             let approaches = rates[j] * f64::from(entries[j]) < 0.0;
-            entries[j] != 0 && (located(j) || approaches)
+            // Rounding may show a zero where the motion leaves.
+            let is_tangent = located(j) && rates[j] == 0.0;
+            entries[j] != 0 && (approaches || is_tangent)
         });
         let mut due: Vec<usize> = Vec::new();
         for j in reached {
@@ -127,6 +129,13 @@ impl Integrator<'_> {
             due.dedup();
             self.note_residuals(h, &surfaces);
             return self.act(due).map(Some);
+        }
+        if surfaces.iter().any(|&j| {
+            let departs = rates[j] * f64::from(entries[j]) > 0.0;
+            departs && self.is_only_trigger(j)
+        }) {
+            self.note_residuals(h, &surfaces);
+            return self.go_on_unless_stuck().map(Some);
         }
         if self.motion.is_in_contact() {
             return self.decide_in_contact(event, &surfaces).map(Some);
@@ -155,7 +164,7 @@ impl Integrator<'_> {
     }
 
     /// Notes how far the point lies off the surfaces that vanish there, and those that the motion stays on.
-    fn note_residuals(&mut self, h: &Values, surfaces: &[usize]) {
+    pub(super) fn note_residuals(&mut self, h: &Values, surfaces: &[usize]) {
         self.residuals.clear();
         self.residuals.resize(h.len(), 0.0);
         for &j in surfaces.iter().chain(self.motion.sliding()) {
@@ -164,7 +173,7 @@ impl Integrator<'_> {
     }
 
     /// The actions at surface `j` for a motion that comes from `side`.
-    fn triggered_at(&self, j: usize, side: i8) -> impl Iterator<Item = usize> + '_ {
+    pub(super) fn triggered_at(&self, j: usize, side: i8) -> impl Iterator<Item = usize> + '_ {
         let fires = move |trigger: &Trigger| match trigger {
             Trigger::Surface { index, direction } => {
                 *index == j && (*direction == 0 || *direction == -side)
@@ -188,6 +197,8 @@ impl Integrator<'_> {
             passes: vec![false; before.entries().len()],
         };
         let mut count = 0;
+        self.push_back(&before)?;
+        let start = self.surface_values(&before.signs())?;
         while !due.is_empty() {
             for &index in &due {
                 count += 1;
@@ -197,22 +208,94 @@ impl Integrator<'_> {
                         actions: names.collect(),
                     }));
                 }
+                let arrives = self.passage(index, &before, &approach)?;
                 if let Some(stop) = self.do_action(index, &before)? {
                     return Ok(Some(stop));
                 }
+                if let (Some((j, true)), Some((_, true))) =
+                    (arrives, self.passage(index, &before, &approach)?)
+                {
+                    approach.passes[j] = true;
+                }
             }
+            self.push_back(&before)?;
             due = self.triggered_by_jump(&due, &mut approach)?;
         }
+        if let Some(j) = self.penetrates(&before, &start, &approach)? {
+            return Ok(Some(Stop::Contact { surfaces: vec![j] }));
+        }
+        let passing = approach.passes.iter().enumerate();
+        self.passing = passing.filter(|(_, p)| **p).map(|(j, _)| j).collect();
         self.recorder.jump(self.t, &self.x);
         let (after, left) = match self.place(Some(&before))? {
             Ok(placed) => placed,
             Err(stop) => return Ok(Some(stop)),
         };
         self.residuals.clear();
+        self.passing.clear();
         self.recorder.set_last_mode(first, &after);
         if let Some(rest) = self.impacts_end(first, &after)? {
             return self.come_to_rest(rest, after);
         }
+        self.begin(after, &left)
+    }
+
+    /// The surface of an action, and whether the motion goes through it from here.
+    fn passage(
+        &mut self,
+        index: usize,
+        before: &Mode,
+        approach: &Approach,
+    ) -> Result<Option<(usize, bool)>, FieldError> {
+        let Trigger::Surface { index: j, .. } = self.actions.list[index].trigger else {
+            return Ok(None);
+        };
+        let side = approach.side[j];
+        if side == 0 {
+            return Ok(None);
+        }
+        let Some(Sides { mode, on_surface }) = self.sides(Some(before))? else {
+            return Ok(None);
+        };
+        let goes_on = on_surface[j] && self.goes_through(j, side, &mode)?;
+        Ok(Some((j, goes_on)))
+    }
+
+    /// A trigger that the motion has passed by more than the tolerance without an action that carried it across: bodies
+    /// that could not be kept apart.
+    fn penetrates(
+        &mut self,
+        before: &Mode,
+        start: &Values,
+        approach: &Approach,
+    ) -> Result<Option<usize>, FieldError> {
+        let signs = before.signs();
+        let h = self.surface_values(&signs)?;
+        for j in (0..h.len()).filter(|&j| self.is_only_trigger(j) && !approach.passes[j]) {
+            let side = self.trigger_side(j, Some(before));
+            let came_from = before.entries()[j] == side || before.entries()[j] == 0;
+            let is_beyond = h[j] * f64::from(side) < 0.0 && came_from;
+            let has_jumped = (h[j] - start[j]).abs() > PENETRATION * h[j].abs();
+            if !is_beyond || has_jumped {
+                continue;
+            }
+            let known = self.residuals.get(j).copied().unwrap_or(0.0);
+            let size = self.system.surface_size(j, self.t, &self.x, &signs)?;
+            if h[j].abs() > (SURFACE_NOISE * size).max(known.min(PENETRATION * size)) {
+                return Ok(Some(j));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Decides the mode anew where an event turned out to be none.
+    fn go_on_unless_stuck(&mut self) -> Result<Option<Stop>, FieldError> {
+        let before = self.motion.mode.clone();
+        let (after, left) = match self.place(Some(&before))? {
+            Ok(placed) => placed,
+            Err(stop) => return Ok(Some(stop)),
+        };
+        self.residuals.clear();
         self.begin(after, &left)
     }
 
@@ -278,8 +361,6 @@ impl Integrator<'_> {
             }
             if !self.goes_through(j, side, &mode)? {
                 approach.passes[j] = false;
-            } else if was_done {
-                approach.passes[j] = true;
             } else if !approach.passes[j] {
                 due.extend(self.triggered_at(j, side));
             }
@@ -294,7 +375,11 @@ impl Integrator<'_> {
     fn goes_through(&self, j: usize, side: i8, mode: &Mode) -> Result<bool, FieldError> {
         let mode = mode.with(j, side);
         let leading = first_nonzero(self.system, j, side, 0, self.t, &self.x, &mode.signs())?;
-        Ok(leading.sign() == -side && (leading.order == 1 || !self.can_stay(j, &mode)?))
+        if leading.sign() != -side {
+            return Ok(false);
+        }
+        let is_still = leading.order != 1 || self.is_slow(j, leading.value, &mode)?;
+        Ok(!is_still || !self.can_stay(j, &mode)?)
     }
 
     /// The sides of a mode; where it is in contact, the free side.

@@ -11,7 +11,7 @@ use crate::field::{ContactField, SmoothField};
 use crate::mode::Mode;
 use crate::switching::Leading;
 use crate::system::dot;
-use crate::tolerances::{DRIFT_SHARE, MOST_IN_CONTACT, VANISHING_MULTIPLIER};
+use crate::tolerances::{DRIFT_SHARE, MOST_IN_CONTACT, NO_GAP, VANISHING_MULTIPLIER};
 
 /// An entry of the mode that is known before the decision: that of a multiplier that just vanished.
 type Known = (usize, i8);
@@ -117,6 +117,9 @@ impl<'a> Integrator<'a> {
         let mut field = self.field_of(mode);
         field.eval(self.t, &mut x, &mut velocity)?;
         self.stats.n_field_evaluations += field.n_evaluations();
+        if matches!(&field, ModeField::Contact(field) if !field.presses()) {
+            return Ok(None);
+        }
         let exits = field.last_exits();
         let size = exits.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         let is_admissible = exits.iter().all(|&v| v >= -VANISHING_MULTIPLIER * size)
@@ -141,8 +144,10 @@ impl<'a> Integrator<'a> {
         velocity: &[f64],
     ) -> Result<Option<Lefts>, FieldError> {
         // Above the static limit the slipping motion has an acceleration at once.
-        let is_known =
-            |j: usize| known.iter().any(|(surface, _)| *surface == j) && !self.system.sticks_at(j);
+        let is_known = |j: usize| {
+            let ratio = self.system.stick_ratio(j, self.t, &self.x, &mode.signs());
+            ratio <= 1.0 + NO_GAP && known.iter().any(|(surface, _)| *surface == j)
+        };
         let vanishes: Vec<bool> = contacts
             .iter()
             .chain(meeting)
@@ -171,9 +176,11 @@ impl<'a> Integrator<'a> {
             if leading.value * f64::from(entry) < 0.0 {
                 return Ok(None);
             }
-            if leading.value != 0.0 {
-                left.push(Left::Surface(j, leading));
+            if leading.value == 0.0 {
+                // Nothing moves the bodies together or apart.
+                leading.order = 0;
             }
+            left.push(Left::Surface(j, leading));
         }
         Ok(Some(left))
     }

@@ -6,7 +6,7 @@ use super::actions::is_reset;
 use super::integrator::Integrator;
 use super::Stop;
 use crate::error::FieldError;
-use crate::field::ContactField;
+use crate::field::{ContactField, Projector};
 use crate::mode::Mode;
 use crate::solution::Switch;
 use crate::switching::Kind;
@@ -119,10 +119,20 @@ impl Integrator<'_> {
             self.recorder.jump(self.t, &self.x);
         }
         self.stats.n_switches += 1;
+        let due = self.reached_beside(&before, surface)?;
+        if !due.is_empty() {
+            self.record_rest(y_before, surface, before.clone(), before.clone());
+            return self.act(due);
+        }
         let (after, left) = match self.place(Some(&before))? {
             Ok(decided) => decided,
             Err(stop) => return Ok(Some(stop)),
         };
+        self.record_rest(y_before, surface, before, after.clone());
+        self.begin(after, &left)
+    }
+
+    fn record_rest(&mut self, y_before: Vec<f64>, surface: usize, before: Mode, after: Mode) {
         self.recorder.switch(Switch {
             t: self.t,
             y_before: y_before.into(),
@@ -130,9 +140,37 @@ impl Integrator<'_> {
             kind: Kind::Accumulation,
             surfaces: smallvec![surface],
             mode_before: before,
-            mode_after: after.clone(),
+            mode_after: after,
             note: String::new(),
         });
-        self.begin(after, &left)
+    }
+
+    /// The actions at other surfaces that the jump to the limit passed: the point is moved back onto them.
+    fn reached_beside(&mut self, before: &Mode, surface: usize) -> Result<Vec<usize>, FieldError> {
+        let signs = before.signs();
+        let h = self.surface_values(&signs)?;
+        let passed = (0..h.len()).filter(|&k| {
+            let side = before.entries()[k];
+            k != surface && self.is_only_trigger(k) && h[k] * f64::from(side) < 0.0
+        });
+        let passed: Vec<usize> = passed
+            .filter(|&k| self.trigger_side(k, None) == before.entries()[k])
+            .collect();
+        if passed.is_empty() {
+            return Ok(Vec::new());
+        }
+        let set: Vec<usize> = passed.iter().copied().chain([surface]).collect();
+        let mut projector = Projector::new(self.x.len(), self.system.n_surfaces());
+        projector.project_onto(self.system, &set, self.t, &mut self.x, &signs)?;
+        self.recorder.jump(self.t, &self.x);
+        self.motion
+            .restart(self.system, self.t, before.clone(), &[]);
+        let h = self.surface_values(&signs)?;
+        self.note_residuals(&h, &set);
+        let due = passed.iter().flat_map(|&k| {
+            let side = before.entries()[k];
+            self.triggered_at(k, side).collect::<Vec<_>>()
+        });
+        Ok(due.collect())
     }
 }

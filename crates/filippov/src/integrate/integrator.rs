@@ -55,6 +55,8 @@ pub struct Integrator<'a> {
     pub(super) horizon: f64,
     /// How far the point of an event lies off the surfaces that vanish there, by rounding; else empty.
     pub(super) residuals: Vec<f64>,
+    /// Triggers whose action leaves the motion as it is: it goes through them.
+    pub(super) passing: Vec<usize>,
     /// The step that was proposed where the horizon shortened it, else 0.
     wanted_dt: f64,
     pub(super) x: Vec<f64>,
@@ -118,6 +120,7 @@ impl<'a> Integrator<'a> {
             timetable: Timetable::new(actions, t_span.0),
             horizon: t_span.1,
             residuals: Vec::new(),
+            passing: Vec::new(),
             wanted_dt: 0.0,
             x: y0.to_vec(),
             motion: Motion::new(system, t_span.0, undecided, options.into(), actions),

@@ -205,7 +205,13 @@ impl Integrator<'_> {
             let tolerance: f64 = components
                 .map(|(i, (g, x))| g.abs() * self.scale.of(i, *x, *x))
                 .sum();
-            if h[j].abs() > LEFT_RESTING * tolerance {
+            // Bodies that touch have to be held apart at once.
+            let factor = if self.is_only_trigger(j) {
+                1.0
+            } else {
+                LEFT_RESTING
+            };
+            if h[j].abs() > factor * tolerance {
                 return Ok(true);
             }
         }

@@ -4,11 +4,11 @@ use super::integrator::Integrator;
 use super::transition::{Decided, Left, Lefts};
 use super::Stop;
 use crate::error::FieldError;
-use crate::field::{ContactField, SmoothField};
+use crate::field::{ContactField, Projector, SmoothField};
 use crate::mode::Mode;
 use crate::switching::{decide, first_nonzero, Arrival, Leading};
 use crate::system::{dot, surfaces_that_matter};
-use crate::tolerances::SURFACE_NOISE;
+use crate::tolerances::{SLIPPED, SLOW, SURFACE_NOISE};
 
 /// The sides that a point is on.
 pub(super) struct Sides {
@@ -93,6 +93,11 @@ impl Integrator<'_> {
                 let noise = (SURFACE_NOISE * size).max(2.0 * residual);
                 on_surface[j] = h[j].abs() <= noise;
                 let known = memory.map_or(0, |memory| memory.entries()[j]);
+                if let Some(side) = self.slipped_through(j, h[j], &signs, memory)? {
+                    on_surface[j] = true;
+                    mode.set(j, side);
+                    continue;
+                }
                 let entry = match known {
                     side if on_surface[j] && side != 0 => side,
                     _ if h[j] < 0.0 => -1,
@@ -105,6 +110,50 @@ impl Integrator<'_> {
             }
         }
         Ok(Some(Sides { mode, on_surface }))
+    }
+
+    /// The free side of a trigger that the motion came from and that the point lies beyond by less than the
+    /// tolerance: errors of jumps to a limit, and of impacts at nearly the same time. It counts as there.
+    fn slipped_through(
+        &self,
+        j: usize,
+        h: f64,
+        signs: &[f64],
+        memory: Option<&Mode>,
+    ) -> Result<Option<i8>, FieldError> {
+        let Some(memory) = memory.filter(|_| self.is_only_trigger(j)) else {
+            return Ok(None);
+        };
+        let side = self.trigger_side(j, Some(memory));
+        let came_from = memory.entries()[j] == side || memory.entries()[j] == 0;
+        if !came_from || h * f64::from(side) >= 0.0 {
+            return Ok(None);
+        }
+        let mut gradient = vec![0.0; self.x.len()];
+        self.system
+            .gradient(j, self.t, &self.x, signs, &mut gradient)?;
+        let components = gradient.iter().zip(&self.x).enumerate();
+        let tolerance: f64 = components
+            .map(|(i, (g, x))| g.abs() * self.scale.of(i, *x, *x))
+            .sum();
+        Ok((h.abs() <= SLIPPED * tolerance).then_some(side))
+    }
+
+    /// Moves the point back onto the triggers that it slipped through.
+    pub(super) fn push_back(&mut self, memory: &Mode) -> Result<(), FieldError> {
+        let signs = memory.signs();
+        let h = self.surface_values(&signs)?;
+        let mut beyond = Vec::new();
+        for (j, h) in h.iter().enumerate() {
+            if self.slipped_through(j, *h, &signs, Some(memory))?.is_some() {
+                beyond.push(j);
+            }
+        }
+        if !beyond.is_empty() {
+            let mut projector = Projector::new(self.x.len(), self.system.n_surfaces());
+            projector.project_onto(self.system, &beyond, self.t, &mut self.x, &signs)?;
+        }
+        Ok(())
     }
 
     /// The mode on surfaces of which some trigger actions and switch nothing: contact, where the impact has no
@@ -123,10 +172,17 @@ impl Integrator<'_> {
             mode.set(j, side);
             let signs = mode.signs();
             let leading = first_nonzero(self.system, j, side, 0, self.t, &self.x, &signs)?;
-            let is_still = leading.order != 1;
-            let stays = leading.sign() != side;
+            let is_slow = leading.order == 1 && self.is_slow(j, leading.value, &mode)?;
+            let is_still = leading.order != 1 || is_slow;
+            let stays = leading.sign() != side || is_slow;
             if is_still && stays && self.can_stay(j, &mode)? {
                 contacts.push(j);
+                continue;
+            }
+            let came_from = memory.map_or(side, |memory| memory.entries()[j]);
+            let crosses = self.passing.contains(&j) || came_from == -side;
+            if leading.sign() == -side && !crosses {
+                // Its action comes first: the next event is here.
                 continue;
             }
             if leading.order > 0 {
@@ -161,6 +217,18 @@ impl Integrator<'_> {
             _ if known != 0 => known,
             _ => 1,
         }
+    }
+
+    /// Is this speed at surface j below the tolerance?
+    pub(super) fn is_slow(&self, j: usize, speed: f64, mode: &Mode) -> Result<bool, FieldError> {
+        let mut row = vec![0.0; self.x.len()];
+        self.system
+            .rate_gradient(j, self.t, &self.x, &mode.signs(), &mut row)?;
+        let components = row.iter().zip(&self.x).enumerate();
+        let tolerance: f64 = components
+            .map(|(i, (r, x))| r.abs() * self.scale.of(i, *x, *x))
+            .sum();
+        Ok(speed.abs() <= SLOW * tolerance)
     }
 
     /// Can a body stay in contact at h_j = 0? The action there leaves the point alone and acts on the velocity.

@@ -102,7 +102,7 @@ impl Integrator<'_> {
     /// Decides the mode anew at the current point and goes on.
     pub(super) fn go_on_from_here(&mut self) -> Result<Option<Stop>, FieldError> {
         let before = self.motion.mode.clone();
-        let (after, left) = match self.place(None)? {
+        let (after, left) = match self.place(Some(&before))? {
             Ok(placed) => placed,
             Err(stop) => return Ok(Some(stop)),
         };

@@ -121,9 +121,15 @@ impl Integrator<'_> {
                 let mode = self.motion.mode.clone();
                 return self.jump_to(limit, mode);
             }
-            return Ok(Some(Stop::NoProgress {
-                surfaces: self.recorder.surfaces_switched_at(self.t),
-            }));
+            let mut surfaces = self.recorder.surfaces_switched_at(self.t);
+            if surfaces.is_empty() {
+                let named = event.functions.iter().filter_map(|f| match f {
+                    EventFunction::Surface(j) => Some(*j),
+                    _ => None,
+                });
+                surfaces.extend(named);
+            }
+            return Ok(Some(Stop::NoProgress { surfaces }));
         }
         if !self.actions.list.is_empty() {
             let signs = self.motion.signs.clone();

@@ -10,6 +10,7 @@ use super::codim1::{Arrival, Decision};
 use super::lie::{first_nonzero, Leading};
 use crate::error::FieldError;
 use crate::system::{BothSides, PiecewiseSystem};
+use crate::tolerances::NO_GAP;
 
 /// What follows where the motion is on such a surface.
 pub(super) fn decide_sticking(
@@ -34,8 +35,13 @@ pub(super) fn decide_sticking(
         let first = |value: f64| Leading { order: 1, value };
         (first(sides.normal_minus), first(sides.normal_plus))
     } else {
-        let along = |side: i8| first_nonzero(system, j, side, 0, t, x, signs);
-        (along(-1)?, along(1)?)
+        // Without a gap between static and kinetic friction the component vanishes where the motion breaks away.
+        let has_gap = system.stick_ratio(j, t, x, signs) > 1.0 + NO_GAP;
+        let along = |side: i8, exit: Arrival| {
+            let vanishing = usize::from(arrival == exit && !has_gap);
+            first_nonzero(system, j, side, vanishing, t, x, signs)
+        };
+        (along(-1, Arrival::ExitMinus)?, along(1, Arrival::ExitPlus)?)
     };
     Ok(Decision {
         entry,
