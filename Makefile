@@ -22,7 +22,10 @@ RUST_TESTED := --workspace --exclude filippov-py
 export MPLBACKEND ?= Agg
 
 .DEFAULT_GOAL := help
-.PHONY: help tools setup build build-release fmt lint types test test-rs test-py test-slow bench demo \
+N ?= 6000
+SEED ?= 0
+
+.PHONY: help tools setup build build-release fmt lint types test test-rs test-py test-slow fuzz bench demo \
 	pictures docs check all clean
 
 help: ## list the targets
@@ -68,6 +71,9 @@ test-py: $(BUILD_STAMP) ## Python tests and the examples in the docstrings
 test-slow: $(BUILD_STAMP) ## the slow tests
 	$(CARGO) test --release $(RUST_TESTED) -- --ignored
 	$(BIN)/pytest -m slow
+
+fuzz: $(BUILD_STAMP) ## solve N random systems from SEED on, in two processes; print what does not hold
+	PYTHONPATH=tests OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PY) -m fuzz --n $(N) --seed $(SEED)
 
 bench: $(BENCH_STAMP) ## run the benchmarks
 	$(PY) benchmarks/disode_tables.py

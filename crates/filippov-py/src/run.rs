@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use filippov::{Mode, PiecewiseSystem, Side, Solution, Stop};
+use filippov::{Mode, PiecewiseSystem, Segment, Side, Solution, Stop};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -90,6 +90,26 @@ impl Run {
         }
         Ok(out)
     }
+
+    fn multipliers_at_ends(
+        &self,
+        solution: &Solution,
+        segment: &Segment,
+    ) -> PyResult<(Vec<f64>, Vec<f64>)> {
+        if segment.t_end > segment.t_start {
+            return Ok((
+                self.multiplier_vector(solution, segment.t_start, Side::Right)?,
+                self.multiplier_vector(solution, segment.t_end, Side::Left)?,
+            ));
+        }
+        // A segment without duration is not what the limits of the solution at its time belong to.
+        let mut out = vec![f64::NAN; self.n_visible];
+        let values = segment.mode.sliding_set().zip(&segment.multipliers);
+        for (j, &value) in values.filter(|(j, _)| *j < self.n_visible) {
+            out[j] = if value.is_finite() { value } else { f64::NAN };
+        }
+        Ok((out.clone(), out))
+    }
 }
 
 #[pymethods]
@@ -119,9 +139,17 @@ impl Run {
 
     #[getter]
     fn switches<'py>(&self, py: Python<'py>) -> PyResult<Vec<SwitchRow<'py>>> {
+        // A crossing or a touch of surfaces without an entry in the mode is not told.
+        let visible = |mode: &Mode| mode.entries()[..self.n_visible].to_vec();
+        let is_told = |s: &&filippov::Switch| {
+            !matches!(s.kind.name(), "crossing" | "grazing")
+                || s.surfaces.iter().any(|&j| j < self.n_visible)
+                || visible(&s.mode_before) != visible(&s.mode_after)
+        };
         self.solution()
             .switches
             .iter()
+            .filter(is_told)
             .map(|s| {
                 let visible = s.surfaces.iter().filter(|&&j| j < self.n_visible);
                 let visible: Vec<usize> = visible.copied().collect();
@@ -146,8 +174,7 @@ impl Run {
             .segments
             .iter()
             .map(|s| {
-                let start = self.multiplier_vector(&solution, s.t_start, Side::Right)?;
-                let end = self.multiplier_vector(&solution, s.t_end, Side::Left)?;
+                let (start, end) = self.multipliers_at_ends(&solution, s)?;
                 Ok((
                     s.t_start,
                     s.t_end,

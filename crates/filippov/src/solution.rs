@@ -10,6 +10,7 @@ use crate::options::SlidingRule;
 use crate::stepper::Basis;
 use crate::switching::Kind;
 use crate::system::PiecewiseSystem;
+use crate::tolerances::AT_SIDE;
 
 pub use crate::integrate::UserZero;
 
@@ -204,6 +205,16 @@ impl Solution {
         };
         let set: Vec<usize> = mode.sliding_set().collect();
         let near = self.multipliers_near(t, side);
+        let in_interval = |lambda: f64| {
+            // At an exit it is one up to the rounding of the time. Where both fields are tangent there is none.
+            if !lambda.is_finite() {
+                f64::NAN
+            } else if lambda.abs() < 1.0 + AT_SIDE {
+                lambda.clamp(-1.0, 1.0)
+            } else {
+                lambda
+            }
+        };
         if near.iter().any(|lambda| lambda.is_nan()) {
             // Contact: the forces depend on the actions of the run.
             return Ok(set.into_iter().zip(near.iter().copied()).collect());
@@ -212,16 +223,19 @@ impl Solution {
             [] => Vec::new(),
             &[j] => {
                 let mut field = SlidingField::new(system, j, &mode.signs());
-                vec![(j, field.normal_components(t, &mut y)?.multiplier())]
+                let lambda = field.normal_components(t, &mut y)?.multiplier();
+                vec![(j, in_interval(lambda))]
             }
             _ => {
                 // Of several roots that which the motion follows.
                 let field = IntersectionField::new(system, &set, &mode.signs(), near);
                 let mut field = field.with_rule(self.sliding);
                 field.eval(t, &mut y, &mut vec![0.0; self.n_states])?;
-                set.into_iter()
-                    .zip(field.multipliers().iter().copied())
-                    .collect()
+                let values = field
+                    .multipliers()
+                    .iter()
+                    .map(|&lambda| in_interval(lambda));
+                set.into_iter().zip(values).collect()
             }
         })
     }

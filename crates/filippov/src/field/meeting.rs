@@ -110,10 +110,19 @@ impl MeetingFields {
                 self.signs[self.set[i]] = -1.0;
             }
         }
-        for i in (0..m).filter(|&i| system.sticks_at(self.set[i])) {
-            let ratio = system.stick_ratio(self.set[i], t, x, signs);
-            stretch(&mut self.fields, 1 << i, n, ratio);
-            stretch(&mut self.components, 1 << i, m, ratio);
+        let mut first = 0;
+        for group in &self.groups {
+            let rows = first..first + (1 << group.len());
+            first = rows.end;
+            for (bit, &i) in group.iter().enumerate() {
+                if system.sticks_at(self.set[i]) {
+                    let ratio = system.stick_ratio(self.set[i], t, x, signs);
+                    let fields = &mut self.fields[rows.start * n..rows.end * n];
+                    stretch(fields, 1 << bit, n, ratio);
+                    let components = &mut self.components[rows.start * m..rows.end * m];
+                    stretch(components, 1 << bit, m, ratio);
+                }
+            }
         }
         Ok(evaluations)
     }

@@ -36,6 +36,46 @@ impl Integrator<'_> {
         meeting: &[usize],
         fresh: &[usize],
     ) -> Result<Decided, FieldError> {
+        let decided = self.decide_with_static_friction(event, mode, meeting, fresh)?;
+        self.decide_with_kinetic_friction(decided, meeting)
+    }
+
+    /// Where a body has broken away, or has not been held, its friction is the kinetic one: what the other surfaces do
+    /// is decided once more.
+    fn decide_with_kinetic_friction(
+        &mut self,
+        decided: Decided,
+        meeting: &[usize],
+    ) -> Result<Decided, FieldError> {
+        let Ok((after, left)) = decided else {
+            return Ok(decided);
+        };
+        let slips = |j: &usize| self.system.sticks_at(*j) && after.entries()[*j] != 0;
+        let (slipping, others): (Vec<usize>, Vec<usize>) = meeting.iter().partition(|j| slips(j));
+        if slipping.is_empty() || others.is_empty() {
+            return Ok(Ok((after, left)));
+        }
+        let multipliers = std::mem::take(&mut self.decided);
+        Ok(match self.place_on(after.clone(), &others, Some(&after))? {
+            Ok((again, _)) if again != after => {
+                self.decided = DecidedRoot::default();
+                let left = self.departures(&again, meeting, &[])?;
+                Ok((again, left))
+            }
+            _ => {
+                self.decided = multipliers;
+                Ok((after, left))
+            }
+        })
+    }
+
+    fn decide_with_static_friction(
+        &mut self,
+        event: &Found,
+        mode: &Mode,
+        meeting: &[usize],
+        fresh: &[usize],
+    ) -> Result<Decided, FieldError> {
         if fresh.is_empty() && self.slides_by_rule() {
             return self.leave_by_rule(mode, meeting);
         }

@@ -13,6 +13,7 @@ mod irregular;
 mod leave_by_rule;
 mod meeting;
 mod motion;
+mod nested;
 mod pace;
 mod placement;
 mod relay;

@@ -42,11 +42,12 @@ impl Integrator<'_> {
         if !smooth.is_empty() {
             return self.place_on_triggers(mode, &smooth, meeting, memory);
         }
-        self.place_on(mode, &meeting, memory)
+        let decided = self.place_on(mode.clone(), &meeting, memory)?;
+        self.follow_jumps(&mode, &meeting, decided)
     }
 
     /// The mode where these surfaces matter and vanish.
-    fn place_on(
+    pub(super) fn place_on(
         &mut self,
         mode: Mode,
         meeting: &[usize],

@@ -161,8 +161,10 @@ impl Integrator<'_> {
             }
         }
         surfaces.sort_unstable();
-        let decided = match (surfaces.as_slice(), arrival) {
-            (&[j], Some(arrival)) => self.decide_at_surface(&mode, j, arrival)?,
+        let jumping = self.decide_where_others_jump(&mode, &fresh)?;
+        let decided = match (jumping, surfaces.as_slice(), arrival) {
+            (Some(decided), ..) => decided,
+            (_, &[j], Some(arrival)) => self.decide_at_surface(&mode, j, arrival)?,
             _ => self.decide_at_intersection(event, &mode, &surfaces, &fresh)?,
         };
         let (after, left) = match decided {

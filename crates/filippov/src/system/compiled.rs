@@ -31,6 +31,8 @@ pub(super) struct Model {
     rates_program: OnceLock<TieredProgram>,
     affine_signs: OnceLock<AffineModel>,
     pub affine: Vec<bool>,
+    /// Do switching functions contain signs of others?
+    pub is_nested: bool,
     pub is_analytic: bool,
     gradients: Vec<OnceLock<CompiledGradient>>,
     both_sides: Vec<OnceLock<TieredProgram>>,
@@ -100,6 +102,7 @@ impl Model {
             n_states: field.len(),
             is_analytic: graph.is_analytic(&field) && graph.is_analytic(&surfaces),
             affine: surfaces.iter().map(|&h| graph.is_affine(h)).collect(),
+            is_nested: graph.sign_dependencies(&surfaces, &[]).contains(&true),
             gradients: surfaces.iter().map(|_| OnceLock::new()).collect(),
             both_sides: surfaces.iter().map(|_| OnceLock::new()).collect(),
             first_lie: surfaces.iter().map(|_| OnceLock::new()).collect(),

@@ -198,6 +198,11 @@ pub trait PiecewiseSystem: Sync {
         active.fill(true);
     }
 
+    /// Do switching functions contain signs of others? Then they may jump where those change.
+    fn has_nested_signs(&self) -> bool {
+        false
+    }
+
     /// Is h_j affine in (t, x)? Then the filter on end values and slopes decides more steps.
     fn is_affine(&self, j: usize) -> bool {
         let _ = j;

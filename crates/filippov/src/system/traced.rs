@@ -306,6 +306,10 @@ impl PiecewiseSystem for TracedSystem {
         self.model.active(signs, sliding, active);
     }
 
+    fn has_nested_signs(&self) -> bool {
+        self.model.is_nested
+    }
+
     fn is_affine(&self, j: usize) -> bool {
         self.model.affine[j]
     }

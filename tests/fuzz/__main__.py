@@ -1,0 +1,141 @@
+"""`make fuzz`: solve many random systems in two processes, and report what does not hold."""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import multiprocessing
+import sys
+import time
+import warnings
+from collections import Counter
+from collections.abc import Iterator
+from multiprocessing.connection import Connection, wait
+from typing import Any
+
+from fuzz.comparisons import comparisons
+from fuzz.properties import violations
+from fuzz.systems import Case, build, random_case
+
+# A case takes milliseconds; Euler's method and a run to `max_wall_time` some seconds.
+LONGEST_CASE = 60.0
+SHOWN = 20
+
+
+def check(case: Case) -> tuple[str, list[str]]:
+    """Solve a case; return the reason of its end and what is wrong."""
+    problem = build(case.source)
+    start = time.process_time()
+    sol = problem.solve()
+    seconds = time.process_time() - start
+    found = list(violations(problem, sol))
+    if seconds > 1.5 * problem.limits["max_wall_time"]:
+        found.append(f"{seconds:.1f} s, max_wall_time is {problem.limits['max_wall_time']:g} s")
+    found += comparisons(problem, sol, case.seed)
+    return sol._run.reason, found
+
+
+def _work(connection: Connection) -> None:
+    warnings.simplefilter("ignore")  # of NumPy, where a plain call overflows
+    while (seed := connection.recv()) is not None:
+        try:
+            connection.send((seed, *check(random_case(seed))))
+        except BaseException as error:  # a panic is no Exception
+            connection.send((seed, "raised", [f"{type(error).__name__}: {error}"]))
+
+
+class Worker:
+    """A process that checks one case at a time, and is ended if it takes too long."""
+
+    def __init__(self) -> None:
+        self.connection, other = multiprocessing.Pipe()
+        self.process = multiprocessing.Process(target=_work, args=(other,), daemon=True)
+        self.process.start()
+        other.close()
+        self.seed: int | None = None
+        self.since = 0.0
+
+    def give(self, seed: int) -> None:
+        """Start on a case."""
+        self.seed, self.since = seed, time.monotonic()
+        self.connection.send(seed)
+
+    def end(self) -> None:
+        """End the process, whatever it does."""
+        self.process.kill()
+        self.process.join()
+
+
+def results(seeds: Iterator[int], n_processes: int) -> Iterator[tuple[int, str, list[str]]]:
+    """Yield seed, reason and violations of every case, in the order in which they are done."""
+    workers = [Worker() for _ in range(n_processes)]
+
+    def give(worker: Worker) -> None:
+        worker.seed = None
+        seed = next(seeds, None)
+        if seed is not None:
+            worker.give(seed)
+
+    for worker in workers:
+        give(worker)
+    while busy := [worker for worker in workers if worker.seed is not None]:
+        ready = wait([worker.connection for worker in busy], timeout=1.0)
+        for worker in busy:
+            assert worker.seed is not None
+            result: Any = None
+            if worker.connection in ready:
+                try:
+                    result = worker.connection.recv()
+                except EOFError:
+                    worker.process.join()
+                    result = (worker.seed, "crash", [f"the process ended with {worker.process.exitcode}"])
+            elif time.monotonic() - worker.since > LONGEST_CASE:
+                result = (worker.seed, "hang", [f"no answer after {LONGEST_CASE:g} s"])
+            if result is None:
+                continue
+            if result[1] in ("crash", "hang"):
+                worker.end()
+                workers.remove(worker)
+                worker = Worker()
+                workers.append(worker)
+            yield result
+            give(worker)
+    for worker in workers:
+        worker.end()
+
+
+def main() -> int:
+    """Run the cases and print the tallies; return 1 if anything does not hold."""
+    parser = argparse.ArgumentParser(prog="make fuzz", description=__doc__)
+    parser.add_argument("--n", type=int, default=4000, help="number of systems")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the first; the others follow")
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--seconds", type=float, default=1e9, help="give out no more cases after this time")
+    arguments = parser.parse_args()
+    seeds = range(arguments.seed, arguments.seed + arguments.n)
+    reasons: Counter[str] = Counter()
+    features: Counter[str] = Counter()
+    failed: list[int] = []
+    start = time.monotonic()
+    in_time = itertools.takewhile(lambda _: time.monotonic() - start < arguments.seconds, seeds)
+    for seed, reason, found in results(in_time, arguments.processes):
+        case = random_case(seed)
+        reasons[reason] += 1
+        features.update(case.features)
+        if found:
+            failed.append(seed)
+            if len(failed) <= SHOWN:
+                print(
+                    f"--- seed {seed} ({reason})", *(f"  {text}" for text in found[:4]), case.source, sep="\n"
+                )
+    seconds = time.monotonic() - start
+    n_done = reasons.total()
+    print(f"{n_done} systems, seeds {seeds.start} to {seeds.start + n_done - 1}, {seconds:.0f} s")
+    print("ended by:", ", ".join(f"{name} {count}" for name, count in reasons.most_common()))
+    print("with:", ", ".join(f"{name} {count}" for name, count in features.most_common()))
+    print(f"{len(failed)} violations" + (f", seeds {sorted(failed)}" if failed else ""))
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,60 @@
+"""A switching function that contains the sign of another one jumps where that one changes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import filippov as fl
+import numpy as np
+import pytest
+
+
+def test_the_sign_of_a_function_that_jumps_is_decided_anew() -> None:
+    def f(t: float, x: Any) -> Any:
+        return [1.0, np.sign(x[0] - 0.2 * np.sign(x[0] - 0.1))]
+
+    # h = x + 0.2 is positive up to x = 0.1, then x - 0.2 is negative up to x = 0.2.
+    sol = fl.solve_ivp(f, (0.0, 1.0), [0.0, 0.0])
+    np.testing.assert_allclose(sol.switches.t, [0.1, 0.2], rtol=0, atol=1e-12)
+    assert [str(mode) for mode in sol.segments.mode] == ["-+", "+-", "++"]
+    assert sol.y[1, -1] == pytest.approx(0.1 - 0.1 + 0.8, abs=1e-12)
+
+
+def test_sliding_ends_where_its_surface_jumps_away() -> None:
+    def f(t: float, x: Any) -> Any:
+        return [-1.0, -2.0 * np.sign(x[1] + 0.25 * np.sign(x[0] - 0.5))]
+
+    # It slides on y = -1/4 until x = 1/2, then goes up to y = 1/4 within another 1/4.
+    sol = fl.solve_ivp(f, (0.0, 2.0), [1.0, 0.0])
+    assert [str(mode) for mode in sol.segments.mode] == ["++", "+0", "--", "-0"]
+    np.testing.assert_allclose(sol.switches.t, [0.125, 0.5, 0.75], rtol=0, atol=1e-9)
+    assert sol.sol(0.5)[1] == pytest.approx(-0.25, abs=1e-12)
+    assert sol.y[1, -1] == pytest.approx(0.25, abs=1e-12)
+
+
+def test_a_start_where_another_function_jumps() -> None:
+    def f(t: float, x: Any) -> Any:
+        return [-1.0, np.sign(x[0] - 0.2 * np.sign(x[0] - 0.1))]
+
+    # Below x = 0.1 the inner function is x + 0.2, positive down to x = -0.2.
+    sol = fl.solve_ivp(f, (0.0, 1.0), [0.1, 0.0])
+    assert [str(mode) for mode in sol.segments.mode] == ["-+", "--"]
+    np.testing.assert_allclose(sol.switches.t, [0.3], rtol=0, atol=1e-12)
+    assert sol.y[1, -1] == pytest.approx(0.3 - 0.7, abs=1e-12)
+
+
+def test_sliding_beyond_a_bend_of_its_surface() -> None:
+    def f(t: float, x: Any) -> Any:
+        return [1.0, -2.0 * np.sign(x[1] - np.maximum(x[0], 0.5))]
+
+    sol = fl.solve_ivp(f, (0.0, 1.0), [0.0, 0.5])
+    assert sol.y[1, -1] == pytest.approx(1.0, abs=1e-12)
+    assert sol.sol.multipliers(0.9)[list(sol.segments[-1].sliding)] == pytest.approx(-0.5)
+
+    def steep(t: float, x: Any) -> Any:
+        return [1.0, -0.5 * np.sign(x[1] - np.maximum(x[0], 0.5))]
+
+    # Beyond the bend the surface rises faster than the motion can: it stays behind.
+    sol = fl.solve_ivp(steep, (0.0, 1.0), [0.0, 0.5])
+    assert sol.success, sol.message
+    assert sol.y[1, -1] == pytest.approx(0.75, abs=1e-12)

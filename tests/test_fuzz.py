@@ -1,0 +1,42 @@
+"""A few of the random systems of `make fuzz`, and what the generator is worth."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import pytest
+from fuzz.__main__ import check
+from fuzz.systems import build, random_case
+
+N = 240
+# Where plain calls leave the range of the functions, far out.
+pytestmark = pytest.mark.filterwarnings("ignore::RuntimeWarning")
+
+
+@pytest.mark.parametrize("first", range(0, N, 40))
+def test_random_systems_keep_all_properties(first: int) -> None:
+    for seed in range(first, first + 40):
+        case = random_case(seed)
+        _, found = check(case)
+        assert not found, f"seed {seed}: {found[:3]}\n{case.source}"
+
+
+def test_random_systems_have_all_features() -> None:
+    features: Counter[str] = Counter()
+    for seed in range(N):
+        features.update(random_case(seed).features)
+    rare = {"copysign", "clock surface", "undamped"}
+    assert all(features[name] >= (1 if name in rare else 5) for name in features)
+    assert len(features) >= 34
+    kinds = Counter(kind for seed in range(N) for kind in kinds_of(seed))
+    for kind in ("crossing", "enter_sliding", "exit_sliding", "reset", "clock"):
+        assert kinds[kind] >= 5
+
+
+def kinds_of(seed: int) -> set[str]:
+    return set(build(random_case(seed).source).solve().switches.kind)
+
+
+def test_the_same_seed_gives_the_same_system() -> None:
+    assert random_case(11).source == random_case(11).source
+    assert random_case(11).source != random_case(12).source
