@@ -28,14 +28,14 @@ COSTS = {
 
 # The same by Taylor series, where an expansion counts as the evaluations that take as many operations.
 COSTS_BY_SERIES = {
-    "relay_feedback": (1644, 103, 102),
-    "dry_friction_autonomous": (1945, 84, 83),
-    "relay_feedback_slow": (1657, 96, 95),
-    "relay_feedback_fast": (2293, 147, 146),
-    "drill_string": (5917, 174, 151),
-    "dieci_lopez_6_1": (1716, 22, 21),
-    "dieci_lopez_6_4_i": (714, 48, 47),
-    "dieci_lopez_6_4_ii": (7085, 444, 443),
+    "relay_feedback": (1604, 84, 83),
+    "dry_friction_autonomous": (1861, 65, 64),
+    "relay_feedback_slow": (1505, 81, 80),
+    "relay_feedback_fast": (2081, 111, 110),
+    "drill_string": (6930, 153, 137),
+    "dieci_lopez_6_1": (2028, 19, 18),
+    "dieci_lopez_6_4_i": (789, 36, 35),
+    "dieci_lopez_6_4_ii": (8396, 443, 442),
 }
 
 

@@ -364,12 +364,15 @@ pub const BEYOND_GUESS: f64 = 1.1;
 /// Halvings of a step whose bounds have to decide everything; beyond that samples help.
 pub const PROVED_DEPTH: u32 = 6;
 
-/// Order of a Taylor step per decimal digit of the relative tolerance. The least work per unit of time takes 1.15
-/// (Jorba and Zou); a step has costs beside its coefficients, and longer ones pay.
-pub const TAYLOR_DIGITS_TO_ORDER: f64 = 2.5;
+/// Orders of Taylor steps per decimal digit of the relative tolerance, and beside that: where the coefficients are
+/// cheap, and where they are dear. The least work on coefficients per unit of time takes 1.15 per digit (Jorba and
+/// Zou); a step has costs of its own, and longer ones pay.
+pub const TAYLOR_ORDER_CHEAP: (f64, f64) = (2.5, 3.0);
+/// The same where the coefficients are dear.
+pub const TAYLOR_ORDER_DEAR: (f64, f64) = (1.5, 2.0);
 
-/// Lowest order of a Taylor step: below it the step is no longer than one of DOPRI5.
-pub const TAYLOR_SMALLEST_ORDER: usize = 8;
+/// Coefficients are dear from so many operations on: then they take longer than the rest of a step.
+pub const TAYLOR_DEAR: usize = 2000;
 
 /// The last terms of a Taylor step, times this, may be as large as the tolerance: errors of many steps add up.
 pub const TAYLOR_SHARE: f64 = 10.0;

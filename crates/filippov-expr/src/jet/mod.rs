@@ -75,6 +75,7 @@ pub struct JetProgram {
     order: usize,
     width: usize,
     cost: usize,
+    operations: usize,
 }
 
 #[derive(Debug)]
@@ -115,6 +116,7 @@ impl JetProgram {
             order,
             width,
             cost: size.div_ceil(single.max(1)).max(1),
+            operations: size,
         })
     }
 
@@ -131,6 +133,11 @@ impl JetProgram {
     /// How many evaluations of the field take as many operations.
     pub fn cost(&self) -> usize {
         self.cost
+    }
+
+    /// How many operations an evaluation takes.
+    pub fn operations(&self) -> usize {
+        self.operations
     }
 
     /// Is the program unrolled?

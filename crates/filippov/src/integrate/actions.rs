@@ -271,7 +271,8 @@ impl Integrator<'_> {
     ) -> Result<Option<usize>, FieldError> {
         let signs = before.signs();
         let h = self.surface_values(&signs)?;
-        for j in (0..h.len()).filter(|&j| self.is_only_trigger(j) && !approach.passes[j]) {
+        let is_solid = |j: &usize| self.is_only_trigger(*j) && !self.is_internal(*j);
+        for j in (0..h.len()).filter(|j| is_solid(j) && !approach.passes[*j]) {
             let side = self.trigger_side(j, Some(before));
             let came_from = before.entries()[j] == side || before.entries()[j] == 0;
             let is_beyond = h[j] * f64::from(side) < 0.0 && came_from;
@@ -350,6 +351,9 @@ impl Integrator<'_> {
             let was_done = self
                 .triggered_at(j, side)
                 .any(|index| done.contains(&index));
+            if was_done && self.is_internal(j) {
+                continue;
+            }
             if !on_surface {
                 let now = mode.entries()[j];
                 // The jump of its own action may complete the passage that triggered it.

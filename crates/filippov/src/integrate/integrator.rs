@@ -108,7 +108,11 @@ impl<'a> Integrator<'a> {
             Method::Taylor => true,
             Method::Auto => system.is_analytic(),
         };
-        let taylor = uses_series.then(|| Taylor::new(n, Taylor::order_for(options.rtol)));
+        let operations = |order| Some(system.motion_jets(&[], order)?.operations());
+        let taylor = uses_series.then(|| {
+            let order = Taylor::order_for(options.rtol, operations);
+            Taylor::new(n, order)
+        });
         let undecided = Mode::new(vec![1; system.n_surfaces()]);
         Ok(Integrator {
             system,

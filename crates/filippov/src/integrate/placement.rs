@@ -3,6 +3,7 @@
 use super::integrator::Integrator;
 use super::transition::{Decided, Left, Lefts};
 use super::Stop;
+use crate::action::Trigger;
 use crate::error::FieldError;
 use crate::field::{ContactField, Projector, SmoothField};
 use crate::mode::Mode;
@@ -34,7 +35,8 @@ impl Integrator<'_> {
         let Some(Sides { mode, on_surface }) = self.sides(memory)? else {
             return Ok(Err(Stop::NotFinite));
         };
-        let zeros = (0..on_surface.len()).filter(|&j| on_surface[j]);
+        // What only a law of the system sees has the side that is known: its action has been done, or will be.
+        let zeros = (0..on_surface.len()).filter(|&j| on_surface[j] && !self.is_internal(j));
         let (smooth, zeros): (Vec<usize>, Vec<usize>) =
             zeros.partition(|&j| self.is_only_trigger(j));
         // An inactive surface has the sign of the side that it moves to.
@@ -72,6 +74,17 @@ impl Integrator<'_> {
     /// Does the surface trigger actions and switch nothing?
     pub(super) fn is_only_trigger(&self, j: usize) -> bool {
         self.actions.at_surface(j).is_some() && !self.system.switches_at(j)
+    }
+
+    /// Does the surface trigger nothing but laws of the system, which move no state?
+    pub(super) fn is_internal(&self, j: usize) -> bool {
+        let mut actions = self.actions.list.iter().filter(
+            |action| matches!(action.trigger, Trigger::Surface { index, .. } if index == j),
+        );
+        let first = actions.next();
+        first.is_some_and(|first| first.kind.is_none())
+            && actions.all(|action| action.kind.is_none())
+            && !self.system.switches_at(j)
     }
 
     /// The side of every surface at the current point; a surface that the point lies on has the side of the mode

@@ -5,7 +5,7 @@ use super::{Attempt, ErrorScale, Interpolant};
 use crate::error::FieldError;
 use crate::field::SmoothField;
 use crate::tolerances::{
-    TAYLOR_DIGITS_TO_ORDER, TAYLOR_LARGEST_ORDER, TAYLOR_SHARE, TAYLOR_SMALLEST_ORDER,
+    TAYLOR_DEAR, TAYLOR_LARGEST_ORDER, TAYLOR_ORDER_CHEAP, TAYLOR_ORDER_DEAR, TAYLOR_SHARE,
 };
 
 /// A Taylor step of variable length.
@@ -36,12 +36,19 @@ pub struct Taylor {
 }
 
 impl Taylor {
-    /// The order for a relative tolerance. The higher the order, the longer and dearer the step; where most of
-    /// the cost is that of a step whatever its order, more than the least work per unit of time pays.
-    pub fn order_for(rtol: f64) -> usize {
-        let digits = -rtol.log10();
-        let order = (TAYLOR_DIGITS_TO_ORDER * digits).ceil();
-        (order as usize).clamp(TAYLOR_SMALLEST_ORDER, TAYLOR_LARGEST_ORDER)
+    /// The order for a relative tolerance. The higher the order, the longer and dearer the step; `operations` tells
+    /// how many the coefficients up to an order take, if there are any.
+    pub fn order_for(rtol: f64, operations: impl Fn(usize) -> Option<usize>) -> usize {
+        let digits = -rtol.log10().min(0.0);
+        let order = |(per_digit, beside): (f64, f64)| {
+            let order = (per_digit * digits + beside).ceil() as usize;
+            order.clamp(2, TAYLOR_LARGEST_ORDER)
+        };
+        let cheap = order(TAYLOR_ORDER_CHEAP);
+        match operations(cheap) {
+            Some(count) if count > TAYLOR_DEAR => order(TAYLOR_ORDER_DEAR),
+            _ => cheap,
+        }
     }
 
     /// A stepper for n states.

@@ -56,6 +56,11 @@ impl MotionJets {
         self.program.program().cost() as u64
     }
 
+    /// How many operations the coefficients take.
+    pub fn operations(&self) -> usize {
+        self.program.program().operations()
+    }
+
     /// Is the program unrolled? Else it works by loops, for large systems.
     pub fn is_unrolled(&self) -> bool {
         self.program.program().is_unrolled()
