@@ -85,16 +85,21 @@ impl<'a> IntersectionField<'a> {
         signs: &[f64],
         lambda: &[f64],
     ) -> Self {
+        let affine = AffineLaw::new(system, set, signs);
+        // Its space grows as the square of the number of surfaces: where there are many, only what needs it has it.
+        let has_canopy = match affine {
+            Some(_) => set.len() <= MOST_MEETING,
+            None => {
+                let groups = system.sign_groups(set);
+                groups.iter().all(|group| group.len() <= MOST_MEETING)
+            }
+        };
         IntersectionField {
             system,
             set: set.to_vec(),
             signs: signs.to_vec(),
-            affine: AffineLaw::new(system, set, signs),
-            canopy: system
-                .sign_groups(set)
-                .iter()
-                .all(|group| group.len() <= MOST_MEETING)
-                .then(|| Canopy::new(system, set)),
+            affine,
+            canopy: has_canopy.then(|| Canopy::new(system, set)),
             by_rule: None,
             refused: None,
             lambda: Vec::new(),

@@ -194,7 +194,7 @@ impl Integrator<'_> {
             margin: &self.detector.margin,
             stages: &self.detector.stages,
             affine: self.motion.affine_bounds(),
-            by_multipliers: !self.slides_by_rule() && self.motion.has_bounds(self.system),
+            by_multipliers: !self.slides_by_rule() && self.motion.has_bounds(),
             known_exits: &self.detector.enclosed_exits,
             last_root: &self.detector.enclosed_root,
         };
@@ -217,7 +217,7 @@ impl Integrator<'_> {
     pub(super) fn prepare_bounds(&mut self) -> Result<(), FieldError> {
         let (motion, system) = (&mut self.motion, self.system);
         if motion.sliding.len() < 2
-            || !motion.has_bounds(system)
+            || !motion.has_bounds()
             || motion.affine_bounds.is_some()
             || self.options.sliding != SlidingRule::Canopy
         {

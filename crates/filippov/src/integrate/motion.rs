@@ -188,6 +188,8 @@ pub(super) struct Motion<'a> {
     pub monitored: Vec<Monitored>,
     /// Its Taylor series, if it is integrated by them.
     pub jets: Option<Arc<MotionJets>>,
+    /// It slides on several surfaces, some of them with static friction above kinetic.
+    sticks: bool,
     law: Law<'a>,
     /// Surfaces that the motion stays on by either field, so that h is zero all along: not monitored.
     pub resting: SmallVec<[usize; 2]>,
@@ -218,6 +220,7 @@ impl<'a> Motion<'a> {
             current: 0,
             monitored: Vec::new(),
             jets: None,
+            sticks: false,
             law,
             resting: SmallVec::new(),
             actions,
@@ -301,6 +304,7 @@ impl<'a> Motion<'a> {
         deflations: &[(EventFunction, Deflation)],
     ) {
         self.recall(system);
+        self.sticks = self.sliding.len() > 1 && self.sliding.iter().any(|&j| system.sticks_at(j));
         let signs = &self.signs;
         let monitor = |function, orientation, affine| Monitored {
             function,
@@ -345,9 +349,8 @@ impl<'a> Motion<'a> {
     }
 
     /// Do bounds of the multipliers hold for the exit functions?
-    pub fn has_bounds(&self, system: &dyn PiecewiseSystem) -> bool {
-        let sticks = self.sliding.len() > 1 && self.sliding.iter().any(|&j| system.sticks_at(j));
-        !self.is_in_contact() && !sticks
+    pub fn has_bounds(&self) -> bool {
+        !self.is_in_contact() && !self.sticks
     }
 
     /// Is the motion in contact at some surface?
