@@ -240,7 +240,7 @@ def _equation(checked: Checked, segment: fl.Segment) -> Iterator[str]:
         fields = np.array([problem.rhs(t, x) for t, x in zip(times, sol.sol(times).T, strict=True)])
         change = length * WEIGHTS @ fields
         error = np.abs(sol.sol(a + length) - sol.sol(a) - change).max()
-        # The continuous extension of DOPRI5 has some ten times the error of the step, and there may be a few steps.
+        # The continuous extension of DOPRI5 has ten times the error of the step; a few steps may lie there.
         if error > 100.0 * checked.tolerance + 1e-9 * checked.scale:
             yield f"from t = {a!r} in mode {segment.mode} the change of state is {error:.3g} off the field's"
             return
