@@ -28,7 +28,7 @@ REASONS = {
         "no_progress",
         "resets_do_not_end",
     ),
-    *("resets_do_not_end", "reset_not_finite", "contact", "field_not_finite", "intersection"),
+    *("resets_do_not_end", "reset_not_finite", "contact", "field_not_finite", "intersection", "non_unique"),
 }
 JUMPS = {"reset", "clock", "accumulation"}
 CHANGES = {"crossing", "enter_sliding", "exit_sliding", "switch_sliding"}
@@ -113,6 +113,9 @@ def _record(problem: Problem, sol: fl.Solution) -> Iterator[str]:
     last = {switch.t: _without_levels(sol, switch.mode_after) for switch in sol.switches}
     for before, after in itertools.pairwise(segments):
         one, other = _without_levels(sol, before.mode), _without_levels(sol, after.mode)
+        # Entries of surfaces that do not matter there follow with the next switch, told or not.
+        if len(one) < len(before.mode):
+            continue
         if one != other and last.get(after.t_start) != other and after.duration > 0.0:
             yield f"the mode changes from {before.mode} to {after.mode} at {after.t_start!r} without a switch"
 
@@ -231,10 +234,13 @@ def _equation(checked: Checked, segment: fl.Segment) -> Iterator[str]:
         speed = np.abs(problem.rhs(a, sol.sol(a))).max()
         length = min(0.02, 0.15 * segment.duration, 0.2 / (1.0 + speed))
         times = a + length * NODES
+        # On a surface that it does not leave, the function has no meaning: the sign of 0.
+        if any(h is not None and abs(h(a, sol.sol(a))) < 1e-12 * checked.scale for h in checked.surfaces):
+            return
         fields = np.array([problem.rhs(t, x) for t, x in zip(times, sol.sol(times).T, strict=True)])
         change = length * WEIGHTS @ fields
         error = np.abs(sol.sol(a + length) - sol.sol(a) - change).max()
-        # A few steps may lie within the piece, each with its local error.
-        if error > 20.0 * checked.tolerance + 1e-9 * checked.scale:
+        # The continuous extension of DOPRI5 has ten times the error of the step; a few steps may lie there.
+        if error > 100.0 * checked.tolerance + 1e-9 * checked.scale:
             yield f"from t = {a!r} in mode {segment.mode} the change of state is {error:.3g} off the field's"
             return

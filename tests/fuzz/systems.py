@@ -291,7 +291,8 @@ class _Writer:
             terms[i] += f" + {size}*{clock}"
         elif kind == "stick":
             ratio = round(1.0 + abs(self.number(0.6)), 2)
-            v = f"{self.state()} - {self.number(0.4)}"
+            # Two ratios at one surface would be refused.
+            v = f"{self.state()} - {self.number(0.4) + self.n_laws / 16}"
             self.definitions.append(f"{law} = fl.Stick(lambda t, x: {v}, {ratio})")
             terms[i] += f" - {abs(size)}*{law}(t, x)"
         else:

@@ -185,6 +185,10 @@ pub const MOST_PIECES: usize = 100_000;
 /// so that this leaves room for dozens of near misses.
 pub const ZERO_SEARCHES: usize = 2000;
 
+/// Interval tests of one run of the hidden dynamics, of which a piece takes a few: motions that stay within rounding of a
+/// border, as where two surfaces are in the same place, need thousands for each.
+pub const MOST_TESTS: usize = 20 * MOST_PIECES;
+
 /// Two zeros nearer together than this fraction of a piece are one touch.
 pub const SHORTEST_PIECE: f64 = 1e-12;
 

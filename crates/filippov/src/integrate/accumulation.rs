@@ -125,6 +125,9 @@ impl Integrator<'_> {
 
     /// What follows at the limit: sliding on all surfaces if that is possible.
     fn decide_at_limit(&mut self, mode: &Mode, meeting: &[usize]) -> Result<Decided, FieldError> {
+        if let Some(decided) = self.decide_where_others_jump(mode, meeting)? {
+            return Ok(decided);
+        }
         let fields = self.corners(meeting, mode)?;
         let telling = fields.telling();
         let stays = fields.normal_fields().is_ok_and(|fields| {

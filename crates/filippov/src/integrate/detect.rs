@@ -194,7 +194,7 @@ impl Integrator<'_> {
                 self.keep_earliest(&mut found, index, zero, dt);
             }
         }
-        if found.is_none() && self.one_sided {
+        if found.is_none() && self.one_sided && !self.detector.uncertain {
             self.detect_beyond(dt, &mut found)?;
         }
         Ok(found)
@@ -278,7 +278,7 @@ impl Integrator<'_> {
                 reach = searched;
             }
         }
-        if found.is_none() && self.one_sided {
+        if found.is_none() && self.one_sided && !self.detector.uncertain {
             self.detect_beyond(dt, &mut found)?;
         }
         Ok(found)

@@ -27,17 +27,17 @@ impl Integrator<'_> {
         fresh
             .iter()
             .for_each(|&j| beyond.set(j, -mode.entries()[j]));
-        let jumped = self.let_others_jump(mode, &mut beyond, fresh)?;
+        let (jumped, landed) = self.let_others_jump(mode, &mut beyond, fresh)?;
         if jumped.is_empty() {
             return match fresh {
                 [j] if self.bends_what_is_slid_on(mode, &beyond)? => {
-                    Ok(self.leave_to(&beyond, *j)?.map(Ok))
+                    Ok(self.leave_to(&beyond, *j, &landed)?.map(Ok))
                 }
                 _ => Ok(None),
             };
         }
         if let [j] = fresh {
-            if let Some(decided) = self.leave_to(&beyond, *j)? {
+            if let Some(decided) = self.leave_to(&beyond, *j, &landed)? {
                 return Ok(Some(Ok(decided)));
             }
         }
@@ -58,16 +58,16 @@ impl Integrator<'_> {
             return Ok(decided);
         }
         let mut beyond = after.clone();
-        let jumped = self.let_others_jump(mode, &mut beyond, meeting)?;
+        let (jumped, landed) = self.let_others_jump(mode, &mut beyond, meeting)?;
         if jumped.is_empty() {
             return Ok(decided);
         }
         if let [j] = meeting {
             let mut opposite = mode.with(*j, -after.entries()[*j]);
-            self.let_others_jump(mode, &mut opposite, meeting)?;
-            for mode in [beyond, opposite] {
+            let (_, on_opposite) = self.let_others_jump(mode, &mut opposite, meeting)?;
+            for (mode, landed) in [(beyond, landed), (opposite, on_opposite)] {
                 if mode.entries()[*j] != 0 {
-                    if let Some(decided) = self.leave_to(&mode, *j)? {
+                    if let Some(decided) = self.leave_to(&mode, *j, &landed)? {
                         return Ok(Ok(decided));
                     }
                 }
@@ -76,10 +76,17 @@ impl Integrator<'_> {
         Ok(Err(between(meeting, &jumped)))
     }
 
-    /// The motion that leaves h_j = 0 to its side in `mode`, if its field leads there. What it slides on besides is
-    /// decided anew.
-    fn leave_to(&mut self, mode: &Mode, j: usize) -> Result<Option<(Mode, Lefts)>, FieldError> {
-        let sliding: Vec<usize> = mode.sliding_set().collect();
+    /// The motion that leaves h_j = 0 to its side in `mode`, if its field leads there. What it slides on besides, and
+    /// what jumped to zero, is decided anew.
+    fn leave_to(
+        &mut self,
+        mode: &Mode,
+        j: usize,
+        landed: &[usize],
+    ) -> Result<Option<(Mode, Lefts)>, FieldError> {
+        let mut sliding: Vec<usize> = mode.sliding_set().chain(landed.iter().copied()).collect();
+        sliding.sort_unstable();
+        sliding.dedup();
         let mut after = mode.clone();
         if !sliding.is_empty() {
             match self.place_on(mode.clone(), &sliding, Some(mode))? {
@@ -110,26 +117,32 @@ impl Integrator<'_> {
         Ok(false)
     }
 
-    /// Gives all surfaces that jump between two modes the side that they are on afterwards; returns which.
+    /// Gives all surfaces that jump between two modes the side that they are on afterwards; returns which, and those
+    /// of them that jump to zero, which keep their side.
     fn let_others_jump(
         &mut self,
         before: &Mode,
         after: &mut Mode,
         fresh: &[usize],
-    ) -> Result<Vec<usize>, FieldError> {
+    ) -> Result<(Vec<usize>, Vec<usize>), FieldError> {
         let old = self.surface_values(&before.signs())?;
-        let mut jumped = Vec::new();
+        let (mut jumped, mut landed) = (Vec::new(), Vec::new());
         // A jump may make others jump.
         for _ in 0..old.len() {
             let signs = after.signs();
             let new = self.surface_values(&signs)?;
             let mut is_final = true;
+            landed.clear();
             for j in (0..new.len()).filter(|j| !fresh.contains(j)) {
                 let size = self.system.surface_size(j, self.t, &self.x, &signs)?;
                 let noise = SURFACE_NOISE * (size + old[j].abs() + new[j].abs());
+                if (new[j] - old[j]).abs() <= noise {
+                    continue;
+                }
                 let side = if new[j] < 0.0 { -1 } else { 1 };
-                let jumps = (new[j] - old[j]).abs() > noise && new[j].abs() > noise;
-                if jumps && after.entries()[j] != side {
+                if new[j].abs() <= noise {
+                    landed.push(j);
+                } else if after.entries()[j] != side {
                     after.set(j, side);
                     jumped.push(j);
                     is_final = false;
@@ -139,7 +152,8 @@ impl Integrator<'_> {
                 break;
             }
         }
-        Ok(jumped)
+        jumped.extend(&landed);
+        Ok((jumped, landed))
     }
 }
 

@@ -19,6 +19,8 @@ pub(super) struct Cell {
     terms: Vec<Term>,
     /// Series of the state.
     state: Vec<Series>,
+    /// Intervals that were searched for zeros, in all steps.
+    pub tests: usize,
 }
 
 /// The part of the field with the components of one group.
@@ -62,6 +64,7 @@ impl Cell {
             constant,
             terms,
             state: vec![[0.0; ORDER + 1]; m],
+            tests: 0,
         }
     }
 
@@ -81,14 +84,16 @@ impl Cell {
             for border in borders.into_iter().filter(|&b| b != 0) {
                 // Positive within the cell.
                 let inwards = f64::from(if self.sides[i] == 0 { -border } else { border });
-                if let Some(t) = first_loss(&self.distance(i, f64::from(border), inwards), end) {
+                let distance = self.distance(i, f64::from(border), inwards);
+                if let Some(t) = first_loss(&distance, end, &mut self.tests) {
                     (end, reason, stop) = (t, StepEnd::Border, Some((i, f64::from(border))));
                 }
             }
         }
         if let Some((i, level)) = watched {
             let away = self.direction(i, level);
-            if let Some(t) = first_loss(&self.distance(i, level, away), end) {
+            let distance = self.distance(i, level, away);
+            if let Some(t) = first_loss(&distance, end, &mut self.tests) {
                 (end, reason, stop) = (t, StepEnd::Level, Some((i, level)));
             }
         }

@@ -6,8 +6,8 @@ use crate::tolerances::{SHORTEST_PIECE, ZERO_SEARCHES};
 /// divided out.
 ///
 /// Intervals are excluded, or found to be monotone, by a bound of the derivative, and halved
-/// otherwise: no pair of zeros is lost, except one nearer together than rounding.
-pub(super) fn first_loss(p: &[f64], end: f64) -> Option<f64> {
+/// otherwise: no pair of zeros is lost, except one nearer together than rounding. `tests` counts them.
+pub(super) fn first_loss(p: &[f64], end: f64, tests: &mut usize) -> Option<f64> {
     let p = if p[0] > 0.0 { p } else { &p[1..] };
     if p[0] < 0.0 {
         return Some(0.0);
@@ -15,6 +15,7 @@ pub(super) fn first_loss(p: &[f64], end: f64) -> Option<f64> {
     let mut pending = vec![(0.0, end)];
     for _ in 0..ZERO_SEARCHES {
         let (a, b) = pending.pop()?;
+        *tests += 1;
         match look(p, a, b, end) {
             Look::Nothing => {}
             Look::Zero => return Some(bisect(p, a, b)),

@@ -8,7 +8,7 @@ use super::{clipped, side, Outcome};
 use crate::mode::Mode;
 use crate::switching::codim2::{Bilinear, Lap};
 use crate::switching::normal_fields::NormalFields;
-use crate::tolerances::MOST_PIECES;
+use crate::tolerances::{MOST_PIECES, MOST_TESTS};
 
 /// Follows the motion from u, piece by piece: corner, strip, or a step within the square.
 ///
@@ -24,6 +24,9 @@ pub(super) fn limit(fields: &NormalFields, u: [f64; 2]) -> Outcome {
     for _ in 0..MOST_PIECES {
         if let Some(outcome) = plane.piece() {
             return outcome;
+        }
+        if plane.square.tests > MOST_TESTS {
+            break;
         }
     }
     plane.out_of_work()

@@ -6,13 +6,16 @@ use super::{clipped, side, Outcome};
 use crate::mode::Mode;
 use crate::switching::normal_fields::NormalFields;
 use crate::switching::roots::stable_roots;
-use crate::tolerances::{AT_THE_ROOT, FIRST_WATCH, LAST_WATCH, MOST_PIECES, STEADY_CYCLE};
+use crate::tolerances::{
+    AT_THE_ROOT, FIRST_WATCH, LAST_WATCH, MOST_PIECES, MOST_TESTS, STEADY_CYCLE,
+};
 
 /// Follows the motion from u until it has a certain outcome, or for a long time.
 pub(super) fn limit(fields: &NormalFields, u: &[f64]) -> Outcome {
     let mut u = u.to_vec();
     let mut cell: Option<Cell> = None;
     let mut watch = Watch::new(&u);
+    let mut tests = 0;
     let work = fields.m() * fields.m();
     for _ in 0..MOST_PIECES * 36 / work.max(36) {
         let lambda = clipped(&u);
@@ -26,7 +29,12 @@ pub(super) fn limit(fields: &NormalFields, u: &[f64]) -> Outcome {
             Some(cell) => cell,
             None => Cell::new(fields, &sides),
         };
+        let before = here.tests;
         let (time, _) = here.advance(&mut u, None);
+        tests += here.tests - before;
+        if tests > MOST_TESTS {
+            break;
+        }
         cell = Some(here);
         if let Some(mode) = watch.note(time, &u) {
             return oscillation(fields, &mode);

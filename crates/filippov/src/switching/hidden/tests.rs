@@ -151,14 +151,14 @@ fn the_first_of_several_zeros_is_found() {
         -1.0,
     ];
     assert!(value(&p, 0.0) > 0.0);
-    let found = first_loss(&p, 1.0).unwrap();
+    let found = first_loss(&p, 1.0, &mut 0).unwrap();
     assert!((found - 0.3).abs() < 1e-10, "{found}");
-    assert_eq!(first_loss(&p, 0.29), None);
+    assert_eq!(first_loss(&p, 0.29, &mut 0), None);
     // A zero at the start is divided out.
-    let found = first_loss(&[0.0, 1.0, -2.0], 1.0).unwrap();
+    let found = first_loss(&[0.0, 1.0, -2.0], 1.0, &mut 0).unwrap();
     assert!((found - 0.5).abs() < 1e-15);
     // A touch is no zero.
-    assert_eq!(first_loss(&[0.25, -1.0, 1.0 + 1e-9], 1.0), None);
+    assert_eq!(first_loss(&[0.25, -1.0, 1.0 + 1e-9], 1.0, &mut 0), None);
 }
 
 /// Rest at a point that does not attract is said, and a start beside it goes somewhere.
