@@ -9,8 +9,8 @@ use crate::mode::Mode;
 use crate::options::SlidingRule;
 use crate::stepper::Basis;
 use crate::switching::Kind;
-use crate::system::PiecewiseSystem;
-use crate::tolerances::AT_SIDE;
+use crate::system::{dot_magnitude, PiecewiseSystem};
+use crate::tolerances::{AT_SIDE, TANGENT};
 
 pub use crate::integrate::UserZero;
 
@@ -223,8 +223,21 @@ impl Solution {
             [] => Vec::new(),
             &[j] => {
                 let mut field = SlidingField::new(system, j, &mode.signs());
-                let lambda = field.normal_components(t, &mut y)?.multiplier();
-                vec![(j, in_interval(lambda))]
+                let components = field.normal_components(t, &mut y)?;
+                let lambda = in_interval(components.multiplier());
+                // Near a two-fold it is a quotient of rounding errors.
+                let beyond = 0.5 * (lambda.abs() - 1.0) * (components.minus - components.plus);
+                if beyond > 0.0 {
+                    let (mut normal, mut velocity) = (y.clone(), y.clone());
+                    let signs = mode.signs();
+                    let ht = system.gradient(j, t, &y, &signs, &mut normal)?;
+                    system.field(t, &y, &signs, &mut velocity)?;
+                    let size = ht.abs() + dot_magnitude(&normal, &velocity);
+                    if beyond < TANGENT * size {
+                        return Ok(vec![(j, lambda.clamp(-1.0, 1.0))]);
+                    }
+                }
+                vec![(j, lambda)]
             }
             _ => {
                 // Of several roots that which the motion follows.
