@@ -327,6 +327,8 @@ impl Integrator<'_> {
                 note: action.name.clone(),
             });
         }
+        // The run may end in the middle of an instant.
+        self.recorder.jump(self.t, &self.x);
         let is_finite = self.x.iter().all(|v| v.is_finite());
         Ok((!is_finite).then(|| Stop::ActionNotFinite {
             action: action.name.clone(),

@@ -135,7 +135,8 @@ impl Integrator<'_> {
         signs: &[f64],
         memory: Option<&Mode>,
     ) -> Result<Option<i8>, FieldError> {
-        let Some(memory) = memory.filter(|_| self.is_only_trigger(j)) else {
+        let is_solid = self.is_only_trigger(j) && !self.is_internal(j);
+        let Some(memory) = memory.filter(|_| is_solid) else {
             return Ok(None);
         };
         let side = self.trigger_side(j, Some(memory));
