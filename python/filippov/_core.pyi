@@ -18,6 +18,7 @@ __all__ = [
     "hidden_dynamics",
     "intersection_field",
     "solve",
+    "solve_many",
 ]
 
 _Array = npt.NDArray[np.float64]
