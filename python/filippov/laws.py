@@ -39,7 +39,7 @@ def sawtooth(t: Any, period: Any) -> Any:
     Examples
     --------
     >>> import filippov as fl
-    >>> fl.sawtooth(2.25, 0.5)
+    >>> float(fl.sawtooth(2.25, 0.5))
     0.5
     >>> sol = fl.solve_ivp(lambda t, x: [fl.sawtooth(t, 0.5)], (0, 2), [0.0])
     >>> sol.switches.kind.tolist(), sol.y[0, -1].round(12)
@@ -196,7 +196,7 @@ class Stick:
     >>> import filippov as fl
     >>> friction = fl.Stick(lambda t, x: x[1] - 0.2, 1.2)
     >>> sol = fl.solve_ivp(lambda t, x: [x[1], -x[0] - friction(t, x)], (0, 10), [0.0, 0.2])
-    >>> sol.switches[0].kind, round(sol.switches[0].y_after[0], 9)
+    >>> sol.switches[0].kind, round(float(sol.switches[0].y_after[0]), 9)
     ('exit_sliding', 1.2)
     """
 
