@@ -1,5 +1,7 @@
 //! Outward spirals: infinitely many laps from an intersection, started at a small distance.
 
+use smallvec::SmallVec;
+
 use super::integrator::Integrator;
 use crate::error::FieldError;
 use crate::field::{MeetingFields, Projector};
@@ -35,6 +37,12 @@ impl Integrator<'_> {
         let t = self.t + jump.duration();
         let mut projector = Projector::new(end.len(), self.system.n_surfaces());
         projector.project(self.system, border, t, &mut end, &region.signs())?;
+        if !self.recorder.has_segments() {
+            // The run starts here: what follows belongs to the first region.
+            let discrete = &self.motion.discrete;
+            self.recorder
+                .begin_segment(self.t, &region, SmallVec::new(), discrete);
+        }
         self.move_straight(t, end)?;
         Ok(Some((region, border)))
     }
