@@ -26,3 +26,17 @@ def test_segments_begin_where_the_run_begins(method: str) -> None:
     ends = [segment.t_end for segment in sol.segments]
     assert starts[1:] == ends[:-1]
     assert ends[-1] == 1.0
+
+
+@pytest.mark.parametrize("bias", [0.0, 0.1])
+def test_relays_that_push_away_spiral_outwards(bias: float) -> None:
+    """The only sliding motion is one that no scaling makes stable."""
+
+    def relays(t: float, x: Any) -> Any:
+        a, b = np.sign(x[0]), np.sign(x[1])
+        return [0.4 * a - 1.2 * b + bias, 1.2 * a + 0.4 * b]
+
+    sol = fl.solve_ivp(relays, (0.0, 1.0), [0.0, 0.0])
+    assert sol.success, sol.message
+    assert sol.warnings[0].code == "non_unique"
+    assert np.abs(sol.y[:, -1]).max() > 0.1

@@ -23,6 +23,10 @@ impl Integrator<'_> {
         mode: &Mode,
         meeting: &[usize],
     ) -> Result<Option<Decided>, FieldError> {
+        // From a start on two surfaces the motion may also spiral outwards: their trees know.
+        if event.is_none() && meeting.len() == 2 {
+            return Ok(None);
+        }
         let exits = event.is_some_and(|event| {
             let mut functions = event.functions.iter();
             functions.any(|f| {
