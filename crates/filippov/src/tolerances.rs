@@ -375,6 +375,13 @@ pub const TAYLOR_ORDER_CHEAP: (f64, f64) = (2.5, 3.0);
 /// The same where the coefficients are dear.
 pub const TAYLOR_ORDER_DEAR: (f64, f64) = (1.5, 2.0);
 
+/// So many multipliers may depend on one another in series: the inverse of their equations is dense.
+pub const LARGEST_SERIES_BLOCK: usize = 32;
+
+/// Sliding on so many surfaces is integrated by series unless a method is named. All exit functions are searched
+/// along the whole step: with more of them the short steps of a Runge-Kutta method are cheaper.
+pub const MOST_AUTO_SERIES: usize = 5;
+
 /// Coefficients are dear from so many operations on: then they take longer than the rest of a step.
 pub const TAYLOR_DEAR: usize = 2000;
 

@@ -249,7 +249,7 @@ impl Integrator<'_> {
             affine: self.motion.affine_bounds.as_ref().and_then(Option::as_ref),
             by_multipliers,
             known_exits: &self.detector.enclosed_exits,
-            last_root: &self.detector.enclosed_root,
+            known_roots: &self.detector.enclosed_roots,
         };
         let mut curve = Curve {
             system: self.system,

@@ -11,6 +11,7 @@ mod both_sides;
 mod closures;
 mod compiled;
 mod discrete;
+mod jet_multipliers;
 mod jets;
 mod laws;
 mod map;
