@@ -441,3 +441,8 @@ pub const SLIPPED: f64 = 10.0;
 /// Bodies that overlap by less than this fraction of their positions touch; an action that moves them changes h by more
 /// than this fraction.
 pub const PENETRATION: f64 = 1e-6;
+
+/// How far behind an event a step of the method for stiff motions ends that is taken anew for it, as a share of the
+/// step: first so far that the error of the continuous extension leaves the event inside, then so near that the
+/// extension lies no farther from the manifold of the motion than rounding, also at a stiffness of 1e8.
+pub const AIM_MARGINS: [f64; 2] = [1e-3, 1e-7];

@@ -25,6 +25,7 @@ mod spiral;
 mod start;
 mod stats;
 mod status;
+mod stiff;
 mod timetable;
 mod transition;
 mod user_events;

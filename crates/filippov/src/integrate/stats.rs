@@ -12,6 +12,12 @@ pub struct Stats {
     pub n_steps: u64,
     /// Accepted steps by Taylor series.
     pub n_steps_taylor: u64,
+    /// Accepted steps by the method for stiff motions.
+    pub n_steps_rodas5p: u64,
+    /// Evaluations of the derivatives of the field.
+    pub n_jacobians: u64,
+    /// Factorisations of its matrix.
+    pub n_factorisations: u64,
     /// Rejected steps.
     pub n_rejected: u64,
     /// Accepted steps while sliding.
