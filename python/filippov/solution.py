@@ -176,7 +176,8 @@ class Solution:
     segments : SegmentTable
         Pieces of constant mode.
     stats : dict
-        Counters of the run and how the field was evaluated (``stats["backend"]``).
+        Counters of the run, the methods that took steps (``stats["method"]``), how the field was evaluated
+        (``stats["backend"]``), and if a run turned out to be stiff from when on (``stats["stiff_since"]``).
     warnings : list of RunWarning
         What deserves a look.
     branches : Branches or None

@@ -251,6 +251,9 @@ impl Run {
         dict.set_item("method", methods(&stats))?;
         dict.set_item("n_steps_taylor", stats.n_steps_taylor)?;
         dict.set_item("n_steps_rodas5p", stats.n_steps_rodas5p)?;
+        if let Some(since) = stats.stiff_since {
+            dict.set_item("stiff_since", since)?;
+        }
         dict.set_item("native", self.is_native)?;
         dict.set_item("nfev", stats.n_field_evaluations)?;
         dict.set_item("njev", stats.n_jacobians)?;

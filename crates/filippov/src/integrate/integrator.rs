@@ -23,6 +23,7 @@ use super::meeting::DecidedRoot;
 use super::motion::{ModeField, Motion};
 use super::pace::Pace;
 use super::stiff::Derivatives;
+use super::stiffness::Stiffness;
 use super::timetable::Timetable;
 use super::user_events::UserEvents;
 use super::{Stats, Stop, Warning};
@@ -79,6 +80,7 @@ pub struct Integrator<'a> {
     pub(super) one_sided: bool,
     /// Some attempt of this run met such a point.
     pub(super) meets_edges: bool,
+    pub(super) stiffness: Stiffness,
     /// How often the step was taken anew to end at an event.
     pub(super) n_aims: usize,
     /// Largest recent step of this motion.
@@ -147,6 +149,7 @@ impl<'a> Integrator<'a> {
             n_choices: 0,
             one_sided: false,
             meets_edges: false,
+            stiffness: Stiffness::default(),
             n_aims: 0,
             recent_dt: 0.0,
             last_switch: (f64::NAN, 0),
@@ -366,8 +369,13 @@ impl<'a> Integrator<'a> {
         let Some(event) = found else {
             self.recorder
                 .step(self.stepper.interpolant(), t1, self.stepper.end());
+            let turns_stiff =
+                self.stiffness.is_due(self.stats.n_steps) && self.look_at_stiffness(dt)?;
             self.stepper.accept(&mut self.x);
             self.t = t1;
+            if turns_stiff {
+                self.go_on_implicitly();
+            }
             if self.detector.accept(&mut self.motion.monitored, dt) {
                 self.motion.note_departure();
             }
@@ -393,6 +401,7 @@ impl<'a> Integrator<'a> {
     /// Closes the books.
     pub fn finish(mut self, stop: Stop) -> Solution {
         self.stats.n_field_evaluations += self.motion.field.n_evaluations();
+        self.stats.stiff_since = self.stiffness.since;
         let (zeros, recorder) = (self.user_events.into_zeros(), self.recorder);
         recorder.finish(
             (self.t, &self.x, self.options.sliding),

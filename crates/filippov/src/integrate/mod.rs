@@ -26,6 +26,7 @@ mod start;
 mod stats;
 mod status;
 mod stiff;
+mod stiffness;
 mod timetable;
 mod transition;
 mod user_events;
