@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    from filippov.solution import Solution
+    from filippov.system import System
 
 __all__ = ["Problem"]
 
@@ -25,6 +30,8 @@ class Problem(NamedTuple):
         Parameter values, in the order of the arguments of `fun`.
     note : str
         What happens, and the source.
+    resets : Reset, sequence of Reset, or None
+        Jumps of the state.
     """
 
     name: str
@@ -33,3 +40,32 @@ class Problem(NamedTuple):
     t_span: tuple[float, float]
     args: tuple[Any, ...] = ()
     note: str = ""
+    resets: Any = None
+
+    def system(self) -> System:
+        """Return the system; what follows ``(t, x)`` in `fun` and is a number is a parameter.
+
+        Examples
+        --------
+        >>> import filippov as fl
+        >>> fl.problems.get("dry_friction_attractor_I").system().params
+        {'F': 0.4, 'omega': 2.0}
+        """
+        from filippov.system import System
+
+        names = list(inspect.signature(self.fun).parameters)[2:]
+        values = dict(zip(names, self.args, strict=False))
+        if all(isinstance(value, (int, float)) for value in values.values()):
+            return System(self.fun, n=len(self.y0), params=values or None, resets=self.resets)
+        return System(self.fun, n=len(self.y0), args=self.args, resets=self.resets)
+
+    def solve(self, **options: Any) -> Solution:
+        """Solve the problem over its interval, with the options of `solve_ivp`.
+
+        Examples
+        --------
+        >>> import filippov as fl
+        >>> fl.problems.get("biased_relay").solve().switches.t.round(6).tolist()
+        [1.428571]
+        """
+        return self.system().solve(self.t_span, self.y0, **options)
