@@ -188,10 +188,12 @@ def _kinds_of(sheet: Array, kind: Callable[[Array], str]) -> npt.NDArray[np.str_
 
 
 def _sheets(height: Callable[[Array], float], window: Array, points: int) -> list[Array]:
-    """Return the sheets along the direction in which a coarse grid finds most points."""
+    """Return the sheets along the direction in which a coarse grid finds many points in few sheets."""
     found = [_sheets_along(axis, height, window, _COARSE) for axis in range(len(window))]
     counts = [sum(int(np.isfinite(sheet[0]).sum()) for sheet in sheets) for sheets in found]
-    return _sheets_along(int(np.argmax(counts)), height, window, points)
+    useful = [axis for axis, count in enumerate(counts) if 2 * count >= max(counts)]
+    best = min(useful, key=lambda axis: (len(found[axis]), -counts[axis]))
+    return _sheets_along(best, height, window, points)
 
 
 def _sheets_along(axis: int, height: Callable[[Array], float], window: Array, points: int) -> list[Array]:

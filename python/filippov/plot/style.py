@@ -54,7 +54,7 @@ LIGHT = Theme(
     ink="#000000",
     faint="#B0B0B0",
     colours=(_BLUE, *_MIDDLE, _SKY, _VERMILION, "#4D4D4D"),
-    attracting=_BLUE,
+    attracting="#45456B",
     repelling=_VERMILION,
     crossing="#8C8C8C",
 )
@@ -63,7 +63,7 @@ DARK = Theme(
     ink="#E8E8E8",
     faint="#606468",
     colours=(_SKY, *_MIDDLE, "#3D9BDC", "#FF7B39", _YELLOW),
-    attracting=_SKY,
+    attracting="#BFC4F0",
     repelling="#FF7B39",
     crossing="#84888C",
 )
@@ -179,9 +179,11 @@ def palette(dark: bool | None) -> list[str]:
 
 
 def mode_colours(modes: Sequence[Mode], dark: bool | None) -> dict[Mode, str]:
-    """Return a colour for every mode that occurs, in the order of first appearance."""
+    """Return a colour for every mode that occurs; regions come first, and + before -, whatever the run."""
     colours = palette(dark)
-    ordered = list(dict.fromkeys(modes))
+    ordered = sorted(set(modes), key=lambda mode: (mode.codimension, tuple(-entry for entry in mode)))
+    if all(len(mode) == 1 for mode in ordered):  # the same in every figure
+        return {mode: colours[{1: 0, -1: 1, 0: 2}[mode[0]]] for mode in ordered}
     return {mode: colours[index % len(colours)] for index, mode in enumerate(ordered)}
 
 

@@ -20,7 +20,7 @@ _NAMES = {
 }
 _STYLES: dict[str, Any] = {"attracting": "-", "repelling": (0, (4, 1.5)), "crossing": (0, (1, 1.5))}
 _WIDTHS = {"attracting": 2.0, "repelling": 2.0, "crossing": 1.4}
-_OPACITY = {"attracting": 0.3, "repelling": 0.3, "crossing": 0.18}
+_OPACITY = {"attracting": 0.25, "repelling": 0.3, "crossing": 0.15}
 
 
 def surface(parts: SurfaceParts, ax: Any = None, dark: bool | None = None, legend: bool = True) -> Any:
@@ -120,7 +120,7 @@ def _draw_grid(ax: Any, sheet: Any, kinds: Any, chosen: Theme) -> None:
             facecolor=_colour(kind, chosen),
             edgecolor="none",
             alpha=_OPACITY.get(kind, 0.15),
-            antialiased=False,  # else every edge between two cells would show
+            linewidth=0.0,
         )
         ax.add_collection3d(collection)
     found = sheet[:, np.isfinite(sheet[0])]

@@ -32,6 +32,8 @@ class Problem(NamedTuple):
         What happens, and the source.
     resets : Reset, sequence of Reset, or None
         Jumps of the state.
+    states : tuple of str or None
+        Names of the states.
     """
 
     name: str
@@ -41,6 +43,7 @@ class Problem(NamedTuple):
     args: tuple[Any, ...] = ()
     note: str = ""
     resets: Any = None
+    states: tuple[str, ...] | None = None
 
     def system(self) -> System:
         """Return the system; what follows ``(t, x)`` in `fun` and is a number is a parameter.
@@ -53,11 +56,12 @@ class Problem(NamedTuple):
         """
         from filippov.system import System
 
+        common: dict[str, Any] = {"n": len(self.y0), "resets": self.resets, "states": self.states}
         names = list(inspect.signature(self.fun).parameters)[2:]
         values = dict(zip(names, self.args, strict=False))
         if all(isinstance(value, (int, float)) for value in values.values()):
-            return System(self.fun, n=len(self.y0), params=values or None, resets=self.resets)
-        return System(self.fun, n=len(self.y0), args=self.args, resets=self.resets)
+            return System(self.fun, params=values or None, **common)
+        return System(self.fun, args=self.args, **common)
 
     def solve(self, **options: Any) -> Solution:
         """Solve the problem over its interval, with the options of `solve_ivp`.
