@@ -440,7 +440,7 @@ class Solution:
         attributes = {"message": self.message, "status": self.status, "surfaces": list(self.surfaces)}
         return xarray.Dataset(variables, coords={"t": self.t}, attrs=attributes)
 
-    def plot(self, ax: Any = None, states: Any = None, dark: bool = False) -> Any:
+    def plot(self, ax: Any = None, states: Any = None, dark: bool | None = None) -> Any:
         """Draw the states over time, coloured by mode; see `filippov.plot.time_series`.
 
         Parameters
@@ -450,7 +450,7 @@ class Solution:
         states : sequence of int or str, optional
             Which states; all by default.
         dark : bool, optional
-            Light lines on a dark ground.
+            Light lines on a dark ground; by default as `filippov.plot.style` around says.
 
         Returns
         -------
