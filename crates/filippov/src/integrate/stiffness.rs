@@ -1,5 +1,7 @@
 //! Stiffness noticed by the explicit methods.
 
+use smallvec::SmallVec;
+
 use super::integrator::Integrator;
 use super::stiff::Derivatives;
 use super::{Warning, WarningCode};
@@ -98,8 +100,8 @@ impl Integrator<'_> {
             return Ok(false);
         };
         let (t, end, rates) = (self.t + dt, taylor.end(), taylor.end_derivative());
-        let apart: Vec<f64> = beside.iter().zip(end).map(|(a, b)| a - b).collect();
-        let mut rates_beside = vec![0.0; beside.len()];
+        let apart: SmallVec<[f64; 16]> = beside.iter().zip(end).map(|(a, b)| a - b).collect();
+        let mut rates_beside: SmallVec<[f64; 16]> = SmallVec::from_elem(0.0, beside.len());
         self.motion
             .field
             .eval_unprojected(t, &mut beside, &mut rates_beside)?;
