@@ -217,6 +217,11 @@ impl<'a> Integrator<'a> {
                 self.one_sided = false;
                 return self.switch(&event);
             }
+            if let Some(event) = self.lost_share()? {
+                self.dt = f64::NAN;
+                self.one_sided = false;
+                return self.switch(&event);
+            }
             if !self.one_sided {
                 return Ok(Some(Stop::StepTooSmall));
             }
@@ -341,6 +346,7 @@ impl<'a> Integrator<'a> {
         let Some(event) = found else {
             self.recorder
                 .step(self.stepper.interpolant(), t1, self.stepper.end());
+            self.note_zero_surfaces(t1)?;
             self.stepper.accept(&mut self.x);
             self.t = t1;
             if self.detector.accept(&mut self.motion.monitored, dt) {

@@ -27,6 +27,7 @@ mod stats;
 mod status;
 mod timetable;
 mod transition;
+mod two_fold;
 mod user_events;
 
 pub use integrator::Integrator;
