@@ -231,6 +231,11 @@ impl<'a> Integrator<'a> {
                 self.one_sided = false;
                 return self.switch(&event);
             }
+            if let Some(event) = self.lost_share()? {
+                self.dt = f64::NAN;
+                self.one_sided = false;
+                return self.switch(&event);
+            }
             if !self.one_sided {
                 return Ok(Some(Stop::StepTooSmall));
             }
@@ -369,6 +374,7 @@ impl<'a> Integrator<'a> {
         let Some(event) = found else {
             self.recorder
                 .step(self.stepper.interpolant(), t1, self.stepper.end());
+            self.note_zero_surfaces(t1)?;
             let turns_stiff =
                 self.stiffness.is_due(self.stats.n_steps) && self.look_at_stiffness(dt)?;
             self.stepper.accept(&mut self.x);
