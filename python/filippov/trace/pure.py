@@ -44,12 +44,18 @@ class PureFunction(NamedTuple):
     def of(cls, function: Any) -> PureFunction:
         """Take down what there is to see of the function now."""
         attributes = None if isinstance(function, type) else getattr(function, "__dict__", None)
-        return cls(function, getattr(function, "__code__", None), attributes and dict(attributes))
+        code = getattr(function, "__code__", None)
+        return cls(function, code, None if attributes is None else dict(attributes))
+
+    def can_change(self) -> bool:
+        """Whether a function like this one can be given another code or attributes."""
+        return self.code is not None or self.attributes is not None
 
     def is_unchanged(self) -> bool:
         """Whether nobody has given the function another code or other attributes."""
-        now = PureFunction.of(self.function)
-        return now.code is self.code and (now.attributes or None) == (self.attributes or None)
+        if self.attributes is not None and self.function.__dict__ != self.attributes:
+            return False
+        return self.code is None or self.function.__code__ is self.code
 
 
 def _pure_functions() -> dict[int, PureFunction]:
