@@ -60,7 +60,7 @@ def preparation_seconds(fun: Any, y0: npt.ArrayLike) -> float:
 
 
 def first_call_seconds() -> float:
-    """Return the time from the start of the interpreter to the end of a first run over ten periods, 42 switches.
+    """Return the time from the start of the interpreter to the end of a first run over ten periods.
 
     The clock of the machine is read, because the process began before any of its code.
     """

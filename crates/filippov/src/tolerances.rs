@@ -476,6 +476,9 @@ pub const AIM_MARGINS: [f64; 2] = [1e-3, 1e-7];
 /// limits the step (Hairer, Wanner 1996, section IV.2).
 pub const STIFF_DOPRI5: f64 = 3.25;
 
+/// That of DOP853 (Hairer's choice).
+pub const STIFF_DOP853: f64 = 6.1;
+
 /// That of a Taylor step whose velocity hardly changes: without a fast rate the product would be as small as that change.
 pub const STIFF_SERIES: f64 = 2.0;
 

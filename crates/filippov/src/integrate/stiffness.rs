@@ -9,7 +9,7 @@ use crate::error::FieldError;
 use crate::field::SmoothField;
 use crate::options::Method;
 use crate::stepper::{Rodas5p, StepMethod};
-use crate::tolerances::{NOT_STIFF_SIGNS, STIFF_DOPRI5, STIFF_SERIES, STIFF_SIGNS};
+use crate::tolerances::{NOT_STIFF_SIGNS, STIFF_DOP853, STIFF_DOPRI5, STIFF_SERIES, STIFF_SIGNS};
 
 /// Accepted steps between two looks, a power of two.
 const LOOK_EVERY: u64 = 128;
@@ -64,6 +64,10 @@ impl Integrator<'_> {
             StepMethod::Dopri5 if matches!(self.motion.derivatives, Derivatives::None) => {
                 let product = self.stepper.dopri5.stiffness();
                 product.is_some_and(|product| product > STIFF_DOPRI5)
+            }
+            StepMethod::Dop853 => {
+                let product = self.stepper.dop853.as_ref().and_then(|d| d.stiffness());
+                product.is_some_and(|product| product > STIFF_DOP853)
             }
             StepMethod::Taylor => self.is_series_limited(dt)?,
             _ => return Ok(false),
