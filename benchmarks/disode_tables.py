@@ -119,7 +119,7 @@ def compare(sweep: list[dict[str, Any]], theirs: list[dict[str, float]]) -> list
 
 
 def cheapest(sweep: list[dict[str, Any]], theirs: list[dict[str, float]]) -> list[list[str]]:
-    """Return one row per tolerance: the fewest evaluations with an error no larger than the paper's, per error."""
+    """Return one row per tolerance: the fewest evaluations for an error no larger than the paper's."""
     rows = []
     for paper in theirs:
         cells = [f"{paper['Tol']:.0e}", str(paper["Nfcn"])]
