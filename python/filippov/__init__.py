@@ -75,7 +75,8 @@ from filippov.switches import RunWarning, Segment, SegmentTable, Switch, SwitchT
 from filippov.system import System
 
 if TYPE_CHECKING:
-    from filippov import plot, problems
+    from filippov import analysis, plot, problems
+    from filippov.analysis import Phase, Section, Tangency, poincare
     from filippov.ensemble import Ensemble
     from filippov.hidden import HiddenDynamics, hidden_dynamics
 
@@ -94,8 +95,10 @@ __all__ = [
     "Mode",
     "ModelError",
     "NonUniqueError",
+    "Phase",
     "Reset",
     "RunWarning",
+    "Section",
     "Segment",
     "SegmentTable",
     "Solution",
@@ -104,9 +107,11 @@ __all__ = [
     "Switch",
     "SwitchTable",
     "System",
+    "Tangency",
     "ToleranceError",
     "TraceError",
     "absolute",
+    "analysis",
     "arccos",
     "arccosh",
     "arcsin",
@@ -136,6 +141,7 @@ __all__ = [
     "minimum",
     "mod",
     "plot",
+    "poincare",
     "problems",
     "rint",
     "sawtooth",
@@ -152,8 +158,13 @@ __all__ = [
     "where",
 ]
 
-_LAZY = ("plot", "problems")
-_LAZY_NAMES = {"HiddenDynamics": "hidden", "hidden_dynamics": "hidden", "Ensemble": "ensemble"}
+_LAZY = ("analysis", "plot", "problems")
+_LAZY_NAMES = {
+    "HiddenDynamics": "hidden",
+    "hidden_dynamics": "hidden",
+    "Ensemble": "ensemble",
+    **dict.fromkeys(("Phase", "Section", "Tangency", "poincare"), "analysis"),
+}
 
 
 def __getattr__(name: str) -> Any:

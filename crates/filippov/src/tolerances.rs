@@ -441,3 +441,7 @@ pub const SLIPPED: f64 = 10.0;
 /// Bodies that overlap by less than this fraction of their positions touch; an action that moves them changes h by more
 /// than this fraction.
 pub const PENETRATION: f64 = 1e-6;
+
+/// Returns to a section have to agree with those one period before so many times in a row, and at least one period
+/// long: a single agreement may be a turning point.
+pub const LEAST_AGREEMENTS: u64 = 2;

@@ -38,18 +38,20 @@ class PureFunction(NamedTuple):
 
     function: Any
     code: CodeType | None
-    attributes: dict[str, Any] | None
+    attributes: dict[str, Any]
 
     @classmethod
     def of(cls, function: Any) -> PureFunction:
         """Take down what there is to see of the function now."""
         attributes = None if isinstance(function, type) else getattr(function, "__dict__", None)
-        return cls(function, getattr(function, "__code__", None), attributes and dict(attributes))
+        # What `inspect` keeps of a function of NumPy says nothing about its results.
+        seen = {name: value for name, value in (attributes or {}).items() if name != "__signature__"}
+        return cls(function, getattr(function, "__code__", None), seen)
 
     def is_unchanged(self) -> bool:
         """Whether nobody has given the function another code or other attributes."""
         now = PureFunction.of(self.function)
-        return now.code is self.code and (now.attributes or None) == (self.attributes or None)
+        return now.code is self.code and now.attributes == self.attributes
 
 
 def _pure_functions() -> dict[int, PureFunction]:
