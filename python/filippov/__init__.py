@@ -76,7 +76,16 @@ from filippov.system import System
 
 if TYPE_CHECKING:
     from filippov import analysis, plot, problems
-    from filippov.analysis import Phase, Section, Tangency, poincare
+    from filippov.analysis import (
+        Phase,
+        Section,
+        Tangency,
+        basins,
+        bifurcation_diagram,
+        open_sweep,
+        poincare,
+        sweep,
+    )
     from filippov.ensemble import Ensemble
     from filippov.hidden import HiddenDynamics, hidden_dynamics
 
@@ -119,6 +128,8 @@ __all__ = [
     "arctan",
     "arctan2",
     "arctanh",
+    "basins",
+    "bifurcation_diagram",
     "cbrt",
     "ceil",
     "clip",
@@ -140,6 +151,7 @@ __all__ = [
     "maximum",
     "minimum",
     "mod",
+    "open_sweep",
     "plot",
     "poincare",
     "problems",
@@ -152,6 +164,7 @@ __all__ = [
     "sqrt",
     "square",
     "stick",
+    "sweep",
     "system",
     "tan",
     "tanh",
@@ -164,6 +177,7 @@ _LAZY_NAMES = {
     "hidden_dynamics": "hidden",
     "Ensemble": "ensemble",
     **dict.fromkeys(("Phase", "Section", "Tangency", "poincare"), "analysis"),
+    **dict.fromkeys(("basins", "bifurcation_diagram", "open_sweep", "sweep"), "analysis"),
 }
 
 
