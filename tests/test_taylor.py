@@ -149,3 +149,49 @@ def test_repeated_runs_agree_to_the_bit() -> None:
         last = system.solve((0, 60), [1.0, 2.0])
     np.testing.assert_array_equal(first.y, last.y)
     np.testing.assert_array_equal(first.switches.t, last.switches.t)
+
+
+def coupled(t: float, x: Any) -> Any:
+    """Two surfaces whose signs multiply each other, and a third state that moves by the multipliers."""
+    first, second = np.sign(x[0]), np.sign(x[1])
+    return [
+        -first + 0.3 * first * second * np.cos(x[2]) + 0.2 * np.sin(t),
+        -second + 0.2 * first + 0.3 * first * second + 0.1,
+        np.cos(t) + 0.1 * first - 0.1 * x[2] * second,
+    ]
+
+
+def friction_chain(t: float, x: Any) -> Any:
+    d = 3
+    q, v = x[:d], x[d:]
+    left, right = [1.3 * np.sin(0.6 * t), *q[:-1]], [*q[1:], 0.0]
+    return [*v, *(left[i] + right[i] - 2 * q[i] - 0.3 * np.sign(v[i]) for i in range(d))]
+
+
+@pytest.mark.parametrize(
+    ("system", "start", "t_end"), [(coupled, [0.5, 0.3, 0.1], 20), (friction_chain, [0.1] * 6, 60)]
+)
+def test_sliding_on_intersections_has_series(system: Any, start: list[float], t_end: float) -> None:
+    tight = {"rtol": 1e-12, "atol": 1e-12}
+    series = fl.solve_ivp(system, (0, t_end), start, **tight)
+    stages = fl.solve_ivp(system, (0, t_end), start, method="DOPRI5", **tight)
+    assert any(segment.mode.count(0) >= 2 for segment in series.segments)
+    assert series.stats["n_steps_taylor"] == series.stats["n_steps"] < 0.2 * stages.stats["n_steps"]
+    assert [segment.mode for segment in series.segments] == [segment.mode for segment in stages.segments]
+    np.testing.assert_allclose(series.switches.t, stages.switches.t, rtol=0, atol=2e-10)
+    np.testing.assert_allclose(series.y[:, -1], stages.y[:, -1], rtol=0, atol=1e-10)
+
+
+def test_event_times_at_an_intersection_to_some_units_of_rounding() -> None:
+    import reference
+
+    sol = reference.solve("two_masses", 1e-13, method="Taylor")
+    expected = np.array([event.t for event in reference.of_problem("two_masses").switches])
+    units = np.abs(sol.switches.t - expected) / np.spacing(expected)
+    assert units.max() < 200
+
+
+def test_a_motion_by_another_rule_has_no_series() -> None:
+    sol = fl.solve_ivp(coupled, (0, 4), [0.5, 0.3, 0.1], method="Taylor", sliding="moments")
+    assert sol.success
+    assert [warning.code for warning in sol.warnings] == ["no_series"]

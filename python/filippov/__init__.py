@@ -88,6 +88,7 @@ if TYPE_CHECKING:
     )
     from filippov.ensemble import Ensemble
     from filippov.hidden import HiddenDynamics, hidden_dynamics
+    from filippov.sheets import SurfaceParts, surface_parts
 
 __all__ = [
     "Branches",
@@ -113,6 +114,7 @@ __all__ = [
     "Solution",
     "StepSizeError",
     "Stick",
+    "SurfaceParts",
     "Switch",
     "SwitchTable",
     "System",
@@ -164,6 +166,7 @@ __all__ = [
     "sqrt",
     "square",
     "stick",
+    "surface_parts",
     "sweep",
     "system",
     "tan",
@@ -178,6 +181,8 @@ _LAZY_NAMES = {
     "Ensemble": "ensemble",
     **dict.fromkeys(("Phase", "Section", "Tangency", "poincare"), "analysis"),
     **dict.fromkeys(("basins", "bifurcation_diagram", "open_sweep", "sweep"), "analysis"),
+    "SurfaceParts": "sheets",
+    "surface_parts": "sheets",
 }
 
 

@@ -65,7 +65,7 @@ pub use enclosure::{Enclosure, EnclosureProgram, Motion};
 pub use error::ExprError;
 pub use graph::Graph;
 pub use interval::Interval;
-pub use jet::JetProgram;
+pub use jet::{JetProgram, Multipliers};
 pub use node::{Node, NodeId};
 pub use op::{BinaryOp, UnaryOp};
 pub use print::Names;

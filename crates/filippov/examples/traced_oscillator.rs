@@ -1,14 +1,20 @@
 //! The dry-friction oscillator as a traced expression, run many times: for profilers.
 //!
-//! `cargo run --release --example traced_oscillator -- 100 1e-6`
+//! `cargo run --release --example traced_oscillator -- 100 1e-6 DOPRI5 slip`: repetitions, tolerance, method
+//! (Taylor unless given), and `slip` for the piece before the first switch alone.
 
-use filippov::{solve, Options, TracedSystem};
+use filippov::{solve, Method, Options, TracedSystem};
 use filippov_expr::{Backend, Graph, Names, UnaryOp};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
     let repeats: u32 = arguments.next().map_or(Ok(1), |v| v.parse())?;
     let tolerance: f64 = arguments.next().map_or(Ok(1e-6), |v| v.parse())?;
+    let method = match arguments.next().as_deref() {
+        Some("DOPRI5") => Method::Dopri5,
+        _ => Method::Taylor,
+    };
+    let slips_only = arguments.next().as_deref() == Some("slip");
 
     let mut g = Graph::new();
     let (t, y, v) = (g.time(), g.state(0), g.state(1));
@@ -31,9 +37,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         rtol: tolerance,
         atol: vec![tolerance],
         dense_output: false,
+        method,
+        max_step: if slips_only { 1e-4 } else { f64::INFINITY },
         ..Options::default()
     };
-    let t_end = 60.0 * std::f64::consts::PI;
+    let t_end = if slips_only {
+        1.0
+    } else {
+        60.0 * std::f64::consts::PI
+    };
     let mut steps = 0;
     for _ in 0..repeats {
         steps += solve(&system, (0.0, t_end), &[1.0, 2.0], &options, &[])?

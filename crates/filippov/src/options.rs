@@ -62,6 +62,8 @@ pub enum Method {
     Dopri5,
     /// Taylor series wherever the system has them; else DOPRI5.
     Taylor,
+    /// The Rosenbrock-Wanner method of Steinebach, for stiff motions.
+    Rodas5p,
 }
 
 /// Options of [`crate::solve`].

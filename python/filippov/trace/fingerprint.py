@@ -15,14 +15,16 @@ from __future__ import annotations
 
 import dis
 import functools
+import marshal
 import math
-from collections.abc import Iterator
-from types import CodeType, FunctionType, ModuleType
-from typing import Any, cast
+from collections.abc import Iterable, Iterator
+from types import CodeType, FunctionType, ModuleType, NoneType
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from filippov.trace.pure import PURE
+from filippov.trace.watch import MISSING, Watch
 
 __all__ = ["Fingerprint", "fingerprint"]
 
@@ -115,14 +117,57 @@ def fingerprint(*values: Any) -> Fingerprint | None:
     >>> before == fingerprint(f), fingerprint(g)
     (False, None)
     """
-    reader = _Reader()
+    first, *others = values
     try:
-        for value in values:
-            reader.read(value)
-        reader.read_modules()
+        if not all(map(_is_plain, others)):
+            return tuple(_read(values).items)
+        # Version 2: types and bits, and nothing that depends on who else holds the values.
+        return (*_items_of(first), marshal.dumps(others, 2))
     except (_Unknown, RecursionError):
         return None
-    return tuple(reader.items)
+
+
+def _read(values: Iterable[Any]) -> _Reader:
+    reader = _Reader()
+    for value in values:
+        reader.read(value)
+    reader.read_modules()
+    return reader
+
+
+def _items_of(value: Any) -> tuple[Any, ...]:
+    """Return the entries of a value that shares nothing with others; quickly for a function read before."""
+    known = _WATCHED.get(id(value))
+    if known is not None and known.watch.holds():
+        return known.items
+    reader = _read([value])
+    items = tuple(reader.items)
+    if type(value) is FunctionType and reader.watch.is_possible:
+        if len(_WATCHED) >= _MOST_WATCHED:
+            _WATCHED.clear()
+        _WATCHED[id(value)] = _Watched(value, reader.watch, items)
+    return items
+
+
+class _Watched(NamedTuple):
+    """A function, which is kept alive, and its fingerprint as long as the watch holds."""
+
+    function: FunctionType
+    watch: Watch
+    items: tuple[Any, ...]
+
+
+_WATCHED: dict[int, _Watched] = {}
+_MOST_WATCHED = 64
+_PLAIN = frozenset([float, int, bool, str, NoneType])
+
+
+def _is_plain(value: Any) -> bool:
+    """Whether a value is a number, a text, nothing, or a tuple or list of these: it leads nowhere else."""
+    kind = type(value)
+    if kind is not tuple and kind is not list:
+        return kind in _PLAIN
+    return all(type(entry) in _PLAIN or _is_plain(entry) for entry in value)
 
 
 class _Reader:
@@ -130,6 +175,7 @@ class _Reader:
 
     def __init__(self) -> None:
         self.items: list[Any] = []
+        self.watch = Watch()
         self._objects: dict[int, int] = {}
         self._modules: dict[int, ModuleType] = {}
         self._names: dict[str, None] = {}
@@ -154,6 +200,7 @@ class _Reader:
             self.items.append(value)
         elif id(value) in PURE:
             self.items.append(value)
+            self.watch.add_pure(PURE[id(value)])
             if not PURE[id(value)].is_unchanged():
                 raise _Unknown
         elif kind is FunctionType:
@@ -164,6 +211,7 @@ class _Reader:
             for entry in value:
                 self.read(entry)
         elif kind in (list, dict):
+            self.watch.is_possible = False
             if self._is_new(value):
                 self.read(tuple(value) if kind is list else tuple(value.items()))
         elif kind is np.ndarray:
@@ -174,6 +222,7 @@ class _Reader:
         elif kind is ModuleType:
             self._read_module(value)
         elif kind is functools.partial:
+            self.watch.is_possible = False
             for part in (value.func, value.args, value.keywords, value.__dict__):
                 self.read(part)
         else:
@@ -193,6 +242,7 @@ class _Reader:
             return
         self._looked_up.add((id(module), name))
         entries = vars(module)
+        self.watch.add_name(entries, name, entries.get(name, MISSING))
         if name in entries:
             self.items.append(name)
             self.read(entries[name])
@@ -216,6 +266,7 @@ class _Reader:
             self.items.append(math.copysign(1.0, value))
 
     def _read_array(self, value: Any) -> None:
+        self.watch.is_possible = False
         if value.dtype.kind not in "fiub" or value.nbytes > _LARGEST_ARRAY:
             raise _Unknown
         if not self._is_new(value):
@@ -226,6 +277,7 @@ class _Reader:
 
     def _read_module(self, module: ModuleType) -> None:
         self.items.append(module)
+        self.watch.add_name(vars(module), "__getattr__", vars(module).get("__getattr__", MISSING))
         supplied = "__getattr__" in vars(module) and module.__name__ not in _LAZY_MODULES
         if supplied:
             raise _Unknown
@@ -236,6 +288,7 @@ class _Reader:
         if names.is_opaque:
             raise _Unknown
         self.items.append(names)
+        self.watch.add_function(function)
         for part in (function.__defaults__, function.__kwdefaults__, function.__dict__):
             if part:
                 self.read(part)
@@ -246,6 +299,7 @@ class _Reader:
                 content = cell.cell_contents
             except ValueError:  # not assigned yet
                 raise _Unknown from None
+            self.watch.add_cell(cell, content)
             self.read(content)
         self._read_names(function, names.names)
 
@@ -255,12 +309,14 @@ class _Reader:
             raise _Unknown
         for name in names:
             self._names[name] = None
+            self.watch.add_name(own, name, own.get(name, MISSING))
             if name in own:
                 value = own[name]
-            elif name in built_in:
-                value = built_in[name]
             else:
-                continue  # an attribute
+                self.watch.add_name(built_in, name, built_in.get(name, MISSING))
+                if name not in built_in:
+                    continue  # an attribute
+                value = built_in[name]
             self.items.append(name)
             self.read(value)
 

@@ -38,20 +38,31 @@ class PureFunction(NamedTuple):
 
     function: Any
     code: CodeType | None
-    attributes: dict[str, Any]
+    attributes: dict[str, Any] | None
 
     @classmethod
     def of(cls, function: Any) -> PureFunction:
         """Take down what there is to see of the function now."""
         attributes = None if isinstance(function, type) else getattr(function, "__dict__", None)
-        # What `inspect` keeps of a function of NumPy says nothing about its results.
-        seen = {name: value for name, value in (attributes or {}).items() if name != "__signature__"}
-        return cls(function, getattr(function, "__code__", None), seen)
+        code = getattr(function, "__code__", None)
+        return cls(function, code, None if attributes is None else _seen(attributes))
+
+    def can_change(self) -> bool:
+        """Whether a function like this one can be given another code or attributes."""
+        return self.code is not None or self.attributes is not None
 
     def is_unchanged(self) -> bool:
         """Whether nobody has given the function another code or other attributes."""
-        now = PureFunction.of(self.function)
-        return now.code is self.code and now.attributes == self.attributes
+        if self.attributes is not None:
+            now = self.function.__dict__
+            if now != self.attributes and _seen(now) != self.attributes:
+                return False
+        return self.code is None or self.function.__code__ is self.code
+
+
+def _seen(attributes: dict[str, Any]) -> dict[str, Any]:
+    """Return attributes without what `inspect` keeps of a function of NumPy: it says nothing of results."""
+    return {name: value for name, value in attributes.items() if name != "__signature__"}
 
 
 def _pure_functions() -> dict[int, PureFunction]:

@@ -24,11 +24,13 @@ impl Looped {
         Looped { plan, order }
     }
 
-    pub fn eval(&self, t: f64, x: &[f64], s: &[f64], p: &[f64], out: &mut [f64]) {
+    pub fn eval(&self, t: f64, x: &[f64], s: &[f64], p: &[f64], v: &[f64], out: &mut [f64]) {
         let Looped { plan, order } = self;
         let needed = plan.lengths;
-        let is_short =
-            x.len() < needed.states || s.len() < needed.signs || p.len() < needed.parameters;
+        let is_short = x.len() < needed.states
+            || s.len() < needed.signs
+            || p.len() < needed.parameters
+            || v.len() < needed.inputs;
         if is_short {
             out.fill(f64::NAN);
             return;
@@ -41,7 +43,14 @@ impl Looped {
         let mut table = known
             .filter(fits)
             .unwrap_or_else(|| Table::new(plan.rules.len(), *order, 0.0));
-        let mut numbers = Numbers { plan, t, x, s, p };
+        let mut numbers = Numbers {
+            plan,
+            t,
+            x,
+            s,
+            p,
+            v,
+        };
         fill(plan, &mut table, *order, &mut numbers);
         let rows = out.chunks_exact_mut(plan.field.len() + plan.functions.len());
         for (k, row) in rows.take(order + 1).enumerate() {
@@ -67,6 +76,7 @@ struct Numbers<'a> {
     x: &'a [f64],
     s: &'a [f64],
     p: &'a [f64],
+    v: &'a [f64],
 }
 
 impl Arithmetic for Numbers<'_> {
@@ -89,6 +99,7 @@ impl Arithmetic for Numbers<'_> {
         match self.plan.still.get(&leaf) {
             Some(&Node::Parameter(i)) => self.p[i as usize],
             Some(&Node::Sign(j)) => self.s[j as usize],
+            Some(&Node::Input(i)) => self.v[i as usize],
             _ => f64::NAN,
         }
     }

@@ -9,6 +9,7 @@
 //! A large one is computed by loops over the orders.
 
 mod looped;
+mod multipliers;
 mod plan;
 mod recurrence;
 mod unrolled;
@@ -20,6 +21,7 @@ use crate::op::{BinaryOp, UnaryOp};
 use crate::program::{Backend, Program};
 
 use looped::Looped;
+pub use multipliers::Multipliers;
 use plan::Plan;
 
 /// Programs with more nodes than this are not unrolled: they would take longer to compile than they save.
@@ -62,7 +64,7 @@ impl Graph {
 /// let energy = g.mul(x, v);
 /// let jets = JetProgram::compile(&g, &[v, pull], &[energy], 3, Backend::Auto)?;
 /// let mut out = [0.0; 4 * 3];
-/// jets.eval(0.0, &[1.0, 0.0], &[], &[], &mut out);
+/// jets.eval(0.0, &[1.0, 0.0], &[], &[], &[], &mut out);
 /// // orders 0 to 3, each with x, v and x v: cos, -sin, and -sin cos
 /// assert_eq!(out[..6], [1.0, 0.0, 0.0, 0.0, -1.0, -1.0]);
 /// assert_eq!(out[6..9], [-0.5, 0.0, 0.0]);
@@ -81,7 +83,7 @@ pub struct JetProgram {
 #[derive(Debug)]
 enum Code {
     Unrolled(Program),
-    Looped(Looped),
+    Looped(Box<Looped>),
 }
 
 impl JetProgram {
@@ -98,18 +100,34 @@ impl JetProgram {
         order: usize,
         backend: Backend,
     ) -> Result<JetProgram, ExprError> {
-        let plan = Plan::new(graph, field, functions)?;
+        let multipliers = Multipliers::default();
+        JetProgram::with_multipliers(graph, field, functions, &multipliers, order, backend)
+    }
+
+    /// The same where some signs are multipliers, which keep functions at zero.
+    ///
+    /// # Errors
+    /// As for [`compile`](Self::compile).
+    pub fn with_multipliers(
+        graph: &Graph,
+        field: &[NodeId],
+        functions: &[NodeId],
+        multipliers: &Multipliers,
+        order: usize,
+        backend: Backend,
+    ) -> Result<JetProgram, ExprError> {
+        let mut graph = graph.clone();
+        let plan = Plan::new(&mut graph, field, functions, multipliers)?;
         let width = field.len() + functions.len();
-        let single = operations(graph, field);
+        let single = operations(&graph, field);
         let (code, size) = if plan.unrolled_size(order) <= MOST_UNROLLED {
-            let mut graph = graph.clone();
             let outputs = unrolled::unroll(&plan, &mut graph, order);
             let size = operations(&graph, &outputs);
             let program = Program::compile(&graph, &outputs, backend)?;
             (Code::Unrolled(program), size)
         } else {
             let size = plan.unrolled_size(order);
-            (Code::Looped(Looped::new(plan, order)), size)
+            (Code::Looped(Box::new(Looped::new(plan, order))), size)
         };
         Ok(JetProgram {
             code,
@@ -145,13 +163,13 @@ impl JetProgram {
         matches!(self.code, Code::Unrolled(_))
     }
 
-    /// Evaluates at time `t`, states `x`, signs `s`, parameters `p`; writes (order + 1) rows, each with the
+    /// Evaluates at time `t`, states `x`, signs `s`, parameters `p`, inputs `v`; writes (order + 1) rows, each with the
     /// coefficients of the states and then those of the functions. A coefficient that does not exist is not
     /// finite, and those of higher order are not finite either.
-    pub fn eval(&self, t: f64, x: &[f64], s: &[f64], p: &[f64], out: &mut [f64]) {
+    pub fn eval(&self, t: f64, x: &[f64], s: &[f64], p: &[f64], v: &[f64], out: &mut [f64]) {
         match &self.code {
-            Code::Unrolled(program) => program.eval(t, x, s, p, &[], out),
-            Code::Looped(looped) => looped.eval(t, x, s, p, out),
+            Code::Unrolled(program) => program.eval(t, x, s, p, v, out),
+            Code::Looped(looped) => looped.eval(t, x, s, p, v, out),
         }
     }
 }

@@ -5,6 +5,7 @@
 
 use rustc_hash::FxHashMap;
 
+use super::multipliers::{Multipliers, Rounds};
 use crate::error::ExprError;
 use crate::graph::Graph;
 use crate::node::{Node, NodeId};
@@ -32,6 +33,8 @@ pub(super) enum Rule {
     State(u32),
     /// A value that does not move: a parameter or a sign.
     Still(NodeId),
+    /// A sign that is solved for, and where it starts.
+    Multiplier(NodeId),
     Neg(Row),
     Add(Row, Row),
     Sub(Row, Row),
@@ -80,6 +83,32 @@ pub(super) enum Rule {
     },
 }
 
+impl Rule {
+    /// The rows that a coefficient is made of, at the same order.
+    pub fn operands(&self) -> impl Iterator<Item = Row> {
+        let (a, b, c) = match *self {
+            Rule::Constant(_)
+            | Rule::Time
+            | Rule::State(_)
+            | Rule::Still(_)
+            | Rule::Multiplier(_) => (None, None, None),
+            Rule::Neg(a) | Rule::Shift(a, _) | Rule::Scale(a, ..) | Rule::Power { of: a, .. } => {
+                (Some(a), None, None)
+            }
+            Rule::Add(a, b) | Rule::Sub(a, b) | Rule::Mul(a, b) | Rule::Div(a, b) => {
+                (Some(a), Some(b), None)
+            }
+            Rule::Select { plus, minus, .. } => (Some(plus), Some(minus), None),
+            Rule::Chain { of, weight, .. } | Rule::InverseChain { of, weight, .. } => {
+                (Some(of), Some(weight), None)
+            }
+            Rule::PowerOf { of, exponent, .. } => (Some(of), Some(exponent), None),
+            Rule::Angle { y, x, weight } => (Some(y), Some(x), Some(weight)),
+        };
+        [a, b, c].into_iter().flatten()
+    }
+}
+
 /// All rows in the order in which a coefficient of each can be computed.
 #[derive(Debug)]
 pub(super) struct Plan {
@@ -88,6 +117,7 @@ pub(super) struct Plan {
     pub field: Vec<Row>,
     pub functions: Vec<Row>,
     pub lengths: Lengths,
+    pub rounds: Rounds,
     /// The leaves that do not move, as they are evaluated.
     pub still: FxHashMap<NodeId, Node>,
     rows: FxHashMap<NodeId, Row>,
@@ -95,32 +125,44 @@ pub(super) struct Plan {
 }
 
 impl Plan {
-    pub fn new(graph: &Graph, field: &[NodeId], functions: &[NodeId]) -> Result<Self, ExprError> {
-        let outputs: Vec<NodeId> = field.iter().chain(functions).copied().collect();
+    pub fn new(
+        graph: &mut Graph,
+        field: &[NodeId],
+        functions: &[NodeId],
+        multipliers: &Multipliers,
+    ) -> Result<Self, ExprError> {
+        let mut outputs: Vec<NodeId> = field.iter().chain(functions).copied().collect();
+        outputs.extend(multipliers.nodes(graph));
         let schedule = Schedule::new(graph, &outputs)?;
         let mut plan = Plan {
             rules: Vec::with_capacity(schedule.order.len()),
             field: Vec::new(),
             functions: Vec::new(),
             lengths: schedule.lengths,
+            rounds: Rounds::default(),
             still: FxHashMap::default(),
             rows: FxHashMap::default(),
             made: FxHashMap::default(),
         };
         plan.lengths.states = plan.lengths.states.max(field.len());
         for &id in &schedule.order {
-            let row = plan.row_of(id, *graph.node(id));
+            let node = *graph.node(id);
+            let row = match multipliers.start(node) {
+                Some(start) => plan.push(Rule::Multiplier(start)),
+                None => plan.row_of(id, node),
+            };
             plan.rows.insert(id, row);
         }
         plan.field = field.iter().map(|id| plan.rows[id]).collect();
         plan.functions = functions.iter().map(|id| plan.rows[id]).collect();
+        plan.rounds = Rounds::new(&plan, multipliers.solved(graph, &plan.rows));
         Ok(plan)
     }
 
     /// About how many operations all coefficients up to `order` take one by one.
     pub fn unrolled_size(&self, order: usize) -> usize {
         let convolution = order * order;
-        let sizes = self.rules.iter().map(|rule| match *rule {
+        let size = |rule: &Rule| match *rule {
             Rule::Mul(a, b) | Rule::Div(a, b) if self.is_still(a) || self.is_still(b) => order,
             Rule::Mul(..) | Rule::Div(..) => convolution,
             Rule::Chain { of, .. } if self.is_linear(of) => 2 * order,
@@ -129,8 +171,9 @@ impl Plan {
             Rule::Angle { .. } => 3 * convolution,
             Rule::Constant(_) | Rule::Still(_) | Rule::Time => 1,
             _ => order,
-        });
-        sizes.sum()
+        };
+        let products = self.rounds.solved.iter().map(|s| 2 * order * s.terms.len());
+        self.rules.iter().map(size).sum::<usize>() + products.sum::<usize>()
     }
 
     fn is_still(&self, row: Row) -> bool {

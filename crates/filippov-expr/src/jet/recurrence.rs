@@ -11,7 +11,7 @@ pub(super) trait Arithmetic {
     fn constant(&mut self, value: f64) -> Self::Value;
     fn time(&mut self) -> Self::Value;
     fn state(&mut self, index: u32) -> Self::Value;
-    /// A parameter or a sign.
+    /// A parameter, a sign or an input.
     fn still(&mut self, leaf: NodeId) -> Self::Value;
     fn unary(&mut self, op: UnaryOp, a: Self::Value) -> Self::Value;
     fn binary(&mut self, op: BinaryOp, a: Self::Value, b: Self::Value) -> Self::Value;
@@ -57,26 +57,69 @@ pub(super) fn fill<A: Arithmetic>(
     order: usize,
     ring: &mut A,
 ) {
+    let rounds = &plan.rounds;
     for k in 0..=order {
-        for (row, rule) in plan.rules.iter().enumerate() {
-            let value = match *rule {
-                Rule::State(i) if k > 0 => match plan.field.get(i as usize) {
-                    Some(&rate) => {
-                        let rate = table.at(rate, k - 1);
-                        ring.scaled(rate, 1.0 / k as f64)
-                    }
-                    None => ring.constant(0.0),
-                },
-                rule => Coefficient {
-                    table,
-                    ring,
-                    row,
-                    k,
-                }
-                .of(rule),
-            };
-            table.set(row, k, value);
+        if k == 0 || rounds.solved.is_empty() {
+            fill_rows(plan, table, k, ring, |_| true);
+            continue;
         }
+        let zero = ring.constant(0.0);
+        rounds.solved.iter().for_each(|s| table.set(s.row, k, zero));
+        fill_rows(plan, table, k, ring, |row| rounds.first[row]);
+        for solved in &rounds.solved {
+            let terms = solved.terms.iter();
+            let terms = terms.map(|&(equation, entry)| (table.at(equation, k), table.at(entry, 0)));
+            let value = solve(ring, terms);
+            table.set(solved.row, k, value);
+        }
+        fill_rows(plan, table, k, ring, |row| rounds.second[row]);
+    }
+}
+
+/// Minus the sum of products.
+fn solve<A: Arithmetic>(
+    ring: &mut A,
+    terms: impl Iterator<Item = (A::Value, A::Value)>,
+) -> A::Value {
+    let mut sum = ring.constant(0.0);
+    for (value, entry) in terms {
+        if !ring.is_zero(value) {
+            let term = ring.binary(BinaryOp::Mul, entry, value);
+            sum = ring.binary(BinaryOp::Sub, sum, term);
+        }
+    }
+    sum
+}
+
+/// Coefficient k of the rows that are wanted.
+fn fill_rows<A: Arithmetic>(
+    plan: &Plan,
+    table: &mut Table<A::Value>,
+    k: usize,
+    ring: &mut A,
+    is_wanted: impl Fn(Row) -> bool,
+) {
+    for (row, rule) in plan.rules.iter().enumerate() {
+        if !is_wanted(row) {
+            continue;
+        }
+        let value = match *rule {
+            Rule::State(i) if k > 0 => match plan.field.get(i as usize) {
+                Some(&rate) => {
+                    let rate = table.at(rate, k - 1);
+                    ring.scaled(rate, 1.0 / k as f64)
+                }
+                None => ring.constant(0.0),
+            },
+            rule => Coefficient {
+                table,
+                ring,
+                row,
+                k,
+            }
+            .of(rule),
+        };
+        table.set(row, k, value);
     }
 }
 
@@ -95,8 +138,8 @@ impl<A: Arithmetic> Coefficient<'_, A> {
             Rule::Constant(value) if k == 0 => self.ring.constant(value),
             Rule::Time if k == 0 => self.ring.time(),
             Rule::State(i) => self.ring.state(i),
-            Rule::Still(leaf) if k == 0 => self.ring.still(leaf),
-            Rule::Constant(_) | Rule::Still(_) => self.ring.constant(0.0),
+            Rule::Still(leaf) | Rule::Multiplier(leaf) if k == 0 => self.ring.still(leaf),
+            Rule::Constant(_) | Rule::Still(_) | Rule::Multiplier(_) => self.ring.constant(0.0),
             Rule::Time => self.ring.constant(if k == 1 { 1.0 } else { 0.0 }),
             Rule::Neg(a) => self.ring.unary(UnaryOp::Neg, self.table.at(a, k)),
             Rule::Add(a, b) => self.add(self.table.at(a, k), self.table.at(b, k)),
@@ -207,7 +250,9 @@ impl<A: Arithmetic> Coefficient<'_, A> {
             }
             return sum;
         }
-        for j in 0..=self.k {
+        // The coefficients of order k come last: the rest is the same whatever they are.
+        let ends: &[usize] = if self.k == 0 { &[0] } else { &[0, self.k] };
+        for j in (1..self.k).chain(ends.iter().copied()) {
             let term = self.mul(self.table.at(a, j), self.table.at(b, self.k - j));
             sum = self.add(sum, term);
         }

@@ -34,9 +34,12 @@ pub(super) struct BoundedCurve<'a> {
     pub by_multipliers: bool,
     /// The normal components on pieces of this extension: they are asked for one after the other.
     pub known_exits: &'a RefCell<Vec<Piece>>,
-    /// The multipliers on the last piece, while sliding on an intersection.
-    pub last_root: &'a RefCell<Option<RootPiece>>,
+    /// The multipliers on the pieces looked at, while sliding on an intersection: all exit functions ask for them.
+    pub known_roots: &'a RefCell<Vec<RootPiece>>,
 }
+
+/// Pieces whose multipliers are remembered within a step.
+const MOST_KNOWN_ROOTS: usize = 64;
 
 /// A piece with the bounds of both normal components.
 pub(super) type Piece = (f64, f64, [Enclosure; 2]);
@@ -68,13 +71,19 @@ impl BoundedCurve<'_> {
         if !self.by_multipliers || m > MOST_ENCLOSED && self.affine.is_none() {
             return None;
         }
-        let mut last = self.last_root.borrow_mut();
-        let known = last.take().filter(|last| (last.0, last.1) == (a, b));
-        let piece = match known {
-            Some(piece) => piece,
-            None => (a, b, self.enclosed_root(a, b)?),
+        let mut known = self.known_roots.borrow_mut();
+        let place = match known.iter().position(|piece| (piece.0, piece.1) == (a, b)) {
+            Some(place) => place,
+            None => {
+                let piece = (a, b, self.enclosed_root(a, b)?);
+                if known.len() == MOST_KNOWN_ROOTS {
+                    known.clear();
+                }
+                known.push(piece);
+                known.len() - 1
+            }
         };
-        let value = match &last.insert(piece).2 {
+        let value = match &known[place].2 {
             RootBounds::Proved(root) => exit_bound(IntersectionExit::of(index, m), root)?,
             RootBounds::Unproved => Interval::ALL,
             RootBounds::Singular => return None,
@@ -196,7 +205,7 @@ impl Integrator<'_> {
             affine: self.motion.affine_bounds(),
             by_multipliers: !self.slides_by_rule() && self.motion.has_bounds(),
             known_exits: &self.detector.enclosed_exits,
-            last_root: &self.detector.enclosed_root,
+            known_roots: &self.detector.enclosed_roots,
         };
         // Next to a zero that is divided out the function itself may only rise.
         let at_start = if m.deflation.is_some() {

@@ -37,7 +37,7 @@ pub(super) struct Detector {
     /// Bounds of the normal components over pieces of the extension of this step.
     pub enclosed_exits: RefCell<Vec<Piece>>,
     /// Bounds of the multipliers there, while sliding on an intersection.
-    pub enclosed_root: RefCell<Option<RootPiece>>,
+    pub enclosed_roots: RefCell<Vec<RootPiece>>,
     /// Value and rate at the end of the step, per monitored function.
     pub right: Vec<(f64, f64)>,
     /// Rounding of the exit functions in this step, once it was needed.
@@ -71,7 +71,7 @@ impl Detector {
             x: vec![0.0; n],
             margin: Vec::new(),
             enclosed_exits: RefCell::default(),
-            enclosed_root: RefCell::new(None),
+            enclosed_roots: RefCell::default(),
             right: Vec::new(),
             exit_noise: None,
             suspects: Vec::new(),
@@ -164,7 +164,7 @@ impl Integrator<'_> {
         self.detector.uncertain = false;
         self.detector.exits.clear();
         self.detector.enclosed_exits.get_mut().clear();
-        self.detector.enclosed_root.take();
+        self.detector.enclosed_roots.get_mut().clear();
         self.detector.margin.clear();
         self.detector.exit_noise = None;
         self.detector.next_dt = None;
@@ -181,7 +181,7 @@ impl Integrator<'_> {
             // There will be a search: the extension that it needs serves the filter too.
             self.extend()?;
         }
-        if self.stepper.is_taylor() {
+        if self.stepper.has_series() {
             return self.detect_along_series(dt);
         }
         self.collect_suspects(dt)?;
@@ -264,6 +264,9 @@ impl Integrator<'_> {
     /// be looked at after the first zero.
     fn detect_along_series(&mut self, dt: f64) -> Result<Option<Found>, FieldError> {
         self.measure_margin(dt)?;
+        if self.motion.sliding.len() > 1 {
+            self.prepare_bounds()?;
+        }
         let mut found: Option<Found> = None;
         // What was searched for the first zero is all that the others are searched for.
         let mut reach = 1.0;
@@ -310,7 +313,7 @@ impl Integrator<'_> {
         }
         self.stats.n_extensions += 1;
         self.detector.enclosed_exits.get_mut().clear();
-        self.detector.enclosed_root.take();
+        self.detector.enclosed_roots.get_mut().clear();
         self.stepper.extend(&mut self.motion.field, &self.x)?;
         Ok(())
     }

@@ -1,28 +1,45 @@
 //! Steps by Taylor series.
 
 use super::integrator::Integrator;
+use super::motion::{ModeField, Motion};
+use super::stiff::Derivatives;
 use super::{Warning, WarningCode};
 use crate::error::FieldError;
 use crate::event::Monitored;
+use crate::mode::Signs;
 use crate::options::Method;
-use crate::stepper::{reach as series_reach, Attempt};
-use crate::tolerances::{EPS, TAYLOR_SHORTEST};
+use crate::stepper::{reach as series_reach, Attempt, StepMethod};
+use crate::system::MotionJets;
+use crate::tolerances::{EPS, MOST_AUTO_SERIES, TAYLOR_SHORTEST};
 
 impl Integrator<'_> {
     /// The motion that starts takes Taylor steps if the run may and the motion has series.
     pub(super) fn choose_stepper(&mut self) {
         self.motion.jets = None;
+        self.motion.derivatives = Derivatives::None;
+        if self.stepper.rodas5p.is_some() && self.motion.resting.is_empty() {
+            return self.start_implicit();
+        }
         // Whether a surface is left that h = 0 all along was expected of is seen at the ends of steps only.
-        let may = !self.motion.is_in_contact() && self.motion.resting.is_empty();
+        let may = !self.motion.is_in_contact()
+            && self.motion.resting.is_empty()
+            && !self.slides_by_rule()
+            && self.motion.has_bounds();
         if let (Some(taylor), true) = (&self.stepper.taylor, may) {
             let (system, order) = (self.system, taylor.order());
             let is_auto = self.options.method == Method::Auto;
             self.motion.take_jets(|sliding| {
                 let jets = system.motion_jets(sliding, order);
-                jets.filter(|jets| !is_auto || jets.is_unrolled())
+                let is_cheap =
+                    |jets: &MotionJets| jets.is_unrolled() && sliding.len() <= MOST_AUTO_SERIES;
+                jets.filter(|jets| !is_auto || is_cheap(jets))
             });
         }
-        self.stepper.use_taylor(self.motion.jets.is_some());
+        self.stepper.start_with(if self.motion.jets.is_some() {
+            StepMethod::Taylor
+        } else {
+            StepMethod::Dopri5
+        });
         if self.motion.jets.is_none() {
             self.note_missing_series();
         }
@@ -40,7 +57,7 @@ impl Integrator<'_> {
         let (t, mode) = (self.t, &self.motion.mode);
         let text = format!(
             "the motion in mode {mode} from t = {t:.10} has no Taylor series (its field is not analytic there, is \
-             not traced, slides on several surfaces, or is in contact): DOPRI5 integrates it"
+             not traced, slides by another rule than the canopy, sticks, or is in contact): DOPRI5 integrates it"
         );
         self.warnings.push(Warning {
             t,
@@ -62,7 +79,9 @@ impl Integrator<'_> {
         if taylor.is_expanded() {
             return Ok(());
         }
-        let (system, t, x, signs) = (self.system, self.t, &self.x, &self.motion.signs);
+        let (system, t, x) = (self.system, self.t, &self.x);
+        let signs = multipliers_in(&self.motion, &self.detector.stages);
+        let signs = signs.as_deref().unwrap_or(&self.motion.signs);
         let fill = |rows: &mut [f64]| system.eval_jets(jets, t, x, signs, rows);
         let mut allowed = taylor.expand(jets.width(), x, &self.scale, fill);
         self.stats.n_field_evaluations += jets.cost();
@@ -73,7 +92,7 @@ impl Integrator<'_> {
             self.dt = self.dt.min(allowed);
             return Ok(());
         }
-        self.stepper.leave_taylor();
+        self.stepper.go_on_with(StepMethod::Dopri5);
         self.motion.jets = None;
         self.note_missing_series();
         self.dt = f64::NAN;
@@ -115,11 +134,11 @@ impl Integrator<'_> {
             };
             taylor.coefficient(place, 0).abs().max(moved)
         };
-        let exits = [0, 1].map(|index| jets.exit(index));
-        let size = if exits.contains(&Some(place)) {
-            exits.into_iter().flatten().map(size).fold(0.0, f64::max)
-        } else {
-            size(place)
+        // Exit functions come in pairs.
+        let first = jets.exit(0).filter(|&first| first <= place);
+        let size = match first.map(|first| first + (place - first) / 2 * 2) {
+            Some(pair) => size(pair).max(size(pair + 1)),
+            None => size(place),
         };
         let atol = self
             .options
@@ -164,6 +183,8 @@ impl Integrator<'_> {
         for (row, c) in rows.iter_mut().zip(taylor.column(place)) {
             *row = c;
         }
+        let own = |slack: &&(usize, f64)| m.function.exit_index() == Some(slack.0);
+        rows[0] += self.slacks.iter().find(own).map_or(0.0, |slack| slack.1);
         true
     }
 
@@ -190,4 +211,16 @@ impl Integrator<'_> {
         rows[1] += m.orientation * ht * dt;
         Ok(())
     }
+}
+
+/// The signs of sliding on several surfaces, with the multipliers at the start of the step in their places.
+fn multipliers_in(motion: &Motion, stages: &[[f64; 7]]) -> Option<Signs> {
+    let ModeField::Intersection(_) = motion.field else {
+        return None;
+    };
+    let mut signs = motion.signs.clone();
+    for (pair, &j) in stages.chunks_exact(2).zip(motion.sliding()) {
+        signs[j] = 0.5 * (pair[0][0] - pair[1][0]);
+    }
+    Some(signs)
 }

@@ -185,6 +185,21 @@ impl Dopri5 {
         })
     }
 
+    /// The product of the step and the fastest rate of the field, from the two evaluations at the end of the step;
+    /// `None` once the extension of order 5 has used the space of the first.
+    pub fn stiffness(&self) -> Option<f64> {
+        if self.has_order5() {
+            return None;
+        }
+        let distance = |a: &[f64], b: &[f64]| {
+            let squares = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b));
+            squares.sum::<f64>().sqrt()
+        };
+        let apart = distance(&self.y1, &self.stage);
+        let rates_apart = distance(&self.k[6], &self.k[5]);
+        (apart > 0.0).then(|| self.interpolant.dt * rates_apart / apart)
+    }
+
     /// Is the continuous extension of order 5 already there?
     pub fn has_order5(&self) -> bool {
         self.extended == Some(5)

@@ -1,11 +1,14 @@
 //! Steppers: advance one smooth field by one step, with an error estimate and a continuous extension.
 
 mod coefficients_dopri5;
+mod coefficients_rodas5p;
 mod controller;
 mod dense;
 mod dopri5;
 mod initial_step;
+mod linearisation;
 mod method;
+mod rodas5p;
 mod taylor;
 
 pub use controller::{Controller, ErrorScale};
@@ -13,7 +16,9 @@ pub(crate) use dense::{evaluate, nested, shift};
 pub use dense::{Basis, Expansion, Interpolant};
 pub use dopri5::{Attempt, Dopri5};
 pub use initial_step::{initial_step, restart_step, tiny_step};
-pub use method::Stepper;
+pub use linearisation::Linearisation;
+pub use method::{StepMethod, Stepper};
+pub use rodas5p::Rodas5p;
 pub(crate) use taylor::reach;
 pub use taylor::Taylor;
 

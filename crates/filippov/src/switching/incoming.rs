@@ -197,7 +197,11 @@ fn exit_state(
     }
     let drift = drift.ok_or(Undecided::NoDrift { m: fields.m() })?;
     let largest = drift.iter().fold(0.0_f64, |m, d| m.max(d.abs()));
-    let factor = AFTER_THE_EXIT * fields.size() / largest;
+    let factor = match kind {
+        // Stability may be lost while the normal components at the root stay zero.
+        ExitKind::Stability if largest == 0.0 => 0.0,
+        _ => AFTER_THE_EXIT * fields.size() / largest,
+    };
     if !factor.is_finite() {
         return Err(Undecided::NoDrift { m: fields.m() });
     }

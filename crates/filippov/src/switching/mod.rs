@@ -48,6 +48,7 @@ pub use relay_at::relay_at;
 pub use resolution::{Continuation, Resolution, Undecided};
 pub use resolve::{has_one_mode_only, resolve};
 pub use roots::{multiplier_rates, newton, roots_in_cube, stable_roots, Roots};
+pub(crate) use small_matrix::invert;
 pub use small_matrix::Matrix;
 pub use stability::{
     is_negative_p_matrix, is_scaling_stable, is_stable, is_stable_for, scaling_margin,

@@ -2,6 +2,8 @@
 
 use std::ops::{Index, IndexMut};
 
+use smallvec::SmallVec;
+
 /// A small square matrix.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Matrix {
@@ -171,6 +173,42 @@ impl Matrix {
         }
         coefficients
     }
+}
+
+/// Inverts n rows of n entries where they are; `false`, with entries lost, if a pivot vanishes or is not finite.
+pub(crate) fn invert(rows: &mut [f64], n: usize) -> bool {
+    let mut swaps = SmallVec::<[usize; 8]>::new();
+    for column in 0..n {
+        let size = |row: &usize| rows[row * n + column].abs();
+        let pivot = (column..n).max_by(|a, b| size(a).total_cmp(&size(b)));
+        let pivot = pivot.unwrap_or(column);
+        swaps.push(pivot);
+        for k in 0..n {
+            rows.swap(column * n + k, pivot * n + k);
+        }
+        let inverse = 1.0 / rows[column * n + column];
+        if !inverse.is_finite() || inverse == 0.0 {
+            return false;
+        }
+        rows[column * n + column] = 1.0;
+        rows[column * n..(column + 1) * n]
+            .iter_mut()
+            .for_each(|v| *v *= inverse);
+        for row in (0..n).filter(|&row| row != column) {
+            let factor = std::mem::replace(&mut rows[row * n + column], 0.0);
+            if factor != 0.0 {
+                for k in 0..n {
+                    rows[row * n + k] -= factor * rows[column * n + k];
+                }
+            }
+        }
+    }
+    for (column, pivot) in swaps.into_iter().enumerate().rev() {
+        for row in 0..n {
+            rows.swap(row * n + column, row * n + pivot);
+        }
+    }
+    true
 }
 
 impl Index<(usize, usize)> for Matrix {

@@ -1,7 +1,8 @@
-//! Taylor coefficients of the motions of a traced system: in a region, and sliding on one surface.
+//! Taylor coefficients of the motions of a traced system: in a region, and sliding.
 
-use filippov_expr::{Backend, ExprError, Gradient, Graph, JetProgram, NodeId};
+use filippov_expr::{Backend, ExprError, Gradient, Graph, JetProgram, Multipliers, NodeId};
 
+use super::jet_multipliers::MultiplierEquations;
 use super::tiered::Tiered;
 
 /// Taylor coefficients of the motions on a set of surfaces, and of what is monitored on them.
@@ -13,6 +14,8 @@ pub struct MotionJets {
     n_states: usize,
     surfaces: Vec<usize>,
     n_exits: usize,
+    /// Of sliding on several surfaces.
+    equations: Option<MultiplierEquations>,
 }
 
 impl MotionJets {
@@ -26,23 +29,30 @@ impl MotionJets {
     ) -> Option<MotionJets> {
         let mut graph = graph.clone();
         let n_states = field.len();
+        let mut equations = None;
+        let mut multipliers = Multipliers::default();
         let (field, exits) = match sliding {
             [] => (field.to_vec(), Vec::new()),
             &[j] => sliding_field(&mut graph, field, j),
-            _ => return None,
+            _ => {
+                let made = MultiplierEquations::new(&mut graph, field, sliding, backend)?;
+                (equations, multipliers) = (Some(made.0), made.2);
+                (made.1, ends(&mut graph, sliding))
+            }
         };
         let curved = |j: &usize| !graph.is_affine(graph.surface(*j as u32));
         let surfaces: Vec<usize> = (0..graph.n_surfaces()).filter(curved).collect();
         let mut functions: Vec<NodeId> =
             surfaces.iter().map(|&j| graph.surface(j as u32)).collect();
         functions.extend(&exits);
-        let make = move |backend| compile(&graph, &field, &functions, order, backend);
+        let make = move |backend| compile(&graph, &field, &functions, &multipliers, order, backend);
         Some(MotionJets {
             program: Tiered::from(make, backend),
             order,
             n_states,
             surfaces,
             n_exits: exits.len(),
+            equations,
         })
     }
 
@@ -77,25 +87,45 @@ impl MotionJets {
         Some(self.n_states + place)
     }
 
-    /// The place of an exit function in a row: the normal component of f-, then that of f+ with its sign changed.
+    /// The place of an exit function in a row: on one surface the normal component of f-, then that of f+ with its
+    /// sign changed; on several 1 + lambda and 1 - lambda for each.
     pub fn exit(&self, index: usize) -> Option<usize> {
         (index < self.n_exits).then_some(self.n_states + self.surfaces.len() + index)
     }
 
     pub(super) fn eval(&self, t: f64, x: &[f64], signs: &[f64], p: &[f64], out: &mut [f64]) {
-        self.program.program().eval(t, x, signs, p, out);
+        let program = self.program.program();
+        let Some(equations) = &self.equations else {
+            return program.eval(t, x, signs, p, &[], out);
+        };
+        match equations.inputs(t, x, signs, p) {
+            Some(inputs) => program.eval(t, x, signs, p, &inputs, out),
+            None => out.fill(f64::NAN),
+        }
     }
+}
+
+/// 1 + lambda and 1 - lambda for each surface.
+fn ends(graph: &mut Graph, surfaces: &[usize]) -> Vec<NodeId> {
+    let one = graph.constant(1.0);
+    let mut ends = Vec::with_capacity(2 * surfaces.len());
+    for &j in surfaces {
+        let lambda = graph.sign_of(j as u32);
+        ends.extend([graph.add(one, lambda), graph.sub(one, lambda)]);
+    }
+    ends
 }
 
 fn compile(
     graph: &Graph,
     field: &[NodeId],
     functions: &[NodeId],
+    multipliers: &Multipliers,
     order: usize,
     backend: Backend,
 ) -> JetProgram {
     let compile = |backend| -> Result<JetProgram, ExprError> {
-        JetProgram::compile(graph, field, functions, order, backend)
+        JetProgram::with_multipliers(graph, field, functions, multipliers, order, backend)
     };
     compile(backend)
         .or_else(|_| compile(Backend::Interpreter))
