@@ -74,3 +74,15 @@ options = {"method": "DOPRI5", "rtol": 1e-10, "atol": 1e-10}
 """
     problem = build(source)
     assert list(violations(problem, problem.solve())) == []
+
+
+def test_a_level_passed_while_sliding_is_passed_once() -> None:
+    # It slides on cos(x + t) = -0.3 through the middle between two levels, where rounding of the time shows.
+    def f(t: float, x: Any, start: float = 0.0) -> Any:
+        s = np.heaviside(np.cos(x[0] + t - start) + 0.3, 0.5)
+        return [3.0 * s - 2.0 - 0.1 * np.rint(x[0] - 0.033)]
+
+    for start in (0.0, 2.0, 1000.0):
+        sol = fl.solve_ivp(f, (start, start + 3.0), [0.9], args=(start,), rtol=1e-10, atol=1e-10)
+        assert sol.success, sol.message
+        assert sol.y[0, -1] == pytest.approx(np.arccos(-0.3) - 3.0, abs=1e-8)

@@ -15,7 +15,7 @@ use smallvec::{smallvec, SmallVec};
 use super::detect::Found;
 use super::integrator::Integrator;
 use super::placement::Sides;
-use super::transition::{located_surfaces, Values};
+use super::transition::{located_surfaces, Left, Values};
 use super::Stop;
 use crate::action::Trigger;
 use crate::error::FieldError;
@@ -136,12 +136,16 @@ impl Integrator<'_> {
             self.note_residuals(h, &surfaces);
             return self.act(due).map(Some);
         }
-        if surfaces.iter().any(|&j| {
-            let departs = rates[j] * f64::from(entries[j]) > 0.0;
-            departs && self.is_only_trigger(j)
-        }) {
+        let departs =
+            |j: &&usize| rates[**j] * f64::from(entries[**j]) > 0.0 && self.is_only_trigger(**j);
+        let departing: Vec<(usize, f64)> = surfaces
+            .iter()
+            .filter(departs)
+            .map(|&j| (j, rates[j]))
+            .collect();
+        if !departing.is_empty() {
             self.note_residuals(h, &surfaces);
-            return self.go_on_unless_stuck().map(Some);
+            return self.go_on_unless_stuck(&departing).map(Some);
         }
         if self.motion.is_in_contact() {
             return self.decide_in_contact(event, &surfaces).map(Some);
@@ -297,14 +301,21 @@ impl Integrator<'_> {
         Ok(None)
     }
 
-    /// Decides the mode anew where an event turned out to be none.
-    fn go_on_unless_stuck(&mut self) -> Result<Option<Stop>, FieldError> {
+    /// Decides the mode anew where an event turned out to be none: the motion leaves the surfaces `departing` at these
+    /// rates.
+    fn go_on_unless_stuck(
+        &mut self,
+        departing: &[(usize, f64)],
+    ) -> Result<Option<Stop>, FieldError> {
         let before = self.motion.mode.clone();
-        let (after, left) = match self.place(Some(&before))? {
+        let (after, mut left) = match self.place(Some(&before))? {
             Ok(placed) => placed,
             Err(stop) => return Ok(Some(stop)),
         };
         self.residuals.clear();
+        for &(j, value) in departing.iter().filter(|(j, _)| self.is_internal(*j)) {
+            left.push(Left::Surface(j, Leading { order: 1, value }));
+        }
         let changed =
             (0..before.entries().len()).filter(|&j| before.entries()[j] != after.entries()[j]);
         let changed: Vec<usize> = changed.collect();
