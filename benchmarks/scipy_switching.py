@@ -1,4 +1,4 @@
-"""A hand-written switching loop for the dry-friction oscillator around SciPy's `solve_ivp`."""
+"""Hand-written switching loops around SciPy's `solve_ivp`: dry friction, and the relay of order three."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 from scipy.integrate import solve_ivp
 from stick import direction_from_rest, stick_end
 
-__all__ = ["METHODS", "integrated_stick_end", "transient"]
+__all__ = ["METHODS", "integrated_stick_end", "relay_transient", "transient"]
 
 METHODS = ("RK45", "DOP853")
 
@@ -114,3 +114,74 @@ def transient(
             if t >= t_end:
                 return times
             times.append(t)
+
+
+def relay_transient(
+    t_end: float, y0: Sequence[float], parameters: Sequence[float], method: str, tolerance: float
+) -> list[float]:
+    """Integrate ``x' = A x - B sign(x1)`` of third order, b1 = 1, from t = 0 and return the event times.
+
+    On x1 = 0 it slides for |x2| < 1, with sign(x1) replaced by x2, and leaves at x2 = 1 and -1.
+
+    Parameters
+    ----------
+    t_end : float
+        End of the interval.
+    y0 : sequence of float
+        Initial state off the surface.
+    parameters : sequence of float
+        zeta, omega, sigma.
+    method : str
+        One of `METHODS`.
+    tolerance : float
+        Relative and absolute tolerance.
+
+    Returns
+    -------
+    list of float
+    """
+    zeta, omega, sigma = parameters
+
+    def region(sign: float) -> Callable[..., Any]:
+        def field(t: float, x: Any) -> Any:
+            a, b, c = x
+            return (
+                -(2 * zeta * omega + 1) * a + b - sign,
+                -(2 * zeta * omega + omega**2) * a + c + 2 * sigma * sign,
+                -(omega**2) * a - sign,
+            )
+
+        return field
+
+    def slide(t: float, x: Any) -> Any:
+        _, b, c = x
+        return 0.0, c + 2 * sigma * b, -b
+
+    def arrival(sign: float) -> Callable[..., Any]:
+        return _terminal(lambda t, x: x[0], -sign)
+
+    leaving = (_terminal(lambda t, x: x[1] - 1.0, 1.0), _terminal(lambda t, x: x[1] + 1.0, -1.0))
+    options = {"method": method, "rtol": tolerance, "atol": tolerance}
+    t, state = 0.0, list(y0)
+    side = math.copysign(1.0, state[0] or state[1])
+    slides = state[0] == 0.0 and abs(state[1]) < 1.0
+    times: list[float] = []
+    while True:
+        field, events = (slide, leaving) if slides else (region(side), [arrival(side)])
+        piece = solve_ivp(field, (t, t_end), state, events=events, **options)
+        if piece.status != 1:
+            return times
+        t, state = float(piece.t[-1]), [0.0, *piece.y[1:, -1]]
+        times.append(t)
+        if slides:
+            side, slides = (1.0 if len(piece.t_events[0]) else -1.0), False
+        elif side * state[1] < -1.0:
+            side = -side
+        else:
+            slides = True
+
+
+def _terminal(function: Callable[..., Any], direction: float) -> Callable[..., Any]:
+    function.terminal = True  # type: ignore[attr-defined]
+    function.direction = direction  # type: ignore[attr-defined]
+    return function

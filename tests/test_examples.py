@@ -1,5 +1,11 @@
-"""The scripts in examples/ run and save their picture."""
+"""Every example runs, agrees with its references, and saves its picture.
 
+The numbers are checked by the examples themselves. Those that take long know ``--quick``.
+"""
+
+from __future__ import annotations
+
+import ast
 import runpy
 import sys
 from pathlib import Path
@@ -7,15 +13,37 @@ from pathlib import Path
 import pytest
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
+SCRIPTS = sorted(EXAMPLES.glob("*/*.py"))
 
 
-@pytest.mark.parametrize(
-    "name", ["03_neuron/neuron", "04_thermostat/thermostat", "05_sampled_control/sampled_control"]
-)
-def test_an_example_runs(name, tmp_path, monkeypatch, capsys):
-    pytest.importorskip("matplotlib").use("Agg")
+def test_there_is_one_script_per_folder_named_like_it() -> None:
+    assert SCRIPTS
+    assert [f"{script.parent.name[3:]}.py" for script in SCRIPTS] == [script.name for script in SCRIPTS]
+    numbers = [int(script.parent.name[:2]) for script in SCRIPTS]
+    assert numbers == list(range(1, len(SCRIPTS) + 1))
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)
+def test_a_page_says_what_it_is_about_and_how_to_run_it(script: Path) -> None:
+    text = ast.get_docstring(ast.parse(script.read_text(encoding="utf-8")))
+    assert text is not None
+    title = text.split("\n", maxsplit=1)[0]
+    assert title[-1] in ".:"
+    assert f"examples/{script.parent.name}/{script.name}" in text
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)
+def test_an_example_runs(
+    script: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    quick = ["--quick"] if "--quick" in script.read_text(encoding="utf-8") else []
     picture = tmp_path / "picture.png"
-    monkeypatch.setattr(sys, "argv", ["example", str(picture)])
-    runpy.run_path(str(EXAMPLES / f"{name}.py"), run_name="__main__")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", [str(script), str(picture), *quick])
+    runpy.run_path(str(script), run_name="__main__")
+    matplotlib.pyplot.close("all")
     assert picture.stat().st_size > 10_000
+    assert [path.name for path in tmp_path.iterdir()] == ["picture.png"]
     assert capsys.readouterr().out

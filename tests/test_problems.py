@@ -124,7 +124,7 @@ def test_both_forms_of_dry_friction_agree() -> None:
 @pytest.mark.parametrize("name", fl.problems.names())
 def test_every_problem_can_be_traced(name: str) -> None:
     problem = fl.problems.get(name)
-    system = fl.System(problem.fun, n=len(problem.y0), args=problem.args)
+    system = problem.system()
     assert system.backend in ("native", "interpreter")
     assert system.n_surfaces >= 1
 

@@ -78,6 +78,7 @@ if TYPE_CHECKING:
     from filippov import plot, problems
     from filippov.ensemble import Ensemble
     from filippov.hidden import HiddenDynamics, hidden_dynamics
+    from filippov.sheets import SurfaceParts, surface_parts
 
 __all__ = [
     "Branches",
@@ -101,6 +102,7 @@ __all__ = [
     "Solution",
     "StepSizeError",
     "Stick",
+    "SurfaceParts",
     "Switch",
     "SwitchTable",
     "System",
@@ -146,6 +148,7 @@ __all__ = [
     "sqrt",
     "square",
     "stick",
+    "surface_parts",
     "system",
     "tan",
     "tanh",
@@ -153,7 +156,13 @@ __all__ = [
 ]
 
 _LAZY = ("plot", "problems")
-_LAZY_NAMES = {"HiddenDynamics": "hidden", "hidden_dynamics": "hidden", "Ensemble": "ensemble"}
+_LAZY_NAMES = {
+    "HiddenDynamics": "hidden",
+    "hidden_dynamics": "hidden",
+    "Ensemble": "ensemble",
+    "SurfaceParts": "sheets",
+    "surface_parts": "sheets",
+}
 
 
 def __getattr__(name: str) -> Any:

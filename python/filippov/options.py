@@ -18,8 +18,8 @@ __all__ = ["Options", "check_options", "check_t_span", "check_y0"]
 
 Array = npt.NDArray[np.float64]
 
-_METHODS = {"auto": "auto", "DOPRI5": "DOPRI5", "RK45": "DOPRI5", "Taylor": "Taylor"}
-_PLANNED_METHODS = ("DOP853", "Midpoint", "Rodas5P")
+_METHODS = {"RK45": "DOPRI5", **{name: name for name in ("auto", "DOPRI5", "Taylor", "DOP853", "Rodas5P")}}
+_PLANNED_METHODS = ("Midpoint",)
 _STIFF_METHODS = ("Radau", "BDF", "LSODA")
 # name -> (available values, values that are planned)
 _POLICIES = {
@@ -138,10 +138,7 @@ def check_method(method: Any) -> str:
         if method in _PLANNED_METHODS:
             raise InputError(f'method: "{method}" is not available yet; use "auto"')
         if method in _STIFF_METHODS:
-            raise InputError(
-                f'method: "{method}" is not offered; the method for stiff systems is "Rodas5P" '
-                '(not available yet; "DOPRI5" is correct on stiff systems too, only slower)'
-            )
+            raise InputError(f'method: "{method}" is not offered; the method for stiff systems is "Rodas5P"')
         hint = did_you_mean(method, [*_METHODS, *_PLANNED_METHODS])
         raise InputError(f'method: unknown method {method!r}{hint}; use "auto"')
     raise InputError(f'method: a name such as "auto" is needed, not {type(method).__name__}')

@@ -163,7 +163,8 @@ class Solution:
     t_events, y_events : list of ndarray or None
         Times, shape (k,), and states, shape (k, n), of every event given; ``None`` if none was given.
     nfev, njev, nlu : int
-        Numbers of evaluations of the field, of Jacobians, and of factorisations.
+        Numbers of evaluations of the field, those for Jacobians by differences included, of Jacobians, and
+        of factorisations; the last two are 0 unless ``method="Rodas5P"`` took steps.
     status : int
         0: the end was reached; 1: a terminal event; negative: the run failed and what is here is a part.
     message : str
@@ -175,7 +176,8 @@ class Solution:
     segments : SegmentTable
         Pieces of constant mode.
     stats : dict
-        Counters of the run and how the field was evaluated (``stats["backend"]``).
+        Counters of the run, the methods that took steps (``stats["method"]``), how the field was evaluated
+        (``stats["backend"]``), and if a run turned out to be stiff from when on (``stats["stiff_since"]``).
     warnings : list of RunWarning
         What deserves a look.
     branches : Branches or None
@@ -438,7 +440,7 @@ class Solution:
         attributes = {"message": self.message, "status": self.status, "surfaces": list(self.surfaces)}
         return xarray.Dataset(variables, coords={"t": self.t}, attrs=attributes)
 
-    def plot(self, ax: Any = None, states: Any = None, dark: bool = False) -> Any:
+    def plot(self, ax: Any = None, states: Any = None, dark: bool | None = None) -> Any:
         """Draw the states over time, coloured by mode; see `filippov.plot.time_series`.
 
         Parameters
@@ -448,7 +450,7 @@ class Solution:
         states : sequence of int or str, optional
             Which states; all by default.
         dark : bool, optional
-            Light lines on a dark ground.
+            Light lines on a dark ground; by default as `filippov.plot.style` around says.
 
         Returns
         -------

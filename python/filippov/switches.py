@@ -88,8 +88,8 @@ class RunWarning(NamedTuple):
         Time at which it was noticed.
     code : str
         Short name: ``"non_unique"``, ``"undeclared_jump"``, ``"zero_surface"``, ``"no_series"``,
-        ``"oscillation"`` (sliding on three or more surfaces at a root that is not stable for the given
-        ``kappa``) or ``"max_branches"``.
+        ``"stiff"`` (stability limits the steps of an explicit method), ``"oscillation"`` (sliding on three or
+        more surfaces at a root that is not stable for the given ``kappa``) or ``"max_branches"``.
     message : str
         What was found, in words.
     candidates : tuple of Mode

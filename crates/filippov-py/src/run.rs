@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use filippov::{Mode, PiecewiseSystem, Segment, Side, Solution, Stop};
+use filippov::{Mode, PiecewiseSystem, Segment, Side, Solution, Stats, Stop};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -248,15 +248,17 @@ impl Run {
     fn stats<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let stats = self.solution().stats;
         let dict = PyDict::new(py);
-        let method = match stats.n_steps_taylor {
-            0 => "DOPRI5",
-            all if all == stats.n_steps => "Taylor",
-            _ => "Taylor, DOPRI5",
-        };
-        dict.set_item("method", method)?;
+        dict.set_item("method", methods(&stats))?;
         dict.set_item("n_steps_taylor", stats.n_steps_taylor)?;
+        dict.set_item("n_steps_dop853", stats.n_steps_dop853)?;
+        dict.set_item("n_steps_rodas5p", stats.n_steps_rodas5p)?;
+        if let Some(since) = stats.stiff_since {
+            dict.set_item("stiff_since", since)?;
+        }
         dict.set_item("native", self.is_native)?;
         dict.set_item("nfev", stats.n_field_evaluations)?;
+        dict.set_item("njev", stats.n_jacobians)?;
+        dict.set_item("nlu", stats.n_factorisations)?;
         dict.set_item("n_surface_evaluations", stats.n_surface_evaluations)?;
         dict.set_item("n_steps", stats.n_steps)?;
         dict.set_item("n_rejected", stats.n_rejected)?;
@@ -330,4 +332,22 @@ impl Run {
         }
         Ok(columns(py, &out, self.n_visible))
     }
+}
+
+/// The methods that took steps, the first of which the run preferred.
+fn methods(stats: &Stats) -> String {
+    let others = [
+        ("Rodas5P", stats.n_steps_rodas5p),
+        ("Taylor", stats.n_steps_taylor),
+        ("DOP853", stats.n_steps_dop853),
+    ];
+    let explicit = stats.n_steps - others.iter().map(|(_, count)| count).sum::<u64>();
+    let mut names: Vec<&str> = others
+        .into_iter()
+        .filter_map(|(name, count)| (count > 0).then_some(name))
+        .collect();
+    if explicit > 0 || names.is_empty() {
+        names.push("DOPRI5");
+    }
+    names.join(", ")
 }

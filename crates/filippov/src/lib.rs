@@ -62,5 +62,5 @@ pub use solution::{Segment, Side, Solution, Switch, UserZero};
 pub use switching::Kind;
 pub use system::{
     AffineParts, AffineSigns, BothSides, ClosureSystem, Law, LawAction, LawMap, Laws, LieValue,
-    PiecewiseSystem, SingularSliding, TracedMap, TracedSystem, Word,
+    MotionJacobian, PiecewiseSystem, SingularSliding, TracedMap, TracedSystem, Word,
 };

@@ -1,12 +1,29 @@
-"""Figures of solutions. Plotting draws and never computes.
+"""Figures of solutions, surfaces and diagrams. Plotting draws and never computes.
+
+Every function takes ``ax=`` and returns it, draws on a light or a dark ground (``dark=``, or `style` around
+many figures), and tells things apart by width, style or marker besides colour.
 
 Needs Matplotlib: ``pip install filippov[plot]``.
 """
 
 from __future__ import annotations
 
+from filippov.plot.diagrams import basins, bifurcation_diagram, poincare_section
 from filippov.plot.hidden_dynamics import hidden_dynamics
-from filippov.plot.phase import phase
+from filippov.plot.phase import phase, phase3d
+from filippov.plot.style import style, theme
+from filippov.plot.surface import surface
 from filippov.plot.time_series import time_series
 
-__all__ = ["hidden_dynamics", "phase", "time_series"]
+__all__ = [
+    "basins",
+    "bifurcation_diagram",
+    "hidden_dynamics",
+    "phase",
+    "phase3d",
+    "poincare_section",
+    "style",
+    "surface",
+    "theme",
+    "time_series",
+]

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from filippov.hidden import HiddenDynamics
 from filippov.hidden import hidden_dynamics as hidden_dynamics_at
-from filippov.plot.style import SLIDING_WIDTH, SMOOTH_WIDTH, Theme, apply_theme, import_pyplot, palette, theme
+from filippov.plot.style import SLIDING_WIDTH, SMOOTH_WIDTH, Theme, new_axes, palette, theme
 from filippov.system import System
 
 __all__ = ["hidden_dynamics"]
@@ -28,7 +28,7 @@ def hidden_dynamics(
     kappa: Any = None,
     atol: float = 1e-9,
     ax: Any = None,
-    dark: bool = False,
+    dark: bool | None = None,
     **params: float,
 ) -> Any:
     """Draw the hidden dynamics at a point where two surfaces meet.
@@ -46,7 +46,7 @@ def hidden_dynamics(
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure by default.
     dark : bool, optional
-        Light lines on a dark ground.
+        Light lines on a dark ground; by default as the `style` around says.
 
     Returns
     -------
@@ -69,17 +69,14 @@ def hidden_dynamics(
     >>> relays = fl.System(lambda t, x: [0.5 - np.sign(x[0]), -0.2 - np.sign(x[1])], n=2)
     >>> axes = fl.plot.hidden_dynamics(relays, 0.0, [0.0, 0.0], before="0-")  # doctest: +SKIP
     """
-    pyplot = import_pyplot()
     if isinstance(system, HiddenDynamics):
         hidden = system
     elif x is None:
         raise TypeError("x: the state at which two surfaces meet is needed")
     else:
         hidden = hidden_dynamics_at(system, t, x, before, kappa, atol, **params)
-    if ax is None:
-        _, ax = pyplot.subplots(figsize=(4.6, 4.6), layout="constrained")
+    ax = new_axes(ax, (4.6, 4.6), dark)
     chosen = theme(dark)
-    apply_theme(ax, chosen)
     first, second, motion = palette(dark)[:3]
     _draw_square(ax, chosen)
     _draw_arrows(ax, hidden, chosen)

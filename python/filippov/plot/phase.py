@@ -1,17 +1,27 @@
-"""One state against another, coloured by mode."""
+"""States against one another, in the plane and in space, coloured by mode."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from filippov.plot.pieces import pieces, state_indices
-from filippov.plot.style import SLIDING_WIDTH, SMOOTH_WIDTH, apply_theme, import_pyplot, mode_colours, theme
+from filippov.plot.style import (
+    SLIDING_WIDTH,
+    SMOOTH_WIDTH,
+    draw_legend,
+    mode_colours,
+    mode_handles,
+    new_axes,
+    theme,
+)
 from filippov.solution import Solution
 
-__all__ = ["phase"]
+__all__ = ["phase", "phase3d"]
 
 
-def phase(solution: Solution, i: int | str = 0, j: int | str = 1, ax: Any = None, dark: bool = False) -> Any:
+def phase(
+    solution: Solution, i: int | str = 0, j: int | str = 1, ax: Any = None, dark: bool | None = None
+) -> Any:
     """Draw state `j` against state `i`: colour is the mode, a heavy line is sliding, a dot is a switch.
 
     Parameters
@@ -23,7 +33,7 @@ def phase(solution: Solution, i: int | str = 0, j: int | str = 1, ax: Any = None
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure by default.
     dark : bool, optional
-        Light lines on a dark ground.
+        Light lines on a dark ground; by default as the `style` around says.
 
     Returns
     -------
@@ -35,30 +45,79 @@ def phase(solution: Solution, i: int | str = 0, j: int | str = 1, ax: Any = None
         If Matplotlib is not installed.
     ValueError
         If a state does not exist.
+
+    Examples
+    --------
+    >>> import filippov as fl
+    >>> problem = fl.problems.get("dieci_lopez_6_1")
+    >>> axes = fl.plot.phase(fl.solve_ivp(problem.fun, problem.t_span, problem.y0))  # doctest: +SKIP
     """
-    pyplot = import_pyplot()
-    (first, second) = state_indices(solution, [i, j])
-    if ax is None:
-        _, ax = pyplot.subplots(figsize=(4.6, 4.2), layout="constrained")
+    shown = state_indices(solution, [i, j])
+    ax = new_axes(ax, (5.6, 4.2), dark)
+    _draw(ax, solution, shown, dark)
+    return ax
+
+
+def phase3d(
+    solution: Solution,
+    i: int | str = 0,
+    j: int | str = 1,
+    k: int | str = 2,
+    ax: Any = None,
+    dark: bool | None = None,
+) -> Any:
+    """Draw three states in space: colour is the mode, a heavy line is sliding, a dot is a switch.
+
+    Parameters
+    ----------
+    solution : Solution
+        What to draw.
+    i, j, k : int or str, optional
+        States on the three axes, by number or name.
+    ax : mpl_toolkits.mplot3d.axes3d.Axes3D, optional
+        Where to draw, an axes with ``projection="3d"``; a new figure by default.
+    dark : bool, optional
+        Light lines on a dark ground; by default as the `style` around says.
+
+    Returns
+    -------
+    mpl_toolkits.mplot3d.axes3d.Axes3D
+
+    Raises
+    ------
+    ImportError
+        If Matplotlib is not installed.
+    TypeError
+        If `ax` has two dimensions only.
+    ValueError
+        If a state does not exist.
+
+    Examples
+    --------
+    >>> import filippov as fl
+    >>> problem = fl.problems.get("relay_feedback")
+    >>> solution = fl.solve_ivp(problem.fun, problem.t_span, problem.y0, args=problem.args)
+    >>> axes = fl.plot.phase3d(solution)  # doctest: +SKIP
+    """
+    shown = state_indices(solution, [i, j, k])
+    ax = new_axes(ax, (6.4, 5.0), dark, projection="3d")
+    _draw(ax, solution, shown, dark)
+    ax.set_zlabel(solution.states[shown[2]])
+    return ax
+
+
+def _draw(ax: Any, solution: Solution, shown: list[int], dark: bool | None) -> None:
     chosen = theme(dark)
-    apply_theme(ax, chosen)
     parts = list(pieces(solution))
     colours = mode_colours([mode for mode, _, _ in parts], dark)
-    named: set[Any] = set()
     for mode, _, values in parts:
-        label = None
-        if solution.surfaces and mode not in named:
-            label = f"mode {mode}" + (" (sliding)" if mode.is_sliding else "")
-        named.add(mode)
         width = SLIDING_WIDTH if mode.is_sliding else SMOOTH_WIDTH
-        ax.plot(values[first], values[second], color=colours[mode], linewidth=width, label=label)
+        order = 2.2 if mode.is_sliding else 2.0
+        ax.plot(*values[shown], color=colours[mode], linewidth=width, zorder=order, solid_capstyle="butt")
     if len(solution.switches):
-        points = solution.switches.y_after
-        ax.plot(points[:, first], points[:, second], ".", color=chosen.ink, markersize=3, linestyle="none")
+        points = solution.switches.y_after[:, shown]
+        ax.plot(*points.T, ".", color=chosen.ink, markersize=3, linestyle="none", zorder=2.4)
     if solution.surfaces:
-        legend = ax.legend(fontsize="small", frameon=False)
-        for text in legend.get_texts():
-            text.set_color(chosen.ink)
-    ax.set_xlabel(solution.states[first])
-    ax.set_ylabel(solution.states[second])
-    return ax
+        draw_legend(ax, mode_handles(colours), chosen)
+    ax.set_xlabel(solution.states[shown[0]])
+    ax.set_ylabel(solution.states[shown[1]])

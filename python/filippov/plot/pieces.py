@@ -17,7 +17,8 @@ Array = npt.NDArray[np.float64]
 
 # Points over the whole interval; a step is much longer than a pixel, so straight lines would show.
 _POINTS = 2000
-_FEWEST = 8
+# Points of a segment at least, where there are few segments and where there are many.
+_FEWEST, _FEWEST_OF_MANY, _MANY = 40, 8, 500
 
 
 def pieces(solution: Solution) -> Iterator[tuple[Mode, Array, Array]]:
@@ -28,6 +29,7 @@ def pieces(solution: Solution) -> Iterator[tuple[Mode, Array, Array]]:
     if not len(solution.segments):
         yield Mode(), solution.t, solution.y
         return
+    fewest = _FEWEST if len(solution.segments) < _MANY else _FEWEST_OF_MANY
     length = abs(solution.segments[-1].t_end - solution.segments[0].t_start) or 1.0
     for segment in solution.segments:
         if solution.sol is None:
@@ -35,7 +37,7 @@ def pieces(solution: Solution) -> Iterator[tuple[Mode, Array, Array]]:
             inside = (solution.t >= first) & (solution.t <= last)
             yield segment.mode, solution.t[inside], solution.y[:, inside]
             continue
-        count = max(_FEWEST, int(_POINTS * abs(segment.duration) / length))
+        count = max(fewest, int(_POINTS * abs(segment.duration) / length))
         times = np.linspace(segment.t_start, segment.t_end, count)
         states = solution.sol(times)
         if segment.t_end != segment.t_start:

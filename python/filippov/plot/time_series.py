@@ -12,9 +12,11 @@ from filippov.plot.style import (
     SLIDING_WIDTH,
     SMOOTH_WIDTH,
     Theme,
-    apply_theme,
-    import_pyplot,
+    draw_legend,
     mode_colours,
+    mode_handles,
+    new_axes,
+    palette,
     theme,
 )
 from filippov.solution import Solution
@@ -22,12 +24,19 @@ from filippov.solution import Solution
 __all__ = ["time_series"]
 
 _LINE_STYLES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1, 1, 1)))
+_EVENT_MARKERS = "ovsD^"
 _MOST_TICKS = 200
-_MOST_MODES_NAMED = 8
+# Heights, as shares of the axes: of the strip, and of what is kept free for it and for its names.
+_STRIP, _STRIP_SLIDING, _FREE = 0.02, 0.04, 0.1
+# A name stands in the strip where a piece is this much of the width per letter.
+_WIDTH_OF_A_LETTER = 0.014
 
 
-def time_series(solution: Solution, ax: Any = None, states: Any = None, dark: bool = False) -> Any:
+def time_series(solution: Solution, ax: Any = None, states: Any = None, dark: bool | None = None) -> Any:
     """Draw states over time: colour is the mode, a heavy line is sliding, line styles tell states apart.
+
+    A strip along the lower edge names the modes, higher where the motion slides; ticks at the upper edge are
+    switches; open markers on the curves are the events of the user.
 
     Parameters
     ----------
@@ -38,7 +47,7 @@ def time_series(solution: Solution, ax: Any = None, states: Any = None, dark: bo
     states : int, str, or a sequence of these, optional
         Which states; all by default.
     dark : bool, optional
-        Light lines on a dark ground.
+        Light lines on a dark ground; by default as the `style` around says.
 
     Returns
     -------
@@ -57,12 +66,9 @@ def time_series(solution: Solution, ax: Any = None, states: Any = None, dark: bo
     >>> problem = fl.problems.get("dieci_lopez_6_1")
     >>> axes = fl.plot.time_series(fl.solve_ivp(problem.fun, problem.t_span, problem.y0))  # doctest: +SKIP
     """
-    pyplot = import_pyplot()
     indices = state_indices(solution, states)
-    if ax is None:
-        _, ax = pyplot.subplots(figsize=(7.0, 3.6), layout="constrained")
+    ax = new_axes(ax, (7.0, 3.6), dark)
     chosen = theme(dark)
-    apply_theme(ax, chosen)
     parts = list(pieces(solution))
     colours = mode_colours([mode for mode, _, _ in parts], dark)
     if not solution.surfaces:  # nothing to tell apart by mode: then colour tells the states apart
@@ -81,9 +87,12 @@ def time_series(solution: Solution, ax: Any = None, states: Any = None, dark: bo
                     solid_capstyle="butt",
                 )
         _draw_ticks(ax, solution, chosen)
-        _draw_strip(ax, parts, colours)
+        _draw_strip(ax, parts, colours, chosen)
+    marked = _draw_events(ax, solution, indices, chosen)
     names = [solution.states[index] for index in indices]
-    _draw_legend(ax, colours if solution.surfaces else {}, names, chosen, dark)
+    handles = mode_handles(colours) if solution.surfaces else []
+    handles += _state_handles(names, chosen, None if solution.surfaces else palette(dark))
+    draw_legend(ax, handles + marked, chosen)
     ax.set_xlabel("t")
     if len(names) == 1:
         ax.set_ylabel(names[0])
@@ -100,13 +109,13 @@ def _line_style(order: int, width: float) -> Any:
     return offset, tuple(length * SMOOTH_WIDTH / width for length in dashes)
 
 
-def _draw_smooth(ax: Any, parts: list[tuple[Mode, Any, Any]], indices: list[int], dark: bool) -> None:
-    palette = list(mode_colours([Mode((1,) * k) for k in range(7)], dark).values())
+def _draw_smooth(ax: Any, parts: list[tuple[Mode, Any, Any]], indices: list[int], dark: bool | None) -> None:
+    colours = palette(dark)
     for order, index in enumerate(indices):
         times = np.concatenate([part[1] for part in parts])
         values = np.concatenate([part[2][index] for part in parts])
         style = _LINE_STYLES[order % len(_LINE_STYLES)]
-        ax.plot(times, values, color=palette[order % len(palette)], linewidth=SMOOTH_WIDTH, linestyle=style)
+        ax.plot(times, values, color=colours[order % len(colours)], linewidth=SMOOTH_WIDTH, linestyle=style)
 
 
 def _draw_ticks(ax: Any, solution: Solution, chosen: Theme) -> None:
@@ -124,42 +133,70 @@ def _draw_ticks(ax: Any, solution: Solution, chosen: Theme) -> None:
         )
 
 
-def _draw_strip(ax: Any, parts: list[tuple[Mode, Any, Any]], colours: dict[Mode, str]) -> None:
-    """Draw a thin strip of modes along the lower edge, sliding taller than the rest."""
+def _draw_strip(ax: Any, parts: list[tuple[Mode, Any, Any]], colours: dict[Mode, str], chosen: Theme) -> None:
+    """Draw a thin strip of modes along the lower edge, sliding higher than the rest, with room above it."""
+    low, high = ax.get_ylim()
+    ax.set_ylim(low - _FREE * (high - low), high)
+    length = abs(parts[-1][1][-1] - parts[0][1][0]) if len(parts[-1][1]) and len(parts[0][1]) else 0.0
     for mode, times, _ in parts:
-        if len(times) > 1:
-            ax.axvspan(
-                times[0],
-                times[-1],
-                0.0,
-                0.03 if mode.is_sliding else 0.015,
-                color=colours[mode],
-                linewidth=0,
-                zorder=0,
+        if len(times) < 2 or length == 0.0:
+            continue
+        ax.axvspan(
+            times[0],
+            times[-1],
+            0.0,
+            _STRIP_SLIDING if mode.is_sliding else _STRIP,
+            color=colours[mode],
+            linewidth=0,
+            zorder=0,
+        )
+        if abs(times[-1] - times[0]) > _WIDTH_OF_A_LETTER * (1 + len(mode)) * length:
+            ax.text(
+                0.5 * (times[0] + times[-1]),
+                _STRIP_SLIDING + 0.01,
+                str(mode),
+                transform=ax.get_xaxis_transform(),
+                ha="center",
+                va="bottom",
+                fontsize="x-small",
+                color=chosen.ink,
             )
 
 
-def _draw_legend(ax: Any, colours: dict[Mode, str], names: list[str], chosen: Theme, dark: bool) -> None:
+def _draw_events(ax: Any, solution: Solution, indices: list[int], chosen: Theme) -> list[Any]:
+    """Mark the events of the user on the curves; return the entries of the legend."""
+    handles: list[Any] = []
+    if solution.t_events is None or solution.y_events is None:
+        return handles
+    for number, (times, states) in enumerate(zip(solution.t_events, solution.y_events, strict=True)):
+        if not len(times):
+            continue
+        for order, index in enumerate(indices):
+            (line,) = ax.plot(
+                times,
+                states[:, index],
+                _EVENT_MARKERS[number % len(_EVENT_MARKERS)],
+                markersize=5,
+                markerfacecolor="none",
+                markeredgecolor=chosen.ink,
+                linestyle="none",
+                label=f"event {number}",
+                zorder=3,
+            )
+            if order == 0:
+                handles.append(line)
+    return handles
+
+
+def _state_handles(names: list[str], chosen: Theme, colours: list[str] | None) -> list[Any]:
+    """Return the entries of the legend that tell the states apart, where there are several."""
     from matplotlib.lines import Line2D
 
-    handles: list[Any] = []
-    for mode, colour in list(colours.items())[:_MOST_MODES_NAMED]:
-        width = SLIDING_WIDTH if mode.is_sliding else SMOOTH_WIDTH
-        label = f"mode {mode}" + (" (sliding)" if mode.is_sliding else "")
-        handles.append(Line2D([], [], color=colour, linewidth=width, label=label))
-    if len(colours) > _MOST_MODES_NAMED:
-        handles.append(
-            Line2D([], [], color="none", label=f"... {len(colours) - _MOST_MODES_NAMED} more modes")
-        )
-    if len(names) > 1:
-        palette = list(mode_colours([Mode((1,) * k) for k in range(7)], dark).values())
-        for order, name in enumerate(names):
-            colour = chosen.ink if colours else palette[order % len(palette)]
-            style = _LINE_STYLES[order % len(_LINE_STYLES)]
-            handles.append(Line2D([], [], color=colour, linewidth=SMOOTH_WIDTH, linestyle=style, label=name))
-    if handles:
-        legend = ax.legend(
-            handles=handles, loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize="small", frameon=False
-        )
-        for text in legend.get_texts():
-            text.set_color(chosen.ink)
+    if len(names) < 2:
+        return []
+    handles = []
+    for order, name in enumerate(names):
+        colour = chosen.ink if colours is None else colours[order % len(colours)]
+        style = _LINE_STYLES[order % len(_LINE_STYLES)]
+        handles.append(Line2D([], [], color=colour, linewidth=SMOOTH_WIDTH, linestyle=style, label=name))
+    return handles

@@ -8,7 +8,8 @@ True
 
 from __future__ import annotations
 
+from filippov.problems.comparison import compare
 from filippov.problems.problem import Problem
 from filippov.problems.registry import get, names
 
-__all__ = ["Problem", "get", "names"]
+__all__ = ["Problem", "compare", "get", "names"]

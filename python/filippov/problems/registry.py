@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from filippov.problems import (
     biased_relay,
+    bouncing_ball,
+    buck_converter,
     dieci_lopez,
     disode_planar,
     drill_string,
     dry_friction,
+    friction_chain,
     ifdiff_canonical,
     relay_feedback,
+    sliding_mode_control,
     structural_pounding,
     two_masses,
+    welander,
 )
 from filippov.problems.problem import Problem
 
@@ -19,14 +24,19 @@ __all__ = ["get", "names"]
 
 _MODULES = (
     biased_relay,
+    bouncing_ball,
+    buck_converter,
     dieci_lopez,
     disode_planar,
     drill_string,
     dry_friction,
+    friction_chain,
     ifdiff_canonical,
     relay_feedback,
+    sliding_mode_control,
     structural_pounding,
     two_masses,
+    welander,
 )
 _PROBLEMS: dict[str, Problem] = {problem.name: problem for module in _MODULES for problem in module.PROBLEMS}
 

@@ -250,10 +250,8 @@ impl<'a> IntersectionField<'a> {
         }
     }
 
-    /// Evaluates multipliers and exit functions at (t, x), after projection, and writes the field. Where there is
-    /// no root they are NaN.
-    fn solve(&mut self, t: f64, x: &mut [f64], dx: &mut [f64]) -> Result<(), FieldError> {
-        self.project(t, x)?;
+    /// Evaluates multipliers and exit functions at (t, x) and writes the field. Where there is no root they are NaN.
+    fn solve(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), FieldError> {
         self.is_rootless = false;
         if let Some(law) = &mut self.by_rule {
             let evaluated = (self.system, &self.signs[..]);
@@ -318,6 +316,16 @@ fn by_distance(tracked: &[(f64, Vec<f64>)], t: f64) -> Vec<&[f64]> {
 
 impl SmoothField for IntersectionField<'_> {
     fn eval(&mut self, t: f64, x: &mut [f64], dx: &mut [f64]) -> Result<(), FieldError> {
+        self.project(t, x)?;
+        self.solve(t, x, dx)
+    }
+
+    fn eval_unprojected(
+        &mut self,
+        t: f64,
+        x: &mut [f64],
+        dx: &mut [f64],
+    ) -> Result<(), FieldError> {
         self.solve(t, x, dx)
     }
 

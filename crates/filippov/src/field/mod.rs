@@ -40,6 +40,19 @@ pub trait SmoothField {
     /// If a function of the user raises.
     fn eval(&mut self, t: f64, x: &mut [f64], dx: &mut [f64]) -> Result<(), FieldError>;
 
+    /// As [`eval`](Self::eval), at the point as it is, beside the manifold too, as far as there is a field.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    fn eval_unprojected(
+        &mut self,
+        t: f64,
+        x: &mut [f64],
+        dx: &mut [f64],
+    ) -> Result<(), FieldError> {
+        self.eval(t, x, dx)
+    }
+
     /// Evaluations of the right-hand side so far.
     fn n_evaluations(&self) -> u64;
 }

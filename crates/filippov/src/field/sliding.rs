@@ -136,7 +136,19 @@ impl<'a> SlidingField<'a> {
 
 impl SmoothField for SlidingField<'_> {
     fn eval(&mut self, t: f64, x: &mut [f64], dx: &mut [f64]) -> Result<(), FieldError> {
-        let a = self.normal_components(t, x)?;
+        self.project(t, x)?;
+        self.eval_unprojected(t, x, dx)
+    }
+
+    /// Beside the surface h = 0 it is the field on h = constant.
+    #[inline(always)]
+    fn eval_unprojected(
+        &mut self,
+        t: f64,
+        x: &mut [f64],
+        dx: &mut [f64],
+    ) -> Result<(), FieldError> {
+        let a = self.normal_components_at(t, x)?;
         let weight_plus = a.weight_plus();
         let sides = self.sides.f_minus.iter().zip(&self.sides.f_plus);
         for (dx, (minus, plus)) in dx.iter_mut().zip(sides) {

@@ -181,7 +181,7 @@ impl Integrator<'_> {
             // There will be a search: the extension that it needs serves the filter too.
             self.extend()?;
         }
-        if self.stepper.is_taylor() {
+        if self.stepper.has_series() {
             return self.detect_along_series(dt);
         }
         self.collect_suspects(dt)?;
@@ -264,7 +264,9 @@ impl Integrator<'_> {
     /// be looked at after the first zero.
     fn detect_along_series(&mut self, dt: f64) -> Result<Option<Found>, FieldError> {
         self.measure_margin(dt)?;
-        self.prepare_bounds()?;
+        if self.motion.sliding.len() > 1 {
+            self.prepare_bounds()?;
+        }
         let mut found: Option<Found> = None;
         // What was searched for the first zero is all that the others are searched for.
         let mut reach = 1.0;

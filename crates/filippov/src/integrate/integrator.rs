@@ -22,6 +22,8 @@ use super::detect::Detector;
 use super::meeting::DecidedRoot;
 use super::motion::{ModeField, Motion};
 use super::pace::Pace;
+use super::stiff::Derivatives;
+use super::stiffness::Stiffness;
 use super::timetable::Timetable;
 use super::user_events::UserEvents;
 use super::{Stats, Stop, Warning};
@@ -33,7 +35,9 @@ use crate::mode::Mode;
 use crate::options::{Method, Options};
 use crate::recorder::Recorder;
 use crate::solution::Solution;
-use crate::stepper::{Attempt, Controller, ErrorScale, Stepper, Taylor};
+use crate::stepper::{
+    Attempt, Controller, Dop853, ErrorScale, Rodas5p, StepMethod, Stepper, Taylor,
+};
 use crate::system::PiecewiseSystem;
 use crate::tolerances::SHORTEST_STEP;
 
@@ -78,6 +82,9 @@ pub struct Integrator<'a> {
     pub(super) one_sided: bool,
     /// Some attempt of this run met such a point.
     pub(super) meets_edges: bool,
+    pub(super) stiffness: Stiffness,
+    /// How often the step was taken anew to end at an event.
+    pub(super) n_aims: usize,
     /// Largest recent step of this motion.
     pub(super) recent_dt: f64,
     /// The first of the last switches without progress of time, and how many came since.
@@ -104,7 +111,7 @@ impl<'a> Integrator<'a> {
         super::start::check(system, t_span, y0, options, actions)?;
         let n = system.n_states();
         let uses_series = match options.method {
-            Method::Dopri5 => false,
+            Method::Dopri5 | Method::Dop853 | Method::Rodas5p => false,
             Method::Taylor => true,
             Method::Auto => system.is_analytic(),
         };
@@ -113,6 +120,12 @@ impl<'a> Integrator<'a> {
             let order = Taylor::order_for(options.rtol, operations);
             Taylor::new(n, order)
         });
+        let mut stepper = Stepper::new(n, taylor);
+        match options.method {
+            Method::Rodas5p => stepper.rodas5p = Some(Box::new(Rodas5p::new(n))),
+            Method::Dop853 => stepper.dop853 = Some(Box::new(Dop853::new(n))),
+            Method::Auto | Method::Dopri5 | Method::Taylor => {}
+        }
         let undecided = Mode::new(vec![1; system.n_surfaces()]);
         Ok(Integrator {
             system,
@@ -128,7 +141,7 @@ impl<'a> Integrator<'a> {
             wanted_dt: 0.0,
             x: y0.to_vec(),
             motion: Motion::new(system, t_span.0, undecided, options.into(), actions),
-            stepper: Stepper::new(n, taylor),
+            stepper,
             controller: Controller::default(),
             dt: f64::NAN,
             paces: FxHashMap::default(),
@@ -140,6 +153,8 @@ impl<'a> Integrator<'a> {
             n_choices: 0,
             one_sided: false,
             meets_edges: false,
+            stiffness: Stiffness::default(),
+            n_aims: 0,
             recent_dt: 0.0,
             last_switch: (f64::NAN, 0),
             decided: DecidedRoot::default(),
@@ -202,6 +217,9 @@ impl<'a> Integrator<'a> {
             return self.reach_horizon();
         }
         self.expand()?;
+        if !matches!(self.motion.derivatives, Derivatives::None) {
+            self.linearise()?;
+        }
         let mut dt = self.dt.min(self.options.max_step);
         dt = self.aim_at_surface(dt);
         self.wanted_dt = 0.0;
@@ -256,9 +274,15 @@ impl<'a> Integrator<'a> {
     }
 
     fn attempt(&mut self, dt: f64) -> Result<Attempt, FieldError> {
-        if self.stepper.is_taylor() {
-            return self.attempt_series(dt);
+        match self.stepper.in_use() {
+            StepMethod::Taylor => self.attempt_series(dt),
+            StepMethod::Rodas5p => self.attempt_implicit(dt),
+            StepMethod::Dopri5 => self.attempt_explicit(dt),
+            StepMethod::Dop853 => self.attempt_dop853(dt),
         }
+    }
+
+    pub(super) fn attempt_explicit(&mut self, dt: f64) -> Result<Attempt, FieldError> {
         let (t, x, scale) = (self.t, &self.x, &self.scale);
         let stepper = &mut self.stepper.dopri5;
         match &mut self.motion.field {
@@ -293,6 +317,20 @@ impl<'a> Integrator<'a> {
         }
     }
 
+    fn attempt_dop853(&mut self, dt: f64) -> Result<Attempt, FieldError> {
+        let Some(dop853) = &mut self.stepper.dop853 else {
+            return Ok(Attempt::NotFinite);
+        };
+        let stages = &mut self.detector.stages;
+        let observe = |stage: usize, field: &ModeField| {
+            for (exit, value) in stages.iter_mut().zip(field.last_exits()) {
+                exit[stage] = value;
+            }
+        };
+        let field = &mut self.motion.field;
+        dop853.attempt(field, observe, self.t, &self.x, dt, &self.scale)
+    }
+
     /// Accepts the step, or its part up to the first event.
     fn advance(&mut self, dt: f64, error: f64) -> Result<Option<Stop>, FieldError> {
         let sliding = !self.motion.sliding().is_empty();
@@ -308,6 +346,10 @@ impl<'a> Integrator<'a> {
             return Ok(None);
         }
         let theta = found.as_ref().map_or(1.0, |event| event.theta);
+        let is_implicit = self.stepper.in_use() == StepMethod::Rodas5p;
+        if is_implicit && found.is_some() && self.aims_again(theta, dt) {
+            return Ok(None);
+        }
         let t_stop = if theta == 1.0 {
             t1
         } else {
@@ -322,9 +364,15 @@ impl<'a> Integrator<'a> {
             self.halve_step(dt);
             return Ok(None);
         };
+        self.n_aims = 0;
         self.stats.n_steps += 1;
         self.stats.n_steps_sliding += u64::from(sliding);
-        self.stats.n_steps_taylor += u64::from(self.stepper.is_taylor());
+        match self.stepper.in_use() {
+            StepMethod::Dopri5 => {}
+            StepMethod::Taylor => self.stats.n_steps_taylor += 1,
+            StepMethod::Rodas5p => self.stats.n_steps_rodas5p += 1,
+            StepMethod::Dop853 => self.stats.n_steps_dop853 += 1,
+        }
         self.dt = if self.stepper.is_taylor() {
             f64::INFINITY
         } else {
@@ -347,8 +395,13 @@ impl<'a> Integrator<'a> {
             self.recorder
                 .step(self.stepper.interpolant(), t1, self.stepper.end());
             self.note_zero_surfaces(t1)?;
+            let turns_stiff =
+                self.stiffness.is_due(self.stats.n_steps) && self.look_at_stiffness(dt)?;
             self.stepper.accept(&mut self.x);
             self.t = t1;
+            if turns_stiff {
+                self.go_on_implicitly();
+            }
             if self.detector.accept(&mut self.motion.monitored, dt) {
                 self.motion.note_departure();
             }
@@ -374,6 +427,7 @@ impl<'a> Integrator<'a> {
     /// Closes the books.
     pub fn finish(mut self, stop: Stop) -> Solution {
         self.stats.n_field_evaluations += self.motion.field.n_evaluations();
+        self.stats.stiff_since = self.stiffness.since;
         let (zeros, recorder) = (self.user_events.into_zeros(), self.recorder);
         recorder.finish(
             (self.t, &self.x, self.options.sliding),

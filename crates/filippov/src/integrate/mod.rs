@@ -25,6 +25,8 @@ mod spiral;
 mod start;
 mod stats;
 mod status;
+mod stiff;
+mod stiffness;
 mod timetable;
 mod transition;
 mod two_fold;

@@ -14,6 +14,8 @@ use crate::mode::{Mode, Signs};
 use crate::options::{Options, SlidingRule};
 use crate::system::{MotionJets, PiecewiseSystem};
 
+use super::stiff::Derivatives;
+
 /// The smooth field of a mode.
 pub(super) enum ModeField<'a> {
     Region(RegionField<'a>),
@@ -144,6 +146,20 @@ impl SmoothField for ModeField<'_> {
         }
     }
 
+    fn eval_unprojected(
+        &mut self,
+        t: f64,
+        x: &mut [f64],
+        dx: &mut [f64],
+    ) -> Result<(), FieldError> {
+        match self {
+            ModeField::Region(field) => field.eval(t, x, dx),
+            ModeField::Sliding(field) => field.eval_unprojected(t, x, dx),
+            ModeField::Intersection(field) => field.eval_unprojected(t, x, dx),
+            ModeField::Contact(field) => field.eval(t, x, dx),
+        }
+    }
+
     fn n_evaluations(&self) -> u64 {
         match self {
             ModeField::Region(field) => field.n_evaluations(),
@@ -188,6 +204,8 @@ pub(super) struct Motion<'a> {
     pub monitored: Vec<Monitored>,
     /// Its Taylor series, if it is integrated by them.
     pub jets: Option<Arc<MotionJets>>,
+    /// How it is linearised, if the method for stiff motions integrates it.
+    pub derivatives: Derivatives,
     /// It slides on several surfaces, some of them with static friction above kinetic.
     sticks: bool,
     law: Law<'a>,
@@ -220,6 +238,7 @@ impl<'a> Motion<'a> {
             current: 0,
             monitored: Vec::new(),
             jets: None,
+            derivatives: Derivatives::None,
             sticks: false,
             law,
             resting: SmallVec::new(),
@@ -351,6 +370,15 @@ impl<'a> Motion<'a> {
     /// Do bounds of the multipliers hold for the exit functions?
     pub fn has_bounds(&self) -> bool {
         !self.is_in_contact() && !self.sticks
+    }
+
+    /// Is its field the multilinear combination of the fields around the surfaces slid on?
+    pub fn has_canopy_field(&self) -> bool {
+        match &self.field {
+            ModeField::Contact(_) => false,
+            ModeField::Intersection(field) => field.rule() == SlidingRule::Canopy,
+            ModeField::Region(_) | ModeField::Sliding(_) => true,
+        }
     }
 
     /// Is the motion in contact at some surface?

@@ -5,6 +5,7 @@ use super::curve::{grazes, Curve};
 use super::integrator::Integrator;
 use crate::error::FieldError;
 use crate::event::certificate::Proof;
+use crate::event::filter::may_vanish_between;
 use crate::event::isolate::{first_zero_sampled, Bracket, Evidence, Sampled, Zero, PROBES};
 use crate::event::locate::{refine, Located};
 use crate::event::proved::{expected_zero_proved, first_zero_proved, Proved};
@@ -88,7 +89,7 @@ impl Integrator<'_> {
         let m = self.motion.monitored[index];
         let polynomial = match m.function {
             EventFunction::Surface(j) if self.is_polynomial(&m) => {
-                if self.stepper.is_taylor() {
+                if self.stepper.has_series() {
                     return self.search_series(index, (from, to), dt);
                 }
                 Polynomial::Nested(self.affine_rows(j, &m, dt)?)
@@ -144,7 +145,7 @@ impl Integrator<'_> {
         } else {
             self.prove_clear(index, value, reach)
         };
-        if proof == Proof::Clear {
+        if proof == Proof::Clear || proof == Proof::Silent && !self.exit_may_vanish(&m) {
             return Ok((None, reach));
         }
         let near = if has_series {
@@ -154,6 +155,14 @@ impl Integrator<'_> {
         };
         let bounded = (index, proof == Proof::Open);
         self.search_near(bounded, &Polynomial::None, near, reach, dt)
+    }
+
+    /// May an exit function about which there are no bounds vanish, to judge by its values at the stages?
+    fn exit_may_vanish(&self, m: &Monitored) -> bool {
+        let stages = m.function.exit_index();
+        let stages = stages.and_then(|index| self.detector.stages.get(index));
+        let is_known = m.deflation.is_none() && !self.stepper.is_taylor();
+        stages.is_none_or(|stages| !is_known || may_vanish_between(stages))
     }
 
     /// The only zero of a series, to rounding; `None` if rounding matters for whether it is one.

@@ -2,12 +2,13 @@
 
 use super::integrator::Integrator;
 use super::motion::{ModeField, Motion};
+use super::stiff::Derivatives;
 use super::{Warning, WarningCode};
 use crate::error::FieldError;
 use crate::event::Monitored;
 use crate::mode::Signs;
 use crate::options::Method;
-use crate::stepper::{reach as series_reach, Attempt};
+use crate::stepper::{reach as series_reach, Attempt, StepMethod};
 use crate::system::MotionJets;
 use crate::tolerances::{EPS, MOST_AUTO_SERIES, TAYLOR_SHORTEST};
 
@@ -15,6 +16,10 @@ impl Integrator<'_> {
     /// The motion that starts takes Taylor steps if the run may and the motion has series.
     pub(super) fn choose_stepper(&mut self) {
         self.motion.jets = None;
+        self.motion.derivatives = Derivatives::None;
+        if self.stepper.rodas5p.is_some() && self.motion.resting.is_empty() {
+            return self.start_implicit();
+        }
         // Whether a surface is left that h = 0 all along was expected of is seen at the ends of steps only.
         let may = !self.motion.is_in_contact()
             && self.motion.resting.is_empty()
@@ -30,7 +35,13 @@ impl Integrator<'_> {
                 jets.filter(|jets| !is_auto || is_cheap(jets))
             });
         }
-        self.stepper.use_taylor(self.motion.jets.is_some());
+        self.stepper.start_with(if self.motion.jets.is_some() {
+            StepMethod::Taylor
+        } else if self.stepper.dop853.is_some() {
+            StepMethod::Dop853
+        } else {
+            StepMethod::Dopri5
+        });
         if self.motion.jets.is_none() {
             self.note_missing_series();
         }
@@ -83,7 +94,7 @@ impl Integrator<'_> {
             self.dt = self.dt.min(allowed);
             return Ok(());
         }
-        self.stepper.leave_taylor();
+        self.stepper.go_on_with(StepMethod::Dopri5);
         self.motion.jets = None;
         self.note_missing_series();
         self.dt = f64::NAN;

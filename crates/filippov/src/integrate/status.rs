@@ -123,7 +123,8 @@ impl Stop {
             Stop::End => "The solver successfully reached the end of the integration interval.".into(),
             Stop::TerminalEvent(_) => "A termination event occurred.".into(),
             Stop::MaxSteps => format!(
-                "Stopped at t = {t:.10} in mode ({mode}): max_steps was reached. Raise max_steps, or loosen rtol and atol."
+                "Stopped at t = {t:.10} in mode ({mode}): max_steps was reached. Raise max_steps, or loosen rtol and atol; \
+                 for a stiff system use method=\"Rodas5P\"."
             ),
             Stop::MaxEvents => format!(
                 "Stopped at t = {t:.10} in mode ({mode}): max_events was reached. The switches may accumulate; look at the last ones."
@@ -134,7 +135,7 @@ impl Stop {
             Stop::Interrupted => format!("Interrupted at t = {t:.10} in mode ({mode})."),
             Stop::StepTooSmall => format!(
                 "Stopped at t = {t:.10} in mode ({mode}): the step became shorter than the rounding of time. \
-                 The field may be singular or stiff here, or jump without a declared surface."
+                 The field may be singular here, stiff (method=\"Rodas5P\"), or jump without a declared surface."
             ),
             Stop::NoProgress { surfaces } => format!(
                 "Stopped at t = {t:.10} in mode ({mode}): switches at {} follow one another without any progress of \
@@ -214,6 +215,8 @@ pub enum WarningCode {
     UndeclaredJump,
     /// Taylor series were asked for, and a motion has none.
     NoSeries,
+    /// Stability and not accuracy limits the steps of an explicit method.
+    Stiff,
     /// Sliding goes on at a root that is not stable for the scaling of the surfaces.
     Oscillation,
     /// A switching function is zero all along a motion.
@@ -227,6 +230,7 @@ impl WarningCode {
             WarningCode::NonUnique => "non_unique",
             WarningCode::UndeclaredJump => "undeclared_jump",
             WarningCode::NoSeries => "no_series",
+            WarningCode::Stiff => "stiff",
             WarningCode::Oscillation => "oscillation",
             WarningCode::ZeroSurface => "zero_surface",
         }

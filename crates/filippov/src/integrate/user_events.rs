@@ -121,7 +121,7 @@ impl Integrator<'_> {
     /// How many pieces of a step are searched one after the other for zeros of a user's function.
     fn sampled_pieces(&self, index: usize) -> u32 {
         let is_sampled = !self.user_events.events[index].function.has_bounds();
-        if is_sampled && self.stepper.is_taylor() {
+        if is_sampled && self.stepper.has_series() {
             PIECES_OF_SERIES
         } else {
             1

@@ -64,6 +64,8 @@ pub struct SparseSolver {
     n_orderings: usize,
     /// Relative errors of the entries, beside rounding.
     noise: f64,
+    /// Only a pivot that is zero is singular.
+    takes_all_pivots: bool,
     /// Of factors that other orderings replaced.
     n_operations_before: usize,
 }
@@ -74,6 +76,15 @@ impl SparseSolver {
     pub fn with_noise(noise: f64) -> Self {
         SparseSolver {
             noise,
+            ..SparseSolver::default()
+        }
+    }
+
+    /// A solver that goes on at every pivot but zero: for matrices that have an inverse, however far apart the sizes
+    /// are that they are made of, as 1/dt and the fastest rate of a stiff field.
+    pub fn for_all_pivots() -> Self {
+        SparseSolver {
+            takes_all_pivots: true,
             ..SparseSolver::default()
         }
     }
@@ -97,7 +108,11 @@ impl SparseSolver {
                     factor.add(i, self.place[column], scaled);
                 }
             }
-            let threshold = self.noise.max(SINGULAR_PIVOT * block.largest as f64);
+            let threshold = if self.takes_all_pivots {
+                0.0
+            } else {
+                self.noise.max(SINGULAR_PIVOT * block.largest as f64)
+            };
             if let Err(null) = factor.factor(threshold) {
                 let scaled = component.unknowns.iter().zip(null);
                 return Err(Singular {

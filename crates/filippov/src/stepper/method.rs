@@ -1,25 +1,64 @@
 //! The stepper of a run: the methods that it may use, and which of them takes the current step.
 
-use super::{Dopri5, ErrorScale, Interpolant, Taylor};
+use super::{Dop853, Dopri5, ErrorScale, Interpolant, Rodas5p, Taylor};
 use crate::error::FieldError;
 use crate::field::SmoothField;
 
-/// One method per motion; each keeps the last step that it took.
+/// The method that takes a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StepMethod {
+    /// The Runge-Kutta pair of Dormand and Prince, of order 5.
+    Dopri5,
+    /// That of order 8.
+    Dop853,
+    /// Taylor series.
+    Taylor,
+    /// The Rosenbrock-Wanner method of Steinebach.
+    Rodas5p,
+}
+
+/// The methods of a run; each keeps the last step that it took. DOPRI5 is always there: it takes over where another
+/// method cannot go on.
 pub struct Stepper {
     /// The Runge-Kutta method.
     pub dopri5: Dopri5,
     /// The Taylor method, where the run may use it.
     pub taylor: Option<Box<Taylor>>,
-    is_taylor: bool,
+    /// The Runge-Kutta method of order 8, where the run uses it.
+    pub dop853: Option<Box<Dop853>>,
+    /// The method for stiff motions, where the run may use it.
+    pub rodas5p: Option<Box<Rodas5p>>,
+    in_use: StepMethod,
 }
 
 /// Calls the method in use.
 macro_rules! in_use {
     ($self:ident, $method:ident => $call:expr) => {
-        match &$self.taylor {
-            Some($method) if $self.is_taylor => $call,
+        match (&$self.taylor, &$self.rodas5p, &$self.dop853) {
+            (Some($method), ..) if $self.in_use == StepMethod::Taylor => $call,
+            _ if $self.in_use == StepMethod::Dopri5 => {
+                let $method = &$self.dopri5;
+                $call
+            }
+            (_, Some($method), _) if $self.in_use == StepMethod::Rodas5p => $call,
+            (_, _, Some($method)) if $self.in_use == StepMethod::Dop853 => $call,
             _ => {
                 let $method = &$self.dopri5;
+                $call
+            }
+        }
+    };
+    (mut $self:ident, $method:ident => $call:expr) => {
+        match (&mut $self.taylor, &mut $self.rodas5p, &mut $self.dop853) {
+            (Some($method), ..) if $self.in_use == StepMethod::Taylor => $call,
+            _ if $self.in_use == StepMethod::Dopri5 => {
+                let $method = &mut $self.dopri5;
+                $call
+            }
+            (_, Some($method), _) if $self.in_use == StepMethod::Rodas5p => $call,
+            (_, _, Some($method)) if $self.in_use == StepMethod::Dop853 => $call,
+            _ => {
+                let $method = &mut $self.dopri5;
                 $call
             }
         }
@@ -32,27 +71,46 @@ impl Stepper {
         Stepper {
             dopri5: Dopri5::new(n),
             taylor: taylor.map(Box::new),
-            is_taylor: false,
+            dop853: None,
+            rodas5p: None,
+            in_use: StepMethod::Dopri5,
         }
+    }
+
+    /// The method in use.
+    pub fn in_use(&self) -> StepMethod {
+        self.in_use
     }
 
     /// Does the Taylor method take the steps?
     pub fn is_taylor(&self) -> bool {
-        self.is_taylor
+        self.in_use == StepMethod::Taylor
     }
 
-    /// Lets the Taylor method take the steps of the motion that starts, or not.
-    pub fn use_taylor(&mut self, is_taylor: bool) {
-        self.is_taylor = is_taylor && self.taylor.is_some();
+    /// Is the continuous extension a polynomial in powers of theta that is there as soon as the step is?
+    pub fn has_series(&self) -> bool {
+        self.in_use != StepMethod::Dopri5
     }
 
-    /// Leaves the rest of a motion to the Runge-Kutta method.
-    pub fn leave_taylor(&mut self) {
-        if let (true, Some(taylor)) = (self.is_taylor, &self.taylor) {
-            let start = taylor.start_derivative();
-            self.dopri5.start_derivative_mut().copy_from_slice(start);
+    /// Lets a method take the steps of the motion that starts; DOPRI5 where it is not there.
+    pub fn start_with(&mut self, method: StepMethod) {
+        let is_there = match method {
+            StepMethod::Dopri5 => true,
+            StepMethod::Taylor => self.taylor.is_some(),
+            StepMethod::Rodas5p => self.rodas5p.is_some(),
+            StepMethod::Dop853 => self.dop853.is_some(),
+        };
+        self.in_use = if is_there { method } else { StepMethod::Dopri5 };
+    }
+
+    /// Leaves the rest of a motion to another method.
+    pub fn go_on_with(&mut self, method: StepMethod) {
+        if method == self.in_use {
+            return;
         }
-        self.is_taylor = false;
+        let start = self.start_derivative().to_vec();
+        self.start_with(method);
+        self.start_derivative_mut().copy_from_slice(&start);
     }
 
     /// The derivative at the start of the step.
@@ -62,10 +120,7 @@ impl Stepper {
 
     /// The derivative at the start of the step, to be replaced.
     pub fn start_derivative_mut(&mut self) -> &mut [f64] {
-        match &mut self.taylor {
-            Some(taylor) if self.is_taylor => taylor.start_derivative_mut(),
-            _ => self.dopri5.start_derivative_mut(),
-        }
+        in_use!(mut self, method => method.start_derivative_mut())
     }
 
     /// The end of the attempted step.
@@ -85,22 +140,19 @@ impl Stepper {
 
     /// Makes the end of the attempted step the start of the next one.
     pub fn accept(&mut self, y: &mut [f64]) {
-        match &mut self.taylor {
-            Some(taylor) if self.is_taylor => taylor.accept(y),
-            _ => self.dopri5.accept(y),
-        }
+        in_use!(mut self, method => method.accept(y));
     }
 
     /// Makes the extension that costs nothing available.
     pub fn extend_order4(&mut self, y: &[f64]) {
-        if !self.is_taylor {
+        if !self.has_series() {
             self.dopri5.extend_order4(y);
         }
     }
 
     /// Is the extension as accurate as the step?
     pub fn is_extended(&self) -> bool {
-        self.is_taylor || self.dopri5.has_order5()
+        self.has_series() || self.dopri5.has_order5()
     }
 
     /// Makes the extension as accurate as the step.
@@ -116,20 +168,31 @@ impl Stepper {
 
     /// Estimated error of the extension beyond the end of the step, in units of the tolerance.
     pub fn extension_defect(&self, theta: f64, scale: &ErrorScale) -> f64 {
-        match &self.taylor {
-            Some(taylor) if self.is_taylor => taylor.extrapolation_error(theta),
+        match (&self.taylor, &self.rodas5p, &self.dop853) {
+            (Some(taylor), ..) if self.is_taylor() => taylor.extrapolation_error(theta),
+            (_, Some(rodas5p), _) if self.in_use == StepMethod::Rodas5p => {
+                rodas5p.extrapolation_error(theta, scale)
+            }
+            (_, _, Some(dop853)) if self.in_use == StepMethod::Dop853 => {
+                dop853.extrapolation_error(theta, scale)
+            }
             _ => self.dopri5.extension_defect(theta, scale),
         }
     }
 
-    /// Does the field jump within the attempted step? A series has no jumps.
+    /// Does the field jump within the attempted step? A series has no jumps, and over the stages of a stiff step the
+    /// field changes as fast without any.
     pub fn field_jumps(&self) -> bool {
-        !self.is_taylor && self.dopri5.field_jumps()
+        match (self.in_use, &self.dop853) {
+            (StepMethod::Dopri5, _) => self.dopri5.field_jumps(),
+            (StepMethod::Dop853, Some(dop853)) => dop853.field_jumps(),
+            _ => false,
+        }
     }
 
     /// Makes the continuous extension a straight line: the record of a motion that was not stepped.
     pub fn set_straight(&mut self, t: f64, dt: f64, from: &[f64], to: &[f64]) {
-        self.is_taylor = false;
+        self.in_use = StepMethod::Dopri5;
         self.dopri5.set_straight(t, dt, from, to);
     }
 }

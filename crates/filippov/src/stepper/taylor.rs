@@ -1,11 +1,14 @@
 //! The Taylor method: the coefficients of the motion are the step, its continuous extension and its error.
 
+use smallvec::SmallVec;
+
 use super::controller::{rough_exp2, rough_log2};
 use super::{Attempt, ErrorScale, Interpolant};
 use crate::error::FieldError;
 use crate::field::SmoothField;
 use crate::tolerances::{
-    TAYLOR_DEAR, TAYLOR_LARGEST_ORDER, TAYLOR_ORDER_CHEAP, TAYLOR_ORDER_DEAR, TAYLOR_SHARE,
+    TAYLOR_DEAR, TAYLOR_LARGEST_ORDER, TAYLOR_NOISE, TAYLOR_ORDER_CHEAP, TAYLOR_ORDER_DEAR,
+    TAYLOR_SHARE, TAYLOR_SLOW,
 };
 
 /// A Taylor step of variable length.
@@ -242,6 +245,25 @@ impl Taylor {
         }
         self.y1.copy_from_slice(&y1);
         self.defect.copy_from_slice(&slope);
+    }
+
+    /// The end of the step without the last term of the series, if the velocity hardly changes over the step, however
+    /// many terms there are: an analytic motion would allow a far longer one.
+    pub fn slow_end_without_last(
+        &self,
+        y: &[f64],
+        scale: &ErrorScale,
+    ) -> Option<SmallVec<[f64; 16]>> {
+        let mut rows = self.interpolant.coefficients().chunks_exact(self.n);
+        let velocity = scale.norm(rows.nth(1)?, y);
+        let change: f64 = rows
+            .zip(2..)
+            .map(|(row, k)| f64::from(k) * scale.norm(row, y))
+            .sum();
+        let last = &self.interpolant.coefficients()[self.order * self.n..];
+        let is_slow = change < TAYLOR_SLOW * velocity + TAYLOR_NOISE;
+        (is_slow && scale.norm(last, y) > 0.0)
+            .then(|| self.y1.iter().zip(last).map(|(y, c)| y - c).collect())
     }
 
     /// The factor for another attempt after one with this error was rejected.

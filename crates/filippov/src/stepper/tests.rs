@@ -1,4 +1,8 @@
-//! Order conditions of the tableau and of the continuous extensions.
+//! Order conditions of DOPRI5 and of its continuous extensions; those of the other methods in their own files.
+
+mod dop853;
+mod rodas5p;
+mod trees;
 
 use super::coefficients_dopri5::{A2, A3, A4, A5, A6, A8, A9, B, C, C8, C9, D, E};
 use super::{Attempt, Dopri5, ErrorScale};

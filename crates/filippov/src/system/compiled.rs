@@ -9,6 +9,7 @@ use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 
 use super::affine_model::AffineModel;
+use super::jacobian::MotionJacobian;
 use super::jets::MotionJets;
 use super::tiered::{compile, Tiered, TieredProgram};
 use super::Word;
@@ -50,6 +51,7 @@ pub(super) struct Model {
     /// Surfaces whose sign something depends on: the field, or another surface that matters.
     switching: OnceLock<Vec<bool>>,
     jets: Mutex<JetsCache>,
+    jacobians: Mutex<JacobianCache>,
     /// Active surfaces of the modes met so far; a zero entry is the surface slid on.
     activity: Mutex<FxHashMap<SmallVec<[i8; 16]>, Vec<bool>>>,
 }
@@ -75,6 +77,12 @@ struct LieCache {
 
 /// Taylor coefficients of the motions met so far, by surfaces slid on and order.
 type JetsCache = FxHashMap<(SmallVec<[usize; 2]>, usize), Option<Arc<MotionJets>>>;
+
+/// Derivatives of the fields of the motions met so far, by surfaces slid on.
+type JacobianCache = FxHashMap<SmallVec<[usize; 2]>, Option<Arc<MotionJacobian>>>;
+
+/// Sets of surfaces whose derivatives are kept: a run over more of them finds some anew now and then.
+const MOST_JACOBIANS: usize = 64;
 
 /// Output 0 is the derivative, the others its terms.
 pub(super) struct LieProgram {
@@ -115,6 +123,7 @@ impl Model {
             switching: OnceLock::new(),
             lie: Mutex::new(LieCache::default()),
             jets: Mutex::default(),
+            jacobians: Mutex::default(),
             activity: Mutex::default(),
             rates_program: OnceLock::new(),
             affine_signs: OnceLock::new(),
@@ -327,6 +336,23 @@ impl Model {
         let made = known.entry((SmallVec::from_slice(sliding), order));
         made.or_insert_with(|| {
             MotionJets::new(&self.graph, &self.field, sliding, order, self.backend).map(Arc::new)
+        })
+        .clone()
+    }
+
+    /// Derivatives of the field of the motions on these surfaces.
+    pub fn motion_jacobian(&self, sliding: &[usize]) -> Option<Arc<MotionJacobian>> {
+        let mut known = self
+            .jacobians
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        let key = SmallVec::from_slice(sliding);
+        if known.len() >= MOST_JACOBIANS && !known.contains_key(&key) {
+            known.clear();
+        }
+        let made = known.entry(key);
+        made.or_insert_with(|| {
+            MotionJacobian::new(&self.graph, &self.field, sliding, self.backend).map(Arc::new)
         })
         .clone()
     }

@@ -4,6 +4,7 @@
 use filippov_expr::{Backend, Gradient, Graph, Multipliers, NodeId};
 use smallvec::SmallVec;
 
+use super::blended::Blended;
 use super::tiered::TieredProgram;
 use crate::switching::invert;
 use crate::tolerances::LARGEST_SERIES_BLOCK;
@@ -27,38 +28,19 @@ impl MultiplierEquations {
         surfaces: &[usize],
         backend: Backend,
     ) -> Option<(Self, Vec<NodeId>, Multipliers)> {
-        let signs: Vec<u32> = surfaces.iter().map(|&j| j as u32).collect();
-        let dependence = graph.sign_dependence(field, &signs);
-        if dependence.surfaces != signs {
-            return None;
-        }
+        let blended = Blended::new(graph, field, surfaces)?;
         let zero = graph.constant(0.0);
-        let mut sliding = dependence.values.clone();
-        let mut equations = Vec::new();
-        let mut derivatives = Vec::new();
-        for &j in &signs {
-            let Gradient { time, states } = graph.gradient(graph.surface(j));
-            let mut nodes = vec![time];
-            nodes.extend(states.iter().map(|s| s.1));
-            let bends = graph.sign_dependence(&nodes, &signs).derivatives;
-            if bends.iter().any(|b| !b.is_empty()) {
-                return None;
-            }
-            let (mut rate, mut row) = (time, vec![zero; signs.len()]);
-            for &(i, partial) in &states {
-                let term = graph.mul(partial, dependence.values[i as usize]);
-                rate = graph.add(rate, term);
-                for &(k, derivative) in &dependence.derivatives[i as usize] {
-                    let place = signs.binary_search(&k).ok()?;
-                    let term = graph.mul(partial, derivative);
-                    row[place] = graph.add(row[place], term);
-                }
-            }
+        let mut sliding = blended.values;
+        let (mut equations, mut derivatives) = (Vec::new(), Vec::new());
+        for (&j, (rate, by_sign)) in surfaces.iter().zip(&blended.rates) {
+            let Gradient { time, states } = graph.gradient(graph.surface(j as u32));
             // On a surface x_i = constant the state x_i stands still; computed, that would be so up to rounding.
             if let ([(i, _)], true) = (&states[..], time == zero) {
                 sliding[*i as usize] = zero;
             }
-            equations.push(rate);
+            let mut row = vec![zero; surfaces.len()];
+            by_sign.iter().for_each(|&(place, node)| row[place] = node);
+            equations.push(*rate);
             derivatives.push(row);
         }
         let blocks = tied_together(&derivatives, zero);
@@ -71,7 +53,7 @@ impl MultiplierEquations {
         let mut outputs = equations.clone();
         let mut input = 0..;
         let mut next = |graph: &mut Graph| graph.input(input.next().expect("there is no end"));
-        let signs = signs.iter().map(|&j| (j, next(graph))).collect();
+        let signs = surfaces.iter().map(|&j| (j as u32, next(graph))).collect();
         let mut inverse = vec![Vec::new(); surfaces.len()];
         for block in &blocks {
             for &row in block {

@@ -7,10 +7,12 @@
 mod activity;
 mod affine;
 mod affine_model;
+mod blended;
 mod both_sides;
 mod closures;
 mod compiled;
 mod discrete;
+mod jacobian;
 mod jet_multipliers;
 mod jets;
 mod laws;
@@ -22,6 +24,7 @@ pub(crate) use activity::surfaces_that_matter;
 pub use affine::{AffineParts, AffineSigns, SingularSliding};
 pub use both_sides::BothSides;
 pub use closures::ClosureSystem;
+pub use jacobian::MotionJacobian;
 pub use jets::MotionJets;
 pub use laws::{Law, LawAction, LawMap, Laws};
 pub use map::TracedMap;
@@ -32,6 +35,7 @@ use std::sync::Arc;
 use filippov_expr::{Enclosure, Motion};
 
 use crate::error::FieldError;
+use crate::stepper::Linearisation;
 use crate::tolerances::EPS;
 
 /// The value of a Lie derivative and the sum of the magnitudes that make it up.
@@ -295,6 +299,26 @@ pub trait PiecewiseSystem: Sync {
     fn eval_jets(&self, jets: &MotionJets, t: f64, x: &[f64], signs: &[f64], out: &mut [f64]) {
         let _ = (jets, t, x, signs);
         out.fill(f64::NAN);
+    }
+
+    /// The derivatives of the field of the motions on these surfaces, in a region if there are none; `None` if the
+    /// system has them by differences only.
+    fn motion_jacobian(&self, sliding: &[usize]) -> Option<Arc<MotionJacobian>> {
+        let _ = sliding;
+        None
+    }
+
+    /// Writes these derivatives at a point; entries of `signs` on the surfaces slid on are their multipliers.
+    fn eval_jacobian(
+        &self,
+        jacobian: &MotionJacobian,
+        t: f64,
+        x: &[f64],
+        signs: &[f64],
+        out: &mut Linearisation,
+    ) {
+        let _ = (jacobian, t, x, signs);
+        out.fill(|values, _| values.fill(f64::NAN));
     }
 
     /// These surfaces (increasing) in groups such that the field is a sum of functions of the signs of one group

@@ -1,16 +1,20 @@
 //! A system given by a traced expression graph.
 
+mod affine;
+
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use filippov_expr::{Backend, Enclosure, ExprError, Graph, Interval, Motion, Names, NodeId};
+use filippov_expr::{Backend, Enclosure, ExprError, Graph, Motion, Names, NodeId};
 
 use super::compiled::{CompiledGradient, GradientValues, Model};
 use super::discrete::DiscreteStates;
 use super::{
-    AffineParts, AffineSigns, BothSides, LieValue, MotionJets, PiecewiseSystem, RatePartials, Word,
+    AffineSigns, BothSides, LieValue, MotionJacobian, MotionJets, PiecewiseSystem, RatePartials,
+    Word,
 };
 use crate::error::FieldError;
+use crate::stepper::Linearisation;
 use crate::tolerances::{MAX_LIE_ORDER, TANGENT};
 
 /// Up to that many states both sides of a surface are compiled into one program; the programs of
@@ -402,6 +406,21 @@ impl PiecewiseSystem for TracedSystem {
         self.with_values(|p| jets.eval(t, x, signs, p, out));
     }
 
+    fn motion_jacobian(&self, sliding: &[usize]) -> Option<Arc<MotionJacobian>> {
+        self.model.motion_jacobian(sliding)
+    }
+
+    fn eval_jacobian(
+        &self,
+        jacobian: &MotionJacobian,
+        t: f64,
+        x: &[f64],
+        signs: &[f64],
+        out: &mut Linearisation,
+    ) {
+        self.with_values(|p| jacobian.eval(t, x, signs, p, out));
+    }
+
     fn sign_groups(&self, surfaces: &[usize]) -> Vec<Vec<usize>> {
         self.model.affine_signs().groups(surfaces)
     }
@@ -450,46 +469,5 @@ impl PiecewiseSystem for TracedSystem {
         self.model
             .graph
             .text(self.model.graph.surface(j as u32), &self.model.names)
-    }
-}
-
-impl AffineSigns for TracedSystem {
-    fn affine_parts(&self, surfaces: &[usize]) -> Option<AffineParts> {
-        self.model.affine_signs().parts(surfaces)
-    }
-
-    fn fill_affine_parts(
-        &self,
-        t: f64,
-        x: &[f64],
-        signs: &[f64],
-        parts: &mut AffineParts,
-    ) -> Result<u64, FieldError> {
-        let compiled = self.model.affine_signs();
-        if !self.model.has_sticking() {
-            self.with_values(|p| compiled.fill(t, x, signs, p, parts));
-            return Ok(1);
-        }
-        let mut stretched = signs.to_vec();
-        let ratios: Vec<f64> = parts
-            .surfaces()
-            .iter()
-            .map(|&j| self.stick_ratio(j, t, x, signs))
-            .collect();
-        for (&j, ratio) in parts.surfaces().iter().zip(&ratios) {
-            stretched[j] *= ratio;
-        }
-        self.with_values(|p| compiled.fill(t, x, &stretched, p, parts));
-        parts.stretch(&ratios);
-        Ok(1)
-    }
-
-    fn is_steady(&self, j: usize) -> bool {
-        !self.model.sticks_at(j) && self.model.affine_signs().is_steady(j)
-    }
-
-    fn enclose_rate(&self, j: usize, motion: &dyn Motion, signs: &[f64]) -> Option<Interval> {
-        let model = self.model.affine_signs();
-        self.with_values(|p| model.enclose_rate(j, motion, signs, p))
     }
 }

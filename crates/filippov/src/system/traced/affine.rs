@@ -1,0 +1,48 @@
+//! A traced system whose field is affine in signs.
+
+use filippov_expr::{Interval, Motion};
+
+use super::TracedSystem;
+use crate::error::FieldError;
+use crate::system::{AffineParts, AffineSigns, PiecewiseSystem};
+
+impl AffineSigns for TracedSystem {
+    fn affine_parts(&self, surfaces: &[usize]) -> Option<AffineParts> {
+        self.model.affine_signs().parts(surfaces)
+    }
+
+    fn fill_affine_parts(
+        &self,
+        t: f64,
+        x: &[f64],
+        signs: &[f64],
+        parts: &mut AffineParts,
+    ) -> Result<u64, FieldError> {
+        let compiled = self.model.affine_signs();
+        if !self.model.has_sticking() {
+            self.with_values(|p| compiled.fill(t, x, signs, p, parts));
+            return Ok(1);
+        }
+        let mut stretched = signs.to_vec();
+        let ratios: Vec<f64> = parts
+            .surfaces()
+            .iter()
+            .map(|&j| self.stick_ratio(j, t, x, signs))
+            .collect();
+        for (&j, ratio) in parts.surfaces().iter().zip(&ratios) {
+            stretched[j] *= ratio;
+        }
+        self.with_values(|p| compiled.fill(t, x, &stretched, p, parts));
+        parts.stretch(&ratios);
+        Ok(1)
+    }
+
+    fn is_steady(&self, j: usize) -> bool {
+        !self.model.sticks_at(j) && self.model.affine_signs().is_steady(j)
+    }
+
+    fn enclose_rate(&self, j: usize, motion: &dyn Motion, signs: &[f64]) -> Option<Interval> {
+        let model = self.model.affine_signs();
+        self.with_values(|p| model.enclose_rate(j, motion, signs, p))
+    }
+}

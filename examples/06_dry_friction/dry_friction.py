@@ -1,0 +1,67 @@
+"""A forced oscillator with dry friction: three attractors, with 0, 2 and 4 sticking phases per period.
+
+    y'' = -y + sin(omega t) - F sign(y'),    F = 0.4
+
+At 1 / omega = 0.5 the mass never sticks; at 3 it sticks twice in every period of the forcing, at 6 four
+times. Each panel starts on the attractor, at the fixed point of the map over one period, which the
+reference has to 33 digits; the return to it and the time of every switch are compared.
+
+Piiroinen and Kuznetsov, ACM Trans. Math. Softw. 34 (2008) 13, figure 4 (b) to (d).
+Run it with ``python examples/06_dry_friction/dry_friction.py [picture.png]``.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+
+import filippov as fl
+from filippov.problems import compare
+from filippov.problems.dry_friction import rhs
+from matplotlib import pyplot
+
+oscillator = fl.System(rhs, n=2, params={"F": 0.4, "omega": 2.0}, states=("y", "v"))
+
+# omega, fixed point, times of the switches in one period
+ATTRACTORS = {
+    "I": (2.0, (-0.1366563145999495, -0.4877812284666835), (0.46364760900081, 2.0344439357957)),
+    "II": (
+        1 / 3,
+        (-0.7212678832062929, 0.3570302433858537),
+        (3.6239082266624, 7.69663732181796, 13.04868618743178, 17.12141528258734),
+    ),
+    "III": (
+        1 / 6,
+        (-0.5374500018259063, 0.2544629167250998),
+        (
+            *(3.66297163454682, 4.38493718980687, 9.03529006957802, 16.67212362157611),
+            *(22.51252755608558, 23.23449311134563, 27.88484599111678, 35.52167954311486),
+        ),
+    ),
+}
+PHASES_OF_STICKING = {"I": 0, "II": 2, "III": 4}
+
+
+def main(path: Path) -> None:
+    figure, axes = pyplot.subplots(3, 1, figsize=(8.0, 8.4), layout="constrained")
+    for ax, (name, (omega, start, times)) in zip(axes, ATTRACTORS.items(), strict=True):
+        period = 2 * math.pi / omega
+        once = oscillator.solve((0.0, period), start, omega=omega, rtol=1e-12, atol=1e-12)
+        numbers = {
+            f"{state} after a period": (end, begin)
+            for state, end, begin in zip("yv", once.y[:, -1], start, strict=True)
+        }
+        numbers |= {f"switch {k}": pair for k, pair in enumerate(zip(once.switches.t, times, strict=True))}
+        sticks = sum(segment.mode.is_sliding for segment in once.segments)
+        assert sticks == PHASES_OF_STICKING[name]
+        print(f"attractor {name}, 1/omega = {1 / omega:g}: {sticks} phases of sticking")
+        print(compare(numbers), end="\n\n")
+        twice = oscillator.solve((0.0, 2 * period), start, omega=omega)
+        twice.plot(ax=ax)
+        ax.set_title(f"{name}: 1/omega = {1 / omega:g}", loc="left", fontsize="medium")
+    figure.savefig(path, dpi=150)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else "dry_friction.png"))

@@ -1,0 +1,48 @@
+"""Sliding on a curved surface, next to which the field is not smooth: problem 1 of DISODE45.
+
+    z' = -y1 + u,    z = y1',    u = -sign(g) / (1 + |g|^1.5),    g = z - 0.2
+
+In the coordinates of the paper, y2 = z + sin(2 y1), the surface is curved. After one crossing the motion
+slides, leaves at y1 = 1 every time, and comes back: a limit cycle. Switches and the last state are
+compared with a reference of 28 digits.
+
+Calvo, Montijano and Randez, DISODE45, problem 1 and figure 1.
+Run it with ``python examples/09_curved_surface/curved_surface.py [picture.png]``.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import filippov as fl
+from filippov.problems import compare
+from filippov.problems.disode_planar import rhs
+from matplotlib import pyplot
+
+problem = fl.problems.get("disode_planar")
+planar = fl.System(rhs, n=2, states=("y1", "y2"))
+
+
+def main(path: Path) -> None:
+    solution = planar.solve(problem.t_span, problem.y0, rtol=1e-12, atol=1e-12)
+    switches = solution.switches
+    leaves = [switch for switch in switches if switch.kind == "exit_sliding"]
+    numbers = {
+        "crossing": (switches.t[0], 0.72319254000173446),
+        "sliding begins": (switches.t[1], 1.49648739807384107),
+        "and ends": (leaves[0].t, 11.0833774352252212),
+        "sliding ends last": (leaves[-1].t, 28.7038242778696962),
+        "y1(30)": (solution.y[0, -1], 1.18711949824875850),
+        "y2(30)": (solution.y[1, -1], 0.72840521638541747),
+    }
+    numbers |= {f"y1 where it leaves, {k}": (switch.y_before[0], 1.0) for k, switch in enumerate(leaves)}
+    print(compare(numbers))
+    figure, ax = pyplot.subplots(figsize=(7.4, 4.6), layout="constrained")
+    fl.plot.phase(solution, ax=ax)
+    fl.plot.surface(fl.surface_parts(planar, [(-1.3, 1.6), (-2.2, 1.6)], points=161), ax=ax)
+    figure.savefig(path, dpi=150)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else "curved_surface.png"))

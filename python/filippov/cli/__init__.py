@@ -1,0 +1,66 @@
+"""The command line: ``filippov``, or ``python -m filippov``.
+
+Exit codes: 0 all went well; 1 the run failed, and what it computed was written; 2 a mistake in the command or
+in the model, said in one line; 130 Ctrl-C.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+from filippov.cli.mistakes import Mistake
+from filippov.cli.parser import build_parser
+from filippov.errors import FilippovError, Interrupted
+
+__all__ = ["main"]
+
+FAILED, MISTAKE, INTERRUPTED = 1, 2, 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command and return its exit code.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        What follows the name of the program; by default ``sys.argv[1:]``.
+
+    Returns
+    -------
+    int
+
+    Examples
+    --------
+    >>> from filippov.cli import main
+    >>> main(["list", "biased"])
+    biased_relay                  enters x = 0 at t = 1/0.7 and stays
+    0
+    """
+    parser = build_parser()
+    given = parser.parse_args(arguments)
+    if given.run is None:
+        parser.print_help()
+        return 0
+    try:
+        code: int = given.run(given)
+    except (Mistake, FilippovError) as error:
+        if given.debug:
+            raise
+        print(f"filippov: {error}", file=sys.stderr)
+        return MISTAKE
+    except ImportError as error:
+        if given.debug or "pip install" not in str(error):
+            raise
+        print(f"filippov: {error}", file=sys.stderr)
+        return MISTAKE
+    except OSError as error:
+        if given.debug:
+            raise
+        where = f"{error.filename}: " if error.filename else ""
+        print(f"filippov: {where}{error.strerror or error}", file=sys.stderr)
+        return MISTAKE
+    except (Interrupted, KeyboardInterrupt) as error:
+        print(f"filippov: interrupted. {error}", file=sys.stderr)
+        return INTERRUPTED
+    return code

@@ -1,0 +1,192 @@
+"""What the commands do."""
+
+from __future__ import annotations
+
+import argparse
+import inspect
+import sys
+from importlib.metadata import PackageNotFoundError
+from importlib.metadata import version as installed_version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from filippov import problems
+from filippov.cli.mistakes import Mistake
+from filippov.cli.model import Model, load_model, of_problem
+from filippov.cli.solving import initial_state, interval, options_of_run, parameters
+from filippov.cli.tables import write_csv, write_parquet
+from filippov.solution import Solution
+
+__all__ = ["demo", "list_problems", "solve", "version"]
+
+_PICTURES = (".png", ".pdf", ".svg", ".jpg", ".eps")
+
+
+def version() -> str:
+    """Return the version that is installed."""
+    try:
+        return installed_version("filippov")
+    except PackageNotFoundError:
+        return "(not installed)"
+
+
+def list_problems(given: argparse.Namespace) -> int:
+    """Print the names of the reference problems, with what happens in them."""
+    text = given.text.lower()
+    found = [problems.get(name) for name in problems.names()]
+    shown = [p for p in found if text in p.name.lower() or text in p.note.lower()]
+    if not shown:
+        raise Mistake(f"no problem has {given.text!r} in its name or note")
+    for problem in shown:
+        print(f"{problem.name:28s}  {problem.note}")
+    return 0
+
+
+def demo(given: argparse.Namespace) -> int:
+    """Solve a reference problem, print where it comes from and what happened, and draw it."""
+    model = of_problem(given.name)
+    problem = problems.get(given.name)
+    module = inspect.getmodule(problem.fun)
+    print(inspect.getdoc(module) or problem.note)
+    print(f"\n{problem.name}: {problem.note}\n")
+    if not given.no_plot:
+        path = given.plot or Path(f"{problem.name}.png")
+        _check_picture(path)
+    solution = problem.solve()
+    _print(solution, model, {})
+    if not given.no_plot:
+        _draw(solution, path, None, None, given.dark, problem.name)
+    return _closed(solution)
+
+
+def solve(given: argparse.Namespace) -> int:
+    """Solve a model; print, draw and save what happened."""
+    model = load_model(given.model, given.system)
+    values = parameters(given, model)
+    start, end = interval(given, model)
+    y0 = initial_state(given, model)
+    options = options_of_run(given)
+    if given.points is not None:
+        if given.points < 2:
+            raise Mistake(f"--points: at least 2 are needed, not {given.points}")
+        options["t_eval"] = np.linspace(start, end, given.points)
+    if given.plot is not None:
+        _check_picture(given.plot)
+        _check_states(given.states, model, len(y0), "--states")
+        _check_states(given.phase, model, len(y0), "--phase")
+        if given.phase is not None and len(given.phase) not in (2, 3):
+            raise Mistake(f"--phase: two or three states are needed, not {len(given.phase)}")
+    elif given.phase or given.states:
+        raise Mistake("--plot: --phase and --states need the name of a picture")
+    for path in (given.plot, given.csv, given.parquet):
+        if path is not None:
+            check_target(path)
+    solution = model.system.solve((start, end), y0, params=values, events=model.events, **options)
+    if not given.quiet:
+        _print(solution, model, values)
+    if given.csv is not None:
+        write_csv(solution, given.csv)
+        _say(given, f"written: {given.csv}, {len(solution.t)} rows")
+    if given.parquet is not None:
+        write_parquet(solution, given.parquet, _notes(solution, model, values))
+        _say(given, f"written: {given.parquet}, {len(solution.t)} rows")
+    if given.plot is not None:
+        _draw(solution, given.plot, given.states, given.phase, given.dark, model.name, quiet=given.quiet)
+    return _closed(solution)
+
+
+def _print(solution: Solution, model: Model, values: dict[str, float]) -> None:
+    given = {**model.system.params, **values}
+    if given:
+        print("parameters: " + ", ".join(f"{name}={value:.12g}" for name, value in given.items()))
+    print("surfaces:   " + (", ".join(f"{name} = 0" for name in solution.surfaces) or "none"))
+    print(f"run:        {solution.message}")
+    if len(solution.t):
+        state = ", ".join(
+            f"{name}={value:.12g}" for name, value in zip(solution.states, solution.y[:, -1], strict=True)
+        )
+        print(f"at the end: t={solution.t[-1]:.12g}, {state}")
+    print(f"effort:     {solution.nfev} evaluations, {solution.stats['backend']}")
+    print(solution.switches)
+    for number, times in enumerate(solution.t_events or []):
+        print(f"event {number}: {len(times)} times {np.array2string(times, threshold=8, precision=9)}")
+
+
+def _closed(solution: Solution) -> int:
+    """Print warnings and a failure where they are not missed, and return the exit code."""
+    for warning in solution.warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+    if solution.success:
+        return 0
+    print(f"failed: {solution.message}", file=sys.stderr)
+    return 1
+
+
+def _notes(solution: Solution, model: Model, values: dict[str, float]) -> dict[str, str]:
+    return {
+        "model": model.name,
+        "parameters": ", ".join(f"{k}={v!r}" for k, v in {**model.system.params, **values}.items()),
+        "surfaces": ", ".join(solution.surfaces),
+        "message": solution.message,
+    }
+
+
+def _say(given: argparse.Namespace, text: str) -> None:
+    if not given.quiet:
+        print(text)
+
+
+def check_target(path: Path) -> None:
+    """Refuse a file that cannot be written, before the run."""
+    if path.is_dir():
+        raise Mistake(f"{path}: this is a folder; the name of a file is needed")
+    if not path.resolve().parent.is_dir():
+        raise Mistake(f"{path}: there is no such folder")
+
+
+def _check_picture(path: Path) -> None:
+    if path.suffix.lower() not in _PICTURES:
+        raise Mistake(f"--plot: {path} must end in one of {', '.join(_PICTURES)}")
+    from filippov.plot.style import import_pyplot
+
+    import_pyplot()  # says how to install it, before the run
+
+
+def _check_states(chosen: list[str] | None, model: Model, n: int, where: str) -> None:
+    names = model.system.state_names(n)
+    for name in chosen or []:
+        if name not in names:
+            raise Mistake(f"{where}: no state {name!r}; the names are {', '.join(names)}")
+
+
+def _draw(
+    solution: Solution,
+    path: Path,
+    states: list[str] | None,
+    phase: list[str] | None,
+    dark: bool,
+    title: str,
+    quiet: bool = False,
+) -> None:
+    import matplotlib
+
+    matplotlib.use("Agg")  # a picture is written, no window is opened
+    from filippov import plot
+
+    if not len(solution.t):
+        print("nothing to draw: the run failed at its start", file=sys.stderr)
+        return
+    with plot.style(dark=dark):
+        ax: Any
+        if phase is None:
+            ax = plot.time_series(solution, states=states)
+        elif len(phase) == 2:
+            ax = plot.phase(solution, phase[0], phase[1])
+        else:
+            ax = plot.phase3d(solution, phase[0], phase[1], phase[2])
+        ax.set_title(title)
+        ax.figure.savefig(path)
+    if not quiet:
+        print(f"picture: {path}")

@@ -1,0 +1,110 @@
+"""The grammar of the command line, and the help that teaches it."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from filippov.cli import commands
+from filippov.cli.solving import add_run_options
+
+__all__ = ["build_parser"]
+
+_INTRODUCTION = """\
+Simulate piecewise-smooth (Filippov) systems: friction, relays, switching control, anything whose right-hand
+side jumps. Surfaces are found in the code of the model; crossings, sliding and sticking are computed exactly.
+"""
+
+_FIRST_STEPS = """\
+first steps:
+  filippov list                              the reference problems
+  filippov demo dry_friction                 solve one, print what happened, draw it
+  filippov solve dry_friction --param F=0.8  the same with another parameter
+  filippov solve model.py --t 0 100 --y0 1 0 --plot out.png
+
+a model is a Python file, written as for SciPy:
+  import filippov as fl, numpy as np
+
+  @fl.system(states=("y", "v"))
+  def oscillator(t, x, F=0.4, omega=1/3):    # what has a number as default is a parameter
+      y, v = x
+      return v, -y + np.sin(omega*t) - F*np.sign(v)
+
+  y0 = [1.0, 2.0]                            # optional; so are t_span and events
+
+exit codes: 0 done; 1 the run failed, what it computed is written; 2 a mistake, said in one line; 130 Ctrl-C.
+`filippov COMMAND --help` explains one command.
+"""
+
+_SOLVE = """\
+examples:
+  filippov solve model.py --t 0 100 --param F=0.4 omega=1/3 --plot out.png
+  filippov solve model.py --t 60 --y0 v=2 y=1 --csv out.csv --points 1001
+  filippov solve dry_friction --rtol 1e-10 --atol 1e-10 --parquet out.parquet --quiet
+  filippov solve model.py --plot plane.png --phase y v --dark
+
+A file has one system (else choose by --system), or a function rhs(t, x, ...). Without --points the ends of
+the steps are written; the steps are as long as the tolerances allow.
+"""
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """Return the parser; what it parses has `run`, the function of the command."""
+    parser = argparse.ArgumentParser(
+        prog="filippov",
+        description=_INTRODUCTION,
+        epilog=_FIRST_STEPS,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"filippov {commands.version()}")
+    parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
+    parser.set_defaults(run=None)
+    subparsers = parser.add_subparsers(title="commands", metavar="COMMAND")
+    _add_list(subparsers)
+    _add_demo(subparsers)
+    _add_solve(subparsers)
+    return parser
+
+
+def _add_list(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    command = subparsers.add_parser(
+        "list",
+        help="name the reference problems",
+        description="Name the reference problems, with what happens in them.",
+    )
+    command.add_argument("text", nargs="?", default="", help="only those with this in their name or note")
+    command.set_defaults(run=commands.list_problems)
+
+
+def _add_demo(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    command = subparsers.add_parser(
+        "demo",
+        help="solve a reference problem and draw it",
+        description="Solve a reference problem: print where it comes from and what happened, and draw it.",
+    )
+    command.add_argument("name", metavar="NAME", help="as `filippov list` has it")
+    command.add_argument("--plot", type=Path, metavar="FILE", help="the picture; NAME.png by default")
+    command.add_argument("--no-plot", action="store_true", help="draw nothing")
+    command.add_argument("--dark", action="store_true", help="light lines on a dark ground")
+    command.set_defaults(run=commands.demo)
+
+
+def _add_solve(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    command = subparsers.add_parser(
+        "solve",
+        help="solve a model of your own",
+        description="Solve an initial value problem; print what happened, draw and save it.",
+        epilog=_SOLVE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add_run_options(command)
+    out = command.add_argument_group("what comes out")
+    out.add_argument("--plot", type=Path, metavar="FILE", help="draw the states over time: .png, .pdf, .svg")
+    out.add_argument("--states", nargs="+", metavar="NAME", help="draw these states only")
+    out.add_argument("--phase", nargs="+", metavar="NAME", help="draw two or three states on axes")
+    out.add_argument("--dark", action="store_true", help="light lines on a dark ground")
+    out.add_argument("--csv", type=Path, metavar="FILE", help="write times, states and modes as text")
+    out.add_argument("--parquet", type=Path, metavar="FILE", help="write them for pandas, Polars, DuckDB")
+    out.add_argument("--points", type=int, metavar="N", help="write N equidistant times")
+    out.add_argument("--quiet", action="store_true", help="print nothing but warnings and failures")
+    command.set_defaults(run=commands.solve)

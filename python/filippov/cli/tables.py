@@ -1,0 +1,50 @@
+"""Solutions as files: CSV and Parquet, with one column per state and the mode as text."""
+
+from __future__ import annotations
+
+import csv
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from filippov.solution import Solution
+
+__all__ = ["write_csv", "write_parquet"]
+
+
+def write_csv(solution: Solution, path: Path) -> None:
+    """Write times, states and modes to a CSV file, every number with all of its digits."""
+    columns = _columns(solution)
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(columns)
+        writer.writerows(zip(*columns.values(), strict=True))
+
+
+def write_parquet(solution: Solution, path: Path, notes: dict[str, str]) -> None:
+    """Write times, states and modes to a Parquet file; `notes` become its metadata.
+
+    Raises
+    ------
+    ImportError
+        If PyArrow is not installed.
+    """
+    try:
+        arrow, parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
+    except ImportError as error:
+        raise ImportError("--parquet needs PyArrow: pip install filippov[parquet]") from error
+    table = arrow.table(_columns(solution))
+    parquet.write_table(table.replace_schema_metadata(notes), path)
+
+
+def _columns(solution: Solution) -> dict[str, list[Any]]:
+    columns: dict[str, list[Any]] = {"t": solution.t.tolist()}
+    columns |= {name: solution.y[k].tolist() for k, name in enumerate(solution.states)}
+    if solution.surfaces and len(solution.segments):
+        starts = solution.segments.t_start
+        modes = [str(mode) for mode in solution.segments.mode]
+        places = np.searchsorted(starts, solution.t, side="right") - 1
+        columns["mode"] = [modes[max(place, 0)] for place in places]
+    return columns

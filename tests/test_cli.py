@@ -1,0 +1,183 @@
+"""The command line: it prints and writes what the run gives; a mistake is one line and exit code 2."""
+
+from __future__ import annotations
+
+import csv
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import filippov as fl
+import numpy as np
+import pytest
+from filippov.cli import main
+
+MODEL = """
+import filippov as fl, numpy as np
+
+@fl.system(states=("y", "v"))
+def oscillator(t, x, F=0.4, omega=1/3):
+    y, v = x
+    return v, -y + np.sin(omega*t) - F*np.sign(v)
+
+y0 = [1.0, 2.0]
+"""
+
+
+@pytest.fixture
+def model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "model.py"
+    path.write_text(MODEL)
+    return path
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_solve_writes_every_digit(model: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["solve", "model.py", "--t", "0", "30", "--param", "F=1/2", "--csv", "out.csv"]) == 0
+    names: dict[str, Any] = {}
+    exec(MODEL, names)
+    expected = names["oscillator"].solve((0, 30), [1.0, 2.0], F=0.5)
+    written = rows(model.parent / "out.csv")
+    assert [float(row["t"]) for row in written] == expected.t.tolist()
+    assert [float(row["v"]) for row in written] == expected.y[1].tolist()
+    assert {row["mode"] for row in written} <= {"+", "-", "0"}
+    printed = capsys.readouterr().out
+    assert "F=0.5, omega=0.333333333333" in printed
+    assert f"{len(expected.switches)} switches" in printed
+    assert f"y={expected.y[0, -1]:.12g}" in printed
+
+
+def test_states_by_name_and_points(model: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["--t", "10", "--y0", "v=-1", "--points", "11", "--quiet", "--csv", "out.csv"]
+    assert main(["solve", "model.py", *arguments]) == 0
+    assert capsys.readouterr().out == ""
+    written = rows(model.parent / "out.csv")
+    assert [float(row["t"]) for row in written] == np.linspace(0, 10, 11).tolist()
+    assert (float(written[0]["y"]), float(written[0]["v"])) == (1.0, -1.0)
+
+
+def test_parquet_has_the_columns_and_the_parameters(model: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    assert main(["solve", "model.py", "--t", "10", "--parquet", "out.parquet", "--quiet"]) == 0
+    table = parquet.read_table(model.parent / "out.parquet")
+    assert table.column_names == ["t", "y", "v", "mode"]
+    assert b"F=0.4" in table.schema.metadata[b"parameters"]
+
+
+@pytest.mark.parametrize("more", [[], ["--phase", "y", "v"], ["--states", "v", "--dark"]])
+def test_pictures(model: Path, more: list[str]) -> None:
+    pytest.importorskip("matplotlib")
+    assert main(["solve", "model.py", "--t", "10", "--plot", "out.png", *more]) == 0
+    assert (model.parent / "out.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_failed_run_keeps_what_it_has(model: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["solve", "model.py", "--t", "50", "--max-steps", "3", "--csv", "out.csv"]) == 1
+    assert "max_steps was reached" in capsys.readouterr().err
+    assert len(rows(model.parent / "out.csv")) > 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["solve", "other.py"], "other.py: there is no such file"),
+        (["solve", "dry_frict"], "did you mean 'dry_friction'"),
+        (["solve", "model.py"], "--t: the end is needed"),
+        (["solve", "model.py", "--t", "1", "2", "3"], "--t: the end, or start and end"),
+        (["solve", "model.py", "--t", "x"], "--t: 'x' is not a number"),
+        (["solve", "model.py", "--t", "nan"], "t_span"),
+        (["solve", "model.py", "--t", "1", "--y0", "1"], "y0: the system has 2 states, y0 has 1"),
+        (["solve", "model.py", "--t", "1", "--y0", "w=1"], "--y0: no state 'w'; the names are y, v"),
+        (["solve", "model.py", "--t", "1", "--param", "G=1"], "--param: model has no parameter 'G'"),
+        (["solve", "model.py", "--t", "1", "--param", "F"], "--param: NAME=VALUE is needed"),
+        (["solve", "model.py", "--t", "1", "--param", "F=1", "F=2"], "--param: 'F' is given twice"),
+        (["solve", "model.py", "--t", "1", "--param", "F=1/0"], "--param F: '1/0' is not a number"),
+        (["solve", "model.py", "--t", "1", "--rtol", "-1"], "rtol"),
+        (["solve", "model.py", "--t", "1", "--method", "Radau"], 'method: "Radau" is not offered'),
+        (["solve", "model.py", "--t", "1", "--system", "osc"], "has no system 'osc'; it has oscillator"),
+        (["solve", "model.py", "--t", "1", "--points", "1"], "--points: at least 2"),
+        (["solve", "model.py", "--t", "1", "--csv", "no/out.csv"], "no/out.csv: there is no such folder"),
+        (["solve", "model.py", "--t", "1", "--csv", "."], ".: this is a folder"),
+        (["solve", "model.py", "--t", "1", "--plot", "out.gif"], "--plot: out.gif must end in"),
+        (["solve", "model.py", "--t", "1", "--plot", "out.png", "--phase", "y"], "--phase: two or three"),
+        (["solve", "model.py", "--t", "1", "--plot", "o.png", "--phase", "y", "z"], "--phase: no state"),
+        (["solve", "model.py", "--t", "1", "--phase", "y", "v"], "--plot: "),
+        (["list", "no such thing"], "no problem has"),
+        (["demo", "nothing"], "neither a file nor a problem"),
+    ],
+)
+def test_a_mistake_is_one_line(
+    model: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
+) -> None:
+    assert main(arguments) == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert message in shown.err
+    assert shown.err.startswith("filippov: ")
+    assert shown.err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("def f(:\n", "line 1: "),
+        ("import numpy\n\nnumpy.sinus(1)\n", "line 3: AttributeError"),
+        ("x = 1\n", "has no system: put a function"),
+        ("def rhs(t, x, a):\n    return x\n", "'a' needs a default value"),
+        ("import filippov as fl\na, b = (fl.System(lambda t, x: x, n=1) for _ in 'ab')\n", "has several"),
+        ("def rhs(t, x):\n    return [1 / 0]\ny0 = [1]\n", "ZeroDivisionError"),
+        ("def rhs(t, x):\n    return x[:1]\ny0 = [1, 2]\n", "returned 1 value for a state of 2"),
+        ("import math\ndef rhs(t, x):\n    return [math.sin(x[0])]\ny0 = [1]\n", 'File "model.py", line 3'),
+    ],
+)
+def test_a_mistake_in_the_model_names_the_place(
+    model: Path, capsys: pytest.CaptureFixture[str], text: str, message: str
+) -> None:
+    model.write_text(text)
+    assert main(["solve", "model.py", "--t", "1"]) == 2
+    shown = capsys.readouterr().err
+    assert message in shown
+    assert "Traceback" not in shown
+
+
+def test_a_plain_function_is_a_model(model: Path) -> None:
+    model.write_text("def rhs(t, x, a=2.0):\n    return [a]\ny0 = [1]\nt_span = (0, 3)\n")
+    assert main(["solve", "model.py", "--csv", "out.csv", "--param", "a=3"]) == 0
+    assert float(rows(model.parent / "out.csv")[-1]["x[0]"]) == pytest.approx(10.0)
+
+
+def test_debug_shows_where_it_comes_from(model: Path) -> None:
+    with pytest.raises(fl.InputError):
+        main(["--debug", "solve", "model.py", "--t", "1", "--rtol", "-1"])
+
+
+@pytest.mark.parametrize("name", fl.problems.names())
+def test_every_problem_is_a_demo(name: str, model: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["demo", name, "--no-plot"]) == 0
+    printed = capsys.readouterr().out
+    assert f"{name}: " in printed
+    assert "successfully reached the end" in printed
+
+
+def test_the_program_by_itself(model: Path) -> None:
+    run = [sys.executable, "-m", "filippov"]
+    there = {**os.environ, "PYTHONPATH": str(Path(fl.__file__).parents[1]), "COLUMNS": "110"}
+    shown = subprocess.run([*run, "--help"], capture_output=True, text=True, env=there, check=True)
+    for command in ("list", "demo", "solve"):
+        assert f"    {command} " in shown.stdout
+        words = [*run, command, "--help"]
+        explained = subprocess.run(words, capture_output=True, text=True, env=there, check=True)
+        assert explained.stdout.startswith(f"usage: filippov {command}")
+    wrong = subprocess.run([*run, "solve", "no.py"], capture_output=True, text=True, env=there, check=False)
+    assert wrong.returncode == 2
+    assert wrong.stderr == "filippov: no.py: there is no such file\n"
+    unknown = subprocess.run([*run, "slove"], capture_output=True, text=True, env=there, check=False)
+    assert unknown.returncode == 2
+    assert "Traceback" not in unknown.stderr

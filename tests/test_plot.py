@@ -1,0 +1,181 @@
+"""Figures: what stands in them is what the solution says; looked at by eye besides."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import filippov as fl
+import numpy as np
+import pytest
+
+matplotlib = pytest.importorskip("matplotlib")
+matplotlib.use("Agg")
+
+from matplotlib import pyplot  # noqa: E402
+from matplotlib.colors import to_hex  # noqa: E402
+
+
+@pytest.fixture(autouse=True)
+def _closed() -> Iterator[None]:
+    yield
+    pyplot.close("all")
+
+
+@pytest.fixture(scope="module")
+def belt() -> fl.System:
+    """A block on a belt of speed 0.2, which sticks for ``-1 < x < 1``."""
+    problem = fl.problems.get("dieci_lopez_6_1")
+    return fl.System(problem.fun, n=2, states=("x", "v"))
+
+
+@pytest.fixture(scope="module")
+def solution(belt: fl.System) -> fl.Solution:
+    return belt.solve((0.0, 25.0), [-2.0, 1.5], events=lambda t, x: x[0] - 1.0)
+
+
+def legend(ax: Any) -> list[str]:
+    return [text.get_text() for text in ax.get_legend().get_texts()]
+
+
+def test_sliding_is_heavier_and_every_segment_is_drawn_once(solution: fl.Solution) -> None:
+    ax = fl.plot.time_series(solution, states="x")
+    curves = [line for line in ax.lines if line.get_marker() == "None"]
+    assert len(curves) == len(solution.segments)
+    for line, segment in zip(curves, solution.segments, strict=True):
+        times = line.get_xdata()
+        assert (times[0], times[-1]) == (segment.t_start, segment.t_end)
+        assert (line.get_linewidth() > 2.0) == segment.mode.is_sliding
+    assert legend(ax) == ["mode +", "mode -", "mode 0 (sliding)", "event 0"]
+    assert ax.get_ylabel() == "x"
+
+
+def test_the_strip_names_modes_below_the_curves(solution: fl.Solution) -> None:
+    ax = fl.plot.time_series(solution)
+    named = [(text.get_text(), text.get_position()[0]) for text in ax.texts]
+    assert named
+    for name, middle in named:
+        assert str(solution.mode_at(middle)) == name
+    low, high = ax.get_ylim()
+    assert solution.y.min() > low + 0.08 * (high - low)
+
+
+def test_switches_are_ticks_and_events_are_marked_on_the_curves(solution: fl.Solution) -> None:
+    ax = fl.plot.time_series(solution, states="v")
+    (ticks,) = (found for found in ax.collections if len(found.get_paths()) == len(solution.switches))
+    assert [path.vertices[0, 0] for path in ticks.get_paths()] == list(solution.switches.t)
+    assert solution.t_events is not None
+    assert solution.y_events is not None
+    (marked,) = (line for line in ax.lines if line.get_marker() == "o")
+    np.testing.assert_array_equal(marked.get_xdata(), solution.t_events[0])
+    np.testing.assert_array_equal(marked.get_ydata(), solution.y_events[0][:, 1])
+
+
+@pytest.mark.parametrize("draw", [fl.plot.time_series, fl.plot.phase])
+def test_axes_are_used_and_returned(draw: Any, solution: fl.Solution) -> None:
+    _, ax = pyplot.subplots()
+    assert draw(solution, ax=ax) is ax
+    assert solution.plot(ax=ax) is ax
+    with pytest.raises(TypeError, match=r"^ax: an axes of Matplotlib is needed, not Figure"):
+        draw(solution, ax=ax.figure)
+    with pytest.raises(ValueError, match=r"no state 'w'; the names are x, v"):
+        fl.plot.phase(solution, "x", "w")
+
+
+def test_style_is_the_default_inside_of_its_block_only(solution: fl.Solution) -> None:
+    with fl.plot.style(dark=True, font_size=12) as colours:
+        dark = solution.plot()
+        assert to_hex(dark.get_facecolor()) == colours.ground.lower()
+        assert pyplot.rcParams["font.size"] == 12
+        light = fl.plot.phase(solution, dark=False)
+        assert to_hex(light.get_facecolor()) == "#ffffff"
+    assert to_hex(solution.plot().get_facecolor()) == "#ffffff"
+    assert fl.plot.theme() == fl.plot.theme(False)
+    with pytest.raises(ValueError, match=r"^font_sise: "), fl.plot.style(font_sise=3):
+        pass
+
+
+def test_colours_of_modes_stand_out_from_the_ground() -> None:
+    for dark in (False, True):
+        chosen = fl.plot.theme(dark)
+        for colour in (*chosen.colours, chosen.attracting, chosen.repelling, chosen.crossing):
+            assert contrast(colour, chosen.ground) > 2.0
+
+
+def contrast(first: str, second: str) -> float:
+    """Return the ratio of luminances of WCAG 2."""
+
+    def luminance(colour: str) -> float:
+        channels = np.array(matplotlib.colors.to_rgb(colour))
+        linear = np.where(channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4)
+        return float(linear @ [0.2126, 0.7152, 0.0722])
+
+    light, dim = sorted((luminance(first), luminance(second)), reverse=True)
+    return (light + 0.05) / (dim + 0.05)
+
+
+def test_parts_of_a_surface_have_their_borders_where_the_fields_are_tangent(belt: fl.System) -> None:
+    parts = fl.surface_parts(belt, [(-2.0, 2.0), (-1.0, 1.0)], points=41)
+    assert parts.labels == ("x", "v")
+    (sheet,), (kinds,) = parts.sheets, parts.kinds
+    np.testing.assert_allclose(sheet[1], 0.2, rtol=0, atol=1e-15)
+    x = sheet[0]
+    # Forces 1 / (1.2 - v) and -1 / (0.8 + v) at v = 0.2 are 1 and -1.
+    assert set(kinds[np.abs(x) < 0.999]) == {"attracting"}
+    assert set(kinds[np.abs(x) > 1.001]) == {"crossing"}
+    pushed = fl.System(lambda t, x: [np.sign(x[0]), 1.0], n=2)
+    repelled = fl.surface_parts(pushed, [(-1.0, 1.0), (-1.0, 1.0)], points=4)
+    assert set(repelled.kinds[0]) == {"repelling"}
+
+
+def test_parts_of_a_sphere_and_of_a_curve_in_a_larger_space() -> None:
+    sphere = fl.System(lambda t, x: [-x[0] * np.sign(x[0] ** 2 + x[1] ** 2 + x[2] ** 2 - 1), x[1], x[2]], n=3)
+    parts = fl.surface_parts(sphere, [(-1.5, 1.5)] * 3, points=11)
+    assert len(parts.sheets) == 2
+    found = np.concatenate([sheet[:, np.isfinite(sheet[0])] for sheet in parts.sheets], axis=1)
+    np.testing.assert_allclose((found**2).sum(axis=0), 1.0, rtol=1e-12)
+    across = fl.surface_parts(sphere, [(-1.5, 1.5)] * 2, at=[0.0, 0.0, 0.8], states=(0, 1), points=31)
+    found = np.concatenate([sheet[:, np.isfinite(sheet[0])] for sheet in across.sheets], axis=1)
+    np.testing.assert_allclose((found**2).sum(axis=0), 0.36, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"limits": [(0, 1)]}, r"^limits: two or three intervals"),
+        ({"limits": [(0, 1), (1, 0)]}, r"^limits: two or three intervals"),
+        ({"surface": 1}, r"^surface: 1 is not one of 1"),
+        ({"states": ("x", "x")}, r"^states: 2 different"),
+        ({"states": ("x", "w")}, r"^states: no state 'w'"),
+        ({"at": [1.0]}, r"^at: shape \(2,\)"),
+        ({"points": 1}, r"^points: at least 2"),
+        ({"params": {"k": 1.0}}, r"no parameter 'k'"),
+    ],
+)
+def test_wrong_windows_are_named(belt: fl.System, arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(fl.InputError, match=message):
+        fl.surface_parts(belt, **{"limits": [(-1, 1), (-1, 1)], **arguments})
+
+
+def test_a_surface_in_the_plane_is_drawn_by_parts(belt: fl.System, solution: fl.Solution) -> None:
+    parts = fl.surface_parts(belt, [(-2.0, 2.0), (-1.0, 1.0)], points=41)
+    ax = fl.plot.surface(parts, ax=fl.plot.phase(solution))
+    assert legend(ax)[-2:] == ["v - 0.2 = 0: attracting (sliding)", "v - 0.2 = 0: crossed"]
+    drawn = [line for line in ax.lines if line.get_color() == fl.plot.theme().attracting]
+    spans = [line.get_xdata() for line in drawn if np.allclose(line.get_ydata(), 0.2, atol=1e-9)]
+    assert any(abs(x[0]) <= 1.0 and abs(x[-1]) <= 1.0 and np.ptp(x) > 1.8 for x in spans)
+    assert fl.plot.surface(parts).get_xlabel() == "x"
+
+
+def test_a_surface_in_space_needs_axes_in_space() -> None:
+    problem = fl.problems.get("relay_feedback_cycle")
+    relay = fl.System(problem.fun, n=3, args=problem.args)
+    parts = fl.surface_parts(relay, [(-0.1, 0.1), (-2.0, 2.0), (-2.0, 2.0)], points=9)
+    assert np.all(parts.sheets[0][0] == 0.0)
+    ax = fl.plot.phase3d(relay.solve((0.0, 5.9), problem.y0))
+    fl.plot.surface(parts, ax=ax)
+    assert len(ax.collections) == 2
+    ax.figure.canvas.draw()
+    _, flat = pyplot.subplots()
+    with pytest.raises(TypeError, match='projection="3d"'):
+        fl.plot.surface(parts, ax=flat)
