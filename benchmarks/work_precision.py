@@ -2,8 +2,8 @@
 
 Run ``python benchmarks/work_precision.py``: a picture, ``work_precision.png``, and a table in ``README.md``
 unless ``--no-write`` is given. An error is the largest of those of the times of the switches; a run that does
-not find the switches of the reference has none. Evaluations are those of the field, an expansion into a series
-counted by its operations.
+not find the switches of the reference has none. Evaluations are those of the field; a series counts by its
+operations.
 """
 
 from __future__ import annotations
