@@ -94,7 +94,7 @@ pub fn solve_many(
         let run = |job: &PreparedRun, interrupt: &mut dyn FnMut(f64) -> bool| {
             job.run((t0, t1), &options.options, interrupt)
         };
-        let solutions = py.detach(|| on_threads(&prepared, threads, run));
+        let solutions = py.detach(|| on_threads(&prepared, threads, run))?;
         for (prepared, solution) in prepared.into_iter().zip(solutions) {
             let solution = solution.map_err(|e| PyValueError::new_err(e.to_string()))?;
             runs.push(prepared.result(solution));
@@ -161,6 +161,7 @@ fn method(name: &str) -> PyResult<Method> {
         "auto" => Ok(Method::Auto),
         "DOPRI5" => Ok(Method::Dopri5),
         "Taylor" => Ok(Method::Taylor),
+        "DOP853" => Ok(Method::Dop853),
         "Rodas5P" => Ok(Method::Rodas5p),
         _ => Err(PyValueError::new_err(format!(
             "method: unknown method {name:?}"

@@ -8,10 +8,22 @@ Needs Matplotlib: ``pip install filippov[plot]``.
 
 from __future__ import annotations
 
+from filippov.plot.diagrams import basins, bifurcation_diagram, poincare_section
 from filippov.plot.hidden_dynamics import hidden_dynamics
 from filippov.plot.phase import phase, phase3d
 from filippov.plot.style import style, theme
 from filippov.plot.surface import surface
 from filippov.plot.time_series import time_series
 
-__all__ = ["hidden_dynamics", "phase", "phase3d", "style", "surface", "theme", "time_series"]
+__all__ = [
+    "basins",
+    "bifurcation_diagram",
+    "hidden_dynamics",
+    "phase",
+    "phase3d",
+    "poincare_section",
+    "style",
+    "surface",
+    "theme",
+    "time_series",
+]
