@@ -1,7 +1,7 @@
 """Pages of the documentation that are made when it is built: the gallery, pictures, and pages from the root.
 
-A hook of MkDocs (`mkdocs.yml`). Examples and the code of tutorial and how-to pages are run; where one fails, or
-prints something else than the page says, the build fails.
+A hook of MkDocs (`mkdocs.yml`). Examples and the code of tutorial and how-to pages are run; where one fails,
+or prints something else than the page says, the build fails.
 """
 
 from __future__ import annotations
@@ -144,8 +144,8 @@ def _problem_modules(code: str) -> list[str]:
 def _overview(scripts: list[Path]) -> str:
     lines = [
         "# Gallery",
-        "Every page has the problem in words, the picture, the numbers beside their references, and the code. "
-        "Where a number is off, the example fails, and with it the tests.",
+        "Every page has the problem in words, the picture, the numbers beside their references, and the "
+        "code. Where a number is off, the example fails, and with it the tests.",
     ]
     for script in scripts:
         title, *_ = _words(script)
