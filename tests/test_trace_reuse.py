@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import builtins
 import functools
+import inspect
 import math
 import sys
 import types
@@ -159,6 +160,11 @@ KEPT |= {
 @pytest.mark.parametrize("name", KEPT)
 def test_a_function_that_reads_plain_data_is_traced_once(name: str) -> None:
     assert is_kept(KEPT[name])
+
+
+def test_a_function_of_numpy_that_was_inspected_is_the_same() -> None:
+    inspect.signature(np.abs)
+    assert is_kept(lambda t, x: np.abs(x) - 2 * x)
 
 
 def test_reference_problems_are_traced_once() -> None:

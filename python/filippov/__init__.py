@@ -75,7 +75,17 @@ from filippov.switches import RunWarning, Segment, SegmentTable, Switch, SwitchT
 from filippov.system import System
 
 if TYPE_CHECKING:
-    from filippov import plot, problems
+    from filippov import analysis, plot, problems
+    from filippov.analysis import (
+        Phase,
+        Section,
+        Tangency,
+        basins,
+        bifurcation_diagram,
+        open_sweep,
+        poincare,
+        sweep,
+    )
     from filippov.ensemble import Ensemble
     from filippov.hidden import HiddenDynamics, hidden_dynamics
     from filippov.sheets import SurfaceParts, surface_parts
@@ -95,8 +105,10 @@ __all__ = [
     "Mode",
     "ModelError",
     "NonUniqueError",
+    "Phase",
     "Reset",
     "RunWarning",
+    "Section",
     "Segment",
     "SegmentTable",
     "Solution",
@@ -106,9 +118,11 @@ __all__ = [
     "Switch",
     "SwitchTable",
     "System",
+    "Tangency",
     "ToleranceError",
     "TraceError",
     "absolute",
+    "analysis",
     "arccos",
     "arccosh",
     "arcsin",
@@ -116,6 +130,8 @@ __all__ = [
     "arctan",
     "arctan2",
     "arctanh",
+    "basins",
+    "bifurcation_diagram",
     "cbrt",
     "ceil",
     "clip",
@@ -137,7 +153,9 @@ __all__ = [
     "maximum",
     "minimum",
     "mod",
+    "open_sweep",
     "plot",
+    "poincare",
     "problems",
     "rint",
     "sawtooth",
@@ -149,17 +167,20 @@ __all__ = [
     "square",
     "stick",
     "surface_parts",
+    "sweep",
     "system",
     "tan",
     "tanh",
     "where",
 ]
 
-_LAZY = ("plot", "problems")
+_LAZY = ("analysis", "plot", "problems")
 _LAZY_NAMES = {
     "HiddenDynamics": "hidden",
     "hidden_dynamics": "hidden",
     "Ensemble": "ensemble",
+    **dict.fromkeys(("Phase", "Section", "Tangency", "poincare"), "analysis"),
+    **dict.fromkeys(("basins", "bifurcation_diagram", "open_sweep", "sweep"), "analysis"),
     "SurfaceParts": "sheets",
     "surface_parts": "sheets",
 }

@@ -19,6 +19,7 @@ __all__ = [
     "intersection_field",
     "solve",
     "solve_many",
+    "solve_points",
 ]
 
 _Array = npt.NDArray[np.float64]
@@ -191,6 +192,16 @@ def solve_many(
     actions: list[tuple[str, list[float], Any, str]],
     threads: int,
 ) -> list[Run]: ...
+def solve_points(
+    system: TracedSystem | OpaqueSystem | SignedSystem,
+    spans: _Array,
+    y0: _Array,
+    p: _Array,
+    options: RunOptions,
+    actions: list[tuple[str, list[float], Any, str]],
+    section: dict[str, Any] | None,
+    threads: int,
+) -> dict[str, Any]: ...
 def intersection_field(
     system: TracedSystem | OpaqueSystem | SignedSystem,
     t: float,

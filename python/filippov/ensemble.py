@@ -126,7 +126,7 @@ def run_ensemble(
         checked.for_core(),
         found,
         list(prepared.actions),
-        _check_threads(threads),
+        check_threads(threads),
     )
     return Ensemble(
         runs,
@@ -169,7 +169,8 @@ def _members(
     return np.array(rows, dtype=float), columns
 
 
-def _check_threads(threads: int | None) -> int:
+def check_threads(threads: int | None) -> int:
+    """Return the number of threads, one per core by default."""
     if threads is None:
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     if isinstance(threads, bool) or not isinstance(threads, int | np.integer) or threads < 1:

@@ -9,7 +9,9 @@ mod laws;
 mod prepared_run;
 mod run;
 mod solve;
+mod sweep;
 mod systems;
+mod threads;
 
 use pyo3::prelude::*;
 
@@ -26,6 +28,8 @@ mod _core {
     use super::run::Run;
     #[pymodule_export]
     use super::solve::{solve, solve_many, RunOptions};
+    #[pymodule_export]
+    use super::sweep::solve_points;
     #[pymodule_export]
     use super::systems::TracedSystem;
 }

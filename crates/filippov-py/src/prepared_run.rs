@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use filippov::action::{Action, ActionMap, Actions, Clock, Trigger};
+use filippov::section::Section;
 use filippov::{
-    solve_with_actions, Error, Kind, LawAction, Mode, Options, Solution, TracedMap, UserEvent,
-    UserFunction,
+    solve_to_section, solve_with_actions, Error, Kind, LawAction, Mode, Options, Solution,
+    TracedMap, UserEvent, UserFunction,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -23,6 +24,7 @@ type SharedFunction = Box<dyn UserFunction + Send + Sync>;
 /// One run: a copy of the system with its parameters, the state to start from, events and actions.
 pub struct PreparedRun {
     core: CoreSystem,
+    compiled: Option<Arc<filippov::TracedSystem>>,
     y0: Vec<f64>,
     events: Vec<(SharedFunction, f64, u64)>,
     given: Vec<(SharedMap, Trigger, String)>,
@@ -77,6 +79,7 @@ impl PreparedRun {
             law_names: traced.map_or_else(Vec::new, |t| t.get().law_names()),
             is_native: traced.is_some_and(|t| t.get().system.is_native()),
             core,
+            compiled,
             y0,
             events: functions,
             given,
@@ -92,15 +95,7 @@ impl PreparedRun {
         options: &Options,
         interrupt: &mut dyn FnMut(f64) -> bool,
     ) -> Result<Solution, Error> {
-        let mut completed = None;
-        if !options.choices.is_empty() && self.n_visible < self.core.n_surfaces() {
-            let options = completed.insert(options.clone());
-            for choice in &mut options.choices {
-                let mut entries = choice.entries().to_vec();
-                entries.resize(self.core.n_surfaces(), 1);
-                *choice = Mode::new(entries);
-            }
-        }
+        let completed = self.complete(options);
         let options = completed.as_ref().unwrap_or(options);
         let events = self.events.iter();
         let events = events.map(|(function, direction, terminal)| UserEvent {
@@ -119,6 +114,55 @@ impl PreparedRun {
             &actions,
             interrupt,
         )
+    }
+
+    /// Runs from section to section; the events are those of the section.
+    pub fn run_to_section(
+        &self,
+        t_span: (f64, f64),
+        options: &Options,
+        section: &Section,
+        interrupt: &mut dyn FnMut(f64) -> bool,
+    ) -> Result<Solution, Error> {
+        let completed = self.complete(options);
+        solve_to_section(
+            &*self.core,
+            t_span,
+            &self.y0,
+            completed.as_ref().unwrap_or(options),
+            section,
+            &self.actions(),
+            interrupt,
+        )
+    }
+
+    /// The system with its parameters, if it is traced.
+    pub fn traced(&self) -> Option<&Arc<filippov::TracedSystem>> {
+        self.compiled.as_ref()
+    }
+
+    /// The core's system.
+    pub fn core(&self) -> &CoreSystem {
+        &self.core
+    }
+
+    /// How many of its surfaces a user sees.
+    pub fn n_visible(&self) -> usize {
+        self.n_visible
+    }
+
+    /// The options with choices for the surfaces too that a user does not see, if there are any.
+    fn complete(&self, options: &Options) -> Option<Options> {
+        let mut completed = None;
+        if !options.choices.is_empty() && self.n_visible < self.core.n_surfaces() {
+            let options = completed.insert(options.clone());
+            for choice in &mut options.choices {
+                let mut entries = choice.entries().to_vec();
+                entries.resize(self.core.n_surfaces(), 1);
+                *choice = Mode::new(entries);
+            }
+        }
+        completed
     }
 
     /// What the user gives comes first: a sample at a tick sees the ramp before it drops.

@@ -112,6 +112,15 @@ impl Run {
     }
 }
 
+/// 0 at the end of the span, 1 where the run was to stop, negative where it failed.
+pub fn status_of(stop: &Stop) -> i32 {
+    match stop {
+        Stop::End => 0,
+        stop if stop.is_success() => 1,
+        _ => -1,
+    }
+}
+
 #[pymethods]
 impl Run {
     #[getter]
@@ -216,11 +225,7 @@ impl Run {
 
     #[getter]
     fn status(&self) -> i32 {
-        match self.solution().stop {
-            Stop::End => 0,
-            Stop::TerminalEvent(_) => 1,
-            _ => -1,
-        }
+        status_of(&self.solution().stop)
     }
 
     #[getter]

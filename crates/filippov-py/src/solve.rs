@@ -1,10 +1,8 @@
 //! The call of the integrator.
 
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use filippov::{Keep, Method, Mode, NonUnique, Options, SlidingRule, Solution};
+use filippov::{Keep, Method, Mode, NonUnique, Options, SlidingRule};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -12,17 +10,12 @@ use pyo3::types::PyDict;
 
 use crate::prepared_run::{ActionRow, EventRow, PreparedRun};
 use crate::run::Run;
-
-/// How often the interpreter is asked for signals and told the progress.
-const POLL_EVERY: Duration = Duration::from_millis(20);
-
-/// Runs that one thread takes before signals are looked at and results handed over.
-const CHUNK_PER_THREAD: usize = 256;
+use crate::threads::{on_threads, CHUNK_PER_THREAD, POLL_EVERY};
 
 /// The options of a run, read once; `filippov.solve_ivp` checks them before.
 #[pyclass(frozen, module = "filippov._core")]
 pub struct RunOptions {
-    options: Options,
+    pub options: Options,
     progress: Option<Py<PyAny>>,
 }
 
@@ -98,7 +91,10 @@ pub fn solve_many(
             PreparedRun::new(&system, t0, y0, p, &events, &actions)
         };
         let prepared = chunk.iter().map(prepare).collect::<PyResult<Vec<_>>>()?;
-        let solutions = py.detach(|| run_all(&prepared, (t0, t1), &options.options, threads));
+        let run = |job: &PreparedRun, interrupt: &mut dyn FnMut(f64) -> bool| {
+            job.run((t0, t1), &options.options, interrupt)
+        };
+        let solutions = py.detach(|| on_threads(&prepared, threads, run));
         for (prepared, solution) in prepared.into_iter().zip(solutions) {
             let solution = solution.map_err(|e| PyValueError::new_err(e.to_string()))?;
             runs.push(prepared.result(solution));
@@ -106,54 +102,6 @@ pub fn solve_many(
         py.check_signals()?;
     }
     Ok(runs)
-}
-
-/// Runs everything on some threads, each of which takes the next run that is left.
-fn run_all(
-    prepared: &[PreparedRun],
-    t_span: (f64, f64),
-    options: &Options,
-    threads: usize,
-) -> Vec<Result<Solution, filippov::Error>> {
-    let next = AtomicUsize::new(0);
-    let is_interrupted = AtomicBool::new(false);
-    let results: Vec<Mutex<Option<_>>> = prepared.iter().map(|_| Mutex::new(None)).collect();
-    let work = |asks: bool| {
-        let mut asked = Instant::now();
-        let mut interrupt = |_: f64| {
-            if asks && asked.elapsed() >= POLL_EVERY {
-                asked = Instant::now();
-                if Python::attach(|py| py.check_signals().is_err()) {
-                    is_interrupted.store(true, Ordering::Relaxed);
-                }
-            }
-            is_interrupted.load(Ordering::Relaxed)
-        };
-        loop {
-            let index = next.fetch_add(1, Ordering::Relaxed);
-            let Some(run) = prepared.get(index) else {
-                break;
-            };
-            let solution = run.run(t_span, options, &mut interrupt);
-            *results[index]
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner) = Some(solution);
-        }
-    };
-    std::thread::scope(|scope| {
-        for _ in 1..threads {
-            scope.spawn(|| work(false));
-        }
-        // Signals are for the thread that called.
-        work(true);
-    });
-    let taken = results.into_iter().map(|result| {
-        result
-            .into_inner()
-            .unwrap_or_else(PoisonError::into_inner)
-            .expect("every run was taken by a thread")
-    });
-    taken.collect()
 }
 
 fn read_options(given: &Bound<'_, PyDict>) -> PyResult<(Options, Option<Py<PyAny>>)> {

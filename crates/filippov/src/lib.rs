@@ -40,6 +40,7 @@ mod integrate;
 mod mode;
 mod options;
 mod recorder;
+pub mod section;
 mod solution;
 pub mod sparse;
 pub mod stepper;
@@ -54,7 +55,8 @@ pub use inspect::{
     IntersectionValue, PointKind,
 };
 pub use integrate::{
-    solve, solve_interruptible, solve_with_actions, Integrator, Stats, Stop, Warning, WarningCode,
+    solve, solve_interruptible, solve_to_section, solve_with_actions, Integrator, Stats, Stop,
+    Warning, WarningCode,
 };
 pub use mode::{Mode, Signs};
 pub use options::{Keep, Method, NonUnique, Options, SlidingRule};

@@ -5,6 +5,7 @@ use smallvec::SmallVec;
 use crate::integrate::{Stats, Stop, Warning};
 use crate::mode::Mode;
 use crate::options::{Keep, Options, SlidingRule};
+use crate::section::Observer;
 use crate::solution::{Segment, Solution, Step, Switch, UserZero};
 use crate::stepper::Interpolant;
 use crate::tolerances::LATEST_SWITCHES;
@@ -29,6 +30,8 @@ pub(crate) struct Recorder {
     wanted: Vec<f64>,
     next: usize,
     is_sampled: bool,
+    /// Watches the section, if there is one.
+    pub observer: Option<Observer>,
 }
 
 impl Recorder {
@@ -51,6 +54,7 @@ impl Recorder {
             is_sampled: wanted.is_some(),
             wanted: wanted.unwrap_or_default(),
             next: 0,
+            observer: None,
         }
     }
 
@@ -117,6 +121,9 @@ impl Recorder {
         multipliers: SmallVec<[f64; 2]>,
         discrete: &[f64],
     ) {
+        if let Some(observer) = &mut self.observer {
+            observer.begin(t, mode);
+        }
         let step = self.steps.len();
         self.close_segment(t);
         if self.keep == Keep::Last {
@@ -167,6 +174,9 @@ impl Recorder {
     }
 
     pub fn switch(&mut self, switch: Switch) {
+        if let Some(observer) = &mut self.observer {
+            observer.switched(&switch);
+        }
         self.switches.push(switch);
     }
 
@@ -240,6 +250,7 @@ impl Recorder {
             warnings,
             steps: self.steps,
             coefficients: self.coefficients,
+            returns: self.observer.map(Observer::into_returns),
             y0: self.y0,
             y_last: x.to_vec(),
         }

@@ -7,6 +7,7 @@ use crate::field::{IntersectionField, Projector, SlidingField, SmoothField};
 use crate::integrate::{Stats, Stop, Warning};
 use crate::mode::Mode;
 use crate::options::SlidingRule;
+use crate::section::Returns;
 use crate::stepper::Basis;
 use crate::switching::Kind;
 use crate::system::{dot_magnitude, PiecewiseSystem};
@@ -99,6 +100,8 @@ pub struct Solution {
     pub stats: Stats,
     /// Warnings.
     pub warnings: Vec<Warning>,
+    /// The returns to the section, if the run was observed at one.
+    pub returns: Option<Returns>,
     pub(crate) steps: Vec<Step>,
     pub(crate) coefficients: Vec<f64>,
     pub(crate) y0: Vec<f64>,

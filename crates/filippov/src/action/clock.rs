@@ -1,5 +1,6 @@
 //! Clocks: ticks at equal intervals, by multiplication, so that rounding does not add up.
 
+use crate::error::Error;
 use crate::tolerances::SAME_TICK;
 
 /// Ticks at the times `phase + k * period`, k a whole number.
@@ -12,6 +13,24 @@ pub struct Clock {
 }
 
 impl Clock {
+    /// Refuses a clock that has no ticks; the names are those of the user's arguments.
+    pub(crate) fn check(&self, period: &'static str, phase: &'static str) -> Result<(), Error> {
+        let refuse = |name, value, requirement| {
+            Err(Error::OutOfRange {
+                name,
+                value,
+                requirement,
+            })
+        };
+        if !(self.period > 0.0 && self.period.is_finite()) {
+            return refuse(period, self.period, "must be positive");
+        }
+        if !self.phase.is_finite() {
+            return refuse(phase, self.phase, "must be finite");
+        }
+        Ok(())
+    }
+
     /// The number of the tick at `t`, up to rounding, if there is one.
     pub fn tick_at(&self, t: f64) -> Option<f64> {
         let count = (t - self.phase) / self.period;

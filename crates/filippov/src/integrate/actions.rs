@@ -187,8 +187,8 @@ impl Integrator<'_> {
 
     /// Does these actions and those that they trigger, and goes on with the motion that follows.
     pub(super) fn act(&mut self, mut due: Vec<usize>) -> Result<Option<Stop>, FieldError> {
-        if let Some(event) = self.record_zeros_here() {
-            return Ok(Some(Stop::TerminalEvent(event)));
+        if let Some(stop) = self.record_zeros_here() {
+            return Ok(Some(stop));
         }
         let before = self.motion.mode.clone();
         let first = self.recorder.switches().len();

@@ -197,7 +197,7 @@ impl<'a> Integrator<'a> {
                     return Ok(Stop::Interrupted);
                 }
             }
-            if let Some(stop) = self.step()? {
+            if let Some(stop) = self.step()?.or_else(|| self.stop_at_section()) {
                 return Ok(stop);
             }
         }
@@ -335,7 +335,7 @@ impl<'a> Integrator<'a> {
         let last = self.horizon;
         let is_last = t_stop < last && last - t_stop < SHORTEST_STEP * last.abs();
         let t_stop = if is_last { last } else { t_stop };
-        let Some(zeros) = self.find_user_zeros(theta)? else {
+        let Some(zeros) = self.find_user_zeros(theta, t_stop)? else {
             self.count_rejection(sliding);
             self.halve_step(dt);
             return Ok(None);
@@ -354,8 +354,8 @@ impl<'a> Integrator<'a> {
             (dt * self.controller.accept(error)).max(self.wanted_dt)
         };
         self.note_jump(dt);
-        if let Some(event) = self.record_user_zeros(zeros, theta, t_stop)? {
-            return Ok(Some(Stop::TerminalEvent(event)));
+        if let Some(stop) = self.record_user_zeros(zeros, theta, t_stop)? {
+            return Ok(Some(stop));
         }
         if self.detector.unresolved {
             self.dt = self.dt.min(dt);

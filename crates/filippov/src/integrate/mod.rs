@@ -32,7 +32,7 @@ mod transition;
 mod user_events;
 
 pub use integrator::Integrator;
-pub use solve::{solve, solve_interruptible, solve_with_actions};
+pub use solve::{solve, solve_interruptible, solve_to_section, solve_with_actions};
 pub use stats::Stats;
 pub use status::{Stop, Warning, WarningCode};
 pub use user_events::UserZero;

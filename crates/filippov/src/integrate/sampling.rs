@@ -1,9 +1,22 @@
-//! Wanted times, sampled as the run goes on where the continuous extensions are not kept.
+//! Wanted times, sampled as the run goes on where the continuous extensions are not kept; the section of a run.
 
 use super::integrator::Integrator;
+use super::Stop;
 use crate::error::FieldError;
+use crate::section::{Observer, Place, Section};
 
 impl Integrator<'_> {
+    /// Observes the run at a section; its function, if it has one, is the only one of the user's events.
+    pub(super) fn observe(&mut self, section: &Section) {
+        self.user_events.is_section = matches!(section.place, Place::Function { .. });
+        self.recorder.observer = Some(Observer::new(section, self.t));
+    }
+
+    /// Why the run ends at this point because of its section, if it does.
+    pub(super) fn stop_at_section(&self) -> Option<Stop> {
+        self.recorder.observer.as_ref()?.stop()
+    }
+
     /// Samples the wanted times of the step that was just computed, before `t_stop`, where it ends.
     ///
     /// # Errors

@@ -5,6 +5,7 @@ use crate::action::Actions;
 use crate::error::Error;
 use crate::event::UserEvent;
 use crate::options::Options;
+use crate::section::{Place, Section};
 use crate::solution::Solution;
 use crate::system::PiecewiseSystem;
 
@@ -93,12 +94,8 @@ pub fn solve_with_actions(
     actions: &Actions,
     interrupt: &mut dyn FnMut(f64) -> bool,
 ) -> Result<Solution, Error> {
-    let mut integrator = Integrator::new(system, t_span, y0, options, events, actions)?;
-    let stop = match integrator.run(interrupt) {
-        Ok(stop) => stop,
-        Err(raised) => Stop::FieldRaised(raised),
-    };
-    let mut solution = integrator.finish(stop);
+    let integrator = Integrator::new(system, t_span, y0, options, events, actions)?;
+    let mut solution = run_to_end(integrator, interrupt);
     let resampled = options
         .t_eval
         .as_ref()
@@ -108,4 +105,72 @@ pub fn solve_with_actions(
         solution.stop = Stop::FieldRaised(raised);
     }
     Ok(solution)
+}
+
+/// Integrates until a section was met as often as it asks for, its returns are periodic, or the end of `t_span`;
+/// [`Solution::returns`](crate::Solution::returns) are the returns.
+///
+/// # Example
+///
+/// The forced oscillator with dry friction, once per period of the forcing (Piiroinen and Kuznetsov 2008, Fig. 4).
+///
+/// ```
+/// use filippov::action::{Actions, Clock};
+/// use filippov::section::{Place, Section};
+/// use filippov::{solve_to_section, ClosureSystem, Options};
+///
+/// let oscillator = ClosureSystem::new(
+///     2,
+///     1,
+///     |t, x, s, dx| (dx[0], dx[1]) = (x[1], -x[0] + (t / 3.0).sin() - 0.4 * s[0]),
+///     |_t, x, h| h[0] = x[1],
+/// );
+/// let clock = Clock { period: 6.0 * std::f64::consts::PI, phase: 0.0 };
+/// let section = Section { place: Place::Ticks(clock), transient: 20, most: 2, cycle: None };
+/// let (options, none) = (Options::default(), Actions::none());
+/// let solution =
+///     solve_to_section(&oscillator, (0.0, 1e3), &[1.0, 2.0], &options, &section, &none, &mut |_| false)?;
+/// let returns = solution.returns.expect("there is a section");
+/// assert_eq!((returns.count, returns.kept.len()), (22, 2));
+/// assert!((returns.kept[1].y[1] - 0.3570302433858536).abs() < 1e-5);
+/// # Ok::<(), filippov::Error>(())
+/// ```
+///
+/// # Errors
+/// As [`solve`].
+pub fn solve_to_section(
+    system: &dyn PiecewiseSystem,
+    t_span: (f64, f64),
+    y0: &[f64],
+    options: &Options,
+    section: &Section,
+    actions: &Actions,
+    interrupt: &mut dyn FnMut(f64) -> bool,
+) -> Result<Solution, Error> {
+    let function = match section.place {
+        Place::Function {
+            function,
+            direction,
+        } => Some(UserEvent {
+            function,
+            direction,
+            terminal: 0,
+        }),
+        _ => None,
+    };
+    if let Place::Ticks(clock) = section.place {
+        clock.check("period of the section", "offset of the section")?;
+    }
+    let events = function.as_slice();
+    let mut integrator = Integrator::new(system, t_span, y0, options, events, actions)?;
+    integrator.observe(section);
+    Ok(run_to_end(integrator, interrupt))
+}
+
+fn run_to_end(mut integrator: Integrator, interrupt: &mut dyn FnMut(f64) -> bool) -> Solution {
+    let stop = match integrator.run(interrupt) {
+        Ok(stop) => stop,
+        Err(raised) => Stop::FieldRaised(raised),
+    };
+    integrator.finish(stop)
 }

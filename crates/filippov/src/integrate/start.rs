@@ -68,14 +68,7 @@ pub(super) fn check(
     )?;
     for action in &actions.list {
         if let Trigger::Clock { clock, .. } = action.trigger {
-            let is_clock = clock.period > 0.0 && clock.period.is_finite();
-            require("period", clock.period, is_clock, "must be positive")?;
-            require(
-                "phase",
-                clock.phase,
-                clock.phase.is_finite(),
-                "must be finite",
-            )?;
+            clock.check("period", "phase")?;
         }
         if let Trigger::Surface { index, .. } = action.trigger {
             if index >= system.n_surfaces() {

@@ -13,6 +13,10 @@ pub enum Stop {
     End,
     /// A terminal event (its index) occurred.
     TerminalEvent(usize),
+    /// The section was met as often as asked for.
+    Returned,
+    /// The returns to the section became periodic.
+    Periodic,
     /// `max_steps` was reached.
     MaxSteps,
     /// `max_events` was reached.
@@ -78,7 +82,10 @@ pub enum Stop {
 impl Stop {
     /// Did the run do what was asked?
     pub fn is_success(&self) -> bool {
-        matches!(self, Stop::End | Stop::TerminalEvent(_))
+        matches!(
+            self,
+            Stop::End | Stop::TerminalEvent(_) | Stop::Returned | Stop::Periodic
+        )
     }
 
     /// A stable name of the reason.
@@ -86,6 +93,8 @@ impl Stop {
         match self {
             Stop::End => "end",
             Stop::TerminalEvent(_) => "terminal_event",
+            Stop::Returned => "returned",
+            Stop::Periodic => "periodic",
             Stop::MaxSteps => "max_steps",
             Stop::MaxEvents => "max_events",
             Stop::MaxWallTime => "max_wall_time",
@@ -122,6 +131,8 @@ impl Stop {
         match self {
             Stop::End => "The solver successfully reached the end of the integration interval.".into(),
             Stop::TerminalEvent(_) => "A termination event occurred.".into(),
+            Stop::Returned => "The section was met as often as asked for.".into(),
+            Stop::Periodic => "The returns to the section became periodic.".into(),
             Stop::MaxSteps => format!(
                 "Stopped at t = {t:.10} in mode ({mode}): max_steps was reached. Raise max_steps, or loosen rtol and atol; \
                  for a stiff system use method=\"Rodas5P\"."

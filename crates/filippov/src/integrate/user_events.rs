@@ -2,6 +2,7 @@
 
 use super::integrator::Integrator;
 use super::motion::Motion;
+use super::Stop;
 use crate::error::FieldError;
 use crate::event::certificate::Bound;
 use crate::event::isolate::{first_zero_sampled, Evidence, Zero};
@@ -9,7 +10,9 @@ use crate::event::locate::refine;
 use crate::event::tube::Tube;
 use crate::event::{UserEvent, UserFunction};
 use crate::stepper::Interpolant;
-use crate::tolerances::{EPS, MOST_ZEROS, PIECES_OF_SERIES, SURFACE_NOISE, UNBOUNDED_DEPTH};
+use crate::tolerances::{
+    EPS, MOST_ZEROS, PIECES_OF_SERIES, SAME_TICK, SURFACE_NOISE, UNBOUNDED_DEPTH,
+};
 
 /// A zero of a user's function.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,7 +35,12 @@ pub(super) struct UserEvents<'a> {
     zeros: Vec<Vec<UserZero>>,
     /// No step has been taken yet: a zero at the very start counts, as in SciPy.
     at_start: bool,
+    /// The only function is that of the section: its zeros are returns.
+    pub(super) is_section: bool,
 }
+
+/// Stands for a tick among the indices of functions.
+const TICK: usize = usize::MAX;
 
 impl<'a> UserEvents<'a> {
     pub fn new(events: &'a [UserEvent<'a>]) -> Self {
@@ -44,6 +52,7 @@ impl<'a> UserEvents<'a> {
             last: vec![f64::NAN; d],
             zeros: vec![Vec::new(); d],
             at_start: true,
+            is_section: false,
         }
     }
 
@@ -66,48 +75,68 @@ impl Integrator<'_> {
     pub(super) fn find_user_zeros(
         &mut self,
         theta: f64,
+        t_stop: f64,
     ) -> Result<Option<Vec<(f64, usize)>>, FieldError> {
-        if self.user_events.events.is_empty() {
+        let observer = self.recorder.observer.as_ref();
+        let has_ticks = observer.is_some_and(|observer| observer.has_tick_up_to(t_stop));
+        if self.user_events.events.is_empty() && !has_ticks {
             return Ok(Some(Vec::new()));
         }
         self.stepper.extend_order4(&self.x);
         let found = self.search_user_zeros(theta)?;
-        if found.as_ref().is_none_or(|zeros| zeros.is_empty()) {
+        if !has_ticks && found.as_ref().is_none_or(|zeros| zeros.is_empty()) {
             return Ok(found);
         }
         self.stepper.extend(&mut self.motion.field, &self.x)?;
         let mut found = self.search_user_zeros(theta)?;
         if let Some(zeros) = &mut found {
+            zeros.extend(self.ticks(theta, t_stop));
             zeros.sort_by(|a, b| a.0.total_cmp(&b.0));
         }
         Ok(found)
     }
 
-    /// Records zeros; at one that ends the run, accepts the step up to there and returns its index.
+    /// The ticks of the section's clock in a step up to `theta`, where the time is `t_stop`.
+    fn ticks(&self, theta: f64, t_stop: f64) -> Vec<(f64, usize)> {
+        let (t0, dt) = (self.stepper.interpolant().t0, self.stepper.interpolant().dt);
+        let latest = t_stop + SAME_TICK * t_stop.abs();
+        let observer = self.recorder.observer.as_ref();
+        let tick = |k| observer.and_then(|observer| observer.tick_after(k));
+        let times = (0..).map_while(tick).take_while(|&t| t <= latest);
+        let place = |t: f64| if t >= t_stop { theta } else { (t - t0) / dt };
+        times.map(|t| (place(t).min(theta), TICK)).collect()
+    }
+
+    /// Records zeros; at one that ends the run, accepts the step up to there and returns why.
     pub(super) fn record_user_zeros(
         &mut self,
         zeros: Vec<(f64, usize)>,
         theta: f64,
         t_stop: f64,
-    ) -> Result<Option<usize>, FieldError> {
-        if self.user_events.events.is_empty() {
+    ) -> Result<Option<Stop>, FieldError> {
+        if self.user_events.events.is_empty() && zeros.is_empty() {
             return Ok(None);
         }
         let (t0, dt) = (self.stepper.interpolant().t0, self.stepper.interpolant().dt);
         for (at, index) in zeros {
-            let t = if at == theta { t_stop } else { t0 + at * dt };
+            let t = match &mut self.recorder.observer {
+                Some(observer) if index == TICK => {
+                    let tick = observer.next_tick().unwrap_or(t_stop);
+                    observer.pass_tick();
+                    tick.min(t_stop)
+                }
+                _ if at == theta => t_stop,
+                _ => t0 + at * dt,
+            };
             let mut y = vec![0.0; self.x.len()];
             self.stepper.interpolant().at(at, &mut y);
             self.motion.project(t, &mut y)?;
-            self.user_events.last[index] = t;
-            self.user_events.zeros[index].push(UserZero { t, y: y.clone() });
-            let terminal = self.user_events.events[index].terminal;
-            if terminal > 0 && self.user_events.zeros[index].len() as u64 >= terminal {
+            if let Some(stop) = self.record_zero(index, t, &y) {
                 self.sample(t)?;
                 self.recorder.step(self.stepper.interpolant(), t, &y);
                 self.t = t;
                 self.x = y;
-                return Ok(Some(index));
+                return Ok(Some(stop));
             }
         }
         self.user_events.at_start = false;
@@ -116,6 +145,23 @@ impl Integrator<'_> {
             self.user_events.left[k] = self.user_value(k, theta)?;
         }
         Ok(None)
+    }
+
+    /// Takes down a zero, or a return to the section; says whether the run ends with it, and why.
+    fn record_zero(&mut self, index: usize, t: f64, y: &[f64]) -> Option<Stop> {
+        let events = &mut self.user_events;
+        if index != TICK {
+            events.last[index] = t;
+        }
+        if index == TICK || events.is_section {
+            let observer = self.recorder.observer.as_mut()?;
+            observer.returned(t, y);
+            return observer.stop();
+        }
+        events.zeros[index].push(UserZero { t, y: y.to_vec() });
+        let terminal = events.events[index].terminal;
+        let is_last = terminal > 0 && events.zeros[index].len() as u64 >= terminal;
+        is_last.then_some(Stop::TerminalEvent(index))
     }
 
     /// How many pieces of a step are searched one after the other for zeros of a user's function.
@@ -129,25 +175,23 @@ impl Integrator<'_> {
     }
 
     /// Records the zeros of functions that are within rounding of zero where the state is about to jump; returns the
-    /// index of one that ends the run.
-    pub(super) fn record_zeros_here(&mut self) -> Option<usize> {
-        let (t, events) = (self.t, &mut self.user_events);
-        if events.at_start {
+    /// reason if one of them ends the run.
+    pub(super) fn record_zeros_here(&mut self) -> Option<Stop> {
+        let t = self.t;
+        if self.user_events.at_start {
             return None;
         }
-        for (k, event) in events.events.iter().enumerate() {
+        for k in 0..self.user_events.events.len() {
+            let events = &self.user_events;
             let (before, here) = (events.before[k], events.left[k]);
             let is_zero = here.abs() <= 4.0 * EPS * before.abs();
-            if !is_zero || events.last[k] == t || event.direction * before > 0.0 {
+            let direction = events.events[k].direction;
+            if !is_zero || events.last[k] == t || direction * before > 0.0 {
                 continue;
             }
-            events.last[k] = t;
-            events.zeros[k].push(UserZero {
-                t,
-                y: self.x.clone(),
-            });
-            if event.terminal > 0 && events.zeros[k].len() as u64 >= event.terminal {
-                return Some(k);
+            let y = self.x.clone();
+            if let Some(stop) = self.record_zero(k, t, &y) {
+                return Some(stop);
             }
         }
         None

@@ -1,0 +1,371 @@
+//! Many runs from section to section, each with its own parameters and span; what they leave as arrays.
+
+use std::sync::Arc;
+
+use filippov::action::Clock;
+use filippov::section::{Cycle, Place, Returns, Section};
+use filippov::{Error, Kind, Mode, Solution, Stop, UserFunction};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
+use pyo3::exceptions::{PyKeyError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::callbacks::{CalledEvent, CompiledEvent, EventExpression};
+use crate::prepared_run::{ActionRow, PreparedRun};
+use crate::run::status_of;
+use crate::solve::RunOptions;
+use crate::systems::{raised, TracedSystem};
+use crate::threads::{on_threads, CHUNK_PER_THREAD};
+
+type Outcome = Result<Solution, Error>;
+
+/// Integrates from many initial states, the rows of `y0`, over the spans in the rows of `spans`, with the parameters
+/// in the rows of `p`; a run that cannot even start has a status like any other.
+#[pyfunction]
+#[allow(clippy::too_many_arguments)]
+pub fn solve_points<'py>(
+    py: Python<'py>,
+    system: Bound<'py, PyAny>,
+    spans: PyReadonlyArray2<'py, f64>,
+    y0: PyReadonlyArray2<'py, f64>,
+    p: PyReadonlyArray2<'py, f64>,
+    options: &RunOptions,
+    actions: Vec<ActionRow>,
+    section: Option<Bound<'py, PyDict>>,
+    threads: usize,
+) -> PyResult<Bound<'py, PyDict>> {
+    let (spans, y0, p) = (spans.as_array(), y0.as_array(), p.as_array());
+    let section = section.map(|given| SectionSpec::read(&system, &given));
+    let section = section.transpose()?;
+    let rows: Vec<usize> = (0..y0.nrows()).collect();
+    let mut points = Points::new(y0.ncols());
+    for chunk in rows.chunks(CHUNK_PER_THREAD * threads.max(1)) {
+        let prepare = |&row: &usize| {
+            let (y0, p) = (y0.row(row).to_vec(), p.row(row).to_vec());
+            let run = PreparedRun::new(&system, spans[[row, 0]], y0, p, &[], &actions)?;
+            let place = section.as_ref().map(|section| section.at(&run, row));
+            Ok((run, place, (spans[[row, 0]], spans[[row, 1]])))
+        };
+        let jobs = chunk.iter().map(prepare).collect::<PyResult<Vec<_>>>()?;
+        let go = |(run, place, span): &(PreparedRun, Option<OwnPlace>, (f64, f64)),
+                  interrupt: &mut dyn FnMut(f64) -> bool|
+         -> Outcome {
+            match (place, &section) {
+                (Some(place), Some(section)) => {
+                    let section = section.section(place);
+                    run.run_to_section(*span, &options.options, &section, interrupt)
+                }
+                _ => run.run(*span, &options.options, interrupt),
+            }
+        };
+        let outcomes = py.detach(|| on_threads(&jobs, threads, go));
+        py.check_signals()?;
+        for ((run, _, span), outcome) in jobs.iter().zip(outcomes) {
+            points.take(py, run, *span, outcome)?;
+        }
+    }
+    points.into_dict(py)
+}
+
+/// A section as it comes from Python.
+struct SectionSpec {
+    place: PlaceSpec,
+    transient: u64,
+    most: u64,
+    cycle: Option<Cycle>,
+}
+
+enum PlaceSpec {
+    Called(Py<PyAny>, f64),
+    Compiled(Arc<EventExpression>, f64),
+    Surface(usize, i8, Option<Kind>),
+    /// Period and phase of each row.
+    Ticks(Vec<Clock>),
+}
+
+/// The section of one run.
+enum OwnPlace {
+    Function(Box<dyn UserFunction + Send + Sync>, f64),
+    Surface(usize, i8, Option<Kind>),
+    Ticks(Clock),
+}
+
+type CycleRow = (f64, Vec<f64>, Vec<f64>, usize, bool);
+
+impl SectionSpec {
+    fn read(system: &Bound<'_, PyAny>, given: &Bound<'_, PyDict>) -> PyResult<Self> {
+        let cycle: Option<CycleRow> = item(given, "cycle")?.extract()?;
+        let cycle = cycle.map(|(rtol, atol, moduli, longest, ends_run)| Cycle {
+            rtol,
+            atol,
+            moduli,
+            longest,
+            ends_run,
+        });
+        Ok(SectionSpec {
+            place: PlaceSpec::read(system, given)?,
+            transient: item(given, "transient")?.extract()?,
+            most: item(given, "most")?.extract()?,
+            cycle,
+        })
+    }
+
+    fn at(&self, run: &PreparedRun, row: usize) -> OwnPlace {
+        match (&self.place, run.traced()) {
+            (PlaceSpec::Called(function, direction), _) => {
+                let function = Python::attach(|py| function.clone_ref(py));
+                OwnPlace::Function(Box::new(CalledEvent(function)), *direction)
+            }
+            (PlaceSpec::Compiled(expression, direction), Some(system)) => {
+                let function = CompiledEvent {
+                    expression: Arc::clone(expression),
+                    system: Arc::clone(system),
+                };
+                OwnPlace::Function(Box::new(function), *direction)
+            }
+            (PlaceSpec::Compiled(..), None) => unreachable!("only traced systems have expressions"),
+            (PlaceSpec::Surface(j, direction, kind), _) => OwnPlace::Surface(*j, *direction, *kind),
+            (PlaceSpec::Ticks(clocks), _) => OwnPlace::Ticks(clocks[row]),
+        }
+    }
+
+    fn section<'a>(&self, place: &'a OwnPlace) -> Section<'a> {
+        let place = match place {
+            OwnPlace::Function(function, direction) => Place::Function {
+                function: &**function,
+                direction: *direction,
+            },
+            OwnPlace::Surface(index, direction, kind) => Place::Surface {
+                index: *index,
+                direction: *direction,
+                kind: *kind,
+            },
+            OwnPlace::Ticks(clock) => Place::Ticks(*clock),
+        };
+        Section {
+            place,
+            transient: self.transient,
+            most: self.most,
+            cycle: self.cycle.clone(),
+        }
+    }
+}
+
+impl PlaceSpec {
+    fn read(system: &Bound<'_, PyAny>, given: &Bound<'_, PyDict>) -> PyResult<Self> {
+        let form: String = item(given, "form")?.extract()?;
+        let traced = system.cast::<TracedSystem>().ok();
+        let refused = |text: &str| PyValueError::new_err(text.to_owned());
+        let compiled = |graph: &filippov_expr::Graph, node| {
+            let expression = EventExpression::compile(graph, node);
+            expression.map_err(|e| PyValueError::new_err(e.to_string()))
+        };
+        match form.as_str() {
+            "function" => {
+                let direction = item(given, "direction")?.extract()?;
+                let function = item(given, "function")?;
+                match (function.cast::<TracedSystem>(), traced) {
+                    (Ok(own), Some(_)) => {
+                        let own = &own.get().system;
+                        let node = *own
+                            .field_nodes()
+                            .first()
+                            .ok_or_else(|| refused("section: no function"))?;
+                        let expression = compiled(own.graph(), node)?;
+                        Ok(PlaceSpec::Compiled(Arc::new(expression), direction))
+                    }
+                    (Ok(_), None) => Err(refused("section: the system is not traced")),
+                    _ => Ok(PlaceSpec::Called(function.unbind(), direction)),
+                }
+            }
+            "tangency" => {
+                let direction = item(given, "direction")?.extract()?;
+                let index: usize = item(given, "surface")?.extract()?;
+                let mut signs: Vec<f64> = item(given, "signs")?.extract()?;
+                let traced = traced.ok_or_else(|| refused("section: the system is not traced"))?;
+                let own = &traced.get().system;
+                let mut graph = own.graph().clone();
+                signs.resize(graph.n_surfaces(), 1.0);
+                let signs: Vec<Option<f64>> = signs.into_iter().map(Some).collect();
+                let h = graph.surface(index as u32);
+                let h = graph.at_signs(&[h], &signs)[0];
+                let field = graph.at_signs(own.field_nodes(), &signs);
+                let rate = graph.directional(h, &field);
+                Ok(PlaceSpec::Compiled(
+                    Arc::new(compiled(&graph, rate)?),
+                    direction,
+                ))
+            }
+            "surface" => {
+                let name: Option<String> = item(given, "kind")?.extract()?;
+                let kind = match name {
+                    Some(name) => Some(kind_named(&name).ok_or_else(|| refused("section: kind"))?),
+                    None => None,
+                };
+                Ok(PlaceSpec::Surface(
+                    item(given, "surface")?.extract()?,
+                    item(given, "direction")?.extract()?,
+                    kind,
+                ))
+            }
+            "ticks" => {
+                let rows: PyReadonlyArray2<f64> = item(given, "clocks")?.extract()?;
+                let rows = rows.as_array();
+                let clocks = rows.rows().into_iter().map(|row| Clock {
+                    period: row[0],
+                    phase: row[1],
+                });
+                Ok(PlaceSpec::Ticks(clocks.collect()))
+            }
+            _ => Err(refused("section: unknown form")),
+        }
+    }
+}
+
+fn item<'py>(given: &Bound<'py, PyDict>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+    given
+        .get_item(name)?
+        .ok_or_else(|| PyKeyError::new_err(name.to_owned()))
+}
+
+fn kind_named(name: &str) -> Option<Kind> {
+    let kinds = [
+        Kind::Crossing,
+        Kind::EnterSliding,
+        Kind::ExitSliding,
+        Kind::SwitchSliding,
+        Kind::Grazing,
+        Kind::Accumulation,
+        Kind::Reset,
+    ];
+    kinds.into_iter().find(|kind| kind.name() == name)
+}
+
+/// What the runs leave, in columns.
+#[derive(Default)]
+struct Points {
+    n_states: usize,
+    n_surfaces: usize,
+    status: Vec<i8>,
+    reason: Vec<&'static str>,
+    message: Vec<String>,
+    t_last: Vec<f64>,
+    y_last: Vec<f64>,
+    n_steps: Vec<i64>,
+    n_switches: Vec<i64>,
+    n_returns: Vec<i64>,
+    period: Vec<i64>,
+    row_size: Vec<i64>,
+    t: Vec<f64>,
+    y: Vec<f64>,
+    duration: Vec<f64>,
+    sliding: Vec<f64>,
+    n_pieces: Vec<i32>,
+    modes: Vec<i8>,
+}
+
+impl Points {
+    fn new(n_states: usize) -> Self {
+        Points {
+            n_states,
+            ..Points::default()
+        }
+    }
+
+    fn take(
+        &mut self,
+        py: Python<'_>,
+        run: &PreparedRun,
+        span: (f64, f64),
+        outcome: Outcome,
+    ) -> PyResult<()> {
+        self.n_surfaces = run.n_visible();
+        let mut solution = match outcome {
+            Ok(solution) => solution,
+            Err(error) => {
+                self.end(-1, "wrong_input", error.to_string());
+                self.t_last.push(span.0);
+                self.y_last
+                    .resize(self.y_last.len() + self.n_states, f64::NAN);
+                self.count(0, 0);
+                self.returns(&Returns::default());
+                return Ok(());
+            }
+        };
+        let mode = Mode::new(solution.mode.entries()[..run.n_visible()].to_vec());
+        let name = |j| run.core().surface_name(j);
+        let mut message = solution.stop.message(solution.t_last, &mode, name);
+        let (status, reason) = (status_of(&solution.stop), solution.stop.name());
+        if let Stop::FieldRaised(payload) = &mut solution.stop {
+            let error = raised(std::mem::replace(payload, filippov::FieldError::new(())));
+            if !error.is_instance_of::<pyo3::exceptions::PyException>(py) {
+                return Err(error);
+            }
+            message = format!("{message} {error}");
+        }
+        self.end(status, reason, message);
+        self.t_last.push(solution.t_last);
+        self.y_last.extend_from_slice(solution.last_state());
+        let stats = &solution.stats;
+        self.count(stats.n_steps as i64, stats.n_switches as i64);
+        self.returns(&solution.returns.take().unwrap_or_default());
+        Ok(())
+    }
+
+    fn end(&mut self, status: i32, reason: &'static str, message: String) {
+        self.status.push(status as i8);
+        self.reason.push(reason);
+        self.message.push(message);
+    }
+
+    fn count(&mut self, n_steps: i64, n_switches: i64) {
+        self.n_steps.push(n_steps);
+        self.n_switches.push(n_switches);
+    }
+
+    fn returns(&mut self, returns: &Returns) {
+        self.n_returns.push(returns.count as i64);
+        self.period.push(returns.period as i64);
+        self.row_size.push(returns.kept.len() as i64);
+        for kept in &returns.kept {
+            self.t.push(kept.t);
+            self.y.extend_from_slice(&kept.y);
+            self.duration.push(kept.duration);
+            self.sliding.push(kept.sliding);
+            self.n_pieces.push(kept.modes.len() as i32);
+            let entries = kept.modes.iter();
+            let entries = entries.flat_map(|mode| &mode.entries()[..self.n_surfaces]);
+            self.modes.extend(entries);
+        }
+    }
+
+    fn into_dict(self, py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+        let dict = PyDict::new(py);
+        let n_kept = self.t.len();
+        let n_pieces: i64 = self.n_pieces.iter().map(|&n| i64::from(n)).sum();
+        let table = |values: Vec<f64>, rows: usize| -> PyResult<Bound<'_, PyArray2<f64>>> {
+            PyArray1::from_vec(py, values).reshape([rows, self.n_states])
+        };
+        dict.set_item("y_last", table(self.y_last, self.status.len())?)?;
+        dict.set_item("y", table(self.y, n_kept)?)?;
+        let modes = PyArray1::from_vec(py, self.modes);
+        dict.set_item(
+            "modes",
+            modes.reshape([n_pieces as usize, self.n_surfaces])?,
+        )?;
+        dict.set_item("status", PyArray1::from_vec(py, self.status))?;
+        dict.set_item("reason", self.reason)?;
+        dict.set_item("message", self.message)?;
+        dict.set_item("t_last", PyArray1::from_vec(py, self.t_last))?;
+        dict.set_item("n_steps", PyArray1::from_vec(py, self.n_steps))?;
+        dict.set_item("n_switches", PyArray1::from_vec(py, self.n_switches))?;
+        dict.set_item("n_returns", PyArray1::from_vec(py, self.n_returns))?;
+        dict.set_item("period", PyArray1::from_vec(py, self.period))?;
+        dict.set_item("row_size", PyArray1::from_vec(py, self.row_size))?;
+        dict.set_item("t", PyArray1::from_vec(py, self.t))?;
+        dict.set_item("duration", PyArray1::from_vec(py, self.duration))?;
+        dict.set_item("sliding", PyArray1::from_vec(py, self.sliding))?;
+        dict.set_item("n_pieces", PyArray1::from_vec(py, self.n_pieces))?;
+        Ok(dict)
+    }
+}

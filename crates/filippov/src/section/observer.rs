@@ -1,0 +1,215 @@
+//! The returns of a run to its section, taken down as it goes on.
+
+use std::collections::VecDeque;
+
+use super::cycle::{Agreements, Cycle};
+use super::{Place, Section};
+use crate::action::Clock;
+use crate::integrate::Stop;
+use crate::mode::Mode;
+use crate::solution::Switch;
+use crate::switching::Kind;
+use crate::tolerances::SAME_TICK;
+
+/// A return to the section.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Return {
+    /// Its time.
+    pub t: f64,
+    /// The state there; where the state jumps, just before.
+    pub y: Vec<f64>,
+    /// The time since the return before, or since the start.
+    pub duration: f64,
+    /// The part of it that was spent sliding.
+    pub sliding: f64,
+    /// The modes of the pieces in between, in their order.
+    pub modes: Vec<Mode>,
+}
+
+/// What a run leaves at its section.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Returns {
+    /// The returns that were kept: those after the transient, or one period if the run ended because of it.
+    pub kept: Vec<Return>,
+    /// How many there were, those not kept included.
+    pub count: u64,
+    /// After how many returns the motion repeats; 0 if that was not found.
+    pub period: usize,
+}
+
+/// Watches a run; the recorder tells it what happens.
+pub(crate) struct Observer {
+    surface: Option<(usize, i8, Option<Kind>)>,
+    /// The clock and its next tick.
+    clock: Option<(Clock, f64)>,
+    transient: u64,
+    most: u64,
+    cycle: Option<(Cycle, Agreements)>,
+    returns: Returns,
+    /// The last returns, for the test of periodicity.
+    latest: VecDeque<Return>,
+    longest: usize,
+    /// Time of the start, and of the last return.
+    t_start: f64,
+    t_return: f64,
+    /// Since when the mode is what it is, or since the last return.
+    since: f64,
+    slides: bool,
+    slid: f64,
+    modes: Vec<Mode>,
+    has_ended: bool,
+    is_periodic: bool,
+}
+
+impl Observer {
+    pub fn new(section: &Section, t_start: f64) -> Self {
+        let surface = match section.place {
+            Place::Surface {
+                index,
+                direction,
+                kind,
+            } => Some((index, direction, kind)),
+            _ => None,
+        };
+        let clock = match section.place {
+            Place::Ticks(clock) => Some((clock, clock.last_up_to(t_start) + 1.0)),
+            _ => None,
+        };
+        let longest = section.cycle.as_ref().map_or(0, |cycle| cycle.longest);
+        let cycle = section.cycle.clone();
+        Observer {
+            surface,
+            clock,
+            transient: section.transient,
+            most: section.most,
+            cycle: cycle.map(|cycle| (cycle, Agreements::new(longest))),
+            returns: Returns::default(),
+            latest: VecDeque::with_capacity(longest + 1),
+            longest,
+            t_start,
+            t_return: t_start,
+            since: t_start,
+            slides: false,
+            slid: 0.0,
+            modes: Vec::new(),
+            has_ended: section.most == 0,
+            is_periodic: false,
+        }
+    }
+
+    /// The next tick, if the section is a clock.
+    pub fn next_tick(&self) -> Option<f64> {
+        self.clock.map(|(clock, tick)| clock.time(tick))
+    }
+
+    /// Is the next tick reached at `t`, up to rounding?
+    pub fn has_tick_up_to(&self, t: f64) -> bool {
+        self.next_tick()
+            .is_some_and(|tick| tick <= t + SAME_TICK * t.abs())
+    }
+
+    /// Goes on to the tick after the next one, `k` ticks further on; returns its time.
+    pub fn tick_after(&self, k: usize) -> Option<f64> {
+        self.clock.map(|(clock, tick)| clock.time(tick + k as f64))
+    }
+
+    /// A tick was recorded.
+    pub fn pass_tick(&mut self) {
+        if let Some((_, tick)) = &mut self.clock {
+            *tick += 1.0;
+        }
+    }
+
+    /// A piece of constant mode begins.
+    pub fn begin(&mut self, t: f64, mode: &Mode) {
+        self.pass_time(t);
+        // A piece without duration is no piece.
+        match self.modes.last_mut() {
+            Some(last) if t <= self.since => *last = mode.clone(),
+            _ => self.modes.push(mode.clone()),
+        }
+        self.since = t;
+        self.slides = mode.codimension() > 0;
+    }
+
+    /// A switch: a return, if it lies on the section.
+    pub fn switched(&mut self, switch: &Switch) {
+        let Some((j, direction, kind)) = self.surface else {
+            return;
+        };
+        let before = switch.mode_before.entries()[j];
+        let after = switch.mode_after.entries()[j];
+        let is_meant = match kind {
+            Some(kind) => switch.kind == kind,
+            None => before != 0 && switch.kind != Kind::Grazing,
+        };
+        // From h < 0 the motion comes up, and it leaves the surface upwards to h > 0.
+        let heading = if before != 0 { -before } else { after };
+        if is_meant && switch.surfaces.contains(&j) && heading * direction >= 0 {
+            self.note(switch.t, &switch.y_before);
+            self.modes.clear();
+        }
+    }
+
+    /// A return in the flow.
+    pub fn returned(&mut self, t: f64, y: &[f64]) {
+        let mode = self.modes.last().cloned();
+        self.note(t, y);
+        self.modes = mode.into_iter().collect();
+    }
+
+    fn note(&mut self, t: f64, y: &[f64]) {
+        if t <= self.t_start || self.has_ended {
+            return;
+        }
+        self.pass_time(t);
+        let found = Return {
+            t,
+            y: y.to_vec(),
+            duration: t - self.t_return,
+            sliding: std::mem::take(&mut self.slid),
+            modes: std::mem::take(&mut self.modes),
+        };
+        (self.t_return, self.since) = (t, t);
+        self.returns.count += 1;
+        let is_kept = self.returns.count > self.transient;
+        if let Some((cycle, agreements)) = &mut self.cycle {
+            if self.latest.len() > self.longest {
+                self.latest.pop_front();
+            }
+            self.latest.push_back(found.clone());
+            let period = agreements.take(cycle, &self.latest);
+            self.returns.period = period.unwrap_or(0);
+            if let (Some(period), true) = (period, cycle.ends_run) {
+                let first = self.latest.len() - period;
+                self.returns.kept = self.latest.drain(first..).collect();
+                (self.has_ended, self.is_periodic) = (true, true);
+                return;
+            }
+        }
+        if is_kept {
+            self.returns.kept.push(found);
+            self.has_ended = self.returns.kept.len() as u64 >= self.most;
+        }
+    }
+
+    fn pass_time(&mut self, t: f64) {
+        if self.slides {
+            self.slid += t - self.since;
+        }
+    }
+
+    /// Why the run is to end now.
+    pub fn stop(&self) -> Option<Stop> {
+        let reason = if self.is_periodic {
+            Stop::Periodic
+        } else {
+            Stop::Returned
+        };
+        self.has_ended.then_some(reason)
+    }
+
+    pub fn into_returns(self) -> Returns {
+        self.returns
+    }
+}

@@ -1,0 +1,275 @@
+"""What a sweep is to compute: its points in chunks, each of which can be run anywhere, in any order."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from hashlib import sha256
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from filippov._core import TracedSystem
+from filippov.analysis.dataset import as_json
+from filippov.analysis.grid import Grid
+from filippov.analysis.points import (
+    Observation,
+    Table,
+    Task,
+    concatenate,
+    end_times,
+    failed_table,
+    groups_of,
+    run_task,
+)
+from filippov.analysis.sections import Phase, Place, clocks_of
+from filippov.errors import InputError
+from filippov.options import Options
+from filippov.prepare import Prepared
+
+if TYPE_CHECKING:
+    from filippov.system import System
+
+__all__ = ["Chunk", "Piece", "Plan", "plan_of", "run_chunk"]
+
+Array = npt.NDArray[np.float64]
+
+_MOST_IN_CHUNK = 4096
+_CHUNKS = 50
+
+
+class Chunk(NamedTuple):
+    """Neighbouring points for one worker.
+
+    Attributes
+    ----------
+    parts : tuple of Task or Table
+        What is to be run; tables of points that could not even be prepared.
+    follows : bool
+        Whether every point starts from the state that the one before it left.
+    carry : ndarray, shape (n,), or None
+        The state that the point before the first left; None at the start of a line.
+    """
+
+    parts: tuple[Task | Table, ...]
+    follows: bool
+    carry: Array | None
+
+
+def run_chunk(chunk: Chunk) -> tuple[Table, Array]:
+    """Run the points of a chunk; return their table, and the state left to the point after the last."""
+    carry = chunk.carry
+    tables = []
+    for part in chunk.parts:
+        if isinstance(part, dict):
+            tables.append(part)
+            continue
+        if not chunk.follows:
+            tables.append(run_task(part))
+            continue
+        for row in range(len(part.y0)):
+            one = part.rows(slice(row, row + 1))
+            if carry is not None:
+                one = one._replace(y0=carry[np.newaxis])
+            table = run_task(one)
+            # A point that fails hands on what it was given.
+            if table["status"][0] >= 0:
+                carry = table["y"][-1] if len(table["y"]) else table["y_last"][0]
+            tables.append(table)
+    return concatenate(tables), np.empty(0) if carry is None else np.array(carry)
+
+
+class Piece(NamedTuple):
+    """The points ``start:stop``, and whether a line of neighbours begins there (`line` is its number)."""
+
+    start: int
+    stop: int
+    line: int
+    begins_line: bool
+
+
+class Plan(NamedTuple):
+    """A sweep that was checked.
+
+    Attributes
+    ----------
+    system, grid, prepared, place, options : object
+        What is run, at which points.
+    observed : Observation or None
+        What is observed of every run.
+    clocks, spans : ndarray, shape (n_points, 2)
+    follows : bool
+        Whether neighbours along the last dimension follow one another.
+    units : dict
+    attributes : dict
+        Attributes of the result.
+    """
+
+    system: System
+    grid: Grid
+    prepared: Prepared
+    place: Place | None
+    options: Options
+    observed: Observation | None
+    clocks: Array
+    spans: Array
+    follows: bool
+    units: Mapping[str, str]
+    attributes: Mapping[str, Any]
+
+    @property
+    def n_points(self) -> int:
+        """Number of points."""
+        return len(self.grid.y0)
+
+    def pieces(self, chunk_size: int) -> list[Piece]:
+        """Return the chunks, each of at most `chunk_size` points; those of a line stay in their order."""
+        line = self.grid.shape[-1] if self.follows else self.n_points
+        return [
+            Piece(first + start, first + min(start + chunk_size, line), first // line, start == 0)
+            for first in range(0, self.n_points, line)
+            for start in range(0, line, chunk_size)
+        ]
+
+    def usual_chunk_size(self) -> int:
+        """Return the number of points of a chunk if none is asked for."""
+        return min(max(-(-self.n_points // _CHUNKS), 1), _MOST_IN_CHUNK)
+
+    def chunk(self, piece: Piece, carry: Array | None, threads: int, travels: bool) -> Chunk:
+        """Return what is to be done for a piece."""
+        rows = slice(piece.start, piece.stop)
+        y0, p = self.grid.y0[rows], self.grid.p[rows]
+        limits: tuple[Any, ...] = ()
+        if self.observed is not None:
+            limits = (self.observed.transient, self.observed.n, self.observed.cycle)
+        parts: list[Task | Table] = []
+        t0 = float(self.spans[0, 0])
+        for own, prepared in groups_of(self.system, self.prepared, t0, y0, self.grid.names, p):
+            place: Place | None | Exception = self.place
+            if prepared is not self.prepared and not isinstance(prepared, Exception):
+                place = self._place_for(prepared, y0[own], p[own])
+            error = prepared if isinstance(prepared, Exception) else place
+            if isinstance(prepared, Exception) or isinstance(place, Exception):
+                failed = (str(error), "not_prepared", self.spans[rows][own, 0], y0[own])
+                parts.append(failed_table(*failed, len(self.prepared.surfaces)))
+                continue
+            clocks, spans = self.clocks[rows][own], self.spans[rows][own]
+            task = Task(
+                prepared,
+                place,
+                clocks,
+                spans,
+                y0[own],
+                self.grid.names,
+                p[own],
+                self.options,
+                limits,
+                threads,
+            )
+            parts.append(task.travelling() if travels else task)
+        return Chunk(tuple(parts), self.follows, carry)
+
+    def _place_for(self, prepared: Prepared, y0: Array, p: Array) -> Place | None | Exception:
+        """Return the section for a system that holds for some parameter values only."""
+        if len(prepared.surfaces) != len(self.prepared.surfaces):
+            return InputError(
+                "the function has other surfaces for these parameter values; make a sweep for each side"
+            )
+        if self.observed is None:
+            return None
+        values = dict(zip(self.grid.names, p[0].tolist(), strict=True))
+        section, t0 = self.observed.section, float(self.spans[0, 0])
+        try:
+            return section.place(prepared, self.grid.states, t0, y0[0].copy(), values)
+        except InputError as error:
+            return error
+
+    def identity(self) -> dict[str, str]:
+        """Return what the result follows from, as digests and text."""
+        core = self.prepared.core
+        code = core.to_bytes() if isinstance(core, TracedSystem) else repr(self.prepared.surfaces).encode()
+        maps = [
+            action._replace(
+                map=_digest(action.map.to_bytes()) if isinstance(action.map, TracedSystem) else ""
+            )
+            for action in self.prepared.actions
+        ]
+        place = self.place
+        if place is not None:
+            function = place.function
+            traced = _digest(function.to_bytes()) if isinstance(function, TracedSystem) else ""
+            place = place._replace(function=traced)
+        return {
+            "system": _digest(code),
+            "resets": as_json(maps),
+            "section": as_json([place, None if self.observed is None else self.observed[1:]]),
+            "y0": _digest(self.grid.y0.tobytes()),
+            "params": _digest(as_json(self.grid.names).encode() + self.grid.p.tobytes()),
+            "dimensions": as_json([[axis.name, axis.size] for axis in self.grid.axes]),
+            "t_span": _digest(self.spans.tobytes() + self.clocks.tobytes()),
+            "follow": str(self.follows),
+            "options": self.attributes["options"],
+            "units": as_json(dict(self.units)),
+        }
+
+
+def _digest(data: bytes) -> str:
+    return sha256(data).hexdigest()
+
+
+def plan_of(
+    system: System,
+    grid: Grid,
+    prepared: Prepared,
+    observed: Observation | None,
+    options: Options,
+    t_span: tuple[float, float],
+    follows: bool,
+    units: Mapping[str, str],
+) -> Plan:
+    """Return the plan of a sweep; all arguments are checked."""
+    count = len(grid.y0)
+    t0, t1 = t_span
+    starts, ends, place = np.full(count, t0), np.full(count, t1), None
+    clocks = np.zeros((count, 2))
+    if observed is not None:
+        section = observed.section
+        clocks = clocks_of(section, grid.columns(), count)
+        if follows and isinstance(section, Phase) and section.of is None:
+            # The state that a point hands on belongs to a tick: the next one starts at a tick of its own
+            # clock.
+            period, offset = clocks.T
+            with np.errstate(invalid="ignore", divide="ignore"):
+                ticks = offset + np.ceil((t0 - offset) / period) * period
+            begins_line = np.arange(count) % grid.shape[-1] == 0
+            starts = np.where(begins_line | ~np.isfinite(ticks), t0, ticks)
+        ends = end_times(section, t_span, observed.transient + observed.n, clocks)
+        finite = np.flatnonzero(np.isfinite(grid.y0).all(axis=1) & np.isfinite(grid.p).all(axis=1))
+        row = int(finite[0]) if len(finite) else 0
+        values = dict(zip(grid.names, grid.p[row].tolist(), strict=True))
+        place = section.place(prepared, grid.states, t0, grid.y0[row].copy(), values)
+    shown = {name: value for name, value in options._asdict().items() if name not in _NOT_SHOWN}
+    attributes: dict[str, Any] = {
+        "Conventions": "CF-1.11",
+        "states": as_json(grid.states),
+        "surfaces": as_json(prepared.surfaces),
+        "t_span": [float(t0), float(t1)] if np.isfinite(t1) else [float(t0)],
+        "params": as_json(grid.fixed),
+        "options": as_json(shown),
+    }
+    if observed is not None:
+        attributes |= {
+            "section": repr(observed.section),
+            "n": observed.n,
+            "transient": observed.transient,
+            "periodicity": as_json(observed.cycle),
+            "follow": grid.dims[-1] if follows else "",
+        }
+    return Plan(
+        *(system, grid, prepared, place, options, observed, clocks),
+        np.column_stack([starts, ends]),
+        *(follows, units, attributes),
+    )
+
+
+_NOT_SHOWN = frozenset(("t_eval", "dense_output", "keep", "progress", "max_branches"))

@@ -1,0 +1,251 @@
+"""The runs of a sweep: what is handed to the core, and the table of what comes back."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from filippov._core import TracedSystem, solve_points
+from filippov.analysis.sections import AnySection, Phase, Place
+from filippov.errors import FilippovError, InputError
+from filippov.events import bind_function, selective
+from filippov.options import Options
+from filippov.prepare import Prepared, packed, unpacked
+
+if TYPE_CHECKING:
+    from filippov.system import System
+
+__all__ = ["Observation", "Table", "Task", "concatenate", "prepare_for", "run_task"]
+
+Array = npt.NDArray[np.float64]
+Table = dict[str, Any]
+
+# The columns of a table, by what one row belongs to. Texts are lists.
+POINT_COLUMNS = (
+    *("status", "reason", "message", "t_last", "y_last"),
+    *("n_steps", "n_switches", "n_returns", "period", "row_size"),
+)
+RETURN_COLUMNS = ("t", "y", "duration", "sliding", "n_pieces")
+PIECE_COLUMNS = ("modes",)
+COLUMNS = (*POINT_COLUMNS, *RETURN_COLUMNS, *PIECE_COLUMNS)
+
+
+class Observation(NamedTuple):
+    """What is observed of every run.
+
+    Attributes
+    ----------
+    section : Section, Phase or Tangency
+        Where.
+    transient, n : int
+        Returns that are not kept, and that are.
+    cycle : tuple or None
+        The test of periodicity: relative tolerance, absolute ones, moduli, longest period, whether the run
+        ends.
+    """
+
+    section: AnySection
+    transient: int
+    n: int
+    cycle: tuple[float, list[float], list[float], int, bool] | None
+
+
+class Task(NamedTuple):
+    """Runs for one worker, without anything that belongs to a process unless `system` cannot be pickled.
+
+    Attributes
+    ----------
+    system : Prepared or bytes
+        The system of the core; pickled where the task travels.
+    place : Place or None
+        The section.
+    clocks : ndarray, shape (n_points, 2)
+        Period and offset, for a section at known times.
+    spans : ndarray, shape (n_points, 2)
+    y0 : ndarray, shape (n_points, n)
+    names : tuple of str
+        Names of the parameters.
+    p : ndarray, shape (n_points, n_parameters)
+    options : Options
+    limits : tuple
+        Returns not kept, returns kept, and the test of periodicity.
+    threads : int
+    """
+
+    system: Prepared | bytes
+    place: Place | None
+    clocks: Array
+    spans: Array
+    y0: Array
+    names: tuple[str, ...]
+    p: Array
+    options: Options
+    limits: tuple[Any, ...]
+    threads: int
+
+    def rows(self, chosen: slice) -> Task:
+        """Return the same task for some of the points."""
+        return self._replace(
+            clocks=self.clocks[chosen], spans=self.spans[chosen], y0=self.y0[chosen], p=self.p[chosen]
+        )
+
+    def travelling(self) -> Task:
+        """Return the task in a form that can be pickled, if the system can."""
+        place = self.place
+        if place is not None and isinstance(place.function, TracedSystem):
+            place = place._replace(function=place.function.to_bytes())
+        if isinstance(self.system, Prepared) and isinstance(self.system.core, TracedSystem):
+            return self._replace(system=pickle.dumps(packed(self.system)), place=place)
+        raise InputError(
+            "executor: a system that cannot be traced cannot be sent to other processes; leave executor= "
+            "away, or write the right-hand side with NumPy functions"
+        )
+
+
+@lru_cache(maxsize=16)
+def _system(data: bytes) -> Prepared:
+    return unpacked(pickle.loads(data))
+
+
+@lru_cache(maxsize=16)
+def _function(data: bytes) -> TracedSystem:
+    return TracedSystem.from_bytes(data)
+
+
+def run_task(task: Task) -> Table:
+    """Do the runs of a task; the rows of the table are in the order of the points."""
+    prepared = _system(task.system) if isinstance(task.system, bytes) else task.system
+    place = task.place
+    if place is not None and isinstance(place.function, bytes):
+        place = place._replace(function=_function(place.function))
+    if place is None or not place.is_called:
+        return _run(task, prepared, place)
+    # A function that could not be traced is called; it may read the parameters of its point.
+    tables = []
+    for row in range(len(task.y0)):
+        one = task.rows(slice(row, row + 1))
+        values = dict(zip(task.names, one.p[0].tolist(), strict=True))
+        bound = bind_function(selective(place.function, values), (), values)
+        tables.append(_run(one._replace(threads=1), prepared, place._replace(function=bound)))
+    return concatenate(tables)
+
+
+def _run(task: Task, prepared: Prepared, place: Place | None) -> Table:
+    section = None
+    if place is not None:
+        transient, most, cycle = task.limits
+        section = {
+            **place._asdict(),
+            "clocks": task.clocks,
+            "signs": list(place.signs),
+            "direction": place.direction if place.form != "surface" else int(place.direction),
+            "transient": transient,
+            "most": most,
+            "cycle": cycle,
+        }
+    return solve_points(
+        prepared.core,
+        task.spans,
+        task.y0,
+        task.p,
+        task.options.for_core(),
+        list(prepared.actions),
+        section,
+        task.threads,
+    )
+
+
+def failed_table(message: str, reason: str, t0: Array, y0: Array, n_surfaces: int) -> Table:
+    """Return the table of points that could not be run at all."""
+    count, n = y0.shape
+    zeros = np.zeros(count, dtype=np.int64)
+    return {
+        "status": np.full(count, -1, dtype=np.int8),
+        "reason": [reason] * count,
+        "message": [message] * count,
+        "t_last": t0,
+        "y_last": np.full((count, n), np.nan),
+        **{name: zeros for name in ("n_steps", "n_switches", "n_returns", "period", "row_size")},
+        **{name: np.empty(0) for name in ("t", "duration", "sliding")},
+        "y": np.empty((0, n)),
+        "n_pieces": np.empty(0, dtype=np.int32),
+        "modes": np.empty((0, n_surfaces), dtype=np.int8),
+    }
+
+
+def concatenate(tables: Sequence[Table]) -> Table:
+    """Return one table with the rows of all."""
+    if len(tables) == 1:
+        return tables[0]
+    joined: Table = {}
+    for name in COLUMNS:
+        if isinstance(tables[0][name], list):
+            joined[name] = [text for table in tables for text in table[name]]
+        else:
+            joined[name] = np.concatenate([table[name] for table in tables])
+    return joined
+
+
+def prepare_for(system: System, t0: float, y0: Array, names: Sequence[str], p: Array) -> Prepared:
+    """Return the system of the core, traced at a point of the sweep, or at its default values."""
+    n = y0.shape[1]
+    finite = np.flatnonzero(np.isfinite(y0).all(axis=1) & np.isfinite(p).all(axis=1))
+    row = int(finite[0]) if len(finite) else 0
+    values = dict(zip(names, p[row].tolist(), strict=True))
+    try:
+        return system.prepare(n, t0, np.ascontiguousarray(y0[row]), values)
+    except Exception:
+        defaults = system.parameter_values(None)
+        if defaults == values:
+            raise
+        return system.prepare(n, t0, None, defaults)
+
+
+def groups_of(
+    system: System, prepared: Prepared, t0: float, y0: Array, names: Sequence[str], p: Array
+) -> list[tuple[slice, Prepared | Exception]]:
+    """Return pieces of points with the system that is valid for each; usually one system is valid for all.
+
+    A function that branches on parameter values, or cannot be traced, is prepared for every combination of
+    values anew; where that fails, the error stands in the place of the system.
+    """
+    if prepared.pinned is None:
+        return [(slice(0, len(y0)), prepared)]
+    groups: list[tuple[slice, Prepared | Exception]] = []
+    start = 0
+    while start < len(y0):
+        end = start + 1
+        while end < len(y0) and np.array_equal(p[end], p[start]):
+            end += 1
+        values = dict(zip(names, p[start].tolist(), strict=True))
+        try:
+            own: Prepared | Exception = system.prepare(y0.shape[1], t0, y0[start].copy(), values)
+        except FilippovError as error:
+            own = error
+        except (ArithmeticError, ValueError, IndexError, KeyError, TypeError) as error:
+            own = error
+        groups.append((slice(start, end), own))
+        start = end
+    return groups
+
+
+def end_times(section: AnySection | None, t_span: tuple[float, float], most: int, clocks: Array) -> Array:
+    """Return the end of each run, which lies beyond the last return where `t_span` is open."""
+    t0, t1 = t_span
+    ends = np.full(len(clocks), t1)
+    if np.isinf(t1):
+        assert isinstance(section, Phase)
+        period, offset = clocks.T
+        with np.errstate(invalid="ignore", divide="ignore"):
+            first = np.floor((t0 - offset) / period) + 1
+        ends = offset + (first + most + 1) * period
+    return ends
+
+
+Runner = Callable[[Task], Table]
+Values = Mapping[str, Array]

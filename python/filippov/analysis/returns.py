@@ -1,0 +1,203 @@
+"""Poincare maps: the returns of one motion to a section."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from filippov.analysis.dataset import as_json
+from filippov.analysis.grid import grid_of
+from filippov.analysis.observe import check_system, observation_of, options_of, span_of
+from filippov.analysis.optional import need
+from filippov.analysis.points import Task, end_times, prepare_for, run_task
+from filippov.analysis.sections import clocks_of
+from filippov.errors import InputError
+from filippov.modes import Mode
+from filippov.options import fit_kappa
+
+if TYPE_CHECKING:
+    from filippov.system import System
+
+__all__ = ["poincare"]
+
+
+def poincare(
+    system: System,
+    section: Any,
+    t_span: tuple[float, float],
+    y0: npt.ArrayLike,
+    params: Mapping[str, float] | None = None,
+    *,
+    n: int | None = None,
+    transient: int = 0,
+    until_periodic: bool = False,
+    tolerance: float | None = None,
+    longest_period: int = 64,
+    modulo: Mapping[Any, float] | None = None,
+    units: Mapping[str, str] | None = None,
+    **options: Any,
+) -> Any:
+    """Return the returns of a motion to a Poincare section.
+
+    Parameters
+    ----------
+    system : System
+        The system; it stays traced, so that other calls cost no tracing.
+    section : Section, Phase, Tangency, callable, str or int
+        Where the motion is looked at: a function ``h_P(t, x)``, a surface of the system by its name or index,
+        a phase, a tangency.
+    t_span : (float, float)
+        Longest interval of time. For ``Phase(period)`` with `n` the end may be ``np.inf``.
+    y0 : array_like, shape (n_states,)
+        Initial state.
+    params : dict, optional
+        Parameter values other than the defaults.
+    n : int, optional
+        Stop after so many returns that are kept; by default only the end of `t_span` stops.
+    transient : int, optional
+        So many first returns are not kept.
+    until_periodic : bool, optional
+        Stop when the returns repeat, and keep one period of them.
+    tolerance : float, optional
+        When two returns agree: the components differ by less than ``tolerance (|x| + atol / rtol)``, the
+        weights of the error control. Default: 10 rtol.
+    longest_period : int, optional
+        Most returns that a period may have.
+    modulo : dict, optional
+        States, by name or index, that count up to a multiple of a number: angles and phases.
+    units : dict, optional
+        Units of states, of parameters, and of the time under ``"t"``; they become attributes.
+    **options
+        Options of `solve_ivp`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Along the dimension ``obs``, one entry per return: its time ``t``, every state by its name, the
+        ``return_time`` since the return before (or the start), the ``sliding_time`` in it, and the modes in
+        between, as text in ``itinerary`` and as numbers in ``mode``, ``n_pieces`` rows of it per return. The
+        attributes have ``status, reason, message``, ``n_returns`` (all of them), and ``period``, the number
+        of returns after which the motion repeats, 0 if that was not found.
+
+    Raises
+    ------
+    InputError
+        If an argument is wrong.
+    ImportError
+        If xarray is not installed.
+
+    Notes
+    -----
+    The section is watched by the core: a run keeps its returns and nothing else, and for functions that can
+    be traced no Python is called. The test of periodicity is a heuristic: the last returns agree with those
+    one period before, over one period and at least twice. A motion that drifts by less than the tolerance
+    from one return to the next counts as periodic.
+
+    References
+    ----------
+    Piiroinen and Kuznetsov, ACM Trans. Math. Softw. 34 (2008) 13, sections 3 and 4.1.
+
+    Examples
+    --------
+    The forced oscillator with dry friction, once per period of the forcing:
+
+    >>> import numpy as np, filippov as fl
+    >>> @fl.system(states=("y", "v"))
+    ... def friction(t, x, F=0.4, omega=1 / 3):
+    ...     y, v = x
+    ...     return v, -y + np.sin(omega * t) - F * np.sign(v)
+    >>> once_per_period = fl.Phase(lambda omega: 2 * np.pi / omega)
+    >>> returns = fl.poincare(
+    ...     friction, once_per_period, (0, np.inf), [1.0, 2.0], n=100, until_periodic=True, rtol=1e-9
+    ... )
+    >>> returns.attrs["period"], returns.itinerary.values.tolist()
+    (1, ['+ 0 - 0 +'])
+    >>> returns.v.values.round(6).tolist()
+    [0.35703]
+    """
+    xarray = need("xarray", "poincare()")
+    system = check_system(system)
+    for name, value in (params or {}).items():
+        if np.ndim(value) != 0:
+            raise InputError(f"params: one number is needed for {name}; bifurcation_diagram() takes arrays")
+    grid = grid_of(system, y0, params)
+    if grid.axes:
+        raise InputError("y0: one initial state is needed; bifurcation_diagram() takes several")
+    if not (np.isfinite(grid.y0).all() and np.isfinite(grid.p).all()):
+        raise InputError("y0, params: must be finite")
+    span = span_of(t_span, section, n is not None)
+    checked = options_of(options, span, len(grid.states))
+    observed = observation_of(
+        section,
+        checked,
+        grid.states,
+        n=n,
+        transient=transient,
+        until_periodic=until_periodic,
+        tolerance=tolerance,
+        longest_period=longest_period,
+        modulo=modulo,
+    )
+    prepared = prepare_for(system, span[0], grid.y0, grid.names, grid.p)
+    fit_kappa(checked.kappa, prepared.surfaces)
+    values = dict(zip(grid.names, grid.p[0].tolist(), strict=True))
+    own = observed.section
+    place = own.place(prepared, grid.states, span[0], grid.y0[0].copy(), values)
+    clocks = clocks_of(own, grid.columns(), 1)
+    ends = end_times(own, span, observed.transient + observed.n, clocks)
+    table = run_task(
+        Task(
+            prepared,
+            place,
+            clocks,
+            np.column_stack([[span[0]], ends]),
+            grid.y0,
+            grid.names,
+            grid.p,
+            checked,
+            (observed.transient, observed.n, observed.cycle),
+            1,
+        )
+    )
+    given = units or {}
+
+    def attributes(name: str) -> dict[str, str]:
+        return {"units": given[name]} if name in given else {}
+
+    time = attributes("t")
+    variables: dict[str, Any] = {"t": ("obs", table["t"], time)}
+    for i, name in enumerate(grid.states):
+        variables[name] = ("obs", table["y"][:, i], attributes(name))
+    variables["return_time"] = ("obs", table["duration"], time)
+    variables["sliding_time"] = ("obs", table["sliding"], time)
+    variables["n_pieces"] = ("obs", table["n_pieces"], {"sample_dimension": "piece"})
+    variables["itinerary"] = ("obs", np.array(texts_of(table["modes"], table["n_pieces"]), dtype=object))
+    coordinates = {}
+    if prepared.surfaces:
+        variables["mode"] = (("piece", "surface"), table["modes"])
+        coordinates["surface"] = list(prepared.surfaces)
+    described = {
+        "Conventions": "CF-1.11",
+        "status": int(table["status"][0]),
+        "reason": table["reason"][0],
+        "message": table["message"][0],
+        "n_returns": int(table["n_returns"][0]),
+        "period": int(table["period"][0]),
+        "t_last": float(table["t_last"][0]),
+        "section": repr(own),
+        "params": as_json(values),
+        "options": as_json(checked._asdict()),
+    }
+    return xarray.Dataset(variables, coords=coordinates, attrs=described)
+
+
+def texts_of(modes: npt.NDArray[np.int8], sizes: npt.NDArray[np.int32]) -> list[str]:
+    """Return the modes between returns as text, one entry per return: ``"+ 0 -"``."""
+    ends = np.cumsum(sizes)
+    words = [str(Mode(mode)) for mode in modes.tolist()]
+    return [
+        " ".join(words[end - size : end]) for size, end in zip(sizes.tolist(), ends.tolist(), strict=True)
+    ]

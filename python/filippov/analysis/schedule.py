@@ -1,0 +1,166 @@
+"""Chunks of a sweep on threads of this process or on an executor, handed over as they are finished."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections import deque
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from queue import SimpleQueue
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from filippov.analysis.plan import Piece, Plan, run_chunk
+from filippov.analysis.points import Table
+from filippov.errors import InputError
+
+__all__ = ["Progress", "as_executor", "run_pieces"]
+
+Array = npt.NDArray[np.float64]
+Take = Callable[[int, Table, Array], None]
+
+
+def as_executor(executor: Any) -> Any:
+    """Return an object with ``submit``; of a Dask client its executor.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    if executor is None:
+        return None
+    if hasattr(executor, "get_executor"):
+        executor = executor.get_executor()
+    if not callable(getattr(executor, "submit", None)):
+        raise InputError(
+            "executor: an object with submit() is needed, like those of concurrent.futures, or a Dask "
+            f"client; not {type(executor).__name__}"
+        )
+    return executor
+
+
+def run_pieces(
+    plan: Plan,
+    pieces: list[Piece],
+    wanted: Iterable[int],
+    carry_after: Callable[[int], Array],
+    take: Take,
+    executor: Any,
+    threads: int,
+) -> None:
+    """Run the wanted pieces.
+
+    Parameters
+    ----------
+    plan : Plan
+    pieces : list of Piece
+    wanted : iterable of int
+        Their indices, increasing. A piece that goes on from another comes after it, or that one is finished.
+    carry_after : callable
+        The state that a finished piece left, by its index.
+    take : callable
+        Called in this thread with index, table and the state left, for every piece when it is finished.
+    executor : Executor or None
+    threads : int
+        Native threads of this process, or of each task of an executor.
+    """
+    indices = list(wanted)
+    if executor is None and not plan.follows:
+        for index in indices:
+            table, carry = run_chunk(plan.chunk(pieces[index], None, threads, travels=False))
+            take(index, table, carry)
+        return
+    if executor is not None:
+        travels = not isinstance(executor, ThreadPoolExecutor)
+        _submit_all(plan, pieces, indices, carry_after, take, executor, threads, travels)
+        return
+    # Lines of points that follow one another are independent of each other.
+    with ThreadPoolExecutor(threads) as own:
+        _submit_all(plan, pieces, indices, carry_after, take, own, 1, False)
+
+
+def _submit_all(
+    plan: Plan,
+    pieces: list[Piece],
+    indices: list[int],
+    carry_after: Callable[[int], Array],
+    take: Take,
+    executor: Any,
+    threads: int,
+    travels: bool,
+) -> None:
+    is_wanted = set(indices)
+    goes_on = {index for index in indices if plan.follows and not pieces[index].begins_line}
+    ready = deque(index for index in indices if index not in goes_on or index - 1 not in is_wanted)
+    most = 2 * int(getattr(executor, "_max_workers", 0) or 16)
+    finished: SimpleQueue[tuple[int, Any]] = SimpleQueue()
+    flying: dict[int, Any] = {}
+    try:
+        while ready or flying:
+            while ready and len(flying) < most:
+                index = ready.popleft()
+                carry = carry_after(index - 1) if index in goes_on else None
+                chunk = plan.chunk(
+                    pieces[index], carry if carry is not None and len(carry) else None, threads, travels
+                )
+                future = executor.submit(run_chunk, chunk)
+                flying[index] = future
+                future.add_done_callback(lambda done, index=index: finished.put((index, done)))
+            index, future = finished.get()
+            table, carry = future.result()
+            del flying[index]
+            take(index, table, carry)
+            if index + 1 in goes_on and index + 1 in is_wanted:
+                ready.append(index + 1)
+    finally:
+        for future in flying.values():
+            future.cancel()
+
+
+class Progress:
+    """A line of the terminal that says how far a sweep is, how many points failed, and how long it will take.
+
+    Parameters
+    ----------
+    wanted : bool or callable
+        True for the line; or a function of the number of points that are done, of all, and of those that
+        failed.
+    total : int
+        Number of points.
+    done : int
+        Points that were done before.
+    """
+
+    def __init__(self, wanted: Any, total: int, done: int) -> None:
+        self._report = wanted if callable(wanted) else None
+        self._is_shown = wanted is True
+        self._total, self._done, self._failed = total, done, 0
+        self._before = done
+        self._started = time.monotonic()
+
+    def add(self, table: Table) -> None:
+        """Count the points of a table."""
+        self._done += len(table["status"])
+        self._failed += int(np.count_nonzero(np.asarray(table["status"]) < 0))
+        if self._report is not None:
+            self._report(self._done, self._total, self._failed)
+        if self._is_shown:
+            end = "\n" if self._done >= self._total else ""
+            sys.stderr.write(f"\r{self.text()}{end}")
+            sys.stderr.flush()
+
+    def text(self) -> str:
+        """Return the line."""
+        fraction = self._done / self._total
+        width = 24
+        bar = "#" * int(width * fraction)
+        failed = f", {self._failed} failed" if self._failed else ""
+        elapsed = time.monotonic() - self._started
+        since = self._done - self._before
+        left = elapsed * (self._total - self._done) / since if since else 0.0
+        clock = f"{int(left) // 3600}:{int(left) // 60 % 60:02}:{int(left) % 60:02} left"
+        return f"[{bar:<{width}}] {100 * fraction:5.1f} % of {self._total} points{failed}, {clock}   "

@@ -1,0 +1,358 @@
+"""A sweep on disk: finished chunks, each written in one instant, and the whole as a Zarr group.
+
+A store is a folder. While the sweep goes on::
+
+    plan.json            what the sweep follows from, and the number of points of a chunk
+    chunks/000042.npz    the table of a finished chunk, in one file
+
+and in the end a Zarr group, which any program for Zarr can read: the arrays are moved there, then
+``zarr.json``, then what is above is removed.
+
+A chunk is written beside its place, brought to the disk, and renamed: it is there as a whole or not at all,
+however a process ends. Nothing else says that a chunk is finished, so that nothing can disagree.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import sys
+import uuid
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from filippov.analysis.dataset import REASONS, coordinates_of, dims_of, shape_of, variables_of
+from filippov.analysis.optional import need
+from filippov.analysis.plan import Plan
+from filippov.analysis.points import COLUMNS, Table
+from filippov.analysis.schedule import Progress, run_pieces
+from filippov.errors import InputError
+
+__all__ = ["Store", "open_sweep", "run_with_store"]
+
+_VERSION = 1
+# The attribute of the result that has the plan.
+_RECORD = "filippov_sweep"
+# Rows of the ragged arrays that are written at once: what the memory of the last step is bounded by.
+_ROWS = 1 << 16
+
+
+class Store:
+    """The folder of a sweep.
+
+    Parameters
+    ----------
+    path : str or path
+    """
+
+    def __init__(self, path: Any) -> None:
+        try:
+            self.path = Path(path)
+        except TypeError:
+            raise InputError(f"store: the path of a folder is needed, not {path!r}") from None
+        if self.path.exists() and not self.path.is_dir():
+            raise InputError(f"store: {self.path} is a file; the path of a folder is needed")
+
+    def begin(self, plan: Plan, chunk_size: int | None) -> int:
+        """Take down the plan of a new sweep, or compare it with that of the one begun here.
+
+        Returns
+        -------
+        int
+            The number of points of a chunk.
+
+        Raises
+        ------
+        InputError
+            If the folder has another sweep, or something else.
+        """
+        identity = plan.identity()
+        file = self.path / "plan.json"
+        if not file.exists() and not self.is_whole:
+            if self.path.exists() and any(self.path.iterdir()) and not self._is_begun():
+                raise InputError(f"store: {self.path} is not empty, and holds no sweep; give another folder")
+            (self.path / "chunks").mkdir(parents=True, exist_ok=True)
+            (self.path / ".partial").mkdir(exist_ok=True)
+            size = int(chunk_size or plan.usual_chunk_size())
+            new = {
+                "version": _VERSION,
+                "n_points": plan.n_points,
+                "chunk_size": size,
+                "identity": identity,
+            }
+            self._write(file, (json.dumps(new, indent=1) + "\n").encode())
+        record = self.record()
+        if record is None or record.get("version") != _VERSION:
+            raise InputError(f"store: {self.path} holds no sweep, or one of another version of filippov")
+        known = record["identity"]
+        changed = [name for name in identity if identity[name] != known.get(name)]
+        if changed:
+            raise InputError(
+                f"store: {self.path} holds another sweep, which differs in {', '.join(changed)}; give "
+                "another folder, or the arguments of before"
+            )
+        return int(record["chunk_size"])
+
+    def record(self) -> dict[str, Any] | None:
+        """Return what was taken down of the plan, None if there is none."""
+        try:
+            if self.is_whole:
+                group = json.loads((self.path / "zarr.json").read_text(encoding="utf-8"))
+                return dict(json.loads(group["attributes"][_RECORD]))
+            return dict(json.loads((self.path / "plan.json").read_text(encoding="utf-8")))
+        except (OSError, KeyError, ValueError):
+            return None
+
+    def _is_begun(self) -> bool:
+        """Whether a process was ended, or is just now, before the plan was there."""
+        return {entry.name for entry in self.path.iterdir()} <= {"chunks", ".partial"}
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the result is there."""
+        return (self.path / "zarr.json").exists()
+
+    def finished(self) -> set[int]:
+        """Return the indices of the chunks that are there."""
+        return {int(file.stem) for file in (self.path / "chunks").glob("[0-9]*.npz")}
+
+    def write(self, index: int, table: Table, carry: npt.NDArray[np.float64]) -> None:
+        """Write a finished chunk in one instant."""
+        texts = list(dict.fromkeys(table["message"]))
+        position = {text: k for k, text in enumerate(texts)}
+        columns = {name: np.asarray(table[name]) for name in COLUMNS if name not in ("message", "reason")}
+        columns["message"] = np.array([position[text] for text in table["message"]], dtype=np.int32)
+        columns["reason"] = np.array([REASONS.index(reason) for reason in table["reason"]], dtype=np.int8)
+        columns["messages"] = np.frombuffer(json.dumps(texts).encode(), dtype=np.uint8)
+        columns["carry"] = carry
+        partial = self._partial(".npz")
+        with open(partial, "wb") as file:
+            np.savez(file, **columns)  # type: ignore[arg-type]
+        self._place(partial, self._chunk(index))
+
+    def read(self, index: int, *names: str) -> Table:
+        """Return some columns of a finished chunk, all by default."""
+        with np.load(self._chunk(index), allow_pickle=False) as file:
+            table = {name: file[name] for name in names or (*COLUMNS, "carry")}
+            if "message" in table:
+                texts = [sys.intern(text) for text in json.loads(file["messages"].tobytes())]
+                table["message"] = [texts[k] for k in table["message"]]
+        if "reason" in table:
+            table["reason"] = [REASONS[code] for code in table["reason"]]
+        return table
+
+    def assemble(self, plan: Plan, count: int) -> None:
+        """Write the result from all chunks, the ragged arrays piece by piece."""
+        zarr = need("zarr", "store=")
+        surfaces = plan.prepared.surfaces
+        has_section = plan.observed is not None
+        variables = list(variables_of(plan.grid, len(surfaces), has_section, plan.units))
+        points = [variable for variable in variables if variable.rows == "point"]
+        columns = list(dict.fromkeys(variable.column for variable in points))
+        found: dict[str, list[Any]] = {variable.name: [] for variable in points}
+        sizes = {"point": plan.n_points, "obs": 0, "piece": 0}
+        for index in range(count):
+            table = self.read(index, *columns, "row_size", "n_pieces")
+            sizes["obs"] += int(table["row_size"].sum())
+            sizes["piece"] += int(table["n_pieces"].sum())
+            for variable in points:
+                found[variable.name].append(variable.values(table))
+        partial = self._partial(".result")
+        attributes = {**plan.attributes, _RECORD: json.dumps(self.record())}
+        group = zarr.create_group(partial, attributes=attributes)
+
+        def create(
+            name: str, dims: tuple[str, ...], shape: tuple[int, ...], dtype: Any, attributes: Any
+        ) -> Any:
+            return group.create_array(
+                name,
+                shape=shape,
+                dtype=dtype,
+                chunks=tuple(max(1, min(size, _ROWS)) for size in shape),
+                dimension_names=dims,
+                attributes=dict(attributes),
+            )
+
+        for name, (dims, values, attributes) in coordinates_of(
+            plan.grid, surfaces, has_section, plan.units
+        ).items():
+            is_text = values.dtype.kind == "O"
+            array = create(name, dims, values.shape, "string" if is_text else values.dtype, attributes)
+            array[...] = values
+        for variable in points:
+            values = np.concatenate(found.pop(variable.name))
+            shape = shape_of(variable, plan.grid, len(values), len(surfaces))
+            kind = "string" if values.dtype.kind == "O" else values.dtype
+            array = create(variable.name, dims_of(variable, plan.grid), shape, kind, variable.attributes)
+            array[...] = values.reshape(shape)
+        ragged = [variable for variable in variables if variable.rows != "point"]
+        writers = []
+        for variable in ragged:
+            shape = shape_of(variable, plan.grid, sizes[variable.rows], len(surfaces))
+            number: Any = {"mode": np.int8, "n_pieces": np.int32}.get(variable.name, np.float64)
+            dims = dims_of(variable, plan.grid)
+            writers.append(_Writer(create(variable.name, dims, shape, number, variable.attributes)))
+        wanted = list(dict.fromkeys(variable.column for variable in ragged))
+        for index in range(count if ragged else 0):
+            table = self.read(index, *wanted)
+            for variable, writer in zip(ragged, writers, strict=True):
+                writer.add(variable.values(table))
+        for writer in writers:
+            writer.flush()
+        self._publish(partial)
+
+    def _publish(self, partial: Path) -> None:
+        """Move the result to its place, what says that it is there last."""
+        for entry in sorted(partial.iterdir()):
+            target = self.path / entry.name
+            if entry.name == "zarr.json":
+                continue
+            try:
+                os.rename(entry, target)
+            except OSError:  # another process, or one that was ended, has moved the same array there
+                if not target.is_dir():
+                    raise
+        self._place(partial / "zarr.json", self.path / "zarr.json")
+
+    def clean(self) -> None:
+        """Remove what the result has made superfluous."""
+        for folder in ("chunks", ".partial"):
+            shutil.rmtree(self.path / folder, ignore_errors=True)
+        (self.path / "plan.json").unlink(missing_ok=True)
+
+    def _chunk(self, index: int) -> Path:
+        return self.path / "chunks" / f"{index:06}.npz"
+
+    def _partial(self, suffix: str) -> Path:
+        folder = self.path / ".partial"
+        folder.mkdir(exist_ok=True)
+        return folder / f"{uuid.uuid4().hex}{suffix}"
+
+    def _write(self, target: Path, data: bytes) -> None:
+        partial = self._partial(".part")
+        partial.write_bytes(data)
+        self._place(partial, target)
+
+    @staticmethod
+    def _place(partial: Path, target: Path) -> None:
+        """Bring a file to the disk, then to its place."""
+        with open(partial, "rb+") as file:
+            os.fsync(file.fileno())
+        os.replace(partial, target)
+
+
+class _Writer:
+    """Appends rows to an array on disk in blocks of the size of its chunks, so that none is written twice."""
+
+    def __init__(self, array: Any) -> None:
+        self._array = array
+        self._waiting: list[npt.NDArray[Any]] = []
+        self._start = 0
+
+    def add(self, rows: npt.NDArray[Any]) -> None:
+        self._waiting.append(rows)
+        if sum(map(len, self._waiting)) >= _ROWS:
+            whole = np.concatenate(self._waiting)
+            end = len(whole) - len(whole) % _ROWS
+            self._write(whole[:end])
+            self._waiting = [whole[end:]]
+
+    def flush(self) -> None:
+        """Write what is left."""
+        self._write(np.concatenate(self._waiting))
+
+    def _write(self, rows: npt.NDArray[Any]) -> None:
+        if len(rows):
+            self._array[self._start : self._start + len(rows)] = rows
+            self._start += len(rows)
+
+
+def run_with_store(
+    plan: Plan,
+    path: Any,
+    executor: Any,
+    threads: int,
+    chunk_size: int | None,
+    part: tuple[int, int],
+    progress: Any,
+) -> Any:
+    """Run what a store does not have yet; return the whole, or None while other parts are missing."""
+    need("zarr", "store=")
+    store = Store(path)
+    size = store.begin(plan, chunk_size)
+    if not store.is_whole:
+        pieces = plan.pieces(size)
+        finished = store.finished()
+        k, m = part
+        mine = [
+            index
+            for index, piece in enumerate(pieces)
+            if index not in finished and (piece.line if plan.follows else index) % m == k
+        ]
+        done = sum(pieces[index].stop - pieces[index].start for index in finished)
+        bar = Progress(progress, plan.n_points, done)
+
+        def take(index: int, table: Table, carry: npt.NDArray[np.float64]) -> None:
+            store.write(index, table, carry)
+            bar.add(table)
+
+        def carry_after(index: int) -> npt.NDArray[np.float64]:
+            carry: npt.NDArray[np.float64] = store.read(index, "carry")["carry"]
+            return carry
+
+        run_pieces(plan, pieces, mine, carry_after, take, executor, threads)
+        if len(store.finished()) < len(pieces) and not store.is_whole:
+            return None
+        try:
+            store.assemble(plan, len(pieces))
+        except (OSError, KeyError):  # another job of the same store was faster, and has tidied up
+            if not store.is_whole:
+                raise
+    store.clean()
+    return open_sweep(path)
+
+
+def open_sweep(path: Any, chunks: Mapping[str, int] | str | None = None) -> Any:
+    """Open the result of a sweep with a store. Values are read when they are used.
+
+    Parameters
+    ----------
+    path : str or path
+        The folder given as `store`.
+    chunks : optional
+        As in `xarray.open_zarr`: with ``"auto"`` the variables are Dask arrays.
+
+    Returns
+    -------
+    xarray.Dataset
+
+    Raises
+    ------
+    InputError
+        If there is no sweep, or it is not finished.
+    """
+    xarray = need("xarray", "open_sweep()")
+    need("zarr", "open_sweep()")
+    store = Store(path)
+    if not store.is_whole:
+        plan = store.record()
+        if plan is not None:
+            total = plan["n_points"]
+            raise InputError(
+                f"store: the sweep in {store.path} is not finished: {len(store.finished())} chunks of "
+                f"{plan['chunk_size']} points are there, of {total} points in all; call the sweep again with "
+                "the same arguments to go on"
+            )
+        raise InputError(f"store: there is no sweep in {store.path}")
+    # Times are numbers here, whatever their units.
+    found = xarray.open_zarr(
+        store.path, chunks=chunks, consolidated=False, decode_times=False, decode_timedelta=False
+    )
+    start = [name for name in found.data_vars if str(name).startswith("initial_")]
+    del found.attrs[_RECORD]
+    return found.set_coords(start)
