@@ -19,6 +19,8 @@ __all__ = ["compiled_transient"]
 
 Array = npt.NDArray[np.float64]
 
+NOWHERE = np.zeros(0)
+
 direction_from_rest = njit(stick.direction_from_rest)
 stick_end = njit(stick.stick_end)
 
@@ -50,6 +52,29 @@ def _dense_zero(v: float, v_new: float, q1: float, q7: float, tail: float, h: fl
 
 
 @njit
+def _dense_value(a: float, a_new: float, k1: float, k7: float, tail: float, h: float, x: float) -> float:
+    """Return a component on the continuous extension at a fraction of the step."""
+    rise = a_new - a
+    c2 = h * k1 - rise
+    c3 = rise - h * k7 - c2
+    return a + x * (rise + (1.0 - x) * (c2 + x * (c3 + (1.0 - x) * tail)))
+
+
+@njit
+def _store(points: Array, n: int, t: float, y: float, v: float) -> int:
+    if n < len(points):
+        points[n] = t, y, v
+    return n + 1
+
+
+@njit
+def _store_time(times: Array, n: int, t: float) -> int:
+    if n < len(times):
+        times[n] = t
+    return n + 1
+
+
+@njit
 def compiled_transient(
     t_end: float,
     y: float,
@@ -59,6 +84,8 @@ def compiled_transient(
     tolerance: float,
     event_times: Array,
     points: Array,
+    period: float = math.inf,
+    samples: Array = NOWHERE,
 ) -> tuple[int, int, int]:
     """Integrate from t = 0 and fill in the event times and the ends of the steps.
 
@@ -73,16 +100,23 @@ def compiled_transient(
     event_times : ndarray, shape (k,)
         Filled with the times of the events.
     points : ndarray, shape (m, 3)
-        Filled with ``(t, y, v)`` at the ends of the steps.
+        Filled with ``(t, y, v)`` at the ends of the steps; the first rows only if there are more steps.
+    period : float, optional
+        Length of the intervals after which the speed is sampled, on the continuous extension.
+    samples : ndarray, shape (k,), optional
+        Filled with the speed at the first k multiples of `period`.
 
     Returns
     -------
     (int, int, int)
         Numbers of events, of points, and of evaluations of the field.
     """
+    d1, d3, d4 = -12715105075 / 11282082432, 87487479700 / 32700410799, -10690763975 / 1880347072
+    d5, d6, d7 = 701980252875 / 199316789632, -1453857185 / 822651844, 69997945 / 29380423
     t = 0.0
     n_events = 0
     n_points = 0
+    n_samples = 0
     n_evaluations = 1
     side = math.copysign(1.0, v)
     h = 0.1 * tolerance**0.2
@@ -144,36 +178,37 @@ def compiled_transient(
             continue
         h = step / min(5.0, max(0.1, shrink / previous**0.04))
         previous = max(error, 1e-4)
-        if side * v_new >= 0.0:
+        is_event = side * v_new < 0.0
+        wanted = (n_samples + 1) * period
+        tail_v = 0.0
+        if is_event or wanted <= t_new:
+            tail_v = step * (d1 * q1 + d3 * q3 + d4 * q4 + d5 * q5 + d6 * q6 + d7 * q7)
+        x = _dense_zero(v, v_new, q1, q7, tail_v, step) if is_event else 1.0
+        t_stop = t + x * step if is_event else t_new
+        while wanted <= t_stop and n_samples < len(samples):
+            samples[n_samples] = _dense_value(v, v_new, q1, q7, tail_v, step, (wanted - t) / step)
+            n_samples += 1
+            wanted = (n_samples + 1) * period
+        if not is_event:
             t, y, v, q1 = t_new, y_new, v_new, q7
-            points[n_points] = t, y, v
-            n_points += 1
+            n_points = _store(points, n_points, t, y, v)
             continue
-        d1, d3, d4 = -12715105075 / 11282082432, 87487479700 / 32700410799, -10690763975 / 1880347072
-        d5, d6, d7 = 701980252875 / 199316789632, -1453857185 / 822651844, 69997945 / 29380423
-        tail_v = step * (d1 * q1 + d3 * q3 + d4 * q4 + d5 * q5 + d6 * q6 + d7 * q7)
         tail_y = step * (d1 * p1 + d3 * p3 + d4 * p4 + d5 * p5 + d6 * p6 + d7 * v_new)
-        x = _dense_zero(v, v_new, q1, q7, tail_v, step)
-        rise = y_new - y
-        c2 = step * p1 - rise
-        c3 = rise - step * v_new - c2
-        y += x * (rise + (1.0 - x) * (c2 + x * (c3 + (1.0 - x) * tail_y)))
-        t += x * step
-        v = 0.0
-        h = step
-        event_times[n_events] = t
-        points[n_points] = t, y, v
-        n_events += 1
-        n_points += 1
+        y = _dense_value(y, y_new, p1, v_new, tail_y, step, x)
+        t, v, h = t_stop, 0.0, step
+        n_events = _store_time(event_times, n_events, t)
+        n_points = _store(points, n_points, t, y, v)
         side = direction_from_rest(t, y, force, omega)
         if side == 0.0:
             t, side = stick_end(t, y, force, omega)
+            while wanted <= min(t, t_end) and n_samples < len(samples):
+                samples[n_samples] = 0.0
+                n_samples += 1
+                wanted = (n_samples + 1) * period
             if t >= t_end:
                 break
-            event_times[n_events] = t
-            points[n_points] = t, y, v
-            n_events += 1
-            n_points += 1
+            n_events = _store_time(event_times, n_events, t)
+            n_points = _store(points, n_points, t, y, v)
         q1 = -y + math.sin(omega * t) - side * force
         n_evaluations += 1
     return n_events, n_points, n_evaluations

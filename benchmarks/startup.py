@@ -1,6 +1,6 @@
 """What is paid before the first step: import, tracing and compiling, each measured in a fresh process.
 
-``python benchmarks/startup.py import|oscillator|chain`` prints one time in seconds.
+``python benchmarks/startup.py import|oscillator|chain|first`` prints one time in seconds.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Sequence
-from time import perf_counter
+from time import perf_counter, time
 from typing import Any
 
 import numpy as np
@@ -59,7 +59,20 @@ def preparation_seconds(fun: Any, y0: npt.ArrayLike) -> float:
     return durations[0] - min(durations[1:])
 
 
+def first_call_seconds() -> float:
+    """Return the time from the start of the interpreter to the end of a first run over ten periods.
+
+    The clock of the machine is read, because the process began before any of its code.
+    """
+    import filippov as fl
+
+    sol = fl.solve_ivp(oscillator, (0.0, 60 * np.pi), [1.0, 2.0])
+    assert len(sol.switches) == 42
+    return time() - float(os.environ["STARTED_AT"])
+
+
 MEASUREMENTS = {
+    "first": first_call_seconds,
     "import": import_seconds,
     "oscillator": lambda: preparation_seconds(oscillator, [1.0, 2.0]),
     "chain": lambda: preparation_seconds(chain, np.linspace(0.5, 1.5, 2 * N_MASSES)),
@@ -77,6 +90,7 @@ def fresh_processes(names: Sequence[str], repeats: int) -> dict[str, npt.NDArray
     for turn in range(repeats + 1):
         for name in names:
             command = [sys.executable, __file__, name]
+            environment["STARTED_AT"] = repr(time())
             done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
             if turn > 0:
                 samples[name].append(float(done.stdout))

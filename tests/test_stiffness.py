@@ -40,7 +40,7 @@ def test_auto_goes_on_with_rodas5p() -> None:
     named = fl.solve_ivp(relaxation, (0, 2), START, method="Rodas5P")
     assert sol.stats["method"] == "Rodas5P, Taylor"
     assert sol.warnings == []
-    # Once found, all that follows is left to it: the rest takes as many steps as from the start with it.
+    # All that follows is left to it: the rest takes as many steps as with the method from the start.
     since = float(sol.stats["stiff_since"])
     assert sol.stats["n_steps_taylor"] == np.count_nonzero(sol.t <= since) < 400
     assert sol.stats["n_steps_rodas5p"] < 1.1 * int(named.stats["n_steps"])

@@ -18,8 +18,8 @@ __all__ = ["Options", "check_options", "check_t_span", "check_y0"]
 
 Array = npt.NDArray[np.float64]
 
-_METHODS = {"auto": "auto", "DOPRI5": "DOPRI5", "RK45": "DOPRI5", "Taylor": "Taylor", "Rodas5P": "Rodas5P"}
-_PLANNED_METHODS = ("DOP853", "Midpoint")
+_METHODS = {"RK45": "DOPRI5", **{name: name for name in ("auto", "DOPRI5", "Taylor", "DOP853", "Rodas5P")}}
+_PLANNED_METHODS = ("Midpoint",)
 _STIFF_METHODS = ("Radau", "BDF", "LSODA")
 # name -> (available values, values that are planned)
 _POLICIES = {

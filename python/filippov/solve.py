@@ -92,8 +92,9 @@ def solve_ivp(
         up to sliding on one surface; else ``"DOPRI5"``; from where the run turns out to be stiff,
         ``"Rodas5P"``. ``"Taylor"``: series wherever there are any,
         whatever their cost; a motion without goes on with DOPRI5, and a warning says so. ``"DOPRI5"`` (or
-        ``"RK45"``): the explicit Runge-Kutta pair of Dormand and Prince. ``"Rodas5P"``: for stiff motions,
-        in every mode; Jacobians from the traced function, by differences for a black box.
+        ``"RK45"``): the explicit Runge-Kutta pair of Dormand and Prince. ``"DOP853"``: that of order 8, for
+        high accuracy where there are no series. ``"Rodas5P"``: for stiff motions, in every mode; Jacobians
+        from the traced function, by differences for a black box.
         ``sol.stats["method"]`` says what took the steps.
     t_eval : array_like, shape (k,), optional
         Times at which `y` is given, strictly sorted. It does not influence the steps. Default: the ends of

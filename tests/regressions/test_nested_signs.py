@@ -58,3 +58,40 @@ def test_sliding_beyond_a_bend_of_its_surface() -> None:
     sol = fl.solve_ivp(steep, (0.0, 1.0), [0.0, 0.5])
     assert sol.success, sol.message
     assert sol.y[1, -1] == pytest.approx(0.75, abs=1e-12)
+
+
+def test_a_function_that_vanishes_where_its_own_sign_jumps() -> None:
+    def f(t: float, x: Any) -> Any:
+        return [-1.0, np.sign(x[0] - 0.1 * np.sign(x[0] - 0.1))]
+
+    # h = x - 0.1 falls to 0 at x = 0.1, where it jumps to x + 0.1, which is positive down to x = -0.1.
+    sol = fl.solve_ivp(f, (0.0, 1.0), [0.5, 0.0])
+    np.testing.assert_allclose(sol.switches.t, [0.4, 0.6], rtol=0, atol=1e-12)
+    assert [str(mode) for mode in sol.segments.mode] == ["++", "-+", "--"]
+    assert sol.y[1, -1] == pytest.approx(0.6 - 0.4, abs=1e-12)
+
+
+@pytest.mark.parametrize("method", ["auto", "DOPRI5"])
+@pytest.mark.parametrize(
+    "h",
+    [lambda x: x + 0.5 * abs(x), lambda x: x + 0.5 * x * abs(x), lambda x: -2 * x - x**2 * np.sign(x)],
+    ids=["linear", "quadratic", "turned"],
+)
+def test_a_function_beside_the_sign_in_it(h: Any, method: str) -> None:
+    # h vanishes where x does: with the sign of h the motion is that with the sign of x.
+    turn = np.sign(h(1.0))
+
+    def f(t: float, x: Any) -> Any:
+        return [-turn * np.sign(h(x[0])) + 1.5 * np.sin(t)]
+
+    sol = fl.solve_ivp(f, (0.0, 12.0), [1.0], method=method, rtol=1e-9, atol=1e-9)
+    plain = fl.solve_ivp(
+        lambda t, x: [-np.sign(x[0]) + 1.5 * np.sin(t)], (0.0, 12.0), [1.0], rtol=1e-9, atol=1e-9
+    )
+    assert sol.success, sol.message
+    slides = [segment.t_start for segment in sol.segments if segment.mode.is_sliding]
+    expected = [segment.t_start for segment in plain.segments if segment.mode.is_sliding]
+    np.testing.assert_allclose(slides, expected, rtol=0, atol=1e-7)
+    tt = np.linspace(0.0, 12.0, 50)
+    np.testing.assert_allclose(sol.sol(tt), plain.sol(tt), rtol=0, atol=1e-7)
+    assert not sol.warnings

@@ -255,6 +255,7 @@ impl Run {
         let dict = PyDict::new(py);
         dict.set_item("method", methods(&stats))?;
         dict.set_item("n_steps_taylor", stats.n_steps_taylor)?;
+        dict.set_item("n_steps_dop853", stats.n_steps_dop853)?;
         dict.set_item("n_steps_rodas5p", stats.n_steps_rodas5p)?;
         if let Some(since) = stats.stiff_since {
             dict.set_item("stiff_since", since)?;
@@ -343,6 +344,7 @@ fn methods(stats: &Stats) -> String {
     let others = [
         ("Rodas5P", stats.n_steps_rodas5p),
         ("Taylor", stats.n_steps_taylor),
+        ("DOP853", stats.n_steps_dop853),
     ];
     let explicit = stats.n_steps - others.iter().map(|(_, count)| count).sum::<u64>();
     let mut names: Vec<&str> = others

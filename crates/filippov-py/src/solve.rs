@@ -161,6 +161,7 @@ fn method(name: &str) -> PyResult<Method> {
         "auto" => Ok(Method::Auto),
         "DOPRI5" => Ok(Method::Dopri5),
         "Taylor" => Ok(Method::Taylor),
+        "DOP853" => Ok(Method::Dop853),
         "Rodas5P" => Ok(Method::Rodas5p),
         _ => Err(PyValueError::new_err(format!(
             "method: unknown method {name:?}"

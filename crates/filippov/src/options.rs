@@ -62,6 +62,8 @@ pub enum Method {
     Dopri5,
     /// Taylor series wherever the system has them; else DOPRI5.
     Taylor,
+    /// The Runge-Kutta method of Dormand and Prince of order 8.
+    Dop853,
     /// The Rosenbrock-Wanner method of Steinebach, for stiff motions.
     Rodas5p,
 }

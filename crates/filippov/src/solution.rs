@@ -229,13 +229,15 @@ impl Solution {
                 let components = field.normal_components(t, &mut y)?;
                 let lambda = in_interval(components.multiplier());
                 // Near a two-fold it is a quotient of rounding errors.
-                let beyond = 0.5 * (lambda.abs() - 1.0) * (components.minus - components.plus);
+                let share = (components.minus - components.plus).abs();
+                let beyond = 0.5 * (lambda.abs() - 1.0) * share;
                 if beyond > 0.0 {
-                    let (mut normal, mut velocity) = (y.clone(), y.clone());
-                    let signs = mode.signs();
-                    let ht = system.gradient(j, t, &y, &signs, &mut normal)?;
-                    system.field(t, &y, &signs, &mut velocity)?;
-                    let size = ht.abs() + dot_magnitude(&normal, &velocity);
+                    let (mut gradient, mut size) = (y.clone(), 0.0);
+                    for side in [-1, 1] {
+                        let signs = mode.with(j, side).signs();
+                        let rate = system.rate_gradient(j, t, &y, &signs, &mut gradient)?;
+                        size += dot_magnitude(&gradient, &y) + (rate.time * t).abs();
+                    }
                     if beyond < TANGENT * size {
                         return Ok(vec![(j, lambda.clamp(-1.0, 1.0))]);
                     }

@@ -428,6 +428,24 @@ pub const VANISHING_MULTIPLIER: f64 = 1e-9;
 /// An expression of whole numbers is one itself within this: a few roundings.
 pub const WHOLE_NUMBER: f64 = 1e-12;
 
+/// A switching function above this is not looked at for being zero all along a step: the rounding of states up to
+/// thousands is below it.
+pub const NEARLY_ZERO: f64 = 1e-10;
+
+/// Distance, in units of 1 plus the size of a component, at which two surfaces are compared ...
+pub const BESIDE: f64 = 1e-3;
+
+/// ... and how far apart they may be there, in units of the gradient, to be in one place: far below the square of that
+/// distance, by which surfaces that touch are apart.
+pub const COINCIDE: f64 = 1e-11;
+
+/// A sliding motion has come to a two-fold where both normal components vanish within this multiple of the tolerance of
+/// the state: errors of some steps make up the multiplier there.
+pub const AT_TWO_FOLD: f64 = 100.0;
+
+/// Newton's method has come to a two-fold, in tolerances of the state: far below what matters, above rounding.
+pub const SETTLED: f64 = 1e-6;
+
 /// A motion that was to stay on a surface has left it where h is above this multiple of the tolerance: errors of many
 /// steps add up.
 pub const LEFT_RESTING: f64 = 1e3;
@@ -461,6 +479,9 @@ pub const AIM_MARGINS: [f64; 2] = [1e-3, 1e-7];
 /// The end of the region of stability of DOPRI5 on the negative axis: the product of step and rate at which stability
 /// limits the step (Hairer, Wanner 1996, section IV.2).
 pub const STIFF_DOPRI5: f64 = 3.25;
+
+/// That of DOP853 (Hairer's choice).
+pub const STIFF_DOP853: f64 = 6.1;
 
 /// That of a Taylor step whose velocity hardly changes: without a fast rate the product would be as small as that change.
 pub const STIFF_SERIES: f64 = 2.0;

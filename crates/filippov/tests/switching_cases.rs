@@ -340,6 +340,7 @@ fn mirrored(row: &Row) -> (Vec<f64>, Vec<f64>, Arrival, i8, Vec<i8>) {
         ExitMinus => ExitPlus,
         ExitPlus => ExitMinus,
         Start => Start,
+        Arrival::TwoFold => Arrival::TwoFold,
     };
     (
         turned(plus),

@@ -5,7 +5,9 @@ use std::cell::RefCell;
 use filippov_expr::{Interval, Motion};
 
 use crate::error::FieldError;
+use crate::mode::Signs;
 use crate::sparse::{SparseRows, SparseSolver};
+use crate::switching::{IntervalVector, Vector};
 use crate::system::AffineSigns;
 
 /// What bounds the multipliers of a mode where gradients and jumps, and so N = grad h B, are constant.
@@ -62,12 +64,12 @@ impl AffineBounds {
         motion: &dyn Motion,
         signs: &[f64],
         near: &[f64],
-    ) -> Option<Vec<Interval>> {
-        let mut signs = signs.to_vec();
+    ) -> Option<IntervalVector> {
+        let mut signs = Signs::from_slice(signs);
         for (&j, &lambda) in set.iter().zip(near) {
             signs[j] = lambda;
         }
-        let mut spread = Vec::with_capacity(set.len());
+        let mut spread = Vector::with_capacity(set.len());
         for &j in set {
             let rate = affine.enclose_rate(j, motion, &signs)?;
             spread.push(rate.hi.max(-rate.lo));

@@ -229,7 +229,10 @@ impl SmoothField for ContactField<'_> {
             .map(|&j| self.system.stick_ratio(j, t, x, &self.signs))
             .collect();
         let solved = gram(&rows, &directions).solve(&rates);
-        self.multipliers = solved.unwrap_or_else(|| vec![f64::NAN; rows.len()]);
+        self.multipliers = match solved {
+            Some(found) => found.into_vec(),
+            None => vec![f64::NAN; rows.len()],
+        };
         dx.copy_from_slice(&base);
         for (multiplier, direction) in self.multipliers.iter().zip(&directions) {
             dx.iter_mut()

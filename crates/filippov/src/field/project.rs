@@ -1,7 +1,7 @@
 //! Projection onto a surface, or onto an intersection of surfaces.
 
 use crate::error::FieldError;
-use crate::switching::Matrix;
+use crate::switching::{Matrix, Vector};
 use crate::system::{dot, dot_magnitude, PiecewiseSystem};
 use crate::tolerances::SURFACE_NOISE;
 
@@ -88,9 +88,8 @@ impl Projector {
                 system.gradient(j, t, x, signs, row)?;
                 is_near &= self.h[j].abs() <= 0.25 * SURFACE_NOISE * dot_magnitude(row, x);
             }
-            let Some(shifts) = self.shifts(set, n).filter(|_| !is_near) else {
-                break;
-            };
+            let shifts = if is_near { None } else { self.shifts(set, n) };
+            let Some(shifts) = shifts else { break };
             for (row, shift) in self.rows.chunks_exact(n).zip(shifts) {
                 x.iter_mut().zip(row).for_each(|(x, g)| *x -= shift * g);
             }
@@ -99,7 +98,7 @@ impl Projector {
     }
 
     /// (N N^T)^-1 h; `None` if the gradients are dependent or h is not finite.
-    fn shifts(&self, set: &[usize], n: usize) -> Option<Vec<f64>> {
+    fn shifts(&self, set: &[usize], n: usize) -> Option<Vector> {
         let row = |i: usize| &self.rows[i * n..(i + 1) * n];
         let mut gram = Matrix::zeros(set.len());
         for i in 0..set.len() {
@@ -107,7 +106,7 @@ impl Projector {
                 gram[(i, j)] = dot(row(i), row(j));
             }
         }
-        let h: Vec<f64> = set.iter().map(|&j| self.h[j]).collect();
+        let h: Vector = set.iter().map(|&j| self.h[j]).collect();
         gram.solve(&h)
             .filter(|shifts| shifts.iter().all(|v| v.is_finite()))
     }

@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 
 use filippov_expr::{Enclosure, Interval};
+use smallvec::SmallVec;
 
 use super::detect::Detector;
 use super::integrator::Integrator;
@@ -12,9 +13,10 @@ use crate::event::isolate::PROBES;
 use crate::event::tube::Tube;
 use crate::event::{EventFunction, Monitored};
 use crate::field::{AffineBounds, IntersectionExit};
+use crate::mode::Signs;
 use crate::options::SlidingRule;
 use crate::stepper::Interpolant;
-use crate::switching::{enclose_root, EnclosedRoot, RootBounds};
+use crate::switching::{enclose_root, EnclosedRoot, IntervalVector, RootBounds, Vector};
 use crate::system::PiecewiseSystem;
 use crate::tolerances::{MARGIN, MOST_ENCLOSED, PROOF_DEPTH, ROOT_BOXES};
 
@@ -95,11 +97,11 @@ impl BoundedCurve<'_> {
     }
 
     /// Bounds of the normal components of all fields around the intersection.
-    fn all_components(&self, a: f64, b: f64) -> Option<Vec<Interval>> {
+    fn all_components(&self, a: f64, b: f64) -> Option<SmallVec<[Interval; 24]>> {
         let tube = Tube::new(self.interpolant, (a, b), self.margin);
         let m = self.sliding.len();
-        let mut components = vec![Interval::ALL; m << m];
-        let mut signs = self.signs.to_vec();
+        let mut components = SmallVec::from_elem(Interval::ALL, m << m);
+        let mut signs = Signs::from_slice(self.signs);
         for pattern in 0..1_usize << m {
             for (i, &j) in self.sliding.iter().enumerate() {
                 signs[j] = if pattern >> i & 1 == 1 { 1.0 } else { -1.0 };
@@ -134,22 +136,25 @@ impl BoundedCurve<'_> {
             let tube = Tube::new(self.interpolant, (a, b), self.margin);
             let exits = self.stages.chunks_exact(2).take(self.sliding.len());
             let middles = exits.map(|pair| 0.5 * (pair[0][0] + pair[0][6]) - 1.0);
-            let near: Vec<f64> = middles.collect();
+            let near: Vector = middles.collect();
             let found = bounds.enclose(affine, self.sliding, &tube, self.signs, &near);
             return Some(found.map_or(RootBounds::Unproved, |multipliers| {
                 RootBounds::Proved(EnclosedRoot {
                     multipliers,
-                    diagonal: Vec::new(),
+                    diagonal: IntervalVector::new(),
                 })
             }));
         }
         let components = self.all_components(a, b)?;
         let exits = self.stages.chunks_exact(2).take(self.sliding.len());
         let ends = exits.map(|pair| Interval::hull(pair[0][0] - 1.0, pair[0][6] - 1.0));
-        let ends: Vec<Interval> = ends.collect();
+        let ends: IntervalVector = ends.collect();
         let boxes = ROOT_BOXES.into_iter().map(|radius| {
             let wider = |l: &Interval| Interval::hull(l.lo - radius, l.hi + radius);
-            enclose_root(&components, &ends.iter().map(wider).collect::<Vec<_>>())
+            enclose_root(
+                &components,
+                &ends.iter().map(wider).collect::<IntervalVector>(),
+            )
         });
         let mut found = RootBounds::Unproved;
         for bounds in boxes {

@@ -11,6 +11,9 @@ use crate::switching::{first_nonzero, normal_component, Decision, Leading};
 use crate::system::dot;
 use crate::tolerances::DEPARTS_TANGENTIALLY;
 
+/// How the warning begins.
+pub(super) const NOT_UNIQUE_AT: &str = "the continuation at ";
+
 impl Integrator<'_> {
     /// The motion after the decision at one surface.
     pub(super) fn follow_at_surface(
@@ -102,7 +105,7 @@ impl Integrator<'_> {
             .map(|&j| self.system.surface_name(j) + " = 0");
         let names: Vec<String> = names.collect();
         let text = format!(
-            "the continuation at {} is not unique: {}; ({chosen}) was chosen",
+            "{NOT_UNIQUE_AT}{} is not unique: {}; ({chosen}) was chosen",
             names.join(", "),
             modes.join(", ")
         );

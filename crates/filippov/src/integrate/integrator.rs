@@ -35,7 +35,9 @@ use crate::mode::Mode;
 use crate::options::{Method, Options};
 use crate::recorder::Recorder;
 use crate::solution::Solution;
-use crate::stepper::{Attempt, Controller, ErrorScale, Rodas5p, StepMethod, Stepper, Taylor};
+use crate::stepper::{
+    Attempt, Controller, Dop853, ErrorScale, Rodas5p, StepMethod, Stepper, Taylor,
+};
 use crate::system::PiecewiseSystem;
 use crate::tolerances::SHORTEST_STEP;
 
@@ -109,7 +111,7 @@ impl<'a> Integrator<'a> {
         super::start::check(system, t_span, y0, options, actions)?;
         let n = system.n_states();
         let uses_series = match options.method {
-            Method::Dopri5 | Method::Rodas5p => false,
+            Method::Dopri5 | Method::Dop853 | Method::Rodas5p => false,
             Method::Taylor => true,
             Method::Auto => system.is_analytic(),
         };
@@ -119,8 +121,10 @@ impl<'a> Integrator<'a> {
             Taylor::new(n, order)
         });
         let mut stepper = Stepper::new(n, taylor);
-        if options.method == Method::Rodas5p {
-            stepper.rodas5p = Some(Box::new(Rodas5p::new(n)));
+        match options.method {
+            Method::Rodas5p => stepper.rodas5p = Some(Box::new(Rodas5p::new(n))),
+            Method::Dop853 => stepper.dop853 = Some(Box::new(Dop853::new(n))),
+            Method::Auto | Method::Dopri5 | Method::Taylor => {}
         }
         let undecided = Mode::new(vec![1; system.n_surfaces()]);
         Ok(Integrator {
@@ -231,6 +235,11 @@ impl<'a> Integrator<'a> {
                 self.one_sided = false;
                 return self.switch(&event);
             }
+            if let Some(event) = self.lost_share()? {
+                self.dt = f64::NAN;
+                self.one_sided = false;
+                return self.switch(&event);
+            }
             if !self.one_sided {
                 return Ok(Some(Stop::StepTooSmall));
             }
@@ -269,6 +278,7 @@ impl<'a> Integrator<'a> {
             StepMethod::Taylor => self.attempt_series(dt),
             StepMethod::Rodas5p => self.attempt_implicit(dt),
             StepMethod::Dopri5 => self.attempt_explicit(dt),
+            StepMethod::Dop853 => self.attempt_dop853(dt),
         }
     }
 
@@ -305,6 +315,20 @@ impl<'a> Integrator<'a> {
                 stepper.attempt(&mut **field, observe, t, x, dt, scale)
             }
         }
+    }
+
+    fn attempt_dop853(&mut self, dt: f64) -> Result<Attempt, FieldError> {
+        let Some(dop853) = &mut self.stepper.dop853 else {
+            return Ok(Attempt::NotFinite);
+        };
+        let stages = &mut self.detector.stages;
+        let observe = |stage: usize, field: &ModeField| {
+            for (exit, value) in stages.iter_mut().zip(field.last_exits()) {
+                exit[stage] = value;
+            }
+        };
+        let field = &mut self.motion.field;
+        dop853.attempt(field, observe, self.t, &self.x, dt, &self.scale)
     }
 
     /// Accepts the step, or its part up to the first event.
@@ -347,6 +371,7 @@ impl<'a> Integrator<'a> {
             StepMethod::Dopri5 => {}
             StepMethod::Taylor => self.stats.n_steps_taylor += 1,
             StepMethod::Rodas5p => self.stats.n_steps_rodas5p += 1,
+            StepMethod::Dop853 => self.stats.n_steps_dop853 += 1,
         }
         self.dt = if self.stepper.is_taylor() {
             f64::INFINITY
@@ -369,6 +394,7 @@ impl<'a> Integrator<'a> {
         let Some(event) = found else {
             self.recorder
                 .step(self.stepper.interpolant(), t1, self.stepper.end());
+            self.note_zero_surfaces(t1)?;
             let turns_stiff =
                 self.stiffness.is_due(self.stats.n_steps) && self.look_at_stiffness(dt)?;
             self.stepper.accept(&mut self.x);

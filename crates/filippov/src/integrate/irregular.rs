@@ -2,6 +2,7 @@
 
 use smallvec::smallvec;
 
+use super::choice::NOT_UNIQUE_AT;
 use super::detect::Found;
 use super::integrator::Integrator;
 use super::motion::ModeField;
@@ -11,7 +12,7 @@ use crate::error::FieldError;
 use crate::event::{EventFunction, Monitored};
 use crate::field::IntersectionExit;
 use crate::tolerances::{
-    ARRIVED, AT_FOLD, AT_SIDE, FIRST_SLACK, JUMP_SHRINK, LEFT_RESTING, ONE_SIDED_AIM,
+    ARRIVED, AT_FOLD, AT_SIDE, FIRST_SLACK, JUMP_SHRINK, LEFT_RESTING, NEARLY_ZERO, ONE_SIDED_AIM,
 };
 
 impl Integrator<'_> {
@@ -172,25 +173,57 @@ impl Integrator<'_> {
             _ => None,
         });
         self.motion.resting = resting.collect();
-        for &j in &self.motion.resting {
-            let name = self.system.surface_name(j);
-            if self
-                .warnings
-                .iter()
-                .any(|warning| warning.text.contains(&name))
-            {
-                continue;
-            }
+        for k in 0..self.motion.resting.len() {
+            self.warn_zero_surface(self.motion.resting[k]);
+        }
+    }
+
+    /// Names a surface whose function is zero all along the motion, unless something was said about it.
+    fn warn_zero_surface(&mut self, j: usize) {
+        let name = self.system.surface_name(j);
+        let zero = format!("{name} is zero all along the motion from here");
+        let is_named = |warning: &Warning| {
+            let not_unique = warning.text.strip_prefix(NOT_UNIQUE_AT);
+            let surfaces = not_unique.and_then(|text| text.split_once(" is not unique"));
+            warning.text.starts_with(&zero)
+                || surfaces.is_some_and(|(names, _)| names == format!("{name} = 0"))
+        };
+        if !self.warnings.iter().any(is_named) {
             self.warnings.push(Warning {
                 t: self.t,
                 code: WarningCode::ZeroSurface,
-                text: format!(
-                    "{name} is zero all along the motion from here: its sign means nothing, and that of the mode is \
-                     taken"
-                ),
+                text: format!("{zero}: its sign means nothing, and that of the mode is taken"),
                 candidates: Vec::new(),
             });
         }
+    }
+
+    /// Names the surfaces whose functions were zero all along the step just made, up to rounding: a function that becomes
+    /// zero without a sign in it, as one that is called may do.
+    pub(super) fn note_zero_surfaces(&mut self, t1: f64) -> Result<(), FieldError> {
+        for index in 0..self.motion.monitored.len() {
+            let m = self.motion.monitored[index];
+            let (end, _) = self.detector.right[index];
+            let EventFunction::Surface(j) = m.function else {
+                continue;
+            };
+            // Few functions come this far; the sizes in the noise are not computed for the others.
+            if m.deflation.is_some() || m.value.abs().max(end.abs()) > NEARLY_ZERO {
+                continue;
+            }
+            let noise = self.noise_of(m.function)?;
+            if m.value.abs().max(end.abs()) > noise {
+                continue;
+            }
+            let signs = self.motion.signs.clone();
+            self.stepper.interpolant().at(0.5, &mut self.detector.x);
+            let (middle, h) = (0.5 * (self.t + t1), &mut self.detector.h);
+            self.system.surfaces(middle, &self.detector.x, &signs, h)?;
+            if h[j].abs() <= noise {
+                self.warn_zero_surface(j);
+            }
+        }
+        Ok(())
     }
 
     /// Has the motion left a surface that it was to stay on, by more than the tolerance?
@@ -221,8 +254,9 @@ impl Integrator<'_> {
     /// Warns where the field jumps over a step far shorter than its predecessors.
     pub(super) fn note_jump(&mut self, dt: f64) {
         let is_short = dt < JUMP_SHRINK * self.recent_dt;
-        // Towards a fold of the multipliers the field of an intersection bends like a square root.
-        let may_bend = self.motion.sliding.len() > 1;
+        // Towards a fold of the multipliers the field of an intersection bends like a square root, and towards a
+        // two-fold the multiplier is a quotient of small numbers.
+        let may_bend = self.motion.sliding.len() > 1 || self.approaches_two_fold();
         if is_short && !may_bend && !self.meets_edges && self.stepper.field_jumps() {
             let t = self.t + dt;
             self.warnings.push(Warning {

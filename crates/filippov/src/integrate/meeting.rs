@@ -248,6 +248,9 @@ impl Integrator<'_> {
         resolution: Result<Resolution, Undecided>,
         others: &[Continuation],
     ) -> Result<Decided, FieldError> {
+        if let Some(decided) = self.decide_without_inner(mode, meeting, fields)? {
+            return Ok(decided);
+        }
         let resolution = match resolution {
             Ok(resolution) if !resolution.degenerate => resolution,
             // Both say the same, and vanish somewhere in between: higher derivatives do not make them two.

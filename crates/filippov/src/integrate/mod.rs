@@ -29,6 +29,7 @@ mod stiff;
 mod stiffness;
 mod timetable;
 mod transition;
+mod two_fold;
 mod user_events;
 
 pub use integrator::Integrator;

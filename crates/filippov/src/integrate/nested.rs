@@ -9,9 +9,12 @@ use super::integrator::Integrator;
 use super::transition::{Decided, Left, Lefts};
 use super::Stop;
 use crate::error::FieldError;
+use crate::event::{EventFunction, Monitored};
+use crate::field::MeetingFields;
 use crate::mode::Mode;
-use crate::switching::Undecided;
-use crate::tolerances::SURFACE_NOISE;
+use crate::switching::{decide, first_nonzero, Arrival, Leading, Undecided};
+use crate::system::dot;
+use crate::tolerances::{BESIDE, COINCIDE, EPS, MOST_MEETING, SURFACE_NOISE, TANGENT};
 
 impl Integrator<'_> {
     /// What follows where the surfaces `fresh` are reached and others jump; `None` if no other does.
@@ -23,12 +26,18 @@ impl Integrator<'_> {
         if !self.system.has_nested_signs() {
             return Ok(None);
         }
+        let (fresh, jumping) = self.split_those_that_jump(mode, fresh)?;
+        let fresh = &fresh[..];
         let mut beyond = mode.clone();
         fresh
             .iter()
             .for_each(|&j| beyond.set(j, -mode.entries()[j]));
-        let (jumped, landed) = self.let_others_jump(mode, &mut beyond, fresh)?;
+        let (mut jumped, landed) = self.let_others_jump(mode, &mut beyond, (fresh, fresh))?;
+        jumped.extend(jumping);
         if jumped.is_empty() {
+            if let Some(decided) = self.leave_at_bends(mode, fresh)? {
+                return Ok(Some(Ok(decided)));
+            }
             return match fresh {
                 [j] if self.bends_what_is_slid_on(mode, &beyond)? => {
                     Ok(self.leave_to(&beyond, *j, &landed)?.map(Ok))
@@ -42,6 +51,34 @@ impl Integrator<'_> {
             }
         }
         Ok(Some(Err(between(fresh, &jumped))))
+    }
+
+    /// Splits off those of the surfaces reached at once that are not zero beyond another of them: as `x - c*sign(x - c)` at
+    /// x = c, they jump before they can be crossed.
+    fn split_those_that_jump(
+        &mut self,
+        mode: &Mode,
+        fresh: &[usize],
+    ) -> Result<(Vec<usize>, Vec<usize>), FieldError> {
+        let (mut kept, mut jumping) = (fresh.to_vec(), Vec::new());
+        if fresh.len() < 2 {
+            return Ok((kept, jumping));
+        }
+        let old = self.surface_values(&mode.signs())?;
+        let residual = residual(&old, fresh);
+        for &j in fresh {
+            let signs = mode.with(j, -mode.entries()[j]).signs();
+            let h = self.surface_values(&signs)?;
+            for &k in fresh.iter().filter(|&&k| k != j) {
+                let size = self.system.surface_size(k, self.t, &self.x, &signs)?;
+                let is_zero = h[k].abs() <= SURFACE_NOISE * (size + h[k].abs()) + residual;
+                if !is_zero && kept.contains(&j) && !jumping.contains(&k) {
+                    jumping.push(k);
+                    kept.retain(|kept| *kept != k);
+                }
+            }
+        }
+        Ok((kept, jumping))
     }
 
     /// The mode of a start on the surfaces `meeting`, as decided with the signs of `mode`; others may jump with it.
@@ -58,13 +95,13 @@ impl Integrator<'_> {
             return Ok(decided);
         }
         let mut beyond = after.clone();
-        let (jumped, landed) = self.let_others_jump(mode, &mut beyond, meeting)?;
+        let (jumped, landed) = self.let_others_jump(mode, &mut beyond, (meeting, meeting))?;
         if jumped.is_empty() {
             return Ok(decided);
         }
         if let [j] = meeting {
             let mut opposite = mode.with(*j, -after.entries()[*j]);
-            let (_, on_opposite) = self.let_others_jump(mode, &mut opposite, meeting)?;
+            let (_, on_opposite) = self.let_others_jump(mode, &mut opposite, (meeting, meeting))?;
             for (mode, landed) in [(beyond, landed), (opposite, on_opposite)] {
                 if mode.entries()[*j] != 0 {
                     if let Some(decided) = self.leave_to(&mode, *j, &landed)? {
@@ -97,7 +134,9 @@ impl Integrator<'_> {
         let leaving: Vec<usize> = sliding.into_iter().chain([j]).collect();
         let left = self.departures(&after, &leaving, &[])?;
         let leads_away = |l: &Left| match l {
-            Left::Surface(j, leading) => leading.sign() == after.entries()[*j],
+            // A surface that jumped to zero, and along which the motion goes.
+            Left::Surface(k, leading) if leading.order == 0 => *k != j,
+            Left::Surface(k, leading) => leading.sign() == after.entries()[*k],
             Left::Exit(..) => true,
         };
         Ok(left.iter().all(leads_away).then_some((after, left)))
@@ -117,15 +156,228 @@ impl Integrator<'_> {
         Ok(false)
     }
 
+    /// Where several surfaces are reached and one of them bends at another: the motion in a region that leads away from all
+    /// of them, if it is the only one. A surface along which the motion goes keeps its side.
+    pub(super) fn leave_at_bends(
+        &mut self,
+        mode: &Mode,
+        meeting: &[usize],
+    ) -> Result<Option<(Mode, Lefts)>, FieldError> {
+        let m = meeting.len();
+        let is_small = (2..=MOST_MEETING).contains(&m) && self.motion.sliding().is_empty();
+        if !is_small || !self.system.has_nested_signs() || !self.bends(mode, meeting)? {
+            return Ok(None);
+        }
+        let mut found = None;
+        for pattern in 0..1_usize << m {
+            let mut region = mode.clone();
+            for (bit, &j) in meeting.iter().enumerate() {
+                region.set(j, if pattern >> bit & 1 == 1 { 1 } else { -1 });
+            }
+            let mut settled = region.clone();
+            let (jumped, _) = self.let_others_jump(mode, &mut settled, (&[], meeting))?;
+            if !jumped.is_empty() {
+                continue;
+            }
+            let Some(left) = self.leaves_into(mode, &region, meeting)? else {
+                continue;
+            };
+            if found.replace((region, left)).is_some() {
+                return Ok(None);
+            }
+        }
+        Ok(found)
+    }
+
+    /// What vanishes at the start of a motion in `region` that leads away from all surfaces of `meeting`, if it does.
+    fn leaves_into(
+        &self,
+        mode: &Mode,
+        region: &Mode,
+        meeting: &[usize],
+    ) -> Result<Option<Lefts>, FieldError> {
+        let (mut left, signs) = (Lefts::new(), region.signs());
+        for &j in meeting {
+            let side = region.entries()[j];
+            let leading = first_nonzero(self.system, j, side, 0, self.t, &self.x, &signs)?;
+            let stays = leading.order == 0 && side == mode.entries()[j];
+            if leading.sign() != side && !stays {
+                return Ok(None);
+            }
+            left.push(Left::Surface(j, leading));
+        }
+        let is_left = |left: &Left| matches!(left, Left::Surface(_, leading) if leading.order > 0);
+        Ok(left.iter().any(is_left).then_some(left))
+    }
+
+    /// What follows where two surfaces are in one place and the field depends on one of them only, as on
+    /// `x + x*abs(x)` beside `x`: that one decides.
+    pub(super) fn decide_without_inner(
+        &mut self,
+        mode: &Mode,
+        meeting: &[usize],
+        corners: &MeetingFields,
+    ) -> Result<Option<Decided>, FieldError> {
+        let &[first, second] = meeting else {
+            return Ok(None);
+        };
+        if !self.system.has_nested_signs() {
+            return Ok(None);
+        }
+        let same = |a: usize, b: usize| corners.field(a) == corners.field(b);
+        let (j, k) = match (same(0, 1) && same(2, 3), same(0, 2) && same(1, 3)) {
+            (true, false) => (second, first),
+            (false, true) => (first, second),
+            _ => return Ok(None),
+        };
+        if !self.are_parallel(j, k, mode)? {
+            return Ok(None);
+        }
+        let arrival = match mode.entries()[j] {
+            0 => Arrival::Start,
+            side => Arrival::Region(side),
+        };
+        let decision = decide(self.system, j, arrival, self.t, &self.x, &mode.signs())?;
+        let (mut after, mut left) = match self.follow_at_surface(mode, j, decision) {
+            Ok(followed) => followed,
+            Err(stop) => return Ok(Some(Err(stop))),
+        };
+        if after.entries()[j] != 0 {
+            self.leave_together(j, k, &mut after, &mut left)?;
+        } else if after.entries()[k] == 0 {
+            after.set(k, 1);
+        }
+        Ok(Some(Ok((after, left))))
+    }
+
+    /// The surfaces that are in the place of the one slid on, as `x` beside `x + x*abs(x)`: they vanish all along the
+    /// motion, and are no events.
+    pub(super) fn rest_on_coinciding(&mut self) -> Result<(), FieldError> {
+        let &[j] = self.motion.sliding() else {
+            return Ok(());
+        };
+        if !self.system.has_nested_signs() {
+            return Ok(());
+        }
+        // Beside the current point, so that surfaces that only touch are told apart.
+        let t = self.t + BESIDE * (1.0 + self.t.abs());
+        let shifts = (0..self.x.len()).map(|i| BESIDE * (1.0 + 1.0 / (2.0 + i as f64)));
+        let pairs = self.x.iter().zip(shifts);
+        let mut beside: Vec<f64> = pairs.map(|(x, d)| x + d * (1.0 + x.abs())).collect();
+        self.motion.project(t, &mut beside)?;
+        let signs = self.motion.signs.clone();
+        let mut h = vec![0.0; signs.len()];
+        self.system.surfaces(t, &beside, &signs, &mut h)?;
+        let here = self.surface_values(&signs)?;
+        for k in (0..h.len()).filter(|&k| k != j && self.motion.active[k]) {
+            let mut gradient = vec![0.0; beside.len()];
+            let rate = self.system.gradient(k, t, &beside, &signs, &mut gradient)?;
+            let size = rate.abs() + gradient.iter().fold(0.0_f64, |sum, g| sum + g.abs());
+            let coincides = h[k].abs().max(here[k].abs()) <= COINCIDE * size;
+            if coincides && size > 0.0 && !self.motion.resting.contains(&k) {
+                self.motion.resting.push(k);
+                let is_other = |m: &Monitored| m.function != EventFunction::Surface(k);
+                self.motion.monitored.retain(is_other);
+            }
+        }
+        Ok(())
+    }
+
+    /// The sides of the surfaces that the motion rested on, after a switch.
+    pub(super) fn leave_coinciding(
+        &mut self,
+        (mut after, mut left): (Mode, Lefts),
+    ) -> Result<(Mode, Lefts), FieldError> {
+        let &[j] = self.motion.sliding() else {
+            return Ok((after, left));
+        };
+        let is_nested = self.system.has_nested_signs();
+        if !is_nested || self.motion.resting.is_empty() || after.entries()[j] == 0 {
+            return Ok((after, left));
+        }
+        for k in self.motion.resting.clone() {
+            if left.iter().all(|left| left.surface() != k) {
+                self.leave_together(j, k, &mut after, &mut left)?;
+            }
+        }
+        Ok((after, left))
+    }
+
+    /// Have two surfaces the same normal, up to its length?
+    fn are_parallel(&self, j: usize, k: usize, mode: &Mode) -> Result<bool, FieldError> {
+        let (signs, n) = (mode.signs(), self.x.len());
+        let (mut one, mut other) = (vec![0.0; n + 1], vec![0.0; n + 1]);
+        for (j, row) in [(j, &mut one), (k, &mut other)] {
+            row[n] = self
+                .system
+                .gradient(j, self.t, &self.x, &signs, &mut row[..n])?;
+        }
+        let (product, squares) = (dot(&one, &other), dot(&one, &one) * dot(&other, &other));
+        Ok(squares > 0.0 && squares - product * product <= TANGENT * squares)
+    }
+
+    /// Surface k is left as surface j is, which is in the same place.
+    fn leave_together(
+        &self,
+        j: usize,
+        k: usize,
+        after: &mut Mode,
+        left: &mut Lefts,
+    ) -> Result<(), FieldError> {
+        let leading = left.iter().find_map(|left| match left {
+            Left::Surface(of, leading) if *of == j => Some(*leading),
+            _ => None,
+        });
+        let Some(Leading { order, value }) = leading else {
+            return Ok(());
+        };
+        let (signs, n) = (after.signs(), self.x.len());
+        let (mut known, mut other) = (vec![0.0; n], vec![0.0; n]);
+        let (t, x) = (self.t, &self.x[..]);
+        let rates = [
+            self.system.gradient(j, t, x, &signs, &mut known)?,
+            self.system.gradient(k, t, x, &signs, &mut other)?,
+        ];
+        let ratio = (dot(&known, &other) + rates[0] * rates[1])
+            / (dot(&known, &known) + rates[0] * rates[0]);
+        if ratio.is_finite() && ratio != 0.0 {
+            after.set(k, if ratio * value > 0.0 { 1 } else { -1 });
+            let value = ratio * value;
+            left.push(Left::Surface(k, Leading { order, value }));
+        }
+        Ok(())
+    }
+
+    /// Has one of the surfaces another normal on the other side of one of them, or none at all?
+    fn bends(&self, mode: &Mode, meeting: &[usize]) -> Result<bool, FieldError> {
+        let n = self.x.len();
+        let (mut near, mut far) = (vec![0.0; n], vec![0.0; n]);
+        for &k in meeting {
+            let beyond = mode.with(k, -mode.entries()[k]).signs();
+            for &j in meeting.iter().filter(|&&j| j != k) {
+                let (t, x) = (self.t, &self.x[..]);
+                let rate = self.system.gradient(j, t, x, &mode.signs(), &mut near)?;
+                let other = self.system.gradient(j, t, x, &beyond, &mut far)?;
+                let is_flat = rate == 0.0 && near.iter().all(|&g| g == 0.0);
+                if is_flat || near != far || rate != other {
+                    return Ok(true);
+                }
+            }
+        }
+        Ok(false)
+    }
+
     /// Gives all surfaces that jump between two modes the side that they are on afterwards; returns which, and those
-    /// of them that jump to zero, which keep their side.
+    /// of them that jump to zero, which keep their side. Those of `fixed` are not looked at; the point lies on those
+    /// of `reached`, up to what their values are.
     fn let_others_jump(
         &mut self,
         before: &Mode,
         after: &mut Mode,
-        fresh: &[usize],
+        (fixed, reached): (&[usize], &[usize]),
     ) -> Result<(Vec<usize>, Vec<usize>), FieldError> {
         let old = self.surface_values(&before.signs())?;
+        let residual = residual(&old, reached);
         let (mut jumped, mut landed) = (Vec::new(), Vec::new());
         // A jump may make others jump.
         for _ in 0..old.len() {
@@ -133,9 +385,9 @@ impl Integrator<'_> {
             let new = self.surface_values(&signs)?;
             let mut is_final = true;
             landed.clear();
-            for j in (0..new.len()).filter(|j| !fresh.contains(j)) {
+            for j in (0..new.len()).filter(|j| !fixed.contains(j)) {
                 let size = self.system.surface_size(j, self.t, &self.x, &signs)?;
-                let noise = SURFACE_NOISE * (size + old[j].abs() + new[j].abs());
+                let noise = SURFACE_NOISE * (size + old[j].abs() + new[j].abs()) + residual;
                 if (new[j] - old[j]).abs() <= noise {
                     continue;
                 }
@@ -155,6 +407,12 @@ impl Integrator<'_> {
         jumped.extend(&landed);
         Ok((jumped, landed))
     }
+}
+
+/// How far functions may be from zero at a point that lies on the surfaces `reached` to this: their values, and some
+/// times as much for other slopes.
+fn residual(h: &[f64], reached: &[usize]) -> f64 {
+    SURFACE_NOISE / EPS * reached.iter().fold(0.0, |most, &j| h[j].abs().max(most))
 }
 
 /// Surfaces between whose sides the motion would slide while others jump.

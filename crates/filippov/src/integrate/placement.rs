@@ -67,7 +67,10 @@ impl Integrator<'_> {
                 let decision = decide(self.system, *j, arrival, self.t, &self.x, &signs)?;
                 Ok(self.follow_at_surface(&mode, *j, decision))
             }
-            _ => self.decide_at_start(&mode, meeting),
+            _ => match self.leave_at_bends(&mode, meeting)? {
+                Some(left) => Ok(Ok(left)),
+                None => self.decide_at_start(&mode, meeting),
+            },
         }
     }
 

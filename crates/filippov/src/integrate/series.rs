@@ -37,6 +37,8 @@ impl Integrator<'_> {
         }
         self.stepper.start_with(if self.motion.jets.is_some() {
             StepMethod::Taylor
+        } else if self.stepper.dop853.is_some() {
+            StepMethod::Dop853
         } else {
             StepMethod::Dopri5
         });

@@ -1,5 +1,7 @@
 //! Stiffness noticed by the explicit methods.
 
+use smallvec::SmallVec;
+
 use super::integrator::Integrator;
 use super::stiff::Derivatives;
 use super::{Warning, WarningCode};
@@ -7,7 +9,7 @@ use crate::error::FieldError;
 use crate::field::SmoothField;
 use crate::options::Method;
 use crate::stepper::{Rodas5p, StepMethod};
-use crate::tolerances::{NOT_STIFF_SIGNS, STIFF_DOPRI5, STIFF_SERIES, STIFF_SIGNS};
+use crate::tolerances::{NOT_STIFF_SIGNS, STIFF_DOP853, STIFF_DOPRI5, STIFF_SERIES, STIFF_SIGNS};
 
 /// Accepted steps between two looks, a power of two.
 const LOOK_EVERY: u64 = 128;
@@ -63,6 +65,10 @@ impl Integrator<'_> {
                 let product = self.stepper.dopri5.stiffness();
                 product.is_some_and(|product| product > STIFF_DOPRI5)
             }
+            StepMethod::Dop853 => {
+                let product = self.stepper.dop853.as_ref().and_then(|d| d.stiffness());
+                product.is_some_and(|product| product > STIFF_DOP853)
+            }
             StepMethod::Taylor => self.is_series_limited(dt)?,
             _ => return Ok(false),
         };
@@ -98,8 +104,8 @@ impl Integrator<'_> {
             return Ok(false);
         };
         let (t, end, rates) = (self.t + dt, taylor.end(), taylor.end_derivative());
-        let apart: Vec<f64> = beside.iter().zip(end).map(|(a, b)| a - b).collect();
-        let mut rates_beside = vec![0.0; beside.len()];
+        let apart: SmallVec<[f64; 16]> = beside.iter().zip(end).map(|(a, b)| a - b).collect();
+        let mut rates_beside: SmallVec<[f64; 16]> = SmallVec::from_elem(0.0, beside.len());
         self.motion
             .field
             .eval_unprojected(t, &mut beside, &mut rates_beside)?;

@@ -150,10 +150,15 @@ impl Integrator<'_> {
             }
             self.add_vanishing_surfaces(&mut surfaces, &h)?;
         }
-        if event.touch {
+        let at_two_fold = self.arrives_at_two_fold(event, &surfaces)?;
+        if event.touch && !at_two_fold {
             return self.graze(&mode, &surfaces);
         }
-        let arrival = self.arrival(event, &surfaces);
+        let arrival = if at_two_fold {
+            Some(Arrival::TwoFold)
+        } else {
+            self.arrival(event, &surfaces)
+        };
         let fresh = SmallVec::<[usize; 4]>::from_slice(&surfaces);
         for &j in self.motion.sliding() {
             if !surfaces.contains(&j) {
@@ -168,7 +173,7 @@ impl Integrator<'_> {
             _ => self.decide_at_intersection(event, &mode, &surfaces, &fresh)?,
         };
         let (after, left) = match decided {
-            Ok(decided) => decided,
+            Ok(decided) => self.leave_coinciding(decided)?,
             Err(stop) => return Ok(Some(stop)),
         };
         // Stability is lost, and the motion stays all the same: it oscillates around the root from now on.
@@ -214,7 +219,9 @@ impl Integrator<'_> {
         h: &[f64],
     ) -> Result<(), FieldError> {
         for (j, h) in h.iter().enumerate() {
-            let slides = self.motion.mode.entries()[j] == 0;
+            // One that the motion rests on while it slides is in the place of that it slides on.
+            let slides = self.motion.mode.entries()[j] == 0
+                || !self.motion.sliding().is_empty() && self.motion.resting.contains(&j);
             if !self.motion.active[j] || slides || surfaces.contains(&j) {
                 continue;
             }
@@ -244,6 +251,26 @@ impl Integrator<'_> {
             ([_], [], [EventFunction::ExitPlus, ..]) => Some(Arrival::ExitPlus),
             _ => None,
         }
+    }
+
+    /// Has sliding on one surface come to a two-fold? Then the point is moved there.
+    fn arrives_at_two_fold(
+        &mut self,
+        event: &Found,
+        surfaces: &[usize],
+    ) -> Result<bool, FieldError> {
+        let exits = [EventFunction::ExitMinus, EventFunction::ExitPlus];
+        let is_exit = event.functions.iter().any(|f| exits.contains(f));
+        if !is_exit || !surfaces.is_empty() {
+            return Ok(false);
+        }
+        let Some((t, x)) = self.two_fold_here()? else {
+            return Ok(false);
+        };
+        if t > self.t {
+            self.move_straight(t, x)?;
+        }
+        Ok(true)
     }
 
     /// A touch: recorded, the mode stays.
@@ -306,6 +333,7 @@ impl Integrator<'_> {
             }
         }
         self.motion.project(self.t, &mut self.x)?;
+        self.rest_on_coinciding()?;
         let derivative = self.stepper.start_derivative_mut();
         match &mut self.motion.field {
             ModeField::Region(_) => {

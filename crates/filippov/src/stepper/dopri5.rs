@@ -191,13 +191,8 @@ impl Dopri5 {
         if self.has_order5() {
             return None;
         }
-        let distance = |a: &[f64], b: &[f64]| {
-            let squares = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b));
-            squares.sum::<f64>().sqrt()
-        };
-        let apart = distance(&self.y1, &self.stage);
-        let rates_apart = distance(&self.k[6], &self.k[5]);
-        (apart > 0.0).then(|| self.interpolant.dt * rates_apart / apart)
+        let states = [&self.y1[..], &self.stage];
+        stiffness_of(self.interpolant.dt, states, [&self.k[6], &self.k[5]])
     }
 
     /// Is the continuous extension of order 5 already there?
@@ -309,19 +304,9 @@ impl Dopri5 {
         scale.norm(&defect, &self.y1)
     }
 
-    /// Does the field jump within the attempted step? Then nearly all of the range of some component
-    /// falls between two neighbouring stages; a smooth layer spreads it.
+    /// Does the field jump within the attempted step?
     pub fn field_jumps(&self) -> bool {
-        let ordered = [0, 1, 2, 3, 4, 6].map(|stage: usize| &self.k[stage]);
-        (0..self.y1.len()).any(|i| {
-            let values = ordered.map(|k| k[i]);
-            let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-            let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            let largest = values.windows(2).map(|w| (w[1] - w[0]).abs());
-            let largest = largest.fold(0.0_f64, f64::max);
-            let size = low.abs().max(high.abs());
-            high - low > JUMP_SIZE * size && largest > JUMP_SHARE * (high - low)
-        })
+        jumps_between(&[0, 1, 2, 3, 4, 6].map(|stage: usize| &self.k[stage][..]))
     }
 
     /// The extension computed last.
@@ -334,4 +319,29 @@ impl Dopri5 {
         y.copy_from_slice(&self.y1);
         self.k.swap(0, 6);
     }
+}
+
+/// Do these derivatives, in order of time, jump? Then nearly all of the range of some component falls between two
+/// neighbours; a smooth layer spreads it.
+pub(super) fn jumps_between(ordered: &[&[f64]]) -> bool {
+    (0..ordered[0].len()).any(|i| {
+        let values = ordered.iter().map(|k| k[i]);
+        let low = values.clone().fold(f64::INFINITY, f64::min);
+        let high = values.fold(f64::NEG_INFINITY, f64::max);
+        let largest = ordered.windows(2).map(|w| (w[1][i] - w[0][i]).abs());
+        let largest = largest.fold(0.0_f64, f64::max);
+        let size = low.abs().max(high.abs());
+        high - low > JUMP_SIZE * size && largest > JUMP_SHARE * (high - low)
+    })
+}
+
+/// dt |k - k'| / |y - y'|: the product of the step and the fastest rate, from two states at one time and their derivatives;
+/// `None` where they are the same.
+pub(super) fn stiffness_of(dt: f64, states: [&[f64]; 2], rates: [&[f64]; 2]) -> Option<f64> {
+    let distance = |[a, b]: [&[f64]; 2]| {
+        let squares = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b));
+        squares.sum::<f64>().sqrt()
+    };
+    let apart = distance(states);
+    (apart > 0.0).then(|| dt * distance(rates) / apart)
 }

@@ -1,14 +1,16 @@
 //! The stepper of a run: the methods that it may use, and which of them takes the current step.
 
-use super::{Dopri5, ErrorScale, Interpolant, Rodas5p, Taylor};
+use super::{Dop853, Dopri5, ErrorScale, Interpolant, Rodas5p, Taylor};
 use crate::error::FieldError;
 use crate::field::SmoothField;
 
 /// The method that takes a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StepMethod {
-    /// The Runge-Kutta pair of Dormand and Prince.
+    /// The Runge-Kutta pair of Dormand and Prince, of order 5.
     Dopri5,
+    /// That of order 8.
+    Dop853,
     /// Taylor series.
     Taylor,
     /// The Rosenbrock-Wanner method of Steinebach.
@@ -22,6 +24,8 @@ pub struct Stepper {
     pub dopri5: Dopri5,
     /// The Taylor method, where the run may use it.
     pub taylor: Option<Box<Taylor>>,
+    /// The Runge-Kutta method of order 8, where the run uses it.
+    pub dop853: Option<Box<Dop853>>,
     /// The method for stiff motions, where the run may use it.
     pub rodas5p: Option<Box<Rodas5p>>,
     in_use: StepMethod,
@@ -30,9 +34,14 @@ pub struct Stepper {
 /// Calls the method in use.
 macro_rules! in_use {
     ($self:ident, $method:ident => $call:expr) => {
-        match (&$self.taylor, &$self.rodas5p) {
-            (Some($method), _) if $self.in_use == StepMethod::Taylor => $call,
-            (_, Some($method)) if $self.in_use == StepMethod::Rodas5p => $call,
+        match (&$self.taylor, &$self.rodas5p, &$self.dop853) {
+            (Some($method), ..) if $self.in_use == StepMethod::Taylor => $call,
+            _ if $self.in_use == StepMethod::Dopri5 => {
+                let $method = &$self.dopri5;
+                $call
+            }
+            (_, Some($method), _) if $self.in_use == StepMethod::Rodas5p => $call,
+            (_, _, Some($method)) if $self.in_use == StepMethod::Dop853 => $call,
             _ => {
                 let $method = &$self.dopri5;
                 $call
@@ -40,9 +49,14 @@ macro_rules! in_use {
         }
     };
     (mut $self:ident, $method:ident => $call:expr) => {
-        match (&mut $self.taylor, &mut $self.rodas5p) {
-            (Some($method), _) if $self.in_use == StepMethod::Taylor => $call,
-            (_, Some($method)) if $self.in_use == StepMethod::Rodas5p => $call,
+        match (&mut $self.taylor, &mut $self.rodas5p, &mut $self.dop853) {
+            (Some($method), ..) if $self.in_use == StepMethod::Taylor => $call,
+            _ if $self.in_use == StepMethod::Dopri5 => {
+                let $method = &mut $self.dopri5;
+                $call
+            }
+            (_, Some($method), _) if $self.in_use == StepMethod::Rodas5p => $call,
+            (_, _, Some($method)) if $self.in_use == StepMethod::Dop853 => $call,
             _ => {
                 let $method = &mut $self.dopri5;
                 $call
@@ -57,6 +71,7 @@ impl Stepper {
         Stepper {
             dopri5: Dopri5::new(n),
             taylor: taylor.map(Box::new),
+            dop853: None,
             rodas5p: None,
             in_use: StepMethod::Dopri5,
         }
@@ -83,6 +98,7 @@ impl Stepper {
             StepMethod::Dopri5 => true,
             StepMethod::Taylor => self.taylor.is_some(),
             StepMethod::Rodas5p => self.rodas5p.is_some(),
+            StepMethod::Dop853 => self.dop853.is_some(),
         };
         self.in_use = if is_there { method } else { StepMethod::Dopri5 };
     }
@@ -152,9 +168,14 @@ impl Stepper {
 
     /// Estimated error of the extension beyond the end of the step, in units of the tolerance.
     pub fn extension_defect(&self, theta: f64, scale: &ErrorScale) -> f64 {
-        match (self.in_use, &self.taylor, &self.rodas5p) {
-            (StepMethod::Taylor, Some(taylor), _) => taylor.extrapolation_error(theta),
-            (StepMethod::Rodas5p, _, Some(rodas5p)) => rodas5p.extrapolation_error(theta, scale),
+        match (&self.taylor, &self.rodas5p, &self.dop853) {
+            (Some(taylor), ..) if self.is_taylor() => taylor.extrapolation_error(theta),
+            (_, Some(rodas5p), _) if self.in_use == StepMethod::Rodas5p => {
+                rodas5p.extrapolation_error(theta, scale)
+            }
+            (_, _, Some(dop853)) if self.in_use == StepMethod::Dop853 => {
+                dop853.extrapolation_error(theta, scale)
+            }
             _ => self.dopri5.extension_defect(theta, scale),
         }
     }
@@ -162,7 +183,11 @@ impl Stepper {
     /// Does the field jump within the attempted step? A series has no jumps, and over the stages of a stiff step the
     /// field changes as fast without any.
     pub fn field_jumps(&self) -> bool {
-        !self.has_series() && self.dopri5.field_jumps()
+        match (self.in_use, &self.dop853) {
+            (StepMethod::Dopri5, _) => self.dopri5.field_jumps(),
+            (StepMethod::Dop853, Some(dop853)) => dop853.field_jumps(),
+            _ => false,
+        }
     }
 
     /// Makes the continuous extension a straight line: the record of a motion that was not stepped.

@@ -1,9 +1,11 @@
 //! Steppers: advance one smooth field by one step, with an error estimate and a continuous extension.
 
+mod coefficients_dop853;
 mod coefficients_dopri5;
 mod coefficients_rodas5p;
 mod controller;
 mod dense;
+mod dop853;
 mod dopri5;
 mod initial_step;
 mod linearisation;
@@ -14,6 +16,7 @@ mod taylor;
 pub use controller::{Controller, ErrorScale};
 pub(crate) use dense::{evaluate, nested, shift};
 pub use dense::{Basis, Expansion, Interpolant};
+pub use dop853::Dop853;
 pub use dopri5::{Attempt, Dopri5};
 pub use initial_step::{initial_step, restart_step, tiny_step};
 pub use linearisation::Linearisation;

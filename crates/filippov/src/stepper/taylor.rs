@@ -1,5 +1,7 @@
 //! The Taylor method: the coefficients of the motion are the step, its continuous extension and its error.
 
+use smallvec::SmallVec;
+
 use super::controller::{rough_exp2, rough_log2};
 use super::{Attempt, ErrorScale, Interpolant};
 use crate::error::FieldError;
@@ -247,7 +249,11 @@ impl Taylor {
 
     /// The end of the step without the last term of the series, if the velocity hardly changes over the step, however
     /// many terms there are: an analytic motion would allow a far longer one.
-    pub fn slow_end_without_last(&self, y: &[f64], scale: &ErrorScale) -> Option<Vec<f64>> {
+    pub fn slow_end_without_last(
+        &self,
+        y: &[f64],
+        scale: &ErrorScale,
+    ) -> Option<SmallVec<[f64; 16]>> {
         let mut rows = self.interpolant.coefficients().chunks_exact(self.n);
         let velocity = scale.norm(rows.nth(1)?, y);
         let change: f64 = rows

@@ -18,6 +18,8 @@ pub enum Arrival {
     ExitMinus,
     /// Sliding, with the normal component of f+ known to vanish.
     ExitPlus,
+    /// Sliding, with both normal components known to vanish.
+    TwoFold,
     /// The run starts here.
     Start,
 }
@@ -67,7 +69,8 @@ pub fn decide(
         return decide_sticking(system, j, arrival, (t, x), signs);
     }
     let exits = [Arrival::ExitMinus, Arrival::ExitPlus];
-    let vanishing = exits.map(|known| usize::from(arrival == known));
+    let is_known = |exit: Arrival| arrival == exit || arrival == Arrival::TwoFold;
+    let vanishing = exits.map(|exit| usize::from(is_known(exit)));
     let [minus, plus] = first_nonzero_of_both(system, j, vanishing, t, x, signs)?;
     let mut candidates = SmallVec::new();
     if minus.sign() < 0 {
@@ -142,11 +145,7 @@ fn slides(
     two_fold_slides(system, j, t, x, signs)
 }
 
-/// Does sliding start at a two-fold, where both normal components vanish?
-///
-/// With the derivatives p = L-L-h, q = L+L-h, r = L-L+h, s = L+L+h the normal components grow
-/// along the sliding motion with weight w of f+ at the rates B- = p + w (q - p), B+ = r + w (s - r),
-/// and w = B- / (B- - B+) must hold: a quadratic in w. Sliding needs a root in (0, 1) with
+/// Does sliding start at a two-fold, where both normal components vanish? It needs a motion that is slid along with
 /// B- > 0 > B+ (Dieci, Lopez 2009, case IV).
 fn two_fold_slides(
     system: &dyn PiecewiseSystem,
@@ -155,6 +154,24 @@ fn two_fold_slides(
     x: &[f64],
     signs: &[f64],
 ) -> Result<bool, FieldError> {
+    let motions = two_fold_motions(system, j, t, x, signs)?;
+    Ok(motions
+        .iter()
+        .any(|&[_, minus, plus]| minus > 0.0 && plus < 0.0))
+}
+
+/// The sliding motions through a two-fold: the weight w of f+ in (0, 1), and the rates at which the normal components
+/// grow along the motion.
+///
+/// With the derivatives p = L-L-h, q = L+L-h, r = L-L+h, s = L+L+h these rates are B- = p + w (q - p) and
+/// B+ = r + w (s - r), and w = B- / (B- - B+) must hold: a quadratic in w.
+fn two_fold_motions(
+    system: &dyn PiecewiseSystem,
+    j: usize,
+    t: f64,
+    x: &[f64],
+    signs: &[f64],
+) -> Result<SmallVec<[[f64; 3]; 2]>, FieldError> {
     let lie = |word: [i8; 2]| -> Result<f64, FieldError> {
         Ok(system.lie_derivative(j, j, &word, t, x, signs)?.value)
     };
@@ -169,9 +186,10 @@ fn two_fold_slides(
         let k = -0.5 * (b + d.copysign(b));
         [k / a, c / k]
     };
-    Ok(roots
-        .iter()
-        .any(|&w| w > 0.0 && w < 1.0 && p + w * (q - p) > 0.0 && r + w * (s - r) < 0.0))
+    let inside = roots.into_iter().filter(|&w| w > 0.0 && w < 1.0);
+    Ok(inside
+        .map(|w| [w, p + w * (q - p), r + w * (s - r)])
+        .collect())
 }
 
 /// Among several candidates: the side that the motion comes from; at a start the one that the
@@ -192,6 +210,15 @@ fn choose(
         Arrival::Region(side) => side,
         Arrival::ExitMinus => -1,
         Arrival::ExitPlus => 1,
+        Arrival::TwoFold => {
+            // Sliding goes on, and repels: the motion leaves to the side whose field has the larger share.
+            let motions = two_fold_motions(system, j, t, x, signs)?;
+            let repels = |motion: &&[f64; 3]| motion[1] < 0.0 && motion[2] > 0.0;
+            match motions.iter().find(repels) {
+                Some([weight, ..]) if *weight < 0.5 => -1,
+                _ => 1,
+            }
+        }
         Arrival::Start => {
             let minus = normal_component(system, j, j, -1, t, x, signs)?.value;
             let plus = normal_component(system, j, j, 1, t, x, signs)?.value;

@@ -1,6 +1,7 @@
 //! Bounds of the multipliers while the normal components move within intervals.
 
 use filippov_expr::Interval;
+use smallvec::SmallVec;
 
 use super::small_matrix::Matrix;
 
@@ -9,13 +10,16 @@ const WIDENINGS: usize = 4;
 /// A box wider than this says nothing about multipliers in [-1, 1].
 const WIDEST: f64 = 8.0;
 
+/// As many intervals as a few surfaces need.
+pub type IntervalVector = SmallVec<[Interval; 8]>;
+
 /// What is known of the multipliers of sliding on m surfaces over a piece of motion.
 #[derive(Clone, Debug)]
 pub struct EnclosedRoot {
     /// The multipliers.
-    pub multipliers: Vec<Interval>,
+    pub multipliers: IntervalVector,
     /// The diagonal of G in a box around them, where G is invertible; empty if G is constant.
-    pub diagonal: Vec<Interval>,
+    pub diagonal: IntervalVector,
 }
 
 /// What could be said of the multipliers.
@@ -70,30 +74,30 @@ pub fn enclose_root(components: &[Interval], guess: &[Interval]) -> RootBounds {
 }
 
 /// The image of a box, and the diagonal of G in it; `None` if G is singular.
-fn krawczyk(components: &[Interval], guess: &[Interval]) -> Option<(Vec<Interval>, Vec<Interval>)> {
+fn krawczyk(
+    components: &[Interval],
+    guess: &[Interval],
+) -> Option<(IntervalVector, IntervalVector)> {
     let m = guess.len();
-    let middle: Vec<Interval> = guess
+    let middle: IntervalVector = guess
         .iter()
         .map(|l| Interval::point(0.5 * (l.lo + l.hi)))
         .collect();
     let row =
-        |j: usize| -> Vec<Interval> { components.iter().skip(j).step_by(m).copied().collect() };
-    let jacobian: Vec<Vec<Interval>> = (0..m)
-        .map(|j| {
-            (0..m)
-                .map(|p| interpolate(differences(&row(j), p), guess, Some(p)))
-                .collect()
-        })
+        |j: usize| -> IntervalVector { components.iter().skip(j).step_by(m).copied().collect() };
+    let places = (0..m).flat_map(|j| (0..m).map(move |p| (j, p)));
+    let jacobian: IntervalVector = places
+        .map(|(j, p)| interpolate(differences(&row(j), p), guess, Some(p)))
         .collect();
     let mut approximate = Matrix::zeros(m);
     for j in 0..m {
         for p in 0..m {
-            approximate[(j, p)] = 0.5 * (jacobian[j][p].lo + jacobian[j][p].hi);
+            approximate[(j, p)] = 0.5 * (jacobian[j * m + p].lo + jacobian[j * m + p].hi);
         }
     }
     let inverse = approximate.inverse()?;
-    let g: Vec<Interval> = (0..m).map(|j| interpolate(row(j), &middle, None)).collect();
-    let mut multipliers = Vec::with_capacity(m);
+    let g: IntervalVector = (0..m).map(|j| interpolate(row(j), &middle, None)).collect();
+    let mut multipliers = IntervalVector::with_capacity(m);
     for i in 0..m {
         let mut k = middle[i];
         for j in 0..m {
@@ -102,19 +106,19 @@ fn krawczyk(components: &[Interval], guess: &[Interval]) -> Option<(Vec<Interval
         for p in 0..m {
             let mut defect = Interval::point(if i == p { 1.0 } else { 0.0 });
             for j in 0..m {
-                defect = defect - jacobian[j][p].scaled(inverse[(i, j)]);
+                defect = defect - jacobian[j * m + p].scaled(inverse[(i, j)]);
             }
             k = k + defect * (guess[p] - middle[p]);
         }
         multipliers.push(k);
     }
-    let diagonal = (0..m).map(|i| jacobian[i][i]).collect();
+    let diagonal = (0..m).map(|i| jacobian[i * m + i]).collect();
     Some((multipliers, diagonal))
 }
 
 /// Half the differences of the values in direction `axis`, for all patterns of the other bits (those with
 /// bit `axis` hold the same number).
-fn differences(values: &[Interval], axis: usize) -> Vec<Interval> {
+fn differences(values: &[Interval], axis: usize) -> IntervalVector {
     let bit = 1 << axis;
     let pairs = (0..values.len()).map(|pattern| (values[pattern | bit], values[pattern & !bit]));
     pairs
@@ -124,7 +128,7 @@ fn differences(values: &[Interval], axis: usize) -> Vec<Interval> {
 
 /// The multilinear interpolant at a box, one axis after the other; `skip` is an axis that the values do not
 /// depend on. It is linear along each axis, so that the ends of the box bound it.
-fn interpolate(mut values: Vec<Interval>, at: &[Interval], skip: Option<usize>) -> Interval {
+fn interpolate(mut values: IntervalVector, at: &[Interval], skip: Option<usize>) -> Interval {
     for (axis, l) in at.iter().enumerate().rev() {
         let half = 1 << axis;
         for pattern in 0..half {
@@ -149,7 +153,7 @@ mod tests {
         Interval::around(value, radius)
     }
 
-    fn proved(components: &[Interval], guess: &[Interval]) -> Vec<Interval> {
+    fn proved(components: &[Interval], guess: &[Interval]) -> IntervalVector {
         match enclose_root(components, guess) {
             RootBounds::Proved(root) => root.multipliers,
             other => panic!("{other:?}"),

@@ -1,7 +1,7 @@
 //! Where two roots of the sliding equations meet, and how far the equations are from it.
 
 use super::normal_fields::NormalFields;
-use super::small_matrix::Matrix;
+use super::small_matrix::{Matrix, Vector};
 use crate::tolerances::{FOLD_REACH, NEWTON_DONE, NEWTON_STEPS};
 
 /// Two roots as one, in equations that have been moved so that they meet.
@@ -92,7 +92,7 @@ fn equations(
 }
 
 /// The unit vector that a nearly singular matrix shrinks most, by inverse iteration.
-fn near_null_vector(matrix: &Matrix) -> Option<Vec<f64>> {
+fn near_null_vector(matrix: &Matrix) -> Option<Vector> {
     let n = matrix.n();
     let mut regular = matrix.clone();
     for i in 0..n {
@@ -100,7 +100,7 @@ fn near_null_vector(matrix: &Matrix) -> Option<Vec<f64>> {
         regular[(i, i)] += 1e-13 * matrix.size();
     }
     // No null vector of a matrix with small integers is orthogonal to this one.
-    let mut v: Vec<f64> = (0..n).map(|i| 1.0 + (1.0 + i as f64).sqrt()).collect();
+    let mut v: Vector = (0..n).map(|i| 1.0 + (1.0 + i as f64).sqrt()).collect();
     for _ in 0..4 {
         v = regular.transposed().solve(&v)?;
         v = regular.solve(&v)?;

@@ -29,7 +29,7 @@ mod stick;
 
 pub use accumulation::{accumulate, Accumulation, Return};
 pub use codim1::{decide, Arrival, Decision};
-pub use enclosed_root::{enclose_root, EnclosedRoot, RootBounds};
+pub use enclosed_root::{enclose_root, EnclosedRoot, IntervalVector, RootBounds};
 pub use fold::{merged_root, MergedRoot};
 pub use hidden::{
     admissible, limit as limit_of_hidden_dynamics, Admissible, Outcome as HiddenOutcome,
@@ -49,7 +49,7 @@ pub use resolution::{Continuation, Resolution, Undecided};
 pub use resolve::{has_one_mode_only, resolve};
 pub use roots::{multiplier_rates, newton, roots_in_cube, stable_roots, Roots};
 pub(crate) use small_matrix::invert;
-pub use small_matrix::Matrix;
+pub use small_matrix::{Matrix, Vector};
 pub use stability::{
     is_negative_p_matrix, is_scaling_stable, is_stable, is_stable_for, scaling_margin,
     stability_margins,

@@ -4,11 +4,14 @@ use std::ops::{Index, IndexMut};
 
 use smallvec::SmallVec;
 
+/// A vector of the size of an intersection.
+pub type Vector = SmallVec<[f64; 4]>;
+
 /// A small square matrix.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Matrix {
     n: usize,
-    entries: Vec<f64>,
+    entries: SmallVec<[f64; 16]>,
 }
 
 impl Matrix {
@@ -16,7 +19,7 @@ impl Matrix {
     pub fn zeros(n: usize) -> Self {
         Matrix {
             n,
-            entries: vec![0.0; n * n],
+            entries: SmallVec::from_elem(0.0, n * n),
         }
     }
 
@@ -42,7 +45,7 @@ impl Matrix {
     }
 
     /// Solves A x = b; `None` if a pivot vanishes.
-    pub fn solve(&self, b: &[f64]) -> Option<Vec<f64>> {
+    pub fn solve(&self, b: &[f64]) -> Option<Vector> {
         Elimination::of(self).solve(b)
     }
 
@@ -51,7 +54,7 @@ impl Matrix {
         let elimination = Elimination::of(self);
         let mut inverse = Matrix::zeros(self.n);
         for column in 0..self.n {
-            let unit: Vec<f64> = (0..self.n)
+            let unit: Vector = (0..self.n)
                 .map(|i| f64::from(u8::from(i == column)))
                 .collect();
             for (row, value) in elimination.solve(&unit)?.into_iter().enumerate() {
@@ -228,7 +231,7 @@ impl IndexMut<(usize, usize)> for Matrix {
 /// Gaussian elimination with row pivoting: factors below and above the diagonal, row order, sign.
 struct Elimination {
     factors: Matrix,
-    order: Vec<usize>,
+    order: SmallVec<[usize; 4]>,
     sign: f64,
 }
 
@@ -236,7 +239,7 @@ impl Elimination {
     fn of(matrix: &Matrix) -> Self {
         let n = matrix.n;
         let mut a = matrix.clone();
-        let mut order: Vec<usize> = (0..n).collect();
+        let mut order: SmallVec<[usize; 4]> = (0..n).collect();
         let mut sign = 1.0;
         for k in 0..n {
             let larger = |p: usize, i: usize| {
@@ -278,9 +281,9 @@ impl Elimination {
         self.sign * diagonal.product::<f64>()
     }
 
-    fn solve(&self, b: &[f64]) -> Option<Vec<f64>> {
+    fn solve(&self, b: &[f64]) -> Option<Vector> {
         let (a, n) = (&self.factors, self.factors.n);
-        let mut x: Vec<f64> = self.order.iter().map(|&row| b[row]).collect();
+        let mut x: Vector = self.order.iter().map(|&row| b[row]).collect();
         for i in 0..n {
             x[i] -= (0..i).map(|j| a[(i, j)] * x[j]).sum::<f64>();
         }

@@ -1,7 +1,7 @@
 //! The moments sliding vector field on the intersection of two surfaces.
 
 use super::{sign_of, RuleFailure};
-use crate::switching::{Matrix, NormalFields};
+use crate::switching::{Matrix, NormalFields, Vector};
 
 /// The weights w that solve
 ///
@@ -33,5 +33,6 @@ pub fn moments(fields: &NormalFields) -> Result<Vec<f64>, RuleFailure> {
     }
     system
         .solve(&[0.0, 0.0, 1.0, 0.0])
+        .map(Vector::into_vec)
         .ok_or(RuleFailure::Undetermined)
 }

@@ -1,0 +1,156 @@
+//! Two-folds that a sliding motion runs into: points where both fields become tangent to the surface at once.
+//!
+//! Before it the motion is attracted from both sides, behind it from none. Near it the multiplier is the quotient of two
+//! small numbers, which are known to the tolerance only: where both vanish within it, the motion has arrived.
+
+use smallvec::smallvec;
+
+use super::detect::Found;
+use super::integrator::Integrator;
+use super::motion::ModeField;
+use crate::error::FieldError;
+use crate::event::EventFunction;
+use crate::field::SmoothField;
+use crate::switching::Matrix;
+use crate::system::{dot, dot_magnitude, RatePartials};
+use crate::tolerances::{AT_TWO_FOLD, NEWTON_STEPS, SETTLED, TANGENT};
+
+impl Integrator<'_> {
+    /// The two-fold that the motion on one surface has come to, if it has: its time and state.
+    pub(super) fn two_fold_here(&mut self) -> Result<Option<(f64, Vec<f64>)>, FieldError> {
+        let ModeField::Sliding(field) = &mut self.motion.field else {
+            return Ok(None);
+        };
+        let (j, mut x) = (field.surface(), self.x.clone());
+        if self.system.sticks_at(j) {
+            return Ok(None);
+        }
+        let mut velocity = vec![0.0; x.len()];
+        field.eval(self.t, &mut x, &mut velocity)?;
+        let (minus, along_minus) = self.normal_component(j, -1, &x)?;
+        let (plus, along_plus) = self.normal_component(j, 1, &x)?;
+        let (distance, time) = (minus.rate - plus.rate, minus.time - plus.time);
+        let pairs = along_minus.iter().zip(&along_plus);
+        let gradient: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
+        let terms = gradient.iter().zip(&x).enumerate();
+        let tolerance: f64 = terms
+            .map(|(i, (g, x))| g.abs() * self.scale.of(i, *x, *x))
+            .sum();
+        let size = dot_magnitude(&along_minus, &x) + dot_magnitude(&along_plus, &x);
+        let rounding = TANGENT * (size + (minus.time.abs() + plus.time.abs()) * self.t.abs());
+        if distance.abs() > AT_TWO_FOLD * tolerance + rounding {
+            return Ok(None);
+        }
+        let rate = time + dot(&gradient, &velocity);
+        let ahead = -distance / rate;
+        let t = self.t + ahead;
+        if !(ahead > 0.0 && t > self.t && t <= self.horizon) {
+            return Ok(Some((self.t, self.x.clone())));
+        }
+        let pairs = x.iter().zip(&velocity);
+        let end: Vec<f64> = pairs.map(|(x, v)| x + ahead * v).collect();
+        let moved = velocity.iter().enumerate();
+        let speed = moved.map(|(i, v)| v.abs() / self.scale.of(i, x[i], x[i]));
+        let unit = 1.0 / speed.fold(0.0, f64::max).max(1.0 / ahead);
+        let (t, end) = self.settle(j, (t, end), unit)?;
+        let moves = |(i, (a, b)): (usize, (&f64, &f64))| {
+            (a - b).abs() <= 10.0 * AT_TWO_FOLD * self.scale.of(i, *a, *b)
+        };
+        let is_near = end.iter().zip(&self.x).enumerate().all(moves);
+        let is_ahead = t > self.t && t <= self.horizon;
+        Ok(is_near.then(|| match is_ahead {
+            true => (t, end),
+            false => (self.t, self.x.clone()),
+        }))
+    }
+
+    /// The nearest point to (t, x) where h_j and both normal components vanish, distances measured in tolerances and times
+    /// in `unit`s; (t, x) if Newton's method finds none.
+    fn settle(
+        &self,
+        j: usize,
+        start: (f64, Vec<f64>),
+        unit: f64,
+    ) -> Result<(f64, Vec<f64>), FieldError> {
+        let n = start.1.len();
+        let mut units: Vec<f64> = (0..n)
+            .map(|i| self.scale.of(i, start.1[i], start.1[i]))
+            .collect();
+        units.push(unit);
+        let (mut t, mut x) = start.clone();
+        let mut h = vec![0.0; self.system.n_surfaces()];
+        for _ in 0..NEWTON_STEPS {
+            let signs = self.motion.signs.clone();
+            self.system.surfaces(t, &x, &signs, &mut h)?;
+            let mut rows = vec![vec![0.0; n + 1]; 3];
+            rows[0][n] = self.system.gradient(j, t, &x, &signs, &mut rows[0][..n])?;
+            let mut residuals = [h[j], 0.0, 0.0];
+            for (k, side) in [(1, -1), (2, 1)] {
+                let signs = self.motion.mode.with(j, side).signs();
+                let row = &mut rows[k];
+                let partials = self.system.rate_gradient(j, t, &x, &signs, &mut row[..n])?;
+                (residuals[k], row[n]) = (partials.rate, partials.time);
+            }
+            for row in &mut rows {
+                row.iter_mut().zip(&units).for_each(|(g, unit)| *g *= unit);
+            }
+            let mut gram = Matrix::zeros(3);
+            for (a, b) in (0..3).flat_map(|a| (0..3).map(move |b| (a, b))) {
+                gram[(a, b)] = dot(&rows[a], &rows[b]);
+            }
+            let Some(shifts) = gram.solve(&residuals) else {
+                return Ok(start);
+            };
+            let mut largest = 0.0_f64;
+            for i in 0..=n {
+                let move_in_units: f64 = (0..3).map(|k| rows[k][i] * shifts[k]).sum();
+                largest = largest.max(move_in_units.abs());
+                match x.get_mut(i) {
+                    Some(x) => *x -= units[i] * move_in_units,
+                    None => t -= unit * move_in_units,
+                }
+            }
+            if largest.is_nan() || largest > 10.0 * AT_TWO_FOLD {
+                return Ok(start);
+            }
+            if largest <= SETTLED {
+                break;
+            }
+        }
+        Ok((t, x))
+    }
+
+    /// The normal component of the field on one side, and its gradient.
+    fn normal_component(
+        &self,
+        j: usize,
+        side: i8,
+        x: &[f64],
+    ) -> Result<(RatePartials, Vec<f64>), FieldError> {
+        let signs = self.motion.mode.with(j, side).signs();
+        let mut gradient = vec![0.0; x.len()];
+        let partials = self
+            .system
+            .rate_gradient(j, self.t, x, &signs, &mut gradient)?;
+        Ok((partials, gradient))
+    }
+
+    /// Sliding on one surface whose steps shrink to nothing has come to a two-fold.
+    pub(super) fn lost_share(&mut self) -> Result<Option<Found>, FieldError> {
+        let arrived = self.two_fold_here()?.is_some();
+        Ok(arrived.then(|| Found {
+            theta: 0.0,
+            functions: smallvec![EventFunction::ExitMinus, EventFunction::ExitPlus],
+            touch: false,
+        }))
+    }
+
+    /// Does the share of f+ change fast in the step just made, towards a two-fold?
+    pub(super) fn approaches_two_fold(&self) -> bool {
+        let [minus, plus, ..] = self.detector.stages.as_slice() else {
+            return false;
+        };
+        let (before, after) = (minus[0] + plus[0], minus[6] + plus[6]);
+        self.motion.sliding.len() == 1 && after < 0.99 * before
+    }
+}

@@ -1,0 +1,208 @@
+//! DOP853: one step, its error estimate and its continuous extension of order 7.
+
+use super::coefficients_dop853::{A, D, E3, E5, NODES};
+use super::dopri5::{jumps_between, stiffness_of};
+use super::{Attempt, ErrorScale, Interpolant};
+use crate::error::FieldError;
+use crate::field::SmoothField;
+
+/// The stages at which an observer is called, in order of time, with the numbers that it gets.
+const OBSERVED: [(usize, usize); 5] = [(3, 1), (5, 2), (9, 3), (8, 4), (10, 5)];
+
+/// The stages in order of time, the end of the step last.
+const IN_TIME: [usize; 12] = [0, 1, 2, 3, 6, 4, 7, 5, 9, 8, 10, 12];
+
+/// The error e counts as e^(5/8) in the control of the step size, which is made for methods of order 5: 1 stays 1, and
+/// steps change as e^(-1/8).
+const AS_OF_ORDER_FIVE: f64 = 5.0 / 8.0;
+
+/// The method of Dormand and Prince of order 8 with twelve stages and estimates of order 5 and 3. Three more evaluations
+/// make the continuous extension, for every step that is accepted.
+///
+/// Reference: Hairer, Norsett, Wanner, Solving ODEs I (1993), sections II.5 and II.10.
+pub struct Dop853 {
+    /// Derivatives at the stages, at the end of the step, and at the stages of the extension.
+    k: [Vec<f64>; 16],
+    stage: Vec<f64>,
+    /// The state of the last stage, which is at the end of the step too.
+    last_stage: Vec<f64>,
+    y1: Vec<f64>,
+    interpolant: Interpolant,
+}
+
+impl Dop853 {
+    /// A stepper for n states.
+    pub fn new(n: usize) -> Self {
+        let zeros = || vec![0.0; n];
+        Dop853 {
+            k: std::array::from_fn(|_| zeros()),
+            stage: zeros(),
+            last_stage: zeros(),
+            y1: zeros(),
+            interpolant: Interpolant::powers(n, 7),
+        }
+    }
+
+    /// The derivative at the start of the step.
+    pub fn start_derivative(&self) -> &[f64] {
+        &self.k[0]
+    }
+
+    /// The derivative at the start of the step, to be replaced.
+    pub fn start_derivative_mut(&mut self) -> &mut [f64] {
+        &mut self.k[0]
+    }
+
+    /// The end of the attempted step.
+    pub fn end(&self) -> &[f64] {
+        &self.y1
+    }
+
+    /// The derivative at the end of the attempted step.
+    pub fn end_derivative(&self) -> &[f64] {
+        &self.k[12]
+    }
+
+    /// The continuous extension of the attempted step, if its error was acceptable.
+    pub fn interpolant(&self) -> &Interpolant {
+        &self.interpolant
+    }
+
+    /// Attempts a step of length `dt`; `observe(number)` is called with the field after the evaluations at five stages,
+    /// in no order of time but numbered so, and at the end, as 6.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn attempt<F: SmoothField>(
+        &mut self,
+        field: &mut F,
+        mut observe: impl FnMut(usize, &F),
+        t: f64,
+        y: &[f64],
+        dt: f64,
+        scale: &ErrorScale,
+    ) -> Result<Attempt, FieldError> {
+        (self.interpolant.t0, self.interpolant.dt) = (t, dt);
+        for i in 1..=12 {
+            let (before, rest) = self.k.split_at_mut(i);
+            let stage = if i == 12 {
+                &mut self.y1
+            } else {
+                &mut self.stage
+            };
+            fill_stage(stage, y, dt, A[i - 1], before);
+            field.eval(t + NODES[i] * dt, stage, &mut rest[0])?;
+            let observed = OBSERVED.iter().find(|(at, _)| *at == i);
+            if let Some((_, number)) = observed {
+                observe(*number, field);
+            }
+            if i == 11 {
+                self.last_stage.copy_from_slice(&self.stage);
+            }
+        }
+        observe(6, field);
+        let error = self.error(y, dt, scale);
+        let is_finite =
+            error.is_finite() && self.k.iter().take(13).flatten().all(|v| v.is_finite());
+        if !is_finite {
+            return Ok(Attempt::NotFinite);
+        }
+        if error <= 1.0 {
+            for i in 13..16 {
+                let (before, rest) = self.k.split_at_mut(i);
+                fill_stage(&mut self.stage, y, dt, A[i - 1], before);
+                field.eval(t + NODES[i] * dt, &mut self.stage, &mut rest[0])?;
+            }
+            self.extend(y, dt);
+        }
+        Ok(Attempt::Error(error.powf(AS_OF_ORDER_FIVE)))
+    }
+
+    /// |e5|^2 / (|e5|^2 + |e3|^2/100)^(1/2), the norms in units of the tolerance: e5 where the two agree about the order.
+    fn error(&self, y: &[f64], dt: f64, scale: &ErrorScale) -> f64 {
+        let (mut fifth, mut third) = (0.0, 0.0);
+        for (i, (y0, y1)) in y.iter().zip(&self.y1).enumerate() {
+            let of = |weights: &[f64; 12]| -> f64 {
+                let terms = weights.iter().zip(&self.k);
+                terms.map(|(w, k)| w * k[i]).sum::<f64>() / scale.of(i, *y0, *y1)
+            };
+            fifth += of(&E5).powi(2);
+            third += of(&E3).powi(2);
+        }
+        if fifth == 0.0 && third == 0.0 {
+            return 0.0;
+        }
+        dt.abs() * fifth / ((fifth + 0.01 * third) * y.len() as f64).sqrt()
+    }
+
+    /// y0 + x (F0 + u (F1 + x (F2 + u (F3 + x (F4 + u (F5 + x F6)))))) with u = 1 - x, in powers of x = theta.
+    fn extend(&mut self, y: &[f64], dt: f64) {
+        let n = y.len();
+        let rows = self.interpolant.coefficients_mut();
+        for i in 0..n {
+            let (moved, first, last) = (self.y1[i] - y[i], self.k[0][i], self.k[12][i]);
+            let [f3, f4, f5, f6] = D.map(|weights| -> f64 {
+                let terms = weights.iter().zip(&self.k);
+                dt * terms.map(|(w, k)| w * k[i]).sum::<f64>()
+            });
+            let inner = [
+                f5,
+                f4,
+                f3,
+                2.0 * moved - dt * (last + first),
+                dt * first - moved,
+                moved,
+                y[i],
+            ];
+            let mut powers = [f6, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+            for (step, constant) in inner.into_iter().enumerate() {
+                // Times x, and then times 1 - x, in turns.
+                for k in (0..=step).rev() {
+                    powers[k + 1] = if step % 2 == 0 {
+                        powers[k]
+                    } else {
+                        powers[k + 1] - powers[k]
+                    };
+                }
+                powers[0] = if step % 2 == 0 { 0.0 } else { powers[0] } + constant;
+            }
+            for (k, power) in powers.into_iter().enumerate() {
+                rows[k * n + i] = power;
+            }
+        }
+    }
+
+    /// The error of the extension at theta > 1 in units of the tolerance, from above: what its last term does there.
+    pub fn extrapolation_error(&self, theta: f64, scale: &ErrorScale) -> f64 {
+        let weight = theta.powi(4) * (1.0 - theta).powi(3);
+        // The highest power has the factor -1 of that term.
+        let last = &self.interpolant.coefficients()[7 * self.y1.len()..];
+        let change: Vec<f64> = last.iter().map(|c| weight * c).collect();
+        scale.norm(&change, &self.y1)
+    }
+
+    /// The product of the step and the fastest rate of the field, from the two evaluations at the end of the step.
+    pub fn stiffness(&self) -> Option<f64> {
+        let states = [&self.y1[..], &self.last_stage];
+        stiffness_of(self.interpolant.dt, states, [&self.k[12], &self.k[11]])
+    }
+
+    /// Does the field jump within the attempted step?
+    pub fn field_jumps(&self) -> bool {
+        jumps_between(&IN_TIME.map(|stage| &self.k[stage][..]))
+    }
+
+    /// Makes the end of the attempted step the start of the next one.
+    pub fn accept(&mut self, y: &mut [f64]) {
+        y.copy_from_slice(&self.y1);
+        self.k.swap(0, 12);
+    }
+}
+
+/// Writes y + dt sum a_ij k_j.
+fn fill_stage(stage: &mut [f64], y: &[f64], dt: f64, row: &[(usize, f64)], k: &[Vec<f64>]) {
+    for (i, (stage, y)) in stage.iter_mut().zip(y).enumerate() {
+        let sum: f64 = row.iter().map(|&(j, weight)| weight * k[j][i]).sum();
+        *stage = y + dt * sum;
+    }
+}

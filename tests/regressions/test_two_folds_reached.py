@@ -1,0 +1,56 @@
+"""Sliding into a point where both fields become tangent to the surface: the motion has arrived, once."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import filippov as fl
+import numpy as np
+import pytest
+
+
+@pytest.mark.parametrize("method", ["auto", "DOPRI5"])
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-8, 1e-10])
+def test_a_two_fold_that_all_sliding_motions_reach_ends_the_run_there(method: str, tolerance: float) -> None:
+    def f(t: float, x: Any) -> Any:
+        s = np.sign(x[2] ** 2 + x[0] ** 2 - 0.24)
+        return [
+            -0.28 * x[0] - np.tanh(0.24 * x[2]) + 0.54 * s,
+            -0.1 * x[1] - 1.1 * x[2] + 0.5 * np.sin(x[2]) - 1.83 * s,
+            -0.58 * x[2] - 1.49 * x[1] + np.sin(x[2]),
+        ]
+
+    sol = fl.solve_ivp(f, (0.0, 5.0), [-0.5, -0.5, -0.5], method=method, rtol=tolerance, atol=tolerance)
+    # Both fields are tangent where x0 = 0 and x2' = 0; the orbits of both turn back to the surface.
+    end = -np.sqrt(0.24)
+    two_fold = [0.0, (np.sin(end) - 0.58 * end) / 1.49, end]
+    assert "no motion continues" in sol.message
+    np.testing.assert_allclose(sol.y[:, -1], two_fold, rtol=0, atol=300 * tolerance)
+    assert [switch.kind for switch in sol.switches] == ["crossing", "enter_sliding"]
+    assert not sol.warnings  # nothing jumps there
+    for segment in sol.segments:
+        assert not (np.abs(segment.multipliers_end) > 1.0).any()
+
+
+def test_where_both_fields_lead_away_from_a_two_fold_both_are_named() -> None:
+    # Attracting until cos(t) = 0, repelling afterwards.
+    sol = fl.solve_ivp(lambda t, x: [np.where(x[0] > 0, -1.0, 1.375) * np.cos(t)], (0.0, 2.0), [0.0])
+    assert sol.switches.t[-1] == pytest.approx(np.pi / 2, abs=1e-10)
+    (warning,) = [warning for warning in sol.warnings if warning.t > 1.0]
+    assert warning.code == "non_unique"
+    assert [str(mode) for mode in warning.candidates] == ["+", "-"]
+    assert sol.y[0, -1] == pytest.approx(1.0 - np.sin(2.0), abs=1e-6)
+
+
+def test_a_visible_two_fold_in_the_plane_of_a_surface() -> None:
+    # On z = 0 with x, y < 0: f- = (1, 1, -x), f+ = (1, 1, y): sliding until both vanish, then away.
+    def f(t: float, x: Any) -> Any:
+        up = x[2] > 0
+        return [1.0, 1.0, np.where(up, x[1], -x[0])]
+
+    sol = fl.solve_ivp(f, (0.0, 2.0), [-1.0, -1.0, 0.0], rtol=1e-8, atol=1e-8)
+    assert sol.success, sol.message
+    assert [str(mode) for mode in sol.segments.mode] == ["0", "+"]
+    assert sol.switches.t == pytest.approx([1.0], abs=1e-5)
+    assert sol.warnings[-1].code == "non_unique"
+    assert sol.y[2, -1] == pytest.approx(0.5, abs=1e-4)

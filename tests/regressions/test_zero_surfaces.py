@@ -1,0 +1,57 @@
+"""Switching functions that are zero along a part of the motion are named in a warning; the run goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import filippov as fl
+import numpy as np
+import pytest
+
+# Each is zero on one side of 1/2.
+FUNCTIONS: dict[str, Callable[[Any], Any]] = {
+    "x - max(x, c)": lambda x: x - np.maximum(x, 0.5),
+    "max(x, c) - c": lambda x: np.maximum(x, 0.5) - 0.5,
+    "|x - c| + x - c": lambda x: abs(x - 0.5) + x - 0.5,
+    "cut to zero": lambda x: np.where(x > 0.5, x, 0.0),
+    "cut and shifted": lambda x: np.where(x > 0.5, 0.0, x - 0.7),
+    "of third order": lambda x: np.where(x > 0.5, (x - 0.5) ** 3, 0.0),
+    "difference of maxima": lambda x: np.maximum(x, 0.5) - np.maximum(x, 0.2),
+    "clip": lambda x: np.clip(x, -2.0, 0.5) - 0.5,
+}
+
+
+@pytest.mark.parametrize("speed", [1.0, -1.0])
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_a_function_that_vanishes_in_a_region_is_named(name: str, speed: float) -> None:
+    h = FUNCTIONS[name]
+    sol = fl.solve_ivp(lambda t, x: [speed, np.sign(h(x[0]))], (0.0, 2.0), [0.5 - speed, 0.0])
+    assert sol.success, sol.message
+    assert sol.y[0, -1] == pytest.approx(0.5 + speed, abs=1e-9)
+    # Half of the time h has a sign, and counts; in the other half the sign is one of both.
+    sign = np.sign(h(0.5 + np.array([-0.4, 0.4])))
+    known = float(sign[sign != 0.0][0])
+    assert sol.y[1, -1] in (pytest.approx(2 * known, abs=1e-6), pytest.approx(0.0, abs=1e-6))
+    outer = sol.surfaces[1:] or sol.surfaces
+    named = [warning for warning in sol.warnings if warning.code in ("zero_surface", "non_unique")]
+    assert any(surface in warning.message for warning in named for surface in outer)
+
+
+def test_a_dead_zone_around_the_start() -> None:
+    sol = fl.solve_ivp(
+        lambda t, x: [np.cos(t), np.sign(np.where(abs(x[0]) > 0.5, x[0], 0.0))], (0.0, 6.0), [0.0, 0.0]
+    )
+    assert sol.success, sol.message
+    assert any(warning.code == "zero_surface" for warning in sol.warnings)
+    np.testing.assert_allclose(sol.switches.t, np.pi * np.array([1, 5, 6, 7, 11]) / 6, rtol=0, atol=1e-6)
+
+
+def test_a_warning_about_one_surface_does_not_silence_another_whose_name_it_contains() -> None:
+    def f(t: float, x: Any) -> Any:
+        return [0.0, 1.0, np.sign(x[0] - 0.5), np.sign(x[0])]
+
+    # Both are zero for ever, from different starts.
+    for start, name in [(0.5, "x[0] - 0.5"), (0.0, "x[0]")]:
+        sol = fl.solve_ivp(f, (0.0, 1.0), [start, 0.0, 0.0, 0.0])
+        assert any(f" {name} = 0" in warning.message for warning in sol.warnings)
