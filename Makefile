@@ -11,6 +11,7 @@ PY := $(BIN)/python
 STAMPS := $(VENV)/stamps
 ENV_STAMP := $(STAMPS)/env
 BENCH_STAMP := $(STAMPS)/bench
+DOCS_STAMP := $(STAMPS)/docs
 BUILD_STAMP := $(STAMPS)/build
 
 RUST_SOURCES := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
@@ -88,7 +89,8 @@ demo: $(BUILD_STAMP) ## simulate and plot a stick-slip oscillator
 pictures: $(BUILD_STAMP) ## draw the pictures of the README again
 	$(PY) scripts/readme_blocks.py README.md docs/images
 
-docs: tools ## pages of the Rust crates, into target/doc
+docs: $(DOCS_STAMP) ## the documentation, into target/site, and the pages of the Rust crates, into target/doc
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
 	RUSTDOCFLAGS="-D warnings -A rustdoc::private_intra_doc_links" $(CARGO) doc --no-deps $(RUST_TESTED)
 
 check: lint types test ## what must hold before a change is complete; changes nothing
@@ -108,6 +110,10 @@ $(ENV_STAMP): pyproject.toml
 
 $(BENCH_STAMP): $(BUILD_STAMP)
 	$(MATURIN) develop --release --extras bench
+	@touch $@
+
+$(DOCS_STAMP): $(BUILD_STAMP)
+	$(MATURIN) develop --release --extras docs
 	@touch $@
 
 $(BUILD_STAMP): $(ENV_STAMP) $(RUST_SOURCES)
