@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use filippov::{Keep, Method, Mode, NonUnique, Options, SlidingRule, Solution};
+use filippov::{Keep, Method, Mode, NonUnique, Options, SlidingRule, Solution, Stabilization};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -186,6 +186,12 @@ fn read_options(given: &Bound<'_, PyDict>) -> PyResult<(Options, Option<Py<PyAny
                     }
                 }
             }
+            "stabilization" => {
+                options.stabilization = match value.extract::<Option<f64>>()? {
+                    None => Stabilization::Projection,
+                    Some(factor) => Stabilization::Restoring(factor),
+                }
+            }
             "kappa" => options.kappa = value.extract()?,
             "choices" => {
                 let choices: Vec<Vec<i8>> = value.extract()?;
@@ -214,6 +220,7 @@ fn method(name: &str) -> PyResult<Method> {
         "DOPRI5" => Ok(Method::Dopri5),
         "Taylor" => Ok(Method::Taylor),
         "DOP853" => Ok(Method::Dop853),
+        "Midpoint" => Ok(Method::Midpoint),
         "Rodas5P" => Ok(Method::Rodas5p),
         _ => Err(PyValueError::new_err(format!(
             "method: unknown method {name:?}"

@@ -18,7 +18,9 @@ impl Integrator<'_> {
             return self.start_implicit();
         }
         // Whether a surface is left that h = 0 all along was expected of is seen at the ends of steps only.
-        let may = !self.motion.is_in_contact() && self.motion.resting.is_empty();
+        let may = !self.motion.is_in_contact()
+            && self.motion.resting.is_empty()
+            && !self.motion.is_drawn_back();
         if let (Some(taylor), true) = (&self.stepper.taylor, may) {
             let (system, order) = (self.system, taylor.order());
             let is_auto = self.options.method == Method::Auto;
@@ -31,6 +33,8 @@ impl Integrator<'_> {
             StepMethod::Taylor
         } else if self.stepper.dop853.is_some() {
             StepMethod::Dop853
+        } else if self.stepper.midpoint.is_some() {
+            StepMethod::Midpoint
         } else {
             StepMethod::Dopri5
         });
@@ -51,7 +55,7 @@ impl Integrator<'_> {
         let (t, mode) = (self.t, &self.motion.mode);
         let text = format!(
             "the motion in mode {mode} from t = {t:.10} has no Taylor series (its field is not analytic there, is \
-             not traced, slides on several surfaces, or is in contact): DOPRI5 integrates it"
+             not traced, slides on several surfaces, is drawn back to its surface, or is in contact): DOPRI5 integrates it"
         );
         self.warnings.push(Warning {
             t,
