@@ -58,7 +58,7 @@ def test_the_event_is_on_the_extension_of_the_step() -> None:
 
 
 def test_the_field_is_never_evaluated_beyond_a_surface() -> None:
-    """While the motion is above h = x_1 = 0, so are all evaluations of a black box, however long the steps are."""
+    """While the motion is above h = x_1 = 0, so are all evaluations, however long the steps are."""
     seen: list[tuple[float, float]] = []
 
     def called(t: float, x: Any) -> Any:
