@@ -184,9 +184,7 @@ def _draw_dots(ax: Any, x: Any, y: Any, slid: Any, chosen: Theme) -> None:
         (~free, chosen.colours[5], 3.2, "after sliding"),
     ):
         if those.any():
-            (dots,) = ax.plot(
-                x[those], y[those], color=colour, markersize=size * grown, label=text, **common
-            )
+            (dots,) = ax.plot(x[those], y[those], color=colour, markersize=size * grown, label=text, **common)
             handles.append(dots)
     if len(handles) == 2:
         draw_legend(ax, handles, chosen)

@@ -434,7 +434,12 @@ impl Integrator<'_> {
             return Ok(None);
         }
         let rate = self.rates_here()?[j];
-        let is_admissible = self.motion.field.last_exits().iter().all(|&exit| exit > 0.0);
+        let is_admissible = self
+            .motion
+            .field
+            .last_exits()
+            .iter()
+            .all(|&exit| exit > 0.0);
         let mut gradient = vec![0.0; self.x.len()];
         let signs = &self.motion.signs;
         let ht = self

@@ -12,8 +12,9 @@ use crate::event::EventFunction;
 use crate::field::{IntersectionExit, IntersectionField, MeetingFields, SlidingField, SmoothField};
 use crate::mode::Mode;
 use crate::switching::{
-    admissible, decide, decide_intersection, first_nonzero, has_one_mode_only, merged_root, resolve,
-    Arrival, Continuation, ExitKind, Incoming, Leading, NormalFields, Resolution, Undecided,
+    admissible, decide, decide_intersection, first_nonzero, has_one_mode_only, merged_root,
+    resolve, Arrival, Continuation, ExitKind, Incoming, Leading, NormalFields, Resolution,
+    Undecided,
 };
 use crate::system::{dot, dot_magnitude};
 use crate::tolerances::{DEPARTS_TANGENTIALLY, DRIFT_SHARE, EPS, MOST_LISTED, MOST_MEETING};
@@ -325,7 +326,14 @@ impl Integrator<'_> {
         let (Some(j), None) = (slid_on.next(), slid_on.next()) else {
             return Ok(None);
         };
-        let decision = decide(self.system, j, Arrival::Start, self.t, &self.x, &after.signs())?;
+        let decision = decide(
+            self.system,
+            j,
+            Arrival::Start,
+            self.t,
+            &self.x,
+            &after.signs(),
+        )?;
         let is_tangent = decision.minus.order != 1 && decision.plus.order != 1;
         if !is_tangent || decision.entry == 0 || self.system.sticks_at(j) {
             return Ok(None);
