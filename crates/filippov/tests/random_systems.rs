@@ -80,11 +80,11 @@ fn system<'a>(
                 s[place] * factors[place].signum()
             };
             let product = if m > 1 { sign(0) * sign(m - 1) } else { 0.0 };
-            for i in 0..n {
+            for (i, rate) in dx.iter_mut().enumerate() {
                 let row = &random.a[i * n..(i + 1) * n];
                 let linear: f64 = row.iter().zip(x).map(|(a, x)| a * x).sum();
                 let jumps: f64 = (0..m).map(|j| random.b[i * m + j] * sign(j)).sum();
-                dx[i] = linear + random.c[i] * t.cos() + jumps + random.e[i] * product * x[0].sin();
+                *rate = linear + random.c[i] * t.cos() + jumps + random.e[i] * product * x[0].sin();
             }
         },
         move |t, x, out| {
