@@ -3,11 +3,13 @@
 mod actions;
 mod events;
 mod stepping;
+mod stiffness;
 mod switching;
 
 pub use actions::*;
 pub use events::*;
 pub use stepping::*;
+pub use stiffness::*;
 pub use switching::*;
 
 /// Unit roundoff times two.
