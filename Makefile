@@ -11,6 +11,7 @@ PY := $(BIN)/python
 STAMPS := $(VENV)/stamps
 ENV_STAMP := $(STAMPS)/env
 BENCH_STAMP := $(STAMPS)/bench
+DOCS_STAMP := $(STAMPS)/docs
 BUILD_STAMP := $(STAMPS)/build
 
 RUST_SOURCES := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
@@ -79,6 +80,8 @@ bench: $(BENCH_STAMP) ## run the benchmarks
 	$(PY) benchmarks/disode_tables.py
 	$(PY) benchmarks/speed.py
 	$(PY) benchmarks/friction_chain.py
+	$(PY) benchmarks/work_precision.py
+	$(PY) benchmarks/diagram.py
 
 demo: $(BUILD_STAMP) ## simulate and plot a stick-slip oscillator
 	$(PY) examples/01_stick_slip/stick_slip.py
@@ -86,7 +89,8 @@ demo: $(BUILD_STAMP) ## simulate and plot a stick-slip oscillator
 pictures: $(BUILD_STAMP) ## draw the pictures of the README again
 	$(PY) scripts/readme_blocks.py README.md docs/images
 
-docs: tools ## pages of the Rust crates, into target/doc
+docs: $(DOCS_STAMP) ## the documentation, into target/site, and the pages of the Rust crates, into target/doc
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
 	RUSTDOCFLAGS="-D warnings -A rustdoc::private_intra_doc_links" $(CARGO) doc --no-deps $(RUST_TESTED)
 
 check: lint types test ## what must hold before a change is complete; changes nothing
@@ -106,6 +110,10 @@ $(ENV_STAMP): pyproject.toml
 
 $(BENCH_STAMP): $(BUILD_STAMP)
 	$(MATURIN) develop --release --extras bench
+	@touch $@
+
+$(DOCS_STAMP): $(BUILD_STAMP)
+	$(MATURIN) develop --release --extras docs
 	@touch $@
 
 $(BUILD_STAMP): $(ENV_STAMP) $(RUST_SOURCES)

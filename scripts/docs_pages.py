@@ -1,4 +1,4 @@
-"""Pages of the documentation that are made when it is built: the gallery, pictures, and pages from the root.
+"""Pages of the documentation that are made when it is built: gallery, pictures, pages from the root.
 
 A hook of MkDocs (`mkdocs.yml`). Examples and the code of tutorial and how-to pages are run; where one fails,
 or prints something else than the page says, the build fails.
@@ -45,6 +45,7 @@ def on_files(files: Any, config: Any) -> Any:
     files.append(File.generated(config, overview, content=_overview(scripts)))
     _gallery_entries(config).insert(0, overview)
     _replace(config.nav, "decisions", _decisions(docs))
+    _complete(config.nav, docs)
     return files
 
 
@@ -179,3 +180,13 @@ def _replace(nav: list[Any], name: str, entries: list[Any]) -> None:
                 if isinstance(child, dict) and name in child.values():
                     children[place : place + 1] = entries
                     return
+
+
+def _complete(nav: list[Any], docs: Path) -> None:
+    """Append the pages of a folder that the navigation leaves out to the section that has the folder."""
+    for section in nav:
+        for children in section.values():
+            listed = [child for child in children if isinstance(child, str) and child.endswith(".md")]
+            for folder in dict.fromkeys(page.split("/")[0] for page in listed if "/" in page):
+                pages = [page.relative_to(docs).as_posix() for page in sorted((docs / folder).glob("*.md"))]
+                children += [page for page in pages if page not in listed]

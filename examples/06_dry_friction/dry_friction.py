@@ -3,11 +3,13 @@
     y'' = -y + sin(omega t) - F sign(y'),    F = 0.4
 
 At 1 / omega = 0.5 the mass never sticks; at 3 it sticks twice in every period of the forcing, at 6 four
-times. Each panel starts on the attractor, at the fixed point of the map over one period, which the
+times. The diagram has the speed once per period on the attractor of every frequency, and resonance at 1. On
+the way the number of phases of sticking changes twice, near 1.8 and 4.8 in the paper: these are sliding
+bifurcations. The panels below start on the attractor, at the fixed point of the map over one period, which the
 reference has to 33 digits; the return to it and the time of every switch are compared.
 
-Piiroinen and Kuznetsov, ACM Trans. Math. Softw. 34 (2008) 13, figure 4 (b) to (d).
-Run it with ``python examples/06_dry_friction/dry_friction.py [picture.png]``.
+Piiroinen and Kuznetsov, ACM Trans. Math. Softw. 34 (2008) 13, figure 4.
+Run it with ``python examples/06_dry_friction/dry_friction.py [picture.png] [--quick]``.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ import sys
 from pathlib import Path
 
 import filippov as fl
+import numpy as np
 from filippov.problems import compare
 from filippov.problems.dry_friction import rhs
 from matplotlib import pyplot
@@ -43,9 +46,40 @@ ATTRACTORS = {
 PHASES_OF_STICKING = {"I": 0, "II": 2, "III": 4}
 
 
-def main(path: Path) -> None:
-    figure, axes = pyplot.subplots(3, 1, figsize=(8.0, 8.4), layout="constrained")
-    for ax, (name, (omega, start, times)) in zip(axes, ATTRACTORS.items(), strict=True):
+def diagram(ax, quick: bool) -> None:
+    """Draw panel (a), and find where the number of phases of sticking changes."""
+    inverse = np.linspace(0.3, 7.0, 135 if quick else 536)
+    sweep = fl.bifurcation_diagram(
+        oscillator,
+        fl.Phase(lambda omega: 2 * math.pi / omega),
+        (0.0, math.inf),
+        [1.0, 2.0],
+        {"omega": 1.0 / inverse},
+        n=20 if quick else 100,
+        transient=100,
+    )
+    assert (sweep.status == 1).all()
+    sweep = sweep.assign_coords({"1/omega": ("omega", inverse)})
+    fl.plot.bifurcation_diagram(sweep, "v", "1/omega", ax=ax).set(ylim=(-1.5, 1.5))
+    last = np.cumsum(sweep.row_size.values) - 1  # the last return of every frequency
+    ends = np.cumsum(sweep.n_pieces.values)
+    sliding = np.concatenate([[0], np.cumsum(sweep.mode.values[:, 0] == 0)])
+    phases = sliding[ends[last]] - sliding[ends[last] - sweep.n_pieces.values[last]]
+    for k in np.flatnonzero(np.diff(phases)):
+        low, high = inverse[k : k + 2]
+        print(f"from {phases[k]} to {phases[k + 1]} phases between 1/omega = {low:.4f} and {high:.4f}")
+    assert phases[[0, -1]].tolist() == [0, 4]
+    changes = inverse[np.flatnonzero(np.diff(phases))]
+    assert np.allclose(changes, [1.86, 4.82], atol=0.06)  # "near 1.8 and 4.8"
+    for name, (omega, start, _) in ATTRACTORS.items():
+        ax.plot(1 / omega, start[1], "o", markersize=9, markerfacecolor="none", markeredgecolor="k")
+        ax.text(1 / omega, start[1] + 0.2, name, ha="center")
+
+
+def main(path: Path, quick: bool) -> None:
+    figure, axes = pyplot.subplots(4, 1, figsize=(8.0, 11.4), layout="constrained")
+    diagram(axes[0], quick)
+    for ax, (name, (omega, start, times)) in zip(axes[1:], ATTRACTORS.items(), strict=True):
         period = 2 * math.pi / omega
         once = oscillator.solve((0.0, period), start, omega=omega, rtol=1e-12, atol=1e-12)
         numbers = {
@@ -64,4 +98,5 @@ def main(path: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "dry_friction.png"))
+    given = [word for word in sys.argv[1:] if word != "--quick"]
+    main(Path(given[0] if given else "dry_friction.png"), quick="--quick" in sys.argv)

@@ -8,7 +8,7 @@ can be computed by matrix exponentials: its switching instant and its state at t
 E = 26 V the period has doubled, at E = 33 V the motion is chaotic.
 
 Fossas and Olivar, IEEE Trans. Circuits Syst. I 43 (1996) 13-25.
-Run it with ``python examples/17_buck_converter/buck_converter.py [picture.png]``.
+Run it with ``python examples/17_buck_converter/buck_converter.py [picture.png] [--quick]``.
 """
 
 from __future__ import annotations
@@ -67,7 +67,25 @@ def late(E: float, periods: int) -> fl.Solution:
     return buck.solve((0.0, periods * PERIOD), first.y[:, -1], E=E, rtol=1e-11, atol=1e-11)
 
 
-def main(path: Path) -> None:
+def period_doubling(ax, quick: bool) -> None:
+    """Draw the voltages at the ticks over the input voltage."""
+    sweep = fl.bifurcation_diagram(
+        *(buck, fl.Phase(PERIOD), (0.0, np.inf), [12.0, 0.55]),
+        {"E": np.linspace(20.0, 34.0, 57 if quick else 561)},
+        n=60,
+        transient=300,
+        until_periodic=False,
+        follow=True,
+    )
+    fl.plot.bifurcation_diagram(sweep, "v", ax=ax)
+    ax.set_ylabel("v at the ticks")
+    voltages = sweep.v.values.reshape(len(sweep.E), -1)
+    doubled = sweep.E.values[(np.ptp(voltages, axis=1) > 1e-3).argmax()]
+    print(f"the period has doubled at E = {doubled:.2f} V")
+    assert 24.0 < doubled < 25.0  # 24.5 V in the literature
+
+
+def main(path: Path, quick: bool) -> None:
     instant, state = periodic_motion(20.0)
     solution = late(20.0, 5)
     numbers = {
@@ -76,7 +94,9 @@ def main(path: Path) -> None:
         "i at the ticks": (solution.y[1, -1], state[1]),
     }
     print(compare(numbers, within=1e-8))
-    figure, axes = pyplot.subplots(1, 3, figsize=(11.0, 3.8), layout="constrained")
+    figure = pyplot.figure(figsize=(11.0, 7.6), layout="constrained")
+    grid = figure.add_gridspec(2, 3)
+    axes, bottom = [figure.add_subplot(grid[0, k]) for k in range(3)], figure.add_subplot(grid[1, :])
     for ax, (E, periods) in zip(axes, ((20.0, 5), (26.0, 5), (33.0, 150)), strict=True):
         run = late(E, periods)
         ticks = np.unique(run.sol(PERIOD * np.arange(periods))[0].round(6))
@@ -86,8 +106,10 @@ def main(path: Path) -> None:
         ax.set_title(f"E = {E:g} V")
         for line in ax.lines:
             line.set_linewidth(0.8)
+    period_doubling(bottom, quick)
     figure.savefig(path, dpi=150)
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "buck_converter.png"))
+    given = [word for word in sys.argv[1:] if word != "--quick"]
+    main(Path(given[0] if given else "buck_converter.png"), quick="--quick" in sys.argv)

@@ -10,7 +10,7 @@ from filippov.plot.style import Theme, draw_legend, new_axes, theme
 
 __all__ = ["basins", "bifurcation_diagram", "poincare_section"]
 
-_SMALL, _LARGE = 0.6, 2.5
+_SMALL, _LARGE = 0.9, 2.5
 # Points up to which every one is drawn a little larger.
 _FEW = 2000
 
@@ -108,7 +108,7 @@ def basins(data: Any, variable: str | None = None, ax: Any = None, dark: bool | 
     data : xarray.Dataset
         What `filippov.basins` returned: a whole number per point of two dimensions.
     variable : str, optional
-        The variable with these numbers, ``attractor`` by default; a negative one is drawn as not known.
+        The variable with these numbers, ``attractor`` by default: -1 is drawn as not known, -2 as failed.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure by default.
     dark : bool, optional
@@ -181,7 +181,7 @@ def _draw_dots(ax: Any, x: Any, y: Any, slid: Any, chosen: Theme) -> None:
     handles = []
     for those, colour, grown, text in (
         (free, chosen.colours[0], 2.0, "without sliding"),
-        (~free, chosen.colours[5], 3.2, "after sliding"),
+        (~free, chosen.colours[5], 2.6, "after sliding"),
     ):
         if those.any():
             (dots,) = ax.plot(x[those], y[those], color=colour, markersize=size * grown, label=text, **common)
@@ -210,13 +210,16 @@ def _draw_cells(ax: Any, x: Any, y: Any, numbers: Any, colours: dict[int, str]) 
 
 
 def _basin_colour(number: int, chosen: Theme) -> str:
-    return chosen.faint if number < 0 else chosen.colours[number % len(chosen.colours)]
+    if number < 0:
+        return chosen.faint if number == -1 else chosen.ink
+    return chosen.colours[number % len(chosen.colours)]
 
 
 def _patch(colour: str, number: int) -> Any:
     from matplotlib.patches import Patch
 
-    return Patch(color=colour, label="not known" if number < 0 else f"attractor {number}")
+    named = {-1: "not known", -2: "failed"}
+    return Patch(color=colour, label=named.get(number, f"attractor {number}"))
 
 
 def _label(data: Any, name: str) -> str:

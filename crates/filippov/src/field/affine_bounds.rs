@@ -14,9 +14,9 @@ use crate::system::AffineSigns;
 ///
 /// With g(lambda_0) the rates of the switching functions at fixed multipliers, lambda = lambda_0 - N^-1 g(lambda_0), and
 ///
-///   |lambda - lambda_0| <= <N>^-1 |g(lambda_0)|,
+///   |lambda - lambda_0| <= `<N>`^-1 |g(lambda_0)|,
 ///
-/// where <N> has |N_ii| on the diagonal and -|N_ij| beside it, if that is an M-matrix: a sparse system again.
+/// where `<N>` has |N_ii| on the diagonal and -|N_ij| beside it, if that is an M-matrix: a sparse system again.
 ///
 /// Reference: A. Ostrowski, Über die Determinanten mit überwiegender Hauptdiagonale, *Comment. Math. Helv.* 10
 /// (1937); A. Neumaier, *Interval Methods for Systems of Equations* (1990), section 3.7.

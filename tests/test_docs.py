@@ -1,0 +1,70 @@
+"""The documentation: the code of its pages runs and prints what stands there; its links lead somewhere."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+DOCS = ROOT / "docs"
+sys.path.insert(0, str(ROOT / "scripts"))
+
+from readme_blocks import run_blocks  # noqa: E402
+
+RUN = sorted(page for folder in ("tutorial", "howto", "compare") for page in (DOCS / folder).glob("*.md"))
+ALL = sorted(DOCS.rglob("*.md"))
+
+
+@pytest.mark.parametrize("page", RUN, ids=lambda page: f"{page.parent.name}-{page.stem}")
+def test_the_code_of_a_page_runs_and_prints_what_stands_there(
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    for library in ("scipy", "pandas", "xarray"):
+        pytest.importorskip(library)
+    pyplot.switch_backend("Agg")
+    run_blocks(page, tmp_path)
+    pyplot.close("all")
+    drawn = {path.name for path in tmp_path.glob("*.png")}
+    shown = set(re.findall(r"!\[[^]]*\]\(([^)/]*\.png)\)", page.read_text(encoding="utf-8")))
+    assert drawn == shown
+
+
+def test_an_output_that_differs_is_noticed(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("```python\nprint(1)\n```\n\n```text\n2\n```\n")
+    with pytest.raises(AssertionError, match=r"line 2: the block prints\n1"):
+        run_blocks(page, tmp_path)
+    page.write_text("<!-- not run -->\n```python\nprint(1)\n```\n\n```text\n2\n```\n")
+    run_blocks(page, tmp_path)
+
+
+@pytest.mark.parametrize("page", ALL, ids=lambda page: page.relative_to(DOCS).as_posix())
+def test_links_between_pages_lead_somewhere(page: Path) -> None:
+    links = re.findall(r"\]\((?!https?:|#)([^)#\s]+)", page.read_text(encoding="utf-8"))
+    gallery = {f"{script.stem}.md" for script in (ROOT / "examples").glob("*/*.py")} | {"index.md"}
+    for link in links:
+        target = page.parent / link
+        if target.parent.name == "gallery":
+            assert target.name in gallery
+        elif target.suffix != ".png" or target.parent.name == "images":
+            assert target.exists(), link
+
+
+def test_every_public_name_is_in_the_reference() -> None:
+    import filippov as fl
+
+    text = "\n".join(page.read_text(encoding="utf-8") for page in (DOCS / "reference").glob("*.md"))
+    named = {line.rsplit(".", maxsplit=1)[-1] for line in re.findall(r"^::: (\S+)$", text, re.MULTILINE)}
+    functions = {"plot", "problems"} | {name for name in fl.__all__ if _is_a_function_of_numpy(name)}
+    exceptions = set(fl.errors.__all__)
+    assert sorted(set(fl.__all__) - named - functions - exceptions) == []
+
+
+def _is_a_function_of_numpy(name: str) -> bool:
+    import filippov as fl
+
+    return getattr(fl.functions, name, None) is not None
