@@ -471,10 +471,6 @@ pub const SLIPPED: f64 = 10.0;
 /// than this fraction.
 pub const PENETRATION: f64 = 1e-6;
 
-/// Returns to a section have to agree with those one period before so many times in a row, and at least one period
-/// long: a single agreement may be a turning point.
-pub const LEAST_AGREEMENTS: u64 = 2;
-
 /// How far behind an event a step of the method for stiff motions ends that is taken anew for it, as a share of the
 /// step: first so far that the error of the continuous extension leaves the event inside, then so near that the
 /// extension lies no farther from the manifold of the motion than rounding, also at a stiffness of 1e8.
