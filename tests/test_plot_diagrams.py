@@ -83,9 +83,8 @@ def test_a_section_in_two_variables(diagram: Any) -> None:
 
 
 def test_two_parameters_are_not_one_axis() -> None:
-    relay = fl.System(
-        lambda t, x, a, b: [b - a * np.sign(x[0])], n=1, params={"a": 1.0, "b": 0.0}, states=["z"]
-    )
+    values = {"a": 1.0, "b": 0.0}
+    relay = fl.System(lambda t, x, a, b: [b - a * np.sign(x[0])], n=1, params=values, states=["z"])
     data = fl.bifurcation_diagram(
         *(relay, fl.Phase(1.0), (0.0, math.inf), [1.0]), {"a": [1.0, 2.0], "b": [0.0, 0.5]}, n=2, transient=0
     )

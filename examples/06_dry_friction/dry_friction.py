@@ -3,10 +3,10 @@
     y'' = -y + sin(omega t) - F sign(y'),    F = 0.4
 
 At 1 / omega = 0.5 the mass never sticks; at 3 it sticks twice in every period of the forcing, at 6 four
-times. The diagram has the speed once per period on the attractor of every frequency, and resonance at 1. On
-the way the number of phases of sticking changes twice, near 1.8 and 4.8 in the paper: these are sliding
-bifurcations. The panels below start on the attractor, at the fixed point of the map over one period, which the
-reference has to 33 digits; the return to it and the time of every switch are compared.
+times. The diagram has the speed once per period on the attractor of every frequency, and resonance at 1.
+On the way the number of phases of sticking changes twice, near 1.8 and 4.8 in the paper: these are
+sliding bifurcations. The panels below start on the attractor, at the fixed point of the map over one
+period, which the reference has to 33 digits; the return to it and the time of every switch are compared.
 
 Piiroinen and Kuznetsov, ACM Trans. Math. Softw. 34 (2008) 13, figure 4.
 Run it with ``python examples/06_dry_friction/dry_friction.py [picture.png] [--quick]``.

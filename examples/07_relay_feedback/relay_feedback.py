@@ -4,8 +4,9 @@
 
 The limit cycle leaves the surface x1 = 0 fourteen times per period. Its period, the point at which it
 leaves after the long phase, and the share of time that it slides are compared with the reference. With
-zeta = -0.07 and omega = 10 the motion goes on and on without the short flights; its switches up to t = 40 are compared
-too. The last panel has the maxima of x1 on the attractor over sigma: a period-adding sequence.
+zeta = -0.07 and omega = 10 the motion goes on and on without the short flights; its switches up to t = 40
+are compared too. The last panel has the maxima of x1 on the attractor over sigma: a period-adding
+sequence.
 
 Piiroinen and Kuznetsov, ACM Trans. Math. Softw. 34 (2008) 13, figures 5 and 6.
 Run it with ``python examples/07_relay_feedback/relay_feedback.py [picture.png] [--quick]``.

@@ -33,6 +33,7 @@ def main(path: Path) -> None:
     figure, (left, right) = pyplot.subplots(1, 2, figsize=(10.0, 4.4), layout="constrained")
     numbers = {}
     colours = fl.plot.theme().colours
+    heavy = {2: 8.0, 3: 5.0, 5: 2.5}  # the phases of sticking lie on one another
     for voltage, style, colour in zip(CYCLES, ("-", "--", "-.", ":"), colours, strict=False):
         period, kinds, first = CYCLES[voltage]
         problem = fl.problems.get(f"drill_string_u{voltage}")
@@ -49,7 +50,8 @@ def main(path: Path) -> None:
             for segment in cycle.segments:
                 x = cycle.sol(np.linspace(segment.t_start, min(segment.t_end, period), 401))
                 sticks = segment.mode.is_sliding
-                ax.plot(x[0], x[2], "-" if sticks else style, color=colour, linewidth=3.0 if sticks else 1.2)
+                width = heavy[voltage] if sticks else 1.2
+                ax.plot(x[0], x[2], "-" if sticks else style, color=colour, linewidth=width)
         left.plot([], [], style, color=colour, label=f"u = {voltage}")
     print(compare(numbers))
     left.legend(frameon=False)

@@ -19,7 +19,7 @@ from filippov.cli.solving import initial_state, interval, options_of_run, parame
 from filippov.cli.tables import write_csv, write_parquet
 from filippov.solution import Solution
 
-__all__ = ["demo", "list_problems", "solve", "version"]
+__all__ = ["check_picture", "check_target", "demo", "list_problems", "solve", "version"]
 
 _PICTURES = (".png", ".pdf", ".svg", ".jpg", ".eps")
 
@@ -53,7 +53,7 @@ def demo(given: argparse.Namespace) -> int:
     print(f"\n{problem.name}: {problem.note}\n")
     if not given.no_plot:
         path = given.plot or Path(f"{problem.name}.png")
-        _check_picture(path)
+        check_picture(path)
     solution = problem.solve()
     _print(solution, model, {})
     if not given.no_plot:
@@ -73,7 +73,7 @@ def solve(given: argparse.Namespace) -> int:
             raise Mistake(f"--points: at least 2 are needed, not {given.points}")
         options["t_eval"] = np.linspace(start, end, given.points)
     if given.plot is not None:
-        _check_picture(given.plot)
+        check_picture(given.plot)
         _check_states(given.states, model, len(y0), "--states")
         _check_states(given.phase, model, len(y0), "--phase")
         if given.phase is not None and len(given.phase) not in (2, 3):
@@ -146,7 +146,7 @@ def check_target(path: Path) -> None:
         raise Mistake(f"{path}: there is no such folder")
 
 
-def _check_picture(path: Path) -> None:
+def check_picture(path: Path) -> None:
     if path.suffix.lower() not in _PICTURES:
         raise Mistake(f"--plot: {path} must end in one of {', '.join(_PICTURES)}")
     from filippov.plot.style import import_pyplot

@@ -34,6 +34,8 @@ class Model(NamedTuple):
         ``t_span`` of the file.
     events : Any
         ``events`` of the file.
+    section : Any
+        ``section`` of the file, for sweeps.
     """
 
     name: str
@@ -41,6 +43,7 @@ class Model(NamedTuple):
     y0: Any = None
     t_span: Any = None
     events: Any = None
+    section: Any = None
 
 
 def load_model(text: str, wanted: str | None = None) -> Model:
@@ -90,7 +93,7 @@ def _from_file(path: Path, wanted: str | None) -> Model:
         raise Mistake(f"{path}: there is no such file")
     names = _run(path)
     system = _choose(path, names, wanted)
-    return Model(path.stem, system, names.get("y0"), names.get("t_span"), names.get("events"))
+    return Model(path.stem, system, *(names.get(word) for word in ("y0", "t_span", "events", "section")))
 
 
 def _run(path: Path) -> dict[str, Any]:

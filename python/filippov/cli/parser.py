@@ -7,6 +7,7 @@ from pathlib import Path
 
 from filippov.cli import commands
 from filippov.cli.solving import add_run_options
+from filippov.cli.sweeping import add_sweep_options, sweep
 
 __all__ = ["build_parser"]
 
@@ -21,6 +22,7 @@ first steps:
   filippov demo dry_friction                 solve one, print what happened, draw it
   filippov solve dry_friction --param F=0.8  the same with another parameter
   filippov solve model.py --t 0 100 --y0 1 0 --plot out.png
+  filippov sweep model.py --param omega=0.2:2:500 --period 2*pi/omega --store runs --plot diagram.png
 
 a model is a Python file, written as for SciPy:
   import filippov as fl, numpy as np
@@ -30,7 +32,7 @@ a model is a Python file, written as for SciPy:
       y, v = x
       return v, -y + np.sin(omega*t) - F*np.sign(v)
 
-  y0 = [1.0, 2.0]                            # optional; so are t_span and events
+  y0 = [1.0, 2.0]                            # optional; so are t_span, events, section
 
 exit codes: 0 done; 1 the run failed, what it computed is written; 2 a mistake, said in one line; 130 Ctrl-C.
 `filippov COMMAND --help` explains one command.
@@ -63,6 +65,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_list(subparsers)
     _add_demo(subparsers)
     _add_solve(subparsers)
+    _add_sweep(subparsers)
     return parser
 
 
@@ -108,3 +111,29 @@ def _add_solve(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     out.add_argument("--points", type=int, metavar="N", help="write N equidistant times")
     out.add_argument("--quiet", action="store_true", help="print nothing but warnings and failures")
     command.set_defaults(run=commands.solve)
+
+
+_SWEEP = """\
+examples:
+  filippov sweep model.py --param omega=0.2:2:500 --period 2*pi/omega --plot diagram.png
+  filippov sweep model.py --param F=0.1,0.2,0.4 omega=0.2:2:500 --period 2*pi/omega --store runs --csv out.csv
+  filippov sweep model.py --y0 y=-2:2:50 v=-2:2:50 --t 100 --csv ends.csv
+
+START:STOP:COUNT are so many equidistant values, A,B,C a list; all combinations are computed. With --period,
+or with a surface as --section, the returns on the attractor are kept, else the state at the end.
+With --store every finished chunk is written at once. A sweep that was stopped, also by kill -9 or by a power
+cut, goes on when the same command is given again; nothing is done twice, the result is the same to the bit.
+"""
+
+
+def _add_sweep(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    command = subparsers.add_parser(
+        "sweep",
+        help="solve a model over a grid of parameters and initial states",
+        description="Solve a model over a grid of parameters and initial states; draw and save it.",
+        epilog=_SWEEP,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add_run_options(command)
+    add_sweep_options(command)
+    command.set_defaults(run=sweep)

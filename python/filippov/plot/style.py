@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from itertools import product
 from typing import Any, NamedTuple
 
 from filippov.modes import Mode
@@ -179,12 +180,20 @@ def palette(dark: bool | None) -> list[str]:
 
 
 def mode_colours(modes: Sequence[Mode], dark: bool | None) -> dict[Mode, str]:
-    """Return a colour for every mode that occurs; regions come first, and + before -, whatever the run."""
+    """Return a colour for every mode that occurs; regions come first, and + before -, whatever the run.
+
+    With one surface or two a mode has the same colour in every figure.
+    """
     colours = palette(dark)
-    ordered = sorted(set(modes), key=lambda mode: (mode.codimension, tuple(-entry for entry in mode)))
-    if all(len(mode) == 1 for mode in ordered):  # the same in every figure
-        return {mode: colours[{1: 0, -1: 1, 0: 2}[mode[0]]] for mode in ordered}
-    return {mode: colours[index % len(colours)] for index, mode in enumerate(ordered)}
+    present = sorted(set(modes), key=_rank)
+    numbered = present
+    if present and len(present[0]) in (1, 2):
+        numbered = sorted(map(Mode, product((1, -1, 0), repeat=len(present[0]))), key=_rank)
+    return {mode: colours[numbered.index(mode) % len(colours)] for mode in present}
+
+
+def _rank(mode: Mode) -> tuple[int, tuple[int, ...]]:
+    return mode.codimension, tuple(-entry for entry in mode)
 
 
 def mode_handles(colours: dict[Mode, str]) -> list[Any]:

@@ -36,7 +36,7 @@ use crate::options::{Method, Options};
 use crate::recorder::Recorder;
 use crate::solution::Solution;
 use crate::stepper::{
-    Attempt, Controller, Dop853, ErrorScale, Rodas5p, StepMethod, Stepper, Taylor,
+    Attempt, Controller, Dop853, ErrorScale, Midpoint, Rodas5p, StepMethod, Stepper, Taylor,
 };
 use crate::system::PiecewiseSystem;
 use crate::tolerances::SHORTEST_STEP;
@@ -111,7 +111,7 @@ impl<'a> Integrator<'a> {
         super::start::check(system, t_span, y0, options, actions)?;
         let n = system.n_states();
         let uses_series = match options.method {
-            Method::Dopri5 | Method::Dop853 | Method::Rodas5p => false,
+            Method::Dopri5 | Method::Dop853 | Method::Midpoint | Method::Rodas5p => false,
             Method::Taylor => true,
             Method::Auto => system.is_analytic(),
         };
@@ -124,6 +124,7 @@ impl<'a> Integrator<'a> {
         match options.method {
             Method::Rodas5p => stepper.rodas5p = Some(Box::new(Rodas5p::new(n))),
             Method::Dop853 => stepper.dop853 = Some(Box::new(Dop853::new(n))),
+            Method::Midpoint => stepper.midpoint = Some(Box::new(Midpoint::new(n))),
             Method::Auto | Method::Dopri5 | Method::Taylor => {}
         }
         let undecided = Mode::new(vec![1; system.n_surfaces()]);
@@ -253,6 +254,9 @@ impl<'a> Integrator<'a> {
                 None => Ok(Some(Stop::NotFinite)),
             };
         }
+        if self.stepper.in_use() == StepMethod::Midpoint {
+            dt = self.keep_to_side(dt)?;
+        }
         let sliding = !self.motion.sliding().is_empty();
         match self.attempt(dt)? {
             Attempt::NotFinite => {
@@ -279,6 +283,7 @@ impl<'a> Integrator<'a> {
             StepMethod::Rodas5p => self.attempt_implicit(dt),
             StepMethod::Dopri5 => self.attempt_explicit(dt),
             StepMethod::Dop853 => self.attempt_dop853(dt),
+            StepMethod::Midpoint => self.attempt_midpoint(dt),
         }
     }
 
@@ -372,6 +377,7 @@ impl<'a> Integrator<'a> {
             StepMethod::Taylor => self.stats.n_steps_taylor += 1,
             StepMethod::Rodas5p => self.stats.n_steps_rodas5p += 1,
             StepMethod::Dop853 => self.stats.n_steps_dop853 += 1,
+            StepMethod::Midpoint => self.stats.n_steps_midpoint += 1,
         }
         self.dt = if self.stepper.is_taylor() {
             f64::INFINITY
@@ -430,7 +436,7 @@ impl<'a> Integrator<'a> {
         self.stats.stiff_since = self.stiffness.since;
         let (zeros, recorder) = (self.user_events.into_zeros(), self.recorder);
         recorder.finish(
-            (self.t, &self.x, self.options.sliding),
+            (self.t, &self.x, self.options),
             self.motion.mode,
             stop,
             self.stats,

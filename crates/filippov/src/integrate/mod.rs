@@ -14,6 +14,7 @@ mod leave_by_rule;
 mod meeting;
 mod motion;
 mod nested;
+mod one_sided_steps;
 mod pace;
 mod placement;
 mod relay;

@@ -1,0 +1,234 @@
+"""`filippov sweep`: a model over a grid of parameters and initial states."""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import csv
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from filippov import analysis
+from filippov.cli.commands import check_picture, check_target
+from filippov.cli.mistakes import Mistake, assignments, hint, number
+from filippov.cli.model import Model, load_model
+from filippov.cli.solving import initial_state, interval, options_of_run
+
+__all__ = ["add_sweep_options", "sweep"]
+
+_NODES = (ast.Expression, ast.BinOp, ast.UnaryOp, ast.Constant, ast.Name, ast.Load, ast.operator, ast.unaryop)
+
+
+def add_sweep_options(command: argparse.ArgumentParser) -> None:
+    """Add the arguments of a sweep to those of a run."""
+    grid = command.add_argument_group("what is kept of each point")
+    grid.add_argument("--period", metavar="EXPR", help="returns once a period: a number, or 2*pi/omega")
+    grid.add_argument("--section", metavar="SURFACE", help="returns to a surface, as `solve` prints it")
+    grid.add_argument("--returns", type=int, default=100, metavar="N", help="so many returns; 100 by default")
+    grid.add_argument("--transient", type=int, default=400, metavar="N", help="after so many; 400 by default")
+    grid.add_argument(
+        "--follow", action="store_true", help="start every point where the one before it ended, not at y0"
+    )
+    out = command.add_argument_group("what comes out")
+    out.add_argument("--store", type=Path, metavar="FOLDER", help="write every finished chunk, and resume")
+    out.add_argument("--threads", type=int, metavar="N", help="native threads; one per core by default")
+    out.add_argument("--csv", type=Path, metavar="FILE", help="write one row per return, or per point")
+    out.add_argument("--plot", type=Path, metavar="FILE", help="draw the returns over the parameter")
+    out.add_argument("--state", metavar="NAME", help="the state to draw; the first by default")
+    out.add_argument("--dark", action="store_true", help="light dots on a dark ground")
+    out.add_argument("--quiet", action="store_true", help="print nothing but failures")
+
+
+def sweep(given: argparse.Namespace) -> int:
+    """Run a sweep; print, draw and save its result."""
+    model = load_model(given.model, given.system)
+    params = _values(given.param, "--param", list(model.system.params))
+    y0 = _initial_states(given, model)
+    section = _section(given, model)
+    names = _swept(params, y0)
+    if not names:
+        raise Mistake("--param: a sweep needs values, like omega=0.2:2:500 or omega=1,2,4")
+    if given.plot is not None:
+        check_picture(given.plot)
+        if section is None or len(names) != 1:
+            raise Mistake("--plot: one parameter with several values is needed, and --period or --section")
+    for path in (given.plot, given.csv):
+        if path is not None:
+            check_target(path)
+    state = _state(given, model)
+    options = options_of_run(given)
+    options["progress"] = given.progress or (not given.quiet and sys.stderr.isatty())
+    if section is not None:
+        options |= {
+            "section": section,
+            "n": given.returns,
+            "transient": given.transient,
+            "until_periodic": True,
+            "follow": given.follow,
+        }
+    elif given.follow:
+        options["follow"] = True
+    try:
+        result = analysis.sweep(
+            *(model.system, _span(given, model, section), y0, params),
+            store=given.store,
+            threads=given.threads,
+            **options,
+        )
+    except KeyboardInterrupt:
+        if given.store is None:
+            raise
+        raise KeyboardInterrupt(f"What is finished is in {given.store}; the same command goes on.") from None
+    return _close(given, result, names[0], state)
+
+
+def _values(texts: list[str], where: str, known: list[str]) -> dict[str, Any]:
+    """Return numbers, ranges and lists by name."""
+    found = {}
+    for name, text in assignments(texts, where).items():
+        if name not in known:
+            raise Mistake(f"{where}: no {name!r}{hint(name, known)}; there are {', '.join(known) or 'none'}")
+        found[name] = _range(text, f"{where} {name}")
+    return found
+
+
+def _range(text: str, where: str) -> Any:
+    if ":" in text:
+        parts = text.split(":")
+        if len(parts) != 3 or not parts[2].isdigit() or int(parts[2]) < 1:
+            raise Mistake(f"{where}: START:STOP:COUNT is needed, not {text!r}")
+        return np.linspace(number(parts[0], where), number(parts[1], where), int(parts[2]))
+    if "," in text:
+        return np.array([number(part, where) for part in text.split(",")])
+    return number(text, where)
+
+
+def _initial_states(given: argparse.Namespace, model: Model) -> Any:
+    if given.y0 is None or not any(mark in text for text in given.y0 for mark in (":", ",")):
+        return initial_state(given, model)
+    n = model.system.n if model.system.n is not None else len(given.y0)
+    names = list(model.system.state_names(n))
+    if not all("=" in text for text in given.y0):
+        raise Mistake("--y0: ranges need names, like --y0 x=-2:2:50 v=0")
+    found = _values(given.y0, "--y0", names)
+    default = dict(zip(names, np.ravel(model.y0), strict=True)) if model.y0 is not None else {}
+    missing = [name for name in names if name not in found and name not in default]
+    if missing:
+        raise Mistake(f"--y0: no value for {', '.join(missing)}")
+    return {name: found.get(name, default.get(name)) for name in names}
+
+
+def _swept(params: dict[str, Any], y0: Any) -> list[str]:
+    names = [name for name, value in params.items() if np.ndim(value)]
+    if isinstance(y0, dict):
+        names += [f"initial_{name}" for name, value in y0.items() if np.ndim(value)]
+    return names
+
+
+def _section(given: argparse.Namespace, model: Model) -> Any:
+    if given.period is not None and given.section is not None:
+        raise Mistake("--period: give either it or --section")
+    if given.period is not None:
+        return analysis.Phase(_expression(given.period, list(model.system.params)))
+    return given.section if given.section is not None else model.section
+
+
+def _expression(text: str, names: list[str]) -> Any:
+    """Return a number, or a function of parameters, written with + - * / ** and pi."""
+    try:
+        tree = ast.parse(text, mode="eval")
+    except (SyntaxError, ValueError):
+        raise Mistake(f"--period: {text!r} cannot be read; write like 2*pi/omega") from None
+    used = sorted({node.id for node in ast.walk(tree) if isinstance(node, ast.Name)} - {"pi"})
+    for node in ast.walk(tree):
+        is_text = isinstance(node, ast.Constant) and type(node.value) not in (int, float)
+        if is_text or not isinstance(node, _NODES):
+            raise Mistake(f"--period: {text!r} has more than numbers, parameters, pi and + - * / **")
+    for name in used:
+        if name not in names:
+            raise Mistake(f"--period: no parameter {name!r}{hint(name, names)}")
+    # Nothing but arithmetic of numbers and names is left in the text.
+    value = eval(f"lambda {', '.join(used)}: {text}", {"__builtins__": {}, "pi": math.pi})
+    return value if used else value()
+
+
+def _span(given: argparse.Namespace, model: Model, section: Any) -> tuple[float, float]:
+    if given.t is None and model.t_span is None and isinstance(section, analysis.Phase):
+        return 0.0, math.inf  # so many periods
+    return interval(given, model)
+
+
+def _state(given: argparse.Namespace, model: Model) -> str | None:
+    if given.state is None:
+        return None
+    if model.system.n is not None and given.state not in model.system.states:
+        known = ", ".join(model.system.states)
+        raise Mistake(f"--state: no state {given.state!r}; the names are {known}")
+    return str(given.state)
+
+
+def _close(given: argparse.Namespace, result: Any, swept: str, state: str | None) -> int:
+    """Print, write and draw; return the exit code."""
+    found = analysis.failures(result)
+    n_points, n_failed = int(result.status.size), sum(map(len, found.values()))
+    if not given.quiet:
+        print(f"points:   {n_points}, {n_failed} of them failed")
+        if "obs" in result.sizes:
+            periods, counts = np.unique(result.period.values, return_counts=True)
+            shown = [f"{p or 'none'}: {c}" for p, c in zip(periods, counts, strict=True)]
+            print(f"returns:  {result.sizes['obs']}; points by period found: {', '.join(shown)}")
+    if given.csv is not None:
+        rows = _write_csv(result, given.csv)
+        if not given.quiet:
+            print(f"written:  {given.csv}, {rows} rows")
+    if given.plot is not None:
+        _draw(given, result, swept, state or str(_states(result)[0]))
+    for reason, points in found.items():
+        print(f"failed:   {len(points)} times {reason}; first at {points[0].point}", file=sys.stderr)
+    return 1 if n_failed else 0
+
+
+def _states(result: Any) -> list[str]:
+    import json
+
+    return [str(name) for name in json.loads(result.attrs["states"])]
+
+
+def _write_csv(result: Any, path: Path) -> int:
+    if "obs" in result.sizes:
+        table = analysis.expand_returns(result)
+        columns = {str(name): table[name].values for name in table.variables if table[name].dims == ("obs",)}
+    else:
+        whole = result.stack(row=result.status.dims) if result.status.ndim > 1 else result
+        (row,) = whole.status.dims
+        columns = {
+            str(name): whole[name].values
+            for name in whole.variables
+            if name != row or result.status.ndim == 1
+            if whole[name].dims == (row,)
+        }
+    known = [*map(str, result.coords), "t", *_states(result)]
+    order = [*(name for name in known if name in columns), *sorted(set(columns).difference(known))]
+    columns = {name: columns[name] for name in order}
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(columns)
+        writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
+    return len(next(iter(columns.values())))
+
+
+def _draw(given: argparse.Namespace, result: Any, swept: str, state: str) -> None:
+    import matplotlib
+
+    matplotlib.use("Agg")  # a picture is written, no window is opened
+    from filippov import plot
+
+    with plot.style(dark=given.dark):
+        ax = plot.bifurcation_diagram(result, state, swept)
+        ax.figure.savefig(given.plot)
+    if not given.quiet:
+        print(f"picture:  {given.plot}")

@@ -1,0 +1,134 @@
+"""`filippov sweep`: the same as `fl.sweep`, resumed after any end, mistakes in one line."""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import filippov as fl
+import numpy as np
+import pytest
+from filippov.cli import main
+from test_cli import MODEL
+
+pytest.importorskip("xarray")
+
+PERIOD = ["--period", "2*pi/omega", "--transient", "20"]
+SWEEP = ["sweep", "model.py", "--param", "omega=0.5:2:4", "F=0.4", *PERIOD]
+
+
+@pytest.fixture
+def model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "model.py"
+    path.write_text(MODEL)
+    return path
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_returns_are_those_of_the_library(model: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("matplotlib")
+    assert main([*SWEEP, "--csv", "out.csv", "--plot", "out.png", "--state", "v"]) == 0
+    names: dict[str, fl.System] = {}
+    exec(MODEL, names)
+    expected = fl.bifurcation_diagram(
+        *(names["oscillator"], fl.Phase(lambda omega: 2 * math.pi / omega), (0, math.inf), [1.0, 2.0]),
+        {"omega": np.linspace(0.5, 2, 4), "F": 0.4},
+        transient=20,
+    )
+    written = rows(Path("out.csv"))
+    assert next(iter(written[0])) == "omega"
+    assert [float(row["v"]) for row in written] == expected.v.values.tolist()
+    assert Path("out.png").read_bytes().startswith(b"\x89PNG")
+    assert "4, 0 of them failed" in capsys.readouterr().out
+
+
+def test_ends_over_initial_states(model: Path) -> None:
+    grid = ["--y0", "y=-1:1:3", "v=0,2", "--t", "5"]
+    assert main(["sweep", "model.py", *grid, "--csv", "out.csv", "--quiet"]) == 0
+    written = rows(Path("out.csv"))
+    assert [(float(row["initial_y"]), float(row["initial_v"])) for row in written] == [
+        (y, v) for y in (-1.0, 0.0, 1.0) for v in (0.0, 2.0)
+    ]
+
+
+def test_a_section_of_the_file_and_failed_points(model: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model.write_text(MODEL + "section = fl.Section(lambda t, x: x[0], direction='up')\nt_span = (0, 50)\n")
+    assert main(["sweep", "model.py", "--param", "F=0.2,1e400", "--quiet"]) == 1
+    assert "1 times field_not_finite; first at {'F': inf}" in capsys.readouterr().err
+    assert main(["sweep", "model.py", "--param", "F=0.2,0.3", "--max-steps", "3", "--csv", "out.csv"]) == 1
+    assert "2 times max_steps" in capsys.readouterr().err
+    assert main(["sweep", "model.py", "--param", "F=0.2,0.3", "--returns", "3", "--transient", "0"]) == 0
+
+
+def test_a_killed_sweep_goes_on(model: Path) -> None:
+    pytest.importorskip("zarr")
+    sweep = ["sweep", "model.py", "--param", "omega=0.2:0.7:1500", *PERIOD]
+    run = [sys.executable, "-m", "filippov", *sweep, "--store", "runs", "--quiet"]
+    there = {**os.environ, "PYTHONPATH": str(Path(fl.__file__).parents[1])}
+    killed = 0
+    for _ in range(2):
+        process = subprocess.Popen(run, env=there)
+        before = sum(1 for _ in Path("runs").rglob("*"))
+        while process.poll() is None and sum(1 for _ in Path("runs").rglob("*")) < before + 3:
+            time.sleep(0.01)
+        if process.poll() is None:
+            process.send_signal(signal.SIGKILL)
+            killed += 1
+        process.wait()
+    assert killed
+    assert subprocess.run([*run, "--csv", "resumed.csv"], env=there, check=False).returncode == 0
+    assert main([*sweep, "--quiet", "--csv", "undisturbed.csv"]) == 0
+    assert Path("resumed.csv").read_bytes() == Path("undisturbed.csv").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--period", "2*pi/omega"], "--param: a sweep needs values"),
+        (["--param", "omega=1:2"], "--param omega: START:STOP:COUNT is needed"),
+        (["--param", "omega=1:2:0"], "--param omega: START:STOP:COUNT is needed"),
+        (["--param", "omega=1,a"], "--param omega: 'a' is not a number"),
+        (["--param", "omeg=1,2"], "--param: no 'omeg' (did you mean 'omega'?)"),
+        (["--param", "omega=1,2", "--period", "2*pi/"], "--period: '2*pi/' cannot be read"),
+        (["--param", "omega=1,2", "--period", "2*pi/f"], "--period: no parameter 'f'"),
+        (["--param", "omega=1,2", "--period", "open('x')"], "--period: \"open('x')\" has more than"),
+        (["--param", "omega=1,2", "--period", "1", "--section", "v"], "--period: give either it or"),
+        (["--param", "omega=1,2", "--section", "w", "--t", "9"], "w"),
+        (["--param", "omega=1,2"], "--t: the end is needed"),
+        (["--param", "omega=1,2", "--t", "9", "--plot", "o.png"], "--plot: one parameter with several"),
+        (["--param", "omega=1,2", "--t", "9", "--y0", "0:1:3", "1"], "--y0: ranges need names"),
+        (["--param", "omega=1,2", "--t", "9", "--y0", "z=0:1:3"], "--y0: no 'z'; there are y, v"),
+        (["--param", "omega=1,2", "--period", "1", "--state", "z"], "--state: no state 'z'"),
+        (["--param", "omega=1,2", "--period", "1", "--returns", "0"], "n: "),
+        (["--param", "omega=1,2", "--period", "1", "--threads", "0"], "threads: "),
+    ],
+)
+def test_a_mistake_is_one_line(
+    model: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
+) -> None:
+    assert main(["sweep", "model.py", *arguments]) == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert message in shown.err
+    assert shown.err.count("\n") == 1
+
+
+def test_a_store_of_another_sweep_is_refused(model: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("zarr")
+    assert main([*SWEEP, "--store", "runs"]) == 0
+    capsys.readouterr()
+    assert main([*SWEEP, "--store", "runs", "--rtol", "1e-9"]) == 2
+    shown = capsys.readouterr().err
+    assert shown.startswith("filippov: store: ")
+    assert shown.count("\n") == 1
