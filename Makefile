@@ -80,6 +80,8 @@ bench: $(BENCH_STAMP) ## run the benchmarks
 	$(PY) benchmarks/disode_tables.py
 	$(PY) benchmarks/speed.py
 	$(PY) benchmarks/friction_chain.py
+	$(PY) benchmarks/work_precision.py
+	$(PY) benchmarks/diagram.py
 
 demo: $(BUILD_STAMP) ## simulate and plot a stick-slip oscillator
 	$(PY) examples/01_stick_slip/stick_slip.py

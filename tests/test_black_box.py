@@ -37,6 +37,20 @@ def test_same_itinerary_as_traced(rtol: float) -> None:
     assert called.warnings == []
 
 
+@pytest.mark.parametrize("rtol", [1e-5, 1e-8, 1e-11])
+def test_short_slides_of_a_relay_are_those_of_the_traced_one(rtol: float) -> None:
+    """The field on the surface itself is that of neither side: what is tangent there is seen beside it."""
+    problem = fl.problems.get("relay_feedback")
+
+    def relay(t: float, x: Any) -> Any:
+        return problem.fun(float(t), np.array(x, dtype=float), *problem.args)
+
+    sol = fl.solve_ivp(relay, problem.t_span, problem.y0, surfaces=lambda t, x: x[0], rtol=rtol, atol=rtol)
+    assert sol.stats["backend"] == "black box"
+    assert sol.warnings == []
+    assert len(sol.switches) == 55
+
+
 def test_sliding_stays_on_a_curved_surface() -> None:
     def field(t: float, z: Any) -> Any:
         x, y = float(z[0]), float(z[1])

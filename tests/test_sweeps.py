@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import signal
 import sys
+import time
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 from typing import Any
@@ -304,6 +306,29 @@ def test_progress_is_told(friction: fl.System, capsys: pytest.CaptureFixture[str
     assert "50.0 % of 4 points, 1 failed" in shown
     assert "left" in shown
     assert shown.endswith("\n")
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no alarm on this platform")
+@pytest.mark.parametrize("follow", [False, True])
+def test_ctrl_c_ends_a_sweep_at_once(friction: fl.System, follow: bool) -> None:
+    def press(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGALRM, press)
+    params = {"F": np.linspace(0.1, 0.9, 200), "omega": np.linspace(0.1, 2.0, 1000)}
+    signal.setitimer(signal.ITIMER_REAL, 1.0)
+    started = time.monotonic()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            diagram(friction, params=params, follow=follow)
+        # An ensemble too.
+        signal.setitimer(signal.ITIMER_REAL, 0.5)
+        with pytest.raises(KeyboardInterrupt):
+            friction.ensemble((0, 1e6), np.ones((1000, 2)))
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+    assert time.monotonic() - started < 10.0  # it would take a minute; on a busy machine it ends late
 
 
 @pytest.mark.parametrize(

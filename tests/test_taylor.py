@@ -195,3 +195,12 @@ def test_a_motion_by_another_rule_has_no_series() -> None:
     sol = fl.solve_ivp(coupled, (0, 4), [0.5, 0.3, 0.1], method="Taylor", sliding="moments")
     assert sol.success
     assert [warning.code for warning in sol.warnings] == ["no_series"]
+
+
+@pytest.mark.parametrize("tolerance", [10.0**-k for k in range(3, 11)])
+def test_series_that_end_at_a_surface_invent_no_switch_there(tolerance: float) -> None:
+    import reference
+
+    sol = reference.solve("disode_planar", tolerance, method="Taylor")
+    assert sol.success
+    assert len(sol.switches) == len(reference.of_problem("disode_planar").switches) == 7

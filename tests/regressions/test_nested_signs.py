@@ -95,3 +95,11 @@ def test_a_function_beside_the_sign_in_it(h: Any, method: str) -> None:
     tt = np.linspace(0.0, 12.0, 50)
     np.testing.assert_allclose(sol.sol(tt), plain.sol(tt), rtol=0, atol=1e-7)
     assert not sol.warnings
+
+
+def test_a_start_from_which_both_sides_lead_away_names_both() -> None:
+    # At x = 0.1 the function is -0.7 on one side and 0.9 on the other: away on both.
+    sol = fl.solve_ivp(lambda t, x: [-np.sign(x[0] - 0.8 * np.sign(x[0] - 0.1))], (0.0, 0.5), [0.1])
+    assert [warning.code for warning in sol.warnings] == ["non_unique"]
+    assert {str(mode) for mode in sol.warnings[0].candidates} == {"+-", "-+"}
+    assert abs(sol.y[0, -1] - 0.1) == pytest.approx(0.5, abs=1e-9)

@@ -54,3 +54,24 @@ def test_a_visible_two_fold_in_the_plane_of_a_surface() -> None:
     assert sol.switches.t == pytest.approx([1.0], abs=1e-5)
     assert sol.warnings[-1].code == "non_unique"
     assert sol.y[2, -1] == pytest.approx(0.5, abs=1e-4)
+
+
+def test_what_is_said_about_a_point_agrees_with_the_run_from_there() -> None:
+    # Both fields turn back to x0 = 0 from the other side: orbits wind around the origin.
+    system = fl.System(lambda t, x: [x[1] - x[0], 0.3 - x[1] - np.sign(x[0])], n=2)
+    said = system.classify(0.0, [0.0, 0.0])
+    assert said.mode is None
+    assert not said.unique
+    assert "no motion continues" in system.solve((0.0, 1.0), [0.0, 0.0]).message
+
+
+def test_a_tangency_beside_another_surface_has_no_share() -> None:
+    # Both fields are tangent to x0 = 0; the second surface is left at once.
+    def f(t: float, x: Any) -> Any:
+        return [x[1] - x[0], 0.3 - x[1] - np.sign(x[0]) + 0.1 * np.sign(x[0] + t)]
+
+    sol = fl.solve_ivp(f, (0.0, 1.0), [0.0, 0.0])
+    assert "no motion continues" in sol.message or sol.success
+    for segment in sol.segments:
+        values = np.array([segment.multipliers_start, segment.multipliers_end])
+        assert not (np.abs(values) > 1.0).any()

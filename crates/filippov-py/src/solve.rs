@@ -94,7 +94,7 @@ pub fn solve_many(
         let run = |job: &PreparedRun, interrupt: &mut dyn FnMut(f64) -> bool| {
             job.run((t0, t1), &options.options, interrupt)
         };
-        let solutions = py.detach(|| on_threads(&prepared, threads, run));
+        let solutions = py.detach(|| on_threads(&prepared, threads, run))?;
         for (prepared, solution) in prepared.into_iter().zip(solutions) {
             let solution = solution.map_err(|e| PyValueError::new_err(e.to_string()))?;
             runs.push(prepared.result(solution));

@@ -58,7 +58,7 @@ pub fn solve_points<'py>(
                 _ => run.run(*span, &options.options, interrupt),
             }
         };
-        let outcomes = py.detach(|| on_threads(&jobs, threads, go));
+        let outcomes = py.detach(|| on_threads(&jobs, threads, go))?;
         py.check_signals()?;
         for ((run, _, span), outcome) in jobs.iter().zip(outcomes) {
             points.take(py, run, *span, outcome)?;

@@ -17,20 +17,25 @@ pub type Interrupt<'a> = &'a mut dyn FnMut(f64) -> bool;
 
 /// Does `work` for every job, each thread taking the next one that is left; the results are in the order of the
 /// jobs. To be called without the interpreter's lock.
+///
+/// # Errors
+/// What a signal raised, Ctrl-C for instance.
 pub fn on_threads<J: Sync, R: Send>(
     jobs: &[J],
     threads: usize,
     work: impl Fn(&J, Interrupt) -> R + Sync,
-) -> Vec<R> {
+) -> PyResult<Vec<R>> {
     let next = AtomicUsize::new(0);
     let is_interrupted = AtomicBool::new(false);
+    let signal: Mutex<Option<PyErr>> = Mutex::new(None);
     let results: Vec<Mutex<Option<R>>> = jobs.iter().map(|_| Mutex::new(None)).collect();
     let go = |asks: bool| {
         let mut asked = Instant::now();
         let mut interrupt = |_: f64| {
             if asks && asked.elapsed() >= POLL_EVERY {
                 asked = Instant::now();
-                if Python::attach(|py| py.check_signals().is_err()) {
+                if let Err(raised) = Python::attach(|py| py.check_signals()) {
+                    *signal.lock().unwrap_or_else(PoisonError::into_inner) = Some(raised);
                     is_interrupted.store(true, Ordering::Relaxed);
                 }
             }
@@ -53,11 +58,14 @@ pub fn on_threads<J: Sync, R: Send>(
         }
         go(true);
     });
+    if let Some(raised) = signal.into_inner().unwrap_or_else(PoisonError::into_inner) {
+        return Err(raised);
+    }
     let taken = results.into_iter().map(|result| {
         result
             .into_inner()
             .unwrap_or_else(PoisonError::into_inner)
             .expect("every job was taken by a thread")
     });
-    taken.collect()
+    Ok(taken.collect())
 }

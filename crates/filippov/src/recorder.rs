@@ -102,6 +102,16 @@ impl Recorder {
         }
     }
 
+    /// The states before the first switch of this instant, which is `first`, and after the last one.
+    pub fn set_jump(&mut self, first: usize, before: &[f64], after: &[f64]) {
+        if let Some(switch) = self.switches.get_mut(first) {
+            switch.y_before = SmallVec::from_slice(before);
+        }
+        if let Some(switch) = self.switches[first..].last_mut() {
+            switch.y_after = SmallVec::from_slice(after);
+        }
+    }
+
     /// The mode after the switches of this instant, of which `first` is the first.
     pub fn set_last_mode(&mut self, first: usize, after: &Mode) {
         if let Some(last) = self.switches[first..].last_mut() {

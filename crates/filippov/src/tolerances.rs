@@ -108,6 +108,10 @@ pub const JUMP_SHARE: f64 = 0.9;
 /// than this fraction of the tolerance.
 pub const ARRIVED: f64 = 1e-3;
 
+/// Less than this, relative to the time, is no progress of it: bodies that hit one another with the speed of rounding do so
+/// at intervals of some hundred roundings.
+pub const NO_PROGRESS: f64 = 32768.0 * EPS;
+
 /// That many switches without any progress of time end a run.
 pub const MOST_SWITCHES_AT_ONE_TIME: u32 = 64;
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from concurrent.futures import CancelledError
 from hashlib import sha256
+from threading import Event
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -49,11 +51,14 @@ class Chunk(NamedTuple):
         Whether every point starts from the state that the one before it left.
     carry : ndarray, shape (n,), or None
         The state that the point before the first left; None at the start of a line.
+    stop : Event or None
+        Set where the sweep was interrupted, in the same process.
     """
 
     parts: tuple[Task | Table, ...]
     follows: bool
     carry: Array | None
+    stop: Event | None = None
 
 
 def run_chunk(chunk: Chunk) -> tuple[Table, Array]:
@@ -68,6 +73,8 @@ def run_chunk(chunk: Chunk) -> tuple[Table, Array]:
             tables.append(run_task(part))
             continue
         for row in range(len(part.y0)):
+            if chunk.stop is not None and chunk.stop.is_set():
+                raise CancelledError
             one = part.rows(slice(row, row + 1))
             if carry is not None:
                 one = one._replace(y0=carry[np.newaxis])

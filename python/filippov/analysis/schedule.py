@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from queue import SimpleQueue
+from threading import Event
 from typing import Any
 
 import numpy as np
@@ -99,6 +100,7 @@ def _submit_all(
     most = 2 * int(getattr(executor, "_max_workers", 0) or 16)
     finished: SimpleQueue[tuple[int, Any]] = SimpleQueue()
     flying: dict[int, Any] = {}
+    stop = None if travels else Event()
     try:
         while ready or flying:
             while ready and len(flying) < most:
@@ -107,7 +109,7 @@ def _submit_all(
                 chunk = plan.chunk(
                     pieces[index], carry if carry is not None and len(carry) else None, threads, travels
                 )
-                future = executor.submit(run_chunk, chunk)
+                future = executor.submit(run_chunk, chunk._replace(stop=stop))
                 flying[index] = future
                 future.add_done_callback(lambda done, index=index: finished.put((index, done)))
             index, future = finished.get()
@@ -117,6 +119,8 @@ def _submit_all(
             if index + 1 in goes_on and index + 1 in is_wanted:
                 ready.append(index + 1)
     finally:
+        if stop is not None:
+            stop.set()
         for future in flying.values():
             future.cancel()
 

@@ -208,11 +208,14 @@ fn on_surface(
     };
     let decision = decide(system, j, Arrival::Start, t, x, &mode.signs())?;
     let candidates = decision.candidates.iter().map(|&e| mode.with(j, e));
-    let candidates: Vec<Mode> = candidates.collect();
+    let mut candidates: Vec<Mode> = candidates.collect();
+    if decision.turns_back() {
+        candidates.clear();
+    }
     let (minus, plus) = (fields.at(0)[0], fields.at(1)[0]);
     let slides = decision.entry == 0;
     Ok(Some(Classification {
-        mode: Some(mode.with(j, decision.entry)),
+        mode: (!candidates.is_empty()).then(|| mode.with(j, decision.entry)),
         multipliers: slides
             .then(|| ((minus + plus) / (minus - plus)).clamp(-1.0, 1.0))
             .into_iter()

@@ -15,7 +15,7 @@ use smallvec::{smallvec, SmallVec};
 use super::detect::Found;
 use super::integrator::Integrator;
 use super::placement::Sides;
-use super::transition::{located_surfaces, Values};
+use super::transition::{located_surfaces, Left, Values};
 use super::Stop;
 use crate::action::Trigger;
 use crate::error::FieldError;
@@ -23,8 +23,11 @@ use crate::event::EventFunction;
 use crate::field::SmoothField;
 use crate::mode::Mode;
 use crate::solution::Switch;
-use crate::switching::{first_nonzero, Kind};
-use crate::tolerances::{MOST_ACTIONS_AT_ONE_TIME, PENETRATION, SURFACE_NOISE};
+use crate::switching::{first_nonzero, Kind, Leading};
+use crate::system::dot;
+use crate::tolerances::{
+    DEPARTS_TANGENTIALLY, MOST_ACTIONS_AT_ONE_TIME, PENETRATION, SURFACE_NOISE,
+};
 
 /// The surfaces in one instant, as far as they trigger actions.
 struct Approach {
@@ -48,10 +51,13 @@ impl Integrator<'_> {
         };
         let mut due = self.timetable.take(self.actions, self.t);
         self.update_horizon();
-        for j in (0..on_surface.len()).filter(|&j| on_surface[j] && self.is_only_trigger(j)) {
+        for j in 0..on_surface.len() {
+            if !on_surface[j] || !self.is_only_trigger(j) {
+                continue;
+            }
             let side = self.trigger_side(j, None);
             mode.set(j, side);
-            if self.goes_through(j, side, &mode)? {
+            if self.goes_through(j, side, &mode, &on_surface)? {
                 due.extend(self.triggered_at(j, side));
             }
         }
@@ -130,12 +136,16 @@ impl Integrator<'_> {
             self.note_residuals(h, &surfaces);
             return self.act(due).map(Some);
         }
-        if surfaces.iter().any(|&j| {
-            let departs = rates[j] * f64::from(entries[j]) > 0.0;
-            departs && self.is_only_trigger(j)
-        }) {
+        let departs =
+            |j: &&usize| rates[**j] * f64::from(entries[**j]) > 0.0 && self.is_only_trigger(**j);
+        let departing: Vec<(usize, f64)> = surfaces
+            .iter()
+            .filter(departs)
+            .map(|&j| (j, rates[j]))
+            .collect();
+        if !departing.is_empty() {
             self.note_residuals(h, &surfaces);
-            return self.go_on_unless_stuck().map(Some);
+            return self.go_on_unless_stuck(&departing).map(Some);
         }
         if self.motion.is_in_contact() {
             return self.decide_in_contact(event, &surfaces).map(Some);
@@ -197,6 +207,7 @@ impl Integrator<'_> {
             passes: vec![false; before.entries().len()],
         };
         let mut count = 0;
+        let arrived = self.x.clone();
         self.push_back(&before)?;
         let start = self.surface_values(&before.signs())?;
         while !due.is_empty() {
@@ -227,6 +238,7 @@ impl Integrator<'_> {
         let passing = approach.passes.iter().enumerate();
         self.passing = passing.filter(|(_, p)| **p).map(|(j, _)| j).collect();
         self.recorder.jump(self.t, &self.x);
+        self.recorder.set_jump(first, &arrived, &self.x);
         let (after, left) = match self.place(Some(&before))? {
             Ok(placed) => placed,
             Err(stop) => return Ok(Some(stop)),
@@ -257,7 +269,7 @@ impl Integrator<'_> {
         let Some(Sides { mode, on_surface }) = self.sides(Some(before))? else {
             return Ok(None);
         };
-        let goes_on = on_surface[j] && self.goes_through(j, side, &mode)?;
+        let goes_on = on_surface[j] && self.goes_through(j, side, &mode, &on_surface)?;
         Ok(Some((j, goes_on)))
     }
 
@@ -289,14 +301,27 @@ impl Integrator<'_> {
         Ok(None)
     }
 
-    /// Decides the mode anew where an event turned out to be none.
-    fn go_on_unless_stuck(&mut self) -> Result<Option<Stop>, FieldError> {
+    /// Decides the mode anew where an event turned out to be none: the motion leaves the surfaces `departing` at these
+    /// rates.
+    fn go_on_unless_stuck(
+        &mut self,
+        departing: &[(usize, f64)],
+    ) -> Result<Option<Stop>, FieldError> {
         let before = self.motion.mode.clone();
-        let (after, left) = match self.place(Some(&before))? {
+        let (after, mut left) = match self.place(Some(&before))? {
             Ok(placed) => placed,
             Err(stop) => return Ok(Some(stop)),
         };
         self.residuals.clear();
+        for &(j, value) in departing.iter().filter(|(j, _)| self.is_internal(*j)) {
+            left.push(Left::Surface(j, Leading { order: 1, value }));
+        }
+        let changed =
+            (0..before.entries().len()).filter(|&j| before.entries()[j] != after.entries()[j]);
+        let changed: Vec<usize> = changed.collect();
+        if !changed.is_empty() {
+            self.record(before, after.clone(), &changed);
+        }
         self.begin(after, &left)
     }
 
@@ -345,7 +370,7 @@ impl Integrator<'_> {
             return Ok(Vec::new());
         };
         let mut due = Vec::new();
-        for (j, on_surface) in on_surface.into_iter().enumerate() {
+        for j in 0..on_surface.len() {
             let side = approach.side[j];
             if side == 0 || self.actions.at_surface(j).is_none() {
                 continue;
@@ -356,7 +381,7 @@ impl Integrator<'_> {
             if was_done && self.is_internal(j) {
                 continue;
             }
-            if !on_surface {
+            if !on_surface[j] {
                 let now = mode.entries()[j];
                 // The jump of its own action may complete the passage that triggered it.
                 if now != side && !was_done {
@@ -365,7 +390,7 @@ impl Integrator<'_> {
                 (approach.side[j], approach.passes[j]) = (now, false);
                 continue;
             }
-            if !self.goes_through(j, side, &mode)? {
+            if !self.goes_through(j, side, &mode, &on_surface)? {
                 approach.passes[j] = false;
             } else if !approach.passes[j] {
                 due.extend(self.triggered_at(j, side));
@@ -378,14 +403,51 @@ impl Integrator<'_> {
 
     /// Does the motion lead from this side through a surface that the point lies on? A body that is pressed on
     /// without velocity does not: it stays.
-    fn goes_through(&self, j: usize, side: i8, mode: &Mode) -> Result<bool, FieldError> {
+    fn goes_through(
+        &mut self,
+        j: usize,
+        side: i8,
+        mode: &Mode,
+        on_surface: &[bool],
+    ) -> Result<bool, FieldError> {
         let mode = mode.with(j, side);
-        let leading = first_nonzero(self.system, j, side, 0, self.t, &self.x, &mode.signs())?;
+        let leading = match self.rate_of_sliding(j, on_surface)? {
+            Some(value) => Leading { order: 1, value },
+            None => first_nonzero(self.system, j, side, 0, self.t, &self.x, &mode.signs())?,
+        };
         if leading.sign() != -side {
             return Ok(false);
         }
         let is_still = leading.order != 1 || self.is_slow(j, leading.value, &mode)?;
         Ok(!is_still || !self.can_stay(j, &mode)?)
+    }
+
+    /// The rate of h_j where the motion slides on, at a point on its surfaces; `None` if it does not, or h_j is tangent.
+    fn rate_of_sliding(
+        &mut self,
+        j: usize,
+        on_surface: &[bool],
+    ) -> Result<Option<f64>, FieldError> {
+        let sliding = self.motion.sliding();
+        let may_slide = sliding.iter().all(|&k| k != j && on_surface[k]);
+        if sliding.is_empty() || !may_slide || self.motion.is_in_contact() {
+            return Ok(None);
+        }
+        let rate = self.rates_here()?[j];
+        let is_admissible = self
+            .motion
+            .field
+            .last_exits()
+            .iter()
+            .all(|&exit| exit > 0.0);
+        let mut gradient = vec![0.0; self.x.len()];
+        let signs = &self.motion.signs;
+        let ht = self
+            .system
+            .gradient(j, self.t, &self.x, signs, &mut gradient)?;
+        let size = ht.abs() + dot(&gradient, &gradient).sqrt();
+        let is_clear = rate.abs() > DEPARTS_TANGENTIALLY * size;
+        Ok((is_admissible && is_clear).then_some(rate))
     }
 
     /// The sides of a mode; where it is in contact, the free side.

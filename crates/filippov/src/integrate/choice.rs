@@ -22,14 +22,7 @@ impl Integrator<'_> {
         j: usize,
         mut decision: Decision,
     ) -> Decided {
-        // Both fields may turn back to the surface, as at a two-fold that is invisible from both sides.
-        let leading = match decision.entry {
-            -1 => Some(decision.minus),
-            1 => Some(decision.plus),
-            _ => None,
-        };
-        let turns_back = leading.is_some_and(|leading| leading.sign() == -decision.entry);
-        if turns_back {
+        if decision.turns_back() {
             return Err(Stop::NonUnique {
                 surfaces: vec![j],
                 candidates: Vec::new(),

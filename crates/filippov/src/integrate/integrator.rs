@@ -87,7 +87,7 @@ pub struct Integrator<'a> {
     pub(super) n_aims: usize,
     /// Largest recent step of this motion.
     pub(super) recent_dt: f64,
-    /// Time of the last switch, and how many came at that time.
+    /// The first of the last switches without progress of time, and how many came since.
     pub(super) last_switch: (f64, u32),
     /// What its decision found of the root that the next motion begins at.
     pub(super) decided: DecidedRoot,

@@ -12,8 +12,9 @@ use crate::event::EventFunction;
 use crate::field::{IntersectionExit, IntersectionField, MeetingFields, SlidingField, SmoothField};
 use crate::mode::Mode;
 use crate::switching::{
-    admissible, decide_intersection, first_nonzero, has_one_mode_only, merged_root, resolve,
-    Continuation, ExitKind, Incoming, Leading, NormalFields, Resolution, Undecided,
+    admissible, decide, decide_intersection, first_nonzero, has_one_mode_only, merged_root,
+    resolve, Arrival, Continuation, ExitKind, Incoming, Leading, NormalFields, Resolution,
+    Undecided,
 };
 use crate::system::{dot, dot_magnitude};
 use crate::tolerances::{DEPARTS_TANGENTIALLY, DRIFT_SHARE, EPS, MOST_LISTED, MOST_MEETING};
@@ -303,12 +304,47 @@ impl Integrator<'_> {
         } else {
             &[]
         };
+        if let Some(decided) = self.decide_at_tangency(&after, meeting)? {
+            return Ok(decided);
+        }
         let left = self.departures(&after, &leaving, multipliers)?;
         self.decided = DecidedRoot {
             multipliers: multipliers.to_vec(),
             oscillates: after == preferred && resolution.oscillates,
         };
         Ok(Ok((after, left)))
+    }
+
+    /// Where the motion is to slide on one of the surfaces and both of its fields are tangent there: what higher
+    /// derivatives say of that surface.
+    fn decide_at_tangency(
+        &mut self,
+        after: &Mode,
+        meeting: &[usize],
+    ) -> Result<Option<Decided>, FieldError> {
+        let mut slid_on = after.sliding_set();
+        let (Some(j), None) = (slid_on.next(), slid_on.next()) else {
+            return Ok(None);
+        };
+        let decision = decide(
+            self.system,
+            j,
+            Arrival::Start,
+            self.t,
+            &self.x,
+            &after.signs(),
+        )?;
+        let is_tangent = decision.minus.order != 1 && decision.plus.order != 1;
+        if !is_tangent || decision.entry == 0 || self.system.sticks_at(j) {
+            return Ok(None);
+        }
+        let (after, mut left) = match self.follow_at_surface(after, j, decision) {
+            Ok(followed) => followed,
+            Err(stop) => return Ok(Some(Err(stop))),
+        };
+        let others: Vec<usize> = meeting.iter().copied().filter(|&k| k != j).collect();
+        left.extend(self.departures(&after, &others, &[])?);
+        Ok(Some(Ok((after, left))))
     }
 
     fn decide_by_higher_order(
@@ -418,7 +454,7 @@ impl Integrator<'_> {
     }
 
     /// The field of a mode at a point near the current one.
-    fn velocity_in(
+    pub(super) fn velocity_in(
         &mut self,
         mode: &Mode,
         multipliers: &[f64],

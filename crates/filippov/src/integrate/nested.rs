@@ -97,20 +97,61 @@ impl Integrator<'_> {
         let mut beyond = after.clone();
         let (jumped, landed) = self.let_others_jump(mode, &mut beyond, (meeting, meeting))?;
         if jumped.is_empty() {
-            return Ok(decided);
+            return self.compare_with_opposite(mode, meeting, decided);
         }
         if let [j] = meeting {
             let mut opposite = mode.with(*j, -after.entries()[*j]);
             let (_, on_opposite) = self.let_others_jump(mode, &mut opposite, (meeting, meeting))?;
+            let mut left = Vec::new();
             for (mode, landed) in [(beyond, landed), (opposite, on_opposite)] {
                 if mode.entries()[*j] != 0 {
-                    if let Some(decided) = self.leave_to(&mode, *j, &landed)? {
-                        return Ok(Ok(decided));
-                    }
+                    left.extend(self.leave_to(&mode, *j, &landed)?);
                 }
+            }
+            let modes: Vec<Mode> = left.iter().map(|(mode, _)| mode.clone()).collect();
+            let chosen = match modes.as_slice() {
+                [] => None,
+                [only] => Some(only.clone()),
+                [preferred, ..] => match self.choose(meeting, preferred.clone(), modes.clone()) {
+                    Ok(chosen) => Some(chosen),
+                    Err(stop) => return Ok(Err(stop)),
+                },
+            };
+            if let Some(decided) = left
+                .into_iter()
+                .find(|(mode, _)| Some(mode) == chosen.as_ref())
+            {
+                return Ok(Ok(decided));
             }
         }
         Ok(Err(between(meeting, &jumped)))
+    }
+
+    /// A start on one surface that the motion leaves: if others jump on its other side, it may lead away there too.
+    fn compare_with_opposite(
+        &mut self,
+        mode: &Mode,
+        meeting: &[usize],
+        decided: Decided,
+    ) -> Result<Decided, FieldError> {
+        let (Ok((after, _)), &[j]) = (&decided, meeting) else {
+            return Ok(decided);
+        };
+        let side = after.entries()[j];
+        let mut opposite = mode.with(j, -side);
+        let (jumped, landed) = self.let_others_jump(mode, &mut opposite, (meeting, meeting))?;
+        if side == 0 || jumped.is_empty() {
+            return Ok(decided);
+        }
+        let Some(other) = self.leave_to(&opposite, j, &landed)? else {
+            return Ok(decided);
+        };
+        let modes = vec![after.clone(), other.0.clone()];
+        Ok(match self.choose(meeting, after.clone(), modes) {
+            Ok(chosen) if chosen == other.0 => Ok(other),
+            Ok(_) => decided,
+            Err(stop) => Err(stop),
+        })
     }
 
     /// The motion that leaves h_j = 0 to its side in `mode`, if its field leads there. What it slides on besides, and

@@ -8,8 +8,8 @@ use crate::error::FieldError;
 use crate::field::{ContactField, Projector, SmoothField};
 use crate::mode::Mode;
 use crate::switching::{decide, first_nonzero, Arrival, Leading};
-use crate::system::{dot, surfaces_that_matter};
-use crate::tolerances::{SLIPPED, SLOW, SURFACE_NOISE};
+use crate::system::{dot, dot_magnitude, surfaces_that_matter};
+use crate::tolerances::{DEPARTS_TANGENTIALLY, SLIPPED, SLOW, SURFACE_NOISE};
 
 /// The sides that a point is on.
 pub(super) struct Sides {
@@ -154,7 +154,22 @@ impl Integrator<'_> {
         let tolerance: f64 = components
             .map(|(i, (g, x))| g.abs() * self.scale.of(i, *x, *x))
             .sum();
-        Ok((h.abs() <= SLIPPED * tolerance).then_some(side))
+        let is_near = h.abs() <= SLIPPED * tolerance;
+        Ok((is_near && self.leaves_point_alone(j, signs)?).then_some(side))
+    }
+
+    /// Does the action at surface `j` leave h_j as it is, as an impact does? It does not move bodies, but their velocities.
+    fn leaves_point_alone(&self, j: usize, signs: &[f64]) -> Result<bool, FieldError> {
+        let Some((action, _)) = self.actions.at_surface(j) else {
+            return Ok(false);
+        };
+        let (mut moved, mut q) = (self.x.clone(), self.motion.discrete.clone());
+        action.map.apply(self.t, &mut moved, signs, &mut q)?;
+        let mut h = [(); 2].map(|()| vec![0.0; signs.len()]);
+        self.system.surfaces(self.t, &self.x, signs, &mut h[0])?;
+        self.system.surfaces(self.t, &moved, signs, &mut h[1])?;
+        let size = self.system.surface_size(j, self.t, &self.x, signs)?;
+        Ok((h[0][j] - h[1][j]).abs() <= SURFACE_NOISE * size)
     }
 
     /// Moves the point back onto the triggers that it slipped through.
@@ -189,7 +204,10 @@ impl Integrator<'_> {
             let side = self.trigger_side(j, memory);
             mode.set(j, side);
             let signs = mode.signs();
-            let leading = first_nonzero(self.system, j, side, 0, self.t, &self.x, &signs)?;
+            let leading = match self.rate_where_it_slides(j, &mode, &meeting, memory)? {
+                Some(value) => Leading { order: 1, value },
+                None => first_nonzero(self.system, j, side, 0, self.t, &self.x, &signs)?,
+            };
             let is_slow = leading.order == 1 && self.is_slow(j, leading.value, &mode)?;
             let is_still = leading.order != 1 || is_slow;
             let stays = leading.sign() != side || is_slow;
@@ -225,6 +243,39 @@ impl Integrator<'_> {
             left.extend(departing.map(|t| Left::Surface(t.surface, t.leading)));
             (mode, left)
         }))
+    }
+
+    /// The rate of h_j along the motion that slides on surfaces of `meeting`, where it does and is not tangent to h_j.
+    fn rate_where_it_slides(
+        &mut self,
+        j: usize,
+        mode: &Mode,
+        meeting: &[usize],
+        memory: Option<&Mode>,
+    ) -> Result<Option<f64>, FieldError> {
+        if meeting.is_empty() {
+            return Ok(None);
+        }
+        // A trial: what is not unique is told when it is decided.
+        let (n_warnings, n_choices) = (self.warnings.len(), self.n_choices);
+        let decided = self.place_on(mode.clone(), meeting, memory)?;
+        self.warnings.truncate(n_warnings);
+        self.n_choices = n_choices;
+        let multipliers = std::mem::take(&mut self.decided).multipliers;
+        let Ok((after, _)) = decided else {
+            return Ok(None);
+        };
+        if after.codimension() == 0 {
+            return Ok(None);
+        }
+        let (x, mut velocity) = (self.x.clone(), vec![0.0; self.x.len()]);
+        self.velocity_in(&after, &multipliers, self.t, &x, &mut velocity)?;
+        let mut gradient = vec![0.0; x.len()];
+        let signs = after.signs();
+        let ht = self.system.gradient(j, self.t, &x, &signs, &mut gradient)?;
+        let rate = ht + dot(&gradient, &velocity);
+        let size = ht.abs() + dot_magnitude(&gradient, &velocity);
+        Ok((rate.abs() > DEPARTS_TANGENTIALLY * size).then_some(rate))
     }
 
     /// The side from which the action at surface `j` is triggered.

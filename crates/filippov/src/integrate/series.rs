@@ -21,10 +21,13 @@ impl Integrator<'_> {
             return self.start_implicit();
         }
         // Whether a surface is left that h = 0 all along was expected of is seen at the ends of steps only.
+        // A series that ends at the surface that is left would be left itself after a step of no length.
+        let starts_clear = || self.motion.monitored.iter().all(|m| m.deflation.is_none());
         let may = !self.motion.is_in_contact()
             && self.motion.resting.is_empty()
             && !self.slides_by_rule()
-            && self.motion.has_bounds();
+            && self.motion.has_bounds()
+            && (self.system.is_analytic() || starts_clear());
         if let (Some(taylor), true) = (&self.stepper.taylor, may) {
             let (system, order) = (self.system, taylor.order());
             let is_auto = self.options.method == Method::Auto;

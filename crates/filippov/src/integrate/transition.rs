@@ -12,7 +12,7 @@ use crate::field::{eval_on_side, SmoothField};
 use crate::mode::Mode;
 use crate::solution::Switch;
 use crate::switching::{decide, first_nonzero, Arrival, Decision, Kind, Leading};
-use crate::tolerances::{MOST_SWITCHES_AT_ONE_TIME, SURFACE_NOISE};
+use crate::tolerances::{MOST_SWITCHES_AT_ONE_TIME, NO_PROGRESS, SURFACE_NOISE};
 
 /// One value per surface; few are kept without allocation.
 pub(super) type Values = SmallVec<[f64; 8]>;
@@ -110,12 +110,15 @@ impl Integrator<'_> {
     /// Decides what follows the event and starts it.
     pub(super) fn switch(&mut self, event: &Found) -> Result<Option<Stop>, FieldError> {
         self.stats.n_switches += 1;
-        let repeated = if self.last_switch.0 == self.t {
-            self.last_switch.1 + 1
-        } else {
+        let (since, before) = self.last_switch;
+        let is_progress = self.t != since && self.t - since > NO_PROGRESS * self.t.abs();
+        let repeated = if is_progress || since.is_nan() {
+            self.last_switch = (self.t, 0);
             0
+        } else {
+            self.last_switch.1 = before + 1;
+            before + 1
         };
-        self.last_switch = (self.t, repeated);
         if repeated > MOST_SWITCHES_AT_ONE_TIME {
             if let Some(limit) = self.limit_here()? {
                 let mode = self.motion.mode.clone();

@@ -22,7 +22,8 @@ impl Integrator<'_> {
             return Ok(None);
         };
         let (j, mut x) = (field.surface(), self.x.clone());
-        if self.system.sticks_at(j) {
+        // Differences across the surface would mix both fields: only exact derivatives tell a two-fold.
+        if self.system.sticks_at(j) || self.system.lie_tolerance(2) > TANGENT {
             return Ok(None);
         }
         let mut velocity = vec![0.0; x.len()];

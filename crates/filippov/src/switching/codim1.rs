@@ -37,6 +37,18 @@ pub struct Decision {
     pub plus: Leading,
 }
 
+impl Decision {
+    /// Is there no continuation? Both fields turn back to the surface, as at a two-fold that is invisible from both sides.
+    pub fn turns_back(&self) -> bool {
+        let leading = match self.entry {
+            -1 => self.minus,
+            1 => self.plus,
+            _ => return false,
+        };
+        leading.sign() == -self.entry
+    }
+}
+
 /// Decides what follows at a point of h_j = 0.
 ///
 /// Let s- and s+ be the signs of the first non-vanishing derivatives of h along f- and f+. A motion
@@ -187,8 +199,10 @@ fn two_fold_motions(
         [k / a, c / k]
     };
     let inside = roots.into_iter().filter(|&w| w > 0.0 && w < 1.0);
+    let rounding = TANGENT * (p.abs() + q.abs() + r.abs() + s.abs());
+    let rate = |value: f64| if value.abs() > rounding { value } else { 0.0 };
     Ok(inside
-        .map(|w| [w, p + w * (q - p), r + w * (s - r)])
+        .map(|w| [w, rate(p + w * (q - p)), rate(r + w * (s - r))])
         .collect())
 }
 

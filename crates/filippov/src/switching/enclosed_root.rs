@@ -22,7 +22,8 @@ pub struct EnclosedRoot {
     pub diagonal: IntervalVector,
 }
 
-/// What could be said of the multipliers.
+/// What could be said of the multipliers. A box would be an allocation in every step.
+#[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug)]
 pub enum RootBounds {
     /// They are proved to lie there.
