@@ -14,11 +14,12 @@ import pytest
 # at one step length depends on where the events lie within their steps: 8 lengths within 10 % are averaged.
 JITTER = np.linspace(0.9, 1.1, 8)
 FIXED = {"rtol": 0.1, "atol": 0.1}
-METHODS = {"DOPRI5": 5.0, "Rodas5P": 5.0, "DOP853": 8.0}
+METHODS = {"DOPRI5": 5.0, "Rodas5P": 5.0, "DOP853": 8.0, "Midpoint": 2.0}
 LEVELS = {
     "DOPRI5": np.geomspace(0.05, 0.0125, 6),
     "Rodas5P": np.geomspace(0.05, 0.0125, 6),
     "DOP853": np.geomspace(0.25, 0.1, 6),
+    "Midpoint": np.geomspace(0.003, 0.001, 6),
 }
 
 

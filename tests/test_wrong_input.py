@@ -102,12 +102,6 @@ def test_first_step_longer_than_the_interval() -> None:
         fl.solve_ivp(relay, (0, 1), [1.0], first_step=2.0)
 
 
-@pytest.mark.parametrize("method", ["Midpoint"])
-def test_planned_methods(method: str) -> None:
-    with pytest.raises(fl.InputError, match=r'^method: .*not available yet; use "auto"'):
-        fl.solve_ivp(relay, (0, 1), [1.0], method=method)
-
-
 @pytest.mark.parametrize("method", ["Radau", "BDF", "LSODA"])
 def test_stiff_methods_name_the_replacement(method: str) -> None:
     with pytest.raises(fl.InputError, match=r"^method: .*Rodas5P"):

@@ -18,8 +18,8 @@ __all__ = ["Options", "check_options", "check_t_span", "check_y0"]
 
 Array = npt.NDArray[np.float64]
 
-_METHODS = {"RK45": "DOPRI5", **{name: name for name in ("auto", "DOPRI5", "Taylor", "DOP853", "Rodas5P")}}
-_PLANNED_METHODS = ("Midpoint",)
+_NAMED_METHODS = ("auto", "DOPRI5", "Taylor", "DOP853", "Rodas5P", "Midpoint")
+_METHODS = {"RK45": "DOPRI5", **{name: name for name in _NAMED_METHODS}}
 _STIFF_METHODS = ("Radau", "BDF", "LSODA")
 # name -> (available values, values that are planned)
 _POLICIES = {
@@ -45,6 +45,7 @@ class Options(NamedTuple):
     max_wall_time: float | None
     sliding: str
     nonunique: str
+    stabilization: float | None
     kappa: tuple[float, ...]
     t_eval: Array | None
     dense_output: bool
@@ -72,6 +73,7 @@ _DEFAULT_OPTIONS = Options(
     max_wall_time=None,
     sliding="canopy",
     nonunique="regularize",
+    stabilization=None,
     kappa=(),
     t_eval=None,
     dense_output=True,
@@ -85,7 +87,7 @@ _FOR_CORE = {id(_DEFAULT_OPTIONS): RunOptions(_DEFAULT_OPTIONS._asdict())}
 _REPEATABLE = frozenset(
     (
         *("method", "rtol", "atol", "max_step", "max_steps", "max_events", "max_wall_time"),
-        *("sliding", "nonunique", "keep", "dense_output"),
+        *("sliding", "nonunique", "keep", "dense_output", "stabilization"),
     )
 )
 _KNOWN: dict[tuple[Any, ...], Options] = {}
@@ -135,11 +137,9 @@ def check_method(method: Any) -> str:
     if isinstance(method, str):
         if method in _METHODS:
             return _METHODS[method]
-        if method in _PLANNED_METHODS:
-            raise InputError(f'method: "{method}" is not available yet; use "auto"')
         if method in _STIFF_METHODS:
             raise InputError(f'method: "{method}" is not offered; the method for stiff systems is "Rodas5P"')
-        hint = did_you_mean(method, [*_METHODS, *_PLANNED_METHODS])
+        hint = did_you_mean(method, _METHODS)
         raise InputError(f'method: unknown method {method!r}{hint}; use "auto"')
     raise InputError(f'method: a name such as "auto" is needed, not {type(method).__name__}')
 
@@ -279,6 +279,18 @@ def _check_policy(name: str, value: Any) -> str:
     if isinstance(value, str) and value in planned:
         raise InputError(f'{name}: "{value}" is not available yet; use {use}')
     raise InputError(f"{name}: unknown value {value!r}; use {use}")
+
+
+def _check_stabilization(value: Any) -> float | None:
+    """Return the factor of the term that draws sliding motions back; None for projection."""
+    if isinstance(value, str):
+        if value == "projection":
+            return None
+        hint = did_you_mean(value, ["projection"])
+        raise InputError(
+            f'stabilization: unknown value {value!r}{hint}; use "projection" or a positive number'
+        )
+    return _positive("stabilization", value)
 
 
 def check_kappa(kappa: Any) -> tuple[float, ...]:
@@ -461,6 +473,7 @@ def _real(value: Any) -> float:
 _CHECKS: dict[str, Callable[[Any, tuple[float, float], int], Any]] = {
     "sliding": lambda value, t_span, n: _check_policy("sliding", value),
     "nonunique": lambda value, t_span, n: _check_policy("nonunique", value),
+    "stabilization": lambda value, t_span, n: _check_stabilization(value),
     "kappa": lambda value, t_span, n: check_kappa(value),
     "zeno": lambda value, t_span, n: _check_policy("zeno", value),
     "keep": lambda value, t_span, n: _check_policy("keep", value),

@@ -63,6 +63,7 @@ def solve_ivp(
     max_step: float = np.inf,
     sliding: str = "canopy",
     nonunique: str = "regularize",
+    stabilization: str | float = "projection",
     kappa: npt.ArrayLike | None = None,
     zeno: str = "accumulate",
     keep: str = "steps",
@@ -94,7 +95,8 @@ def solve_ivp(
         whatever their cost; a motion without goes on with DOPRI5, and a warning says so. ``"DOPRI5"`` (or
         ``"RK45"``): the explicit Runge-Kutta pair of Dormand and Prince. ``"DOP853"``: that of order 8, for
         high accuracy where there are no series. ``"Rodas5P"``: for stiff motions, in every mode; Jacobians
-        from the traced function, by differences for a black box.
+        from the traced function, by differences for a black box. ``"Midpoint"``: the rule of order 2 as Dieci
+        and Lopez use it, which never evaluates the field of a region beyond a surface; for comparisons.
         ``sol.stats["method"]`` says what took the steps.
     t_eval : array_like, shape (k,), optional
         Times at which `y` is given, strictly sorted. It does not influence the steps. Default: the ends of
@@ -134,6 +136,11 @@ def solve_ivp(
         What to do where the solution is not unique: follow the limit of the regularised system and note the
         alternatives in `warnings`; raise `NonUniqueError`; or follow all alternatives: the solution returned
         is that of ``"regularize"``, and its `branches` are all of them, see `Branches`.
+    stabilization : {"projection"} or float, optional
+        What keeps sliding motions on their surfaces. ``"projection"``, the default: stages, steps and points
+        in between are projected, so that `h` is zero to rounding. A positive number ``C``: nothing is
+        projected, and the sliding field gets the term ``-C h grad(h)`` of Piiroinen and Kuznetsov, which
+        draws the motion back; `h` is then of the size of the tolerance, and a large ``C`` is stiff.
     kappa : float or array_like, shape (n_surfaces,), optional
         Where surfaces meet and the Filippov solution is not unique, the limit of the regularised system
         ``sign h_j -> clip(kappa_j h_j / eps, -1, 1)`` decides: positive numbers that scale the surfaces, in
@@ -205,6 +212,7 @@ def solve_ivp(
         "max_step": max_step,
         "sliding": sliding,
         "nonunique": nonunique,
+        "stabilization": stabilization,
         "kappa": kappa,
         "zeno": zeno,
         "keep": keep,

@@ -256,6 +256,7 @@ impl Run {
         dict.set_item("method", methods(&stats))?;
         dict.set_item("n_steps_taylor", stats.n_steps_taylor)?;
         dict.set_item("n_steps_dop853", stats.n_steps_dop853)?;
+        dict.set_item("n_steps_midpoint", stats.n_steps_midpoint)?;
         dict.set_item("n_steps_rodas5p", stats.n_steps_rodas5p)?;
         if let Some(since) = stats.stiff_since {
             dict.set_item("stiff_since", since)?;
@@ -345,6 +346,7 @@ fn methods(stats: &Stats) -> String {
         ("Rodas5P", stats.n_steps_rodas5p),
         ("Taylor", stats.n_steps_taylor),
         ("DOP853", stats.n_steps_dop853),
+        ("Midpoint", stats.n_steps_midpoint),
     ];
     let explicit = stats.n_steps - others.iter().map(|(_, count)| count).sum::<u64>();
     let mut names: Vec<&str> = others

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use filippov::{Keep, Method, Mode, NonUnique, Options, SlidingRule};
+use filippov::{Keep, Method, Mode, NonUnique, Options, SlidingRule, Stabilization};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -134,6 +134,12 @@ fn read_options(given: &Bound<'_, PyDict>) -> PyResult<(Options, Option<Py<PyAny
                     }
                 }
             }
+            "stabilization" => {
+                options.stabilization = match value.extract::<Option<f64>>()? {
+                    None => Stabilization::Projection,
+                    Some(factor) => Stabilization::Restoring(factor),
+                }
+            }
             "kappa" => options.kappa = value.extract()?,
             "choices" => {
                 let choices: Vec<Vec<i8>> = value.extract()?;
@@ -162,6 +168,7 @@ fn method(name: &str) -> PyResult<Method> {
         "DOPRI5" => Ok(Method::Dopri5),
         "Taylor" => Ok(Method::Taylor),
         "DOP853" => Ok(Method::Dop853),
+        "Midpoint" => Ok(Method::Midpoint),
         "Rodas5P" => Ok(Method::Rodas5p),
         _ => Err(PyValueError::new_err(format!(
             "method: unknown method {name:?}"

@@ -59,7 +59,7 @@ pub use integrate::{
     Warning, WarningCode,
 };
 pub use mode::{Mode, Signs};
-pub use options::{Keep, Method, NonUnique, Options, SlidingRule};
+pub use options::{Keep, Method, NonUnique, Options, SlidingRule, Stabilization};
 pub use solution::{Segment, Side, Solution, Switch, UserZero};
 pub use switching::Kind;
 pub use system::{

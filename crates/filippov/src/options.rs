@@ -52,6 +52,27 @@ pub enum Keep {
     Last,
 }
 
+/// What keeps a sliding motion on its surfaces.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Stabilization {
+    /// Stages, ends of steps and points of the continuous extension are projected.
+    #[default]
+    Projection,
+    /// Nothing is projected; the field gets the term -C sum h_j grad h_j, which draws the motion back (Piiroinen and
+    /// Kuznetsov 2008, equation 50).
+    Restoring(f64),
+}
+
+impl Stabilization {
+    /// The factor C, if the motion is drawn back.
+    pub fn restoring(self) -> Option<f64> {
+        match self {
+            Stabilization::Projection => None,
+            Stabilization::Restoring(factor) => Some(factor),
+        }
+    }
+}
+
 /// How a motion is integrated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
@@ -64,6 +85,8 @@ pub enum Method {
     Taylor,
     /// The Runge-Kutta method of Dormand and Prince of order 8.
     Dop853,
+    /// The explicit midpoint rule of Dieci and Lopez: one-sided, projected.
+    Midpoint,
     /// The Rosenbrock-Wanner method of Steinebach, for stiff motions.
     Rodas5p,
 }
@@ -94,6 +117,8 @@ pub struct Options {
     pub choices: Vec<Mode>,
     /// The sliding field where several surfaces meet.
     pub sliding: SlidingRule,
+    /// What keeps a sliding motion on its surfaces.
+    pub stabilization: Stabilization,
     /// Scaling of every surface in the regularisation that decides where the Filippov solution is not
     /// unique; 1 for all if empty.
     pub kappa: Vec<f64>,
@@ -119,6 +144,7 @@ impl Default for Options {
             nonunique: NonUnique::Regularize,
             choices: Vec::new(),
             sliding: SlidingRule::default(),
+            stabilization: Stabilization::default(),
             kappa: Vec::new(),
             t_eval: None,
             keep: Keep::default(),

@@ -4,7 +4,7 @@ use smallvec::SmallVec;
 
 use crate::integrate::{Stats, Stop, Warning};
 use crate::mode::Mode;
-use crate::options::{Keep, Options, SlidingRule};
+use crate::options::{Keep, Options, Stabilization};
 use crate::section::Observer;
 use crate::solution::{Segment, Solution, Step, Switch, UserZero};
 use crate::stepper::Interpolant;
@@ -225,7 +225,7 @@ impl Recorder {
     #[allow(clippy::too_many_arguments)]
     pub fn finish(
         mut self,
-        (t_last, x, sliding): (f64, &[f64], SlidingRule),
+        (t_last, x, options): (f64, &[f64], &Options),
         mode: Mode,
         stop: Stop,
         stats: Stats,
@@ -254,7 +254,8 @@ impl Recorder {
             user_zeros,
             stop,
             t_last,
-            sliding,
+            sliding: options.sliding,
+            is_projected: options.stabilization == Stabilization::Projection,
             mode,
             stats,
             warnings,

@@ -94,6 +94,8 @@ pub struct Solution {
     pub t_last: f64,
     /// The sliding field where several surfaces meet.
     pub sliding: SlidingRule,
+    /// Are sliding motions on their surfaces by projection?
+    pub is_projected: bool,
     /// The mode at the end.
     pub mode: Mode,
     /// Counters.
@@ -117,7 +119,7 @@ impl Solution {
         &self.y_last
     }
 
-    /// Writes the state at `t` from the continuous extension; on the surface while sliding.
+    /// Writes the state at `t` from the continuous extension; on the surface while sliding, if it is projected.
     /// Returns the mode there, or `None` outside of the span or without dense output.
     ///
     /// # Errors
@@ -166,7 +168,7 @@ impl Solution {
             .partition_point(|s| s.steps.1 <= index)
             .min(self.segments.len() - 1);
         let Segment { mode, discrete, .. } = &self.segments[segment];
-        if mode.codimension() > 0 {
+        if mode.codimension() > 0 && self.is_projected {
             system.set_discrete(discrete);
             let set: Vec<usize> = mode.sliding_set().collect();
             Projector::new(n, system.n_surfaces()).project_onto(

@@ -108,8 +108,7 @@ pub const JUMP_SHARE: f64 = 0.9;
 /// than this fraction of the tolerance.
 pub const ARRIVED: f64 = 1e-3;
 
-/// Less than this, relative to the time, is no progress of it: bodies that hit one another with the speed of rounding do so
-/// at intervals of some hundred roundings.
+/// Less than this, relative to the time, is no progress: bodies with the speed of rounding hit one another that often.
 pub const NO_PROGRESS: f64 = 32768.0 * EPS;
 
 /// That many switches without any progress of time end a run.
@@ -432,23 +431,24 @@ pub const VANISHING_MULTIPLIER: f64 = 1e-9;
 /// An expression of whole numbers is one itself within this: a few roundings.
 pub const WHOLE_NUMBER: f64 = 1e-12;
 
-/// A switching function above this is not looked at for being zero all along a step: the rounding of states up to
-/// thousands is below it.
+/// Functions above this are not looked at for being zero all along a step: rounding of states up to thousands is below.
 pub const NEARLY_ZERO: f64 = 1e-10;
 
 /// Distance, in units of 1 plus the size of a component, at which two surfaces are compared ...
 pub const BESIDE: f64 = 1e-3;
 
-/// ... and how far apart they may be there, in units of the gradient, to be in one place: far below the square of that
-/// distance, by which surfaces that touch are apart.
+/// ... and how far apart they may be there, in units of the gradient: far below the square of that distance.
 pub const COINCIDE: f64 = 1e-11;
 
-/// A sliding motion has come to a two-fold where both normal components vanish within this multiple of the tolerance of
-/// the state: errors of some steps make up the multiplier there.
-pub const AT_TWO_FOLD: f64 = 100.0;
+/// Sliding has come to a two-fold where both normal components vanish within this multiple of the tolerance: then errors
+/// of some steps make up the multiplier.
+pub const AT_TWO_FOLD: f64 = 10.0;
 
 /// Newton's method has come to a two-fold, in tolerances of the state: far below what matters, above rounding.
 pub const SETTLED: f64 = 1e-6;
+
+/// A function beyond zero by more than this on one side of what is slid on has another sign there: steps end before.
+pub const BETWEEN_SIDES: f64 = 1e-8;
 
 /// A motion that was to stay on a surface has left it where h is above this multiple of the tolerance: errors of many
 /// steps add up.

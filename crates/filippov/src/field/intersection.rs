@@ -72,6 +72,8 @@ pub struct IntersectionField<'a> {
     /// Whether the regularised motion oscillates around the root of three and more surfaces, once it is known.
     oscillates: Option<bool>,
     projector: Projector,
+    /// The factor of the term that draws the motion back, in place of the projection.
+    restoring: Option<f64>,
     n_evaluations: u64,
 }
 
@@ -109,6 +111,7 @@ impl<'a> IntersectionField<'a> {
             slack: vec![0.0; 2 * set.len()],
             oscillates: None,
             projector: Projector::new(system.n_states(), system.n_surfaces()),
+            restoring: None,
             n_evaluations: 0,
         }
     }
@@ -129,6 +132,13 @@ impl<'a> IntersectionField<'a> {
                 _ => RuleFailure::TooManySurfaces { m },
             });
         }
+        self
+    }
+
+    /// The same drawn back to the surfaces by a term with this factor, if there is one, and not projected.
+    #[must_use]
+    pub fn with_restoring(mut self, restoring: Option<f64>) -> Self {
+        self.restoring = restoring;
         self
     }
 
@@ -237,11 +247,14 @@ impl<'a> IntersectionField<'a> {
         &self.exits
     }
 
-    /// Moves `x` onto the intersection.
+    /// Moves `x` onto the intersection, if the motion is projected.
     ///
     /// # Errors
     /// If a function of the user raises.
     pub fn project(&mut self, t: f64, x: &mut [f64]) -> Result<(), FieldError> {
+        if self.restoring.is_some() {
+            return Ok(());
+        }
         match &mut self.affine {
             Some(law) if self.set.len() > MOST_MEETING => law.project(t, x, &self.signs),
             _ => self
@@ -317,7 +330,13 @@ fn by_distance(tracked: &[(f64, Vec<f64>)], t: f64) -> Vec<&[f64]> {
 impl SmoothField for IntersectionField<'_> {
     fn eval(&mut self, t: f64, x: &mut [f64], dx: &mut [f64]) -> Result<(), FieldError> {
         self.project(t, x)?;
-        self.solve(t, x, dx)
+        self.solve(t, x, dx)?;
+        if let Some(factor) = self.restoring {
+            let term = (&self.set[..], factor);
+            self.projector
+                .pull_back(self.system, term, (t, x), &self.signs, dx)?;
+        }
+        Ok(())
     }
 
     fn eval_unprojected(

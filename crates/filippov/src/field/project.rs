@@ -97,6 +97,28 @@ impl Projector {
         Ok(())
     }
 
+    /// Adds the term that draws a point beside the surfaces back to them, -C sum h_j grad h_j.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn pull_back(
+        &mut self,
+        system: &dyn PiecewiseSystem,
+        (set, factor): (&[usize], f64),
+        (t, x): (f64, &[f64]),
+        signs: &[f64],
+        dx: &mut [f64],
+    ) -> Result<(), FieldError> {
+        system.surfaces(t, x, signs, &mut self.h)?;
+        for &j in set {
+            system.gradient(j, t, x, signs, &mut self.gradient)?;
+            let pull = factor * self.h[j];
+            let components = dx.iter_mut().zip(&self.gradient);
+            components.for_each(|(dx, g)| *dx -= pull * g);
+        }
+        Ok(())
+    }
+
     /// (N N^T)^-1 h; `None` if the gradients are dependent or h is not finite.
     fn shifts(&self, set: &[usize], n: usize) -> Option<Vector> {
         let row = |i: usize| &self.rows[i * n..(i + 1) * n];

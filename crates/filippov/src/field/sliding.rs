@@ -52,6 +52,8 @@ pub struct SlidingField<'a> {
     signs: Signs,
     sides: BothSides,
     projector: Projector,
+    /// The factor of the term that draws the motion back, in place of the projection.
+    restoring: Option<f64>,
     n_evaluations: u64,
     last: NormalComponents,
 }
@@ -65,12 +67,20 @@ impl<'a> SlidingField<'a> {
             signs: Signs::from_slice(signs),
             sides: BothSides::new(system.n_states(), system.n_surfaces()),
             projector: Projector::new(system.n_states(), system.n_surfaces()),
+            restoring: None,
             n_evaluations: 0,
             last: NormalComponents {
                 minus: f64::NAN,
                 plus: f64::NAN,
             },
         }
+    }
+
+    /// The same drawn back to the surface by a term with this factor, if there is one, and not projected.
+    #[must_use]
+    pub fn with_restoring(mut self, restoring: Option<f64>) -> Self {
+        self.restoring = restoring;
+        self
     }
 
     /// Starts anew on another surface.
@@ -91,11 +101,14 @@ impl<'a> SlidingField<'a> {
         self.last
     }
 
-    /// Moves `x` onto the surface.
+    /// Moves `x` onto the surface, if the motion is projected.
     ///
     /// # Errors
     /// If a function of the user raises.
     pub fn project(&mut self, t: f64, x: &mut [f64]) -> Result<(), FieldError> {
+        if self.restoring.is_some() {
+            return Ok(());
+        }
         self.projector
             .project(self.system, self.surface, t, x, &self.signs)
     }
@@ -137,7 +150,13 @@ impl<'a> SlidingField<'a> {
 impl SmoothField for SlidingField<'_> {
     fn eval(&mut self, t: f64, x: &mut [f64], dx: &mut [f64]) -> Result<(), FieldError> {
         self.project(t, x)?;
-        self.eval_unprojected(t, x, dx)
+        self.eval_unprojected(t, x, dx)?;
+        if let Some(factor) = self.restoring {
+            let term = (&[self.surface][..], factor);
+            self.projector
+                .pull_back(self.system, term, (t, x), &self.signs, dx)?;
+        }
+        Ok(())
     }
 
     /// Beside the surface h = 0 it is the field on h = constant.

@@ -36,10 +36,10 @@ use crate::options::{Method, Options};
 use crate::recorder::Recorder;
 use crate::solution::Solution;
 use crate::stepper::{
-    Attempt, Controller, Dop853, ErrorScale, Rodas5p, StepMethod, Stepper, Taylor,
+    Attempt, Controller, Dop853, ErrorScale, Midpoint, Rodas5p, StepMethod, Stepper, Taylor,
 };
 use crate::system::PiecewiseSystem;
-use crate::tolerances::SHORTEST_STEP;
+use crate::tolerances::{EPS, SHORTEST_STEP};
 
 /// Most steps between two looks at the clock and at the caller's wish to stop.
 const LONGEST_POLL: u64 = 64;
@@ -111,7 +111,7 @@ impl<'a> Integrator<'a> {
         super::start::check(system, t_span, y0, options, actions)?;
         let n = system.n_states();
         let uses_series = match options.method {
-            Method::Dopri5 | Method::Dop853 | Method::Rodas5p => false,
+            Method::Dopri5 | Method::Dop853 | Method::Midpoint | Method::Rodas5p => false,
             Method::Taylor => true,
             Method::Auto => system.is_analytic(),
         };
@@ -124,6 +124,7 @@ impl<'a> Integrator<'a> {
         match options.method {
             Method::Rodas5p => stepper.rodas5p = Some(Box::new(Rodas5p::new(n))),
             Method::Dop853 => stepper.dop853 = Some(Box::new(Dop853::new(n))),
+            Method::Midpoint => stepper.midpoint = Some(Box::new(Midpoint::new(n))),
             Method::Auto | Method::Dopri5 | Method::Taylor => {}
         }
         let undecided = Mode::new(vec![1; system.n_surfaces()]);
@@ -253,6 +254,9 @@ impl<'a> Integrator<'a> {
                 None => Ok(Some(Stop::NotFinite)),
             };
         }
+        if self.stepper.in_use() == StepMethod::Midpoint {
+            dt = self.keep_to_side(dt)?;
+        }
         let sliding = !self.motion.sliding().is_empty();
         match self.attempt(dt)? {
             Attempt::NotFinite => {
@@ -279,6 +283,7 @@ impl<'a> Integrator<'a> {
             StepMethod::Rodas5p => self.attempt_implicit(dt),
             StepMethod::Dopri5 => self.attempt_explicit(dt),
             StepMethod::Dop853 => self.attempt_dop853(dt),
+            StepMethod::Midpoint => self.attempt_midpoint(dt),
         }
     }
 
@@ -345,6 +350,21 @@ impl<'a> Integrator<'a> {
             self.halve_step(dt);
             return Ok(None);
         }
+        if sliding && self.system.has_nested_signs() {
+            let (mut end, mut t) = (self.stepper.end().to_vec(), t1);
+            if let Some(event) = &found {
+                self.stepper.interpolant().at(event.theta, &mut end);
+                t = self.t + event.theta * dt;
+            }
+            if let Some(stop) = self.differs_between_sides(t, &end)? {
+                if dt < SHORTEST_STEP * self.t.abs().max(1.0) / EPS.sqrt() {
+                    return Ok(Some(stop));
+                }
+                self.count_rejection(sliding);
+                self.halve_step(dt);
+                return Ok(None);
+            }
+        }
         let theta = found.as_ref().map_or(1.0, |event| event.theta);
         let is_implicit = self.stepper.in_use() == StepMethod::Rodas5p;
         if is_implicit && found.is_some() && self.aims_again(theta, dt) {
@@ -372,6 +392,7 @@ impl<'a> Integrator<'a> {
             StepMethod::Taylor => self.stats.n_steps_taylor += 1,
             StepMethod::Rodas5p => self.stats.n_steps_rodas5p += 1,
             StepMethod::Dop853 => self.stats.n_steps_dop853 += 1,
+            StepMethod::Midpoint => self.stats.n_steps_midpoint += 1,
         }
         self.dt = if self.stepper.is_taylor() {
             f64::INFINITY
@@ -430,7 +451,7 @@ impl<'a> Integrator<'a> {
         self.stats.stiff_since = self.stiffness.since;
         let (zeros, recorder) = (self.user_events.into_zeros(), self.recorder);
         recorder.finish(
-            (self.t, &self.x, self.options.sliding),
+            (self.t, &self.x, self.options),
             self.motion.mode,
             stop,
             self.stats,

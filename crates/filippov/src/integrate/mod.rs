@@ -2,6 +2,7 @@
 
 mod accumulation;
 mod actions;
+mod between_sides;
 mod bounds;
 mod choice;
 mod contact;
@@ -14,6 +15,7 @@ mod leave_by_rule;
 mod meeting;
 mod motion;
 mod nested;
+mod one_sided_steps;
 mod pace;
 mod placement;
 mod relay;

@@ -31,6 +31,8 @@ pub(super) struct Law<'a> {
     pub rule: SlidingRule,
     /// The scaling of all surfaces; empty: 1 for each.
     pub kappa: &'a [f64],
+    /// The factor of the term that draws it back, in place of the projection.
+    pub restoring: Option<f64>,
 }
 
 impl<'a> From<&'a Options> for Law<'a> {
@@ -38,6 +40,7 @@ impl<'a> From<&'a Options> for Law<'a> {
         Law {
             rule: options.sliding,
             kappa: &options.kappa,
+            restoring: options.stabilization.restoring(),
         }
     }
 }
@@ -71,10 +74,13 @@ impl<'a> ModeField<'a> {
     ) -> Self {
         match *sliding {
             [] => ModeField::Region(RegionField::new(system, signs)),
-            [j] => ModeField::Sliding(Box::new(SlidingField::new(system, j, signs))),
+            [j] => {
+                let field = SlidingField::new(system, j, signs);
+                ModeField::Sliding(Box::new(field.with_restoring(law.restoring)))
+            }
             _ => {
                 let field = IntersectionField::new(system, sliding, signs, &[]);
-                let field = field.with_rule(law.rule);
+                let field = field.with_rule(law.rule).with_restoring(law.restoring);
                 ModeField::Intersection(Box::new(field.with_scaling(&law.scaling(sliding))))
             }
         }
@@ -370,6 +376,11 @@ impl<'a> Motion<'a> {
     /// Do bounds of the multipliers hold for the exit functions?
     pub fn has_bounds(&self) -> bool {
         !self.is_in_contact() && !self.sticks
+    }
+
+    /// Is it drawn back to the surfaces slid on, and not projected?
+    pub fn is_drawn_back(&self) -> bool {
+        self.law.restoring.is_some() && !self.sliding.is_empty()
     }
 
     /// Is its field the multilinear combination of the fields around the surfaces slid on?

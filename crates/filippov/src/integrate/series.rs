@@ -25,6 +25,7 @@ impl Integrator<'_> {
         let starts_clear = || self.motion.monitored.iter().all(|m| m.deflation.is_none());
         let may = !self.motion.is_in_contact()
             && self.motion.resting.is_empty()
+            && !self.motion.is_drawn_back()
             && !self.slides_by_rule()
             && self.motion.has_bounds()
             && (self.system.is_analytic() || starts_clear());
@@ -42,6 +43,8 @@ impl Integrator<'_> {
             StepMethod::Taylor
         } else if self.stepper.dop853.is_some() {
             StepMethod::Dop853
+        } else if self.stepper.midpoint.is_some() {
+            StepMethod::Midpoint
         } else {
             StepMethod::Dopri5
         });
@@ -62,7 +65,8 @@ impl Integrator<'_> {
         let (t, mode) = (self.t, &self.motion.mode);
         let text = format!(
             "the motion in mode {mode} from t = {t:.10} has no Taylor series (its field is not analytic there, is \
-             not traced, slides by another rule than the canopy, sticks, or is in contact): DOPRI5 integrates it"
+             not traced, slides by another rule than the canopy, sticks, is drawn back to its surface, or is in \
+             contact): DOPRI5 integrates it"
         );
         self.warnings.push(Warning {
             t,

@@ -66,6 +66,14 @@ pub(super) fn check(
         options.max_step > 0.0,
         "must be positive",
     )?;
+    if let Some(factor) = options.stabilization.restoring() {
+        require(
+            "stabilization",
+            factor,
+            factor > 0.0 && factor.is_finite(),
+            "must be positive",
+        )?;
+    }
     for action in &actions.list {
         if let Trigger::Clock { clock, .. } = action.trigger {
             clock.check("period", "phase")?;

@@ -14,6 +14,8 @@ pub struct Stats {
     pub n_steps_taylor: u64,
     /// Accepted steps by the Runge-Kutta method of order 8.
     pub n_steps_dop853: u64,
+    /// Accepted steps by the midpoint rule.
+    pub n_steps_midpoint: u64,
     /// Accepted steps by the method for stiff motions.
     pub n_steps_rodas5p: u64,
     /// The time from which on an explicit method found the run stiff.

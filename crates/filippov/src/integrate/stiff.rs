@@ -24,7 +24,7 @@ impl Integrator<'_> {
     #[inline(never)]
     pub(super) fn start_implicit(&mut self) {
         self.stepper.start_with(StepMethod::Rodas5p);
-        let by_graph = self.motion.has_canopy_field();
+        let by_graph = self.motion.has_canopy_field() && !self.motion.is_drawn_back();
         let jacobian = by_graph
             .then(|| self.system.motion_jacobian(self.motion.sliding()))
             .flatten();

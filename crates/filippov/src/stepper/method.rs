@@ -1,6 +1,6 @@
 //! The stepper of a run: the methods that it may use, and which of them takes the current step.
 
-use super::{Dop853, Dopri5, ErrorScale, Interpolant, Rodas5p, Taylor};
+use super::{Dop853, Dopri5, ErrorScale, Interpolant, Midpoint, Rodas5p, Taylor};
 use crate::error::FieldError;
 use crate::field::SmoothField;
 
@@ -11,6 +11,8 @@ pub enum StepMethod {
     Dopri5,
     /// That of order 8.
     Dop853,
+    /// The explicit midpoint rule.
+    Midpoint,
     /// Taylor series.
     Taylor,
     /// The Rosenbrock-Wanner method of Steinebach.
@@ -26,6 +28,8 @@ pub struct Stepper {
     pub taylor: Option<Box<Taylor>>,
     /// The Runge-Kutta method of order 8, where the run uses it.
     pub dop853: Option<Box<Dop853>>,
+    /// The midpoint rule, where the run uses it.
+    pub midpoint: Option<Box<Midpoint>>,
     /// The method for stiff motions, where the run may use it.
     pub rodas5p: Option<Box<Rodas5p>>,
     in_use: StepMethod,
@@ -34,14 +38,20 @@ pub struct Stepper {
 /// Calls the method in use.
 macro_rules! in_use {
     ($self:ident, $method:ident => $call:expr) => {
-        match (&$self.taylor, &$self.rodas5p, &$self.dop853) {
+        match (
+            &$self.taylor,
+            &$self.rodas5p,
+            &$self.dop853,
+            &$self.midpoint,
+        ) {
             (Some($method), ..) if $self.in_use == StepMethod::Taylor => $call,
             _ if $self.in_use == StepMethod::Dopri5 => {
                 let $method = &$self.dopri5;
                 $call
             }
-            (_, Some($method), _) if $self.in_use == StepMethod::Rodas5p => $call,
-            (_, _, Some($method)) if $self.in_use == StepMethod::Dop853 => $call,
+            (_, Some($method), ..) if $self.in_use == StepMethod::Rodas5p => $call,
+            (_, _, Some($method), _) if $self.in_use == StepMethod::Dop853 => $call,
+            (.., Some($method)) if $self.in_use == StepMethod::Midpoint => $call,
             _ => {
                 let $method = &$self.dopri5;
                 $call
@@ -49,14 +59,20 @@ macro_rules! in_use {
         }
     };
     (mut $self:ident, $method:ident => $call:expr) => {
-        match (&mut $self.taylor, &mut $self.rodas5p, &mut $self.dop853) {
+        match (
+            &mut $self.taylor,
+            &mut $self.rodas5p,
+            &mut $self.dop853,
+            &mut $self.midpoint,
+        ) {
             (Some($method), ..) if $self.in_use == StepMethod::Taylor => $call,
             _ if $self.in_use == StepMethod::Dopri5 => {
                 let $method = &mut $self.dopri5;
                 $call
             }
-            (_, Some($method), _) if $self.in_use == StepMethod::Rodas5p => $call,
-            (_, _, Some($method)) if $self.in_use == StepMethod::Dop853 => $call,
+            (_, Some($method), ..) if $self.in_use == StepMethod::Rodas5p => $call,
+            (_, _, Some($method), _) if $self.in_use == StepMethod::Dop853 => $call,
+            (.., Some($method)) if $self.in_use == StepMethod::Midpoint => $call,
             _ => {
                 let $method = &mut $self.dopri5;
                 $call
@@ -72,6 +88,7 @@ impl Stepper {
             dopri5: Dopri5::new(n),
             taylor: taylor.map(Box::new),
             dop853: None,
+            midpoint: None,
             rodas5p: None,
             in_use: StepMethod::Dopri5,
         }
@@ -99,6 +116,7 @@ impl Stepper {
             StepMethod::Taylor => self.taylor.is_some(),
             StepMethod::Rodas5p => self.rodas5p.is_some(),
             StepMethod::Dop853 => self.dop853.is_some(),
+            StepMethod::Midpoint => self.midpoint.is_some(),
         };
         self.in_use = if is_there { method } else { StepMethod::Dopri5 };
     }
@@ -168,16 +186,23 @@ impl Stepper {
 
     /// Estimated error of the extension beyond the end of the step, in units of the tolerance.
     pub fn extension_defect(&self, theta: f64, scale: &ErrorScale) -> f64 {
-        match (&self.taylor, &self.rodas5p, &self.dop853) {
-            (Some(taylor), ..) if self.is_taylor() => taylor.extrapolation_error(theta),
-            (_, Some(rodas5p), _) if self.in_use == StepMethod::Rodas5p => {
-                rodas5p.extrapolation_error(theta, scale)
+        let extrapolated = match self.in_use {
+            StepMethod::Dopri5 => None,
+            StepMethod::Taylor => self.taylor.as_ref().map(|m| m.extrapolation_error(theta)),
+            StepMethod::Rodas5p => {
+                let method = self.rodas5p.as_ref();
+                method.map(|m| m.extrapolation_error(theta, scale))
             }
-            (_, _, Some(dop853)) if self.in_use == StepMethod::Dop853 => {
-                dop853.extrapolation_error(theta, scale)
+            StepMethod::Dop853 => {
+                let method = self.dop853.as_ref();
+                method.map(|m| m.extrapolation_error(theta, scale))
             }
-            _ => self.dopri5.extension_defect(theta, scale),
-        }
+            StepMethod::Midpoint => {
+                let method = self.midpoint.as_ref();
+                method.map(|m| m.extrapolation_error(theta, scale))
+            }
+        };
+        extrapolated.unwrap_or_else(|| self.dopri5.extension_defect(theta, scale))
     }
 
     /// Does the field jump within the attempted step? A series has no jumps, and over the stages of a stiff step the

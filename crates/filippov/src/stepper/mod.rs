@@ -10,6 +10,7 @@ mod dopri5;
 mod initial_step;
 mod linearisation;
 mod method;
+mod midpoint;
 mod rodas5p;
 mod taylor;
 
@@ -21,6 +22,7 @@ pub use dopri5::{Attempt, Dopri5};
 pub use initial_step::{initial_step, restart_step, tiny_step};
 pub use linearisation::Linearisation;
 pub use method::{StepMethod, Stepper};
+pub use midpoint::Midpoint;
 pub use rodas5p::Rodas5p;
 pub(crate) use taylor::reach;
 pub use taylor::Taylor;
