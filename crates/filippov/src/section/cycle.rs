@@ -3,9 +3,7 @@
 use std::collections::VecDeque;
 
 use super::observer::Return;
-
-/// Agreements in a row that are needed even for a period of one return: a single one may be a turning point.
-const LEAST_AGREEMENTS: u64 = 2;
+use crate::tolerances::LEAST_AGREEMENTS;
 
 /// The test: returns number k and k - q agree, `q` times in a row (at least twice).
 ///

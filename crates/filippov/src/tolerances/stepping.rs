@@ -48,7 +48,3 @@ pub const TAYLOR_LARGEST_ORDER: usize = 24;
 /// A Taylor step that is shorter than this, in units of the rounding of the time, means that the motion comes to a
 /// point where its field has no series.
 pub const TAYLOR_SHORTEST: f64 = 1e4;
-
-/// Returns to a section have to agree with those one period before so many times in a row, and at least one period
-/// long: a single agreement may be a turning point.
-pub const LEAST_AGREEMENTS: u64 = 2;
