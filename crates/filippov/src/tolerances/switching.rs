@@ -1,123 +1,6 @@
-//! Numerical thresholds, each with its reason. No other file holds a small number of this kind.
+//! Thresholds of decisions: where surfaces meet, at tangencies and two-folds, at accumulations.
 
-mod stiffness;
-
-pub use stiffness::*;
-
-/// Unit roundoff times two.
-pub const EPS: f64 = f64::EPSILON;
-
-/// A switching function counts as zero below this multiple of `EPS` times the sum of the
-/// magnitudes it is made of: the rounding of the state plus that of a few operations.
-pub const SURFACE_NOISE: f64 = 16.0 * EPS;
-
-/// A Lie derivative counts as zero below this fraction of the sum of the magnitudes it is made of.
-/// Points handed in by a user or found as a root carry a few rounding errors, amplified by at most
-/// some thousands through the derivatives; a genuine value this small would be
-/// indistinguishable from a tangency in the sense of every later comparison.
-pub const TANGENT: f64 = 1e-11;
-
-/// Highest order of Lie derivative looked at before a point counts as undecided.
-pub const MAX_LIE_ORDER: usize = 6;
-
-/// The remainder of the cubic through end values and end slopes is taken as at most this fraction
-/// of the spread of its Bernstein coefficients. For a sinusoid stepped with two radians a step
-/// it is 3 %, and error control keeps steps below that.
-pub const CUBIC_REMAINDER: f64 = 0.25;
-
-/// The remainder of the quartic through five samples is taken as at most this multiple of the
-/// fourth difference; for a function whose fifth derivative is ten times its fourth, it is 0.08.
-pub const QUARTIC_REMAINDER: f64 = 0.25;
-
-/// The exit functions are searched only if their smallest stage value is below this multiple of
-/// their spread over the stages.
-pub const STAGE_SPREAD: f64 = 0.75;
-
-/// A function within this multiple of its rounding all along a piece is judged by samples: bounds of
-/// it are wider than itself.
-pub const HUGGING: f64 = 1e4;
-
-/// The motion on a curved surface lies beside the continuous extension by at most this multiple of the
-/// distances at the probes of the step ...
-pub const MARGIN: f64 = 2.0;
-
-/// ... and that distance changes over the step by at most this multiple of itself: as theta^2 (1-theta)^2
-/// it would be 5.
-pub const MARGIN_SLOPE: f64 = 8.0;
-
-/// Where no bounds exist after that many bisections (a root at the edge of its domain), samples decide.
-pub const UNBOUNDED_DEPTH: u32 = 6;
-
-/// The same for multipliers on intersections, whose bounds prove something only on short pieces where the fields
-/// change fast.
-pub const UNPROVED_DEPTH: u32 = 14;
-
-/// After that many pieces of a step without a proof the samples decide in the rest of it: the reason is not a short
-/// pulse, which lies in few pieces, but lasts, as near a fold of the multipliers.
-pub const MOST_UNPROVED: u32 = 64;
-
-/// Halvings of a step in the attempt to prove it free of zeros before it is searched with samples;
-/// each costs two bounds, the search at least two evaluations of the field.
-pub const PROOF_DEPTH: u32 = 3;
-
-/// Bisections of a step in the search for zeros; 2^-48 of a step is below the rounding of time.
-pub const MAX_DEPTH: u32 = 48;
-
-/// Where a change of sign is narrowed down to rounding and the function is still larger than this
-/// fraction of its values over the step, it has a pole or a jump there and no zero.
-pub const POLE: f64 = 1e-3;
-
-/// Samples that one search may take; bisecting to one zero takes about four per level of depth.
-pub const MOST_SAMPLES: u32 = 1000;
-
-/// Zeros of the user's functions in one step; with more the step is too long for them.
-pub const MOST_ZEROS: usize = 64;
-
-/// A search that needed more bisections than this met a function that the step does not resolve;
-/// the step may not grow then.
-pub const RESOLVED_DEPTH: u32 = 3;
-
-/// Farthest extrapolation of the continuous extension, in steps (DISODE45, section 3).
-pub const EXTRAPOLATION: f64 = 1.3;
-
-/// A step towards the edge of a one-sided field aims to end at this fraction of the predicted
-/// time to the surface, so that the surface lies at 1.15 steps, well inside the extrapolation.
-pub const ONE_SIDED_AIM: f64 = 0.87;
-
-/// A surface is not aimed at if its function, continued as a parabola, falls to no less than this share of its value: an
-/// error of the curvature by a factor of two leaves it positive.
-pub const TURNS_BACK: f64 = 0.5;
-
-/// First offset into its own side for a field that is not finite on its surface, in units of
-/// `EPS` times the size of the state; grown by 16 up to five times.
-pub const SIDE_OFFSET: f64 = 8.0;
-
-/// A point counts as on a surface up to rounding within this multiple of the offset.
-pub const SIDE_REACH: f64 = 1.25;
-
-/// Shortest step in units of the rounding of time.
-pub const SHORTEST_STEP: f64 = 16.0 * EPS;
-
-/// A step shorter than this fraction of its recent predecessors is looked at for a jump that no surface
-/// declares.
-pub const JUMP_SHRINK: f64 = 0.05;
-
-/// The field jumps in a step if its range over the stages exceeds this fraction of its size ...
-pub const JUMP_SIZE: f64 = 0.02;
-
-/// ... and this share of the range falls between two neighbouring stages, at most half a step apart.
-pub const JUMP_SHARE: f64 = 0.9;
-
-/// A motion that can go no further towards the edge of its field has arrived at a surface that is nearer
-/// than this fraction of the tolerance.
-pub const ARRIVED: f64 = 1e-3;
-
-/// Less than this, relative to the time, is no progress of it: bodies that hit one another with the speed of rounding do so
-/// at intervals of some hundred roundings.
-pub const NO_PROGRESS: f64 = 32768.0 * EPS;
-
-/// That many switches without any progress of time end a run.
-pub const MOST_SWITCHES_AT_ONE_TIME: u32 = 64;
+use super::EPS;
 
 /// Largest number of surfaces that meet and whose signs multiply one another: their 2^m fields are all evaluated, and
 /// all 3^m modes looked at.
@@ -280,24 +163,6 @@ pub const FOLD_REACH: f64 = 0.2;
 /// Evaluations of which the multipliers are kept to track from: those of a step and its rejected attempts.
 pub const MOST_TRACKED: usize = 16;
 
-/// A motion of that many times the last step shows which step suits its mode.
-pub const MANY: f64 = 8.0;
-
-/// Share of the step last proposed in a mode with which the next motion there starts: its error is a
-/// tenth, so that a point where the field is less smooth is rarely a rejection.
-pub const FAMILIAR: f64 = 0.7;
-
-/// The field does not limit a step of that many times the motion: within it the error is below a
-/// hundredth of the tolerance.
-pub const SEVERAL: f64 = 3.0;
-
-/// How far ahead the first step looks then, as a multiple of the last motion in the mode.
-pub const REACH: f64 = 1.25;
-
-/// Share of the last step over which rates at an event are taken by differences: short against the time in
-/// which anything changes, long against rounding.
-pub const DRIFT_SHARE: f64 = 1e-4;
-
 /// A normal component below this fraction of its terms, where an intersection is left, is that of a multiplier
 /// that just reached its end; the event is located to better than that.
 pub const DEPARTS_TANGENTIALLY: f64 = 1e-6;
@@ -362,94 +227,25 @@ pub const MOST_SCALED_SINGLY: usize = 12;
 /// Combinations of candidates of the parts of an intersection that are listed.
 pub const MOST_COMBINED: usize = 81;
 
-/// After a touch of an exit function the search goes on from this share of the step behind it.
-pub const BEYOND_TOUCH: f64 = 0.02;
-
 /// Where steps shrink to nothing because multipliers end, their determinant is below this: it falls like the
 /// square root of the time that is left.
 pub const AT_FOLD: f64 = 1e-2;
 
-/// A zero that is expected somewhere is searched for up to this many times the way there: behind it, so that it is
-/// found, and not far, so that bounds are narrow.
-pub const BEYOND_GUESS: f64 = 1.1;
-
-/// Halvings of a step whose bounds have to decide everything; beyond that samples help.
-pub const PROVED_DEPTH: u32 = 6;
-
-/// Orders of Taylor steps per decimal digit of the relative tolerance, and beside that: where the coefficients are
-/// cheap, and where they are dear. The least work on coefficients per unit of time takes 1.15 per digit (Jorba and
-/// Zou); a step has costs of its own, and longer ones pay.
-pub const TAYLOR_ORDER_CHEAP: (f64, f64) = (2.5, 3.0);
-/// The same where the coefficients are dear.
-pub const TAYLOR_ORDER_DEAR: (f64, f64) = (1.5, 2.0);
-
-/// So many multipliers may depend on one another in series: the inverse of their equations is dense.
-pub const LARGEST_SERIES_BLOCK: usize = 32;
-
-/// Sliding on so many surfaces is integrated by series unless a method is named. All exit functions are searched
-/// along the whole step: with more of them the short steps of a Runge-Kutta method are cheaper.
-pub const MOST_AUTO_SERIES: usize = 5;
-
-/// Coefficients are dear from so many operations on: then they take longer than the rest of a step.
-pub const TAYLOR_DEAR: usize = 2000;
-
-/// The last terms of a Taylor step, times this, may be as large as the tolerance: errors of many steps add up.
-pub const TAYLOR_SHARE: f64 = 10.0;
-
-/// Pieces of a Taylor step in which a user's function without bounds is sampled: about as many steps would DOPRI5
-/// have made.
-pub const PIECES_OF_SERIES: u32 = 8;
-
-/// Highest order of a Taylor step: beyond it rounding limits the error, and not the step.
-pub const TAYLOR_LARGEST_ORDER: usize = 24;
-
-/// A Taylor step that is shorter than this, in units of the rounding of the time, means that the motion comes to a
-/// point where its field has no series.
-pub const TAYLOR_SHORTEST: f64 = 1e4;
-
-/// A tick of a clock counts as at a time within this multiple of the size of both in periods: a few roundings.
-pub const SAME_TICK: f64 = 8.0 * EPS;
-
-/// A map changes a velocity if the derivative is above this fraction of the sizes that make it up: differences
-/// of black boxes have an error of 1e-10.
-pub const NO_IMPULSE: f64 = 1e-8;
-
-/// Switches that are kept where only the last state is wanted: several turns of the longest accumulation.
-pub const LATEST_SWITCHES: usize = 8 * LONGEST_TURN;
-
-/// Actions in one instant at most. A chain of bodies that pass an impulse on needs about the square of their number.
-pub const MOST_ACTIONS_AT_ONE_TIME: usize = 1000;
-
-/// The ratios of the last intervals between impacts agree within this share of their distance to 1: the time of rest
-/// is then known to that share of the time until then.
-pub const IMPACTS_AGREE: f64 = 0.1;
-
-/// Impacts whose flights rise less than this multiple of the rounding of the surface are not resolved.
-pub const UNRESOLVED_FLIGHT: f64 = 64.0;
-
-/// Largest number of surfaces in contact and slid on at once, whose combinations are all looked at.
-pub const MOST_IN_CONTACT: usize = 6;
-
 /// At an exit a multiplier vanishes to this fraction of the largest one: the event is located to better than that.
 pub const VANISHING_MULTIPLIER: f64 = 1e-9;
 
-/// An expression of whole numbers is one itself within this: a few roundings.
-pub const WHOLE_NUMBER: f64 = 1e-12;
-
-/// A switching function above this is not looked at for being zero all along a step: the rounding of states up to
-/// thousands is below it.
+/// Functions above this are not looked at for being zero all along a step: rounding of states up to thousands is below.
 pub const NEARLY_ZERO: f64 = 1e-10;
 
 /// Distance, in units of 1 plus the size of a component, at which two surfaces are compared ...
 pub const BESIDE: f64 = 1e-3;
 
-/// ... and how far apart they may be there, in units of the gradient, to be in one place: far below the square of that
-/// distance, by which surfaces that touch are apart.
+/// ... and how far apart they may be there, in units of the gradient: far below the square of that distance.
 pub const COINCIDE: f64 = 1e-11;
 
-/// A sliding motion has come to a two-fold where both normal components vanish within this multiple of the tolerance of
-/// the state: errors of some steps make up the multiplier there.
-pub const AT_TWO_FOLD: f64 = 100.0;
+/// Sliding has come to a two-fold where both normal components vanish within this multiple of the tolerance: then errors
+/// of some steps make up the multiplier.
+pub const AT_TWO_FOLD: f64 = 10.0;
 
 /// Newton's method has come to a two-fold, in tolerances of the state: far below what matters, above rounding.
 pub const SETTLED: f64 = 1e-6;
@@ -457,24 +253,3 @@ pub const SETTLED: f64 = 1e-6;
 /// A motion that was to stay on a surface has left it where h is above this multiple of the tolerance: errors of many
 /// steps add up.
 pub const LEFT_RESTING: f64 = 1e3;
-
-/// Static friction above the kinetic one by less than this fraction makes no jump of the acceleration that could be told
-/// from the error of the time at which the motion breaks away.
-pub const NO_GAP: f64 = 1e-6;
-
-/// A body that touches another is in contact if the force exceeds this fraction of the accelerations around.
-pub const NO_FORCE: f64 = 1e-10;
-
-/// A body touches without speed if that is below this fraction of the tolerance.
-pub const SLOW: f64 = 0.1;
-
-/// A point beyond a surface at which bodies touch by less than this multiple of the tolerance is on it.
-pub const SLIPPED: f64 = 10.0;
-
-/// Bodies that overlap by less than this fraction of their positions touch; an action that moves them changes h by more
-/// than this fraction.
-pub const PENETRATION: f64 = 1e-6;
-
-/// Returns to a section have to agree with those one period before so many times in a row, and at least one period
-/// long: a single agreement may be a turning point.
-pub const LEAST_AGREEMENTS: u64 = 2;
