@@ -73,7 +73,8 @@ test-slow: $(BUILD_STAMP) ## the slow tests
 	$(CARGO) test --release $(RUST_TESTED) -- --ignored
 	$(BIN)/pytest -m slow
 
-fuzz: $(BUILD_STAMP) ## solve N random systems from SEED on, in two processes; print what does not hold
+fuzz: $(BUILD_STAMP) ## random graphs in native code and interpreter; N random systems from SEED on, in two processes
+	$(CARGO) test --release -p filippov-expr --test fuzz -- --ignored
 	PYTHONPATH=tests OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PY) -m fuzz --n $(N) --seed $(SEED)
 
 bench: $(BENCH_STAMP) ## run the benchmarks

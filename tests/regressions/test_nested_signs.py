@@ -103,3 +103,14 @@ def test_a_start_from_which_both_sides_lead_away_names_both() -> None:
     assert [warning.code for warning in sol.warnings] == ["non_unique"]
     assert {str(mode) for mode in sol.warnings[0].candidates} == {"+-", "-+"}
     assert abs(sol.y[0, -1] - 0.1) == pytest.approx(0.5, abs=1e-9)
+
+
+def test_sliding_ends_where_a_function_gets_another_sign_on_one_of_its_sides() -> None:
+    # On x1 = 0.1 the bend of |x0 + 0.48 sign(x1 - 0.1)| is at x0 = 0.48 below, and at -0.48 above.
+    def f(t: float, x: Any) -> Any:
+        return [-1.0, -2.0 * np.sign(x[1] - 0.1) + 0.1 * abs(x[0] + 0.48 * np.sign(x[1] - 0.1))]
+
+    sol = fl.solve_ivp(f, (0.0, 2.0), [1.0, 0.0], rtol=1e-8, atol=1e-8)
+    assert not sol.success
+    assert "x[1] - 0.1 = 0" in sol.message
+    assert sol.y[0, -1] == pytest.approx(0.48, abs=1e-6)

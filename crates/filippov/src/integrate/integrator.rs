@@ -39,7 +39,7 @@ use crate::stepper::{
     Attempt, Controller, Dop853, ErrorScale, Midpoint, Rodas5p, StepMethod, Stepper, Taylor,
 };
 use crate::system::PiecewiseSystem;
-use crate::tolerances::SHORTEST_STEP;
+use crate::tolerances::{EPS, SHORTEST_STEP};
 
 /// Most steps between two looks at the clock and at the caller's wish to stop.
 const LONGEST_POLL: u64 = 64;
@@ -349,6 +349,21 @@ impl<'a> Integrator<'a> {
             self.count_rejection(sliding);
             self.halve_step(dt);
             return Ok(None);
+        }
+        if sliding && self.system.has_nested_signs() {
+            let (mut end, mut t) = (self.stepper.end().to_vec(), t1);
+            if let Some(event) = &found {
+                self.stepper.interpolant().at(event.theta, &mut end);
+                t = self.t + event.theta * dt;
+            }
+            if let Some(stop) = self.differs_between_sides(t, &end)? {
+                if dt < SHORTEST_STEP * self.t.abs().max(1.0) / EPS.sqrt() {
+                    return Ok(Some(stop));
+                }
+                self.count_rejection(sliding);
+                self.halve_step(dt);
+                return Ok(None);
+            }
         }
         let theta = found.as_ref().map_or(1.0, |event| event.theta);
         let is_implicit = self.stepper.in_use() == StepMethod::Rodas5p;

@@ -2,6 +2,7 @@
 
 mod accumulation;
 mod actions;
+mod between_sides;
 mod bounds;
 mod choice;
 mod contact;

@@ -457,7 +457,7 @@ fn residual(h: &[f64], reached: &[usize]) -> f64 {
 }
 
 /// Surfaces between whose sides the motion would slide while others jump.
-fn between(meeting: &[usize], jumped: &[usize]) -> Stop {
+pub(super) fn between(meeting: &[usize], jumped: &[usize]) -> Stop {
     let mut surfaces: Vec<usize> = meeting.iter().chain(jumped).copied().collect();
     surfaces.sort_unstable();
     surfaces.dedup();

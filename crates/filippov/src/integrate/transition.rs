@@ -364,6 +364,12 @@ impl Integrator<'_> {
         if let Some(stop) = self.refusal() {
             return Ok(Some(stop));
         }
+        if self.system.has_nested_signs() {
+            let x = self.x.clone();
+            if let Some(stop) = self.differs_between_sides(self.t, &x)? {
+                return Ok(Some(stop));
+            }
+        }
         let derivative = self.stepper.start_derivative();
         if derivative.iter().any(|v| !v.is_finite()) {
             return Ok(Some(Stop::NotFinite));

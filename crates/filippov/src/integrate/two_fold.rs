@@ -39,7 +39,10 @@ impl Integrator<'_> {
             .sum();
         let size = dot_magnitude(&along_minus, &x) + dot_magnitude(&along_plus, &x);
         let rounding = TANGENT * (size + (minus.time.abs() + plus.time.abs()) * self.t.abs());
-        if distance.abs() > AT_TWO_FOLD * tolerance + rounding {
+        if distance.abs() <= rounding {
+            return Ok(Some((self.t, self.x.clone())));
+        }
+        if distance.abs() > AT_TWO_FOLD * tolerance {
             return Ok(None);
         }
         let rate = time + dot(&gradient, &velocity);
@@ -53,7 +56,9 @@ impl Integrator<'_> {
         let moved = velocity.iter().enumerate();
         let speed = moved.map(|(i, v)| v.abs() / self.scale.of(i, x[i], x[i]));
         let unit = 1.0 / speed.fold(0.0, f64::max).max(1.0 / ahead);
-        let (t, end) = self.settle(j, (t, end), unit)?;
+        let Some((t, end)) = self.settle(j, (t, end), unit)? else {
+            return Ok(None);
+        };
         let moves = |(i, (a, b)): (usize, (&f64, &f64))| {
             (a - b).abs() <= 10.0 * AT_TWO_FOLD * self.scale.of(i, *a, *b)
         };
@@ -66,19 +71,19 @@ impl Integrator<'_> {
     }
 
     /// The nearest point to (t, x) where h_j and both normal components vanish, distances measured in tolerances and times
-    /// in `unit`s; (t, x) if Newton's method finds none.
+    /// in `unit`s; `None` if Newton's method finds none.
     fn settle(
         &self,
         j: usize,
         start: (f64, Vec<f64>),
         unit: f64,
-    ) -> Result<(f64, Vec<f64>), FieldError> {
+    ) -> Result<Option<(f64, Vec<f64>)>, FieldError> {
         let n = start.1.len();
         let mut units: Vec<f64> = (0..n)
             .map(|i| self.scale.of(i, start.1[i], start.1[i]))
             .collect();
         units.push(unit);
-        let (mut t, mut x) = start.clone();
+        let (mut t, mut x) = start;
         let mut h = vec![0.0; self.system.n_surfaces()];
         for _ in 0..NEWTON_STEPS {
             let signs = self.motion.signs.clone();
@@ -100,7 +105,7 @@ impl Integrator<'_> {
                 gram[(a, b)] = dot(&rows[a], &rows[b]);
             }
             let Some(shifts) = gram.solve(&residuals) else {
-                return Ok(start);
+                return Ok(None);
             };
             let mut largest = 0.0_f64;
             for i in 0..=n {
@@ -112,13 +117,13 @@ impl Integrator<'_> {
                 }
             }
             if largest.is_nan() || largest > 10.0 * AT_TWO_FOLD {
-                return Ok(start);
+                return Ok(None);
             }
             if largest <= SETTLED {
-                break;
+                return Ok(Some((t, x)));
             }
         }
-        Ok((t, x))
+        Ok(None)
     }
 
     /// The normal component of the field on one side, and its gradient.

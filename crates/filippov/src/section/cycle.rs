@@ -3,11 +3,9 @@
 use std::collections::VecDeque;
 
 use super::observer::Return;
+use crate::tolerances::LEAST_AGREEMENTS;
 
-/// Agreements in a row that are needed even for a period of one return: a single one may be a turning point.
-const LEAST_AGREEMENTS: u64 = 2;
-
-/// The test: returns number k and k - q agree, `q` times in a row (at least twice).
+/// The test: returns number k and k - q agree, `q` times in a row (at least [`LEAST_AGREEMENTS`] times).
 ///
 /// Two states agree if every component differs by at most `atol + rtol * |x|`. It is a heuristic: an orbit that
 /// drifts by less than that from one return to the next counts as periodic.

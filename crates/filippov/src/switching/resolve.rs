@@ -15,7 +15,7 @@ use crate::tolerances::{AFTER_THE_EXIT, DOUBTFUL, MOST_MEETING, MOST_SCALED_SING
 ///
 /// One surface has its two figures, two surfaces their decision trees; where a tree says that the
 /// outcome depends on the scaling, and for three and more surfaces, the hidden dynamics at `kappa`
-/// decides. If a quantity whose sign decided is doubtful (`tolerances.rs`), the decision is
+/// decides. If a quantity whose sign decided is doubtful (`tolerances/`), the decision is
 /// repeated with perturbed fields: if they agree, theirs counts, and if not,
 /// [`Resolution::degenerate`] says so. Surfaces in parts that do not know of each other are decided part by part.
 ///

@@ -1,0 +1,96 @@
+//! Thresholds of the event stage.
+
+/// The remainder of the cubic through end values and end slopes is taken as at most this fraction
+/// of the spread of its Bernstein coefficients. For a sinusoid stepped with two radians a step
+/// it is 3 %, and error control keeps steps below that.
+pub const CUBIC_REMAINDER: f64 = 0.25;
+
+/// The remainder of the quartic through five samples is taken as at most this multiple of the
+/// fourth difference; for a function whose fifth derivative is ten times its fourth, it is 0.08.
+pub const QUARTIC_REMAINDER: f64 = 0.25;
+
+/// The exit functions are searched only if their smallest stage value is below this multiple of
+/// their spread over the stages.
+pub const STAGE_SPREAD: f64 = 0.75;
+
+/// A function within this multiple of its rounding all along a piece is judged by samples: bounds of
+/// it are wider than itself.
+pub const HUGGING: f64 = 1e4;
+
+/// The motion on a curved surface lies beside the continuous extension by at most this multiple of the
+/// distances at the probes of the step ...
+pub const MARGIN: f64 = 2.0;
+
+/// ... and that distance changes over the step by at most this multiple of itself: as theta^2 (1-theta)^2
+/// it would be 5.
+pub const MARGIN_SLOPE: f64 = 8.0;
+
+/// Where no bounds exist after that many bisections (a root at the edge of its domain), samples decide.
+pub const UNBOUNDED_DEPTH: u32 = 6;
+
+/// The same for multipliers on intersections, whose bounds prove something only on short pieces where the fields
+/// change fast.
+pub const UNPROVED_DEPTH: u32 = 14;
+
+/// After that many pieces of a step without a proof the samples decide in the rest of it: the reason is not a short
+/// pulse, which lies in few pieces, but lasts, as near a fold of the multipliers.
+pub const MOST_UNPROVED: u32 = 64;
+
+/// Halvings of a step in the attempt to prove it free of zeros before it is searched with samples;
+/// each costs two bounds, the search at least two evaluations of the field.
+pub const PROOF_DEPTH: u32 = 3;
+
+/// Bisections of a step in the search for zeros; 2^-48 of a step is below the rounding of time.
+pub const MAX_DEPTH: u32 = 48;
+
+/// Where a change of sign is narrowed down to rounding and the function is still larger than this
+/// fraction of its values over the step, it has a pole or a jump there and no zero.
+pub const POLE: f64 = 1e-3;
+
+/// Samples that one search may take; bisecting to one zero takes about four per level of depth.
+pub const MOST_SAMPLES: u32 = 1000;
+
+/// Zeros of the user's functions in one step; with more the step is too long for them.
+pub const MOST_ZEROS: usize = 64;
+
+/// A search that needed more bisections than this met a function that the step does not resolve;
+/// the step may not grow then.
+pub const RESOLVED_DEPTH: u32 = 3;
+
+/// Farthest extrapolation of the continuous extension, in steps (DISODE45, section 3).
+pub const EXTRAPOLATION: f64 = 1.3;
+
+/// A step towards the edge of a one-sided field aims to end at this fraction of the predicted
+/// time to the surface, so that the surface lies at 1.15 steps, well inside the extrapolation.
+pub const ONE_SIDED_AIM: f64 = 0.87;
+
+/// A surface is not aimed at if its function, continued as a parabola, falls to no less than this share of its value: an
+/// error of the curvature by a factor of two leaves it positive.
+pub const TURNS_BACK: f64 = 0.5;
+
+/// First offset into its own side for a field that is not finite on its surface, in units of
+/// `EPS` times the size of the state; grown by 16 up to five times.
+pub const SIDE_OFFSET: f64 = 8.0;
+
+/// A point counts as on a surface up to rounding within this multiple of the offset.
+pub const SIDE_REACH: f64 = 1.25;
+
+/// A step shorter than this fraction of its recent predecessors is looked at for a jump that no surface
+/// declares.
+pub const JUMP_SHRINK: f64 = 0.05;
+
+/// The field jumps in a step if its range over the stages exceeds this fraction of its size ...
+pub const JUMP_SIZE: f64 = 0.02;
+
+/// ... and this share of the range falls between two neighbouring stages, at most half a step apart.
+pub const JUMP_SHARE: f64 = 0.9;
+
+/// After a touch of an exit function the search goes on from this share of the step behind it.
+pub const BEYOND_TOUCH: f64 = 0.02;
+
+/// A zero that is expected somewhere is searched for up to this many times the way there: behind it, so that it is
+/// found, and not far, so that bounds are narrow.
+pub const BEYOND_GUESS: f64 = 1.1;
+
+/// Halvings of a step whose bounds have to decide everything; beyond that samples help.
+pub const PROVED_DEPTH: u32 = 6;

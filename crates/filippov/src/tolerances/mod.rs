@@ -1,0 +1,43 @@
+//! Numerical thresholds, each with its reason. No other file holds a small number of this kind.
+
+mod actions;
+mod events;
+mod stepping;
+mod switching;
+
+pub use actions::*;
+pub use events::*;
+pub use stepping::*;
+pub use switching::*;
+
+/// Unit roundoff times two.
+pub const EPS: f64 = f64::EPSILON;
+
+/// A switching function counts as zero below this multiple of `EPS` times the sum of the
+/// magnitudes it is made of: the rounding of the state plus that of a few operations.
+pub const SURFACE_NOISE: f64 = 16.0 * EPS;
+
+/// A Lie derivative counts as zero below this fraction of the sum of the magnitudes it is made of.
+/// Points handed in by a user or found as a root carry a few rounding errors, amplified by at most
+/// some thousands through the derivatives; a genuine value this small would be
+/// indistinguishable from a tangency in the sense of every later comparison.
+pub const TANGENT: f64 = 1e-11;
+
+/// Highest order of Lie derivative looked at before a point counts as undecided.
+pub const MAX_LIE_ORDER: usize = 6;
+
+/// Shortest step in units of the rounding of time.
+pub const SHORTEST_STEP: f64 = 16.0 * EPS;
+
+/// A motion that can go no further towards the edge of its field has arrived at a surface that is nearer
+/// than this fraction of the tolerance.
+pub const ARRIVED: f64 = 1e-3;
+
+/// Less than this, relative to the time, is no progress: bodies with the speed of rounding hit one another that often.
+pub const NO_PROGRESS: f64 = 32768.0 * EPS;
+
+/// That many switches without any progress of time end a run.
+pub const MOST_SWITCHES_AT_ONE_TIME: u32 = 64;
+
+/// Switches that are kept where only the last state is wanted: several turns of the longest accumulation.
+pub const LATEST_SWITCHES: usize = 8 * LONGEST_TURN;

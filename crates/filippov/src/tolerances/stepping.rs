@@ -1,0 +1,82 @@
+//! Thresholds of steps and their lengths.
+
+/// A motion of that many times the last step shows which step suits its mode.
+pub const MANY: f64 = 8.0;
+
+/// Share of the step last proposed in a mode with which the next motion there starts: its error is a
+/// tenth, so that a point where the field is less smooth is rarely a rejection.
+pub const FAMILIAR: f64 = 0.7;
+
+/// The field does not limit a step of that many times the motion: within it the error is below a
+/// hundredth of the tolerance.
+pub const SEVERAL: f64 = 3.0;
+
+/// How far ahead the first step looks then, as a multiple of the last motion in the mode.
+pub const REACH: f64 = 1.25;
+
+/// Share of the last step over which rates at an event are taken by differences: short against the time in
+/// which anything changes, long against rounding.
+pub const DRIFT_SHARE: f64 = 1e-4;
+
+/// Orders of Taylor steps per decimal digit of the relative tolerance, and beside that: where the coefficients are
+/// cheap, and where they are dear. The least work on coefficients per unit of time takes 1.15 per digit (Jorba and
+/// Zou); a step has costs of its own, and longer ones pay.
+pub const TAYLOR_ORDER_CHEAP: (f64, f64) = (2.5, 3.0);
+/// The same where the coefficients are dear.
+pub const TAYLOR_ORDER_DEAR: (f64, f64) = (1.5, 2.0);
+
+/// So many multipliers may depend on one another in series: the inverse of their equations is dense.
+pub const LARGEST_SERIES_BLOCK: usize = 32;
+
+/// Sliding on so many surfaces is integrated by series unless a method is named. All exit functions are searched
+/// along the whole step: with more of them the short steps of a Runge-Kutta method are cheaper.
+pub const MOST_AUTO_SERIES: usize = 5;
+
+/// Coefficients are dear from so many operations on: then they take longer than the rest of a step.
+pub const TAYLOR_DEAR: usize = 2000;
+
+/// The last terms of a Taylor step, times this, may be as large as the tolerance: errors of many steps add up.
+pub const TAYLOR_SHARE: f64 = 10.0;
+
+/// Pieces of a Taylor step in which a user's function without bounds is sampled: about as many steps would DOPRI5
+/// have made.
+pub const PIECES_OF_SERIES: u32 = 8;
+
+/// Highest order of a Taylor step: beyond it rounding limits the error, and not the step.
+pub const TAYLOR_LARGEST_ORDER: usize = 24;
+
+/// A Taylor step that is shorter than this, in units of the rounding of the time, means that the motion comes to a
+/// point where its field has no series.
+pub const TAYLOR_SHORTEST: f64 = 1e4;
+
+/// Returns to a section have to agree with those one period before so many times in a row, and at least one period
+/// long: a single agreement may be a turning point.
+pub const LEAST_AGREEMENTS: u64 = 2;
+
+/// How far behind an event a step of the method for stiff motions ends that is taken anew for it, as a share of the
+/// step: first so far that the error of the continuous extension leaves the event inside, then so near that the
+/// extension lies no farther from the manifold of the motion than rounding, also at a stiffness of 1e8.
+pub const AIM_MARGINS: [f64; 2] = [1e-3, 1e-7];
+
+/// The end of the region of stability of DOPRI5 on the negative axis: the product of step and rate at which stability
+/// limits the step (Hairer, Wanner 1996, section IV.2).
+pub const STIFF_DOPRI5: f64 = 3.25;
+
+/// That of DOP853 (Hairer's choice).
+pub const STIFF_DOP853: f64 = 6.1;
+
+/// That of a Taylor step whose velocity hardly changes: without a fast rate the product would be as small as that change.
+pub const STIFF_SERIES: f64 = 2.0;
+
+/// The velocity of a Taylor step hardly changes: its terms of higher order together are less than this share of it, ...
+pub const TAYLOR_SLOW: f64 = 0.2;
+
+/// ... or that many tolerances. At the limit of stability, where the last of 18 terms is a tenth of the tolerance, the
+/// largest ones of a fast component are some hundreds; those of an oscillation as large as its state are 1e5 and more.
+pub const TAYLOR_NOISE: f64 = 1e3;
+
+/// Steps at the limit of stability that make a run stiff, and steps in a row away from it that make it begin to count
+/// anew (Hairer's choice).
+pub const STIFF_SIGNS: u32 = 15;
+/// See [`STIFF_SIGNS`].
+pub const NOT_STIFF_SIGNS: u32 = 6;
