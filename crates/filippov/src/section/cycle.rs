@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use super::observer::Return;
 use crate::tolerances::LEAST_AGREEMENTS;
 
-/// The test: returns number k and k - q agree, `q` times in a row (at least twice).
+/// The test: returns number k and k - q agree, `q` times in a row (at least [`LEAST_AGREEMENTS`] times).
 ///
 /// Two states agree if every component differs by at most `atol + rtol * |x|`. It is a heuristic: an orbit that
 /// drifts by less than that from one return to the next counts as periodic.
