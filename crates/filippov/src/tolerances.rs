@@ -94,8 +94,7 @@ pub const SIDE_REACH: f64 = 1.25;
 /// Shortest step in units of the rounding of time.
 pub const SHORTEST_STEP: f64 = 16.0 * EPS;
 
-/// A step shorter than this fraction of its recent predecessors is looked at for a jump that no surface
-/// declares.
+/// A step shorter than this fraction of its recent predecessors is looked at for a jump that no surface declares.
 pub const JUMP_SHRINK: f64 = 0.05;
 
 /// The field jumps in a step if its range over the stages exceeds this fraction of its size ...
@@ -134,8 +133,7 @@ pub const PROPORTIONAL: f64 = 64.0 * EPS;
 /// known to its square root, are then no better after a Newton step.
 pub const DOUBLE_ROOT: f64 = 1e-14;
 
-/// A multiplier counts as -1 or +1 at an exit within this distance; the event is located to better
-/// than that.
+/// A multiplier counts as -1 or +1 at an exit within this distance; the event is located to better than that.
 pub const AT_SIDE: f64 = 1e-6;
 
 /// How far a multiplier may go beyond its end at first where forces balance to rounding: clear of the rounding of exit
@@ -147,8 +145,7 @@ pub const FIRST_SLACK: f64 = 1e-12;
 pub const VANISHING_DIAGONAL: f64 = 1e-2;
 
 /// A sign that decided at an intersection is doubtful if its quantity is smaller than this fraction
-/// of its size: about the error of the fields at a located event. The fields are perturbed by as
-/// much then.
+/// of its size: about the error of the fields at a located event. The fields are perturbed by as much then.
 pub const DOUBTFUL: f64 = 1e-8;
 
 /// Where an exit leaves several ways open, the hidden dynamics starts beside the root by this much.
@@ -205,15 +202,13 @@ pub const AT_THE_ROOT: f64 = 1e-7;
 /// Returns that differ by less than this fraction lie on a cycle.
 pub const CYCLE: f64 = 1e-10;
 
-/// Returns watched to tell a cycle from a slow approach to the root, once the motion is known to be
-/// bounded.
+/// Returns watched to tell a cycle from a slow approach to the root, once the motion is known to be bounded.
 pub const RETURNS_TO_A_CYCLE: usize = 400;
 
 /// Returns watched at most.
 pub const MOST_RETURNS: usize = 20_000;
 
-/// Beyond this distance, in units of the transition, the strips are negligible and each lap has the
-/// factor gamma.
+/// Beyond this distance, in units of the transition, the strips are negligible and each lap has the factor gamma.
 pub const FAR_OUT: f64 = 1e5;
 
 /// Components of the hidden dynamics of three and more surfaces rest if they are slower than this
