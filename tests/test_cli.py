@@ -147,6 +147,10 @@ def test_a_mistake_in_the_model_names_the_place(
     assert "Traceback" not in shown
 
 
+def test_numbers_may_be_negative(model: Path) -> None:
+    assert main(["solve", str(model), "--t", "-1e-3", "5", "--y0", "-1/3", "-.5", "--quiet"]) == 0
+
+
 def test_a_plain_function_is_a_model(model: Path) -> None:
     model.write_text("def rhs(t, x, a=2.0):\n    return [a]\ny0 = [1]\nt_span = (0, 3)\n")
     assert main(["solve", "model.py", "--csv", "out.csv", "--param", "a=3"]) == 0

@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
+import filippov as fl
 import numpy as np
 import pytest
 from filippov.errors import ModelError, TraceError
@@ -306,3 +307,23 @@ def test_the_size_of_a_chain_does_not_multiply_paths() -> None:
 
     traced = trace(chain, 2 * n, t0=0.0, y0=np.linspace(0.0, 1.0, 2 * n))
     assert (traced.n_paths, traced.system.n_surfaces) == (1, n)
+
+
+is_on = True
+
+
+def test_a_function_that_remembers_is_warned_of() -> None:
+    """A thermostat by hand: in between the thresholds it returns what an earlier call decided."""
+
+    def room(t: Any, x: Any) -> Any:
+        global is_on
+        if x[0] > 21:
+            is_on = False
+        elif x[0] < 19:
+            is_on = True
+        return [0.1 * (10 - x[0]) + (2 if is_on else 0)]
+
+    for sol in (fl.solve_ivp(room, (0, 5), [15.0]), fl.System(room).solve((0, 5), [15.0])):
+        warning = next(w for w in sol.warnings if w.code == "memory")
+        assert "is_on" in warning.message
+        assert "fl.Hysteresis" in warning.message

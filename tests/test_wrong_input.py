@@ -335,3 +335,25 @@ def test_errors_are_of_one_family_and_travel() -> None:
         error = kind("what", t=1.0, state=[2.0], surface="x[0]", mode=(1,))
         copy = pickle.loads(pickle.dumps(error))
         assert (str(copy), copy.t, copy.state, copy.surface, copy.mode) == ("what", 1.0, [2.0], "x[0]", (1,))
+
+
+def test_misspelled_names_are_pointed_at() -> None:
+    @fl.system
+    def oscillator(t: Any, x: Any, omega: float = 1.0) -> Any:
+        return [x[1], -(omega**2) * x[0] - np.sign(x[1])]
+
+    with pytest.raises(TypeError, match=r"'omga'.*'omega'.*parameters of the system are omega"):
+        oscillator.solve((0, 1), [1.0, 0.0], omga=2.0)
+    with pytest.raises(TypeError, match=r"'rto'.*'rtol'"):
+        oscillator.ensemble((0, 1), [1.0, 0.0], rto=1e-3)
+
+
+def test_names_of_states_are_given_once() -> None:
+    with pytest.raises(fl.InputError, match=r"states: 'y' is given more than once"):
+        fl.System(lambda t, x: [x[1], -x[0]], states=("y", "y"))
+
+
+@pytest.mark.parametrize("g", [lambda t, x, G: x[0], lambda t, x: x[3], lambda t, x: 1 / 0])
+def test_an_event_that_raises_is_named(g: Any) -> None:
+    with pytest.raises(fl.InputError, match=r"events: entry 0 .* raised"):
+        fl.solve_ivp(lambda t, x: [-x[0]], (0, 1), [1.0], events=g)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
@@ -13,7 +14,7 @@ import numpy.typing as npt
 from filippov._core import Run, solve_many
 from filippov.errors import InputError
 from filippov.events import normalise_events
-from filippov.options import check_options, check_t_span, finite_array
+from filippov.options import check_options, check_t_span, check_unknown, finite_array
 from filippov.prepare import Prepared
 from filippov.solution import Solution
 from filippov.solve import core_events
@@ -97,6 +98,8 @@ def run_ensemble(
     options: Mapping[str, Any],
 ) -> Ensemble:
     """Run an ensemble; all arguments as in `System.ensemble`."""
+    from filippov.solve import solve_ivp
+
     t0, t1 = check_t_span(t_span)
     if t1 <= t0:
         raise InputError("t_span: an ensemble runs forward, t1 > t0")
@@ -105,6 +108,9 @@ def run_ensemble(
     for name in ("nonunique", "progress"):
         if options.get(name) in ("branch", True) or callable(options.get(name)):
             raise InputError(f"{name}: {options[name]!r} is not for an ensemble")
+    known = inspect.signature(solve_ivp).parameters
+    unknown = {name: value for name, value in options.items() if name not in known}
+    check_unknown(unknown, solve_ivp, system.params)
     checked = check_options({"keep": "last", **options}, (t0, t1), n)
     first = dict(zip(values, values_of_row(values, 0), strict=True))
     prepared = system.prepare(n, t0, states[0], first)

@@ -149,7 +149,10 @@ def accepted_names(function: Callable[..., Any], names: Any) -> list[str]:
 
 def check_scalar_function(g: Callable[[float, Any], Any], t0: float, y0: Any, what: str) -> None:
     """Call `g` once at the start and refuse what is not a single real number."""
-    value = np.asarray(g(t0, y0.copy()))
+    try:
+        value = np.asarray(g(t0, y0.copy()))
+    except Exception as error:
+        raise InputError(f"{what} raised {type(error).__name__} at the start: {error}") from error
     if value.size != 1 or value.dtype.kind not in "fiub":
         raise InputError(
             f"{what} must return one real number, it returned {value.dtype.name} of shape {value.shape}"

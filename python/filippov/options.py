@@ -141,7 +141,8 @@ def check_method(method: Any) -> str:
             raise InputError(f'method: "{method}" is not offered; the method for stiff systems is "Rodas5P"')
         spelled = {name.casefold(): name for name in _METHODS}.get(method.casefold(), method)
         hint = did_you_mean(spelled, _METHODS)
-        raise InputError(f'method: unknown method {method!r}{hint}; use "auto"')
+        listed = ", ".join(f'"{name}"' for name in _NAMED_METHODS)
+        raise InputError(f"method: unknown method {method!r}{hint}; there are {listed}")
     raise InputError(f'method: a name such as "auto" is needed, not {type(method).__name__}')
 
 
@@ -253,14 +254,19 @@ def check_params(params: Any) -> dict[str, float]:
     return checked
 
 
-def check_unknown(unknown: Mapping[str, Any], function: Callable[..., Any]) -> None:
-    """Refuse unknown keywords of `function` with a suggestion; those of SciPy alone are ignored."""
+def check_unknown(
+    unknown: Mapping[str, Any], function: Callable[..., Any], parameters: Iterable[str] = ()
+) -> None:
+    """Refuse unknown keywords with a suggestion; a system takes `parameters` too. SciPy's own are ignored."""
     for name in unknown:
         if name == "vectorized":  # SciPy's promise that columns may be handed over; no change of the result
             continue
         if name not in _SCIPY_ONLY:
-            hint = did_you_mean(name, inspect.signature(function).parameters)
-            raise TypeError(f"{function.__name__}() got an unexpected keyword argument {name!r}{hint}")
+            known = [*parameters, *inspect.signature(function).parameters]
+            hint = did_you_mean(name, known)
+            of_system = f"; the parameters of the system are {', '.join(parameters)}" if parameters else ""
+            what = f"{function.__name__}() got an unexpected keyword argument {name!r}"
+            raise TypeError(f"{what}{hint}{of_system}")
         warnings.warn(f"{name}: has no effect with an explicit method", UserWarning, stacklevel=3)
 
 

@@ -17,6 +17,7 @@ from filippov.laws import without_memory
 from filippov.resets import CoreAction, check_map_value
 from filippov.trace import Trace, trace
 from filippov.trace.fingerprint import fingerprint
+from filippov.trace.memory import remembered
 from filippov.trace.reuse import Recent
 from filippov.trace.verify import verify
 
@@ -43,6 +44,8 @@ class Prepared(NamedTuple):
         Why the function could not be traced; empty if it was.
     actions : tuple of CoreAction
         The resets, as the core takes them.
+    remembers : tuple of str
+        Names outside of itself that a traced function with an ``if`` assigns.
     """
 
     core: CoreSystem
@@ -51,6 +54,7 @@ class Prepared(NamedTuple):
     pinned: dict[str, float] | None
     why_opaque: str
     actions: tuple[CoreAction, ...] = ()
+    remembers: tuple[str, ...] = ()
 
     @property
     def backend(self) -> str:
@@ -117,7 +121,10 @@ def prepare(
             raise
     actions, is_pinned = _actions(source, traced.triggers, n, values, states, t0, start)
     pinned = dict(values) if traced.guards or is_pinned else None
-    prepared = Prepared(traced.system, traced, tuple(traced.system.surfaces()), pinned, "", actions)
+    remembers = tuple(remembered(source.fun)) if traced.n_paths > 1 else ()
+    prepared = Prepared(
+        traced.system, traced, tuple(traced.system.surfaces()), pinned, "", actions, remembers
+    )
     # A function that has changed what it reads, a counter for instance, is traced again at the next call.
     if key is not None and key == _key(source, n, values, states):
         _KEPT.keep(key, _Kept(prepared, {_point(values, t0, start)}))

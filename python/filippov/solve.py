@@ -34,6 +34,7 @@ from filippov.options import (
 from filippov.prepare import Prepared, parameter_vector
 from filippov.solution import AnyRun, Solution
 from filippov.start import StandingRun
+from filippov.switches import RunWarning
 from filippov.system import System
 from filippov.trace import trace_event
 from filippov.trace.fingerprint import fingerprint
@@ -201,7 +202,7 @@ def solve_ivp(
     >>> sol.success, sol.surfaces
     (True, ('x[1]',))
     """
-    check_unknown(unknown, solve_ivp)
+    check_unknown(unknown, solve_ivp, fun.params if isinstance(fun, System) else ())
     given = {
         "method": method,
         "t_eval": t_eval,
@@ -274,9 +275,21 @@ def _solve(
         return solution
 
     solution = follow(())
+    _warn_of_memory(solution, prepared)
     if options.nonunique == "branch":
         _add_branches(solution, follow, options.max_branches)
     return solution
+
+
+def _warn_of_memory(solution: Solution, prepared: Prepared) -> None:
+    """Warn where a function with an ``if`` assigns what other calls of it may read."""
+    if prepared.remembers:
+        text = (
+            f"fun assigns {', '.join(prepared.remembers)}, outside of itself: a trace does not remember what "
+            "an earlier call left there. For a relay with two thresholds use fl.Hysteresis; else keep such "
+            "values out of fun"
+        )
+        solution.warnings.append(RunWarning(float(solution.t[0]), "memory", text, ()))
 
 
 def _add_branches(

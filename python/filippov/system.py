@@ -236,6 +236,9 @@ class System(Points):
                 self._n = len(self._states)
             elif self._n != len(self._states):
                 raise InputError(f"states: {self._n} names are needed, {len(self._states)} are given")
+            repeated = sorted({name for name in self._states if self._states.count(name) > 1})
+            if repeated:
+                raise InputError(f"states: {', '.join(map(repr, repeated))} is given more than once")
 
     @property
     def n(self) -> int | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from pathlib import Path
 
 from filippov.cli import commands
@@ -101,6 +102,8 @@ def _add_solve(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_run_options(command)
+    # All that begins with a minus and a digit is a number here, such as -1e-3 and -1/3; no option does.
+    command._negative_number_matcher = re.compile(r"-\.?\d")
     out = command.add_argument_group("what comes out")
     out.add_argument("--plot", type=Path, metavar="FILE", help="draw the states over time: .png, .pdf, .svg")
     out.add_argument("--states", nargs="+", metavar="NAME", help="draw these states only")
@@ -135,5 +138,7 @@ def _add_sweep(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_run_options(command)
+    # All that begins with a minus and a digit is a number here, such as -1e-3 and -1/3; no option does.
+    command._negative_number_matcher = re.compile(r"-\.?\d")
     add_sweep_options(command)
     command.set_defaults(run=sweep)
