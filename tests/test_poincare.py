@@ -251,3 +251,42 @@ def test_a_period_that_is_none_is_told(friction: fl.System) -> None:
     found = fl.poincare(friction, fl.Phase(lambda omega: -omega), (0, 10), [1.0, 2.0])
     assert found.attrs["reason"] == "wrong_input"
     assert "period of the section" in found.attrs["message"]
+
+
+@pytest.mark.parametrize("name", fl.problems.names())
+def test_returns_are_those_of_a_run_with_events(name: str) -> None:
+    """On every reference problem: zeros of a function as events of `solve_ivp`, ticks as its dense output."""
+    problem = fl.problems.get(name)
+    n = len(problem.y0)
+    system = fl.System(problem.fun, n=n, args=problem.args, resets=getattr(problem, "resets", None))
+    t0, t1 = problem.t_span
+    middle = system.solve((t0, t1), problem.y0, rtol=1e-9, atol=1e-12)
+    level = float(np.quantile(middle.y[0], 0.6)) + 1e-3 * float(np.ptp(middle.y[0]))
+    up = fl.Event(lambda t, x: x[0] - level, direction="up")
+    sol = system.solve((t0, t1), problem.y0, events=up, rtol=1e-9, atol=1e-12)
+    found = fl.poincare(system, up, (t0, t1), problem.y0, rtol=1e-9, atol=1e-12)
+    times = sol.t_events[0][sol.t_events[0] > t0]
+    np.testing.assert_array_equal(found.t, times)
+    pieces = [piece for piece in sol.segments if piece.duration > 0]
+    for k in range(1, len(times)):
+        # A piece of constant mode that begins at the very return belongs to what follows.
+        within = [p for p in pieces if p.t_end > times[k - 1] and p.t_start < times[k]]
+        assert found.itinerary.values[k] == " ".join(str(p.mode) for p in within).strip()
+    period = (t1 - t0) / 7.3
+    ticks = fl.poincare(system, fl.Phase(period, t0), (t0, t1), problem.y0, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(ticks.t, t0 + period * np.arange(1, 8), rtol=1e-14)
+    states = np.array([ticks[state] for state in middle.states])
+    np.testing.assert_allclose(states, middle.sol(ticks.t.values, side="left"), rtol=1e-6, atol=1e-8)
+
+
+def test_a_return_within_rounding_of_a_switch() -> None:
+    """A piece that begins at the very return belongs to what follows, on whichever side rounding puts it."""
+    ball = fl.System(
+        lambda t, x: [x[1], -9.8], n=2, resets=fl.Reset(lambda t, x: x[0], lambda t, x: [x[0], -0.9 * x[1]])
+    )
+    for level in (1.2e-16, -1.2e-16, 3e-17):
+        for direction in (1, -1):
+            section = fl.Section(lambda t, x, level=level: x[0] - level, direction)
+            found = fl.poincare(ball, section, (0, 4), [1.0, 0.0], rtol=1e-9)
+            assert {"+"} >= set(found.itinerary.values[1:].tolist())  # the first may have an ulp of "+" too
+            assert (np.diff(found.t) > 0.1).all()

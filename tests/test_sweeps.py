@@ -357,6 +357,13 @@ def test_wrong_arguments_are_named(friction: fl.System, arguments: dict[str, Any
         fl.bifurcation_diagram(friction, ONCE_PER_PERIOD, (0, np.inf), [1.0, 2.0], **given)
 
 
+@pytest.mark.parametrize("name", ["n", "transient", "until_periodic", "tolerance", "modulo"])
+def test_what_is_about_returns_needs_a_section(friction: fl.System, name: str) -> None:
+    value: Any = {"tolerance": 1e-6, "modulo": {"v": 1.0}}.get(name, 2)
+    with pytest.raises(fl.InputError, match=rf"^{name}: .* give section="):
+        fl.sweep(friction, (0, 1), [1.0, 2.0], {"F": [0.1, 0.2]}, **{name: value})
+
+
 def test_wrong_initial_states_are_named(friction: fl.System) -> None:
     for y0, message in (
         ({"y": [1.0]}, "y0: no value for v"),

@@ -102,6 +102,12 @@ def test_first_step_longer_than_the_interval() -> None:
         fl.solve_ivp(relay, (0, 1), [1.0], first_step=2.0)
 
 
+@pytest.mark.parametrize("method", ["rodas5P", "RODAS5P", "Rodas5", "rodas5p"])
+def test_a_method_in_another_spelling(method: str) -> None:
+    with pytest.raises(fl.InputError, match=r"^method: .*did you mean 'Rodas5P'"):
+        fl.solve_ivp(relay, (0, 1), [1.0], method=method)
+
+
 @pytest.mark.parametrize("method", ["Radau", "BDF", "LSODA"])
 def test_stiff_methods_name_the_replacement(method: str) -> None:
     with pytest.raises(fl.InputError, match=r"^method: .*Rodas5P"):

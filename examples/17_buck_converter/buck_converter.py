@@ -24,8 +24,8 @@ from filippov.problems.buck_converter import (
     GAIN,
     INDUCTANCE,
     PERIOD,
-    RAMP_HIGH,
     RAMP_LOW,
+    RAMP_RISE,
     REFERENCE,
     RESISTANCE,
 )
@@ -52,7 +52,7 @@ def periodic_motion(E: float) -> tuple[float, np.ndarray]:
 
     def control(instant: float) -> float:
         v = (exponential(instant) @ start(instant))[0]
-        return GAIN * (v - REFERENCE) - (RAMP_LOW + (RAMP_HIGH - RAMP_LOW) * instant / PERIOD)
+        return GAIN * (v - REFERENCE) - (RAMP_LOW + RAMP_RISE * instant / PERIOD)
 
     low, high = 0.0, PERIOD
     for _ in range(200):

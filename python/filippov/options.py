@@ -139,7 +139,8 @@ def check_method(method: Any) -> str:
             return _METHODS[method]
         if method in _STIFF_METHODS:
             raise InputError(f'method: "{method}" is not offered; the method for stiff systems is "Rodas5P"')
-        hint = did_you_mean(method, _METHODS)
+        spelled = {name.casefold(): name for name in _METHODS}.get(method.casefold(), method)
+        hint = did_you_mean(spelled, _METHODS)
         raise InputError(f'method: unknown method {method!r}{hint}; use "auto"')
     raise InputError(f'method: a name such as "auto" is needed, not {type(method).__name__}')
 

@@ -80,8 +80,11 @@ def basins(
         not isinstance(resolution, int | float | np.number) or not 0.0 < resolution < 1.0
     ):
         raise InputError(f"resolution: a number between 0 and 1 is needed, not {resolution!r}")
-    given: dict[str, Any] = {"n": n, "until_periodic": True} if section is not None else {}
-    found = sweep(system, t_span, y0, params, section=section, modulo=modulo, **given, **arguments)
+    if "until_periodic" in arguments:
+        raise InputError("until_periodic: has no place here; a run of basins() ends when its returns repeat")
+    returns: dict[str, Any] = {"n": n, "until_periodic": True, "modulo": modulo}
+    given = returns if section is not None else {}
+    found = sweep(system, t_span, y0, params, section=section, **given, **arguments)
     if found is None:
         return None
     states = json.loads(found.attrs["states"])

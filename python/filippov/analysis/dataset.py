@@ -52,6 +52,11 @@ class Variable(NamedTuple):
     component: int | None
     attributes: dict[str, Any]
 
+    @property
+    def dtype(self) -> Any:
+        """The type of its numbers, as Zarr names it."""
+        return _TYPES.get(self.column, np.float64)
+
     def values(self, table: Table) -> npt.NDArray[Any]:
         """Return the rows that a table has."""
         column = table[self.column]
@@ -61,6 +66,14 @@ class Variable(NamedTuple):
             return np.array(column, dtype=object)
         values = np.asarray(column)
         return values if self.component is None else values[:, self.component]
+
+
+_TYPES: dict[str, Any] = {
+    **dict.fromkeys(("status", "reason", "modes"), np.int8),
+    **dict.fromkeys(("n_steps", "n_switches", "n_returns", "period", "row_size"), np.int64),
+    "n_pieces": np.int32,
+    "message": "string",
+}
 
 
 def variables_of(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 __all__ = ["Axis", "Grid", "grid_of"]
 
 Array = npt.NDArray[np.float64]
+
+# Points whose numbers are made at once.
+_BLOCK = 1 << 14
 
 
 class Axis(NamedTuple):
@@ -44,20 +47,55 @@ class Grid(NamedTuple):
     ----------
     axes : tuple of Axis
     states : tuple of str
-    names : tuple of str
-        Names of the parameters.
-    y0 : ndarray, shape (n_points, n)
-    p : ndarray, shape (n_points, n_parameters)
+    values : dict of str to ndarray
+        The parameters: numbers, and the values along their dimensions.
+    starts : callable
+        The initial states, from the indices along the dimensions.
     fixed : dict of str to float
         The parameters that do not vary.
     """
 
     axes: tuple[Axis, ...]
     states: tuple[str, ...]
-    names: tuple[str, ...]
-    y0: Array
-    p: Array
+    values: dict[str, Any]
+    starts: Callable[[dict[str, Any], int], Array]
     fixed: dict[str, float]
+
+    @property
+    def n_points(self) -> int:
+        """Number of points."""
+        return int(np.prod(self.shape, dtype=np.int64))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return tuple(self.values)
+
+    def rows(self, start: int, stop: int) -> tuple[Array, Array]:
+        """Return initial states, shape (k, n), and parameters, shape (k, n_parameters), of some points."""
+        count = stop - start
+        along = np.unravel_index(np.arange(start, stop), self.shape) if self.axes else ()
+        indices = dict(zip(names_of(self.axes), along, strict=True))
+        p = np.empty((count, len(self.values)))
+        for k, (name, value) in enumerate(self.values.items()):
+            p[:, k] = value if np.ndim(value) == 0 else value[indices[name]]
+        return np.ascontiguousarray(self.starts(indices, count)), p
+
+    def blocks(self) -> Iterator[tuple[int, int]]:
+        """Yield pieces of the points that need little memory."""
+        for start in range(0, self.n_points, _BLOCK):
+            yield start, min(start + _BLOCK, self.n_points)
+
+    def first(self) -> tuple[Array, dict[str, float]]:
+        """Return initial state and parameters of the first point that is finite, else of the first."""
+        for start, stop in self.blocks():
+            y0, p = self.rows(start, stop)
+            finite = np.flatnonzero(np.isfinite(y0).all(axis=1) & np.isfinite(p).all(axis=1))
+            if len(finite):
+                row = int(finite[0])
+                return y0[row].copy(), dict(zip(self.names, p[row].tolist(), strict=True))
+        y0, p = self.rows(0, 1)
+        return y0[0].copy(), dict(zip(self.names, p[0].tolist(), strict=True))
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -68,10 +106,6 @@ class Grid(NamedTuple):
     def dims(self) -> tuple[str, ...]:
         """Names of the axes."""
         return tuple(axis.name for axis in self.axes)
-
-    def columns(self) -> dict[str, Array]:
-        """Return the parameters by name, one value per point."""
-        return {name: self.p[:, k] for k, name in enumerate(self.names)}
 
 
 def grid_of(system: System, y0: Any, params: Mapping[str, Any] | None, last: str | None = None) -> Grid:
@@ -112,40 +146,18 @@ def grid_of(system: System, y0: Any, params: Mapping[str, Any] | None, last: str
         raise InputError(
             f"states: {clash[0]!r} is a name of the result too; name the states otherwise: System(states=...)"
         )
-    shape = tuple(axis.size for axis in axes)
-    count = int(np.prod(shape, dtype=np.int64))
-    indices = dict(zip(names_of(axes), np.indices(shape).reshape(len(shape), count), strict=True))
-    p = np.empty((count, len(defaults)))
-    for k, (name, default) in enumerate(defaults.items()):
-        value = given.get(name)
-        p[:, k] = default if value is None else value if value.ndim == 0 else value[indices[name]]
-    fixed = {
-        name: float(given.get(name, np.float64(value)))
-        for name, value in defaults.items()
-        if name not in indices
-    }
-    return Grid(tuple(axes), states, tuple(defaults), np.ascontiguousarray(rows(indices, count)), p, fixed)
+    values = {name: given.get(name, np.float64(default)) for name, default in defaults.items()}
+    fixed = {name: float(value) for name, value in values.items() if np.ndim(value) == 0}
+    return Grid(tuple(axes), states, values, rows, fixed)
 
 
 # Names of variables and dimensions of the results.
-RESERVED = frozenset(
-    (
-        *(
-            "t",
-            "status",
-            "reason",
-            "message",
-            "period",
-            "row_size",
-            "n_returns",
-            "n_steps",
-            "n_switches",
-            "t_last",
-        ),
-        *("return_time", "sliding_time", "n_pieces", "mode", "itinerary", "surface", "obs", "piece", "point"),
-        *("start", "attractor", "attractor_size"),
-    )
+_TAKEN = (
+    "t status reason message period row_size n_returns n_steps n_switches t_last return_time sliding_time "
+    "n_pieces mode itinerary surface obs piece point start attractor attractor_number attractor_size "
+    "attractor_period"
 )
+RESERVED = frozenset(_TAKEN.split(" "))
 
 
 def names_of(axes: Sequence[Axis]) -> list[str]:

@@ -104,7 +104,7 @@ class Plan(NamedTuple):
         What is run, at which points.
     observed : Observation or None
         What is observed of every run.
-    clocks, spans : ndarray, shape (n_points, 2)
+    t_span : (float, float)
     follows : bool
         Whether neighbours along the last dimension follow one another.
     units : dict
@@ -118,8 +118,7 @@ class Plan(NamedTuple):
     place: Place | None
     options: Options
     observed: Observation | None
-    clocks: Array
-    spans: Array
+    t_span: tuple[float, float]
     follows: bool
     units: Mapping[str, str]
     attributes: Mapping[str, Any]
@@ -127,7 +126,7 @@ class Plan(NamedTuple):
     @property
     def n_points(self) -> int:
         """Number of points."""
-        return len(self.grid.y0)
+        return self.grid.n_points
 
     def pieces(self, chunk_size: int) -> list[Piece]:
         """Return the chunks, each of at most `chunk_size` points; those of a line stay in their order."""
@@ -142,25 +141,44 @@ class Plan(NamedTuple):
         """Return the number of points of a chunk if none is asked for."""
         return min(max(-(-self.n_points // _CHUNKS), 1), _MOST_IN_CHUNK)
 
+    def points(self, start: int, stop: int) -> tuple[Array, Array, Array, Array]:
+        """Return initial states, parameters, clocks and spans of some points, one row for each."""
+        y0, p = self.grid.rows(start, stop)
+        t0, t1 = self.t_span
+        starts, ends = np.full(len(p), t0), np.full(len(p), t1)
+        if self.observed is None:
+            return y0, p, np.zeros((len(p), 2)), np.column_stack([starts, ends])
+        section = self.observed.section
+        clocks = clocks_of(section, self.grid.names, p)
+        if self.follows and isinstance(section, Phase) and section.of is None:
+            # The state that a point hands on belongs to a tick: the next one starts at a tick of its own
+            # clock.
+            period, offset = clocks.T
+            with np.errstate(invalid="ignore", divide="ignore"):
+                ticks = offset + np.ceil((t0 - offset) / period) * period
+            begins_line = np.arange(start, stop) % self.grid.shape[-1] == 0
+            starts = np.where(begins_line | ~np.isfinite(ticks), t0, ticks)
+        ends = end_times(section, self.t_span, self.observed.transient + self.observed.n, clocks)
+        return y0, p, clocks, np.column_stack([starts, ends])
+
     def chunk(self, piece: Piece, carry: Array | None, threads: int, travels: bool) -> Chunk:
         """Return what is to be done for a piece."""
-        rows = slice(piece.start, piece.stop)
-        y0, p = self.grid.y0[rows], self.grid.p[rows]
+        y0, p, all_clocks, all_spans = self.points(piece.start, piece.stop)
         limits: tuple[Any, ...] = ()
         if self.observed is not None:
             limits = (self.observed.transient, self.observed.n, self.observed.cycle)
         parts: list[Task | Table] = []
-        t0 = float(self.spans[0, 0])
+        t0 = self.t_span[0]
         for own, prepared in groups_of(self.system, self.prepared, t0, y0, self.grid.names, p):
             place: Place | None | Exception = self.place
             if prepared is not self.prepared and not isinstance(prepared, Exception):
                 place = self._place_for(prepared, y0[own], p[own])
             error = prepared if isinstance(prepared, Exception) else place
             if isinstance(prepared, Exception) or isinstance(place, Exception):
-                failed = (str(error), "not_prepared", self.spans[rows][own, 0], y0[own])
+                failed = (str(error), "not_prepared", all_spans[own, 0], y0[own])
                 parts.append(failed_table(*failed, len(self.prepared.surfaces)))
                 continue
-            clocks, spans = self.clocks[rows][own], self.spans[rows][own]
+            clocks, spans = all_clocks[own], all_spans[own]
             task = Task(
                 prepared,
                 place,
@@ -185,7 +203,7 @@ class Plan(NamedTuple):
         if self.observed is None:
             return None
         values = dict(zip(self.grid.names, p[0].tolist(), strict=True))
-        section, t0 = self.observed.section, float(self.spans[0, 0])
+        section, t0 = self.observed.section, self.t_span[0]
         try:
             return section.place(prepared, self.grid.states, t0, y0[0].copy(), values)
         except InputError as error:
@@ -201,6 +219,13 @@ class Plan(NamedTuple):
             )
             for action in self.prepared.actions
         ]
+        digests = [sha256() for _ in range(3)]
+        for start, stop in self.grid.blocks():
+            y0, p, clocks, spans = self.points(start, stop)
+            for digest, data in zip(
+                digests, (y0.tobytes(), p.tobytes(), spans.tobytes() + clocks.tobytes()), strict=True
+            ):
+                digest.update(data)
         place = self.place
         if place is not None:
             function = place.function
@@ -210,10 +235,10 @@ class Plan(NamedTuple):
             "system": _digest(code),
             "resets": as_json(maps),
             "section": as_json([place, None if self.observed is None else self.observed[1:]]),
-            "y0": _digest(self.grid.y0.tobytes()),
-            "params": _digest(as_json(self.grid.names).encode() + self.grid.p.tobytes()),
+            "y0": digests[0].hexdigest(),
+            "params": as_json(self.grid.names) + digests[1].hexdigest(),
             "dimensions": as_json([[axis.name, axis.size] for axis in self.grid.axes]),
-            "t_span": _digest(self.spans.tobytes() + self.clocks.tobytes()),
+            "t_span": digests[2].hexdigest(),
             "follow": str(self.follows),
             "options": self.attributes["options"],
             "units": as_json(dict(self.units)),
@@ -235,26 +260,11 @@ def plan_of(
     units: Mapping[str, str],
 ) -> Plan:
     """Return the plan of a sweep; all arguments are checked."""
-    count = len(grid.y0)
     t0, t1 = t_span
-    starts, ends, place = np.full(count, t0), np.full(count, t1), None
-    clocks = np.zeros((count, 2))
+    place = None
     if observed is not None:
-        section = observed.section
-        clocks = clocks_of(section, grid.columns(), count)
-        if follows and isinstance(section, Phase) and section.of is None:
-            # The state that a point hands on belongs to a tick: the next one starts at a tick of its own
-            # clock.
-            period, offset = clocks.T
-            with np.errstate(invalid="ignore", divide="ignore"):
-                ticks = offset + np.ceil((t0 - offset) / period) * period
-            begins_line = np.arange(count) % grid.shape[-1] == 0
-            starts = np.where(begins_line | ~np.isfinite(ticks), t0, ticks)
-        ends = end_times(section, t_span, observed.transient + observed.n, clocks)
-        finite = np.flatnonzero(np.isfinite(grid.y0).all(axis=1) & np.isfinite(grid.p).all(axis=1))
-        row = int(finite[0]) if len(finite) else 0
-        values = dict(zip(grid.names, grid.p[row].tolist(), strict=True))
-        place = section.place(prepared, grid.states, t0, grid.y0[row].copy(), values)
+        state, values = grid.first()
+        place = observed.section.place(prepared, grid.states, t0, state, values)
     shown = {name: value for name, value in options._asdict().items() if name not in _NOT_SHOWN}
     attributes: dict[str, Any] = {
         "Conventions": "CF-1.11",
@@ -272,11 +282,7 @@ def plan_of(
             "periodicity": as_json(observed.cycle),
             "follow": grid.dims[-1] if follows else "",
         }
-    return Plan(
-        *(system, grid, prepared, place, options, observed, clocks),
-        np.column_stack([starts, ends]),
-        *(follows, units, attributes),
-    )
+    return Plan(system, grid, prepared, place, options, observed, t_span, follows, units, attributes)
 
 
 _NOT_SHOWN = frozenset(("t_eval", "dense_output", "keep", "progress", "max_branches"))

@@ -191,19 +191,15 @@ def concatenate(tables: Sequence[Table]) -> Table:
     return joined
 
 
-def prepare_for(system: System, t0: float, y0: Array, names: Sequence[str], p: Array) -> Prepared:
+def prepare_for(system: System, t0: float, y0: Array, values: dict[str, float]) -> Prepared:
     """Return the system of the core, traced at a point of the sweep, or at its default values."""
-    n = y0.shape[1]
-    finite = np.flatnonzero(np.isfinite(y0).all(axis=1) & np.isfinite(p).all(axis=1))
-    row = int(finite[0]) if len(finite) else 0
-    values = dict(zip(names, p[row].tolist(), strict=True))
     try:
-        return system.prepare(n, t0, np.ascontiguousarray(y0[row]), values)
+        return system.prepare(len(y0), t0, y0, values)
     except Exception:
         defaults = system.parameter_values(None)
         if defaults == values:
             raise
-        return system.prepare(n, t0, None, defaults)
+        return system.prepare(len(y0), t0, None, defaults)
 
 
 def groups_of(

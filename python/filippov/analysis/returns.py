@@ -126,7 +126,8 @@ def poincare(
     grid = grid_of(system, y0, params)
     if grid.axes:
         raise InputError("y0: one initial state is needed; bifurcation_diagram() takes several")
-    if not (np.isfinite(grid.y0).all() and np.isfinite(grid.p).all()):
+    y0_rows, p_rows = grid.rows(0, 1)
+    if not (np.isfinite(y0_rows).all() and np.isfinite(p_rows).all()):
         raise InputError("y0, params: must be finite")
     span = span_of(t_span, section, n is not None)
     checked = options_of(options, span, len(grid.states))
@@ -141,12 +142,12 @@ def poincare(
         longest_period=longest_period,
         modulo=modulo,
     )
-    prepared = prepare_for(system, span[0], grid.y0, grid.names, grid.p)
+    state, values = grid.first()
+    prepared = prepare_for(system, span[0], state, values)
     fit_kappa(checked.kappa, prepared.surfaces)
-    values = dict(zip(grid.names, grid.p[0].tolist(), strict=True))
     own = observed.section
-    place = own.place(prepared, grid.states, span[0], grid.y0[0].copy(), values)
-    clocks = clocks_of(own, grid.columns(), 1)
+    place = own.place(prepared, grid.states, span[0], state, values)
+    clocks = clocks_of(own, grid.names, p_rows)
     ends = end_times(own, span, observed.transient + observed.n, clocks)
     table = run_task(
         Task(
@@ -154,9 +155,9 @@ def poincare(
             place,
             clocks,
             np.column_stack([[span[0]], ends]),
-            grid.y0,
+            y0_rows,
             grid.names,
-            grid.p,
+            p_rows,
             checked,
             (observed.transient, observed.n, observed.cycle),
             1,
@@ -196,8 +197,7 @@ def poincare(
 
 def texts_of(modes: npt.NDArray[np.int8], sizes: npt.NDArray[np.int32]) -> list[str]:
     """Return the modes between returns as text, one entry per return: ``"+ 0 -"``."""
-    ends = np.cumsum(sizes)
     words = [str(Mode(mode)) for mode in modes.tolist()]
-    return [
-        " ".join(words[end - size : end]) for size, end in zip(sizes.tolist(), ends.tolist(), strict=True)
-    ]
+    ends = np.cumsum(sizes)
+    starts = ends - sizes
+    return [" ".join(words[a:b]).strip() for a, b in zip(starts.tolist(), ends.tolist(), strict=True)]

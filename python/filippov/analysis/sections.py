@@ -337,11 +337,11 @@ def as_section(section: Any) -> AnySection:
     )
 
 
-def clocks_of(section: AnySection, values: Mapping[str, Array], count: int) -> Array:
-    """Return period and offset of each point, shape (count, 2); zeros for other sections."""
+def clocks_of(section: AnySection, names: Sequence[str], p: Array) -> Array:
+    """Return period and offset of points with these parameters; zeros for other sections."""
     if isinstance(section, Phase) and section.of is None:
-        return section.clocks(values, count)
-    return np.zeros((count, 2))
+        return section.clocks({name: p[:, k] for k, name in enumerate(names)}, len(p))
+    return np.zeros((len(p), 2))
 
 
 def _surface_index(surface: Any, surfaces: tuple[str, ...]) -> int:

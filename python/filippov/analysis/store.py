@@ -152,16 +152,11 @@ class Store:
         surfaces = plan.prepared.surfaces
         has_section = plan.observed is not None
         variables = list(variables_of(plan.grid, len(surfaces), has_section, plan.units))
-        points = [variable for variable in variables if variable.rows == "point"]
-        columns = list(dict.fromkeys(variable.column for variable in points))
-        found: dict[str, list[Any]] = {variable.name: [] for variable in points}
         sizes = {"point": plan.n_points, "obs": 0, "piece": 0}
         for index in range(count):
-            table = self.read(index, *columns, "row_size", "n_pieces")
+            table = self.read(index, "row_size", "n_pieces")
             sizes["obs"] += int(table["row_size"].sum())
             sizes["piece"] += int(table["n_pieces"].sum())
-            for variable in points:
-                found[variable.name].append(variable.values(table))
         partial = self._partial(".result")
         attributes = {**plan.attributes, _RECORD: json.dumps(self.record())}
         group = zarr.create_group(partial, attributes=attributes)
@@ -169,11 +164,13 @@ class Store:
         def create(
             name: str, dims: tuple[str, ...], shape: tuple[int, ...], dtype: Any, attributes: Any
         ) -> Any:
+            rest = int(np.prod(shape[1:], dtype=np.int64))
+            rows = max(1, min(shape[0], _ROWS // max(rest, 1)))
             return group.create_array(
                 name,
                 shape=shape,
                 dtype=dtype,
-                chunks=tuple(max(1, min(size, _ROWS)) for size in shape),
+                chunks=(rows, *(max(size, 1) for size in shape[1:])),
                 dimension_names=dims,
                 attributes=dict(attributes),
             )
@@ -184,23 +181,15 @@ class Store:
             is_text = values.dtype.kind == "O"
             array = create(name, dims, values.shape, "string" if is_text else values.dtype, attributes)
             array[...] = values
-        for variable in points:
-            values = np.concatenate(found.pop(variable.name))
-            shape = shape_of(variable, plan.grid, len(values), len(surfaces))
-            kind = "string" if values.dtype.kind == "O" else values.dtype
-            array = create(variable.name, dims_of(variable, plan.grid), shape, kind, variable.attributes)
-            array[...] = values.reshape(shape)
-        ragged = [variable for variable in variables if variable.rows != "point"]
         writers = []
-        for variable in ragged:
+        for variable in variables:
             shape = shape_of(variable, plan.grid, sizes[variable.rows], len(surfaces))
-            number: Any = {"mode": np.int8, "n_pieces": np.int32}.get(variable.name, np.float64)
             dims = dims_of(variable, plan.grid)
-            writers.append(_Writer(create(variable.name, dims, shape, number, variable.attributes)))
-        wanted = list(dict.fromkeys(variable.column for variable in ragged))
-        for index in range(count if ragged else 0):
+            writers.append(_Writer(create(variable.name, dims, shape, variable.dtype, variable.attributes)))
+        wanted = list(dict.fromkeys(variable.column for variable in variables))
+        for index in range(count):
             table = self.read(index, *wanted)
-            for variable, writer in zip(ragged, writers, strict=True):
+            for variable, writer in zip(variables, writers, strict=True):
                 writer.add(variable.values(table))
         for writer in writers:
             writer.flush()
@@ -247,20 +236,27 @@ class Store:
 
 
 class _Writer:
-    """Appends rows to an array on disk in blocks of the size of its chunks, so that none is written twice."""
+    """Appends rows in C order to an array on disk, in blocks of its chunks: none is written twice."""
 
     def __init__(self, array: Any) -> None:
         self._array = array
         self._waiting: list[npt.NDArray[Any]] = []
-        self._start = 0
+        self._count = self._start = 0
+        self._inner = array.shape[1:]
+        # Rows that come per index of the first dimension: one where a row is a line of the array.
+        self._rows_per_index = 0
 
     def add(self, rows: npt.NDArray[Any]) -> None:
+        inner = self._inner[: len(self._inner) - (rows.ndim - 1)]
+        self._rows_per_index = int(np.prod(inner, dtype=np.int64))
         self._waiting.append(rows)
-        if sum(map(len, self._waiting)) >= _ROWS:
+        self._count += len(rows)
+        block = self._array.chunks[0] * self._rows_per_index
+        if block and self._count >= block:
             whole = np.concatenate(self._waiting)
-            end = len(whole) - len(whole) % _ROWS
+            end = len(whole) - len(whole) % block
             self._write(whole[:end])
-            self._waiting = [whole[end:]]
+            self._waiting, self._count = [whole[end:]], len(whole) - end
 
     def flush(self) -> None:
         """Write what is left."""
@@ -268,8 +264,9 @@ class _Writer:
 
     def _write(self, rows: npt.NDArray[Any]) -> None:
         if len(rows):
-            self._array[self._start : self._start + len(rows)] = rows
-            self._start += len(rows)
+            indices = len(rows) // self._rows_per_index
+            self._array[self._start : self._start + indices] = rows.reshape(indices, *self._inner)
+            self._start += indices
 
 
 def run_with_store(

@@ -133,7 +133,17 @@ def sweep(
     span = span_of(t_span, section, n is not None)
     checked = options_of(options, span, len(grid.states))
     observed = None
-    if section is not None:
+    if section is None:
+        alone: dict[str, Any] = {
+            "n": n,
+            "transient": transient or None,
+            "until_periodic": until_periodic or None,
+        }
+        alone |= {"tolerance": tolerance, "modulo": modulo}
+        for name, value in alone.items():
+            if value is not None:
+                raise InputError(f"{name}: is about returns; give section= too")
+    else:
         observed = observation_of(
             section,
             checked,
@@ -145,7 +155,7 @@ def sweep(
             longest_period=longest_period,
             modulo=modulo,
         )
-    prepared = prepare_for(system, span[0], grid.y0, grid.names, grid.p)
+    prepared = prepare_for(system, span[0], *grid.first())
     fit_kappa(checked.kappa, prepared.surfaces)
     plan = plan_of(system, grid, prepared, observed, checked, span, last is not None, units or {})
     return run_plan(plan, store, executor, threads, chunk_size, part, progress)

@@ -61,6 +61,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"filippov: {where}{error.strerror or error}", file=sys.stderr)
         return MISTAKE
     except (Interrupted, KeyboardInterrupt) as error:
-        print(f"filippov: interrupted. {error}", file=sys.stderr)
+        print(f"filippov: interrupted. {error}".rstrip(), file=sys.stderr)
         return INTERRUPTED
     return code

@@ -22,11 +22,13 @@ def add_run_options(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--y0", nargs="+", metavar="X", help="initial state: numbers, or NAME=NUMBER for some of them"
     )
-    command.add_argument("--param", nargs="+", default=[], action="extend", metavar="NAME=VALUE")
+    command.add_argument(
+        "--param", nargs="+", default=[], action="extend", metavar="NAME=VALUE", help="values of parameters"
+    )
     how = command.add_argument_group("how it is solved")
     how.add_argument("--rtol", metavar="TOL", help="relative tolerance, 1e-6 by default")
     how.add_argument("--atol", metavar="TOL", help="absolute tolerance, 1e-9 by default")
-    how.add_argument("--method", metavar="NAME", help='"auto" (default), "Taylor" or "DOPRI5"')
+    how.add_argument("--method", metavar="NAME", help='"auto" (default), "Taylor", "DOPRI5", "Rodas5P", ...')
     how.add_argument(
         "--sliding", metavar="RULE", help='where surfaces meet: "canopy" (default), "moments", ...'
     )

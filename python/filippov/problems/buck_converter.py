@@ -20,13 +20,13 @@ from filippov.problems.problem import Problem
 __all__ = ["PERIOD", "PROBLEMS", "rhs"]
 
 RESISTANCE, CAPACITY, INDUCTANCE, PERIOD = 22.0, 47e-6, 20e-3, 400e-6
-GAIN, REFERENCE, RAMP_LOW, RAMP_HIGH = 8.4, 11.3, 3.8, 8.2
+GAIN, REFERENCE, RAMP_LOW, RAMP_RISE = 8.4, 11.3, 3.8, 4.4
 
 
 def rhs(t: float, x: Any, E: float = 33.0) -> list[Any]:
     """Voltage `v` at the load and current `i`; the input `E` is connected while the control is low."""
     v, i = x
-    ramp = RAMP_LOW + (RAMP_HIGH - RAMP_LOW) * sawtooth(t, PERIOD)
+    ramp = RAMP_LOW + RAMP_RISE * sawtooth(t, PERIOD)
     connected = where(GAIN * (v - REFERENCE) < ramp, 1.0, 0.0)
     return [(i - v / RESISTANCE) / CAPACITY, (E * connected - v) / INDUCTANCE]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["Both", "Comparison", "Condition"]
 
 
-class Condition:
+class Condition(ABC):
     """A traced truth value, such as ``x[1] > 0``.
 
     ``np.where(condition, a, b)`` turns it into a choice by the sign of its switching function. In ``if``,
@@ -28,18 +29,17 @@ class Condition:
 
     tracer: Tracer
 
-    # The three questions that `Comparison` and `Both` answer; a condition is always one of them.
-
+    @abstractmethod
     def choose(self, plus: int, minus: int) -> int:
         """Return the node that is `plus` where the condition holds and `minus` elsewhere."""
-        raise NotImplementedError
 
+    @abstractmethod
     def negated(self) -> Condition:
         """Return the opposite condition."""
-        raise NotImplementedError
 
+    @abstractmethod
     def __bool__(self) -> bool:
-        raise NotImplementedError
+        """Answer by forced branching."""
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **kwargs: Any) -> Any:
         return self.tracer.apply_ufunc(ufunc, method, inputs, kwargs)

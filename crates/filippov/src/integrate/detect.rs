@@ -209,7 +209,9 @@ impl Integrator<'_> {
             self.stepper.extend_order4(&self.x);
         }
         self.measure_margin(dt)?;
-        self.prepare_bounds()?;
+        if self.motion.sliding.len() > 1 {
+            self.prepare_bounds()?;
+        }
         let mut probed = false;
         for index in 0..self.motion.monitored.len() {
             let m = self.motion.monitored[index];

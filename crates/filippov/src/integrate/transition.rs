@@ -263,7 +263,8 @@ impl Integrator<'_> {
         surfaces: &[usize],
     ) -> Result<bool, FieldError> {
         let exits = [EventFunction::ExitMinus, EventFunction::ExitPlus];
-        let is_exit = event.functions.iter().any(|f| exits.contains(f));
+        let n_exits = event.functions.iter().filter(|f| exits.contains(f)).count();
+        let is_exit = n_exits == 2 || n_exits == 1 && self.approaches_two_fold();
         if !is_exit || !surfaces.is_empty() {
             return Ok(false);
         }

@@ -126,7 +126,7 @@ impl Integrator<'_> {
                     tick.min(t_stop)
                 }
                 _ if at == theta => t_stop,
-                _ => t0 + at * dt,
+                _ => (t0 + at * dt).min(t_stop),
             };
             let mut y = vec![0.0; self.x.len()];
             self.stepper.interpolant().at(at, &mut y);

@@ -163,6 +163,10 @@ impl Observer {
             return;
         }
         self.pass_time(t);
+        if t <= self.since && self.modes.len() > 1 {
+            // It begins here, and belongs to what follows.
+            self.modes.pop();
+        }
         let found = Return {
             t,
             y: y.to_vec(),

@@ -132,6 +132,7 @@ impl Stepper {
     }
 
     /// The derivative at the start of the step.
+    #[inline(always)]
     pub fn start_derivative(&self) -> &[f64] {
         in_use!(self, method => method.start_derivative())
     }
@@ -142,21 +143,25 @@ impl Stepper {
     }
 
     /// The end of the attempted step.
+    #[inline(always)]
     pub fn end(&self) -> &[f64] {
         in_use!(self, method => method.end())
     }
 
     /// The derivative at the end of the attempted step.
+    #[inline(always)]
     pub fn end_derivative(&self) -> &[f64] {
         in_use!(self, method => method.end_derivative())
     }
 
     /// The continuous extension of the attempted step.
+    #[inline(always)]
     pub fn interpolant(&self) -> &Interpolant {
         in_use!(self, method => method.interpolant())
     }
 
     /// Makes the end of the attempted step the start of the next one.
+    #[inline(always)]
     pub fn accept(&mut self, y: &mut [f64]) {
         in_use!(mut self, method => method.accept(y));
     }

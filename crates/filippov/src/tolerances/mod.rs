@@ -3,11 +3,13 @@
 mod actions;
 mod events;
 mod stepping;
+mod stiffness;
 mod switching;
 
 pub use actions::*;
 pub use events::*;
 pub use stepping::*;
+pub use stiffness::*;
 pub use switching::*;
 
 /// Unit roundoff times two.
@@ -41,3 +43,7 @@ pub const MOST_SWITCHES_AT_ONE_TIME: u32 = 64;
 
 /// Switches that are kept where only the last state is wanted: several turns of the longest accumulation.
 pub const LATEST_SWITCHES: usize = 8 * LONGEST_TURN;
+
+/// Returns to a section have to agree with those one period before so many times in a row, and at least one period
+/// long: a single agreement may be a turning point.
+pub const LEAST_AGREEMENTS: u64 = 2;

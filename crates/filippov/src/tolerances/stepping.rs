@@ -48,35 +48,3 @@ pub const TAYLOR_LARGEST_ORDER: usize = 24;
 /// A Taylor step that is shorter than this, in units of the rounding of the time, means that the motion comes to a
 /// point where its field has no series.
 pub const TAYLOR_SHORTEST: f64 = 1e4;
-
-/// Returns to a section have to agree with those one period before so many times in a row, and at least one period
-/// long: a single agreement may be a turning point.
-pub const LEAST_AGREEMENTS: u64 = 2;
-
-/// How far behind an event a step of the method for stiff motions ends that is taken anew for it, as a share of the
-/// step: first so far that the error of the continuous extension leaves the event inside, then so near that the
-/// extension lies no farther from the manifold of the motion than rounding, also at a stiffness of 1e8.
-pub const AIM_MARGINS: [f64; 2] = [1e-3, 1e-7];
-
-/// The end of the region of stability of DOPRI5 on the negative axis: the product of step and rate at which stability
-/// limits the step (Hairer, Wanner 1996, section IV.2).
-pub const STIFF_DOPRI5: f64 = 3.25;
-
-/// That of DOP853 (Hairer's choice).
-pub const STIFF_DOP853: f64 = 6.1;
-
-/// That of a Taylor step whose velocity hardly changes: without a fast rate the product would be as small as that change.
-pub const STIFF_SERIES: f64 = 2.0;
-
-/// The velocity of a Taylor step hardly changes: its terms of higher order together are less than this share of it, ...
-pub const TAYLOR_SLOW: f64 = 0.2;
-
-/// ... or that many tolerances. At the limit of stability, where the last of 18 terms is a tenth of the tolerance, the
-/// largest ones of a fast component are some hundreds; those of an oscillation as large as its state are 1e5 and more.
-pub const TAYLOR_NOISE: f64 = 1e3;
-
-/// Steps at the limit of stability that make a run stiff, and steps in a row away from it that make it begin to count
-/// anew (Hairer's choice).
-pub const STIFF_SIGNS: u32 = 15;
-/// See [`STIFF_SIGNS`].
-pub const NOT_STIFF_SIGNS: u32 = 6;
