@@ -75,3 +75,15 @@ def test_a_tangency_beside_another_surface_has_no_share() -> None:
     for segment in sol.segments:
         values = np.array([segment.multipliers_start, segment.multipliers_end])
         assert not (np.abs(values) > 1.0).any()
+
+
+@pytest.mark.parametrize("method", ["auto", "DOPRI5"])
+def test_fields_that_stand_still_for_an_instant_still_attract(method: str) -> None:
+    def f(t: float, x: Any) -> Any:
+        return [-3 * (t - 1.0) ** 2 * np.sign(x[0])]
+
+    for t_span in [(1.0, 2.0), (0.0, 1.0), (0.0, 2.0)]:
+        sol = fl.solve_ivp(f, t_span, [(1.0 - t_span[0]) ** 3], method=method)
+        assert sol.success, sol.message
+        assert sol.y[0, -1] == pytest.approx(0.0, abs=1e-14)
+    assert fl.System(f, n=1).classify(1.0, [0.0]).mode == (0,)

@@ -47,6 +47,11 @@ pub trait ActionMap: Sync {
     /// If a function of the user raises.
     fn apply(&self, t: f64, x: &mut [f64], signs: &[f64], q: &mut [f64]) -> Result<(), FieldError>;
 
+    /// Does it change x? A map that says no changes discrete states only, so that its surface becomes positive again.
+    fn moves_state(&self) -> bool {
+        true
+    }
+
     /// Writes the derivative of x+ - x in the direction `along`: the direction of the impulse, where the map
     /// leaves x alone at zero speed. By differences unless overridden.
     ///

@@ -378,6 +378,13 @@ impl Integrator<'_> {
             let was_done = self
                 .triggered_at(j, side)
                 .any(|index| done.contains(&index));
+            if self.follows_law(j) && !on_surface[j] {
+                // Whatever led there in this instant, also after its own change: in the end the law holds.
+                if mode.entries()[j] < 0 {
+                    due.extend(self.triggered_at(j, 1));
+                }
+                continue;
+            }
             if was_done && self.is_internal(j) {
                 continue;
             }

@@ -90,6 +90,14 @@ impl Integrator<'_> {
             && !self.system.switches_at(j)
     }
 
+    /// Does the surface trigger changes of discrete states by laws of the system only?
+    pub(super) fn follows_law(&self, j: usize) -> bool {
+        let mut maps = self.actions.list.iter().filter(
+            |action| matches!(action.trigger, Trigger::Surface { index, .. } if index == j),
+        );
+        self.is_only_trigger(j) && maps.all(|action| !action.map.moves_state())
+    }
+
     /// The side of every surface at the current point; a surface that the point lies on has the side of the mode
     /// before, or that which rounding says. `None` if a switching function is not a number.
     pub(super) fn sides(&mut self, memory: Option<&Mode>) -> Result<Option<Sides>, FieldError> {

@@ -154,7 +154,38 @@ fn slides(
         // A side whose derivatives all vanish keeps the motion on the surface: lambda = -1 or +1.
         return Ok(minus.sign() >= 0 && plus.sign() <= 0);
     }
-    two_fold_slides(system, j, t, x, signs)
+    Ok(two_fold_slides(system, j, t, x, signs)?
+        || (minus.order == plus.order
+            && minus.order > 2
+            && attracts_along_all_motions(system, j, minus.order, t, x, signs)?))
+}
+
+/// Do both normal components vanish to this order less 1 along every motion, whatever mixture of both fields it follows, and
+/// point to the surface afterwards? So do those that share a factor like (t - 1)^2.
+fn attracts_along_all_motions(
+    system: &dyn PiecewiseSystem,
+    j: usize,
+    order: usize,
+    t: f64,
+    x: &[f64],
+    signs: &[f64],
+) -> Result<bool, FieldError> {
+    for length in 2..=order {
+        let tolerance = system.lie_tolerance(length);
+        for letters in 0..1_u32 << length {
+            let word: SmallVec<[i8; 8]> = (0..length)
+                .map(|k| if letters >> k & 1 == 0 { -1 } else { 1 })
+                .collect();
+            let lie = system.lie_derivative(j, j, &word, t, x, signs)?;
+            let is_zero = lie.value.abs() <= tolerance * lie.magnitude;
+            // The first letter says whose normal component it is.
+            let attracts = !is_zero && lie.value * f64::from(word[0]) < 0.0;
+            if !(if length < order { is_zero } else { attracts }) {
+                return Ok(false);
+            }
+        }
+    }
+    Ok(true)
 }
 
 /// Does sliding start at a two-fold, where both normal components vanish? It needs a motion that is slid along with

@@ -278,6 +278,10 @@ fn floor(value: f64) -> f64 {
 }
 
 impl ActionMap for LawMap {
+    fn moves_state(&self) -> bool {
+        false
+    }
+
     fn apply(&self, t: f64, x: &mut [f64], signs: &[f64], q: &mut [f64]) -> Result<(), FieldError> {
         let index = self.index;
         match self.laws.laws[index] {
