@@ -87,3 +87,23 @@ def test_fields_that_stand_still_for_an_instant_still_attract(method: str) -> No
         assert sol.success, sol.message
         assert sol.y[0, -1] == pytest.approx(0.0, abs=1e-14)
     assert fl.System(f, n=1).classify(1.0, [0.0]).mode == (0,)
+
+
+def test_sliding_goes_through_a_point_where_the_jump_across_the_surface_has_a_double_zero() -> None:
+    # The normal component jumps by a multiple of x1^2; the motion slides through x1 = 0 near t = 2 pi/1.4.
+    friction = fl.Stick(lambda t, x: x[1] + 0.1375, 1.17)
+
+    def f(t: float, x: Any) -> Any:
+        s0 = np.sign(x[1] - 0.6)
+        u = np.exp(-(x[1] ** 2)) if x[0] + 0.7 * x[1] ** 3 > 0 else -1.48
+        return [
+            -x[0] + np.cos(x[0]) * np.sin(x[1]) - 0.24 * s0 * np.sin(1.4 * t),
+            -x[1] + x[0] + 0.8 * x[0] / (1 + x[1] ** 2) - 1.22 * s0 - 1.14 * u - 0.881 * friction(t, x),
+        ]
+
+    sol = fl.solve_ivp(f, (0, 5), [-0.29, -0.4], rtol=1e-4, atol=1e-4)
+    assert sol.success, sol.message
+    assert len(sol.switches) < 20
+    for segment in sol.segments:
+        values = np.array([segment.multipliers_start, segment.multipliers_end])
+        assert not (np.abs(values) > 1.0).any()

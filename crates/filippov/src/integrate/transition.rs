@@ -179,6 +179,10 @@ impl Integrator<'_> {
             Ok(decided) => self.leave_coinciding(decided)?,
             Err(stop) => return Ok(Some(stop)),
         };
+        if let (true, true, &[j]) = (at_two_fold, after == mode, self.motion.sliding()) {
+            self.pass_two_fold(j)?;
+            return self.graze(&mode, &[]);
+        }
         // Stability is lost, and the motion stays all the same: it oscillates around the root from now on.
         let slides_on = after
             .sliding_set()

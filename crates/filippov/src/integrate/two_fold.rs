@@ -10,10 +10,12 @@ use super::integrator::Integrator;
 use super::motion::ModeField;
 use crate::error::FieldError;
 use crate::event::EventFunction;
-use crate::field::SmoothField;
-use crate::switching::Matrix;
+use crate::field::{eval_on_side, SmoothField};
+use crate::switching::{weight_at_two_fold, Matrix};
 use crate::system::{dot, dot_magnitude, RatePartials};
-use crate::tolerances::{AT_TWO_FOLD, NEWTON_STEPS, SETTLED, TANGENT};
+use crate::tolerances::{
+    AT_TWO_FOLD, EPS, KNOWN_MULTIPLIER, MOST_DOUBLINGS, NEWTON_STEPS, SETTLED, TANGENT,
+};
 
 impl Integrator<'_> {
     /// The two-fold that the motion on one surface has come to, if it has: its time and state.
@@ -28,8 +30,8 @@ impl Integrator<'_> {
         }
         let mut velocity = vec![0.0; x.len()];
         field.eval(self.t, &mut x, &mut velocity)?;
-        let (minus, along_minus) = self.normal_component(j, -1, &x)?;
-        let (plus, along_plus) = self.normal_component(j, 1, &x)?;
+        let (minus, along_minus) = self.normal_component(j, -1, self.t, &x)?;
+        let (plus, along_plus) = self.normal_component(j, 1, self.t, &x)?;
         let (distance, time) = (minus.rate - plus.rate, minus.time - plus.time);
         let pairs = along_minus.iter().zip(&along_plus);
         let gradient: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
@@ -56,7 +58,7 @@ impl Integrator<'_> {
         let moved = velocity.iter().enumerate();
         let speed = moved.map(|(i, v)| v.abs() / self.scale.of(i, x[i], x[i]));
         let unit = 1.0 / speed.fold(0.0, f64::max).max(1.0 / ahead);
-        let Some((t, end)) = self.settle(j, (t, end), unit)? else {
+        let Some((t, end)) = self.settle(j, &[0.0, 1.0], (t, end), unit)? else {
             return Ok(None);
         };
         let moves = |(i, (a, b)): (usize, (&f64, &f64))| {
@@ -70,11 +72,61 @@ impl Integrator<'_> {
         }))
     }
 
-    /// The nearest point to (t, x) where h_j and both normal components vanish, distances measured in tolerances and times
-    /// in `unit`s; `None` if Newton's method finds none.
+    /// Goes on beyond a two-fold through which the motion slides: the difference of the normal components has a double zero
+    /// there, and the multiplier, their quotient, is lost in errors near it. The straight continuation is taken to where it is
+    /// known again: where the difference is as large as errors of the components, which is at the root of a tolerance, so
+    /// that the way is straight up to a tolerance.
+    pub(super) fn pass_two_fold(&mut self, j: usize) -> Result<(), FieldError> {
+        let signs = self.motion.signs.clone();
+        let weight = weight_at_two_fold(self.system, j, self.t, &self.x, &signs)?;
+        let Some(weight) = weight else {
+            return Ok(());
+        };
+        let mut velocity = vec![0.0; self.x.len()];
+        for (side, share) in [(-1, 1.0 - weight), (1, weight)] {
+            let signs = self.motion.mode.with(j, side).signs();
+            let mut field = vec![0.0; self.x.len()];
+            eval_on_side(self.system, self.t, &self.x, &signs, &mut field)?;
+            let pairs = velocity.iter_mut().zip(&field);
+            pairs.for_each(|(v, f)| *v += share * f);
+        }
+        let moved = velocity.iter().enumerate();
+        let speed = moved.map(|(i, v)| v.abs() / self.scale.of(i, self.x[i], self.x[i]));
+        let mut ahead = 1.0 / speed.fold(0.0, f64::max);
+        for _ in 0..MOST_DOUBLINGS {
+            if ahead.is_nan() || ahead > self.horizon - self.t {
+                return Ok(());
+            }
+            let pairs = self.x.iter().zip(&velocity);
+            let end = pairs.map(|(x, v)| x + ahead * v).collect();
+            let Some((t, end)) = self.settle(j, &[weight], (self.t + ahead, end), ahead)? else {
+                return Ok(());
+            };
+            let (minus, along_minus) = self.normal_component(j, -1, t, &end)?;
+            let (plus, along_plus) = self.normal_component(j, 1, t, &end)?;
+            let size = dot_magnitude(&along_minus, &end) + dot_magnitude(&along_plus, &end);
+            let rounding = EPS * (size + (minus.time.abs() + plus.time.abs()) * t.abs());
+            let pairs = along_minus.iter().zip(&along_plus).enumerate();
+            let error: f64 = pairs
+                .map(|(i, (a, b))| a.abs().max(b.abs()) * self.scale.of(i, end[i], end[i]))
+                .sum();
+            if minus.rate - plus.rate > error.max(rounding / KNOWN_MULTIPLIER) {
+                if t > self.t && t <= self.horizon {
+                    self.move_straight(t, end)?;
+                }
+                return Ok(());
+            }
+            ahead *= 2.0;
+        }
+        Ok(())
+    }
+
+    /// The nearest point to (t, x) where h_j and the normal components of the mixtures with these shares of f+ vanish,
+    /// distances measured in tolerances and times in `unit`s; `None` if Newton's method finds none.
     fn settle(
         &self,
         j: usize,
+        shares: &[f64],
         start: (f64, Vec<f64>),
         unit: f64,
     ) -> Result<Option<(f64, Vec<f64>)>, FieldError> {
@@ -88,20 +140,25 @@ impl Integrator<'_> {
         for _ in 0..NEWTON_STEPS {
             let signs = self.motion.signs.clone();
             self.system.surfaces(t, &x, &signs, &mut h)?;
-            let mut rows = vec![vec![0.0; n + 1]; 3];
+            let m = shares.len() + 1;
+            let mut rows = vec![vec![0.0; n + 1]; m];
             rows[0][n] = self.system.gradient(j, t, &x, &signs, &mut rows[0][..n])?;
-            let mut residuals = [h[j], 0.0, 0.0];
-            for (k, side) in [(1, -1), (2, 1)] {
-                let signs = self.motion.mode.with(j, side).signs();
-                let row = &mut rows[k];
-                let partials = self.system.rate_gradient(j, t, &x, &signs, &mut row[..n])?;
-                (residuals[k], row[n]) = (partials.rate, partials.time);
+            let mut residuals = vec![0.0; m];
+            residuals[0] = h[j];
+            let (minus, along_minus) = self.normal_component(j, -1, t, &x)?;
+            let (plus, along_plus) = self.normal_component(j, 1, t, &x)?;
+            for (k, share) in shares.iter().enumerate() {
+                let mix = |minus: f64, plus: f64| (1.0 - share) * minus + share * plus;
+                residuals[k + 1] = mix(minus.rate, plus.rate);
+                let row = &mut rows[k + 1];
+                (0..n).for_each(|i| row[i] = mix(along_minus[i], along_plus[i]));
+                row[n] = mix(minus.time, plus.time);
             }
             for row in &mut rows {
                 row.iter_mut().zip(&units).for_each(|(g, unit)| *g *= unit);
             }
-            let mut gram = Matrix::zeros(3);
-            for (a, b) in (0..3).flat_map(|a| (0..3).map(move |b| (a, b))) {
+            let mut gram = Matrix::zeros(m);
+            for (a, b) in (0..m).flat_map(|a| (0..m).map(move |b| (a, b))) {
                 gram[(a, b)] = dot(&rows[a], &rows[b]);
             }
             let Some(shifts) = gram.solve(&residuals) else {
@@ -109,7 +166,7 @@ impl Integrator<'_> {
             };
             let mut largest = 0.0_f64;
             for i in 0..=n {
-                let move_in_units: f64 = (0..3).map(|k| rows[k][i] * shifts[k]).sum();
+                let move_in_units: f64 = (0..m).map(|k| rows[k][i] * shifts[k]).sum();
                 largest = largest.max(move_in_units.abs());
                 match x.get_mut(i) {
                     Some(x) => *x -= units[i] * move_in_units,
@@ -131,13 +188,12 @@ impl Integrator<'_> {
         &self,
         j: usize,
         side: i8,
+        t: f64,
         x: &[f64],
     ) -> Result<(RatePartials, Vec<f64>), FieldError> {
         let signs = self.motion.mode.with(j, side).signs();
         let mut gradient = vec![0.0; x.len()];
-        let partials = self
-            .system
-            .rate_gradient(j, self.t, x, &signs, &mut gradient)?;
+        let partials = self.system.rate_gradient(j, t, x, &signs, &mut gradient)?;
         Ok((partials, gradient))
     }
 

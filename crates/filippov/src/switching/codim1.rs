@@ -203,6 +203,24 @@ fn two_fold_slides(
         .any(|&[_, minus, plus]| minus > 0.0 && plus < 0.0))
 }
 
+/// The weight of f+ in the motion through a two-fold along which sliding attracts, or does not stop to.
+///
+/// # Errors
+/// If a function of the user raises.
+pub fn weight_at_two_fold(
+    system: &dyn PiecewiseSystem,
+    j: usize,
+    t: f64,
+    x: &[f64],
+    signs: &[f64],
+) -> Result<Option<f64>, FieldError> {
+    let motions = two_fold_motions(system, j, t, x, signs)?;
+    let attracting = motions
+        .iter()
+        .find(|&&[_, minus, plus]| minus >= 0.0 && plus <= 0.0);
+    Ok(attracting.map(|&[weight, ..]| weight))
+}
+
 /// The sliding motions through a two-fold: the weight w of f+ in (0, 1), and the rates at which the normal components
 /// grow along the motion.
 ///
