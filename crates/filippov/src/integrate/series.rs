@@ -9,7 +9,6 @@ use crate::event::Monitored;
 use crate::mode::Signs;
 use crate::options::Method;
 use crate::stepper::{reach as series_reach, Attempt, StepMethod};
-use crate::system::MotionJets;
 use crate::tolerances::{EPS, MOST_AUTO_SERIES, TAYLOR_SHORTEST};
 
 impl Integrator<'_> {
@@ -33,10 +32,12 @@ impl Integrator<'_> {
             let (system, order) = (self.system, taylor.order());
             let is_auto = self.options.method == Method::Auto;
             self.motion.take_jets(|sliding| {
+                // Series on many surfaces are long: they are not even made where they are not wanted.
+                if is_auto && sliding.len() > MOST_AUTO_SERIES {
+                    return None;
+                }
                 let jets = system.motion_jets(sliding, order);
-                let is_cheap =
-                    |jets: &MotionJets| jets.is_unrolled() && sliding.len() <= MOST_AUTO_SERIES;
-                jets.filter(|jets| !is_auto || is_cheap(jets))
+                jets.filter(|jets| !is_auto || jets.is_unrolled())
             });
         }
         self.stepper.start_with(if self.motion.jets.is_some() {
