@@ -121,7 +121,6 @@ def draw(results: dict[str, dict[str, Curve]], path: Path) -> None:
         for (method, curve), marker in zip(curves.items(), "osD^v", strict=False):
             ax.loglog(curve.errors, 1e6 * curve.seconds, marker=marker, markersize=4, label=method)
         ax.set_title(title, fontsize="medium", loc="left")
-        ax.invert_xaxis()
         ax.grid(alpha=0.3)
     for ax in axes[-1]:
         ax.set_xlabel("largest error of the switching times")
