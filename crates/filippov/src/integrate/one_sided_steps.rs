@@ -30,7 +30,7 @@ impl Integrator<'_> {
             return Ok(dt);
         }
         let (system, t, signs) = (self.system, self.t, &self.motion.signs);
-        let (x, derivative) = (&self.x, midpoint.start_derivative());
+        let (x, derivative) = (&self.x, &midpoint.step().start_derivative);
         let mut h = vec![0.0; system.n_surfaces()];
         let mut stage = x.clone();
         let mut at = |index: usize, dt: f64| -> Result<f64, FieldError> {

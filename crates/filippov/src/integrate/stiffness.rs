@@ -103,7 +103,11 @@ impl Integrator<'_> {
         let Some(mut beside) = taylor.slow_end_without_last(&self.x, &self.scale) else {
             return Ok(false);
         };
-        let (t, end, rates) = (self.t + dt, taylor.end(), taylor.end_derivative());
+        let (t, end, rates) = (
+            self.t + dt,
+            &taylor.step().end,
+            &taylor.step().end_derivative,
+        );
         let apart: SmallVec<[f64; 16]> = beside.iter().zip(end).map(|(a, b)| a - b).collect();
         let mut rates_beside: SmallVec<[f64; 16]> = SmallVec::from_elem(0.0, beside.len());
         self.motion

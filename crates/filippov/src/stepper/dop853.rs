@@ -2,7 +2,7 @@
 
 use super::coefficients_dop853::{A, D, E3, E5, NODES};
 use super::dopri5::{jumps_between, stiffness_of};
-use super::{Attempt, ErrorScale, Interpolant};
+use super::{Attempt, ErrorScale, Interpolant, Step};
 use crate::error::FieldError;
 use crate::field::SmoothField;
 
@@ -26,8 +26,7 @@ pub struct Dop853 {
     stage: Vec<f64>,
     /// The state of the last stage, which is at the end of the step too.
     last_stage: Vec<f64>,
-    y1: Vec<f64>,
-    interpolant: Interpolant,
+    step: Step,
 }
 
 impl Dop853 {
@@ -38,34 +37,19 @@ impl Dop853 {
             k: std::array::from_fn(|_| zeros()),
             stage: zeros(),
             last_stage: zeros(),
-            y1: zeros(),
-            interpolant: Interpolant::powers(n, 7),
+            step: Step::new(n, Interpolant::powers(n, 7)),
         }
-    }
-
-    /// The derivative at the start of the step.
-    pub fn start_derivative(&self) -> &[f64] {
-        &self.k[0]
     }
 
     /// The derivative at the start of the step, to be replaced.
     pub fn start_derivative_mut(&mut self) -> &mut [f64] {
-        &mut self.k[0]
+        &mut self.step.start_derivative
     }
 
-    /// The end of the attempted step.
-    pub fn end(&self) -> &[f64] {
-        &self.y1
-    }
-
-    /// The derivative at the end of the attempted step.
-    pub fn end_derivative(&self) -> &[f64] {
-        &self.k[12]
-    }
-
-    /// The continuous extension of the attempted step, if its error was acceptable.
-    pub fn interpolant(&self) -> &Interpolant {
-        &self.interpolant
+    /// The step that was attempted last.
+    #[inline]
+    pub fn step(&self) -> &Step {
+        &self.step
     }
 
     /// Attempts a step of length `dt`; `observe(number)` is called with the field after the evaluations at five stages,
@@ -82,11 +66,12 @@ impl Dop853 {
         dt: f64,
         scale: &ErrorScale,
     ) -> Result<Attempt, FieldError> {
-        (self.interpolant.t0, self.interpolant.dt) = (t, dt);
+        (self.step.interpolant.t0, self.step.interpolant.dt) = (t, dt);
+        self.k[0].copy_from_slice(&self.step.start_derivative);
         for i in 1..=12 {
             let (before, rest) = self.k.split_at_mut(i);
             let stage = if i == 12 {
-                &mut self.y1
+                &mut self.step.end
             } else {
                 &mut self.stage
             };
@@ -100,6 +85,7 @@ impl Dop853 {
                 self.last_stage.copy_from_slice(&self.stage);
             }
         }
+        self.step.end_derivative.copy_from_slice(&self.k[12]);
         observe(6, field);
         let error = self.error(y, dt, scale);
         let is_finite =
@@ -121,7 +107,7 @@ impl Dop853 {
     /// |e5|^2 / (|e5|^2 + |e3|^2/100)^(1/2), the norms in units of the tolerance: e5 where the two agree about the order.
     fn error(&self, y: &[f64], dt: f64, scale: &ErrorScale) -> f64 {
         let (mut fifth, mut third) = (0.0, 0.0);
-        for (i, (y0, y1)) in y.iter().zip(&self.y1).enumerate() {
+        for (i, (y0, y1)) in y.iter().zip(&self.step.end).enumerate() {
             let of = |weights: &[f64; 12]| -> f64 {
                 let terms = weights.iter().zip(&self.k);
                 terms.map(|(w, k)| w * k[i]).sum::<f64>() / scale.of(i, *y0, *y1)
@@ -138,9 +124,9 @@ impl Dop853 {
     /// y0 + x (F0 + u (F1 + x (F2 + u (F3 + x (F4 + u (F5 + x F6)))))) with u = 1 - x, in powers of x = theta.
     fn extend(&mut self, y: &[f64], dt: f64) {
         let n = y.len();
-        let rows = self.interpolant.coefficients_mut();
+        let rows = self.step.interpolant.coefficients_mut();
         for i in 0..n {
-            let (moved, first, last) = (self.y1[i] - y[i], self.k[0][i], self.k[12][i]);
+            let (moved, first, last) = (self.step.end[i] - y[i], self.k[0][i], self.k[12][i]);
             let [f3, f4, f5, f6] = D.map(|weights| -> f64 {
                 let terms = weights.iter().zip(&self.k);
                 dt * terms.map(|(w, k)| w * k[i]).sum::<f64>()
@@ -176,15 +162,15 @@ impl Dop853 {
     pub fn extrapolation_error(&self, theta: f64, scale: &ErrorScale) -> f64 {
         let weight = theta.powi(4) * (1.0 - theta).powi(3);
         // The highest power has the factor -1 of that term.
-        let last = &self.interpolant.coefficients()[7 * self.y1.len()..];
+        let last = &self.step.interpolant.coefficients()[7 * self.step.end.len()..];
         let change: Vec<f64> = last.iter().map(|c| weight * c).collect();
-        scale.norm(&change, &self.y1)
+        scale.norm(&change, &self.step.end)
     }
 
     /// The product of the step and the fastest rate of the field, from the two evaluations at the end of the step.
     pub fn stiffness(&self) -> Option<f64> {
-        let states = [&self.y1[..], &self.last_stage];
-        stiffness_of(self.interpolant.dt, states, [&self.k[12], &self.k[11]])
+        let states = [&self.step.end[..], &self.last_stage];
+        stiffness_of(self.step.interpolant.dt, states, [&self.k[12], &self.k[11]])
     }
 
     /// Does the field jump within the attempted step?
@@ -194,8 +180,7 @@ impl Dop853 {
 
     /// Makes the end of the attempted step the start of the next one.
     pub fn accept(&mut self, y: &mut [f64]) {
-        y.copy_from_slice(&self.y1);
-        self.k.swap(0, 12);
+        self.step.accept(y);
     }
 }
 

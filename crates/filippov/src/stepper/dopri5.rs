@@ -1,7 +1,7 @@
 //! DOPRI5(4): one step, its error estimate and its continuous extensions.
 
 use super::coefficients_dopri5::{A2, A3, A4, A5, A6, A8, A9, B, C, C8, C9, D, E};
-use super::{ErrorScale, Interpolant};
+use super::{ErrorScale, Interpolant, Step};
 use crate::error::FieldError;
 use crate::field::SmoothField;
 use crate::tolerances::{JUMP_SHARE, JUMP_SIZE};
@@ -23,14 +23,13 @@ const ANY: usize = 0;
 ///
 /// Reference: Hairer, Norsett, Wanner, Solving ODEs I (1993), table II.5.2.
 pub struct Dopri5 {
-    /// Derivatives at the stages.
-    k: [Vec<f64>; 7],
+    /// Its derivatives are those at the first and at the last stage.
+    step: Step,
+    /// Derivatives at the stages in between.
+    k: [Vec<f64>; 5],
     /// Derivatives at the two extra stages.
     extra: [Vec<f64>; 2],
     stage: Vec<f64>,
-    /// End of the attempted step.
-    y1: Vec<f64>,
-    interpolant: Interpolant,
     /// Quartic coefficient of the free extension, kept when the extension is raised to order 5.
     free_quartic: Vec<f64>,
     /// Order of the extension of the attempted step, as far as it was computed.
@@ -45,11 +44,21 @@ impl Dopri5 {
             k: std::array::from_fn(|_| zeros()),
             extra: [zeros(), zeros()],
             stage: zeros(),
-            y1: zeros(),
-            interpolant: Interpolant::empty(n),
+            step: Step::new(n, Interpolant::empty(n)),
             free_quartic: zeros(),
             extended: None,
         }
+    }
+
+    /// The step that was attempted last.
+    #[inline]
+    pub fn step(&self) -> &Step {
+        &self.step
+    }
+
+    /// The derivative at the start of the step, to be replaced.
+    pub fn start_derivative_mut(&mut self) -> &mut [f64] {
+        &mut self.step.start_derivative
     }
 
     /// Evaluates the field at the start; needed after every restart, not between steps.
@@ -62,27 +71,7 @@ impl Dopri5 {
         t: f64,
         y: &mut [f64],
     ) -> Result<(), FieldError> {
-        field.eval(t, y, &mut self.k[0])
-    }
-
-    /// The derivative at the start of the step.
-    pub fn start_derivative(&self) -> &[f64] {
-        &self.k[0]
-    }
-
-    /// The derivative at the start of the step, to be replaced.
-    pub fn start_derivative_mut(&mut self) -> &mut [f64] {
-        &mut self.k[0]
-    }
-
-    /// The derivative at the end of the attempted step.
-    pub fn end_derivative(&self) -> &[f64] {
-        &self.k[6]
-    }
-
-    /// The end of the attempted step.
-    pub fn end(&self) -> &[f64] {
-        &self.y1
+        field.eval(t, y, &mut self.step.start_derivative)
     }
 
     /// Attempts a step of length `dt`; `observe(stage)` is called with the field after each
@@ -121,11 +110,15 @@ impl Dopri5 {
         let n = if N == ANY { y.len() } else { N };
         let y = &y[..n];
         self.extended = None;
-        (self.interpolant.t0, self.interpolant.dt) = (t, dt);
-        let [k1, k2, k3, k4, k5, k6, k7] = &mut self.k;
-        let (k1, stage, y1) = (&k1[..n], &mut self.stage[..n], &mut self.y1[..n]);
+        (self.step.interpolant.t0, self.step.interpolant.dt) = (t, dt);
+        let (k1, k7) = (
+            &self.step.start_derivative[..n],
+            &mut self.step.end_derivative[..n],
+        );
+        let (stage, y1) = (&mut self.stage[..n], &mut self.step.end[..n]);
+        let [k2, k3, k4, k5, k6] = &mut self.k;
         let (k2, k3, k4) = (&mut k2[..n], &mut k3[..n], &mut k4[..n]);
-        let (k5, k6, k7) = (&mut k5[..n], &mut k6[..n], &mut k7[..n]);
+        let (k5, k6) = (&mut k5[..n], &mut k6[..n]);
 
         for i in 0..n {
             stage[i] = y[i] + dt * (A2[0] * k1[i]);
@@ -191,8 +184,12 @@ impl Dopri5 {
         if self.has_order5() {
             return None;
         }
-        let states = [&self.y1[..], &self.stage];
-        stiffness_of(self.interpolant.dt, states, [&self.k[6], &self.k[5]])
+        let states = [&self.step.end[..], &self.stage];
+        stiffness_of(
+            self.step.interpolant.dt,
+            states,
+            [&self.step.end_derivative, &self.k[4]],
+        )
     }
 
     /// Is the continuous extension of order 5 already there?
@@ -213,16 +210,20 @@ impl Dopri5 {
             }
             self.extended = Some(4);
         }
-        &self.interpolant
+        &self.step.interpolant
     }
 
     #[inline(always)]
     fn extend_sized<const N: usize>(&mut self, y: &[f64]) {
         let n = if N == ANY { y.len() } else { N };
-        let (y, dt) = (&y[..n], self.interpolant.dt);
-        let [k1, k3, k4, k5, k6, k7] = [0, 2, 3, 4, 5, 6].map(|stage: usize| &self.k[stage][..n]);
-        let y1 = &self.y1[..n];
-        let [y0, r1, r2, r3, r4, r5] = self.interpolant.rows().map(|row| &mut row[..n]);
+        let (y, dt) = (&y[..n], self.step.interpolant.dt);
+        let (k1, k7) = (
+            &self.step.start_derivative[..n],
+            &self.step.end_derivative[..n],
+        );
+        let [k3, k4, k5, k6] = [1, 2, 3, 4].map(|stage: usize| &self.k[stage][..n]);
+        let y1 = &self.step.end[..n];
+        let [y0, r1, r2, r3, r4, r5] = self.step.interpolant.rows().map(|row| &mut row[..n]);
         for i in 0..n {
             y0[i] = y[i];
             r5[i] = 0.0;
@@ -241,8 +242,8 @@ impl Dopri5 {
 
     /// Makes the continuous extension a straight line: the record of a motion that was not stepped.
     pub fn set_straight(&mut self, t: f64, dt: f64, from: &[f64], to: &[f64]) {
-        (self.interpolant.t0, self.interpolant.dt) = (t, dt);
-        let [y0, r1, rest @ ..] = self.interpolant.rows();
+        (self.step.interpolant.t0, self.step.interpolant.dt) = (t, dt);
+        let [y0, r1, rest @ ..] = self.step.interpolant.rows();
         y0.copy_from_slice(from);
         let ends = from.iter().zip(to);
         r1.iter_mut().zip(ends).for_each(|(r, (a, b))| *r = b - a);
@@ -262,18 +263,20 @@ impl Dopri5 {
         y: &[f64],
     ) -> Result<&Interpolant, FieldError> {
         if self.has_order5() {
-            return Ok(&self.interpolant);
+            return Ok(&self.step.interpolant);
         }
         self.extend_order4(y);
-        let (t, dt) = (self.interpolant.t0, self.interpolant.dt);
+        let (t, dt) = (self.step.interpolant.t0, self.step.interpolant.dt);
         for ((row, c), out) in [(&A8, C8), (&A9, C9)].into_iter().zip(&mut self.extra) {
             for (i, s) in self.stage.iter_mut().enumerate() {
-                let increment: f64 = row.iter().zip(&self.k).map(|(a, k)| a * k[i]).sum();
+                let ends = [&self.step.start_derivative, &self.step.end_derivative];
+                let all = ends[..1].iter().copied().chain(&self.k).chain([ends[1]]);
+                let increment: f64 = row.iter().zip(all).map(|(a, k)| a * k[i]).sum();
                 *s = y[i] + dt * increment;
             }
             field.eval(t + c * dt, &mut self.stage, out)?;
         }
-        let [_, r1, r2, r3, r4, r5] = self.interpolant.rows();
+        let [_, r1, r2, r3, r4, r5] = self.step.interpolant.rows();
         for i in 0..y.len() {
             let at_fifth = dt * self.extra[0][i] - (r1[i] + 0.6 * r2[i] + 0.28 * r3[i]);
             let at_half = dt * self.extra[1][i] - (r1[i] + 0.25 * r3[i]);
@@ -286,7 +289,7 @@ impl Dopri5 {
             }
         }
         self.extended = Some(5);
-        Ok(&self.interpolant)
+        Ok(&self.step.interpolant)
     }
 
     /// Distance of the extensions of order 4 and 5 at theta, in units of the tolerance: an estimate of
@@ -294,30 +297,31 @@ impl Dopri5 {
     pub fn extension_defect(&self, theta: f64, scale: &ErrorScale) -> f64 {
         let weight = (theta * (1.0 - theta)).powi(2);
         let rows: Vec<&[f64]> = self
+            .step
             .interpolant
             .coefficients()
-            .chunks_exact(self.y1.len())
+            .chunks_exact(self.step.end.len())
             .collect();
-        let defect: Vec<f64> = (0..self.y1.len())
+        let defect: Vec<f64> = (0..self.step.end.len())
             .map(|i| weight * (rows[4][i] - self.free_quartic[i] + theta * rows[5][i]))
             .collect();
-        scale.norm(&defect, &self.y1)
+        scale.norm(&defect, &self.step.end)
     }
 
     /// Does the field jump within the attempted step?
     pub fn field_jumps(&self) -> bool {
-        jumps_between(&[0, 1, 2, 3, 4, 6].map(|stage: usize| &self.k[stage][..]))
-    }
-
-    /// The extension computed last.
-    pub fn interpolant(&self) -> &Interpolant {
-        &self.interpolant
+        let [k2, k3, k4, k5, _] = &self.k;
+        let Step {
+            start_derivative,
+            end_derivative,
+            ..
+        } = &self.step;
+        jumps_between(&[start_derivative, k2, k3, k4, k5, end_derivative])
     }
 
     /// Makes the end of the attempted step the start of the next one.
     pub fn accept(&mut self, y: &mut [f64]) {
-        y.copy_from_slice(&self.y1);
-        self.k.swap(0, 6);
+        self.step.accept(y);
     }
 }
 

@@ -1,6 +1,6 @@
 //! The stepper of a run: the methods that it may use, and which of them takes the current step.
 
-use super::{Dop853, Dopri5, ErrorScale, Interpolant, Midpoint, Rodas5p, Taylor};
+use super::{Dop853, Dopri5, ErrorScale, Interpolant, Midpoint, Rodas5p, Step, Taylor};
 use crate::error::FieldError;
 use crate::field::SmoothField;
 
@@ -35,52 +35,6 @@ pub struct Stepper {
     in_use: StepMethod,
 }
 
-/// Calls the method in use.
-macro_rules! in_use {
-    ($self:ident, $method:ident => $call:expr) => {
-        match (
-            &$self.taylor,
-            &$self.rodas5p,
-            &$self.dop853,
-            &$self.midpoint,
-        ) {
-            (Some($method), ..) if $self.in_use == StepMethod::Taylor => $call,
-            _ if $self.in_use == StepMethod::Dopri5 => {
-                let $method = &$self.dopri5;
-                $call
-            }
-            (_, Some($method), ..) if $self.in_use == StepMethod::Rodas5p => $call,
-            (_, _, Some($method), _) if $self.in_use == StepMethod::Dop853 => $call,
-            (.., Some($method)) if $self.in_use == StepMethod::Midpoint => $call,
-            _ => {
-                let $method = &$self.dopri5;
-                $call
-            }
-        }
-    };
-    (mut $self:ident, $method:ident => $call:expr) => {
-        match (
-            &mut $self.taylor,
-            &mut $self.rodas5p,
-            &mut $self.dop853,
-            &mut $self.midpoint,
-        ) {
-            (Some($method), ..) if $self.in_use == StepMethod::Taylor => $call,
-            _ if $self.in_use == StepMethod::Dopri5 => {
-                let $method = &mut $self.dopri5;
-                $call
-            }
-            (_, Some($method), ..) if $self.in_use == StepMethod::Rodas5p => $call,
-            (_, _, Some($method), _) if $self.in_use == StepMethod::Dop853 => $call,
-            (.., Some($method)) if $self.in_use == StepMethod::Midpoint => $call,
-            _ => {
-                let $method = &mut $self.dopri5;
-                $call
-            }
-        }
-    };
-}
-
 impl Stepper {
     /// A stepper for n states; with the Taylor method if it is given.
     pub fn new(n: usize, taylor: Option<Taylor>) -> Self {
@@ -92,6 +46,19 @@ impl Stepper {
             rodas5p: None,
             in_use: StepMethod::Dopri5,
         }
+    }
+
+    /// The step of the method in use.
+    #[inline(always)]
+    fn step(&self) -> &Step {
+        match self.in_use {
+            StepMethod::Dopri5 => None,
+            StepMethod::Taylor => self.taylor.as_ref().map(|m| m.step()),
+            StepMethod::Rodas5p => self.rodas5p.as_ref().map(|m| m.step()),
+            StepMethod::Dop853 => self.dop853.as_ref().map(|m| m.step()),
+            StepMethod::Midpoint => self.midpoint.as_ref().map(|m| m.step()),
+        }
+        .unwrap_or_else(|| self.dopri5.step())
     }
 
     /// The method in use.
@@ -134,36 +101,53 @@ impl Stepper {
     /// The derivative at the start of the step.
     #[inline(always)]
     pub fn start_derivative(&self) -> &[f64] {
-        in_use!(self, method => method.start_derivative())
+        &self.step().start_derivative
     }
 
     /// The derivative at the start of the step, to be replaced.
     pub fn start_derivative_mut(&mut self) -> &mut [f64] {
-        in_use!(mut self, method => method.start_derivative_mut())
+        match self.in_use {
+            StepMethod::Dopri5 => None,
+            StepMethod::Taylor => self.taylor.as_mut().map(|m| m.start_derivative_mut()),
+            StepMethod::Rodas5p => self.rodas5p.as_mut().map(|m| m.start_derivative_mut()),
+            StepMethod::Dop853 => self.dop853.as_mut().map(|m| m.start_derivative_mut()),
+            StepMethod::Midpoint => self.midpoint.as_mut().map(|m| m.start_derivative_mut()),
+        }
+        .unwrap_or_else(|| self.dopri5.start_derivative_mut())
     }
 
     /// The end of the attempted step.
     #[inline(always)]
     pub fn end(&self) -> &[f64] {
-        in_use!(self, method => method.end())
+        &self.step().end
     }
 
     /// The derivative at the end of the attempted step.
     #[inline(always)]
     pub fn end_derivative(&self) -> &[f64] {
-        in_use!(self, method => method.end_derivative())
+        &self.step().end_derivative
     }
 
     /// The continuous extension of the attempted step.
     #[inline(always)]
     pub fn interpolant(&self) -> &Interpolant {
-        in_use!(self, method => method.interpolant())
+        &self.step().interpolant
     }
 
     /// Makes the end of the attempted step the start of the next one.
     #[inline(always)]
     pub fn accept(&mut self, y: &mut [f64]) {
-        in_use!(mut self, method => method.accept(y));
+        match (self.in_use, &mut self.taylor) {
+            (StepMethod::Taylor, Some(taylor)) => return taylor.accept(y),
+            (StepMethod::Dopri5, _) => return self.dopri5.accept(y),
+            _ => {}
+        }
+        match (&mut self.rodas5p, &mut self.dop853, &mut self.midpoint) {
+            (Some(method), ..) if self.in_use == StepMethod::Rodas5p => method.accept(y),
+            (_, Some(method), _) if self.in_use == StepMethod::Dop853 => method.accept(y),
+            (.., Some(method)) if self.in_use == StepMethod::Midpoint => method.accept(y),
+            _ => self.dopri5.accept(y),
+        }
     }
 
     /// Makes the extension that costs nothing available.

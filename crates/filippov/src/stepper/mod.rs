@@ -12,6 +12,7 @@ mod linearisation;
 mod method;
 mod midpoint;
 mod rodas5p;
+mod step;
 mod taylor;
 
 pub use controller::{Controller, ErrorScale};
@@ -24,6 +25,7 @@ pub use linearisation::Linearisation;
 pub use method::{StepMethod, Stepper};
 pub use midpoint::Midpoint;
 pub use rodas5p::Rodas5p;
+pub use step::Step;
 pub(crate) use taylor::reach;
 pub use taylor::Taylor;
 

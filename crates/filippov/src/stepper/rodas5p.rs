@@ -1,7 +1,7 @@
 //! Rodas5P: one step for stiff motions, its error estimate and its continuous extension.
 
 use super::coefficients_rodas5p::{A, C, EXTENSION, GAMMA, NODES, TIME_SHARES};
-use super::{Attempt, ErrorScale, Interpolant, Linearisation};
+use super::{Attempt, ErrorScale, Interpolant, Linearisation, Step};
 use crate::error::FieldError;
 use crate::field::SmoothField;
 use crate::sparse::SparseSolver;
@@ -22,11 +22,8 @@ pub struct Rodas5p {
     /// U_i, and behind them the multipliers.
     increments: [Vec<f64>; 8],
     stage: Vec<f64>,
-    start_derivative: Vec<f64>,
-    y1: Vec<f64>,
-    end_derivative: Vec<f64>,
+    step: Step,
     defect: Vec<f64>,
-    interpolant: Interpolant,
 }
 
 impl Rodas5p {
@@ -39,12 +36,15 @@ impl Rodas5p {
             solver: SparseSolver::for_all_pivots(),
             increments: std::array::from_fn(|_| zeros()),
             stage: zeros(),
-            start_derivative: zeros(),
-            y1: zeros(),
-            end_derivative: zeros(),
+            step: Step::new(n, Interpolant::powers(n, 4)),
             defect: zeros(),
-            interpolant: Interpolant::powers(n, 4),
         }
+    }
+
+    /// The step that was attempted last.
+    #[inline]
+    pub fn step(&self) -> &Step {
+        &self.step
     }
 
     /// Are the derivatives of the field at the start of the step known?
@@ -73,30 +73,10 @@ impl Rodas5p {
         &self.linearisation
     }
 
-    /// The derivative at the start of the step.
-    pub fn start_derivative(&self) -> &[f64] {
-        &self.start_derivative
-    }
-
     /// The derivative at the start of the step, to be replaced.
     pub fn start_derivative_mut(&mut self) -> &mut [f64] {
         self.is_linearised = false;
-        &mut self.start_derivative
-    }
-
-    /// The end of the attempted step.
-    pub fn end(&self) -> &[f64] {
-        &self.y1
-    }
-
-    /// The derivative at the end of the attempted step.
-    pub fn end_derivative(&self) -> &[f64] {
-        &self.end_derivative
-    }
-
-    /// The continuous extension of the attempted step.
-    pub fn interpolant(&self) -> &Interpolant {
-        &self.interpolant
+        &mut self.step.start_derivative
     }
 
     /// Factors the matrix of a step of length `dt`; returns whether it has an inverse.
@@ -119,12 +99,12 @@ impl Rodas5p {
         dt: f64,
         scale: &ErrorScale,
     ) -> Result<Attempt, FieldError> {
-        (self.interpolant.t0, self.interpolant.dt) = (t, dt);
+        (self.step.interpolant.t0, self.step.interpolant.dt) = (t, dt);
         for i in 0..8 {
             let (before, rest) = self.increments.split_at_mut(i);
             let right = &mut rest[0];
             if i == 0 {
-                right[..y.len()].copy_from_slice(&self.start_derivative);
+                right[..y.len()].copy_from_slice(&self.step.start_derivative);
             } else {
                 fill_stage(&mut self.stage, y, before);
                 let (time, rate) = (t + NODES[i] * dt, &mut right[..y.len()]);
@@ -150,12 +130,12 @@ impl Rodas5p {
             }
             self.solver.solve(right);
         }
-        fill_stage(&mut self.y1, y, &self.increments);
-        let error = scale.norm(&self.increments[7][..y.len()], &self.y1);
+        fill_stage(&mut self.step.end, y, &self.increments);
+        let error = scale.norm(&self.increments[7][..y.len()], &self.step.end);
         if !error.is_finite() {
             return Ok(Attempt::NotFinite);
         }
-        field.eval(t + dt, &mut self.y1, &mut self.end_derivative)?;
+        field.eval(t + dt, &mut self.step.end, &mut self.step.end_derivative)?;
         observe(6, field);
         self.extend(y);
         let between = self.error_between(field, t, dt, scale)?;
@@ -179,8 +159,8 @@ impl Rodas5p {
         dt: f64,
         scale: &ErrorScale,
     ) -> Result<f64, FieldError> {
-        let n = self.y1.len();
-        self.interpolant.at(0.5, &mut self.stage);
+        let n = self.step.end.len();
+        self.step.interpolant.at(0.5, &mut self.stage);
         self.defect.resize(self.linearisation.n_unknowns(), 0.0);
         let rate = &mut self.defect[..n];
         if self.linearisation.is_exact() {
@@ -188,23 +168,23 @@ impl Rodas5p {
         } else {
             field.eval(t + 0.5 * dt, &mut self.stage, rate)?;
         }
-        self.interpolant.derivative(0.5, &mut self.stage);
+        self.step.interpolant.derivative(0.5, &mut self.stage);
         rate.iter_mut().zip(&self.stage).for_each(|(f, p)| *f -= p);
         self.defect[n..].fill(0.0);
         self.solver.solve(&mut self.defect);
-        Ok(scale.norm(&self.defect[..n], &self.y1))
+        Ok(scale.norm(&self.defect[..n], &self.step.end))
     }
 
     fn extend(&mut self, y: &[f64]) {
         let n = y.len();
-        let rows = self.interpolant.coefficients_mut();
+        let rows = self.step.interpolant.coefficients_mut();
         for i in 0..n {
             let k = EXTENSION.map(|weights| -> f64 {
                 let terms = weights.iter().zip(&self.increments);
                 terms.map(|(w, u)| w * u[i]).sum()
             });
             rows[i] = y[i];
-            rows[n + i] = self.y1[i] - y[i] + k[0];
+            rows[n + i] = self.step.end[i] - y[i] + k[0];
             rows[2 * n + i] = k[1] - k[0];
             rows[3 * n + i] = k[2] - k[1];
             rows[4 * n + i] = -k[2];
@@ -214,15 +194,14 @@ impl Rodas5p {
     /// The error of the extension at theta > 1 in units of the tolerance, from above: what its last term does there.
     pub fn extrapolation_error(&self, theta: f64, scale: &ErrorScale) -> f64 {
         let weight = (1.0 - theta) * theta.powi(3);
-        let last = &self.interpolant.coefficients()[4 * self.y1.len()..];
+        let last = &self.step.interpolant.coefficients()[4 * self.step.end.len()..];
         let change: Vec<f64> = last.iter().map(|c| weight * c).collect();
-        scale.norm(&change, &self.y1)
+        scale.norm(&change, &self.step.end)
     }
 
     /// Makes the end of the attempted step the start of the next one.
     pub fn accept(&mut self, y: &mut [f64]) {
-        y.copy_from_slice(&self.y1);
-        self.start_derivative.copy_from_slice(&self.end_derivative);
+        self.step.accept(y);
         self.is_linearised = false;
     }
 }

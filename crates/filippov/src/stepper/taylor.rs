@@ -3,7 +3,7 @@
 use smallvec::SmallVec;
 
 use super::controller::{rough_exp2, rough_log2};
-use super::{Attempt, ErrorScale, Interpolant};
+use super::{Attempt, ErrorScale, Interpolant, Step};
 use crate::error::FieldError;
 use crate::field::SmoothField;
 use crate::tolerances::{
@@ -29,11 +29,8 @@ pub struct Taylor {
     rows: Vec<f64>,
     /// The rows belong to the current start.
     is_expanded: bool,
-    start_derivative: Vec<f64>,
-    y1: Vec<f64>,
-    end_derivative: Vec<f64>,
+    step: Step,
     defect: Vec<f64>,
-    interpolant: Interpolant,
     /// Error of the attempted step in units of the tolerance.
     error: f64,
 }
@@ -62,13 +59,16 @@ impl Taylor {
             width: n,
             rows: Vec::new(),
             is_expanded: false,
-            start_derivative: vec![0.0; n],
-            y1: vec![0.0; n],
-            end_derivative: vec![0.0; n],
+            step: Step::new(n, Interpolant::powers(n, order)),
             defect: vec![0.0; n],
-            interpolant: Interpolant::powers(n, order),
             error: 0.0,
         }
+    }
+
+    /// The step that was attempted last.
+    #[inline]
+    pub fn step(&self) -> &Step {
+        &self.step
     }
 
     /// The order of the method.
@@ -110,7 +110,7 @@ impl Taylor {
     /// Column `place` of the coefficients, in powers of theta.
     pub fn column(&self, place: usize) -> impl Iterator<Item = f64> + '_ {
         let rows = self.rows.iter().skip(place).step_by(self.width);
-        let dt = self.interpolant.dt;
+        let dt = self.step.interpolant.dt;
         rows.scan(1.0, move |power, c| {
             let scaled = c * *power;
             *power *= dt;
@@ -134,30 +134,10 @@ impl Taylor {
         reach([self.order, self.order - 1].map(|k| (size(k), k)))
     }
 
-    /// The derivative at the start of the step.
-    pub fn start_derivative(&self) -> &[f64] {
-        &self.start_derivative
-    }
-
     /// The derivative at the start of the step, to be replaced.
     pub fn start_derivative_mut(&mut self) -> &mut [f64] {
         self.is_expanded = false;
-        &mut self.start_derivative
-    }
-
-    /// The end of the attempted step.
-    pub fn end(&self) -> &[f64] {
-        &self.y1
-    }
-
-    /// The derivative at the end of the attempted step.
-    pub fn end_derivative(&self) -> &[f64] {
-        &self.end_derivative
-    }
-
-    /// The series of the attempted step.
-    pub fn interpolant(&self) -> &Interpolant {
-        &self.interpolant
+        &mut self.step.start_derivative
     }
 
     /// Attempts a step of length `dt` with the coefficients taken last; the field is evaluated at its end.
@@ -172,7 +152,7 @@ impl Taylor {
         dt: f64,
         scale: &ErrorScale,
     ) -> Result<Attempt, FieldError> {
-        (self.interpolant.t0, self.interpolant.dt) = (t, dt);
+        (self.step.interpolant.t0, self.step.interpolant.dt) = (t, dt);
         match self.n {
             1 => self.sum_few::<1>(y),
             2 => self.sum_few::<2>(y),
@@ -180,14 +160,14 @@ impl Taylor {
             4 => self.sum_few::<4>(y),
             _ => self.sum(y),
         }
-        field.eval(t + dt, &mut self.y1, &mut self.end_derivative)?;
+        field.eval(t + dt, &mut self.step.end, &mut self.step.end_derivative)?;
         // The defect is the derivative of the first term left out: order + 1 times that term over the step.
         let share = 1.0 / (self.order + 1) as f64;
-        for (defect, rate) in self.defect.iter_mut().zip(&self.end_derivative) {
+        for (defect, rate) in self.defect.iter_mut().zip(&self.step.end_derivative) {
             *defect = share * (*defect - dt * rate);
         }
-        self.error = scale.norm(&self.defect, &self.y1);
-        let is_finite = self.error.is_finite() && self.y1.iter().all(|y| y.is_finite());
+        self.error = scale.norm(&self.defect, &self.step.end);
+        let is_finite = self.error.is_finite() && self.step.end.iter().all(|y| y.is_finite());
         Ok(if is_finite {
             Attempt::Error(self.error)
         } else {
@@ -198,8 +178,8 @@ impl Taylor {
     /// Writes the coefficients in powers of theta, their sum, which is the end of the step, and the derivative in
     /// theta there.
     fn sum(&mut self, y: &[f64]) {
-        let (n, dt) = (self.n, self.interpolant.dt);
-        let (first, rest) = self.interpolant.coefficients_mut().split_at_mut(n);
+        let (n, dt) = (self.n, self.step.interpolant.dt);
+        let (first, rest) = self.step.interpolant.coefficients_mut().split_at_mut(n);
         first.copy_from_slice(y);
         let mut power = dt;
         let rows = self.rows.chunks_exact(self.width).skip(1);
@@ -209,11 +189,11 @@ impl Taylor {
             }
             power *= dt;
         }
-        self.y1.fill(0.0);
+        self.step.end.fill(0.0);
         self.defect.fill(0.0);
-        let rows = self.interpolant.coefficients().chunks_exact(n);
+        let rows = self.step.interpolant.coefficients().chunks_exact(n);
         for (k, row) in rows.enumerate().rev() {
-            let sums = self.y1.iter_mut().zip(&mut self.defect);
+            let sums = self.step.end.iter_mut().zip(&mut self.defect);
             for ((y1, slope), c) in sums.zip(row) {
                 *y1 += c;
                 *slope += k as f64 * c;
@@ -223,8 +203,12 @@ impl Taylor {
 
     /// As [`sum`](Self::sum), for few states: the sums stay in registers.
     fn sum_few<const N: usize>(&mut self, y: &[f64]) {
-        let dt = self.interpolant.dt;
-        let (scaled, _) = self.interpolant.coefficients_mut().as_chunks_mut::<N>();
+        let dt = self.step.interpolant.dt;
+        let (scaled, _) = self
+            .step
+            .interpolant
+            .coefficients_mut()
+            .as_chunks_mut::<N>();
         scaled[0].copy_from_slice(y);
         let mut power = dt;
         let rows = self.rows.chunks_exact(self.width).skip(1);
@@ -243,7 +227,7 @@ impl Taylor {
             }
             k -= 1.0;
         }
-        self.y1.copy_from_slice(&y1);
+        self.step.end.copy_from_slice(&y1);
         self.defect.copy_from_slice(&slope);
     }
 
@@ -254,16 +238,16 @@ impl Taylor {
         y: &[f64],
         scale: &ErrorScale,
     ) -> Option<SmallVec<[f64; 16]>> {
-        let mut rows = self.interpolant.coefficients().chunks_exact(self.n);
+        let mut rows = self.step.interpolant.coefficients().chunks_exact(self.n);
         let velocity = scale.norm(rows.nth(1)?, y);
         let change: f64 = rows
             .zip(2..)
             .map(|(row, k)| f64::from(k) * scale.norm(row, y))
             .sum();
-        let last = &self.interpolant.coefficients()[self.order * self.n..];
+        let last = &self.step.interpolant.coefficients()[self.order * self.n..];
         let is_slow = change < TAYLOR_SLOW * velocity + TAYLOR_NOISE;
         (is_slow && scale.norm(last, y) > 0.0)
-            .then(|| self.y1.iter().zip(last).map(|(y, c)| y - c).collect())
+            .then(|| self.step.end.iter().zip(last).map(|(y, c)| y - c).collect())
     }
 
     /// The factor for another attempt after one with this error was rejected.
@@ -279,8 +263,7 @@ impl Taylor {
 
     /// Makes the end of the attempted step the start of the next one.
     pub fn accept(&mut self, y: &mut [f64]) {
-        y.copy_from_slice(&self.y1);
-        self.start_derivative.copy_from_slice(&self.end_derivative);
+        self.step.accept(y);
         self.is_expanded = false;
     }
 }
