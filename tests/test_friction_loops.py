@@ -76,6 +76,18 @@ def test_the_way_that_multipliers_are_shared_does_not_move_anything() -> None:
     assert np.all(sol.y == 0)
 
 
+def test_shares_change_continuously_while_the_contacts_stick() -> None:
+    problem = fl.problems.get("rubbing_blocks")
+    sol = problem.system().solve(problem.t_span, problem.y0)
+    resting = [segment for segment in sol.segments if segment.mode.codimension == 5]
+    assert len(resting) == 6
+    for segment in resting:
+        t = np.linspace(segment.t_start, segment.t_end, 2001)[1:-1]
+        shares = sol.sol.multipliers(t)
+        assert np.abs(shares).max() <= 1
+        assert np.abs(np.diff(shares)).max() < 5e-3
+
+
 def row_of_bodies(n: int, seed: int) -> tuple[Any, Array]:
     rng = np.random.default_rng(seed)
     stiffness, push, rate = rng.uniform(0.5, 2.0, n), rng.uniform(0.3, 1.2, n), rng.uniform(0.5, 2.0, n)

@@ -453,7 +453,7 @@ impl RelayProblem {
 }
 
 /// The largest entry of a row.
-fn largest(matrix: &SparseRows, i: usize) -> f64 {
+pub(super) fn largest(matrix: &SparseRows, i: usize) -> f64 {
     matrix.row(i).fold(0.0, |size, (_, v)| size.max(v.abs()))
 }
 

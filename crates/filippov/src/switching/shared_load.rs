@@ -3,7 +3,9 @@
 //! Two bodies that rub on the ground and on each other have three contacts and two velocities. At rest the equations
 //! N s = -nu of their multipliers s then have many solutions or none, and those in [-1, 1] all give the same motion:
 //! for friction N = -S D with S symmetric and semidefinite, D > 0 and diagonal, and what N does not see moves nothing.
-//! Of the solutions one is taken that depends smoothly on the point, that of least norm (s, D s). The contacts give way
+//! Of the solutions one is taken that depends smoothly on the point, that of least norm (s, D C s) with C the
+//! largest entries of the rows of N, as in the damped relay problem (`relay.rs`), which finds it where the least one in the cube
+//! is at a border. The contacts give way
 //! together, where no solution in the cube is left: with S = L L^T and L w = nu that is so where some q has
 //!
 //! ```text
@@ -17,7 +19,7 @@
 //! Cottle, Pang, Stone, *The Linear Complementarity Problem* (1992), section 3.1.
 
 use super::p_matrix::{is_p_matrix, symmetrising_scale};
-use super::relay::{negative, with_diagonal, RelayProblem, RelaySolution, SOLVED};
+use super::relay::{largest, negative, with_diagonal, RelayProblem, RelaySolution, SOLVED};
 use super::small_matrix::{Matrix, Vector};
 use crate::sparse::{components, is_positive_definite, SparseRows, SparseSolver};
 use crate::tolerances::{DEFINITE_PIVOT, EPS, MOST_IN_LOOP, REDUNDANT_PIVOT};
@@ -193,6 +195,8 @@ struct Loop {
     leading: Vec<usize>,
     /// D.
     strengths: Vec<f64>,
+    /// C, the largest entries of the rows of N.
+    sizes: Vec<f64>,
     /// The normals q of the facets, with what all contacts together can take in that direction.
     facets: Vec<(Vector, f64)>,
 }
@@ -245,6 +249,7 @@ impl Loop {
             rows,
             leading,
             strengths,
+            sizes: (0..m).map(|i| largest(normal, i)).collect(),
         })
     }
 
@@ -270,24 +275,26 @@ impl Loop {
         if (0..nu.len()).any(|i| rest[i].abs() > REDUNDANT_PIVOT.sqrt() * size(i)) {
             return None;
         }
-        // L^T D L has the square of the condition of the contacts: one correction.
+        // The matrix has the square of the condition of the contacts: one correction.
         let pairs = self.solve(&rest)?.into_iter().zip(first);
         Some(pairs.map(|(correction, sign)| sign + correction).collect())
     }
 
-    /// s = L u with (L^T D L) u = w.
+    /// s = C^-1 L u with (L^T D C^-1 L) u = w.
     fn solve(&self, nu: &[f64]) -> Option<Vec<f64>> {
         let rank = self.leading.len();
         let mut gram = Matrix::zeros(rank);
-        for (row, strength) in self.rows.iter().zip(&self.strengths) {
+        let weights = self.strengths.iter().zip(&self.sizes);
+        for (row, (strength, size)) in self.rows.iter().zip(weights) {
             for a in 0..rank {
                 for b in 0..rank {
-                    gram[(a, b)] += strength * row[a] * row[b];
+                    gram[(a, b)] += strength / size * row[a] * row[b];
                 }
             }
         }
         let u = gram.solve(&self.reduced(nu))?;
-        Some(self.rows.iter().map(|row| dot(row, &u)).collect())
+        let rows = self.rows.iter().zip(&self.sizes);
+        Some(rows.map(|(row, size)| dot(row, &u) / size).collect())
     }
 
     /// One less the part of the strength of all contacts together that the load takes.

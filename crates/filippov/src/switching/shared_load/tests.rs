@@ -17,10 +17,10 @@ fn contacts_of_a_loop_hold_as_long_as_some_shares_of_the_load_do() {
         let [s1, s2, s12] = [0, 1, 2].map(|i| shared.signs[i]);
         assert!((p - 0.5 * s1 - 0.3 * s12).abs() < 1e-14);
         assert!((q - 0.7 * s2 + 0.3 * s12).abs() < 1e-14);
-        // Of all solutions, those along (0.3 / 0.5, -0.3 / 0.7, -1), the least one in the norm of the strengths.
-        let along = [0.6, -0.3 / 0.7, -1.0];
+        // Of all solutions, those along (0.3 / 0.5, -0.3 / 0.7, -1), the least one in the norm of strengths and sizes.
+        let (along, sizes) = ([0.6, -0.3 / 0.7, -1.0], [0.5, 0.7, 0.7]);
         let product: f64 = (0..3)
-            .map(|i| strengths[i] * along[i] * shared.signs[i])
+            .map(|i| strengths[i] * sizes[i] * along[i] * shared.signs[i])
             .sum();
         assert!(product.abs() < 1e-14);
         shared.reserves
