@@ -243,3 +243,43 @@ def test_t_eval_up_to_the_failure() -> None:
     np.testing.assert_array_equal(sol.t, times[: len(sol.t)])
     assert len(sol.t) in (10, 11)
     assert sol.y.shape == (1, len(sol.t))
+
+
+def test_chatter_along_an_undeclared_surface_ends_the_run() -> None:
+    def force(t: float, x: Any) -> list[float]:
+        return [math.cos(t) - (2.0 if float(x[0]) > 0.5 else -2.0)]
+
+    sol = fl.solve_ivp(force, (0, 1000), [1.0], surfaces=lambda t, x: x[0] - 100.0)
+    assert not sol.success
+    assert "chatters along a jump" in sol.message
+    assert 100_000 < sol.stats["n_steps"] < 101_000
+    assert sol.t[-1] == sol.segments[-1].t_end
+    # x' = cos(t) - 2 up to x = 0.5, and nowhere else than there since then.
+    for t in np.linspace(0.0, 0.48, 20):
+        assert sol.sol(t)[0] == pytest.approx(1.0 + math.sin(t) - 2.0 * t, abs=1e-4)
+    assert np.abs(sol.y[0, sol.t > 0.49] - 0.5).max() < 1e-3
+
+
+def test_friction_in_two_directions_does_not_run_for_ever() -> None:
+    """Its force jumps at a point of codimension two, which no switching function describes."""
+
+    def sliding_puck(t: float, x: Any) -> list[Any]:
+        speed = np.sqrt(x[2] ** 2 + x[3] ** 2)
+        return [x[2], x[3], -0.5 * x[2] / speed, -0.5 * x[3] / speed]
+
+    start = [0.0, 0.0, 1.0, 2.0]
+    sol = fl.solve_ivp(sliding_puck, (0, 1000), start)
+    t_rest = 2.0 * math.sqrt(5.0)
+    assert "a point and not at a surface" in sol.message
+    assert sol.stats["n_steps"] < 101_000
+    assert sol.t[-1] == pytest.approx(t_rest, abs=0.1)
+    assert sol.y[:2, -1] == pytest.approx([math.sqrt(5.0), 2.0 * math.sqrt(5.0)], abs=1e-5)
+
+    def with_a_small_core(t: float, x: Any) -> list[Any]:
+        speed = np.maximum(np.sqrt(x[2] ** 2 + x[3] ** 2), 1e-6)
+        return [x[2], x[3], -0.5 * x[2] / speed, -0.5 * x[3] / speed]
+
+    # As the message says.
+    core = fl.solve_ivp(with_a_small_core, (0, 10), start, method="Rodas5P")
+    assert core.success, core.message
+    assert core.y[:, -1] == pytest.approx([math.sqrt(5.0), 2.0 * math.sqrt(5.0), 0.0, 0.0], abs=1e-5)

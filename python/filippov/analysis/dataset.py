@@ -25,7 +25,7 @@ __all__ = ["REASONS", "Variable", "dataset_of", "variables_of"]
 _TEXT = (
     "end terminal_event returned periodic max_steps max_events max_wall_time interrupted step_too_small "
     "no_progress resets_do_not_end reset_not_finite contact field_not_finite field_raised intersection "
-    "sliding_rule non_unique wrong_input not_prepared not_run"
+    "sliding_rule non_unique wrong_input not_prepared not_run chatter"
 )
 REASONS = tuple(_TEXT.split(" "))
 _REASON_CODES = {reason: code for code, reason in enumerate(REASONS)}

@@ -18,6 +18,7 @@ use std::time::Instant;
 
 use rustc_hash::FxHashMap;
 
+use super::chatter::Chatter;
 use super::detect::Detector;
 use super::meeting::DecidedRoot;
 use super::motion::{ModeField, Motion};
@@ -87,6 +88,8 @@ pub struct Integrator<'a> {
     pub(super) n_aims: usize,
     /// Largest recent step of this motion.
     pub(super) recent_dt: f64,
+    /// Since a jump of the field that no surface declares, if the steps have been short since then.
+    pub(super) chatter: Option<Chatter>,
     /// The first of the last switches without progress of time, and how many came since.
     pub(super) last_switch: (f64, u32),
     /// What its decision found of the root that the next motion begins at.
@@ -157,6 +160,7 @@ impl<'a> Integrator<'a> {
             stiffness: Stiffness::default(),
             n_aims: 0,
             recent_dt: 0.0,
+            chatter: None,
             last_switch: (f64::NAN, 0),
             decided: DecidedRoot::default(),
             slacks: Vec::new(),
@@ -400,6 +404,7 @@ impl<'a> Integrator<'a> {
             (dt * self.controller.accept(error)).max(self.wanted_dt)
         };
         self.note_jump(dt);
+        let chatter = self.chatters(dt);
         if let Some(stop) = self.record_user_zeros(zeros, theta, t_stop)? {
             return Ok(Some(stop));
         }
@@ -429,7 +434,7 @@ impl<'a> Integrator<'a> {
             if !self.motion.resting.is_empty() && self.has_left_resting()? {
                 return self.go_on_from_here();
             }
-            return Ok(None);
+            return Ok(chatter);
         };
         self.stepper.interpolant().at(theta, &mut self.x);
         self.motion.project(t_stop, &mut self.x)?;
@@ -437,6 +442,7 @@ impl<'a> Integrator<'a> {
             .step(self.stepper.interpolant(), t_stop, &self.x);
         self.t = t_stop;
         self.recent_dt = 0.0;
+        self.chatter = None;
         self.switch(&event)
     }
 

@@ -268,6 +268,7 @@ impl Integrator<'_> {
                 ),
                 candidates: Vec::new(),
             });
+            self.suspect_chatter(self.recent_dt);
             self.recent_dt = 0.0;
         }
         self.recent_dt = dt.max(0.98 * self.recent_dt);

@@ -4,6 +4,7 @@ mod accumulation;
 mod actions;
 mod between_sides;
 mod bounds;
+mod chatter;
 mod choice;
 mod contact;
 mod curve;

@@ -5,6 +5,7 @@ use crate::field::weights::RuleFailure;
 use crate::mode::Mode;
 use crate::options::SlidingRule;
 use crate::switching::Undecided;
+use crate::tolerances::CHATTER_STEPS;
 
 /// Why a run ended. Whatever the reason, the solution up to that time is kept.
 #[derive(Debug)]
@@ -31,6 +32,11 @@ pub enum Stop {
     NoProgress {
         /// The surfaces they happen on.
         surfaces: Vec<usize>,
+    },
+    /// The motion chatters along a jump of the field that no surface declares.
+    Chatter {
+        /// When it began.
+        since: f64,
     },
     /// Actions trigger one another without end in one instant.
     ActionsDoNotEnd {
@@ -101,6 +107,7 @@ impl Stop {
             Stop::Interrupted => "interrupted",
             Stop::StepTooSmall => "step_too_small",
             Stop::NoProgress { .. } => "no_progress",
+            Stop::Chatter { .. } => "chatter",
             Stop::ActionsDoNotEnd { .. } => "resets_do_not_end",
             Stop::ActionNotFinite { .. } => "reset_not_finite",
             Stop::Contact { .. } => "contact",
@@ -152,6 +159,12 @@ impl Stop {
                 "Stopped at t = {t:.10} in mode ({mode}): switches at {} follow one another without any progress of \
                  time. They accumulate here, or the field on one side is not defined up to its surface.",
                 names(surfaces)
+            ),
+            Stop::Chatter { since } => format!(
+                "Stopped at t = {t:.10} in mode ({mode}): since t = {since:.10} the motion chatters along a jump of the \
+                 right-hand side for which no surface is declared; {CHATTER_STEPS} steps have led no further. Give its \
+                 switching function in surfaces=, or write it with np.sign or np.where. A force like -v/|v| in several \
+                 directions jumps at a point and not at a surface: make it -v/max(|v|, small)."
             ),
             Stop::ActionsDoNotEnd { actions } => format!(
                 "Stopped at t = {t:.10} in mode ({mode}): resets trigger one another without end in one instant: {}. \

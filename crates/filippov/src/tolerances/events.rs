@@ -79,6 +79,10 @@ pub const SIDE_REACH: f64 = 1.25;
 /// declares.
 pub const JUMP_SHRINK: f64 = 0.05;
 
+/// After so many short steps in a row since a jump that no surface declares, a tenth of them across jumps, the motion
+/// chatters along it: a passage makes a few dozen, and this many take a tenth of a second.
+pub const CHATTER_STEPS: u32 = 100_000;
+
 /// The field jumps in a step if its range over the stages exceeds this fraction of its size ...
 pub const JUMP_SIZE: f64 = 0.02;
 
