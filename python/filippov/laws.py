@@ -35,6 +35,12 @@ def sawtooth(t: Any, period: Any) -> Any:
     t : number or traced value
         Usually the time; then the drops are ticks of a clock, ends of steps that are never searched for.
     period : number or parameter
+        Positive.
+
+    Raises
+    ------
+    InputError
+        If the period is a number that is not positive.
 
     Examples
     --------
@@ -45,6 +51,8 @@ def sawtooth(t: Any, period: Any) -> Any:
     >>> sol.switches.kind.tolist(), sol.y[0, -1].round(12)
     (['clock', 'clock', 'clock', 'clock'], np.float64(1.0))
     """
+    if isinstance(period, int | float | np.number) and not 0 < period < np.inf:
+        raise InputError(f"period: a positive number is needed, not {period!r}")
     phase = t / period
     return phase - np.floor(phase)
 
