@@ -14,6 +14,7 @@ __all__ = [
     "RunOptions",
     "SignedSystem",
     "TracedSystem",
+    "__version__",
     "classify",
     "hidden_dynamics",
     "intersection_field",
