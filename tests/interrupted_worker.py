@@ -42,7 +42,7 @@ def run(what: str, store: str) -> Any:
     if what == "ensemble":
         return friction.ensemble((0, 1e5), np.ones((1000, 2)))
     if what == "basins":
-        grid = np.linspace(-2.0, 2.0, 2000)
+        grid = np.linspace(-2.0, 2.0, 1000)
         return fl.basins(fl.System(bistable, n=2, states=("a", "b")), None, (0, 100), {"a": grid, "b": grid})
     if what == "black_box":
         return fl.solve_ivp(black_box, (0, 1e6), [1.0, 0.0], surfaces=lambda t, x: float(x[1]))

@@ -11,6 +11,7 @@ import numpy as np
 
 from filippov.errors import InputError, ModelError
 from filippov.trace import Scalar
+from filippov.trace.pure import PURE, PureFunction
 
 __all__ = ["Hysteresis", "Stick", "hysteresis", "sawtooth", "stick", "without_memory"]
 
@@ -55,6 +56,10 @@ def sawtooth(t: Any, period: Any) -> Any:
         raise InputError(f"period: a positive number is needed, not {period!r}")
     phase = t / period
     return phase - np.floor(phase)
+
+
+# A trace is kept for functions that call it: it depends on its arguments alone.
+PURE[id(sawtooth)] = PureFunction.of(sawtooth)
 
 
 def hysteresis(value: Any, low: Any, high: Any, initial: float = -1) -> Any:
