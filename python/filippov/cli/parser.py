@@ -24,7 +24,7 @@ first steps:
   filippov demo dry_friction                 solve one, print what happened, draw it
   filippov solve dry_friction --param F=0.8  the same with another parameter
   filippov solve model.py --t 0 100 --y0 1 0 --plot out.png
-  filippov sweep model.py --param omega=0.2:2:500 --period 2*pi/omega --store runs --plot diagram.png
+  filippov sweep model.py --param omega=0.2:2:500 --period "2*pi/omega" --store runs --plot diagram.png
 
 a model is a Python file, written as for SciPy:
   import filippov as fl, numpy as np
@@ -120,8 +120,8 @@ def _add_solve(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 _SWEEP = """\
 examples:
-  filippov sweep model.py --param omega=0.2:2:500 --period 2*pi/omega --plot diagram.png
-  filippov sweep model.py --param F=0.1,0.2,0.4 omega=0.2:2:500 --period 2*pi/omega --store runs --csv out.csv
+  filippov sweep model.py --param omega=0.2:2:500 --period "2*pi/omega" --plot diagram.png
+  filippov sweep model.py --param F=0.1,0.2,0.4 omega=0.2:2:500 --period "2*pi/omega" --store runs --csv out.csv
   filippov sweep model.py --y0 y=-2:2:50 v=-2:2:50 --t 100 --csv ends.csv
 
 START:STOP:COUNT are so many equidistant values, A,B,C a list; all combinations are computed. With --period,
