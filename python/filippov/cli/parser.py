@@ -121,7 +121,7 @@ def _add_solve(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 _SWEEP = """\
 examples:
   filippov sweep model.py --param omega=0.2:2:500 --period "2*pi/omega" --plot diagram.png
-  filippov sweep model.py --param F=0.1,0.2,0.4 omega=0.2:2:500 --period "2*pi/omega" --store runs --csv out.csv
+  filippov sweep model.py --param F=0.1,0.4 omega=0.2:2:500 --period "2*pi/omega" --store runs --csv out.csv
   filippov sweep model.py --y0 y=-2:2:50 v=-2:2:50 --t 100 --csv ends.csv
 
 START:STOP:COUNT are so many equidistant values, A,B,C a list; all combinations are computed. With --period,
