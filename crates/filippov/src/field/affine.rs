@@ -2,7 +2,7 @@
 
 use super::canopy::root_ends;
 use crate::error::FieldError;
-use crate::switching::Matrix;
+use crate::switching::{solve_relay, Matrix, RelayProblem, SharedLoad, SharedLoads};
 use crate::system::{AffineParts, AffineSigns, PiecewiseSystem};
 use crate::tolerances::{MOST_MEETING, SURFACE_NOISE};
 
@@ -18,6 +18,10 @@ pub struct AffineLaw<'a> {
     h: Vec<f64>,
     /// The scaling of the surfaces, for the stability of the root of three and more.
     kappa: Vec<f64>,
+    multipliers: Vec<f64>,
+    /// The multipliers last found are not the only ones: redundant contacts share their load.
+    shared: Option<SharedLoad>,
+    loads: Option<SharedLoads>,
 }
 
 impl<'a> AffineLaw<'a> {
@@ -32,6 +36,9 @@ impl<'a> AffineLaw<'a> {
             signs,
             h: vec![0.0; system.n_surfaces()],
             kappa: vec![1.0; set.len()],
+            multipliers: vec![f64::NAN; set.len()],
+            shared: None,
+            loads: None,
         })
     }
 
@@ -47,26 +54,79 @@ impl<'a> AffineLaw<'a> {
     /// If a function of the user raises.
     pub fn eval(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<u64, FieldError> {
         let evaluations = self.parts.evaluate(self.system, t, x, &self.signs)?;
-        if self.parts.slide(dx).is_err() {
-            dx.fill(f64::NAN);
+        self.shared = None;
+        if self.parts.slide(dx).is_ok() {
+            self.multipliers.copy_from_slice(self.parts.multipliers());
+        } else {
+            self.share(dx);
         }
-        for (&j, &lambda) in self.parts.surfaces().iter().zip(self.parts.multipliers()) {
+        for (&j, &lambda) in self.parts.surfaces().iter().zip(&self.multipliers) {
             // The nearer the evaluation is to the multipliers, the less cancels.
             self.signs[j] = if lambda.is_finite() { lambda } else { 0.0 };
         }
         Ok(evaluations)
     }
 
+    /// The field and multipliers where those are not the only ones. All that make the motion slide give the same
+    /// field; those of least norm may be outside of [-1, 1] while others are inside.
+    fn share(&mut self, dx: &mut [f64]) {
+        let surfaces = self.parts.surfaces();
+        let here: Vec<f64> = surfaces.iter().map(|&j| self.signs[j]).collect();
+        let normal = self.parts.normal();
+        if self
+            .loads
+            .as_ref()
+            .is_none_or(|loads| loads.normal() != normal)
+        {
+            self.loads = SharedLoads::new(normal);
+        }
+        let loads = self.loads.as_mut();
+        self.shared = loads.and_then(|loads| loads.at(self.parts.rates(), &here));
+        let Some(shared) = &self.shared else {
+            dx.fill(f64::NAN);
+            self.multipliers.fill(f64::NAN);
+            return;
+        };
+        self.parts.combine(&shared.signs, dx);
+        self.multipliers.copy_from_slice(&shared.signs);
+        let entries = || shared.reserves.iter().zip(&shared.signs);
+        if entries().any(|(reserve, sign)| reserve.is_some() && sign.abs() > 1.0) {
+            let problem = RelayProblem {
+                nu: self.parts.nu(),
+                n: self.parts.normal().clone(),
+                noise: self.system.lie_tolerance(1),
+            };
+            if let Ok(inside) = solve_relay(&problem, &vec![0; here.len()]) {
+                for (place, reserve) in shared.reserves.iter().enumerate() {
+                    if reserve.is_some() {
+                        self.multipliers[place] = inside.signs[place];
+                    }
+                }
+            }
+        }
+    }
+
     /// The multipliers last found.
     pub fn multipliers(&self) -> &[f64] {
-        self.parts.multipliers()
+        &self.multipliers
+    }
+
+    /// For the multiplier of a contact that shares its load with others, what is left of their strength
+    /// ([`SharedLoad`]); `None` if it is the only one.
+    pub fn reserve(&self, place: usize) -> Option<f64> {
+        self.shared.as_ref()?.reserves[place]
+    }
+
+    /// Do redundant contacts share their load?
+    pub fn is_shared(&self) -> bool {
+        self.shared.is_some()
     }
 
     /// The exit functions of the root, as those of the canopy: the determinant of N with the sign of a stable one,
     /// and the stability ([`root_ends`]). Only for a few surfaces; the friction of many bodies is stable for good.
     pub fn ends(&self, oscillates: &mut Option<bool>) -> [f64; 2] {
         let (normal, m) = (self.parts.normal(), self.parts.surfaces().len());
-        if m > MOST_MEETING {
+        if m > MOST_MEETING || self.is_shared() {
             return [1.0, 1.0];
         }
         let mut jacobian = Matrix::zeros(m);

@@ -167,6 +167,11 @@ impl<'a> IntersectionField<'a> {
         self.slack[index] = slack;
     }
 
+    /// Do redundant contacts share their load at the last evaluation? The equations then do not determine the multipliers.
+    pub fn shares_load(&self) -> bool {
+        self.affine.as_ref().is_some_and(AffineLaw::is_shared)
+    }
+
     /// Does the regularised motion oscillate around the root, for three and more surfaces?
     pub fn oscillates(&self) -> bool {
         self.oscillates == Some(true)
@@ -256,7 +261,9 @@ impl<'a> IntersectionField<'a> {
             return Ok(());
         }
         match &mut self.affine {
-            Some(law) if self.set.len() > MOST_MEETING => law.project(t, x, &self.signs),
+            Some(law) if self.set.len() > MOST_MEETING || law.is_shared() => {
+                law.project(t, x, &self.signs)
+            }
             _ => self
                 .projector
                 .project_onto(self.system, &self.set, t, x, &self.signs),
@@ -316,6 +323,15 @@ impl<'a> IntersectionField<'a> {
             (pair[0], pair[1]) = (1.0 + lambda + slack[0], 1.0 - lambda + slack[1]);
         }
         let m = self.lambda.len();
+        // Contacts that share their load give way together.
+        for place in 0..m {
+            let reserve = self.affine.as_ref().and_then(|law| law.reserve(place));
+            if let Some(reserve) = reserve {
+                let slack = &self.slack[2 * place..];
+                (self.exits[2 * place], self.exits[2 * place + 1]) =
+                    (reserve + slack[0], reserve + slack[1]);
+            }
+        }
         (self.exits[2 * m], self.exits[2 * m + 1]) = (fold, stability);
     }
 }

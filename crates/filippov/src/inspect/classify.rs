@@ -299,7 +299,7 @@ fn decided_by_relay(
             point.multipliers.push(sign);
         }
     }
-    point.unique = found.uniqueness == Uniqueness::Certain;
+    point.unique = matches!(found.uniqueness, Uniqueness::Certain | Uniqueness::OfMotion);
     point.candidates = vec![after.clone()];
     point.mode = Some(after);
     point.leaf = "relay";

@@ -3,12 +3,13 @@
 use super::detect::Found;
 use super::integrator::Integrator;
 use super::transition::{Decided, Left, Lefts};
+use super::Stop;
 use crate::error::FieldError;
 use crate::event::EventFunction;
 use crate::field::SmoothField;
 use crate::mode::Mode;
-use crate::switching::{relay_at, RelaySolution, Uniqueness};
-use crate::tolerances::{AT_SIDE, DRIFT_SHARE, MOST_MEETING};
+use crate::switching::{relay_at, RelaySolution, Undecided, Uniqueness};
+use crate::tolerances::{AT_SIDE, DRIFT_SHARE, MOST_IN_LOOP, MOST_MEETING};
 
 impl Integrator<'_> {
     /// What follows where the surfaces of `meeting` vanish, if the field is affine in their signs and the relay
@@ -48,13 +49,20 @@ impl Integrator<'_> {
         let Some(mut found) = found else {
             return Ok(None);
         };
+        if found.n_sharing > MOST_IN_LOOP {
+            return Ok(Some(Err(Stop::Intersection {
+                surfaces: meeting.to_vec(),
+                candidates: Vec::new(),
+                reason: Undecided::TooRedundant { n: found.n_sharing },
+            })));
+        }
         if !found.degenerate.is_empty() {
             if event.is_none() {
                 return Ok(None);
             }
             self.let_go(mode, meeting, &mut found);
         }
-        let is_certain = found.uniqueness == Uniqueness::Certain;
+        let is_certain = matches!(found.uniqueness, Uniqueness::Certain | Uniqueness::OfMotion);
         if !is_certain && meeting.len() <= MOST_MEETING {
             return Ok(None);
         }

@@ -54,6 +54,27 @@ impl Integrator<'_> {
         }
     }
 
+    /// Where redundant contacts share a load their equations do not determine the multipliers: there are no series, and no
+    /// exact derivatives.
+    pub(super) fn go_without_equations(&mut self) {
+        let is_shared = match &self.motion.field {
+            ModeField::Intersection(field) => field.shares_load(),
+            _ => false,
+        };
+        if is_shared && self.motion.jets.is_some() {
+            let derivative = self.stepper.start_derivative().to_vec();
+            self.motion.jets = None;
+            self.stepper.start_with(StepMethod::Dopri5);
+            self.stepper
+                .start_derivative_mut()
+                .copy_from_slice(&derivative);
+            self.note_missing_series();
+        }
+        if is_shared && matches!(self.motion.derivatives, Derivatives::Exact(_)) {
+            self.take_derivatives(Derivatives::Differences);
+        }
+    }
+
     /// Warns, once, that a run that was to use series uses another method.
     fn note_missing_series(&mut self) {
         let is_known = self
@@ -66,7 +87,7 @@ impl Integrator<'_> {
         let (t, mode) = (self.t, &self.motion.mode);
         let text = format!(
             "the motion in mode {mode} from t = {t:.10} has no Taylor series (its field is not analytic there, is \
-             not traced, slides by another rule than the canopy, sticks, is drawn back to its surface, or is in \
+             not traced, slides by another rule than the canopy, sticks, shares a load among redundant contacts, is drawn back to its surface, or is in \
              contact): DOPRI5 integrates it"
         );
         self.warnings.push(Warning {

@@ -31,7 +31,7 @@ impl Integrator<'_> {
         self.take_derivatives(jacobian.map_or(Derivatives::Differences, Derivatives::Exact));
     }
 
-    fn take_derivatives(&mut self, derivatives: Derivatives) {
+    pub(super) fn take_derivatives(&mut self, derivatives: Derivatives) {
         if let Some(rodas5p) = &mut self.stepper.rodas5p {
             rodas5p.restart(match &derivatives {
                 Derivatives::Exact(jacobian) => jacobian.linearisation(),

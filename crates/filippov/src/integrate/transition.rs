@@ -356,6 +356,7 @@ impl Integrator<'_> {
                 self.detector
                     .stages
                     .extend(exits.iter().map(|&exit| [exit; 7]));
+                self.go_without_equations();
             }
         }
         self.note_oscillation();

@@ -22,6 +22,7 @@ mod relay_at;
 mod resolution;
 mod resolve;
 mod roots;
+mod shared_load;
 mod single;
 mod small_matrix;
 mod stability;
@@ -48,6 +49,7 @@ pub use relay_at::relay_at;
 pub use resolution::{Continuation, Resolution, Undecided};
 pub use resolve::{has_one_mode_only, resolve};
 pub use roots::{multiplier_rates, newton, roots_in_cube, stable_roots, Roots};
+pub use shared_load::{SharedLoad, SharedLoads};
 pub(crate) use small_matrix::invert;
 pub use small_matrix::{Matrix, Vector};
 pub use stability::{

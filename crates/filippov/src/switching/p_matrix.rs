@@ -91,26 +91,28 @@ fn is_diagonally_stable(block: &SparseRows) -> bool {
         })
 }
 
-/// Positive numbers with a_ij d_j = a_ji d_i along a walk through the component.
-fn symmetrising_scale(block: &SparseRows) -> Option<Vec<f64>> {
+/// Positive numbers with a_ij d_j = a_ji d_i along a walk through each component.
+pub(super) fn symmetrising_scale(block: &SparseRows) -> Option<Vec<f64>> {
     let transposed = block.transposed();
     let mut scale = vec![0.0; block.n_rows()];
-    let mut order = vec![0];
-    scale[0] = 1.0;
-    let mut next = 0;
-    while next < order.len() {
-        let i = order[next];
-        next += 1;
-        for (j, value) in block.row(i) {
-            let mirrored = transposed.row(i).find(|entry| entry.0 == j)?.1;
-            if scale[j] == 0.0 {
-                scale[j] = scale[i] * mirrored / value;
-                // Also refuses a NaN.
-                let is_positive = scale[j] > 0.0 && scale[j].is_finite();
-                if !is_positive {
-                    return None;
+    for start in 0..block.n_rows() {
+        if scale[start] != 0.0 {
+            continue;
+        }
+        scale[start] = 1.0;
+        let mut order = vec![start];
+        while let Some(i) = order.pop() {
+            for (j, value) in block.row(i).filter(|entry| entry.1 != 0.0) {
+                let mirrored = transposed.row(i).find(|entry| entry.0 == j)?.1;
+                if scale[j] == 0.0 {
+                    scale[j] = scale[i] * mirrored / value;
+                    // Also refuses a NaN.
+                    let is_positive = scale[j] > 0.0 && scale[j].is_finite();
+                    if !is_positive {
+                        return None;
+                    }
+                    order.push(j);
                 }
-                order.push(j);
             }
         }
     }

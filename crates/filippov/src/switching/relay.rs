@@ -23,8 +23,9 @@
 //! Guglielmi, Hairer (2022); `docs/theory/switching.md`.
 
 use super::p_matrix::is_p_matrix;
+use super::shared_load::{has_one_motion, let_stick};
 use crate::sparse::{Singular, SparseRows, SparseSolver};
-use crate::tolerances::RELAY_DAMPING;
+use crate::tolerances::{EPS, RELAY_DAMPING};
 
 /// Largest number of surfaces for which all modes are tried.
 pub const MOST_ENUMERATED: usize = 8;
@@ -34,6 +35,10 @@ const PATIENCE: usize = 4;
 
 /// Proximal steps; each gains a factor of about 1 / d.
 const MOST_PROXIMAL: usize = 30;
+
+/// Rates of a solution that are to be 0 may be this many times what rounding alone would leave: the solution of the
+/// linear system, and the last proximal step, add theirs.
+pub(super) const SOLVED: f64 = 8.0;
 
 /// The data of (R), one entry or row per surface.
 #[derive(Clone, Debug)]
@@ -51,6 +56,8 @@ pub struct RelayProblem {
 pub enum Uniqueness {
     /// It is.
     Certain,
+    /// There are others with the same rates, and so the same motion: redundant contacts share their load.
+    OfMotion,
     /// There are others.
     Several,
     /// Not known.
@@ -71,6 +78,8 @@ pub struct RelaySolution {
     /// Entries with v_i = 0 and |s_i| = 1 within rounding: `modes` has one of the two possibilities, and
     /// derivatives along the motion decide.
     pub degenerate: Vec<usize>,
+    /// How many contacts at most share one load because they are redundant.
+    pub n_sharing: usize,
     /// Linear systems solved.
     pub n_pivots: usize,
     /// Multiplications and divisions in them.
@@ -121,6 +130,9 @@ pub fn solve_relay(problem: &RelayProblem, before: &[i8]) -> Result<RelaySolutio
     let is_follower = |i: &usize| leaders.binary_search(i).is_err();
     if solution.degenerate.iter().any(is_follower) {
         solution.uniqueness = Uniqueness::Unknown;
+    }
+    if solution.uniqueness == Uniqueness::OfMotion {
+        let_stick(problem, &mut solution);
     }
     Ok(solution)
 }
@@ -217,6 +229,7 @@ impl RelayProblem {
             rates,
             uniqueness: solved.uniqueness,
             degenerate,
+            n_sharing: 0,
             n_pivots: solved.n_pivots,
             n_operations: solved.n_operations,
         }
@@ -237,9 +250,10 @@ impl RelayProblem {
         let mut state = state.filter(|state| self.is_solution(state));
         let mut uniqueness = match is_p {
             true => Uniqueness::Certain,
+            false if has_one_motion(&self.n) => Uniqueness::OfMotion,
             false => Uniqueness::Unknown,
         };
-        if !is_p && self.nu.len() <= MOST_ENUMERATED {
+        if uniqueness == Uniqueness::Unknown && self.nu.len() <= MOST_ENUMERATED {
             let (all, has_singular) = self.enumerate();
             uniqueness = match (all.len(), has_singular) {
                 (2.., _) => Uniqueness::Several,
@@ -347,9 +361,10 @@ impl RelayProblem {
         })
     }
 
-    /// A rate below this is rounding.
-    fn rounding(&self, signs: &[f64], i: usize) -> f64 {
-        self.noise * (self.nu[i].abs() + self.n.magnitude(i, signs))
+    /// A rate below this is rounding: of the rates at the signs, and of signs of size 1.
+    pub(super) fn rounding(&self, signs: &[f64], i: usize) -> f64 {
+        let of_signs: f64 = self.n.row(i).map(|(_, value)| value.abs()).sum();
+        self.noise * (self.nu[i].abs() + self.n.magnitude(i, signs)) + EPS * of_signs
     }
 
     /// How much of a sign is rounding, if the rates are known up to `rounding`.
@@ -377,7 +392,7 @@ impl RelayProblem {
             .collect();
         (0..signs.len()).all(|i| {
             let rate = self.nu[i] + self.n.dot(i, &signs);
-            let rounding = 8.0 * self.rounding(&signs, i);
+            let rounding = SOLVED * self.rounding(&signs, i);
             match state.modes[i] {
                 0 => rate.abs() <= rounding,
                 mode => f64::from(mode) * rate >= -rounding,
@@ -438,11 +453,11 @@ impl RelayProblem {
 }
 
 /// The largest entry of a row.
-fn largest(matrix: &SparseRows, i: usize) -> f64 {
+pub(super) fn largest(matrix: &SparseRows, i: usize) -> f64 {
     matrix.row(i).fold(0.0, |size, (_, v)| size.max(v.abs()))
 }
 
-fn negative(matrix: &SparseRows) -> SparseRows {
+pub(super) fn negative(matrix: &SparseRows) -> SparseRows {
     let mut result = matrix.clone();
     result
         .values_mut()
@@ -452,7 +467,7 @@ fn negative(matrix: &SparseRows) -> SparseRows {
 }
 
 /// The matrix less a diagonal.
-fn with_diagonal(matrix: &SparseRows, less: &[f64]) -> SparseRows {
+pub(super) fn with_diagonal(matrix: &SparseRows, less: &[f64]) -> SparseRows {
     let mut result = SparseRows::new(matrix.n_columns());
     for (i, less) in less.iter().enumerate() {
         let mut entries: Vec<(usize, f64)> = matrix.row(i).collect();

@@ -1,6 +1,7 @@
 //! What a decision at an intersection returns.
 
 use crate::mode::Mode;
+use crate::tolerances::MOST_IN_LOOP;
 
 /// How the motion goes on.
 #[derive(Clone, Debug, PartialEq)]
@@ -106,6 +107,14 @@ pub enum Undecided {
     /// The signs of too many surfaces multiply one another.
     #[error("the signs of {n} of the surfaces that meet multiply one another in the field; at most 6 may")]
     TooMany {
+        /// How many.
+        n: usize,
+    },
+    /// Too many redundant contacts share one load.
+    #[error(
+        "{n} contacts close loops with one another and share one load; at most {MOST_IN_LOOP} may"
+    )]
+    TooRedundant {
         /// How many.
         n: usize,
     },

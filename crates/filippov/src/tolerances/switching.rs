@@ -202,6 +202,14 @@ pub const NULL_VECTOR_ENTRY: f64 = 1e-6;
 /// about this factor each; the damped matrix has half of the digits left.
 pub const RELAY_DAMPING: f64 = 1e-6;
 
+/// Most contacts that close loops with one another, as those of seven bodies in a row: up to 1716 facets are looked at in
+/// each evaluation.
+pub const MOST_IN_LOOP: usize = 13;
+
+/// A contact is redundant if this share of its strength or less is left where the others are taken out: rounding of
+/// the elimination is far below it, and multipliers found from less than this would have lost most of their digits.
+pub const REDUNDANT_PIVOT: f64 = 1e-11;
+
 /// A matrix with diagonal 1 counts as definite, or as one with positive minors, if all pivots exceed this: what is
 /// claimed of it (that a mode is the only one) has to be clear of rounding.
 pub const DEFINITE_PIVOT: f64 = 1e-10;

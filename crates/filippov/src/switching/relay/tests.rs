@@ -120,7 +120,7 @@ fn redundant_contacts_share_the_load() {
     let large = solved(&[25.0; 50], &vec![vec![-1.0; 50]; 50], &[1; 50]);
     // Rounding of the rates divided by the damping.
     assert!(large.signs.iter().all(|s| (s - 0.5).abs() < 1e-7));
-    assert_eq!(large.uniqueness, Uniqueness::Unknown);
+    assert_eq!(large.uniqueness, Uniqueness::OfMotion);
 }
 
 #[test]
@@ -305,5 +305,47 @@ fn chains_are_solved_in_a_number_of_steps_that_does_not_grow() {
                 );
             }
         }
+    }
+}
+
+#[test]
+fn redundant_contacts_stick_though_one_of_them_be_at_its_limit() {
+    // v_0 = v_1 and v_0 = 0 are reached at once: the least signs that hold would have |s_0| > 1.
+    let n = vec![
+        vec![-0.07497008918135284, 0.0, -0.20824086372106426, 0.0],
+        vec![0.0, -0.5972311458188959, 0.45076785452004287, 0.0],
+        vec![
+            -0.07497008918135284,
+            0.5972311458188959,
+            -0.6590087182411071,
+            0.0,
+        ],
+        vec![0.0, 0.0, 0.0, -1.032975138214604],
+    ];
+    let nu = [
+        -0.2466256497092047,
+        -0.0716068596042802,
+        -0.1750187901049245,
+        0.4143809623537302,
+    ];
+    let found = solved(&nu, &n, &[1, 1, 0, 0]);
+    assert_eq!(found.modes, [0; 4]);
+    assert!(found.signs[0] == -1.0 && found.degenerate.is_empty());
+    assert_eq!(
+        (found.uniqueness, found.n_sharing),
+        (Uniqueness::OfMotion, 3)
+    );
+}
+
+#[test]
+fn a_load_of_rounding_is_carried_by_redundant_contacts() {
+    let n = vec![
+        vec![-0.6, -0.5, 0.7],
+        vec![-0.3, -0.5, 0.0],
+        vec![0.3, 0.0, -0.7],
+    ];
+    for nu in [[0.0; 3], [1.1e-16, 0.0, 0.0], [0.0, -5.6e-17, 2.8e-17]] {
+        let found = solved(&nu, &n, &[1, 1, 1]);
+        assert_eq!((found.modes, found.degenerate), (vec![0; 3], vec![]));
     }
 }
