@@ -69,6 +69,10 @@ def _page_of(path: Path) -> str | None:
     """Return the page or file of the documentation that a file of the repository is, if it is one."""
     if path.parent == ROOT and path.name in FROM_ROOT:
         return FROM_ROOT[path.name]
+    if path == EXAMPLES / "README.md":
+        return "gallery/index.md"
+    if path.is_relative_to(EXAMPLES) and path.suffix == ".py" and path.is_file():
+        return f"gallery/{path.stem}.md"
     docs = ROOT / "docs"
     if not path.is_relative_to(docs):
         return None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import os
 import subprocess
 import sys
@@ -12,31 +11,8 @@ from typing import Any
 import filippov as fl
 import numpy as np
 import pytest
+from command_line import COMMAND, ENVIRONMENT, MODEL, rows, rows_of
 from filippov.cli import main
-
-MODEL = """
-import filippov as fl, numpy as np
-
-@fl.system(states=("y", "v"))
-def oscillator(t, x, F=0.4, omega=1/3):
-    y, v = x
-    return v, -y + np.sin(omega*t) - F*np.sign(v)
-
-y0 = [1.0, 2.0]
-"""
-
-
-@pytest.fixture
-def model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    path = tmp_path / "model.py"
-    path.write_text(MODEL)
-    return path
-
-
-def rows(path: Path) -> list[dict[str, str]]:
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def test_solve_writes_every_digit(model: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -108,7 +84,6 @@ def test_a_failed_run_keeps_what_it_has(model: Path, capsys: pytest.CaptureFixtu
         (["solve", "model.py", "--t", "1", "--plot", "out.gif"], "--plot: out.gif must end in"),
         (["solve", "model.py", "--t", "1", "--plot", "out.png", "--phase", "y"], "--phase: two or three"),
         (["solve", "model.py", "--t", "1", "--plot", "o.png", "--phase", "y", "z"], "--phase: no state"),
-        (["solve", "model.py", "--t", "1", "--phase", "y", "v"], "--plot: "),
         (["list", "no such thing"], "no problem has"),
         (["demo", "nothing"], "neither a file nor a problem"),
     ],
@@ -171,17 +146,71 @@ def test_every_problem_is_a_demo(name: str, model: Path, capsys: pytest.CaptureF
 
 
 def test_the_program_by_itself(model: Path) -> None:
-    run = [sys.executable, "-m", "filippov"]
-    there = {**os.environ, "PYTHONPATH": str(Path(fl.__file__).parents[1]), "COLUMNS": "110"}
-    shown = subprocess.run([*run, "--help"], capture_output=True, text=True, env=there, check=True)
+    shown = subprocess.run([*COMMAND, "--help"], capture_output=True, text=True, env=ENVIRONMENT, check=True)
     for command in ("list", "demo", "solve"):
         assert f"    {command} " in shown.stdout
-        words = [*run, command, "--help"]
-        explained = subprocess.run(words, capture_output=True, text=True, env=there, check=True)
+        words = [*COMMAND, command, "--help"]
+        explained = subprocess.run(words, capture_output=True, text=True, env=ENVIRONMENT, check=True)
         assert explained.stdout.startswith(f"usage: filippov {command}")
-    wrong = subprocess.run([*run, "solve", "no.py"], capture_output=True, text=True, env=there, check=False)
+    wrong = subprocess.run(
+        [*COMMAND, "solve", "no.py"], capture_output=True, text=True, env=ENVIRONMENT, check=False
+    )
     assert wrong.returncode == 2
     assert wrong.stderr == "filippov: no.py: there is no such file\n"
-    unknown = subprocess.run([*run, "slove"], capture_output=True, text=True, env=there, check=False)
+    unknown = subprocess.run(
+        [*COMMAND, "slove"], capture_output=True, text=True, env=ENVIRONMENT, check=False
+    )
     assert unknown.returncode == 2
     assert "Traceback" not in unknown.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--t", "1", "--dark"], "--dark: needs --plot"),
+        (["--t", "1", "--states", "v"], "--states: needs --plot"),
+        (["--t", "1", "--phase", "y", "v"], "--phase: needs --plot"),
+        (["--t", "1", "--points", "5"], "--points: needs --csv or --parquet"),
+        (["--t", "1", "--parquet", "-"], "--parquet: the name of a file is needed"),
+    ],
+)
+def test_no_option_is_ignored(
+    model: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
+) -> None:
+    assert main(["solve", "model.py", *arguments]) == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert shown.err.startswith(f"filippov: {message}")
+
+
+def test_a_picture_that_is_not_wanted_has_no_name(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["demo", "biased_relay", "--no-plot", "--plot", "a.png"]) == 2
+    assert capsys.readouterr().err.startswith("filippov: --plot: has no meaning with --no-plot")
+
+
+def test_a_table_on_the_standard_output(model: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["solve", "model.py", "--t", "9", "--points", "4", "--csv", "-"]) == 0
+    shown = capsys.readouterr()
+    assert [float(row["t"]) for row in rows_of(shown.out)] == [0.0, 3.0, 6.0, 9.0]
+    assert "at the end: t=9" in shown.err
+    assert not (model.parent / "-").exists()
+
+
+def test_a_reader_that_stops_is_no_mistake() -> None:
+    # Nobody reads: the pipe is closed before the first line is written.
+    reading, writing = os.pipe()
+    os.close(reading)
+    with os.fdopen(writing, "wb") as pipe:
+        done = subprocess.run(
+            [*COMMAND, "list"], stdout=pipe, stderr=subprocess.PIPE, env=ENVIRONMENT, check=False
+        )
+    assert done.stderr == b""
+    assert done.returncode == 141
+
+
+def test_what_is_not_installed_is_named_with_its_command(
+    model: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    assert main(["solve", "model.py", "--t", "1", "--parquet", "out.parquet"]) == 2
+    assert 'pip install "filippov[parquet]"' in capsys.readouterr().err

@@ -2,38 +2,22 @@
 
 from __future__ import annotations
 
-import csv
 import math
-import os
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 
 import filippov as fl
 import numpy as np
 import pytest
+from command_line import COMMAND, ENVIRONMENT, MODEL, rows, rows_of
 from filippov.cli import main
-from test_cli import MODEL
 
 pytest.importorskip("xarray")
 
 PERIOD = ["--period", "2*pi/omega", "--transient", "20"]
 SWEEP = ["sweep", "model.py", "--param", "omega=0.5:2:4", "F=0.4", *PERIOD]
-
-
-@pytest.fixture
-def model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    path = tmp_path / "model.py"
-    path.write_text(MODEL)
-    return path
-
-
-def rows(path: Path) -> list[dict[str, str]]:
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def test_returns_are_those_of_the_library(model: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -74,11 +58,10 @@ def test_a_section_of_the_file_and_failed_points(model: Path, capsys: pytest.Cap
 def test_a_killed_sweep_goes_on(model: Path) -> None:
     pytest.importorskip("zarr")
     sweep = ["sweep", "model.py", "--param", "omega=0.2:0.7:1500", *PERIOD]
-    run = [sys.executable, "-m", "filippov", *sweep, "--store", "runs", "--quiet"]
-    there = {**os.environ, "PYTHONPATH": str(Path(fl.__file__).parents[1])}
+    run = [*COMMAND, *sweep, "--store", "runs", "--quiet"]
     killed = 0
     for _ in range(2):
-        process = subprocess.Popen(run, env=there)
+        process = subprocess.Popen(run, env=ENVIRONMENT)
         before = sum(1 for _ in Path("runs").rglob("*"))
         while process.poll() is None and sum(1 for _ in Path("runs").rglob("*")) < before + 3:
             time.sleep(0.01)
@@ -87,7 +70,7 @@ def test_a_killed_sweep_goes_on(model: Path) -> None:
             killed += 1
         process.wait()
     assert killed
-    assert subprocess.run([*run, "--csv", "resumed.csv"], env=there, check=False).returncode == 0
+    assert subprocess.run([*run, "--csv", "resumed.csv"], env=ENVIRONMENT, check=False).returncode == 0
     assert main([*sweep, "--quiet", "--csv", "undisturbed.csv"]) == 0
     assert Path("resumed.csv").read_bytes() == Path("undisturbed.csv").read_bytes()
 
@@ -109,7 +92,14 @@ def test_a_killed_sweep_goes_on(model: Path) -> None:
         (["--param", "omega=1,2", "--t", "9", "--plot", "o.png"], "--plot: one parameter with several"),
         (["--param", "omega=1,2", "--t", "9", "--y0", "0:1:3", "1"], "--y0: ranges need names"),
         (["--param", "omega=1,2", "--t", "9", "--y0", "z=0:1:3"], "--y0: no 'z'; there are y, v"),
-        (["--param", "omega=1,2", "--period", "1", "--state", "z"], "--state: no state 'z'"),
+        (
+            ["--param", "omega=1,2", "--period", "1", "--plot", "o.png", "--state", "z"],
+            "--state: no state 'z'",
+        ),
+        (["--param", "omega=1,2", "--t", "9", "--returns", "5"], "--returns: is about returns"),
+        (["--param", "omega=1,2", "--t", "9", "--transient", "5"], "--transient: is about returns"),
+        (["--param", "omega=1,2", "--period", "1", "--state", "v"], "--state: needs --plot"),
+        (["--param", "omega=1,2", "--period", "1", "--dark"], "--dark: needs --plot"),
         (["--param", "omega=1,2", "--period", "1", "--returns", "0"], "n: "),
         (["--param", "omega=1,2", "--period", "1", "--threads", "0"], "threads: "),
     ],
@@ -132,3 +122,18 @@ def test_a_store_of_another_sweep_is_refused(model: Path, capsys: pytest.Capture
     shown = capsys.readouterr().err
     assert shown.startswith("filippov: store: ")
     assert shown.count("\n") == 1
+
+
+def test_ends_are_followed_too(model: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    ends = ["sweep", "model.py", "--param", "F=0.2,0.3", "--t", "5", "--csv", "-", "--quiet"]
+    found = []
+    for more in ([], ["--follow"]):
+        assert main([*ends, *more]) == 0
+        found.append(rows_of(capsys.readouterr().out))
+    alone, followed = found
+    assert alone[0] == followed[0]
+    names: dict[str, fl.System] = {}
+    exec(MODEL, names)
+    start = [float(alone[0]["y"]), float(alone[0]["v"])]
+    expected = names["oscillator"].solve((0, 5), start, F=0.3).y[:, -1]
+    assert [float(followed[1]["y"]), float(followed[1]["v"])] == expected.tolist()

@@ -32,6 +32,17 @@ def test_a_page_says_what_it_is_about_and_how_to_run_it(script: Path) -> None:
     assert f"examples/{script.parent.name}/{script.name}" in text
 
 
+def test_the_list_has_every_example_with_its_title() -> None:
+    text = (EXAMPLES / "README.md").read_text(encoding="utf-8")
+    rows = []
+    for script in SCRIPTS:
+        words = ast.get_docstring(ast.parse(script.read_text(encoding="utf-8"))) or ""
+        title = " ".join(words.split("\n\n")[0].split())
+        name = script.stem.replace("_", " ").capitalize()
+        rows.append(f"| [{name}]({script.parent.name}/{script.name}) | {title} |")
+    assert [line for line in text.splitlines() if line.startswith("| [")] == rows
+
+
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)
 def test_an_example_runs(
     script: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

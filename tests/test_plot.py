@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import filippov as fl
@@ -10,16 +9,11 @@ import numpy as np
 import pytest
 
 matplotlib = pytest.importorskip("matplotlib")
-matplotlib.use("Agg")
 
 from matplotlib import pyplot  # noqa: E402
 from matplotlib.colors import to_hex  # noqa: E402
 
-
-@pytest.fixture(autouse=True)
-def _closed() -> Iterator[None]:
-    yield
-    pyplot.close("all")
+pytestmark = pytest.mark.usefixtures("figures_closed")
 
 
 @pytest.fixture(scope="module")
@@ -131,12 +125,33 @@ def test_parts_of_a_surface_have_their_borders_where_the_fields_are_tangent(belt
 def test_parts_of_a_sphere_and_of_a_curve_in_a_larger_space() -> None:
     sphere = fl.System(lambda t, x: [-x[0] * np.sign(x[0] ** 2 + x[1] ** 2 + x[2] ** 2 - 1), x[1], x[2]], n=3)
     parts = fl.surface_parts(sphere, [(-1.5, 1.5)] * 3, points=11)
-    assert len(parts.sheets) == 2
-    found = np.concatenate([sheet[:, np.isfinite(sheet[0])] for sheet in parts.sheets], axis=1)
+    (found,) = parts.sheets
     np.testing.assert_allclose((found**2).sum(axis=0), 1.0, rtol=1e-12)
+    # A closed net: every edge belongs to two triangles, and Euler's number is that of a sphere.
+    edges = np.sort(np.concatenate([parts.triangles[:, pair] for pair in ((0, 1), (1, 2), (2, 0))]), axis=1)
+    once, counts = np.unique(edges, axis=0, return_counts=True)
+    assert set(counts) == {2}
+    assert len(np.unique(parts.triangles)) - len(once) + len(parts.triangles) == 2
     across = fl.surface_parts(sphere, [(-1.5, 1.5)] * 2, at=[0.0, 0.0, 0.8], states=(0, 1), points=31)
-    found = np.concatenate([sheet[:, np.isfinite(sheet[0])] for sheet in across.sheets], axis=1)
-    np.testing.assert_allclose((found**2).sum(axis=0), 0.36, rtol=1e-12)
+    (circle,) = across.sheets
+    np.testing.assert_allclose((circle**2).sum(axis=0), 0.36, rtol=1e-12)
+    np.testing.assert_array_equal(circle[:, 0], circle[:, -1])
+    assert np.abs(np.diff(circle, axis=1)).max() < 0.11  # one curve, without a jump
+
+
+def test_the_border_of_parts_in_space_is_where_the_fields_are_tangent() -> None:
+    # On x0 = 0 the components across are x1 - 1 and x1 + 1: attracting for -1 < x1 < 1.
+    system = fl.System(lambda t, x: [x[1] - np.sign(x[0]), x[2], 0.0], n=3)
+    parts = fl.surface_parts(system, [(-1.0, 1.0), (-2.0, 2.0), (-1.0, 1.0)], points=8)
+    (corners,), (kinds,) = parts.sheets, parts.kinds
+    x1 = corners[1][parts.triangles]
+    border = kinds[parts.triangles] == "tangency"
+    np.testing.assert_allclose(np.abs(x1[border]), 1.0, rtol=0, atol=1e-8)
+    # No triangle reaches across.
+    assert ((np.abs(x1) < 1.0 + 1e-8).all(axis=1) | (np.abs(x1) > 1.0 - 1e-8).all(axis=1)).all()
+    a, b, c = (corners[1:, parts.triangles[:, k]] for k in range(3))
+    areas = 0.5 * np.abs((b - a)[0] * (c - a)[1] - (b - a)[1] * (c - a)[0])
+    assert areas.sum() == pytest.approx(8.0)
 
 
 @pytest.mark.parametrize(
@@ -163,7 +178,7 @@ def test_a_surface_in_the_plane_is_drawn_by_parts(belt: fl.System, solution: fl.
     assert legend(ax)[-2:] == ["v - 0.2 = 0: attracting (sliding)", "v - 0.2 = 0: crossed"]
     drawn = [line for line in ax.lines if line.get_color() == fl.plot.theme().attracting]
     spans = [line.get_xdata() for line in drawn if np.allclose(line.get_ydata(), 0.2, atol=1e-9)]
-    assert any(abs(x[0]) <= 1.0 and abs(x[-1]) <= 1.0 and np.ptp(x) > 1.8 for x in spans)
+    assert any(np.sort(x[[0, -1]]) == pytest.approx([-1.0, 1.0], abs=1e-8) for x in spans)
     assert fl.plot.surface(parts).get_xlabel() == "x"
 
 

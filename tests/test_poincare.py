@@ -290,3 +290,29 @@ def test_a_return_within_rounding_of_a_switch() -> None:
             found = fl.poincare(ball, section, (0, 4), [1.0, 0.0], rtol=1e-9)
             assert {"+"} >= set(found.itinerary.values[1:].tolist())  # the first may have an ulp of "+" too
             assert (np.diff(found.t) > 0.1).all()
+
+
+@pytest.mark.parametrize("mu", [-0.97, -0.9, -0.5, 0.9])
+def test_the_way_to_a_fixed_point_is_not_its_period(mu: float) -> None:
+    """Returns of z -> 1 + mu (z - 1) come to 1, for mu < 0 from alternating sides."""
+    jump = fl.Reset(period=1.0, map=lambda t, x: [1.0 + mu * (x[0] - 1.0)])
+    system = fl.System(lambda t, x: [0.0 * x[0]], n=1, states=["z"], resets=jump)
+    found = fl.poincare(system, fl.Phase(1.0, 0.5), (0, np.inf), [3.0], n=2000, until_periodic=True)
+    assert found.attrs["period"] == 1
+    # What is left of 2 mu^k where two returns differ by the tolerance, 1e-5 (|z| + atol / rtol).
+    np.testing.assert_allclose(found.z.values, 1.0, rtol=0, atol=1.1e-5 / (1.0 - mu))
+
+
+@pytest.mark.parametrize(("q", "maxima"), [(8.0, [6.0099]), (6.0, [5.6355, 7.1093])])
+def test_the_period_of_a_pressure_relief_valve(q: float, maxima: list[float]) -> None:
+    """Both attractors attract by negative multipliers; at q = 6 the period has doubled."""
+
+    def valve(t: Any, y: Any) -> Any:
+        return [y[1], -1.25 * y[1] - (y[0] + 10.0) + y[2], 20.0 * (q - y[0] * np.sqrt(y[2]))]
+
+    seat = fl.Reset(lambda t, y: y[0], lambda t, y: [y[0], -0.8 * y[1], y[2]])
+    system = fl.System(valve, n=3, resets=seat)
+    peak = fl.Section(lambda t, y: y[1], direction="down")
+    found = fl.poincare(system, peak, (0, 3000), [0.2, 0.0, 0.0], until_periodic=True, rtol=1e-8)
+    assert found.attrs["period"] == len(maxima)
+    assert np.sort(found["x[0]"].values) == pytest.approx(maxima, abs=1e-4)

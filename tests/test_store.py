@@ -235,3 +235,53 @@ def test_zarr_missing_is_named(system: fl.System, tmp_path: Path, monkeypatch: p
     monkeypatch.setitem(sys.modules, "zarr", None)
     with pytest.raises(ImportError, match="pip install zarr"):
         small(system, store=tmp_path)
+
+
+def relays(store: Path, **more: Any) -> Any:
+    system = fl.System(lambda t, x, a: [-a * np.sign(x[0])], n=1, params={"a": 1.0}, states=["z"])
+    return fl.sweep(system, (0, 1), [1.0], {"a": np.linspace(1, 2, 40)}, chunk_size=10, store=store, **more)
+
+
+@pytest.mark.parametrize("path", ["/proc/foo", "/dev/null/foo", "file/foo"])
+def test_a_place_that_cannot_be_written_is_named(
+    path: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("file").write_text("")
+    with pytest.raises(fl.InputError, match=rf"^store: {path} cannot be written: "):
+        relays(Path(path))
+
+
+def test_a_damaged_chunk_is_named_and_can_be_computed_again(tmp_path: Path) -> None:
+    expected = relays(tmp_path / "whole")
+    store = tmp_path / "runs"
+    assert relays(store, part=(0, 2)) is None
+    chunk = store / "chunks" / "000000.npz"
+    whole = chunk.read_bytes()
+    for damage in (b"", whole[: len(whole) // 2], b"nonsense" * 100, whole[:200] + b"x" * 50 + whole[250:]):
+        chunk.write_bytes(damage)
+        with pytest.raises(fl.InputError, match=r"^store: .*000000.npz is damaged .*; remove it"):
+            relays(store)
+    chunk.unlink()
+    assert relays(store).identical(expected)
+
+
+def test_a_chunk_of_another_sweep_is_named(tmp_path: Path) -> None:
+    store, other = tmp_path / "runs", tmp_path / "other"
+    assert relays(store, part=(0, 2)) is None
+    assert relays(other, part=(0, 2), rtol=1e-9) is None
+    (store / "chunks" / "000000.npz").write_bytes((other / "chunks" / "000000.npz").read_bytes())
+    with pytest.raises(fl.InputError, match=r"^store: .*000000.npz belongs to another sweep; remove it"):
+        relays(store)
+
+
+def test_a_damaged_result_is_named(tmp_path: Path) -> None:
+    store = tmp_path / "runs"
+    relays(store)
+    (store / "zarr.json").write_text("{")
+    for call in (lambda: relays(store), lambda: fl.open_sweep(store)):
+        with pytest.raises(fl.InputError, match=r"^store: .*runs.* damaged"):
+            call()
+    (store / "zarr.json").write_text('{"zarr_format": 3, "node_type": "group", "attributes": {}}')
+    with pytest.raises(fl.InputError, match=r"^store: .*runs is damaged"):
+        fl.open_sweep(store)

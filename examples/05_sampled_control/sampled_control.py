@@ -51,7 +51,7 @@ def main(path: Path) -> None:
         right.plot(t, s, linewidth=0.8)
     left.plot(t, slides.sol(t)[0], color="k", linewidth=1.4, label="ideal")
     left.set(xlabel="t", title="x")
-    right.set(xlabel="t", title="s", ylim=(-0.4, 1.05))
+    right.set(xlabel="t", title="s", ylim=(-0.6, 1.05))
     left.legend()
     figure.savefig(path, dpi=150)
 

@@ -42,7 +42,8 @@ def main(path: Path) -> None:
     fl.plot.time_series(solution, ax=top, states=("y1", "y2"))
     fl.plot.time_series(solution, ax=bottom, states=("v1", "v2"))
     bottom.get_legend().remove()
-    top.set_xlabel("")
+    top.set(xlabel="", ylabel="positions: y1, y2 dashed")
+    bottom.set(ylabel="speeds: v1, v2 dashed")
     figure.savefig(path, dpi=150)
 
 

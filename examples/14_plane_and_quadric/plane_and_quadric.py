@@ -52,9 +52,10 @@ def main(path: Path) -> None:
         for surface in range(2):
             parts = fl.surface_parts(system, list(zip(low, high, strict=True)), surface, points=33)
             fl.plot.surface(parts, ax=ax, legend=False)
-        ax.get_legend().set(loc="lower left", bbox_to_anchor=(0.0, -0.1))
+        ax.view_init(elev=25.0, azim=-35.0)
+        ax.get_legend().set(loc="upper left", bbox_to_anchor=(-0.08, 1.0))
         ax.set_title(("the quadric first", "the plane first")[place])
-    figure.subplots_adjust(left=0.02, right=0.95, bottom=0.1, top=0.93)
+    figure.subplots_adjust(left=0.02, right=0.95, bottom=0.06, top=0.92)
     figure.savefig(path, dpi=150)
 
 

@@ -42,7 +42,7 @@ def main(path: Path) -> None:
     }
     print(compare(numbers, within=1e-8))
     figure = pyplot.figure(figsize=(11.0, 8.0))
-    grid = figure.add_gridspec(2, 2, left=0.02, right=0.88, bottom=0.07, top=0.95, width_ratios=(1.0, 1.3))
+    grid = figure.add_gridspec(2, 2, left=0.02, right=0.85, bottom=0.07, top=0.95, width_ratios=(1.0, 1.3))
     for row, (solution, title) in enumerate(
         ((slides.solve((0.0, 40.0), START), "(i)"), (chatters.solve((0.0, 13.0), START), "(ii)"))
     ):

@@ -51,7 +51,7 @@ def main(path: Path) -> None:
         (line,) = top.plot(t, x[i], linewidth=1.4, label=f"block {i + 1}", color=fl.plot.theme().colours[i])
         for segment in solution.segments:
             if segment.mode[i] == 0:
-                width = {"linewidth": 6.0, "solid_capstyle": "butt"}
+                width = {"linewidth": 6.0, "solid_capstyle": "butt", "antialiased": False}
                 bottom.plot([segment.t_start, segment.t_end], [i + 1, i + 1], color=line.get_color(), **width)
     top.set_ylabel("position")
     top.legend(frameon=False)

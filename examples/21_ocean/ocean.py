@@ -73,9 +73,10 @@ def main(path: Path) -> None:
     for ax, run, value in ((left, solution, eps), (right, calm, 0.1)):
         fl.plot.phase(run, "T", "S", ax=ax)
         parts = fl.surface_parts(ocean, [(0.1, 1.05), (-0.1, 1.05)], points=201, params={"eps": value})
-        fl.plot.surface(parts, ax=ax, legend=ax is right)
+        fl.plot.surface(parts, ax=ax)
         ax.set(xlim=(0.3, 1.05), ylim=(0.1, 1.0), title=f"eps = {value}")
-    left.get_legend().remove()
+    for ax in (left, right):
+        ax.get_legend().set(loc="upper left", bbox_to_anchor=(0.0, 1.0))
     figure.savefig(path, dpi=150)
 
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from filippov._core import __version__ as __version__
 from filippov.branches import Branches
 from filippov.classification import Classification
 from filippov.decorator import system

@@ -14,6 +14,7 @@ __all__ = [
     "RunOptions",
     "SignedSystem",
     "TracedSystem",
+    "__version__",
     "classify",
     "hidden_dynamics",
     "intersection_field",
@@ -23,6 +24,8 @@ __all__ = [
 ]
 
 _Array = npt.NDArray[np.float64]
+
+__version__: str
 
 @final
 class Builder:
@@ -164,6 +167,8 @@ class Run:
     def warnings(self) -> list[tuple[float, str, str, list[tuple[int, ...]]]]: ...
     @property
     def candidates(self) -> list[tuple[int, ...]]: ...
+    @property
+    def not_finite(self) -> tuple[float, _Array] | None: ...
     def evaluate(self, t: _Array, left: bool = False) -> _Array: ...
     def multipliers(self, t: _Array) -> _Array: ...
 
@@ -191,7 +196,7 @@ def solve_many(
     events: list[tuple[Callable[[float, _Array], float] | int, float, int, str]],
     actions: list[tuple[str, list[float], Any, str]],
     threads: int,
-) -> list[Run]: ...
+) -> tuple[list[Run], BaseException | None]: ...
 def solve_points(
     system: TracedSystem | OpaqueSystem | SignedSystem,
     spans: _Array,

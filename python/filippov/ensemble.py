@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from filippov._core import Run, solve_many
-from filippov.errors import InputError
+from filippov.errors import InputError, Interrupted
 from filippov.events import normalise_events
 from filippov.options import check_options, check_t_span, check_unknown, finite_array
 from filippov.prepare import Prepared
@@ -110,6 +110,7 @@ def run_ensemble(
             raise InputError(f"{name}: {options[name]!r} is not for an ensemble")
     known = inspect.signature(solve_ivp).parameters
     unknown = {name: value for name, value in options.items() if name not in known}
+    system.refuse_undeclared(unknown)
     check_unknown(unknown, solve_ivp, system.params)
     checked = check_options({"keep": "last", **options}, (t0, t1), n)
     first = dict(zip(values, values_of_row(values, 0), strict=True))
@@ -123,7 +124,7 @@ def run_ensemble(
     specs = normalise_events(events)
     found = core_events(specs or [], prepared, t0, states[0], (), first)
     table = np.column_stack(list(values.values())) if values else np.empty((len(states), 0))
-    runs = solve_many(
+    runs, raised = solve_many(
         prepared.core,
         t0,
         t1,
@@ -134,7 +135,7 @@ def run_ensemble(
         list(prepared.actions),
         check_threads(threads),
     )
-    return Ensemble(
+    ensemble = Ensemble(
         runs,
         prepared,
         t0=t0,
@@ -142,6 +143,14 @@ def run_ensemble(
         has_events=specs is not None,
         dense_output=checked.dense_output and checked.keep == "steps",
     )
+    if isinstance(raised, KeyboardInterrupt):
+        raise Interrupted(
+            f"{len(runs)} of {len(states)} members were begun; what was computed is in `partial`.",
+            partial=ensemble,
+        )
+    if raised is not None:
+        raise raised
+    return ensemble
 
 
 def values_of_row(values: Mapping[str, Array], row: int) -> list[float]:

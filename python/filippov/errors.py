@@ -111,8 +111,11 @@ class Interrupted(KeyboardInterrupt):
     ----------
     message : str
         Where the run was interrupted.
-    partial : Solution
-        The solution up to the last accepted step.
+    partial : Solution, Ensemble, xarray.Dataset or None
+        Of a run, the solution up to the last accepted step. Of an ensemble, the members that were begun, the
+        last ones up to where they came. Of `poincare` the returns until then. Of a sweep the whole Dataset:
+        points that were cut short have the reason ``interrupted``, those not begun ``not_run``. None for a
+        sweep with a store, which has what is finished on disk.
     """
 
     def __init__(self, message: str = "", partial: Any = None) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from filippov.errors import InputError, ModelError
 from filippov.trace import Scalar
+from filippov.trace.pure import PURE, PureFunction
 
 __all__ = ["Hysteresis", "Stick", "hysteresis", "sawtooth", "stick", "without_memory"]
 
@@ -35,6 +36,12 @@ def sawtooth(t: Any, period: Any) -> Any:
     t : number or traced value
         Usually the time; then the drops are ticks of a clock, ends of steps that are never searched for.
     period : number or parameter
+        Positive.
+
+    Raises
+    ------
+    InputError
+        If the period is a number that is not positive.
 
     Examples
     --------
@@ -45,8 +52,14 @@ def sawtooth(t: Any, period: Any) -> Any:
     >>> sol.switches.kind.tolist(), sol.y[0, -1].round(12)
     (['clock', 'clock', 'clock', 'clock'], np.float64(1.0))
     """
+    if isinstance(period, int | float | np.number) and not 0 < period < np.inf:
+        raise InputError(f"period: a positive number is needed, not {period!r}")
     phase = t / period
     return phase - np.floor(phase)
+
+
+# A trace is kept for functions that call it: it depends on its arguments alone.
+PURE[id(sawtooth)] = PureFunction.of(sawtooth)
 
 
 def hysteresis(value: Any, low: Any, high: Any, initial: float = -1) -> Any:

@@ -73,7 +73,10 @@ class Points(ABC):
         t, state = check_time(t), check_y0(x, "x")
         values = self.parameter_values(params)
         prepared = self.prepare(len(state), float(t), state, values)
-        entries = Mode([int(mode)] if isinstance(mode, (int, np.integer)) else mode)
+        try:
+            entries = Mode([int(mode)] if isinstance(mode, (int, np.integer)) else mode)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"mode: {error}") from None
         if len(entries) != len(prepared.surfaces):
             raise InputError(
                 f"mode: one entry per surface is needed: {len(prepared.surfaces)}, it has {len(entries)}"

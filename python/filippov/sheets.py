@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +10,8 @@ import numpy.typing as npt
 
 from filippov.classification import classify
 from filippov.errors import InputError
+from filippov.implicit import zero_curves, zero_triangles
+from filippov.kinds import part_curve, part_triangles
 from filippov.options import check_time, finite_array
 from filippov.prepare import Prepared, parameter_vector
 from filippov.system import System
@@ -18,10 +20,6 @@ __all__ = ["SurfaceParts", "surface_parts"]
 
 Array = npt.NDArray[np.float64]
 
-# Points of the grid in each direction that chooses the direction of the lines.
-_COARSE = 9
-# More than enough for the rule of Illinois to come to rounding, whose order is 1.44.
-_ITERATIONS = 60
 # Points at which `kind` is asked for lie on the surface to rounding, which grows with the size of the state.
 _NEAR = 1e-9
 _KINDS = {"sliding": "attracting", "escaping": "repelling", "crossing": "crossing", "region": "inactive"}
@@ -41,11 +39,14 @@ class SurfaceParts:
         The two or three states that the window is over.
     labels : tuple of str
         Their names.
-    sheets : list of ndarray, shape (len(states), k) or (len(states), k, k)
-        Points of the surface, a curve or a grid each; NaN where the sheet does not reach.
-    kinds : list of ndarray of str, shape (k,) or (k, k)
-        For every point ``attracting``, ``repelling``, ``crossing``, ``tangency``, ``intersection``,
-        ``inactive`` (the field does not switch there), or empty where there is no point.
+    sheets : list of ndarray, shape (len(states), k)
+        Points of the surface. In the plane every sheet is a curve, its points in their order; in space there
+        is one, the corners of `triangles`.
+    kinds : list of ndarray of str, shape (k,)
+        For every point ``attracting``, ``repelling``, ``crossing``, ``tangency``, ``intersection``, or
+        ``inactive`` (the field does not switch there).
+    triangles : ndarray of int, shape (n_triangles, 3)
+        Corners of triangles that make up the surface in space; none in the plane.
     """
 
     surface: int
@@ -54,6 +55,7 @@ class SurfaceParts:
     labels: tuple[str, ...]
     sheets: list[Array]
     kinds: list[npt.NDArray[np.str_]]
+    triangles: npt.NDArray[np.int64]
 
 
 def surface_parts(
@@ -68,8 +70,9 @@ def surface_parts(
 ) -> SurfaceParts:
     """Find a surface in a window over two or three states, and what the fields do at its points.
 
-    Along the lines of a grid the zeros of h are found to rounding, in the direction in which most of
-    the surface is found; every point is then classified by the normal components of the fields beside it.
+    The window is divided into triangles, or tetrahedra; the zeros of h on their edges are found to rounding,
+    and put together without gaps. Every point is classified by the normal components of the fields beside it;
+    where neighbours differ, the border between them, a tangency or another surface, is put in.
 
     Parameters
     ----------
@@ -102,15 +105,15 @@ def surface_parts(
 
     Notes
     -----
-    A heuristic: what lies between the lines of the grid, or is met twice within a cell, is missed.
+    A heuristic: what lies between the points of the grid, or is met twice on an edge, is missed.
 
     Examples
     --------
     >>> import numpy as np, filippov as fl
     >>> friction = fl.System(lambda t, x: [x[1], -x[0] - np.sign(x[1])], n=2)
     >>> parts = fl.surface_parts(friction, [(-2, 2), (-1, 1)], points=5)
-    >>> parts.name, parts.sheets[0][0].tolist(), parts.kinds[0].tolist()[1:4]
-    ('x[1]', [-2.0, -1.0, 0.0, 1.0, 2.0], ['tangency', 'attracting', 'tangency'])
+    >>> parts.name, parts.sheets[0].shape, sorted(set(parts.kinds[0].tolist()))
+    ('x[1]', (2, 13), ['attracting', 'crossing', 'tangency'])
     """
     window = finite_array([list(pair) for pair in limits], "limits")
     if window.ndim != 2 or window.shape not in ((2, 2), (3, 2)) or not (window[:, 0] < window[:, 1]).all():
@@ -142,10 +145,16 @@ def surface_parts(
     def kind(coordinates: Array) -> str:
         return _kind(prepared, time, place(coordinates), p, surface)
 
-    sheets = _sheets(height, window, points)
-    kinds = [_kinds_of(sheet, kind) for sheet in sheets]
+    triangles = np.empty((0, 3), dtype=np.int64)
+    if len(window) == 3:
+        corners, triangles = zero_triangles(height, window, points)
+        parted = [part_triangles(height, kind, corners, triangles)]
+        triangles = parted[0].triangles
+    else:
+        parted = [part_curve(height, kind, curve) for curve in zero_curves(height, window, points)]
+    sheets, kinds = [part.points for part in parted], [part.kinds for part in parted]
     labels = tuple(system.state_names(n)[k] for k in shown)
-    return SurfaceParts(surface, prepared.surfaces[surface], tuple(shown), labels, sheets, kinds)
+    return SurfaceParts(surface, prepared.surfaces[surface], tuple(shown), labels, sheets, kinds, triangles)
 
 
 def _state_numbers(names: Sequence[str], states: Sequence[int | str] | None, count: int) -> list[int]:
@@ -176,78 +185,3 @@ def _kind(prepared: Prepared, t: float, x: Array, p: Array, surface: int) -> str
     if surface not in found.surfaces:
         return "inactive"
     return _KINDS.get(found.kind, "tangency")
-
-
-def _kinds_of(sheet: Array, kind: Callable[[Array], str]) -> npt.NDArray[np.str_]:
-    kinds = np.full(sheet.shape[1:], "", dtype="<U12")
-    for place in np.ndindex(*kinds.shape):
-        coordinates = sheet[(slice(None), *place)]
-        if np.isfinite(coordinates).all():
-            kinds[place] = kind(coordinates)
-    return kinds
-
-
-def _sheets(height: Callable[[Array], float], window: Array, points: int) -> list[Array]:
-    """Return the sheets along the direction in which a coarse grid finds many points in few sheets."""
-    found = [_sheets_along(axis, height, window, _COARSE) for axis in range(len(window))]
-    counts = [sum(int(np.isfinite(sheet[0]).sum()) for sheet in sheets) for sheets in found]
-    useful = [axis for axis, count in enumerate(counts) if 2 * count >= max(counts)]
-    best = min(useful, key=lambda axis: (len(found[axis]), -counts[axis]))
-    return _sheets_along(best, height, window, points)
-
-
-def _sheets_along(axis: int, height: Callable[[Array], float], window: Array, points: int) -> list[Array]:
-    """Return the zeros along lines in direction `axis`: the first of each as a sheet, and so on."""
-    others = [k for k in range(len(window)) if k != axis]
-    grids = [np.linspace(window[k, 0], window[k, 1], points) for k in others]
-    shape = (points,) * len(others)
-    # An even number of intervals would put a grid point on a surface in the middle of the window.
-    line = np.linspace(window[axis, 0], window[axis, 1], points + 1 + points % 2)
-    sheets: list[Array] = []
-    for place in np.ndindex(*shape):
-        start = np.empty(len(window))
-        start[others] = [grid[index] for grid, index in zip(grids, place, strict=True)]
-        for number, zero in enumerate(_zeros(height, start, axis, line)):
-            if number == len(sheets):
-                sheets.append(np.full((len(window), *shape), np.nan))
-            start[axis] = zero
-            sheets[number][(slice(None), *place)] = start
-    return sheets
-
-
-def _zeros(height: Callable[[Array], float], start: Array, axis: int, line: Array) -> list[float]:
-    def value(coordinate: float) -> float:
-        start[axis] = coordinate
-        return height(start)
-
-    values = [value(coordinate) for coordinate in line]
-    zeros = []
-    for k in range(len(line)):
-        if values[k] == 0.0:
-            beside = (*values[max(k - 1, 0) : k], *values[k + 1 : k + 2])
-            if 0.0 not in beside:  # else the line lies in the surface
-                zeros.append(float(line[k]))
-        elif k + 1 < len(line) and values[k] * values[k + 1] < 0.0:
-            ends = [(float(line[m]), values[m]) for m in (k, k + 1)]
-            zeros.append(_false_position(value, *ends))
-    return zeros
-
-
-def _false_position(
-    value: Callable[[float], float], low: tuple[float, float], high: tuple[float, float]
-) -> float:
-    """Return a zero between two points at which the signs differ, by the rule of Illinois."""
-    (a, at_a), (b, at_b) = low, high
-    for _ in range(_ITERATIONS):
-        c = b - at_b * (b - a) / (at_b - at_a)
-        if not min(a, b) < c < max(a, b):
-            return c
-        at_c = value(c)
-        if at_c == 0.0:
-            return c
-        if at_c * at_b < 0.0:
-            a, at_a = b, at_b
-        else:
-            at_a *= 0.5
-        b, at_b = c, at_c
-    return b

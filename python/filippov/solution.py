@@ -489,7 +489,10 @@ def _message(run: AnyRun) -> str:
     """Return the reason in words, with the exception of the user's function if there was one."""
     if run.error is None or isinstance(run.error, KeyboardInterrupt):
         return run.message
-    return f"{run.message} {type(run.error).__name__}: {run.error}"
+    from filippov.trace.explain import deepest_user_line
+
+    line = deepest_user_line(run.error.__traceback__)
+    return f"{run.message} {type(run.error).__name__}: {run.error}{f'{chr(10)}{line}' if line else ''}"
 
 
 def _short(values: Array) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from filippov._core import TracedSystem
+from filippov._core import Run, TracedSystem
 from filippov._core import solve as run_core
 from filippov.backward import ReversedRun, reversed_function
 from filippov.branches import explore
@@ -202,6 +202,8 @@ def solve_ivp(
     >>> sol.success, sol.surfaces
     (True, ('x[1]',))
     """
+    if isinstance(fun, System):
+        fun.refuse_undeclared(unknown)
     check_unknown(unknown, solve_ivp, fun.params if isinstance(fun, System) else ())
     given = {
         "method": method,
@@ -272,6 +274,8 @@ def _solve(
         )
         if run.status < 0:
             _raise_if_asked(run, solution, options)
+            if run.reason == "field_not_finite" and isinstance(run, Run):
+                solution.message += system.line_not_finite(run, values)
         return solution
 
     solution = follow(())

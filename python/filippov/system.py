@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from filippov._core import TracedSystem
+from filippov._core import Run, TracedSystem
 from filippov.backward import reversed_source
 from filippov.errors import InputError, ModelError
 from filippov.events import accepted_names, function_name
@@ -22,6 +22,7 @@ from filippov.points import Points
 from filippov.prepare import Prepared, check_n, numbered_states, packed, prepare, unpacked
 from filippov.resets import check_resets
 from filippov.solution import Solution
+from filippov.trace.explain import deepest_user_line
 
 if TYPE_CHECKING:
     from filippov.ensemble import Ensemble
@@ -357,9 +358,52 @@ class System(Points):
         for name in changes:
             if name not in self._params:
                 known = f"the parameters are {', '.join(self._params)}" if self._params else "it has none"
-                hint = did_you_mean(name, self._params)
+                hint = self._how_to_declare(name) or did_you_mean(name, self._params)
                 raise InputError(f"params: the system has no parameter {name!r}{hint}; {known}")
         return {**self._params, **changes}
+
+    def line_not_finite(self, run: Run, values: Mapping[str, float]) -> str:
+        """Return the line of the function in which a number becomes infinite or NaN at the end of a run.
+
+        The function is called once more at the point where the run ended, with NumPy's errors raised; the
+        text is empty if that finds nothing.
+        """
+        place, source = run.not_finite, self._source
+        if place is None or source is None or not callable(source.fun):
+            return ""
+        t, x = place
+        try:
+            with np.errstate(all="raise", under="ignore"):
+                source.fun(np.float64(t), x, *source.args, **values)
+        except FloatingPointError as error:
+            line = deepest_user_line(error.__traceback__)
+            return "" if line is None else f" {error}:\n{line}"
+        except Exception:  # at this point it may do anything; the message says what is known without it
+            return ""
+        return ""
+
+    def refuse_undeclared(self, given: Iterable[str]) -> None:
+        """Refuse names of arguments of the function that are no parameters, and say how they become such.
+
+        Raises
+        ------
+        InputError
+            If there is one.
+        """
+        for name in given:
+            hint = self._how_to_declare(name)
+            if hint:
+                raise InputError(f"{name}: the system has no such parameter{hint}")
+
+    def _how_to_declare(self, name: str) -> str:
+        """Return how an argument of the function becomes a parameter; empty if it has none of that name."""
+        fun = None if self._source is None else self._source.fun
+        if not callable(fun) or name not in accepted_names(fun, [name]):
+            return ""
+        return (
+            f"; {name} is an argument of the function that was not declared: give fl.System(fun, "
+            f"params={{{name!r}: value}}), or take @fl.system, which declares all that have defaults"
+        )
 
     def prepare(self, n: int, t0: float, y0: Array | None, values: dict[str, float]) -> Prepared:
         """Return the system of the core, traced now if it was not yet.

@@ -32,4 +32,8 @@ mod _core {
     use super::sweep::solve_points;
     #[pymodule_export]
     use super::systems::TracedSystem;
+
+    #[pymodule_export]
+    #[allow(non_upper_case_globals)]
+    const __version__: &str = env!("CARGO_PKG_VERSION");
 }

@@ -2,9 +2,11 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use filippov::{Mode, PiecewiseSystem, Segment, Side, Solution, Stats, Stop};
+use filippov::{
+    not_finite, state_text, Mode, PiecewiseSystem, Segment, Side, Solution, Stats, Stop,
+};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
@@ -52,11 +54,7 @@ impl Run {
         is_native: bool,
         n_visible: usize,
     ) -> Self {
-        let mut error = None;
-        if let Stop::FieldRaised(payload) = &mut solution.stop {
-            let taken = std::mem::replace(payload, filippov::FieldError::new(()));
-            error = Some(raised(taken));
-        }
+        let error = take_error(&mut solution);
         Run {
             system,
             solution: Mutex::new(solution),
@@ -68,6 +66,11 @@ impl Run {
 
     fn solution(&self) -> std::sync::MutexGuard<'_, Solution> {
         self.solution.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Did the caller stop it?
+    pub fn was_interrupted(&self) -> bool {
+        matches!(self.solution().stop, Stop::Interrupted)
     }
 
     /// A mode as a user sees it.
@@ -109,6 +112,48 @@ impl Run {
             out[j] = if value.is_finite() { value } else { f64::NAN };
         }
         Ok((out.clone(), out))
+    }
+}
+
+/// Takes the exception of a user's function out of a solution; Ctrl-C in there is an interruption like any other.
+pub fn take_error(solution: &mut Solution) -> Option<PyErr> {
+    let Stop::FieldRaised(payload) = &mut solution.stop else {
+        return None;
+    };
+    let error = raised(std::mem::replace(payload, filippov::FieldError::new(())));
+    if Python::attach(|py| error.is_instance_of::<PyKeyboardInterrupt>(py)) {
+        solution.stop = Stop::Interrupted;
+        return None;
+    }
+    Some(error)
+}
+
+/// Was a run ended by Ctrl-C in a function of the user?
+pub fn is_interruption(outcome: &Result<Solution, filippov::Error>) -> bool {
+    let Ok(Solution {
+        stop: Stop::FieldRaised(error),
+        ..
+    }) = outcome
+    else {
+        return false;
+    };
+    let raised = error.0.downcast_ref::<PyErr>();
+    raised.is_some_and(|e| Python::attach(|py| e.is_instance_of::<PyKeyboardInterrupt>(py)))
+}
+
+/// Why a run ended, where, and what to try.
+pub fn message_of(system: &dyn PiecewiseSystem, solution: &Solution, n_visible: usize) -> String {
+    let mode = Mode::new(solution.mode.entries()[..n_visible].to_vec());
+    let (t, x) = (solution.t_last, solution.last_state());
+    let name = |j| system.surface_name(j);
+    let message = solution.stop.message(t, &mode, name);
+    match &solution.stop {
+        Stop::NotFinite => match not_finite(system, t, x, &solution.mode) {
+            Some(place) => format!("{message} {}", place.text(name)),
+            None => message,
+        },
+        Stop::FieldRaised(_) => format!("{message} The last good state is {}.", state_text(x)),
+        _ => message,
     }
 }
 
@@ -235,11 +280,19 @@ impl Run {
 
     #[getter]
     fn message(&self) -> String {
+        message_of(&*self.system, &self.solution(), self.n_visible)
+    }
+
+    /// Time and state where the field is not finite, if the run ended there.
+    #[getter]
+    fn not_finite<'py>(&self, py: Python<'py>) -> Option<(f64, Vector<'py>)> {
         let solution = self.solution();
-        let mode = Mode::new(solution.mode.entries()[..self.n_visible].to_vec());
-        solution
-            .stop
-            .message(solution.t_last, &mode, |j| self.system.surface_name(j))
+        if !matches!(solution.stop, Stop::NotFinite) {
+            return None;
+        }
+        let end = solution.last_state();
+        let place = not_finite(&*self.system, solution.t_last, end, &solution.mode)?;
+        Some((place.t, PyArray1::from_vec(py, place.x)))
     }
 
     #[getter]

@@ -4,12 +4,12 @@ use std::time::Instant;
 
 use filippov::{Keep, Method, Mode, NonUnique, Options, SlidingRule, Stabilization};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::prepared_run::{ActionRow, EventRow, PreparedRun};
-use crate::run::Run;
+use crate::run::{is_interruption, Run};
 use crate::threads::{on_threads, CHUNK_PER_THREAD, POLL_EVERY};
 
 /// The options of a run, read once; `filippov.solve_ivp` checks them before.
@@ -66,7 +66,8 @@ pub fn solve(
 }
 
 /// Integrates a system from many initial states, the rows of `y0`, with the parameters in the rows of `p`, on some
-/// threads. The result of each is that of a run of its own.
+/// threads. The result of each is that of a run of its own. Where a signal raised, the runs are the first ones, and
+/// the exception stands beside them.
 #[pyfunction]
 #[pyo3(signature = (system, t0, t1, y0, p, options, events, actions, threads))]
 #[allow(clippy::too_many_arguments)]
@@ -81,7 +82,7 @@ pub fn solve_many(
     events: Vec<EventRow>,
     actions: Vec<ActionRow>,
     threads: usize,
-) -> PyResult<Vec<Run>> {
+) -> PyResult<(Vec<Run>, Option<Py<PyAny>>)> {
     let (y0, p) = (y0.as_array(), p.as_array());
     let mut runs = Vec::with_capacity(y0.nrows());
     let rows: Vec<usize> = (0..y0.nrows()).collect();
@@ -94,14 +95,22 @@ pub fn solve_many(
         let run = |job: &PreparedRun, interrupt: &mut dyn FnMut(f64) -> bool| {
             job.run((t0, t1), &options.options, interrupt)
         };
-        let solutions = py.detach(|| on_threads(&prepared, threads, run))?;
-        for (prepared, solution) in prepared.into_iter().zip(solutions) {
+        let done = py.detach(|| on_threads(&prepared, threads, run, is_interruption));
+        let is_cut = done.results.len() < prepared.len();
+        for (prepared, solution) in prepared.into_iter().zip(done.results) {
             let solution = solution.map_err(|e| PyValueError::new_err(e.to_string()))?;
             runs.push(prepared.result(solution));
         }
-        py.check_signals()?;
+        let raised = done.raised.or_else(|| py.check_signals().err());
+        let raised = raised.or_else(|| {
+            let interrupted = runs.iter().any(Run::was_interrupted);
+            (is_cut || interrupted).then(|| PyKeyboardInterrupt::new_err(()))
+        });
+        if let Some(raised) = raised {
+            return Ok((runs, Some(raised.into_value(py).into_any())));
+        }
     }
-    Ok(runs)
+    Ok((runs, None))
 }
 
 fn read_options(given: &Bound<'_, PyDict>) -> PyResult<(Options, Option<Py<PyAny>>)> {

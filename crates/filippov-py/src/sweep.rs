@@ -4,23 +4,24 @@ use std::sync::Arc;
 
 use filippov::action::Clock;
 use filippov::section::{Cycle, Place, Returns, Section};
-use filippov::{Error, Kind, Mode, Solution, Stop, UserFunction};
+use filippov::{Error, Kind, Solution, Stop, UserFunction};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
-use pyo3::exceptions::{PyKeyError, PyValueError};
+use pyo3::exceptions::{PyException, PyKeyError, PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::callbacks::{CalledEvent, CompiledEvent, EventExpression};
 use crate::prepared_run::{ActionRow, PreparedRun};
-use crate::run::status_of;
+use crate::run::{is_interruption, message_of, status_of, take_error};
 use crate::solve::RunOptions;
-use crate::systems::{raised, TracedSystem};
+use crate::systems::TracedSystem;
 use crate::threads::{on_threads, CHUNK_PER_THREAD};
 
 type Outcome = Result<Solution, Error>;
 
 /// Integrates from many initial states, the rows of `y0`, over the spans in the rows of `spans`, with the parameters
-/// in the rows of `p`; a run that cannot even start has a status like any other.
+/// in the rows of `p`; a run that cannot even start has a status like any other. Where a signal raised, the exception
+/// stands under `raised`, and the runs that were not begun have the reason `not_run`.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
 pub fn solve_points<'py>(
@@ -58,10 +59,20 @@ pub fn solve_points<'py>(
                 _ => run.run(*span, &options.options, interrupt),
             }
         };
-        let outcomes = py.detach(|| on_threads(&jobs, threads, go))?;
-        py.check_signals()?;
-        for ((run, _, span), outcome) in jobs.iter().zip(outcomes) {
-            points.take(py, run, *span, outcome)?;
+        let done = py.detach(|| on_threads(&jobs, threads, go, is_interruption));
+        for ((run, _, span), outcome) in jobs.iter().zip(done.results) {
+            points.take(py, run, *span, outcome);
+        }
+        let signalled = done.raised.or_else(|| py.check_signals().err());
+        if let Some(raised) = signalled {
+            points.raised = Some(raised);
+        }
+        if points.raised.is_some() {
+            let first_left = points.status.len();
+            for &row in &rows[first_left..] {
+                points.leave_out(spans[[row, 0]]);
+            }
+            break;
         }
     }
     points.into_dict(py)
@@ -262,6 +273,8 @@ struct Points {
     sliding: Vec<f64>,
     n_pieces: Vec<i32>,
     modes: Vec<i8>,
+    /// What ended the sweep before its end.
+    raised: Option<PyErr>,
 }
 
 impl Points {
@@ -272,36 +285,27 @@ impl Points {
         }
     }
 
-    fn take(
-        &mut self,
-        py: Python<'_>,
-        run: &PreparedRun,
-        span: (f64, f64),
-        outcome: Outcome,
-    ) -> PyResult<()> {
+    fn take(&mut self, py: Python<'_>, run: &PreparedRun, span: (f64, f64), outcome: Outcome) {
         self.n_surfaces = run.n_visible();
         let mut solution = match outcome {
             Ok(solution) => solution,
             Err(error) => {
                 self.end(-1, "wrong_input", error.to_string());
-                self.t_last.push(span.0);
-                self.y_last
-                    .resize(self.y_last.len() + self.n_states, f64::NAN);
-                self.count(0, 0);
-                self.returns(&Returns::default());
-                return Ok(());
+                self.nothing(span.0);
+                return;
             }
         };
-        let mode = Mode::new(solution.mode.entries()[..run.n_visible()].to_vec());
-        let name = |j| run.core().surface_name(j);
-        let mut message = solution.stop.message(solution.t_last, &mode, name);
+        let error = take_error(&mut solution);
+        let mut message = message_of(&**run.core(), &solution, run.n_visible());
         let (status, reason) = (status_of(&solution.stop), solution.stop.name());
-        if let Stop::FieldRaised(payload) = &mut solution.stop {
-            let error = raised(std::mem::replace(payload, filippov::FieldError::new(())));
-            if !error.is_instance_of::<pyo3::exceptions::PyException>(py) {
-                return Err(error);
-            }
+        if matches!(solution.stop, Stop::Interrupted) {
+            self.raised = Some(PyKeyboardInterrupt::new_err(()));
+        }
+        if let Some(error) = error {
             message = format!("{message} {error}");
+            if !error.is_instance_of::<PyException>(py) {
+                self.raised = Some(error);
+            }
         }
         self.end(status, reason, message);
         self.t_last.push(solution.t_last);
@@ -309,7 +313,20 @@ impl Points {
         let stats = &solution.stats;
         self.count(stats.n_steps as i64, stats.n_switches as i64);
         self.returns(&solution.returns.take().unwrap_or_default());
-        Ok(())
+    }
+
+    /// A run that was not begun.
+    fn leave_out(&mut self, t0: f64) {
+        self.end(-1, "not_run", "Not run: the sweep was interrupted.".into());
+        self.nothing(t0);
+    }
+
+    fn nothing(&mut self, t0: f64) {
+        self.t_last.push(t0);
+        self.y_last
+            .resize(self.y_last.len() + self.n_states, f64::NAN);
+        self.count(0, 0);
+        self.returns(&Returns::default());
     }
 
     fn end(&mut self, status: i32, reason: &'static str, message: String) {
@@ -353,6 +370,8 @@ impl Points {
             "modes",
             modes.reshape([n_pieces as usize, self.n_surfaces])?,
         )?;
+        let raised = self.raised.map(|raised| raised.into_value(py));
+        dict.set_item("raised", raised)?;
         dict.set_item("status", PyArray1::from_vec(py, self.status))?;
         dict.set_item("reason", self.reason)?;
         dict.set_item("message", self.message)?;

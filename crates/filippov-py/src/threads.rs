@@ -15,16 +15,22 @@ pub const CHUNK_PER_THREAD: usize = 256;
 /// What a run asks now and then with the time reached: is it to stop?
 pub type Interrupt<'a> = &'a mut dyn FnMut(f64) -> bool;
 
-/// Does `work` for every job, each thread taking the next one that is left; the results are in the order of the
-/// jobs. To be called without the interpreter's lock.
-///
-/// # Errors
-/// What a signal raised, Ctrl-C for instance.
+/// What threads have done of some jobs.
+pub struct Done<R> {
+    /// The results in the order of the jobs: of all, or where a signal came of the first ones.
+    pub results: Vec<R>,
+    /// What a signal raised, Ctrl-C for instance.
+    pub raised: Option<PyErr>,
+}
+
+/// Does `work` for every job, each thread taking the next one that is left; no other one after a signal, or after a
+/// result that `is_last`. To be called without the interpreter's lock.
 pub fn on_threads<J: Sync, R: Send>(
     jobs: &[J],
     threads: usize,
     work: impl Fn(&J, Interrupt) -> R + Sync,
-) -> PyResult<Vec<R>> {
+    is_last: impl Fn(&R) -> bool + Sync,
+) -> Done<R> {
     let next = AtomicUsize::new(0);
     let is_interrupted = AtomicBool::new(false);
     let signal: Mutex<Option<PyErr>> = Mutex::new(None);
@@ -41,12 +47,15 @@ pub fn on_threads<J: Sync, R: Send>(
             }
             is_interrupted.load(Ordering::Relaxed)
         };
-        loop {
+        while !is_interrupted.load(Ordering::Relaxed) {
             let index = next.fetch_add(1, Ordering::Relaxed);
             let Some(job) = jobs.get(index) else {
                 break;
             };
             let result = work(job, &mut interrupt);
+            if is_last(&result) {
+                is_interrupted.store(true, Ordering::Relaxed);
+            }
             *results[index]
                 .lock()
                 .unwrap_or_else(PoisonError::into_inner) = Some(result);
@@ -58,14 +67,13 @@ pub fn on_threads<J: Sync, R: Send>(
         }
         go(true);
     });
-    if let Some(raised) = signal.into_inner().unwrap_or_else(PoisonError::into_inner) {
-        return Err(raised);
-    }
-    let taken = results.into_iter().map(|result| {
-        result
-            .into_inner()
-            .unwrap_or_else(PoisonError::into_inner)
-            .expect("every job was taken by a thread")
+    // Jobs are taken in their order, and every one that was taken has a result.
+    let results = results.into_iter().map_while(|result| {
+        let result = result.into_inner();
+        result.unwrap_or_else(PoisonError::into_inner)
     });
-    Ok(taken.collect())
+    Done {
+        results: results.collect(),
+        raised: signal.into_inner().unwrap_or_else(PoisonError::into_inner),
+    }
 }

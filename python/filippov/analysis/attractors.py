@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from filippov.analysis.observe import check_keywords
 from filippov.analysis.sweeps import sweep
-from filippov.errors import InputError
+from filippov.errors import InputError, Interrupted
 
 if TYPE_CHECKING:
     from filippov.system import System
@@ -63,6 +64,8 @@ def basins(
     ------
     InputError
         If an argument is wrong.
+    KeyboardInterrupt
+        On Ctrl-C; `partial` is as that of `sweep`, with the attractors of the points that were run.
 
     Notes
     -----
@@ -76,6 +79,7 @@ def basins(
     >>> found.attractor.values.tolist(), found.z.values.round(6).tolist()
     ([0, 0, 1, 1], [-1.0, -1.0, 1.0, 1.0])
     """
+    check_keywords(arguments, system, basins, sweep)
     if resolution is not None and (
         not isinstance(resolution, int | float | np.number) or not 0.0 < resolution < 1.0
     ):
@@ -84,18 +88,31 @@ def basins(
         raise InputError("until_periodic: has no place here; a run of basins() ends when its returns repeat")
     returns: dict[str, Any] = {"n": n, "until_periodic": True, "modulo": modulo}
     given = returns if section is not None else {}
-    found = sweep(system, t_span, y0, params, section=section, **given, **arguments)
-    if found is None:
-        return None
-    states = json.loads(found.attrs["states"])
-    rtol, atol = float(arguments.get("rtol", 1e-6)), arguments.get("atol", 1e-9)
-    weight = np.broadcast_to(np.asarray(atol, dtype=np.float64) / rtol, len(states))
+    atol, rtol = arguments.get("atol", 1e-9), float(arguments.get("rtol", 1e-6))
     nearness = 1000.0 * rtol if resolution is None else float(resolution)
-    moduli = np.array(
-        [float((modulo or {}).get(name, (modulo or {}).get(i, 0.0))) for i, name in enumerate(states)]
-    )
+
+    def numbered(found: Any) -> Any:
+        weight = np.asarray(atol, dtype=np.float64) / rtol
+        return _with_attractors(found, section is not None, nearness, weight, modulo or {})
+
+    try:
+        found = sweep(system, t_span, y0, params, section=section, **given, **arguments)
+    except Interrupted as cut:
+        if cut.partial is not None:
+            cut.partial = numbered(cut.partial)
+        raise
+    return None if found is None else numbered(found)
+
+
+def _with_attractors(
+    found: Any, has_section: bool, nearness: float, weight: Any, modulo: Mapping[Any, float]
+) -> Any:
+    """Return the Dataset of a sweep with the attractors of its points."""
+    states = json.loads(found.attrs["states"])
+    weight = np.broadcast_to(weight, len(states))
+    moduli = np.array([float(modulo.get(name, modulo.get(i, 0.0))) for i, name in enumerate(states)])
     failed = found.status.values.ravel() < 0
-    if section is None:
+    if not has_section:
         orbits = np.column_stack([found[name].values.ravel() for name in states])
         sizes = np.where(failed, 0, 1)
         orbits = orbits[~failed]

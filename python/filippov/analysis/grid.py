@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -14,7 +16,7 @@ from filippov.options import did_you_mean
 if TYPE_CHECKING:
     from filippov.system import System
 
-__all__ = ["Axis", "Grid", "grid_of"]
+__all__ = ["Axis", "Grid", "check_size", "grid_of", "memory_of_machine"]
 
 Array = npt.NDArray[np.float64]
 
@@ -64,7 +66,7 @@ class Grid(NamedTuple):
     @property
     def n_points(self) -> int:
         """Number of points."""
-        return int(np.prod(self.shape, dtype=np.int64))
+        return math.prod(self.shape)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -149,6 +151,39 @@ def grid_of(system: System, y0: Any, params: Mapping[str, Any] | None, last: str
     values = {name: given.get(name, np.float64(default)) for name, default in defaults.items()}
     fixed = {name: float(value) for name, value in values.items() if np.ndim(value) == 0}
     return Grid(tuple(axes), states, values, rows, fixed)
+
+
+# What a point without any return takes in memory beside its state, and with a store its part of the plan of
+# a chunk; measured, and rounded down.
+_BYTES, _BYTES_IN_STORE = 150.0, 0.03
+
+
+def check_size(grid: Grid, has_store: bool) -> None:
+    """Refuse a sweep that cannot fit into the memory of this machine.
+
+    Raises
+    ------
+    InputError
+        The message has the number of values of each dimension.
+    """
+    per_point = _BYTES_IN_STORE if has_store else _BYTES + 8.0 * len(grid.states)
+    needed, there = grid.n_points * per_point, memory_of_machine()
+    if needed <= there:
+        return
+    sizes = ", ".join(f"{axis.name}: {axis.size}" for axis in grid.axes)
+    way_out = "make parts of it" if has_store else "take fewer values, or write it to disk, store="
+    raise InputError(
+        f"params, y0: {grid.n_points} points ({sizes}) need {needed / 2**30:.3g} GiB of memory at least, "
+        f"this machine has {there / 2**30:.3g} GiB; {way_out}"
+    )
+
+
+def memory_of_machine() -> float:
+    """Return the memory in bytes; where that is not told, what no machine has."""
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, OSError, ValueError):
+        return 2.0**44
 
 
 # Names of variables and dimensions of the results.

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
+from inspect import signature
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from filippov.options import Options, check_options, check_t_span, did_you_mean
 if TYPE_CHECKING:
     from filippov.system import System
 
-__all__ = ["check_system", "observation_of", "options_of", "span_of"]
+__all__ = ["check_keywords", "check_system", "observation_of", "options_of", "span_of"]
 
 _OWN = {
     "keep": "what is kept is decided by the section",
@@ -69,6 +70,29 @@ def span_of(t_span: Any, section: Any, has_count: bool) -> tuple[float, float]:
     return check_t_span((t0, 0.0))[0], math.inf
 
 
+def check_keywords(given: Iterable[str], system: Any, *functions: Callable[..., Any]) -> None:
+    """Refuse keywords that neither the function called, nor one that it hands them on to, has.
+
+    Raises
+    ------
+    TypeError
+        If there is no option of that name; the message has the nearest one.
+    """
+    known = {*Options._fields, "zeno"}.difference(_OWN)
+    for function in functions:
+        known |= {
+            name for name, one in signature(function).parameters.items() if one.kind is not one.VAR_KEYWORD
+        }
+    parameters = getattr(system, "params", {})
+    for name in given:
+        if name in known or name in _OWN:
+            continue
+        what = f"{functions[0].__name__}() got an unexpected keyword argument {name!r}"
+        if name in parameters:
+            raise TypeError(f"{what}; it is a parameter of the system: params={{{name!r}: ...}}")
+        raise TypeError(f"{what}{did_you_mean(name, known)}")
+
+
 def options_of(given: Mapping[str, Any], t_span: tuple[float, float], n: int) -> Options:
     """Return the checked options of the runs.
 
@@ -76,15 +100,10 @@ def options_of(given: Mapping[str, Any], t_span: tuple[float, float], n: int) ->
     ------
     InputError
         If an option is wrong, or means nothing here.
-    TypeError
-        If there is no option of that name.
     """
-    known = set(Options._fields) | {"zeno"}
     for name in given:
         if name in _OWN:
             raise InputError(f"{name}: has no place here; {_OWN[name]}")
-        if name not in known:
-            raise TypeError(f"unexpected keyword argument {name!r}{did_you_mean(name, known)}")
     if given.get("nonunique") == "branch":
         raise InputError('nonunique: "branch" is for single runs')
     end = t_span[1] if math.isfinite(t_span[1]) else _LONGEST

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from concurrent.futures import CancelledError
 from hashlib import sha256
 from threading import Event
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -22,10 +21,11 @@ from filippov.analysis.points import (
     end_times,
     failed_table,
     groups_of,
+    not_run,
     run_task,
 )
 from filippov.analysis.sections import Phase, Place, clocks_of
-from filippov.errors import InputError
+from filippov.errors import InputError, Interrupted
 from filippov.options import Options
 from filippov.prepare import Prepared
 
@@ -62,28 +62,61 @@ class Chunk(NamedTuple):
 
 
 def run_chunk(chunk: Chunk) -> tuple[Table, Array]:
-    """Run the points of a chunk; return their table, and the state left to the point after the last."""
+    """Run the points of a chunk; return their table, and the state left to the point after the last.
+
+    Raises
+    ------
+    Interrupted
+        On Ctrl-C; `partial` is the table of all points, with what was computed of them.
+    """
+    tables: list[Table] = []
+    try:
+        carry = _run_parts(chunk, tables)
+    except Interrupted:
+        whole = concatenate(tables)
+        done, n_surfaces = len(whole["status"]), whole["modes"].shape[1]
+        for part in chunk.parts:
+            count = len(part["status"]) if isinstance(part, dict) else len(part.y0)
+            if done < count:
+                tables.append(
+                    part if isinstance(part, dict) else not_run(part.rows(slice(done, None)), n_surfaces)
+                )
+            done = max(done - count, 0)
+        raise Interrupted(partial=concatenate(tables)) from None
+    return concatenate(tables), np.empty(0) if carry is None else np.array(carry)
+
+
+def _run_parts(chunk: Chunk, tables: list[Table]) -> Array | None:
+    """Run the parts of a chunk one after the other, and append their tables; return the state left."""
     carry = chunk.carry
-    tables = []
     for part in chunk.parts:
         if isinstance(part, dict):
             tables.append(part)
             continue
         if not chunk.follows:
-            tables.append(run_task(part))
+            tables.append(_kept(part, tables))
             continue
         for row in range(len(part.y0)):
             if chunk.stop is not None and chunk.stop.is_set():
-                raise CancelledError
+                raise Interrupted
             one = part.rows(slice(row, row + 1))
             if carry is not None:
                 one = one._replace(y0=carry[np.newaxis])
-            table = run_task(one)
+            table = _kept(one, tables)
             # A point that fails hands on what it was given.
             if table["status"][0] >= 0:
                 carry = table["y"][-1] if len(table["y"]) else table["y_last"][0]
             tables.append(table)
-    return concatenate(tables), np.empty(0) if carry is None else np.array(carry)
+    return carry
+
+
+def _kept(task: Task, tables: list[Table]) -> Table:
+    """Run a task; where that is interrupted, append what there is of it."""
+    try:
+        return run_task(task)
+    except Interrupted as cut:
+        tables.append(cut.partial)
+        raise
 
 
 class Piece(NamedTuple):
@@ -193,6 +226,12 @@ class Plan(NamedTuple):
             )
             parts.append(task.travelling() if travels else task)
         return Chunk(tuple(parts), self.follows, carry)
+
+    def left_out(self, piece: Piece) -> Table:
+        """Return the table of a piece that was not begun."""
+        y0, p, clocks, spans = self.points(piece.start, piece.stop)
+        task = Task(self.prepared, None, clocks, spans, y0, self.grid.names, p, self.options, (), 1)
+        return not_run(task, len(self.prepared.surfaces))
 
     def _place_for(self, prepared: Prepared, y0: Array, p: Array) -> Place | None | Exception:
         """Return the section for a system that holds for some parameter values only."""

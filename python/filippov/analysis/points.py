@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from filippov._core import TracedSystem, solve_points
 from filippov.analysis.sections import AnySection, Phase, Place
-from filippov.errors import FilippovError, InputError
+from filippov.errors import FilippovError, InputError, Interrupted
 from filippov.events import bind_function, selective
 from filippov.options import Options
 from filippov.prepare import Prepared, packed, unpacked
@@ -20,7 +20,7 @@ from filippov.prepare import Prepared, packed, unpacked
 if TYPE_CHECKING:
     from filippov.system import System
 
-__all__ = ["Observation", "Table", "Task", "concatenate", "prepare_for", "run_task"]
+__all__ = ["Observation", "Table", "Task", "concatenate", "not_run", "prepare_for", "run_task"]
 
 Array = npt.NDArray[np.float64]
 Table = dict[str, Any]
@@ -118,7 +118,13 @@ def _function(data: bytes) -> TracedSystem:
 
 
 def run_task(task: Task) -> Table:
-    """Do the runs of a task; the rows of the table are in the order of the points."""
+    """Do the runs of a task; the rows of the table are in the order of the points.
+
+    Raises
+    ------
+    Interrupted
+        On Ctrl-C; `partial` is the table of all points, with what was computed of them.
+    """
     prepared = _system(task.system) if isinstance(task.system, bytes) else task.system
     place = task.place
     if place is not None and isinstance(place.function, bytes):
@@ -131,7 +137,11 @@ def run_task(task: Task) -> Table:
         one = task.rows(slice(row, row + 1))
         values = dict(zip(task.names, one.p[0].tolist(), strict=True))
         bound = bind_function(selective(place.function, values), (), values)
-        tables.append(_run(one._replace(threads=1), prepared, place._replace(function=bound)))
+        try:
+            tables.append(_run(one._replace(threads=1), prepared, place._replace(function=bound)))
+        except Interrupted as cut:
+            left = not_run(task.rows(slice(row + 1, None)), len(prepared.surfaces))
+            raise Interrupted(partial=concatenate([*tables, cut.partial, left])) from None
     return concatenate(tables)
 
 
@@ -148,7 +158,7 @@ def _run(task: Task, prepared: Prepared, place: Place | None) -> Table:
             "most": most,
             "cycle": cycle,
         }
-    return solve_points(
+    table = solve_points(
         prepared.core,
         task.spans,
         task.y0,
@@ -158,6 +168,20 @@ def _run(task: Task, prepared: Prepared, place: Place | None) -> Table:
         section,
         task.threads,
     )
+    raised = table.pop("raised")
+    if isinstance(raised, KeyboardInterrupt):
+        raise Interrupted(partial=table)
+    if raised is not None:
+        raise raised
+    return table
+
+
+def not_run(task: Task, n_surfaces: int) -> Table:
+    """Return the table of points that were not begun."""
+    return failed_table(_NOT_RUN, "not_run", task.spans[:, 0], task.y0, n_surfaces)
+
+
+_NOT_RUN = "Not run: the sweep was interrupted."
 
 
 def failed_table(message: str, reason: str, t0: Array, y0: Array, n_surfaces: int) -> Table:

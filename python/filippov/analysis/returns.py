@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,11 +10,11 @@ import numpy.typing as npt
 
 from filippov.analysis.dataset import as_json
 from filippov.analysis.grid import grid_of
-from filippov.analysis.observe import check_system, observation_of, options_of, span_of
+from filippov.analysis.observe import check_keywords, check_system, observation_of, options_of, span_of
 from filippov.analysis.optional import need
-from filippov.analysis.points import Task, end_times, prepare_for, run_task
+from filippov.analysis.points import Table, Task, end_times, prepare_for, run_task
 from filippov.analysis.sections import clocks_of
-from filippov.errors import InputError
+from filippov.errors import InputError, Interrupted
 from filippov.modes import Mode
 from filippov.options import fit_kappa
 
@@ -88,13 +88,17 @@ def poincare(
         If an argument is wrong.
     ImportError
         If xarray is not installed.
+    KeyboardInterrupt
+        On Ctrl-C; `partial` has the returns until then.
 
     Notes
     -----
     The section is watched by the core: a run keeps its returns and nothing else, and for functions that can
     be traced no Python is called. The test of periodicity is a heuristic: the last returns agree with those
-    one period before, over one period and at least twice. A motion that drifts by less than the tolerance
-    from one return to the next counts as periodic.
+    one period before, over one period and at least twice. For a period q of several returns, those at its
+    divisors have to stay apart too, as three distances q returns apart say: the way to an orbit, from
+    alternating sides for instance, is not taken for a longer period. A motion that drifts by less than the
+    tolerance from one return to the next counts as periodic.
 
     References
     ----------
@@ -118,7 +122,8 @@ def poincare(
     >>> returns.v.values.round(6).tolist()
     [0.35703]
     """
-    xarray = need("xarray", "poincare()")
+    need("xarray", "poincare()")
+    check_keywords(options, system, poincare)
     system = check_system(system)
     for name, value in (params or {}).items():
         if np.ndim(value) != 0:
@@ -149,38 +154,53 @@ def poincare(
     place = own.place(prepared, grid.states, span[0], state, values)
     clocks = clocks_of(own, grid.names, p_rows)
     ends = end_times(own, span, observed.transient + observed.n, clocks)
-    table = run_task(
-        Task(
-            prepared,
-            place,
-            clocks,
-            np.column_stack([[span[0]], ends]),
-            y0_rows,
-            grid.names,
-            p_rows,
-            checked,
-            (observed.transient, observed.n, observed.cycle),
-            1,
-        )
+    task = Task(
+        prepared,
+        place,
+        clocks,
+        np.column_stack([[span[0]], ends]),
+        y0_rows,
+        grid.names,
+        p_rows,
+        checked,
+        (observed.transient, observed.n, observed.cycle),
+        1,
     )
-    given = units or {}
+    given = {"section": repr(own), "params": as_json(values), "options": as_json(checked._asdict())}
+    try:
+        table = run_task(task)
+    except Interrupted as cut:
+        partial = _dataset(cut.partial, grid.states, prepared.surfaces, units or {}, given)
+        raise Interrupted(partial.attrs["message"], partial=partial) from None
+    return _dataset(table, grid.states, prepared.surfaces, units or {}, given)
+
+
+def _dataset(
+    table: Table,
+    states: Sequence[str],
+    surfaces: Sequence[str],
+    given: Mapping[str, str],
+    described: Mapping[str, Any],
+) -> Any:
+    """Return the returns of one run as a Dataset, with its end and what was asked for as attributes."""
+    xarray = need("xarray", "poincare()")
 
     def attributes(name: str) -> dict[str, str]:
         return {"units": given[name]} if name in given else {}
 
     time = attributes("t")
     variables: dict[str, Any] = {"t": ("obs", table["t"], time)}
-    for i, name in enumerate(grid.states):
+    for i, name in enumerate(states):
         variables[name] = ("obs", table["y"][:, i], attributes(name))
     variables["return_time"] = ("obs", table["duration"], time)
     variables["sliding_time"] = ("obs", table["sliding"], time)
     variables["n_pieces"] = ("obs", table["n_pieces"], {"sample_dimension": "piece"})
     variables["itinerary"] = ("obs", np.array(texts_of(table["modes"], table["n_pieces"]), dtype=object))
     coordinates = {}
-    if prepared.surfaces:
+    if surfaces:
         variables["mode"] = (("piece", "surface"), table["modes"])
-        coordinates["surface"] = list(prepared.surfaces)
-    described = {
+        coordinates["surface"] = list(surfaces)
+    end = {
         "Conventions": "CF-1.11",
         "status": int(table["status"][0]),
         "reason": table["reason"][0],
@@ -188,11 +208,8 @@ def poincare(
         "n_returns": int(table["n_returns"][0]),
         "period": int(table["period"][0]),
         "t_last": float(table["t_last"][0]),
-        "section": repr(own),
-        "params": as_json(values),
-        "options": as_json(checked._asdict()),
     }
-    return xarray.Dataset(variables, coords=coordinates, attrs=described)
+    return xarray.Dataset(variables, coords=coordinates, attrs={**end, **described})
 
 
 def texts_of(modes: npt.NDArray[np.int8], sizes: npt.NDArray[np.int32]) -> list[str]:

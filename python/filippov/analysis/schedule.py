@@ -16,12 +16,13 @@ import numpy.typing as npt
 
 from filippov.analysis.plan import Piece, Plan, run_chunk
 from filippov.analysis.points import Table
-from filippov.errors import InputError
+from filippov.errors import InputError, Interrupted
 
 __all__ = ["Progress", "as_executor", "run_pieces"]
 
 Array = npt.NDArray[np.float64]
 Take = Callable[[int, Table, Array], None]
+Keep = Callable[[int, Table], None]
 
 
 def as_executor(executor: Any) -> Any:
@@ -50,6 +51,7 @@ def run_pieces(
     wanted: Iterable[int],
     carry_after: Callable[[int], Array],
     take: Take,
+    keep: Keep,
     executor: Any,
     threads: int,
 ) -> None:
@@ -65,6 +67,8 @@ def run_pieces(
         The state that a finished piece left, by its index.
     take : callable
         Called in this thread with index, table and the state left, for every piece when it is finished.
+    keep : callable
+        Called with index and table for pieces that Ctrl-C has cut short, before it is raised.
     executor : Executor or None
     threads : int
         Native threads of this process, or of each task of an executor.
@@ -72,16 +76,20 @@ def run_pieces(
     indices = list(wanted)
     if executor is None and not plan.follows:
         for index in indices:
-            table, carry = run_chunk(plan.chunk(pieces[index], None, threads, travels=False))
+            try:
+                table, carry = run_chunk(plan.chunk(pieces[index], None, threads, travels=False))
+            except Interrupted as cut:
+                keep(index, cut.partial)
+                raise
             take(index, table, carry)
         return
     if executor is not None:
         travels = not isinstance(executor, ThreadPoolExecutor)
-        _submit_all(plan, pieces, indices, carry_after, take, executor, threads, travels)
+        _submit_all(plan, pieces, indices, carry_after, take, keep, executor, threads, travels)
         return
     # Lines of points that follow one another are independent of each other.
     with ThreadPoolExecutor(threads) as own:
-        _submit_all(plan, pieces, indices, carry_after, take, own, 1, False)
+        _submit_all(plan, pieces, indices, carry_after, take, keep, own, 1, False)
 
 
 def _submit_all(
@@ -90,6 +98,7 @@ def _submit_all(
     indices: list[int],
     carry_after: Callable[[int], Array],
     take: Take,
+    keep: Keep,
     executor: Any,
     threads: int,
     travels: bool,
@@ -118,11 +127,29 @@ def _submit_all(
             take(index, table, carry)
             if index + 1 in goes_on and index + 1 in is_wanted:
                 ready.append(index + 1)
+    except KeyboardInterrupt:
+        if stop is not None:
+            stop.set()
+            _keep_cut(flying, keep, waits=plan.follows)
+        raise
     finally:
         if stop is not None:
             stop.set()
         for future in flying.values():
             future.cancel()
+
+
+def _keep_cut(flying: dict[int, Any], keep: Keep, *, waits: bool) -> None:
+    """Keep what there is of chunks that were begun; wait for those that end after the point they are at."""
+    for index, future in flying.items():
+        if future.cancel() or not (waits or future.done()):
+            continue
+        try:
+            keep(index, future.result()[0])
+        except Interrupted as cut:
+            keep(index, cut.partial)
+        except Exception:  # it has nothing to keep, and Ctrl-C is what is told
+            continue
 
 
 class Progress:
@@ -142,29 +169,29 @@ class Progress:
     def __init__(self, wanted: Any, total: int, done: int) -> None:
         self._report = wanted if callable(wanted) else None
         self._is_shown = wanted is True
-        self._total, self._done, self._failed = total, done, 0
+        self._total, self.done, self._failed = total, done, 0
         self._before = done
         self._started = time.monotonic()
 
     def add(self, table: Table) -> None:
         """Count the points of a table."""
-        self._done += len(table["status"])
+        self.done += len(table["status"])
         self._failed += int(np.count_nonzero(np.asarray(table["status"]) < 0))
         if self._report is not None:
-            self._report(self._done, self._total, self._failed)
+            self._report(self.done, self._total, self._failed)
         if self._is_shown:
-            end = "\n" if self._done >= self._total else ""
+            end = "\n" if self.done >= self._total else ""
             sys.stderr.write(f"\r{self.text()}{end}")
             sys.stderr.flush()
 
     def text(self) -> str:
         """Return the line."""
-        fraction = self._done / self._total
+        fraction = self.done / self._total
         width = 24
         bar = "#" * int(width * fraction)
         failed = f", {self._failed} failed" if self._failed else ""
         elapsed = time.monotonic() - self._started
-        since = self._done - self._before
-        left = elapsed * (self._total - self._done) / since if since else 0.0
+        since = self.done - self._before
+        left = elapsed * (self._total - self.done) / since if since else 0.0
         clock = f"{int(left) // 3600}:{int(left) // 60 % 60:02}:{int(left) % 60:02} left"
         return f"[{bar:<{width}}] {100 * fraction:5.1f} % of {self._total} points{failed}, {clock}   "

@@ -20,8 +20,10 @@ import shutil
 import sys
 import uuid
 from collections.abc import Mapping
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 import numpy.typing as npt
@@ -31,7 +33,7 @@ from filippov.analysis.optional import need
 from filippov.analysis.plan import Plan
 from filippov.analysis.points import COLUMNS, Table
 from filippov.analysis.schedule import Progress, run_pieces
-from filippov.errors import InputError
+from filippov.errors import InputError, Interrupted
 
 __all__ = ["Store", "open_sweep", "run_with_store"]
 
@@ -57,6 +59,7 @@ class Store:
             raise InputError(f"store: the path of a folder is needed, not {path!r}") from None
         if self.path.exists() and not self.path.is_dir():
             raise InputError(f"store: {self.path} is a file; the path of a folder is needed")
+        self._digest = ""
 
     def begin(self, plan: Plan, chunk_size: int | None) -> int:
         """Take down the plan of a new sweep, or compare it with that of the one begun here.
@@ -72,7 +75,14 @@ class Store:
             If the folder has another sweep, or something else.
         """
         identity = plan.identity()
+        self._digest = sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()
         file = self.path / "plan.json"
+        try:
+            return self._begin(plan, chunk_size, identity, file)
+        except OSError as error:
+            raise InputError(f"store: {self.path} cannot be written: {error.strerror or error}") from None
+
+    def _begin(self, plan: Plan, chunk_size: int | None, identity: dict[str, str], file: Path) -> int:
         if not file.exists() and not self.is_whole:
             if self.path.exists() and any(self.path.iterdir()) and not self._is_begun():
                 raise InputError(f"store: {self.path} is not empty, and holds no sweep; give another folder")
@@ -88,7 +98,10 @@ class Store:
             self._write(file, (json.dumps(new, indent=1) + "\n").encode())
         record = self.record()
         if record is None or record.get("version") != _VERSION:
-            raise InputError(f"store: {self.path} holds no sweep, or one of another version of filippov")
+            raise InputError(
+                f"store: {self.path} holds no sweep, or one of another version of filippov, or its "
+                f"{'zarr.json' if self.is_whole else 'plan.json'} is damaged; give another folder"
+            )
         known = record["identity"]
         changed = [name for name in identity if identity[name] != known.get(name)]
         if changed:
@@ -130,21 +143,45 @@ class Store:
         columns["reason"] = np.array([REASONS.index(reason) for reason in table["reason"]], dtype=np.int8)
         columns["messages"] = np.frombuffer(json.dumps(texts).encode(), dtype=np.uint8)
         columns["carry"] = carry
+        columns["sweep"] = np.array(self._digest)
         partial = self._partial(".npz")
         with open(partial, "wb") as file:
             np.savez(file, **columns)  # type: ignore[arg-type]
         self._place(partial, self._chunk(index))
 
     def read(self, index: int, *names: str) -> Table:
-        """Return some columns of a finished chunk, all by default."""
-        with np.load(self._chunk(index), allow_pickle=False) as file:
+        """Return some columns of a finished chunk, all by default.
+
+        Raises
+        ------
+        InputError
+            If it is damaged, or of another sweep.
+        """
+        path = self._chunk(index)
+        try:
+            table, sweep = self._read(path, names)
+        except FileNotFoundError:
+            raise
+        except (OSError, EOFError, KeyError, ValueError, BadZipFile) as error:
+            raise InputError(
+                f"store: {path} is damaged ({error}); remove it, and the same call does its points again"
+            ) from None
+        if sweep != self._digest:
+            raise InputError(
+                f"store: {path} belongs to another sweep; remove it, and the same call does its points again"
+            )
+        return table
+
+    def _read(self, path: Path, names: tuple[str, ...]) -> tuple[Table, str]:
+        with open(path, "rb") as raw, np.load(raw, allow_pickle=False) as file:
+            sweep = str(file["sweep"])
             table = {name: file[name] for name in names or (*COLUMNS, "carry")}
             if "message" in table:
                 texts = [sys.intern(text) for text in json.loads(file["messages"].tobytes())]
                 table["message"] = [texts[k] for k in table["message"]]
         if "reason" in table:
             table["reason"] = [REASONS[code] for code in table["reason"]]
-        return table
+        return table, sweep
 
     def assemble(self, plan: Plan, count: int) -> None:
         """Write the result from all chunks, the ragged arrays piece by piece."""
@@ -302,7 +339,13 @@ def run_with_store(
             carry: npt.NDArray[np.float64] = store.read(index, "carry")["carry"]
             return carry
 
-        run_pieces(plan, pieces, mine, carry_after, take, executor, threads)
+        try:
+            run_pieces(plan, pieces, mine, carry_after, take, lambda *_: None, executor, threads)
+        except KeyboardInterrupt:
+            raise Interrupted(
+                f"{bar.done} of {plan.n_points} points are in the store {store.path}; call the sweep again "
+                "with the same arguments to go on."
+            ) from None
         if len(store.finished()) < len(pieces) and not store.is_whole:
             return None
         try:
@@ -347,9 +390,13 @@ def open_sweep(path: Any, chunks: Mapping[str, int] | str | None = None) -> Any:
             )
         raise InputError(f"store: there is no sweep in {store.path}")
     # Times are numbers here, whatever their units.
-    found = xarray.open_zarr(
-        store.path, chunks=chunks, consolidated=False, decode_times=False, decode_timedelta=False
-    )
+    try:
+        found = xarray.open_zarr(
+            store.path, chunks=chunks, consolidated=False, decode_times=False, decode_timedelta=False
+        )
+        del found.attrs[_RECORD]
+    except (OSError, KeyError, ValueError, TypeError) as error:
+        text = f"{type(error).__name__}: {error}"
+        raise InputError(f"store: {store.path} is damaged, or no store of a sweep ({text})") from error
     start = [name for name in found.data_vars if str(name).startswith("initial_")]
-    del found.attrs[_RECORD]
     return found.set_coords(start)

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from filippov.analysis.dataset import dataset_of
-from filippov.analysis.grid import grid_of
-from filippov.analysis.observe import check_system, observation_of, options_of, span_of
+from filippov.analysis.dataset import REASONS, dataset_of
+from filippov.analysis.grid import check_size, grid_of
+from filippov.analysis.observe import check_keywords, check_system, observation_of, options_of, span_of
 from filippov.analysis.optional import need
 from filippov.analysis.plan import Plan, plan_of
 from filippov.analysis.points import Table, concatenate, prepare_for
 from filippov.analysis.schedule import Progress, as_executor, run_pieces
 from filippov.ensemble import check_threads
-from filippov.errors import InputError
+from filippov.errors import InputError, Interrupted
 from filippov.options import fit_kappa
 
 if TYPE_CHECKING:
@@ -109,6 +109,10 @@ def sweep(
         If an argument is wrong; or if the store has another sweep.
     ImportError
         If xarray, or for a store zarr, is not installed.
+    KeyboardInterrupt
+        On Ctrl-C; `partial` is the Dataset, with the reason ``not_run`` where a point was not begun, and
+        ``interrupted`` where it was cut short. With a store what is finished stays there, and the same call
+        goes on.
 
     Notes
     -----
@@ -125,11 +129,13 @@ def sweep(
     (('a', 'initial_z'), [[0.0, 0.0], [5.0, 6.0]])
     """
     need("xarray", "a sweep")
+    check_keywords(options, system, sweep)
     system = check_system(system)
     last = _followed(follow, params, y0)
     grid = grid_of(system, y0, params, last)
     if not grid.axes:
         raise InputError("params: a sweep needs an array, in params or in y0")
+    check_size(grid, has_store=store is not None)
     span = span_of(t_span, section, n is not None)
     checked = options_of(options, span, len(grid.states))
     observed = None
@@ -216,6 +222,7 @@ def bifurcation_diagram(
     >>> diagram.period.values.tolist(), diagram.v.values.round(3).tolist()
     ([1, 1, 1], [-0.488, 0.357, 0.254])
     """
+    check_keywords(arguments, system, bifurcation_diagram, sweep)
     if not isinstance(params, Mapping) or not any(np.ndim(value) for value in params.values()):
         raise InputError("params: a bifurcation diagram needs an array of values of a parameter")
     return sweep(
@@ -259,7 +266,24 @@ def run_plan(
         carries[index] = carry
         bar.add(table)
 
-    run_pieces(plan, pieces, range(len(pieces)), carries.__getitem__, take, executor, count)
+    try:
+        run_pieces(
+            plan, pieces, range(len(pieces)), carries.__getitem__, take, tables.__setitem__, executor, count
+        )
+    except KeyboardInterrupt:
+        for index, piece in enumerate(pieces):
+            tables[index] = tables[index] or plan.left_out(piece)
+        partial = _dataset(plan, tables)
+        done = int(np.count_nonzero(partial.reason.values < REASONS.index("not_run")))
+        raise Interrupted(
+            f"{done} of {plan.n_points} points were begun; what was computed is in `partial` of this "
+            "exception. A sweep with store= goes on when it is called again.",
+            partial=partial,
+        ) from None
+    return _dataset(plan, tables)
+
+
+def _dataset(plan: Plan, tables: list[Table | None]) -> Any:
     whole = concatenate([table for table in tables if table is not None])
     has_section = plan.observed is not None
     return dataset_of(plan.grid, whole, plan.prepared.surfaces, has_section, plan.units, plan.attributes)

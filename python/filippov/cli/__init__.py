@@ -1,11 +1,12 @@
 """The command line: ``filippov``, or ``python -m filippov``.
 
 Exit codes: 0 all went well; 1 the run failed, and what it computed was written; 2 a mistake in the command or
-in the model, said in one line; 130 Ctrl-C.
+in the model, said in one line; 130 Ctrl-C; 141 nobody reads what is printed any more (``| head``).
 """
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 
@@ -15,7 +16,7 @@ from filippov.errors import FilippovError, Interrupted
 
 __all__ = ["main"]
 
-FAILED, MISTAKE, INTERRUPTED = 1, 2, 130
+MISTAKE, INTERRUPTED, NOBODY_READS = 2, 130, 141
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -44,6 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     try:
         code: int = given.run(given)
+        sys.stdout.flush()
     except (Mistake, FilippovError) as error:
         if given.debug:
             raise
@@ -54,6 +56,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise
         print(f"filippov: {error}", file=sys.stderr)
         return MISTAKE
+    except BrokenPipeError:
+        # As a program that is ended by SIGPIPE. The interpreter shall not try to write the rest at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return NOBODY_READS
     except OSError as error:
         if given.debug:
             raise

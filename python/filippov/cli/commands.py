@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 import inspect
 import sys
-from importlib.metadata import PackageNotFoundError
-from importlib.metadata import version as installed_version
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,20 +15,13 @@ from filippov import problems
 from filippov.cli.mistakes import Mistake
 from filippov.cli.model import Model, load_model, of_problem
 from filippov.cli.solving import initial_state, interval, options_of_run, parameters
-from filippov.cli.tables import write_csv, write_parquet
+from filippov.cli.tables import STDOUT, report_beside, write_csv, write_parquet
+from filippov.errors import Interrupted
 from filippov.solution import Solution
 
-__all__ = ["check_picture", "check_target", "demo", "list_problems", "solve", "version"]
+__all__ = ["check_needs", "check_picture", "check_target", "demo", "list_problems", "say", "solve"]
 
 _PICTURES = (".png", ".pdf", ".svg", ".jpg", ".eps")
-
-
-def version() -> str:
-    """Return the version that is installed."""
-    try:
-        return installed_version("filippov")
-    except PackageNotFoundError:
-        return "(not installed)"
 
 
 def list_problems(given: argparse.Namespace) -> int:
@@ -46,6 +38,9 @@ def list_problems(given: argparse.Namespace) -> int:
 
 def demo(given: argparse.Namespace) -> int:
     """Solve a reference problem, print where it comes from and what happened, and draw it."""
+    for name in ("plot", "dark"):
+        if given.no_plot and getattr(given, name):
+            raise Mistake(f"--{name}: has no meaning with --no-plot")
     model = of_problem(given.name)
     problem = problems.get(given.name)
     module = inspect.getmodule(problem.fun)
@@ -54,10 +49,12 @@ def demo(given: argparse.Namespace) -> int:
     if not given.no_plot:
         path = given.plot or Path(f"{problem.name}.png")
         check_picture(path)
+        check_target(path)
     solution = problem.solve()
     _print(solution, model, {})
     if not given.no_plot:
         _draw(solution, path, None, None, given.dark, problem.name)
+        print(f"picture: {path}")
     return _closed(solution)
 
 
@@ -78,22 +75,34 @@ def solve(given: argparse.Namespace) -> int:
         _check_states(given.phase, model, len(y0), "--phase")
         if given.phase is not None and len(given.phase) not in (2, 3):
             raise Mistake(f"--phase: two or three states are needed, not {len(given.phase)}")
-    elif given.phase or given.states:
-        raise Mistake("--plot: --phase and --states need the name of a picture")
+    else:
+        check_needs(given, ("phase", "states", "dark"), "--plot, the name of a picture")
+    if given.csv is None and given.parquet is None:
+        check_needs(given, ("points",), "--csv or --parquet, where the times are written")
+    if given.parquet == STDOUT:
+        raise Mistake("--parquet: the name of a file is needed; --csv - writes to the standard output")
     for path in (given.plot, given.csv, given.parquet):
         if path is not None:
             check_target(path)
-    solution = model.system.solve((start, end), y0, params=values, events=model.events, **options)
+    cut = None
+    try:
+        solution = model.system.solve((start, end), y0, params=values, events=model.events, **options)
+    except Interrupted as error:
+        cut, solution = error, error.partial
     if not given.quiet:
-        _print(solution, model, values)
+        with report_beside(given.csv):
+            _print(solution, model, values)
     if given.csv is not None:
         write_csv(solution, given.csv)
-        _say(given, f"written: {given.csv}, {len(solution.t)} rows")
+        say(given, f"written: {given.csv}, {len(solution.t)} rows")
     if given.parquet is not None:
         write_parquet(solution, given.parquet, _notes(solution, model, values))
-        _say(given, f"written: {given.parquet}, {len(solution.t)} rows")
+        say(given, f"written: {given.parquet}, {len(solution.t)} rows")
     if given.plot is not None:
-        _draw(solution, given.plot, given.states, given.phase, given.dark, model.name, quiet=given.quiet)
+        _draw(solution, given.plot, given.states, given.phase, given.dark, model.name)
+        say(given, f"picture: {given.plot}")
+    if cut is not None:
+        raise cut
     return _closed(solution)
 
 
@@ -133,13 +142,24 @@ def _notes(solution: Solution, model: Model, values: dict[str, float]) -> dict[s
     }
 
 
-def _say(given: argparse.Namespace, text: str) -> None:
+def say(given: argparse.Namespace, text: str) -> None:
+    """Print a line of the report, unless it is not wanted; not where the table is printed."""
     if not given.quiet:
-        print(text)
+        with report_beside(given.csv):
+            print(text)
+
+
+def check_needs(given: argparse.Namespace, names: Sequence[str], needed: str) -> None:
+    """Refuse options that would have no effect."""
+    for name in names:
+        if getattr(given, name):
+            raise Mistake(f"--{name}: needs {needed}")
 
 
 def check_target(path: Path) -> None:
     """Refuse a file that cannot be written, before the run."""
+    if path == STDOUT:
+        return
     if path.is_dir():
         raise Mistake(f"{path}: this is a folder; the name of a file is needed")
     if not path.resolve().parent.is_dir():
@@ -168,7 +188,6 @@ def _draw(
     phase: list[str] | None,
     dark: bool,
     title: str,
-    quiet: bool = False,
 ) -> None:
     import matplotlib
 
@@ -188,5 +207,3 @@ def _draw(
             ax = plot.phase3d(solution, phase[0], phase[1], phase[2])
         ax.set_title(title)
         ax.figure.savefig(path)
-    if not quiet:
-        print(f"picture: {path}")

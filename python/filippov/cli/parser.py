@@ -6,6 +6,7 @@ import argparse
 import re
 from pathlib import Path
 
+from filippov._core import __version__
 from filippov.cli import commands
 from filippov.cli.solving import add_run_options
 from filippov.cli.sweeping import add_sweep_options, sweep
@@ -23,7 +24,7 @@ first steps:
   filippov demo dry_friction                 solve one, print what happened, draw it
   filippov solve dry_friction --param F=0.8  the same with another parameter
   filippov solve model.py --t 0 100 --y0 1 0 --plot out.png
-  filippov sweep model.py --param omega=0.2:2:500 --period 2*pi/omega --store runs --plot diagram.png
+  filippov sweep model.py --param omega=0.2:2:500 --period "2*pi/omega" --store runs --plot diagram.png
 
 a model is a Python file, written as for SciPy:
   import filippov as fl, numpy as np
@@ -35,7 +36,8 @@ a model is a Python file, written as for SciPy:
 
   y0 = [1.0, 2.0]                            # optional; so are t_span, events, section
 
-exit codes: 0 done; 1 the run failed, what it computed is written; 2 a mistake, said in one line; 130 Ctrl-C.
+exit codes: 0 done; 1 the run failed, what it computed is written; 2 a mistake, said in one line; 130 Ctrl-C;
+  141 nobody reads what is printed any more.
 `filippov COMMAND --help` explains one command.
 """
 
@@ -59,7 +61,7 @@ def build_parser() -> argparse.ArgumentParser:
         epilog=_FIRST_STEPS,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--version", action="version", version=f"filippov {commands.version()}")
+    parser.add_argument("--version", action="version", version=f"filippov {__version__}")
     parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
     parser.set_defaults(run=None)
     subparsers = parser.add_subparsers(title="commands", metavar="COMMAND")
@@ -109,7 +111,7 @@ def _add_solve(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     out.add_argument("--states", nargs="+", metavar="NAME", help="draw these states only")
     out.add_argument("--phase", nargs="+", metavar="NAME", help="draw two or three states on axes")
     out.add_argument("--dark", action="store_true", help="light lines on a dark ground")
-    out.add_argument("--csv", type=Path, metavar="FILE", help="write times, states and modes as text")
+    out.add_argument("--csv", type=Path, metavar="FILE", help="write times, states and modes; - prints them")
     out.add_argument("--parquet", type=Path, metavar="FILE", help="write them for pandas, Polars, DuckDB")
     out.add_argument("--points", type=int, metavar="N", help="write N equidistant times")
     out.add_argument("--quiet", action="store_true", help="print nothing but warnings and failures")
@@ -118,8 +120,8 @@ def _add_solve(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 _SWEEP = """\
 examples:
-  filippov sweep model.py --param omega=0.2:2:500 --period 2*pi/omega --plot diagram.png
-  filippov sweep model.py --param F=0.1,0.2,0.4 omega=0.2:2:500 --period 2*pi/omega --store runs --csv out.csv
+  filippov sweep model.py --param omega=0.2:2:500 --period "2*pi/omega" --plot diagram.png
+  filippov sweep model.py --param F=0.1,0.4 omega=0.2:2:500 --period "2*pi/omega" --store runs --csv out.csv
   filippov sweep model.py --y0 y=-2:2:50 v=-2:2:50 --t 100 --csv ends.csv
 
 START:STOP:COUNT are so many equidistant values, A,B,C a list; all combinations are computed. With --period,

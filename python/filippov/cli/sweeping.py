@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import ast
-import csv
 import math
 import sys
 from pathlib import Path
@@ -13,13 +12,17 @@ from typing import Any
 import numpy as np
 
 from filippov import analysis
-from filippov.cli.commands import check_picture, check_target
+from filippov.analysis.grid import memory_of_machine
+from filippov.cli.commands import check_needs, check_picture, check_target, say
 from filippov.cli.mistakes import Mistake, assignments, hint, number
 from filippov.cli.model import Model, load_model
 from filippov.cli.solving import initial_state, interval, options_of_run
+from filippov.cli.tables import write_rows
+from filippov.errors import Interrupted
 
 __all__ = ["add_sweep_options", "sweep"]
 
+_RETURNS, _TRANSIENT = 100, 400
 _NODES = (ast.Expression, ast.BinOp, ast.UnaryOp, ast.Constant, ast.Name, ast.Load, ast.operator, ast.unaryop)
 
 
@@ -28,15 +31,17 @@ def add_sweep_options(command: argparse.ArgumentParser) -> None:
     grid = command.add_argument_group("what is kept of each point")
     grid.add_argument("--period", metavar="EXPR", help="returns once a period: a number, or 2*pi/omega")
     grid.add_argument("--section", metavar="SURFACE", help="returns to a surface, as `solve` prints it")
-    grid.add_argument("--returns", type=int, default=100, metavar="N", help="so many returns; 100 by default")
-    grid.add_argument("--transient", type=int, default=400, metavar="N", help="after so many; 400 by default")
+    grid.add_argument("--returns", type=int, metavar="N", help="so many returns; 100 by default")
+    grid.add_argument("--transient", type=int, metavar="N", help="after so many; 400 by default")
     grid.add_argument(
         "--follow", action="store_true", help="start every point where the one before it ended, not at y0"
     )
     out = command.add_argument_group("what comes out")
     out.add_argument("--store", type=Path, metavar="FOLDER", help="write every finished chunk, and resume")
     out.add_argument("--threads", type=int, metavar="N", help="native threads; one per core by default")
-    out.add_argument("--csv", type=Path, metavar="FILE", help="write one row per return, or per point")
+    out.add_argument(
+        "--csv", type=Path, metavar="FILE", help="write one row per return, or per point; - prints"
+    )
     out.add_argument("--plot", type=Path, metavar="FILE", help="draw the returns over the parameter")
     out.add_argument("--state", metavar="NAME", help="the state to draw; the first by default")
     out.add_argument("--dark", action="store_true", help="light dots on a dark ground")
@@ -56,22 +61,28 @@ def sweep(given: argparse.Namespace) -> int:
         check_picture(given.plot)
         if section is None or len(names) != 1:
             raise Mistake("--plot: one parameter with several values is needed, and --period or --section")
+    else:
+        check_needs(given, ("state", "dark"), "--plot, the name of a picture")
     for path in (given.plot, given.csv):
         if path is not None:
             check_target(path)
     state = _state(given, model)
     options = options_of_run(given)
     options["progress"] = given.progress or (not given.quiet and sys.stderr.isatty())
+    for name in ("returns", "transient"):
+        if section is None and getattr(given, name) is not None:
+            raise Mistake(f"--{name}: is about returns; give --period or --section, or section in the file")
     if section is not None:
         options |= {
             "section": section,
-            "n": given.returns,
-            "transient": given.transient,
+            "n": _RETURNS if given.returns is None else given.returns,
+            "transient": _TRANSIENT if given.transient is None else given.transient,
             "until_periodic": True,
             "follow": given.follow,
         }
     elif given.follow:
         options["follow"] = True
+    cut = None
     try:
         result = analysis.sweep(
             *(model.system, _span(given, model, section), y0, params),
@@ -79,11 +90,16 @@ def sweep(given: argparse.Namespace) -> int:
             threads=given.threads,
             **options,
         )
-    except KeyboardInterrupt:
-        if given.store is None:
-            raise
-        raise KeyboardInterrupt(f"What is finished is in {given.store}; the same command goes on.") from None
-    return _close(given, result, names[0], state)
+    except Interrupted as error:
+        if given.store is not None:
+            raise KeyboardInterrupt(
+                f"What is finished is in {given.store}; the same command goes on."
+            ) from None
+        cut, result = error, error.partial
+    code = _close(given, result, names[0], state)
+    if cut is not None:
+        raise KeyboardInterrupt("With --store FOLDER the same command would go on.")
+    return code
 
 
 def _values(texts: list[str], where: str, known: list[str]) -> dict[str, Any]:
@@ -101,6 +117,8 @@ def _range(text: str, where: str) -> Any:
         parts = text.split(":")
         if len(parts) != 3 or not parts[2].isdigit() or int(parts[2]) < 1:
             raise Mistake(f"{where}: START:STOP:COUNT is needed, not {text!r}")
+        if 8 * int(parts[2]) > memory_of_machine():
+            raise Mistake(f"{where}: {parts[2]} values do not fit into the memory of this machine")
         return np.linspace(number(parts[0], where), number(parts[1], where), int(parts[2]))
     if "," in text:
         return np.array([number(part, where) for part in text.split(",")])
@@ -175,16 +193,14 @@ def _close(given: argparse.Namespace, result: Any, swept: str, state: str | None
     """Print, write and draw; return the exit code."""
     found = analysis.failures(result)
     n_points, n_failed = int(result.status.size), sum(map(len, found.values()))
-    if not given.quiet:
-        print(f"points:   {n_points}, {n_failed} of them failed")
-        if "obs" in result.sizes:
-            periods, counts = np.unique(result.period.values, return_counts=True)
-            shown = [f"{p or 'none'}: {c}" for p, c in zip(periods, counts, strict=True)]
-            print(f"returns:  {result.sizes['obs']}; points by period found: {', '.join(shown)}")
+    say(given, f"points:   {n_points}, {n_failed} of them failed")
+    if "obs" in result.sizes:
+        periods, counts = np.unique(result.period.values, return_counts=True)
+        shown = [f"{p or 'none'}: {c}" for p, c in zip(periods, counts, strict=True)]
+        say(given, f"returns:  {result.sizes['obs']}; points by period found: {', '.join(shown)}")
     if given.csv is not None:
         rows = _write_csv(result, given.csv)
-        if not given.quiet:
-            print(f"written:  {given.csv}, {rows} rows")
+        say(given, f"written:  {given.csv}, {rows} rows")
     if given.plot is not None:
         _draw(given, result, swept, state or str(_states(result)[0]))
     for reason, points in found.items():
@@ -214,11 +230,7 @@ def _write_csv(result: Any, path: Path) -> int:
     known = [*map(str, result.coords), "t", *_states(result)]
     order = [*(name for name in known if name in columns), *sorted(set(columns).difference(known))]
     columns = {name: columns[name] for name in order}
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(columns)
-        writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
-    return len(next(iter(columns.values())))
+    return write_rows(columns, [column.tolist() for column in columns.values()], path)
 
 
 def _draw(given: argparse.Namespace, result: Any, swept: str, state: str) -> None:
@@ -230,5 +242,4 @@ def _draw(given: argparse.Namespace, result: Any, swept: str, state: str) -> Non
     with plot.style(dark=given.dark):
         ax = plot.bifurcation_diagram(result, state, swept)
         ax.figure.savefig(given.plot)
-    if not given.quiet:
-        print(f"picture:  {given.plot}")
+    say(given, f"picture:  {given.plot}")

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
+import sys
+from collections.abc import Iterable, Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -11,16 +14,37 @@ import numpy as np
 
 from filippov.solution import Solution
 
-__all__ = ["write_csv", "write_parquet"]
+__all__ = ["STDOUT", "report_beside", "write_csv", "write_parquet", "write_rows"]
+
+STDOUT = Path("-")
+
+
+@contextlib.contextmanager
+def report_beside(csv_file: Path | None) -> Iterator[None]:
+    """Let what is printed go to the error stream where the table goes to the standard output."""
+    if csv_file != STDOUT:
+        yield
+        return
+    with contextlib.redirect_stdout(sys.stderr):
+        yield
+
+
+def write_rows(names: Iterable[str], columns: Sequence[Sequence[Any]], path: Path) -> int:
+    """Write columns to a CSV file, or for ``-`` to the standard output; return the number of rows."""
+    with contextlib.ExitStack() as stack:
+        out: Any = sys.stdout
+        if path != STDOUT:
+            out = stack.enter_context(path.open("w", newline="", encoding="utf-8"))
+        writer = csv.writer(out, lineterminator="\n" if path == STDOUT else "\r\n")
+        writer.writerow(names)
+        writer.writerows(zip(*columns, strict=True))
+    return len(columns[0])
 
 
 def write_csv(solution: Solution, path: Path) -> None:
     """Write times, states and modes to a CSV file, every number with all of its digits."""
     columns = _columns(solution)
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(columns)
-        writer.writerows(zip(*columns.values(), strict=True))
+    write_rows(columns, list(columns.values()), path)
 
 
 def write_parquet(solution: Solution, path: Path, notes: dict[str, str]) -> None:
@@ -34,7 +58,7 @@ def write_parquet(solution: Solution, path: Path, notes: dict[str, str]) -> None
     try:
         arrow, parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
     except ImportError as error:
-        raise ImportError("--parquet needs PyArrow: pip install filippov[parquet]") from error
+        raise ImportError('--parquet needs PyArrow: pip install "filippov[parquet]"') from error
     table = arrow.table(_columns(solution))
     parquet.write_table(table.replace_schema_metadata(notes), path)
 

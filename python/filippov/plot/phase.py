@@ -103,6 +103,8 @@ def phase3d(
     ax = new_axes(ax, (6.4, 5.0), dark, projection="3d")
     _draw(ax, solution, shown, dark)
     ax.set_zlabel(solution.states[shown[2]])
+    for axis in "xyz":  # seen from the side, more numbers than this run into one another
+        ax.locator_params(axis=axis, nbins=4)
     return ax
 
 

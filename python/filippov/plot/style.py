@@ -215,8 +215,9 @@ def draw_legend(ax: Any, handles: list[Any], chosen: Theme) -> None:
     """Draw a legend beside the axes, where it covers nothing."""
     if not handles:
         return
+    beside = 1.12 if hasattr(ax, "zaxis") else 1.0  # in space numbers stand beyond the axes
     legend = ax.legend(
-        handles=handles, loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize="small", frameon=False
+        handles=handles, loc="upper left", bbox_to_anchor=(beside, 1.0), fontsize="small", frameon=False
     )
     for text in legend.get_texts():
         text.set_color(chosen.ink)

@@ -59,9 +59,11 @@ def surface(parts: SurfaceParts, ax: Any = None, dark: bool | None = None, legen
     fresh = ax is None
     ax = new_axes(ax, (6.4, 5.0) if in_space else (5.6, 4.2), dark, projection="3d" if in_space else None)
     chosen = theme(dark)
-    draw = _draw_grid if in_space else _draw_curve
-    for sheet, kinds in zip(parts.sheets, parts.kinds, strict=True):
-        draw(ax, sheet, kinds, chosen)
+    if in_space:
+        _draw_triangles(ax, parts, chosen)
+    else:
+        for sheet, kinds in zip(parts.sheets, parts.kinds, strict=True):
+            _draw_curve(ax, sheet, kinds, chosen)
     if fresh:
         ax.set_xlabel(parts.labels[0])
         ax.set_ylabel(parts.labels[1])
@@ -105,26 +107,21 @@ def _of_corners(kinds: Any) -> str:
     return parts[0] if parts else "inactive"
 
 
-def _draw_grid(ax: Any, sheet: Any, kinds: Any, chosen: Theme) -> None:
-    """Draw the cells of a sheet whose corners are all there."""
+def _draw_triangles(ax: Any, parts: SurfaceParts, chosen: Theme) -> None:
     polygons_in_space = import_module("mpl_toolkits.mplot3d.art3d").Poly3DCollection
 
-    cells: dict[str, list[Any]] = {}
-    for i, j in np.ndindex(kinds.shape[0] - 1, kinds.shape[1] - 1):
-        corners = np.stack([sheet[:, i, j], sheet[:, i + 1, j], sheet[:, i + 1, j + 1], sheet[:, i, j + 1]])
-        if np.isfinite(corners).all():
-            cells.setdefault(_of_corners(kinds[i : i + 2, j : j + 2]), []).append(corners)
-    for kind, polygons in cells.items():
+    (corners,), (kinds,) = parts.sheets, parts.kinds
+    of_triangles = np.array([_of_corners(kinds[triangle]) for triangle in parts.triangles], dtype="<U12")
+    for kind in np.unique(of_triangles).tolist():
         collection = polygons_in_space(
-            polygons,
+            corners.T[parts.triangles[of_triangles == kind]],
             facecolor=_colour(kind, chosen),
             edgecolor="none",
             alpha=_OPACITY.get(kind, 0.15),
             linewidth=0.0,
         )
         ax.add_collection3d(collection)
-    found = sheet[:, np.isfinite(sheet[0])]
-    ax.auto_scale_xyz(*found, had_data=ax.has_data())
+    ax.auto_scale_xyz(*corners, had_data=ax.has_data())
 
 
 def _handles(parts: SurfaceParts, chosen: Theme, in_space: bool) -> list[Any]:

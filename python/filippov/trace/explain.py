@@ -23,6 +23,7 @@ __all__ = [
     "NotTraceable",
     "UserLine",
     "calling_line",
+    "deepest_user_line",
     "explain_failure",
     "explain_raise",
 ]
@@ -131,7 +132,7 @@ def explain_failure(error: Exception, fun: Callable[..., Any], role: str, path: 
     path : str, optional
         The decisions of the forced branches on the way to the error.
     """
-    line = _deepest_user_line(error.__traceback__)
+    line = deepest_user_line(error.__traceback__)
     what = error.what if isinstance(error, NotTraceable) else f"{type(error).__name__}: {error}"
     text = f"{role} could not be traced to an expression: {what}\n{line or _name_of(fun)}\n"
     if path:
@@ -142,7 +143,7 @@ def explain_failure(error: Exception, fun: Callable[..., Any], role: str, path: 
 
 def explain_raise(error: Exception, fun: Callable[..., Any], role: str, call: str) -> ModelError:
     """Return the error for a function that fails on plain numbers too, naming the user's line."""
-    line = _deepest_user_line(error.__traceback__)
+    line = deepest_user_line(error.__traceback__)
     reason = f"{type(error).__name__}: {error}"
     if isinstance(error, TypeError) and (line is None or not _entered(error.__traceback__, fun)):
         return ModelError(f"{role} was called as {call}, but is {signature_of(fun)}: {reason}")
@@ -179,7 +180,8 @@ def _frames(traceback: TracebackType | None) -> Iterable[tuple[FrameType, int]]:
         traceback = traceback.tb_next
 
 
-def _deepest_user_line(traceback: TracebackType | None) -> UserLine | None:
+def deepest_user_line(traceback: TracebackType | None) -> UserLine | None:
+    """Return the user's line that raised: the innermost one outside of NumPy, SciPy and this package."""
     own = [place for place in _frames(traceback) if not _is_foreign(place[0].f_code.co_filename)]
     return _line(*own[-1]) if own else None
 

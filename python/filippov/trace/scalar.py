@@ -257,13 +257,13 @@ class Scalar:
         return (self + 0.5).floor()
 
     def __floordiv__(self, other: Any) -> Any:
-        return np.floor(self / other)
+        return np.floor(self / _divisor(other))
 
     def __rfloordiv__(self, other: Any) -> Any:
         return np.floor(other / self)
 
     def __mod__(self, other: Any) -> Any:
-        return self - other * np.floor(self / other)
+        return self - other * np.floor(self / _divisor(other))
 
     def __rmod__(self, other: Any) -> Any:
         return other - self * np.floor(other / self)
@@ -291,6 +291,12 @@ class Scalar:
     def imag(self) -> float:
         """Zero: traced numbers are real."""
         return 0.0
+
+
+def _divisor(value: Any) -> Any:
+    if not isinstance(value, Scalar) and np.ndim(value) == 0 and value == 0:
+        raise NotTraceable("a remainder, or a whole quotient, by 0", "the divisor must not be zero")
+    return value
 
 
 def _method(name: str) -> Callable[[Scalar], Any]:

@@ -5,10 +5,12 @@
 mod classify;
 mod hidden_dynamics;
 mod mode_field;
+mod not_finite;
 
 pub use classify::{classify, Classification, PointKind};
 pub use hidden_dynamics::{hidden_dynamics, HiddenDynamics, HiddenRoot};
 pub use mode_field::{intersection_field, IntersectionValue};
+pub use not_finite::{not_finite, state_text, NotFinitePlace};
 
 #[cfg(test)]
 mod tests;

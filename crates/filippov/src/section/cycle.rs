@@ -3,9 +3,15 @@
 use std::collections::VecDeque;
 
 use super::observer::Return;
-use crate::tolerances::LEAST_AGREEMENTS;
+use crate::tolerances::{COMING_TOGETHER, LEAST_AGREEMENTS};
 
-/// The test: returns number k and k - q agree, `q` times in a row (at least [`LEAST_AGREEMENTS`] times).
+/// The test: returns number k and k - q agree, `q` times in a row (at least [`LEAST_AGREEMENTS`] times), and those
+/// between do not come together.
+///
+/// Returns that come to an orbit of period p from alternating sides (a negative multiplier), or turn around it, agree
+/// with those q before, q a multiple of p, long before they agree with those p before. Their distances at lag p then
+/// shrink geometrically; the limit of these distances, by Aitken's extrapolation from three of them q returns apart,
+/// says whether q is the period of the orbit or only of the way to it.
 ///
 /// Two states agree if every component differs by at most `atol + rtol * |x|`. It is a heuristic: an orbit that
 /// drifts by less than that from one return to the next counts as periodic.
@@ -26,7 +32,13 @@ pub struct Cycle {
 impl Cycle {
     /// Do two states agree?
     fn agree(&self, a: &[f64], b: &[f64]) -> bool {
-        a.iter().zip(b).enumerate().all(|(i, (a, b))| {
+        self.distance(a, b) <= 1.0
+    }
+
+    /// The largest difference of two states, in units of what counts as agreement.
+    fn distance(&self, a: &[f64], b: &[f64]) -> f64 {
+        let mut largest = 0.0;
+        for (i, (a, b)) in a.iter().zip(b).enumerate() {
             let modulus = self.moduli[i];
             let mut difference = a - b;
             let mut size = a.abs();
@@ -34,9 +46,46 @@ impl Cycle {
                 difference -= modulus * (difference / modulus).round();
                 size = modulus;
             }
-            difference.abs() <= self.atol[i] + self.rtol * size
+            let here = difference.abs() / (self.atol[i] + self.rtol * size);
+            // Nothing agrees with what is not a number.
+            if here.is_nan() && difference != 0.0 {
+                return f64::NAN;
+            }
+            largest = f64::max(largest, here);
+        }
+        largest
+    }
+
+    /// Is `q` the period, and not a divisor of it, to which the returns still come together?
+    fn is_settled(&self, q: usize, latest: &VecDeque<Return>) -> bool {
+        let divisors = (1..q).filter(|p| q.is_multiple_of(*p));
+        divisors.into_iter().all(|p| {
+            let Some(newest) = latest.len().checked_sub(1).filter(|&k| k + 1 >= 3 * q + p) else {
+                return false;
+            };
+            // The largest distance over one period: single ones may vanish.
+            let spread = |end: usize| {
+                let distance = |k: usize| self.distance(&latest[k].y, &latest[k - p].y);
+                (0..q).map(|k| distance(end - k)).fold(0.0, f64::max)
+            };
+            let spreads = [2 * q, q, 0].map(|back| spread(newest - back));
+            !comes_to_zero(spreads)
         })
     }
+}
+
+/// Do these distances shrink to less than half of the last one, if they go on geometrically?
+fn comes_to_zero([a, b, c]: [f64; 3]) -> bool {
+    let (first, second) = (a - b, b - c);
+    if second <= 0.0 || first <= 0.0 {
+        return false;
+    }
+    let ratio = second / first;
+    if ratio >= 1.0 {
+        // Far from the orbit, or rounding.
+        return second > COMING_TOGETHER * c;
+    }
+    second * ratio / (1.0 - ratio) > 0.5 * c
 }
 
 /// How often in a row returns have agreed with those `q` before, q = 1, 2, ...
@@ -62,7 +111,10 @@ impl Agreements {
             }
             let agrees = cycle.agree(&newest.y, &latest[before - q].y);
             *count = if agrees { *count + 1 } else { 0 };
-            if period.is_none() && *count >= LEAST_AGREEMENTS.max(q as u64) {
+            if period.is_none()
+                && *count >= LEAST_AGREEMENTS.max(q as u64)
+                && cycle.is_settled(q, latest)
+            {
                 period = Some(q);
             }
         }

@@ -48,7 +48,8 @@ pub(crate) struct Observer {
     returns: Returns,
     /// The last returns, for the test of periodicity.
     latest: VecDeque<Return>,
-    longest: usize,
+    /// How many of them the test needs.
+    remembered: usize,
     /// Time of the start, and of the last return.
     t_start: f64,
     t_return: f64,
@@ -84,8 +85,8 @@ impl Observer {
             most: section.most,
             cycle: cycle.map(|cycle| (cycle, Agreements::new(longest))),
             returns: Returns::default(),
-            latest: VecDeque::with_capacity(longest + 1),
-            longest,
+            latest: VecDeque::new(),
+            remembered: 4 * longest,
             t_start,
             t_return: t_start,
             since: t_start,
@@ -178,7 +179,7 @@ impl Observer {
         self.returns.count += 1;
         let is_kept = self.returns.count > self.transient;
         if let Some((cycle, agreements)) = &mut self.cycle {
-            if self.latest.len() > self.longest {
+            if self.latest.len() >= self.remembered {
                 self.latest.pop_front();
             }
             self.latest.push_back(found.clone());

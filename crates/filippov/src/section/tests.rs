@@ -1,8 +1,10 @@
 //! Returns to sections, against closed forms.
 
+use std::collections::VecDeque;
 use std::f64::consts::PI;
 
-use super::{Cycle, Place, Returns, Section};
+use super::cycle::Agreements;
+use super::{Cycle, Place, Return, Returns, Section};
 use crate::action::{Actions, Clock};
 use crate::switching::Kind;
 use crate::{solve_to_section, ClosureSystem, Options, PiecewiseSystem, Solution, Stop};
@@ -104,10 +106,10 @@ fn ticks_do_not_stop_the_motion() {
     assert!(matches!(solution.stop, Stop::Periodic));
     assert_eq!(
         (returns.period, returns.kept.len(), returns.count),
-        (8, 8, 16)
+        (8, 8, 28)
     );
     for (k, kept) in returns.kept.iter().enumerate() {
-        let t = 0.1 + 0.25 * PI * (k + 8) as f64;
+        let t = 0.1 + 0.25 * PI * (k + 20) as f64;
         assert_eq!(kept.t, t);
         assert!((kept.y[0] - t.cos()).abs() < 1e-9);
     }
@@ -174,4 +176,62 @@ fn a_phase_counts_up_to_its_modulus() {
     }
     let (_, returns) = run(&drift, &[0.0, 0.3], &section(test));
     assert_eq!((returns.period, returns.kept.len()), (3, 3));
+}
+
+/// The period first found in the returns y(0), y(1), ..., and after how many of them.
+fn first_period(y: impl Fn(i32) -> [f64; 2]) -> (usize, i32) {
+    let test = cycle(true).expect("there is one");
+    let mut agreements = Agreements::new(test.longest);
+    let mut latest = VecDeque::new();
+    for k in 0..300_000 {
+        latest.push_back(Return {
+            t: f64::from(k),
+            y: y(k).to_vec(),
+            duration: 1.0,
+            sliding: 0.0,
+            modes: Vec::new(),
+        });
+        if latest.len() > 4 * test.longest {
+            latest.pop_front();
+        }
+        if let Some(period) = agreements.take(&test, &latest) {
+            return (period, k);
+        }
+    }
+    (0, 300_000)
+}
+
+#[test]
+fn the_way_to_an_orbit_is_not_its_period() {
+    for mu in [0.9, -0.5, -0.9, -0.99, -0.9999] {
+        let (period, k) = first_period(|k| [1.0 + f64::powi(mu, k), 0.5]);
+        assert_eq!(period, 1, "multiplier {mu}");
+        let last = (f64::powi(mu, k) - f64::powi(mu, k - 1)).abs();
+        assert!(
+            last < 2.1e-7,
+            "multiplier {mu}: the last two differ by {last}"
+        );
+    }
+    // Around a point by a fifth of a turn each, and to an orbit of period 2 from alternating sides.
+    let turn = 0.4 * PI;
+    let around = |k: i32| {
+        let (size, angle) = (0.999_f64.powi(k), turn * f64::from(k));
+        [size * angle.cos(), size * angle.sin()]
+    };
+    assert_eq!(first_period(around).0, 1);
+    let two = |k: i32| [f64::from(k % 2), (-0.99_f64).powi(k / 2)];
+    assert_eq!(first_period(two).0, 2);
+}
+
+#[test]
+fn an_orbit_of_a_higher_period_is_found_on_the_way_to_it() {
+    for mu in [0.0, 0.5, -0.5, 0.99, -0.99] {
+        for q in [2, 3, 4, 6, 8] {
+            let y = |k: i32| {
+                let spread = 0.3 + f64::powi(mu, k);
+                [1.0 + spread * f64::from(k % q), 0.5]
+            };
+            assert_eq!(first_period(y).0, q as usize, "multiplier {mu}, period {q}");
+        }
+    }
 }

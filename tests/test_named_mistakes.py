@@ -1,0 +1,149 @@
+"""Mistakes and failures are told by their name: the argument, the component, the line."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import filippov as fl
+import numpy as np
+import pytest
+
+RELAY = fl.System(lambda t, x: [-np.sign(x[0])], n=1, states=["z"])
+
+
+def line_of(function: Any, offset: int) -> str:
+    code = function.__code__
+    return f'File "{code.co_filename}", line {code.co_firstlineno + offset}, in {code.co_name}'
+
+
+def test_the_version_is_that_of_the_core() -> None:
+    text = (Path(__file__).parents[1] / "Cargo.toml").read_text(encoding="utf-8")
+    found = re.search(r'^version = "(.*)"$', text, re.MULTILINE)
+    assert found is not None
+    assert fl.__version__ == found[1]
+
+
+@pytest.mark.parametrize("mode", ["x", "+-0?", None, [2], 3])
+def test_a_mode_that_is_none_is_named(mode: Any) -> None:
+    with pytest.raises(fl.InputError, match=r"^mode: "):
+        RELAY.field(0.0, [0.0], mode)
+
+
+def test_an_argument_that_was_not_declared_says_how_to() -> None:
+    pulled = fl.System(lambda t, x, F=1.0: [F - np.sign(x[0])], n=1)
+    for call in (
+        lambda: pulled.solve((0, 1), [1.0], F=2.0),
+        lambda: pulled.solve((0, 1), [1.0], params={"F": 2.0}),
+        lambda: pulled.ensemble((0, 1), [1.0], F=2.0),
+        lambda: pulled.field(0.0, [1.0], "+", F=2.0),
+    ):
+        with pytest.raises(fl.InputError, match=r"F is an argument .* params=\{'F': value\}\), or take @fl"):
+            call()
+    declared = fl.System(lambda t, x, F=1.0: [F - np.sign(x[0])], n=1, params={"F": 1.0})
+    assert declared.solve((0, 1), [1.0], F=3.0).y[0, -1] == pytest.approx(3.0)
+
+
+def test_misspelled_keywords_name_the_right_one() -> None:
+    pytest.importorskip("xarray")
+    phase, span = fl.Phase(1.0), (0.0, 3.0)
+    scaled = fl.System(lambda t, x, a: [-a * np.sign(x[0])], n=1, params={"a": 1.0})
+    values = {"a": [1.0, 2.0]}
+    for call, message in (
+        (lambda: fl.poincare(RELAY, phase, span, [1.0], tolerence=1e-3), "poincare.*'tolerance'"),
+        (lambda: fl.poincare(RELAY, phase, span, [1.0], rtoll=1e-3), "poincare.*'rtol'"),
+        (
+            lambda: fl.bifurcation_diagram(scaled, phase, span, [1.0], values, transients=3),
+            "bifurcation_diagram.*'transient'",
+        ),
+        (lambda: fl.sweep(scaled, span, [1.0], values, chunksize=3), "sweep.*'chunk_size'"),
+        (lambda: fl.basins(RELAY, None, span, {"z": [1.0, 2.0]}, resolutoin=0.1), "basins.*'resolution'"),
+        (lambda: fl.sweep(scaled, span, [1.0], values, a=3.0), r"parameter of the system: params=\{'a'"),
+    ):
+        with pytest.raises(TypeError, match=message):
+            call()
+
+
+def test_a_sweep_that_cannot_fit_is_refused_before_it_begins() -> None:
+    pytest.importorskip("xarray")
+    pytest.importorskip("zarr")
+    values = np.broadcast_to(np.float64(1.0), 10**6)
+    names = {name: values for name in "abcdef"}
+    system = fl.System(
+        lambda t, x, a, b, c, d, e, f: [-a * np.sign(x[0])], n=1, params=dict.fromkeys("abcdef", 1.0)
+    )
+    for more in ({}, {"store": "never"}):
+        with pytest.raises(fl.InputError, match=r"^params, y0: 10{36} points \(a: 1000000, b: .* GiB"):
+            fl.sweep(system, (0, 1), [1.0], names, **more)
+    assert not Path("never").exists()
+
+
+@pytest.mark.parametrize(
+    ("fun", "message"),
+    [
+        (lambda t, x: [fl.sawtooth(t, 0)], "period: a positive number is needed, not 0"),
+        (lambda t, x: [fl.sawtooth(t, -1.0)], "period: a positive number is needed"),
+        (lambda t, x: [t % 0], "modulo"),
+        (lambda t, x: [x[0] % 0], "by 0"),
+        (lambda t, x: [np.mod(x[0], 0)], "by 0"),
+        (lambda t, x: [x[0] // 0.0], "by 0"),
+    ],
+)
+def test_a_period_of_zero_names_the_line(fun: Any, message: str) -> None:
+    with pytest.raises((fl.TraceError, fl.ModelError), match=message) as raised:
+        fl.solve_ivp(fun, (0, 1), [1.0])
+    assert line_of(fun, 0) in str(raised.value)
+
+
+def test_what_is_not_finite_has_its_component_and_its_line() -> None:
+    def ends(t: Any, x: Any) -> Any:
+        push = np.sign(x[0])
+        pull = np.sqrt(1.0 - t)
+        return [push, pull]
+
+    sol = fl.solve_ivp(ends, (0, 3), [1.0, 0.0])
+    assert not sol.success
+    assert sol.t[-1] == pytest.approx(1.0)
+    assert "component 1 of the right-hand side is NaN" in sol.message
+    assert "At t = 1.0000000" in sol.message
+    assert line_of(ends, 2) in sol.message
+    start = fl.solve_ivp(lambda t, x: [1.0, np.log(x[0])], (0, 1), [-1.0, 0.0])
+    assert "At t = 0.0000000000, x = [-1.0, 0.0]: component 1 of the right-hand side is NaN" in start.message
+    surface = fl.solve_ivp(lambda t, x: [np.sign(np.log(x[0]))], (0, 1), [-1.0])
+    assert "the switching function log(x[0]) is NaN" in surface.message
+
+
+def box(change: Any) -> Any:
+    """Return a black box that changes at t = 1."""
+
+    def fun(t: float, x: Any) -> Any:
+        if float(t) > 1.0:
+            return change()
+        return [math.sin(float(x[0])), -1.0]
+
+    return fun
+
+
+def test_a_black_box_that_raises_keeps_what_was_computed() -> None:
+    def raises() -> None:
+        raise RuntimeError("no more")
+
+    sol = fl.solve_ivp(box(raises), (0, 3), [1.0, 5.0], surfaces=lambda t, x: float(x[1]))
+    assert not sol.success
+    assert 0.0 < sol.t[-1] <= 1.0
+    last = ", ".join(repr(float(value)) for value in sol.y[:, -1])
+    assert f"The last good state is [{last}]. RuntimeError: no more" in sol.message
+    assert line_of(raises, 1) in sol.message
+    assert isinstance(sol.error, RuntimeError)
+
+
+@pytest.mark.parametrize(("value", "message"), [([1.0], "1 values"), (["a", 1.0], ""), (None, "")])
+def test_a_black_box_that_returns_something_else_keeps_what_was_computed(value: Any, message: str) -> None:
+    sol = fl.solve_ivp(box(lambda: value), (0, 3), [1.0, 5.0], surfaces=lambda t, x: float(x[1]))
+    assert not sol.success
+    assert 0.0 < sol.t[-1] <= 1.0
+    assert sol.error is not None
+    assert message in sol.message
+    assert sol.sol(0.5 * sol.t[-1]).shape == (2,)
