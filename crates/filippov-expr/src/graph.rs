@@ -128,6 +128,14 @@ impl Graph {
         }
     }
 
+    /// The index of a node that is a state, else `None`.
+    pub fn as_state(&self, id: NodeId) -> Option<usize> {
+        match *self.node(id) {
+            Node::State(index) => Some(index as usize),
+            _ => None,
+        }
+    }
+
     pub(crate) fn facts(&self, id: NodeId) -> Facts {
         self.facts[id.index()]
     }

@@ -10,6 +10,9 @@ use crate::solution::{Segment, Solution, Step, Switch, UserZero};
 use crate::stepper::Interpolant;
 use crate::tolerances::LATEST_SWITCHES;
 
+/// Room that is made at once for so many steps and switches: more of them take more room then.
+const USUAL_LENGTH: usize = 64;
+
 /// Keeps what a run produces, as far as it is wanted.
 ///
 /// The last switches are kept in any case: they tell whether switches accumulate.
@@ -39,17 +42,18 @@ impl Recorder {
         let keeps_steps = options.keep == Keep::Steps;
         let keep_dense = keeps_steps && options.dense_output;
         let wanted = options.t_eval.clone().filter(|_| !keep_dense);
+        let room = if keeps_steps { USUAL_LENGTH } else { 0 };
         Recorder {
             n,
             keep: options.keep,
-            t: Vec::new(),
-            y: Vec::new(),
+            t: Vec::with_capacity(room),
+            y: Vec::with_capacity(room * n),
             y0: vec![0.0; n],
             keep_dense,
             steps: Vec::new(),
             coefficients: Vec::new(),
-            segments: Vec::new(),
-            switches: Vec::new(),
+            segments: Vec::with_capacity(room),
+            switches: Vec::with_capacity(room),
             jump: None,
             is_sampled: wanted.is_some(),
             wanted: wanted.unwrap_or_default(),
@@ -164,9 +168,12 @@ impl Recorder {
             return;
         }
         if self.keep_dense {
-            let from = self.coefficients.len();
-            self.coefficients
-                .extend_from_slice(interpolant.coefficients());
+            let (from, coefficients) = (self.coefficients.len(), interpolant.coefficients());
+            if from == 0 {
+                self.steps.reserve(USUAL_LENGTH);
+                self.coefficients.reserve(USUAL_LENGTH * coefficients.len());
+            }
+            self.coefficients.extend_from_slice(coefficients);
             self.steps.push(Step {
                 t0,
                 dt,

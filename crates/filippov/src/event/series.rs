@@ -72,22 +72,26 @@ impl<'a> Series<'a> {
         self.0.iter().rev().fold(0.0, |value, c| value * theta + c)
     }
 
-    /// What is known about the zeros on [0, 1]. Looks at the sum of the falling terms, then at the signs of the
-    /// Bernstein coefficients, which change at least as often as those of the polynomial (Descartes' rule).
-    pub fn zeros(&self) -> Zeros {
+    /// Is the polynomial positive on [0, 1] for its falling terms alone?
+    pub fn is_far_from_zero(&self) -> bool {
         let falling: f64 = self.0[1..].iter().map(|c| c.min(0.0)).sum();
-        if self.0[0] + falling > 0.0 {
-            return Zeros::Nowhere;
-        }
+        self.0[0] + falling > 0.0
+    }
+
+    /// What is known about the zeros on [0, `to`], by the signs of the Bernstein coefficients there, which change at
+    /// least as often as those of the polynomial (Descartes' rule).
+    pub fn zeros(&self, to: f64) -> Zeros {
         let mut coefficients = LongestSeries::default();
         let b = &mut coefficients[..self.0.len()];
-        // The coefficient of degree i is the sum of C(i, k)/C(n, k) c_k.
+        // The coefficient of degree i is the sum of C(i, k)/C(n, k) c_k to^k.
         let degree = b.len() - 1;
-        let mut size = 0.0;
+        let (mut size, mut power) = (0.0, 1.0);
         let weights = &INVERSE_BINOMIALS[degree];
         for ((b, c), weight) in b.iter_mut().zip(self.0).zip(weights) {
+            let c = c * power;
             size += c.abs();
             *b = weight * c;
+            power *= to;
         }
         sum_binomially(b);
         if b.iter().all(|&b| b > 0.0) {
@@ -103,7 +107,7 @@ impl<'a> Series<'a> {
         // Where the polygon of the coefficients falls through zero.
         let (left, right) = (positive - 1, degree + 1 - negative);
         let share = b[left] / (b[left] - b[right]) * (right - left) as f64;
-        Zeros::One((left as f64 + share) / degree as f64)
+        Zeros::One(to * (left as f64 + share) / degree as f64)
     }
 
     /// About where the polynomial, positive at 0, first falls through zero on [0, 1], found by a few samples and
@@ -171,17 +175,28 @@ impl<'a> Series<'a> {
     }
 }
 
-/// Makes entry i the sum of C(i, k) b_k: a triangle of sums of neighbours, two rows of it at a time.
+/// Rows of the triangle that are summed at a time.
+const ROWS: usize = 4;
+
+/// Makes entry i the sum of C(i, k) b_k: a triangle of sums of neighbours, some rows of it at a time.
 fn sum_binomially(mut b: &mut [f64]) {
-    while let [first, second, rest @ ..] = b {
-        let mut before = *second;
-        *second += *first;
-        let mut above = *second;
+    while b.len() > 1 {
+        let end = ROWS.min(b.len());
+        let (first, rest) = std::mem::take(&mut b).split_at_mut(end);
+        // The entry before in each row.
+        let mut before = [0.0; ROWS];
+        for (i, entry) in first.iter_mut().enumerate() {
+            for neighbour in &mut before[..i] {
+                *entry += std::mem::replace(neighbour, *entry);
+            }
+            before[i] = *entry;
+        }
         for entry in rest.iter_mut() {
-            let sum = *entry + before;
-            before = *entry;
-            *entry = sum + above;
-            above = sum;
+            let mut sum = *entry;
+            for neighbour in &mut before {
+                sum += std::mem::replace(neighbour, sum);
+            }
+            *entry = sum;
         }
         b = rest;
     }
@@ -199,18 +214,22 @@ mod tests {
             let series = Series::new(&coefficients);
             let lowest = (0..=100).map(|k| series.value(f64::from(k) * 0.01));
             assert_eq!(lowest.fold(f64::INFINITY, f64::min) > 1e-9, is_above);
-            assert_eq!(series.zeros(), Zeros::Unknown);
+            assert_eq!(series.zeros(1.0), Zeros::Unknown);
         }
+        assert!(Series::new(&[1.0, -0.5, 1.0, -0.4]).is_far_from_zero());
         // Bernstein coefficients tell where the falling terms do not.
-        assert_eq!(Series::new(&[1.0, -1.5, 1.0, 0.0]).zeros(), Zeros::Nowhere);
-        assert_eq!(Series::new(&[1.0, -2.5, 1.6]).zeros(), Zeros::Unknown);
+        let turning = [1.0, -1.5, 1.0, 0.0];
+        let series = Series::new(&turning);
+        assert!(!series.is_far_from_zero());
+        assert_eq!(series.zeros(1.0), Zeros::Nowhere);
+        assert_eq!(Series::new(&[1.0, -2.5, 1.6]).zeros(1.0), Zeros::Unknown);
     }
 
     #[test]
     fn one_change_of_sign_is_one_zero() {
         // (1 - 2 theta) (1 + theta + theta^2)
         let series = Series::new(&[1.0, -1.0, -1.0, -2.0]);
-        let Zeros::One(guess) = series.zeros() else {
+        let Zeros::One(guess) = series.zeros(1.0) else {
             panic!("not found");
         };
         let (zero, slope) = series.newton(guess).unwrap();
@@ -218,8 +237,21 @@ mod tests {
         assert!((zero - 0.5).abs() < 1e-6 && (slope + 3.5).abs() < 1e-2);
         // Touching zero, or vanishing at an end, is not decided.
         for coefficients in [[0.25, -1.0, 1.0], [1.0, -1.0, 0.0], [0.0, 1.0, -2.0]] {
-            assert_eq!(Series::new(&coefficients).zeros(), Zeros::Unknown);
+            assert_eq!(Series::new(&coefficients).zeros(1.0), Zeros::Unknown);
         }
+    }
+
+    #[test]
+    fn of_several_zeros_the_first_is_told_apart() {
+        // (0.3 - theta) (0.9 - theta)
+        let coefficients = [0.27, -1.2, 1.0];
+        let series = Series::new(&coefficients);
+        assert_eq!(series.zeros(1.0), Zeros::Unknown);
+        let Zeros::One(guess) = series.zeros(0.4) else {
+            panic!("not found");
+        };
+        assert!((guess - 0.3).abs() < 0.1);
+        assert_eq!(series.zeros(0.2), Zeros::Nowhere);
     }
 
     #[test]

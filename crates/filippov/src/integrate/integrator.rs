@@ -94,6 +94,8 @@ pub struct Integrator<'a> {
     pub(super) last_switch: (f64, u32),
     /// What its decision found of the root that the next motion begins at.
     pub(super) decided: DecidedRoot,
+    /// How long a step the series allows that was taken at the start of the motion, until the step.
+    pub(super) series_reach: Option<f64>,
     /// Exit functions of this mode whose multipliers were held at their ends, with what they may go beyond.
     pub(super) slacks: Vec<(usize, f64)>,
 }
@@ -163,6 +165,7 @@ impl<'a> Integrator<'a> {
             chatter: None,
             last_switch: (f64::NAN, 0),
             decided: DecidedRoot::default(),
+            series_reach: None,
             slacks: Vec::new(),
         })
     }

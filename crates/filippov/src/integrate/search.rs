@@ -124,17 +124,28 @@ impl Integrator<'_> {
             let polynomial = self.as_polynomial(&m, rows);
             let mut near = None;
             if let Polynomial::Quotient(series) | Polynomial::Powers(series) = &polynomial {
-                match series.zeros() {
-                    Zeros::Nowhere if value > 0.0 => return Ok((None, reach)),
-                    Zeros::One(guess) if value < 0.0 => {
-                        if let Some(theta) = self.only_zero(index, series, guess, dt)? {
+                if value > 0.0 && series.is_far_from_zero() {
+                    return Ok((None, reach));
+                }
+                let mut zeros = (series.zeros(1.0), 1.0);
+                if let Zeros::Unknown = zeros.0 {
+                    near = series.near_zero();
+                    // A long step has several zeros: not far beyond the first there is one.
+                    if let Some(Near { theta, .. }) = near {
+                        let to = (BEYOND_GUESS * theta).min(1.0);
+                        zeros = (series.zeros(to), to);
+                    }
+                }
+                match zeros {
+                    (Zeros::Nowhere, 1.0) if value > 0.0 => return Ok((None, reach)),
+                    (Zeros::One(guess), to) if value < 0.0 || to < 1.0 => {
+                        if let Some(theta) = self.only_zero(index, series, (guess, to), dt)? {
                             let searched = (theta + self.together(dt)).min(reach);
                             return Ok((Some((theta, false)), searched));
                         }
                     }
                     _ => {}
                 }
-                near = series.near_zero();
             }
             return self.search_near((index, true), &polynomial, near, reach, dt);
         }
@@ -165,30 +176,37 @@ impl Integrator<'_> {
         stages.is_none_or(|stages| !is_known || may_vanish_between(stages))
     }
 
-    /// The only zero of a series, to rounding; `None` if rounding matters for whether it is one.
+    /// The only zero of a series up to `to`, near `guess`, to rounding; `None` if rounding matters for whether it is
+    /// one.
     fn only_zero(
         &mut self,
         index: usize,
         series: &Series,
-        guess: f64,
+        (guess, to): (f64, f64),
         dt: f64,
     ) -> Result<Option<f64>, FieldError> {
         let noise = self.noise_of(self.motion.monitored[index].function)?;
         self.motion.monitored[index].noise = noise;
-        let (g_lo, g_hi) = (series.value(0.0), self.detector.right[index].0);
-        let (guess, slope) = series.newton(guess).unwrap_or((guess, g_hi - g_lo));
-        let bracket = Bracket {
+        let g_lo = series.value(0.0);
+        let g_hi = match to {
+            1.0 => self.detector.right[index].0,
+            _ => series.value(to),
+        };
+        let mut bracket = Bracket {
             lo: 0.0,
-            hi: 1.0,
+            hi: to,
             g_lo,
             g_hi,
             guess,
-            slope,
+            slope: g_hi - g_lo,
         };
         if g_lo <= noise || g_hi >= -noise || !bracket.is_steep(g_lo.max(-g_hi), noise) {
             return Ok(None);
         }
         let width = 0.5 * EPS * (self.t.abs() / dt).max(1.0);
+        if let Some((theta, slope)) = series.newton(guess) {
+            (bracket.guess, bracket.slope) = (theta, slope);
+        }
         let mut g = |theta: f64| Ok(series.value(theta));
         Ok(Some(refine(&mut g, bracket, width)?.theta))
     }

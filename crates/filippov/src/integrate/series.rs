@@ -107,18 +107,19 @@ impl Integrator<'_> {
         let (Some(taylor), Some(jets)) = (&mut self.stepper.taylor, &self.motion.jets) else {
             return Ok(());
         };
-        if taylor.is_expanded() {
-            return Ok(());
-        }
-        let (system, t, x) = (self.system, self.t, &self.x);
-        let signs = multipliers_in(&self.motion, &self.detector.stages);
-        let signs = signs.as_deref().unwrap_or(&self.motion.signs);
-        let fill = |rows: &mut [f64]| system.eval_jets(jets, t, x, signs, rows);
-        let mut allowed = taylor.expand(jets.width(), x, &self.scale, fill);
-        self.stats.n_field_evaluations += jets.cost();
-        if jets.width() > x.len() {
-            allowed = allowed.min(self.longest_for_functions(allowed));
-        }
+        let allowed = match self.series_reach.take() {
+            Some(allowed) => allowed,
+            None if taylor.is_expanded() => return Ok(()),
+            None => {
+                let (system, t, x) = (self.system, self.t, &self.x);
+                let signs = multipliers_in(&self.motion, &self.detector.stages);
+                let signs = signs.as_deref().unwrap_or(&self.motion.signs);
+                let fill = |rows: &mut [f64]| system.eval_jets(jets, t, x, signs, rows);
+                let allowed = taylor.expand(jets.width(), x, &self.scale, fill);
+                self.stats.n_field_evaluations += jets.cost();
+                self.limited_by_functions(allowed)
+            }
+        };
         if allowed > TAYLOR_SHORTEST * EPS * self.t.abs() {
             self.dt = self.dt.min(allowed);
             return Ok(());
@@ -129,6 +130,39 @@ impl Integrator<'_> {
         self.dt = f64::NAN;
         self.dt = self.first_step(&[])?;
         Ok(())
+    }
+
+    /// Starts a motion in a region with its series: the derivative there is the first coefficient. `false` if it has
+    /// none, or none that is finite. Sliding starts with its field: next to a two-fold its series is not accurate.
+    pub(super) fn start_with_series(&mut self) -> bool {
+        let (Some(taylor), Some(jets)) = (&mut self.stepper.taylor, &self.motion.jets) else {
+            return false;
+        };
+        if !self.motion.sliding.is_empty() {
+            return false;
+        }
+        let (system, t, x) = (self.system, self.t, &self.x);
+        let signs = &self.motion.signs;
+        let fill = |rows: &mut [f64]| system.eval_jets(jets, t, x, signs, rows);
+        let allowed = taylor.expand(jets.width(), x, &self.scale, fill);
+        if allowed.is_nan() {
+            taylor.forget();
+            return false;
+        }
+        taylor.start_from_series();
+        self.stats.n_field_evaluations += jets.cost();
+        self.series_reach = Some(self.limited_by_functions(allowed));
+        true
+    }
+
+    /// The length of step that the states allow, or the monitored functions if they allow less.
+    fn limited_by_functions(&self, allowed: f64) -> f64 {
+        match &self.motion.jets {
+            Some(jets) if jets.width() > self.x.len() => {
+                allowed.min(self.longest_for_functions(allowed))
+            }
+            _ => allowed,
+        }
     }
 
     /// How long a step the series of the monitored functions suggest: until their last terms reach the tolerance of
@@ -211,9 +245,7 @@ impl Integrator<'_> {
         let (Some(place), Some(taylor)) = (place, &self.stepper.taylor) else {
             return false;
         };
-        for (row, c) in rows.iter_mut().zip(taylor.column(place)) {
-            *row = c;
-        }
+        taylor.column(place, rows);
         let own = |slack: &&(usize, f64)| m.function.exit_index() == Some(slack.0);
         rows[0] += self.slacks.iter().find(own).map_or(0.0, |slack| slack.1);
         true

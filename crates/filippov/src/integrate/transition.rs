@@ -342,23 +342,7 @@ impl Integrator<'_> {
         }
         self.motion.project(self.t, &mut self.x)?;
         self.rest_on_coinciding()?;
-        let derivative = self.stepper.start_derivative_mut();
-        match &mut self.motion.field {
-            ModeField::Region(_) => {
-                let signs = &self.motion.signs;
-                self.stats.n_field_evaluations +=
-                    eval_on_side(self.system, self.t, &self.x, signs, derivative)?;
-            }
-            field => {
-                field.eval(self.t, &mut self.x, derivative)?;
-                self.detector.stages.clear();
-                let exits = field.last_exits();
-                self.detector
-                    .stages
-                    .extend(exits.iter().map(|&exit| [exit; 7]));
-                self.go_without_equations();
-            }
-        }
+        self.evaluate_start()?;
         self.note_oscillation();
         let multipliers = self.motion.multipliers();
         self.recorder.begin_segment(
@@ -387,5 +371,26 @@ impl Integrator<'_> {
         self.controller.restart();
         self.dt = self.first_step(left)?;
         Ok(None)
+    }
+
+    /// The derivative at the start of the motion, and its exit functions there.
+    fn evaluate_start(&mut self) -> Result<(), FieldError> {
+        self.series_reach = None;
+        if self.start_with_series() {
+            // Known.
+        } else if let ModeField::Region(_) = &self.motion.field {
+            let (signs, derivative) = (&self.motion.signs, self.stepper.start_derivative_mut());
+            self.stats.n_field_evaluations +=
+                eval_on_side(self.system, self.t, &self.x, signs, derivative)?;
+        } else {
+            let derivative = self.stepper.start_derivative_mut();
+            self.motion.field.eval(self.t, &mut self.x, derivative)?;
+            self.go_without_equations();
+        }
+        let exits = self.motion.field.last_exits();
+        self.detector.stages.clear();
+        let stages = exits.iter().map(|&exit| [exit; 7]);
+        self.detector.stages.extend(stages);
+        Ok(())
     }
 }

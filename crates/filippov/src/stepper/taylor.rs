@@ -97,6 +97,12 @@ impl Taylor {
         self.longest_step(y, scale)
     }
 
+    /// Makes the derivative at the start the one that the coefficients tell.
+    pub fn start_from_series(&mut self) {
+        let row = self.width..self.width + self.n;
+        self.step.start_derivative.copy_from_slice(&self.rows[row]);
+    }
+
     /// The start of the step has changed.
     pub fn forget(&mut self) {
         self.is_expanded = false;
@@ -107,15 +113,14 @@ impl Taylor {
         self.rows[k * self.width + place]
     }
 
-    /// Column `place` of the coefficients, in powers of theta.
-    pub fn column(&self, place: usize) -> impl Iterator<Item = f64> + '_ {
-        let rows = self.rows.iter().skip(place).step_by(self.width);
+    /// Writes column `place` of the coefficients, in powers of theta.
+    pub fn column(&self, place: usize, to: &mut [f64]) {
         let dt = self.step.interpolant.dt;
-        rows.scan(1.0, move |power, c| {
-            let scaled = c * *power;
-            *power *= dt;
-            Some(scaled)
-        })
+        let mut power = 1.0;
+        for (to, row) in to.iter_mut().zip(self.rows.chunks_exact(self.width)) {
+            *to = row[place] * power;
+            power *= dt;
+        }
     }
 
     fn row(&self, k: usize) -> &[f64] {
@@ -211,11 +216,10 @@ impl Taylor {
             .as_chunks_mut::<N>();
         scaled[0].copy_from_slice(y);
         let mut power = dt;
-        let rows = self.rows.chunks_exact(self.width).skip(1);
+        let rows = self.rows[self.width..].chunks_exact(self.width);
         for (to, from) in scaled[1..].iter_mut().zip(rows) {
-            let from = &from[..N];
-            for i in 0..N {
-                to[i] = from[i] * power;
+            for (to, from) in to.iter_mut().zip(&from[..N]) {
+                *to = from * power;
             }
             power *= dt;
         }

@@ -32,6 +32,8 @@ pub(super) struct Model {
     rates_program: OnceLock<TieredProgram>,
     affine_signs: OnceLock<AffineModel>,
     pub affine: Vec<bool>,
+    /// The only switching function, if it is a state: nothing needs to be computed then.
+    pub only_state: Option<usize>,
     /// Do switching functions contain signs of others?
     pub is_nested: bool,
     pub is_analytic: bool,
@@ -42,6 +44,8 @@ pub(super) struct Model {
     enclosed_components: Vec<OnceLock<Option<EnclosureProgram>>>,
     rate_gradients: Vec<OnceLock<TieredProgram>>,
     lie: Mutex<LieCache>,
+    /// Second derivatives along the field of one side, asked for at the end of every slide.
+    second_lie: Vec<[OnceLock<Arc<LieProgram>>; 2]>,
     /// Ratio of static to kinetic friction, where it is not 1.
     sticking: FxHashMap<usize, TieredProgram>,
     /// The nodes of these ratios.
@@ -85,9 +89,9 @@ type JacobianCache = FxHashMap<SmallVec<[usize; 2]>, Option<Arc<MotionJacobian>>
 const MOST_JACOBIANS: usize = 64;
 
 /// Output 0 is the derivative, the others its terms.
-pub(super) struct LieProgram {
+struct LieProgram {
     node: NodeId,
-    pub program: TieredProgram,
+    program: TieredProgram,
 }
 
 impl Model {
@@ -109,6 +113,10 @@ impl Model {
         Ok(Model {
             n_states: field.len(),
             is_analytic: graph.is_analytic(&field) && graph.is_analytic(&surfaces),
+            only_state: match surfaces[..] {
+                [h] => graph.as_state(h),
+                _ => None,
+            },
             affine: surfaces.iter().map(|&h| graph.is_affine(h)).collect(),
             is_nested: graph.sign_dependencies(&surfaces, &[]).contains(&true),
             gradients: surfaces.iter().map(|_| OnceLock::new()).collect(),
@@ -122,6 +130,7 @@ impl Model {
             watched: Vec::new(),
             switching: OnceLock::new(),
             lie: Mutex::new(LieCache::default()),
+            second_lie: surfaces.iter().map(|_| Default::default()).collect(),
             jets: Mutex::default(),
             jacobians: Mutex::default(),
             activity: Mutex::default(),
@@ -425,8 +434,24 @@ impl Model {
         }
     }
 
-    /// The program of a Lie derivative, made when it is first needed.
-    pub fn lie_derivative(&self, i: usize, j: usize, word: Word) -> Arc<LieProgram> {
+    /// Calls a function with the program of a Lie derivative, which is made when it is first needed.
+    pub fn with_lie_derivative<R>(
+        &self,
+        (i, j): (usize, usize),
+        word: Word,
+        f: impl FnOnce(&Program) -> R,
+    ) -> R {
+        match *word {
+            [first, second] if i == j && first == second => {
+                let known = &self.second_lie[j][usize::from(first > 0)];
+                let made = known.get_or_init(|| self.lie_derivative(i, j, word));
+                f(made.program.program())
+            }
+            _ => f(self.lie_derivative(i, j, word).program.program()),
+        }
+    }
+
+    fn lie_derivative(&self, i: usize, j: usize, word: Word) -> Arc<LieProgram> {
         let mut cache = self.lie.lock().unwrap_or_else(PoisonError::into_inner);
         self.lie(&mut cache, i, j, word)
     }

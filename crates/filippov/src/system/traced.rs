@@ -2,13 +2,13 @@
 
 mod affine;
 
-use std::borrow::Cow;
 use std::sync::Arc;
 
 use filippov_expr::{Backend, Enclosure, ExprError, Graph, Motion, Names, NodeId};
 
 use super::compiled::{CompiledGradient, GradientValues, Model};
 use super::discrete::DiscreteStates;
+use super::tiered::TieredProgram;
 use super::{
     AffineSigns, BothSides, LieValue, MotionJacobian, MotionJets, PiecewiseSystem, RatePartials,
     Word,
@@ -155,25 +155,37 @@ impl TracedSystem {
         Ok(())
     }
 
-    /// The derivative of h_j in t, then those by the states that it depends on.
-    fn gradient_values(
+    /// Calls a function with the derivative of h_j in t and those by the listed states, in their order.
+    #[inline(always)]
+    fn with_gradient<R>(
         &self,
-        j: usize,
-        t: f64,
-        x: &[f64],
-        signs: &[f64],
-    ) -> (&CompiledGradient, Cow<'_, [f64]>) {
-        let compiled = self.model.gradient(j);
-        let values = match &compiled.values {
-            GradientValues::Constant(values) => Cow::Borrowed(&values[..]),
+        (j, signs): (usize, &[f64]),
+        (t, x): (f64, &[f64]),
+        f: impl FnOnce(f64, &[usize], &[f64]) -> R,
+    ) -> R {
+        let CompiledGradient { states, values } = self.model.gradient(j);
+        let computed;
+        let values = match values {
+            GradientValues::Constant(values) => values,
             GradientValues::Computed(tiered) => {
-                let program = tiered.program();
-                let mut computed = vec![0.0; program.n_outputs()];
-                self.with_values(|p| program.eval(t, x, signs, p, &[], &mut computed));
-                Cow::Owned(computed)
+                computed = self.computed_gradient(tiered, (t, x), signs);
+                &computed
             }
         };
-        (compiled, values)
+        f(values[0], states, &values[1..])
+    }
+
+    #[inline(never)]
+    fn computed_gradient(
+        &self,
+        tiered: &TieredProgram,
+        (t, x): (f64, &[f64]),
+        signs: &[f64],
+    ) -> Vec<f64> {
+        let program = tiered.program();
+        let mut computed = vec![0.0; program.n_outputs()];
+        self.with_values(|p| program.eval(t, x, signs, p, &[], &mut computed));
+        computed
     }
 }
 
@@ -198,6 +210,10 @@ impl PiecewiseSystem for TracedSystem {
     }
 
     fn surfaces(&self, t: f64, x: &[f64], signs: &[f64], h: &mut [f64]) -> Result<(), FieldError> {
+        if let Some(i) = self.model.only_state {
+            h[0] = x[i];
+            return Ok(());
+        }
         let program = self.model.surfaces_program.program();
         self.with_values(|p| program.eval(t, x, signs, p, &[], h));
         Ok(())
@@ -213,6 +229,10 @@ impl PiecewiseSystem for TracedSystem {
         rate: &mut [f64],
     ) -> Result<(), FieldError> {
         let d = h.len();
+        if let Some(i) = self.model.only_state {
+            (h[0], rate[0]) = (x[i], v[i]);
+            return Ok(());
+        }
         let program = self.model.rates();
         if d == 1 {
             let mut out = [0.0; 2];
@@ -235,12 +255,15 @@ impl PiecewiseSystem for TracedSystem {
         signs: &[f64],
         gradient: &mut [f64],
     ) -> Result<f64, FieldError> {
-        let (compiled, values) = self.gradient_values(j, t, x, signs);
-        gradient.fill(0.0);
-        for (&state, &value) in compiled.states.iter().zip(&values[1..]) {
-            gradient[state] = value;
-        }
-        Ok(values[0])
+        Ok(
+            self.with_gradient((j, signs), (t, x), |time, states, values| {
+                gradient.fill(0.0);
+                for (&state, &value) in states.iter().zip(values) {
+                    gradient[state] = value;
+                }
+                time
+            }),
+        )
     }
 
     fn gradient_products(
@@ -251,27 +274,32 @@ impl PiecewiseSystem for TracedSystem {
         vectors: &[f64],
         products: &mut [f64],
     ) -> Result<f64, FieldError> {
-        let (compiled, values) = self.gradient_values(j, t, x, signs);
-        if let &[i] = &compiled.states[..] {
-            let (slope, n) = (values[1], x.len());
-            let vectors = &vectors[..n * products.len()];
-            for (k, product) in products.iter_mut().enumerate() {
-                *product = slope * vectors[k * n + i];
-            }
-            return Ok(values[0]);
-        }
-        for (product, vector) in products.iter_mut().zip(vectors.chunks_exact(x.len())) {
-            let entries = compiled.states.iter().zip(&values[1..]);
-            *product = entries.map(|(&i, value)| value * vector[i]).sum();
-        }
-        Ok(values[0])
+        Ok(
+            self.with_gradient((j, signs), (t, x), |time, states, values| {
+                let vectors = vectors.chunks_exact(x.len());
+                if let (&[i], &[slope]) = (states, values) {
+                    for (product, vector) in products.iter_mut().zip(vectors) {
+                        *product = slope * vector[i];
+                    }
+                    return time;
+                }
+                for (product, vector) in products.iter_mut().zip(vectors) {
+                    let entries = states.iter().zip(values);
+                    *product = entries.map(|(&i, value)| value * vector[i]).sum();
+                }
+                time
+            }),
+        )
     }
 
     fn surface_size(&self, j: usize, t: f64, x: &[f64], signs: &[f64]) -> Result<f64, FieldError> {
-        let (compiled, values) = self.gradient_values(j, t, x, signs);
-        let entries = compiled.states.iter().zip(&values[1..]);
-        let size: f64 = entries.map(|(&i, value)| (value * x[i]).abs()).sum();
-        Ok(size + (values[0] * t).abs())
+        Ok(
+            self.with_gradient((j, signs), (t, x), |time, states, values| {
+                let entries = states.iter().zip(values);
+                let size: f64 = entries.map(|(&i, value)| (value * x[i]).abs()).sum();
+                size + (time * t).abs()
+            }),
+        )
     }
 
     fn both_sides(
@@ -346,22 +374,21 @@ impl PiecewiseSystem for TracedSystem {
         x: &[f64],
         signs: &[f64],
     ) -> Result<LieValue, FieldError> {
-        let lie = self.model.lie_derivative(i, j, word);
-        let mut small = [0.0; MOST_TERMS];
-        let mut large = Vec::new();
-        let program = lie.program.program();
-        let count = program.n_outputs();
-        let out = if count <= small.len() {
-            &mut small[..count]
-        } else {
-            large.resize(count, 0.0);
-            &mut large[..]
-        };
-        self.with_values(|p| program.eval(t, x, signs, p, &[], out));
-        Ok(LieValue {
-            value: out[0],
-            magnitude: out[1..].iter().map(|v| v.abs()).sum(),
-        })
+        Ok(self.model.with_lie_derivative((i, j), word, |program| {
+            let (mut small, mut large) = ([0.0; MOST_TERMS], Vec::new());
+            let count = program.n_outputs();
+            let out = if count <= small.len() {
+                &mut small[..count]
+            } else {
+                large.resize(count, 0.0);
+                &mut large[..]
+            };
+            self.with_values(|p| program.eval(t, x, signs, p, &[], out));
+            LieValue {
+                value: out[0],
+                magnitude: out[1..].iter().map(|v| v.abs()).sum(),
+            }
+        }))
     }
 
     fn first_lie_derivatives(
