@@ -45,9 +45,9 @@ def verify(
 ) -> None:
     """Compare the traced field with the function it came from, at `y0` and at points around it.
 
-    Points on a surface, where the function raises, and where either result is not finite are skipped. A right-hand
-    side may have a value of its own at a point that the motion leaves, as ``sign((t - 1)**2)`` at t = 1: what counts
-    is that they agree just behind it.
+    Points on a surface, where the function raises, and where either result is not finite are skipped. A
+    right-hand side may have a value of its own at a point that the motion leaves, as ``sign((t - 1)**2)`` at
+    t = 1: what counts is that they agree just behind it.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def verify(
 def _difference(
     system: TracedSystem, fun: Callable[[float, Vector], Any], t: float, x: Vector, values: Vector
 ) -> tuple[int, Vector, Vector] | None:
-    """Return the component that differs most at a point, and both results; None where they agree or nothing is known."""
+    """Return the component that differs most at a point, and both results; None where none is known to."""
     signs = consistent_signs(system, t, x, values)
     if signs is None:
         return None

@@ -1,6 +1,7 @@
 //! A system given by a traced expression graph.
 
 mod affine;
+mod rounding;
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -15,7 +16,7 @@ use super::{
 };
 use crate::error::FieldError;
 use crate::stepper::Linearisation;
-use crate::tolerances::{MAX_LIE_ORDER, TANGENT};
+use crate::tolerances::{MAX_LIE_ORDER, SURFACE_NOISE, TANGENT};
 
 /// Up to that many states both sides of a surface are compiled into one program; the programs of
 /// larger systems would take longer to compile than they save.
@@ -271,7 +272,12 @@ impl PiecewiseSystem for TracedSystem {
         let (compiled, values) = self.gradient_values(j, t, x, signs);
         let entries = compiled.states.iter().zip(&values[1..]);
         let size: f64 = entries.map(|(&i, value)| (value * x[i]).abs()).sum();
-        Ok(size + (values[0] * t).abs())
+        let size = size + (values[0] * t).abs();
+        if self.is_affine(j) {
+            return Ok(size);
+        }
+        // Terms may cancel where the gradient vanishes.
+        Ok(size.max(self.rounding_of_surface(j, t, x, signs) / SURFACE_NOISE))
     }
 
     fn both_sides(
