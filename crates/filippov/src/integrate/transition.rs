@@ -277,7 +277,7 @@ impl Integrator<'_> {
         let &[j] = self.motion.sliding() else {
             return Ok(None);
         };
-        if n_exits(event) == 0 || !surfaces.is_empty() {
+        if n_exits(event) == 0 || !surfaces.is_empty() || !self.may_lose_multiplier() {
             return Ok(None);
         }
         let Some((t, end)) = self.beyond_double_zero(j)? else {

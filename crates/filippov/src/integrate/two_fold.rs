@@ -15,7 +15,7 @@ use crate::switching::{weight_at_two_fold, Matrix};
 use crate::system::{dot, dot_magnitude, RatePartials};
 use crate::tolerances::{
     AT_TWO_FOLD, EPS, INSIDE_SHARES, KNOWN_MULTIPLIER, LOST_MULTIPLIER, MOST_DOUBLINGS,
-    NEWTON_STEPS, SETTLED, TANGENT,
+    NEWTON_STEPS, SETTLED, SMALL_JUMP, TANGENT,
 };
 
 impl Integrator<'_> {
@@ -234,6 +234,18 @@ impl Integrator<'_> {
             functions: smallvec![EventFunction::ExitMinus, EventFunction::ExitPlus],
             touch: false,
         }))
+    }
+
+    /// Is the difference of the normal components at the end of the step so small, compared with the speed, that the
+    /// multiplier may be lost? Far from it nothing else has to be looked at.
+    pub(super) fn may_lose_multiplier(&self) -> bool {
+        let [minus, plus, ..] = self.detector.stages.as_slice() else {
+            return false;
+        };
+        let speed = self.stepper.end_derivative().iter();
+        let speed = speed.fold(0.0_f64, |most, v| most.max(v.abs()));
+        let least = minus[0].min(minus[6]) + plus[0].min(plus[6]);
+        least <= (SMALL_JUMP * self.options.rtol).min(1.0) * speed
     }
 
     /// Does the share of f+ change fast in the step just made, towards a two-fold?

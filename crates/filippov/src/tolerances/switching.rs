@@ -252,6 +252,10 @@ pub const AT_TWO_FOLD: f64 = 10.0;
 /// error that its tolerance allows, and to a tenth where stages of explicit steps are stiff.
 pub const LOST_MULTIPLIER: f64 = 100.0;
 
+/// A multiplier is not lost where the difference is above this multiple of the tolerance, relative to the speed: gradients of
+/// normal components a hundred times larger than what they are made of are not expected.
+pub const SMALL_JUMP: f64 = 1e4;
+
 /// A multiplier was lost, and not at its end, where the shares of both fields beyond are above this.
 pub const INSIDE_SHARES: f64 = 0.05;
 
