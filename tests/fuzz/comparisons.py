@@ -19,6 +19,8 @@ Comparison = Callable[[Problem, fl.Solution], Iterator[str]]
 
 SHIFT = 2.0  # of time: a power of two, so that no rounding is added
 STEPS = 400  # of Euler's method per unit of time
+METHODS_APART = 1000.0  # some hundred steps, each with its local error
+ROUNDING_APART = 10.0  # the same steps but for rounding, which may shift one of them
 
 
 def comparisons(problem: Problem, sol: fl.Solution, number: int) -> Iterator[str]:
@@ -146,7 +148,7 @@ def _other_method(problem: Problem, sol: fl.Solution) -> Iterator[str]:
         options = {**LIMITS, "method": method, "rtol": 1e-11, "atol": 1e-11}
         return fl.solve_ivp(problem.rhs, (0.0, problem.t_end), y0, resets=problem.resets, **options)
 
-    yield from _same(problem, sol, run, lambda y: y)
+    yield from _same(problem, sol, run, lambda y: y, METHODS_APART)
 
 
 def _euler(problem: Problem, sol: fl.Solution) -> Iterator[str]:
@@ -205,21 +207,23 @@ def _same(
     sol: fl.Solution,
     run: Callable[[Array], fl.Solution],
     back: Callable[[Array], Array],
+    apart: float = ROUNDING_APART,
 ) -> Iterator[str]:
-    """Compare the ends, unless the motion is so sensitive that rounding and local errors decide."""
+    """Compare the ends, unless the motion is so sensitive that rounding and local errors decide.
+
+    They may be `apart` by that many local errors, and a tenth of that many times the sensitivity.
+    """
     if not _is_certain(sol):
         return
     y0 = np.array(problem.y0)
     other = run(y0)
     error = np.abs(back(other.y[:, -1]) - sol.y[:, -1]).max() if other.success else np.inf
     tolerance = problem.tolerance * (1.0 + np.abs(sol.y).max())
-    # Some hundred steps, each with its local error.
-    if error <= 1000.0 * tolerance:
+    if error <= apart * tolerance:
         return
-    if not np.isfinite(error) or error > 1000.0 * tolerance:
-        sensitivity = _sensitivity(problem, sol)
-        if sensitivity is None or error <= 100.0 * sensitivity * tolerance:
-            return
+    sensitivity = _sensitivity(problem, sol)
+    if sensitivity is None or error <= 0.1 * apart * sensitivity * tolerance:
+        return
     if not other.success:
         yield f"stops: {other.message}"
         return

@@ -35,6 +35,10 @@ CHANGES = {"crossing", "enter_sliding", "exit_sliding", "switch_sliding"}
 KINDS = JUMPS | CHANGES | {"grazing"}
 # Motions that escape to infinity are known to a relative tolerance only.
 ESCAPED = 1e6
+# What the functions of random systems give no reason for unless the state grows: their exponentials leave
+# the range of steps near 25.
+UNEXPLAINED = {"max_wall_time", "step_too_small", "no_progress", "field_not_finite"}
+MODERATE = 20.0
 # A piece this short may lie within the error of a tangency at its ends.
 SHORT = 1e-3
 # Nodes and weights on [0, 1]; the error over 0.02 is far below the tolerances.
@@ -64,6 +68,8 @@ def violations(problem: Problem, sol: fl.Solution) -> Iterator[str]:
     reason = sol._run.reason
     if reason not in REASONS:
         yield f"the reason {reason!r} has no place here"
+    if reason in UNEXPLAINED and np.abs(sol.y).max() < MODERATE:
+        yield f"stops with {reason} at a state of moderate size: {sol.message}"
     if sol.success != (reason == "end") or not sol.message:
         yield f"success is {sol.success}, the reason {reason}, the message {sol.message!r}"
     if not np.isfinite(sol.y).all() or not np.isfinite(sol.t).all():
@@ -206,22 +212,25 @@ def _multipliers(sol: fl.Solution, segment: fl.Segment) -> Iterator[str]:
 
 
 def _sliding(checked: Checked, segment: fl.Segment) -> Iterator[str]:
-    """Compare the slope of the solution with the sliding field, where there is no memory nor contact."""
+    """Compare the change of the state with the integral of the sliding field, without memory and contact."""
     sol, mode = checked.sol, segment.mode
     if any(np.isnan(segment.multipliers_start[list(mode.sliding)])) or checked.problem.has_discrete_states:
         return
-    for t in _inner_times(segment):
-        d = min(1e-3, 0.05 * segment.duration)
-        slope = (sol.sol(t + d) - sol.sol(t - d)) / (2 * d)
+    for share in (0.1, 0.5, 0.8):
+        a = segment.t_start + share * segment.duration
         try:
-            field = checked.source.field(t, sol.sol(t), mode)
+            speed = np.abs(checked.source.field(a, sol.sol(a), mode)).max()
+            length = min(0.02, 0.15 * segment.duration, 0.2 / (1.0 + speed))
+            times = a + length * NODES
+            states = sol.sol(times).T
+            fields = [checked.source.field(t, x, mode) for t, x in zip(times, states, strict=True)]
         except fl.ModelError as refused:
-            yield f"slides in mode {mode} at t = {t:.6g}, where {refused}"
+            yield f"slides in mode {mode} at t = {a:.6g}, where {refused}"
             continue
-        # Local errors over the distance of the difference, and its own error d^2/6 times a third derivative.
-        error = 10.0 * checked.tolerance / d + 2e-3 * (1.0 + np.abs(field).max())
-        if np.abs(slope - field).max() > error:
-            yield f"slope {slope} in mode {mode} at t = {t:.6g}, sliding field {field}"
+        error = np.abs(sol.sol(a + length) - sol.sol(a) - length * WEIGHTS @ np.array(fields)).max()
+        if error > 100.0 * checked.tolerance + 1e-9 * checked.scale:
+            yield f"from t = {a!r} in mode {mode} the change of state is {error:.3g} off the sliding field's"
+            return
 
 
 def _equation(checked: Checked, segment: fl.Segment) -> Iterator[str]:

@@ -107,3 +107,30 @@ def test_sliding_goes_through_a_point_where_the_jump_across_the_surface_has_a_do
     for segment in sol.segments:
         values = np.array([segment.multipliers_start, segment.multipliers_end])
         assert not (np.abs(values) > 1.0).any()
+
+
+@pytest.mark.parametrize("method", ["auto", "DOPRI5", "DOP853", "Rodas5P"])
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-9])
+@pytest.mark.parametrize("beside", [0.0, 1e-9, -1e-9, 1e-5, -1e-5])
+def test_sliding_that_becomes_infinitely_stiff_at_a_double_zero_of_the_jump_goes_on(
+    method: str, tolerance: float, beside: float
+) -> None:
+    # The jump of the normal component is 8.4 x1^2; sliding is drawn to its slow motion at 1/(2.1 x1^2).
+    def f(t: float, x: Any) -> Any:
+        return [x[1] - np.sin(1 - t), -0.5 - 2 * np.sign(x[0] + 0.7 * x[1] ** 3)]
+
+    start = [beside - 0.7 * 0.0561**3, 0.0561]
+    sol = fl.solve_ivp(
+        f,
+        (0.95, 2.0),
+        start,
+        method=method,
+        rtol=tolerance,
+        atol=tolerance,
+        max_wall_time=10.0,
+        max_steps=30_000,
+    )
+    assert sol.success, sol.message
+    assert all(mode == (0,) for mode in sol.segments.mode[1:])
+    # sign(h) replaced by tanh(h/eps), with Radau at 1e-12: [0.132831..., -0.574646...] as eps goes to zero.
+    assert sol.y[:, -1] == pytest.approx([0.13283159, -0.57464696], abs=100 * tolerance)

@@ -44,6 +44,8 @@ pub struct Deflation {
     pub order: i32,
     /// The first coefficient that does not vanish, in the sense of the mode (positive).
     pub leading: f64,
+    /// The value that the function has there all the same, by rounding or errors of the step before.
+    pub residual: f64,
 }
 
 /// A monitored function with its state at the start of the step.
@@ -91,7 +93,13 @@ impl Monitored {
 
     /// The value at `time` after division by the zero at the start, in units of the step `dt`.
     pub fn deflated(&self, value: f64, time: f64, dt: f64, noise: f64) -> f64 {
-        let Some(Deflation { t, order, leading }) = self.deflation else {
+        let Some(Deflation {
+            t,
+            order,
+            leading,
+            residual,
+        }) = self.deflation
+        else {
             return value;
         };
         let limit = leading * dt.powi(order);
@@ -100,6 +108,10 @@ impl Monitored {
         // Closer to the zero than rounding can resolve, the limit is the better value.
         if elapsed <= 0.0 || limit.abs() * power <= noise {
             limit
+        } else if residual < -noise {
+            // What the function starts below zero fades out where it is far above that.
+            let share = limit * power / (8.0 * residual);
+            (value - residual / (1.0 + share * share)) / power
         } else {
             value / power
         }

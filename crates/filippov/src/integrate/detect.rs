@@ -23,6 +23,10 @@ pub(super) struct Detector {
     pub unresolved: bool,
     /// A monitored function could not be searched; the step has to be shortened.
     pub uncertain: bool,
+    /// Rounding blurs the zero that was found: it may be a multiple one.
+    pub blurred: bool,
+    /// How far below zero the touch that was found may be, else 0.
+    pub depth: f64,
     /// Length of the next step, if the event stage knows better than the error control.
     pub next_dt: Option<f64>,
     /// Exit functions computed in the search of this step, by theta.
@@ -63,6 +67,8 @@ impl Detector {
             stages: Vec::new(),
             unresolved: false,
             uncertain: false,
+            blurred: false,
+            depth: 0.0,
             next_dt: None,
             exits: Vec::new(),
             h: vec![0.0; d],
@@ -130,6 +136,13 @@ impl Detector {
     pub fn accept_start(&mut self, monitored: &mut [Monitored]) {
         for (m, &(value, rate)) in monitored.iter_mut().zip(&self.right) {
             (m.value, m.rate) = (value, rate);
+            if let Some(zero) = &mut m.deflation {
+                zero.residual = if value.abs() <= self.depth {
+                    value
+                } else {
+                    0.0
+                };
+            }
         }
     }
 
@@ -162,6 +175,8 @@ impl Integrator<'_> {
         let end = (t1, self.stepper.end(), self.stepper.end_derivative());
         self.detector.unresolved = false;
         self.detector.uncertain = false;
+        self.detector.blurred = false;
+        self.detector.depth = 0.0;
         self.detector.exits.clear();
         self.detector.enclosed_exits.get_mut().clear();
         self.detector.enclosed_roots.get_mut().clear();
@@ -241,7 +256,9 @@ impl Integrator<'_> {
                 }
                 (EventFunction::Surface(_), Some(deflation), _) => {
                     let noise = self.motion.monitored[index].noise;
-                    let Deflation { t, order, leading } = deflation;
+                    let Deflation {
+                        t, order, leading, ..
+                    } = deflation;
                     // A multiple zero stays within rounding for long: the end has to be clear of it.
                     let clear = order == 1 || order == 2 && value > 1e3 * noise;
                     let leading = leading * dt.powi(order);

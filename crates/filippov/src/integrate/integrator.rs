@@ -351,11 +351,16 @@ impl<'a> Integrator<'a> {
         } else {
             self.t + dt
         };
-        let found = self.detect(t1, dt)?;
+        let mut found = self.detect(t1, dt)?;
         if self.detector.uncertain {
             self.count_rejection(sliding);
             self.halve_step(dt);
             return Ok(None);
+        }
+        if let Some(event) = found.as_mut().filter(|event| self.may_be_multiple(event)) {
+            if !self.resolve_multiple_zero(event, dt)? {
+                found = None;
+            }
         }
         if sliding && self.system.has_nested_signs() {
             let (mut end, mut t) = (self.stepper.end().to_vec(), t1);
@@ -374,7 +379,10 @@ impl<'a> Integrator<'a> {
         }
         let theta = found.as_ref().map_or(1.0, |event| event.theta);
         let is_implicit = self.stepper.in_use() == StepMethod::Rodas5p;
-        if is_implicit && found.is_some() && self.aims_again(theta, dt) {
+        let crosses = found
+            .as_ref()
+            .is_some_and(|event| !event.touch && !self.detector.blurred);
+        if is_implicit && crosses && self.aims_again(theta, dt) {
             return Ok(None);
         }
         let t_stop = if theta == 1.0 {

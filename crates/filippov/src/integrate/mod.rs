@@ -15,6 +15,7 @@ mod irregular;
 mod leave_by_rule;
 mod meeting;
 mod motion;
+mod multiple_zero;
 mod nested;
 mod one_sided_steps;
 mod pace;

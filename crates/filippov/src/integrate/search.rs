@@ -41,6 +41,16 @@ pub(super) struct Searched {
 }
 
 impl Searched {
+    /// Is the zero clear of rounding: a crossing with a slope, or one that the motion is already behind?
+    fn is_clear(&self, zero: &Zero) -> bool {
+        match zero {
+            Zero::Crossing(bracket) => {
+                bracket.lo >= bracket.hi || bracket.is_steep(self.scale, self.noise)
+            }
+            Zero::Touch(_) => false,
+        }
+    }
+
     /// What an isolated zero of `g` means, located to rounding.
     pub fn outcome(&self, g: Sampled, zero: Option<Zero>) -> Result<SearchOutcome, FieldError> {
         let (from, to) = self.piece;
@@ -370,9 +380,13 @@ impl Integrator<'_> {
             noise,
             width,
         };
+        let is_clear = isolated.zero.is_some_and(|zero| searched.is_clear(&zero));
         match searched.outcome(&mut g, isolated.zero)? {
             SearchOutcome::Nothing => Ok(None),
-            SearchOutcome::At(theta, touch) => Ok(Some((theta, touch))),
+            SearchOutcome::At(theta, touch) => {
+                self.detector.blurred |= !is_clear;
+                Ok(Some((theta, touch)))
+            }
             SearchOutcome::Beyond(rest) => {
                 self.search_piece((index, has_bounds), polynomial, None, (rest, to), dt)
             }

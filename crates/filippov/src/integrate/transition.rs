@@ -80,6 +80,7 @@ impl Left {
                     t,
                     order,
                     leading: leading.coefficient().abs(),
+                    residual: 0.0,
                 },
             )
         })
@@ -96,6 +97,12 @@ pub(super) fn located_surfaces(event: &Found) -> SmallVec<[usize; 4]> {
     }
     surfaces.sort_unstable();
     surfaces
+}
+
+/// How many normal components of sliding on one surface vanish.
+fn n_exits(event: &Found) -> usize {
+    let exits = [EventFunction::ExitMinus, EventFunction::ExitPlus];
+    event.functions.iter().filter(|f| exits.contains(f)).count()
 }
 
 impl Integrator<'_> {
@@ -153,6 +160,9 @@ impl Integrator<'_> {
             }
             self.add_vanishing_surfaces(&mut surfaces, &h)?;
         }
+        if let Some(done) = self.pass_double_zero(event, &mode, &surfaces)? {
+            return Ok(done);
+        }
         let at_two_fold = self.arrives_at_two_fold(event, &surfaces)?;
         if event.touch && !at_two_fold {
             return self.graze(&mode, &surfaces);
@@ -179,10 +189,6 @@ impl Integrator<'_> {
             Ok(decided) => self.leave_coinciding(decided)?,
             Err(stop) => return Ok(Some(stop)),
         };
-        if let (true, true, &[j]) = (at_two_fold, after == mode, self.motion.sliding()) {
-            self.pass_two_fold(j)?;
-            return self.graze(&mode, &[]);
-        }
         // Stability is lost, and the motion stays all the same: it oscillates around the root from now on.
         let slides_on = after
             .sliding_set()
@@ -260,14 +266,35 @@ impl Integrator<'_> {
         }
     }
 
+    /// Goes on beyond a double zero of the difference of the normal components, if sliding has come to one: what came of
+    /// that.
+    fn pass_double_zero(
+        &mut self,
+        event: &Found,
+        mode: &Mode,
+        surfaces: &[usize],
+    ) -> Result<Option<Option<Stop>>, FieldError> {
+        let &[j] = self.motion.sliding() else {
+            return Ok(None);
+        };
+        if n_exits(event) == 0 || !surfaces.is_empty() || !self.may_lose_multiplier() {
+            return Ok(None);
+        }
+        let Some((t, end)) = self.beyond_double_zero(j)? else {
+            return Ok(None);
+        };
+        self.record(mode.clone(), mode.clone(), &[]);
+        self.move_straight(t, end)?;
+        Ok(Some(self.begin(mode.clone(), &[])?))
+    }
+
     /// Has sliding on one surface come to a two-fold? Then the point is moved there.
     fn arrives_at_two_fold(
         &mut self,
         event: &Found,
         surfaces: &[usize],
     ) -> Result<bool, FieldError> {
-        let exits = [EventFunction::ExitMinus, EventFunction::ExitPlus];
-        let n_exits = event.functions.iter().filter(|f| exits.contains(f)).count();
+        let n_exits = n_exits(event);
         let is_exit = n_exits == 2 || n_exits == 1 && self.approaches_two_fold();
         if !is_exit || !surfaces.is_empty() {
             return Ok(false);

@@ -14,7 +14,8 @@ use crate::field::{eval_on_side, SmoothField};
 use crate::switching::{weight_at_two_fold, Matrix};
 use crate::system::{dot, dot_magnitude, RatePartials};
 use crate::tolerances::{
-    AT_TWO_FOLD, EPS, KNOWN_MULTIPLIER, MOST_DOUBLINGS, NEWTON_STEPS, SETTLED, TANGENT,
+    AT_TWO_FOLD, EPS, INSIDE_SHARES, KNOWN_MULTIPLIER, LOST_MULTIPLIER, MOST_DOUBLINGS,
+    NEWTON_STEPS, SETTLED, SMALL_JUMP, TANGENT,
 };
 
 impl Integrator<'_> {
@@ -72,15 +73,28 @@ impl Integrator<'_> {
         }))
     }
 
-    /// Goes on beyond a two-fold through which the motion slides: the difference of the normal components has a double zero
-    /// there, and the multiplier, their quotient, is lost in errors near it. The straight continuation is taken to where it is
-    /// known again: where the difference is as large as errors of the components, which is at the root of a tolerance, so
-    /// that the way is straight up to a tolerance.
-    pub(super) fn pass_two_fold(&mut self, j: usize) -> Result<(), FieldError> {
+    /// The point where the motion on surface `j` goes on beyond a double zero of the difference of the normal components, if
+    /// there is one here. The multiplier, the quotient of two functions that vanish, is lost in errors around it. The straight
+    /// continuation is taken to where it is known again: where the difference is as large as errors of the components,
+    /// which is at the root of a tolerance, so that the way is straight up to a tolerance. `None` too where the difference
+    /// changes its sign, as at a two-fold.
+    pub(super) fn beyond_double_zero(
+        &mut self,
+        j: usize,
+    ) -> Result<Option<(f64, Vec<f64>)>, FieldError> {
+        if self.system.sticks_at(j) || self.system.lie_tolerance(2) > TANGENT {
+            return Ok(None);
+        }
+        let (difference, error) = self.difference_and_error(j, self.t, &self.x)?;
+        if difference.abs() > LOST_MULTIPLIER * error {
+            return Ok(None);
+        }
         let signs = self.motion.signs.clone();
         let weight = weight_at_two_fold(self.system, j, self.t, &self.x, &signs)?;
-        let Some(weight) = weight else {
-            return Ok(());
+        // At a multiplier near its end the motion may have come to a true exit.
+        let is_inside = |weight: &f64| (INSIDE_SHARES..1.0 - INSIDE_SHARES).contains(weight);
+        let Some(weight) = weight.filter(is_inside) else {
+            return Ok(None);
         };
         let mut velocity = vec![0.0; self.x.len()];
         for (side, share) in [(-1, 1.0 - weight), (1, weight)] {
@@ -93,32 +107,42 @@ impl Integrator<'_> {
         let moved = velocity.iter().enumerate();
         let speed = moved.map(|(i, v)| v.abs() / self.scale.of(i, self.x[i], self.x[i]));
         let mut ahead = 1.0 / speed.fold(0.0, f64::max);
+        let (mut last, mut is_lost) = (difference, difference.abs() <= AT_TWO_FOLD * error);
         for _ in 0..MOST_DOUBLINGS {
             if ahead.is_nan() || ahead > self.horizon - self.t {
-                return Ok(());
+                return Ok(None);
             }
             let pairs = self.x.iter().zip(&velocity);
             let end = pairs.map(|(x, v)| x + ahead * v).collect();
             let Some((t, end)) = self.settle(j, &[weight], (self.t + ahead, end), ahead)? else {
-                return Ok(());
+                return Ok(None);
             };
-            let (minus, along_minus) = self.normal_component(j, -1, t, &end)?;
-            let (plus, along_plus) = self.normal_component(j, 1, t, &end)?;
-            let size = dot_magnitude(&along_minus, &end) + dot_magnitude(&along_plus, &end);
-            let rounding = EPS * (size + (minus.time.abs() + plus.time.abs()) * t.abs());
-            let pairs = along_minus.iter().zip(&along_plus).enumerate();
-            let error: f64 = pairs
-                .map(|(i, (a, b))| a.abs().max(b.abs()) * self.scale.of(i, end[i], end[i]))
-                .sum();
-            if minus.rate - plus.rate > error.max(rounding / KNOWN_MULTIPLIER) {
-                if t > self.t && t <= self.horizon {
-                    self.move_straight(t, end)?;
-                }
-                return Ok(());
+            let (difference, error) = self.difference_and_error(j, t, &end)?;
+            let is_known = difference.abs() > AT_TWO_FOLD * error;
+            if is_known && difference.abs() > last.abs() {
+                let is_ahead = is_lost && t > self.t && t <= self.horizon;
+                return Ok((difference > 0.0 && is_ahead).then_some((t, end)));
             }
-            ahead *= 2.0;
+            is_lost |= !is_known;
+            (last, ahead) = (difference, 2.0 * ahead);
         }
-        Ok(())
+        Ok(None)
+    }
+
+    /// The difference of the normal components of both sides, and errors of the components.
+    fn difference_and_error(&self, j: usize, t: f64, x: &[f64]) -> Result<(f64, f64), FieldError> {
+        let (minus, along_minus) = self.normal_component(j, -1, t, x)?;
+        let (plus, along_plus) = self.normal_component(j, 1, t, x)?;
+        let size = dot_magnitude(&along_minus, x) + dot_magnitude(&along_plus, x);
+        let rounding = EPS * (size + (minus.time.abs() + plus.time.abs()) * t.abs());
+        let pairs = along_minus.iter().zip(&along_plus).enumerate();
+        let error: f64 = pairs
+            .map(|(i, (a, b))| a.abs().max(b.abs()) * self.scale.of(i, x[i], x[i]))
+            .sum();
+        Ok((
+            minus.rate - plus.rate,
+            error.max(rounding / KNOWN_MULTIPLIER),
+        ))
     }
 
     /// The nearest point to (t, x) where h_j and the normal components of the mixtures with these shares of f+ vanish,
@@ -199,12 +223,29 @@ impl Integrator<'_> {
 
     /// Sliding on one surface whose steps shrink to nothing has come to a two-fold.
     pub(super) fn lost_share(&mut self) -> Result<Option<Found>, FieldError> {
-        let arrived = self.two_fold_here()?.is_some();
+        let sliding = self.motion.sliding();
+        let is_double = match (sliding, &self.motion.field) {
+            (&[j], ModeField::Sliding(_)) => self.beyond_double_zero(j)?.is_some(),
+            _ => false,
+        };
+        let arrived = is_double || self.two_fold_here()?.is_some();
         Ok(arrived.then(|| Found {
             theta: 0.0,
             functions: smallvec![EventFunction::ExitMinus, EventFunction::ExitPlus],
             touch: false,
         }))
+    }
+
+    /// Is the difference of the normal components at the end of the step so small, compared with the speed, that the
+    /// multiplier may be lost? Far from it nothing else has to be looked at.
+    pub(super) fn may_lose_multiplier(&self) -> bool {
+        let [minus, plus, ..] = self.detector.stages.as_slice() else {
+            return false;
+        };
+        let speed = self.stepper.end_derivative().iter();
+        let speed = speed.fold(0.0_f64, |most, v| most.max(v.abs()));
+        let least = minus[0].min(minus[6]) + plus[0].min(plus[6]);
+        least <= (SMALL_JUMP * self.options.rtol).min(1.0) * speed
     }
 
     /// Does the share of f+ change fast in the step just made, towards a two-fold?

@@ -203,7 +203,7 @@ fn two_fold_slides(
         .any(|&[_, minus, plus]| minus > 0.0 && plus < 0.0))
 }
 
-/// The weight of f+ in the motion through a two-fold along which sliding attracts, or does not stop to.
+/// The weight of f+ in the motion through a two-fold along which the normal components stay nearest to zero.
 ///
 /// # Errors
 /// If a function of the user raises.
@@ -215,10 +215,9 @@ pub fn weight_at_two_fold(
     signs: &[f64],
 ) -> Result<Option<f64>, FieldError> {
     let motions = two_fold_motions(system, j, t, x, signs)?;
-    let attracting = motions
-        .iter()
-        .find(|&&[_, minus, plus]| minus >= 0.0 && plus <= 0.0);
-    Ok(attracting.map(|&[weight, ..]| weight))
+    let rate = |motion: &[f64; 3]| motion[1].abs() + motion[2].abs();
+    let slowest = motions.iter().min_by(|a, b| rate(a).total_cmp(&rate(b)));
+    Ok(slowest.map(|&[weight, ..]| weight))
 }
 
 /// The sliding motions through a two-fold: the weight w of f+ in (0, 1), and the rates at which the normal components

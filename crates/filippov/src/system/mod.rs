@@ -169,8 +169,8 @@ pub trait PiecewiseSystem: Sync {
         Ok(ht)
     }
 
-    /// The size of the terms that h_j is made of at a point, sum |d_i h_j x_i| + |d_t h_j t|: h_j is zero up to
-    /// rounding far below it.
+    /// The size of the terms that h_j is made of at a point, sum |d_i h_j x_i| + |d_t h_j t|, and where it is known
+    /// that of the terms that cancel in it: h_j is zero up to rounding far below it.
     ///
     /// # Errors
     /// If a function of the user raises.

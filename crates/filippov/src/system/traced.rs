@@ -1,6 +1,7 @@
 //! A system given by a traced expression graph.
 
 mod affine;
+mod rounding;
 
 use std::sync::Arc;
 
@@ -15,7 +16,7 @@ use super::{
 };
 use crate::error::FieldError;
 use crate::stepper::Linearisation;
-use crate::tolerances::{MAX_LIE_ORDER, TANGENT};
+use crate::tolerances::{MAX_LIE_ORDER, SURFACE_NOISE, TANGENT};
 
 /// Up to that many states both sides of a surface are compiled into one program; the programs of
 /// larger systems would take longer to compile than they save.
@@ -293,13 +294,16 @@ impl PiecewiseSystem for TracedSystem {
     }
 
     fn surface_size(&self, j: usize, t: f64, x: &[f64], signs: &[f64]) -> Result<f64, FieldError> {
-        Ok(
-            self.with_gradient((j, signs), (t, x), |time, states, values| {
-                let entries = states.iter().zip(values);
-                let size: f64 = entries.map(|(&i, value)| (value * x[i]).abs()).sum();
-                size + (time * t).abs()
-            }),
-        )
+        let size = self.with_gradient((j, signs), (t, x), |time, states, values| {
+            let entries = states.iter().zip(values);
+            let size: f64 = entries.map(|(&i, value)| (value * x[i]).abs()).sum();
+            size + (time * t).abs()
+        });
+        if self.is_affine(j) {
+            return Ok(size);
+        }
+        // Terms may cancel where the gradient vanishes.
+        Ok(size.max(self.rounding_of_surface(j, t, x, signs) / SURFACE_NOISE))
     }
 
     fn both_sides(

@@ -89,6 +89,21 @@ pub const JUMP_SIZE: f64 = 0.02;
 /// ... and this share of the range falls between two neighbouring stages, at most half a step apart.
 pub const JUMP_SHARE: f64 = 0.9;
 
+/// Between two crossings with a method other than a series a function that falls to no less than this share of the tolerance
+/// below zero touches it: accumulated rounding alone is up to a hundredth of the tightest tolerances.
+pub const TOUCH_DEPTH: f64 = 1e-2;
+
+/// A function that comes near to zero in this last share of a step is left to the next one.
+pub const AT_THE_END: f64 = 0.05;
+
+/// Rounding above this share of the value of a function at the start of a step is that beside a pole, or the step is so near
+/// to the zero that it shows nothing of what lies around it.
+pub const BESIDE_A_POLE: f64 = 1e-6;
+
+/// A crossing is one at a triple zero where the rate falls below this share of what it is where the function is clear of
+/// rounding: at a simple zero it hardly changes on the way.
+pub const FLAT: f64 = 0.1;
+
 /// After a touch of an exit function the search goes on from this share of the step behind it.
 pub const BEYOND_TOUCH: f64 = 0.02;
 

@@ -255,6 +255,18 @@ pub const COINCIDE: f64 = 1e-11;
 /// of some steps make up the multiplier.
 pub const AT_TWO_FOLD: f64 = 10.0;
 
+/// Sliding whose multiplier ends, or whose steps shrink to nothing, may have lost it where the difference of the normal
+/// components is below this multiple of errors of the components: it is known to a hundredth there, where every step has the
+/// error that its tolerance allows, and to a tenth where stages of explicit steps are stiff.
+pub const LOST_MULTIPLIER: f64 = 100.0;
+
+/// A multiplier is not lost where the difference is above this multiple of the tolerance, relative to the speed: gradients of
+/// normal components a hundred times larger than what they are made of are not expected.
+pub const SMALL_JUMP: f64 = 1e4;
+
+/// A multiplier was lost, and not at its end, where the shares of both fields beyond are above this.
+pub const INSIDE_SHARES: f64 = 0.05;
+
 /// Newton's method has come to a two-fold, in tolerances of the state: far below what matters, above rounding.
 pub const SETTLED: f64 = 1e-6;
 
