@@ -244,7 +244,7 @@ impl Integrator<'_> {
         };
         let speed = self.stepper.end_derivative().iter();
         let speed = speed.fold(0.0_f64, |most, v| most.max(v.abs()));
-        let least = minus[0].min(minus[6]) + plus[0].min(plus[6]);
+        let least = (minus[0] + plus[0]).min(minus[6] + plus[6]);
         least <= (SMALL_JUMP * self.options.rtol).min(1.0) * speed
     }
 
