@@ -32,7 +32,9 @@ def interrupted(what: str, store: Path) -> dict[str, Any]:
         process.send_signal(signal.SIGINT)
         pressed = time.monotonic()
         found: dict[str, Any] = json.loads(process.stdout.read())
-        assert time.monotonic() - pressed < 10.0  # tenths of a second on a machine that is not busy
+        assert (
+            time.monotonic() - pressed < 60.0
+        )  # a second on a machine that is not busy; else it would be hours
     return found
 
 

@@ -43,6 +43,22 @@ def test_the_comparison_with_scipy_is_true(names: dict[str, Any]) -> None:
     assert names["exact"].switches.t == pytest.approx([11.000275475, 11.270040324], abs=1e-8)
 
 
+def test_the_table_of_the_comparison_is_true(names: dict[str, Any]) -> None:
+    integrate = pytest.importorskip("scipy.integrate")
+    table = re.findall(r"^\| (.*`\w+`|\*\*filippov\*\*).*$", README.read_text(encoding="utf-8"), re.MULTILINE)
+    assert table == ["SciPy `RK45`", "SciPy `DOP853`", "SciPy `Radau`", "**filippov**"]
+    problem = {key: value for key, value in names["problem"].items() if key not in ("rtol", "atol")}
+    for method in ("RK45", "DOP853", "Radau"):
+        found = integrate.solve_ivp(names["layer"], method=method, rtol=1e-10, atol=1e-10, **problem)
+        assert found.success
+        assert found.y[:, -1] == pytest.approx([27.667, 0.0], abs=5e-4)
+    ours = names["fl"].solve_ivp(names["layer"], **problem)
+    row = re.search(r"^\| \*\*filippov\*\*.*$", README.read_text(encoding="utf-8"), re.MULTILINE)
+    assert row is not None
+    assert f"| {ours.nfev} |" in row[0]
+    assert f"**{ours.y[0, -1]:.6f}** | **{ours.y[1, -1]:.6f}**" in row[0]
+
+
 def test_the_numbers_in_the_text_are_true(names: dict[str, Any]) -> None:
     assert names["rest"].nfev < 100
     assert names["rest"].switches.t == pytest.approx([1 / 0.7])

@@ -54,7 +54,7 @@ def main(path: Path) -> None:
     for j, contact in enumerate(CONTACTS):
         for segment in solution.segments:
             if segment.mode[j] == 0:
-                width = {"linewidth": 7.0, "solid_capstyle": "butt"}
+                width = {"linewidth": 7.0, "solid_capstyle": "butt", "antialiased": False}
                 middle.plot([segment.t_start, segment.t_end], [j, j], color=colours[j], **width)
         bottom.plot(t, shares[j], linewidth=1.2, color=colours[j], label=contact)
     top.set_ylabel("position")

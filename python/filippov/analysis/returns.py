@@ -214,7 +214,10 @@ def _dataset(
 
 def texts_of(modes: npt.NDArray[np.int8], sizes: npt.NDArray[np.int32]) -> list[str]:
     """Return the modes between returns as text, one entry per return: ``"+ 0 -"``."""
-    words = [str(Mode(mode)) for mode in modes.tolist()]
+    # Few different modes occur, however many pieces there are.
+    different, which = np.unique(modes, axis=0, return_inverse=True)
+    names = [str(Mode(mode)) for mode in different.tolist()]
+    words = [names[k] for k in which.reshape(-1).tolist()]
     ends = np.cumsum(sizes)
     starts = ends - sizes
     return [" ".join(words[a:b]).strip() for a, b in zip(starts.tolist(), ends.tolist(), strict=True)]
