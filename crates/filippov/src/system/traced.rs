@@ -1,15 +1,15 @@
 //! A system given by a traced expression graph.
 
 mod affine;
+mod gradient;
 mod rounding;
 
 use std::sync::Arc;
 
 use filippov_expr::{Backend, Enclosure, ExprError, Graph, Motion, Names, NodeId};
 
-use super::compiled::{CompiledGradient, GradientValues, Model};
+use super::compiled::Model;
 use super::discrete::DiscreteStates;
-use super::tiered::TieredProgram;
 use super::{
     AffineSigns, BothSides, LieValue, MotionJacobian, MotionJets, PiecewiseSystem, RatePartials,
     Word,
@@ -154,39 +154,6 @@ impl TracedSystem {
         let program = &self.model.field_program;
         self.with_values(|p| program.eval(t, x, signs, p, &[], dx));
         Ok(())
-    }
-
-    /// Calls a function with the derivative of h_j in t and those by the listed states, in their order.
-    #[inline(always)]
-    fn with_gradient<R>(
-        &self,
-        (j, signs): (usize, &[f64]),
-        (t, x): (f64, &[f64]),
-        f: impl FnOnce(f64, &[usize], &[f64]) -> R,
-    ) -> R {
-        let CompiledGradient { states, values } = self.model.gradient(j);
-        let computed;
-        let values = match values {
-            GradientValues::Constant(values) => values,
-            GradientValues::Computed(tiered) => {
-                computed = self.computed_gradient(tiered, (t, x), signs);
-                &computed
-            }
-        };
-        f(values[0], states, &values[1..])
-    }
-
-    #[inline(never)]
-    fn computed_gradient(
-        &self,
-        tiered: &TieredProgram,
-        (t, x): (f64, &[f64]),
-        signs: &[f64],
-    ) -> Vec<f64> {
-        let program = tiered.program();
-        let mut computed = vec![0.0; program.n_outputs()];
-        self.with_values(|p| program.eval(t, x, signs, p, &[], &mut computed));
-        computed
     }
 }
 
