@@ -18,20 +18,20 @@ use std::time::Instant;
 
 use rustc_hash::FxHashMap;
 
-use super::chatter::Chatter;
-use super::detect::Detector;
-use super::meeting::DecidedRoot;
-use super::motion::{ModeField, Motion};
-use super::pace::Pace;
-use super::stiff::Derivatives;
-use super::stiffness::Stiffness;
-use super::timetable::Timetable;
-use super::user_events::UserEvents;
 use super::{Stats, Stop, Warning};
 use crate::action::Actions;
 use crate::error::{Error, FieldError};
 use crate::event::UserEvent;
 use crate::field::SmoothField;
+use crate::integrate::actions::timetable::Timetable;
+use crate::integrate::decisions::meeting::DecidedRoot;
+use crate::integrate::detection::detect::Detector;
+use crate::integrate::detection::user_events::UserEvents;
+use crate::integrate::motion::{ModeField, Motion};
+use crate::integrate::steps::chatter::Chatter;
+use crate::integrate::steps::pace::Pace;
+use crate::integrate::steps::stiff::Derivatives;
+use crate::integrate::steps::stiffness::Stiffness;
 use crate::mode::Mode;
 use crate::options::{Method, Options};
 use crate::recorder::Recorder;
@@ -113,7 +113,7 @@ impl<'a> Integrator<'a> {
         events: &'a [UserEvent<'a>],
         actions: &'a Actions<'a>,
     ) -> Result<Self, Error> {
-        super::start::check(system, t_span, y0, options, actions)?;
+        crate::integrate::start::check(system, t_span, y0, options, actions)?;
         let n = system.n_states();
         let uses_series = match options.method {
             Method::Dopri5 | Method::Dop853 | Method::Midpoint | Method::Rodas5p => false,

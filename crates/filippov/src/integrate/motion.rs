@@ -14,7 +14,7 @@ use crate::mode::{Mode, Signs};
 use crate::options::{Options, SlidingRule};
 use crate::system::{MotionJets, PiecewiseSystem};
 
-use super::stiff::Derivatives;
+use crate::integrate::steps::stiff::Derivatives;
 
 /// The smooth field of a mode.
 pub(super) enum ModeField<'a> {

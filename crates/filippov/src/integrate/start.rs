@@ -1,9 +1,9 @@
 //! Where a run starts: arguments checked, the mode of the initial state found.
 
-use super::integrator::Integrator;
 use super::Stop;
 use crate::action::{Actions, Trigger};
 use crate::error::{Error, FieldError};
+use crate::integrate::integrator::Integrator;
 use crate::options::Options;
 use crate::system::PiecewiseSystem;
 

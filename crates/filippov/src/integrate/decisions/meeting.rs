@@ -1,0 +1,495 @@
+//! Where surfaces meet: what follows at an intersection, from the switching stage.
+
+use smallvec::smallvec;
+
+use crate::error::FieldError;
+use crate::event::EventFunction;
+use crate::field::{IntersectionExit, IntersectionField, MeetingFields, SlidingField, SmoothField};
+use crate::integrate::decisions::transition::{Decided, Left, Lefts};
+use crate::integrate::detection::detect::Found;
+use crate::integrate::integrator::Integrator;
+use crate::integrate::motion::{Law, ModeField};
+use crate::integrate::Stop;
+use crate::mode::Mode;
+use crate::switching::{
+    admissible, decide, decide_intersection, first_nonzero, has_one_mode_only, merged_root,
+    resolve, Arrival, Continuation, ExitKind, Incoming, Leading, NormalFields, Resolution,
+    Undecided,
+};
+use crate::system::{dot, dot_magnitude};
+use crate::tolerances::{DEPARTS_TANGENTIALLY, DRIFT_SHARE, EPS, MOST_LISTED, MOST_MEETING};
+
+/// The root at which a motion on an intersection begins.
+#[derive(Default)]
+pub(in crate::integrate) struct DecidedRoot {
+    /// The multipliers; none if they are not known.
+    pub multipliers: Vec<f64>,
+    /// The regularised motion oscillates around it.
+    pub oscillates: bool,
+}
+
+impl Integrator<'_> {
+    /// What follows where the surfaces of `meeting` vanish; `fresh` are those among them that were reached now.
+    pub(in crate::integrate) fn decide_at_intersection(
+        &mut self,
+        event: &Found,
+        mode: &Mode,
+        meeting: &[usize],
+        fresh: &[usize],
+    ) -> Result<Decided, FieldError> {
+        let decided = self.decide_with_static_friction(event, mode, meeting, fresh)?;
+        self.decide_with_kinetic_friction(decided, meeting)
+    }
+
+    /// Where a body has broken away, or has not been held, its friction is the kinetic one: what the other surfaces do
+    /// is decided once more.
+    fn decide_with_kinetic_friction(
+        &mut self,
+        decided: Decided,
+        meeting: &[usize],
+    ) -> Result<Decided, FieldError> {
+        let Ok((after, left)) = decided else {
+            return Ok(decided);
+        };
+        let slips = |j: &usize| self.system.sticks_at(*j) && after.entries()[*j] != 0;
+        let (slipping, others): (Vec<usize>, Vec<usize>) = meeting.iter().partition(|j| slips(j));
+        if slipping.is_empty() || others.is_empty() {
+            return Ok(Ok((after, left)));
+        }
+        let multipliers = std::mem::take(&mut self.decided);
+        Ok(match self.place_on(after.clone(), &others, Some(&after))? {
+            Ok((again, _)) if again != after => {
+                self.decided = DecidedRoot::default();
+                let left = self.departures(&again, meeting, &[])?;
+                Ok((again, left))
+            }
+            _ => {
+                self.decided = multipliers;
+                Ok((after, left))
+            }
+        })
+    }
+
+    fn decide_with_static_friction(
+        &mut self,
+        event: &Found,
+        mode: &Mode,
+        meeting: &[usize],
+        fresh: &[usize],
+    ) -> Result<Decided, FieldError> {
+        if fresh.is_empty() && self.slides_by_rule() {
+            return self.leave_by_rule(mode, meeting);
+        }
+        if let Some(decided) = self.decide_by_relay(Some(event), mode, meeting)? {
+            return Ok(decided);
+        }
+        if let Some(stop) = self.too_many(meeting) {
+            return Ok(Err(stop));
+        }
+        let corners = self.corners(meeting, mode)?;
+        let mut others = Vec::new();
+        let resolution = match corners.normal_fields() {
+            Ok(fields) => {
+                let incoming = self.incoming(event, mode, fresh, (&corners, &fields))?;
+                others = other_solutions(&fields, &incoming);
+                let kappa = self.kappa(meeting);
+                match resolve(&fields, &incoming, &kappa) {
+                    // The last of many turns is within rounding of all surfaces: its region leads past one of
+                    // them, and has no meaning any more.
+                    Err(Undecided::NotArriving { .. })
+                        if matches!(incoming, Incoming::Corner { .. }) =>
+                    {
+                        resolve(&fields, &Incoming::Start, &kappa)
+                    }
+                    decided => decided,
+                }
+            }
+            Err(undecided) => Err(undecided),
+        };
+        self.follow(mode, meeting, &corners, resolution, &others)
+    }
+
+    /// What follows at a start where the surfaces of `meeting` vanish.
+    pub(in crate::integrate) fn decide_at_start(
+        &mut self,
+        mode: &Mode,
+        meeting: &[usize],
+    ) -> Result<Decided, FieldError> {
+        if let Some(decided) = self.decide_by_relay(None, mode, meeting)? {
+            return Ok(decided);
+        }
+        if let Some(stop) = self.too_many(meeting) {
+            return Ok(Err(stop));
+        }
+        let corners = self.corners(meeting, mode)?;
+        let resolution = corners
+            .normal_fields()
+            .and_then(|fields| resolve(&fields, &Incoming::Start, &self.kappa(meeting)));
+        self.follow(mode, meeting, &corners, resolution, &[])
+    }
+
+    /// More surfaces whose signs multiply one another than all of whose fields can be looked at.
+    fn too_many(&self, meeting: &[usize]) -> Option<Stop> {
+        let groups = self.system.sign_groups(meeting).into_iter();
+        let surfaces = groups
+            .filter(|group| group.len() > MOST_MEETING)
+            .max_by_key(Vec::len)?;
+        Some(Stop::Intersection {
+            reason: Undecided::TooMany { n: surfaces.len() },
+            surfaces,
+            candidates: Vec::new(),
+        })
+    }
+
+    /// All fields around the current point of an intersection.
+    pub(in crate::integrate) fn corners(
+        &mut self,
+        meeting: &[usize],
+        mode: &Mode,
+    ) -> Result<MeetingFields, FieldError> {
+        let mut corners = MeetingFields::new(self.system, meeting);
+        self.stats.n_field_evaluations +=
+            corners.evaluate(self.system, self.t, &self.x, &mode.signs())?;
+        Ok(corners)
+    }
+
+    /// The scaling of the surfaces of an intersection in the regularisation that decides.
+    pub(in crate::integrate) fn kappa(&self, meeting: &[usize]) -> Vec<f64> {
+        Law::from(self.options).scaling(meeting)
+    }
+
+    /// How the motion came to the intersection.
+    fn incoming(
+        &mut self,
+        event: &Found,
+        mode: &Mode,
+        fresh: &[usize],
+        (corners, fields): (&MeetingFields, &NormalFields),
+    ) -> Result<Incoming, FieldError> {
+        let meeting = corners.set();
+        let entries: Vec<i8> = meeting.iter().map(|&j| mode.entries()[j]).collect();
+        if self.motion.sliding().is_empty() {
+            return Ok(Incoming::Corner { region: entries });
+        }
+        self.motion.field.exits(self.t, &mut self.x)?;
+        let multipliers = match &self.motion.field {
+            ModeField::Intersection(field) => field.tracked(self.t).to_vec(),
+            _ => self.motion.multipliers().into_vec(),
+        };
+        let exit = event.functions.iter().find_map(|function| match function {
+            EventFunction::Exit(index) => Some(*index),
+            _ => None,
+        });
+        match (exit, &self.motion.field) {
+            (Some(index), ModeField::Intersection(field)) if fresh.is_empty() => {
+                let kind = match field.exit(index) {
+                    IntersectionExit::Side { .. } => ExitKind::Side,
+                    IntersectionExit::Fold => ExitKind::Fold,
+                    IntersectionExit::Stability => ExitKind::Stability,
+                };
+                let mut lambda = multipliers;
+                if let IntersectionExit::Side { position, end } = field.exit(index) {
+                    lambda[position] = f64::from(end);
+                }
+                if kind == ExitKind::Fold && meeting.len() > 2 {
+                    let merged = merged_root(fields, &lambda);
+                    lambda = merged.map_or(lambda, |merged| merged.lambda);
+                }
+                let drift = self.drift(mode, corners, fields, &lambda)?;
+                Ok(Incoming::Exit {
+                    kind,
+                    lambda,
+                    drift: Some(drift),
+                })
+            }
+            _ => Ok(Incoming::Face {
+                mode: entries,
+                multipliers,
+            }),
+        }
+    }
+
+    /// The rate at which the normal components change along the motion at fixed multipliers.
+    fn drift(
+        &mut self,
+        mode: &Mode,
+        corners: &MeetingFields,
+        fields: &NormalFields,
+        lambda: &[f64],
+    ) -> Result<Vec<f64>, FieldError> {
+        let meeting = corners.set();
+        let (mut velocity, mut weights) = (vec![0.0; self.x.len()], Vec::new());
+        corners.fill_product_weights(lambda, &mut weights);
+        corners.combine(&weights, &mut velocity);
+        // Towards a fold steps shrink to nothing.
+        let shortest = EPS.sqrt() * self.t.abs().max(self.t_end - self.t);
+        let dt = (DRIFT_SHARE * self.stepper.interpolant().dt).max(shortest);
+        let pairs = self.x.iter().zip(&velocity);
+        let ahead: Vec<f64> = pairs.map(|(x, v)| x + dt * v).collect();
+        let mut corners = MeetingFields::new(self.system, meeting);
+        self.stats.n_field_evaluations +=
+            corners.evaluate(self.system, self.t + dt, &ahead, &mode.signs())?;
+        let (now, then) = (fields.interpolate(lambda), corners.normal_fields());
+        Ok(match then {
+            Ok(then) => {
+                let pairs = then.interpolate(lambda).into_iter().zip(now);
+                pairs.map(|(then, now)| (then - now) / dt).collect()
+            }
+            Err(_) => vec![f64::NAN; meeting.len()],
+        })
+    }
+
+    /// Turns a resolution into the motion that follows. Where first-order data do not decide, the first
+    /// derivatives that do not vanish may still leave only one way. `others` are further Filippov solutions.
+    fn follow(
+        &mut self,
+        mode: &Mode,
+        meeting: &[usize],
+        fields: &MeetingFields,
+        resolution: Result<Resolution, Undecided>,
+        others: &[Continuation],
+    ) -> Result<Decided, FieldError> {
+        if let Some(decided) = self.decide_without_inner(mode, meeting, fields)? {
+            return Ok(decided);
+        }
+        let resolution = match resolution {
+            Ok(resolution) if !resolution.degenerate => resolution,
+            // Both say the same, and vanish somewhere in between: higher derivatives do not make them two.
+            Err(Undecided::Proportional) if fields.telling().len() == meeting.len() => {
+                return Ok(Err(Stop::Intersection {
+                    surfaces: meeting.to_vec(),
+                    candidates: Vec::new(),
+                    reason: Undecided::Proportional,
+                }));
+            }
+            other => return self.decide_by_higher_order(mode, meeting, other),
+        };
+        let on_all = |k: &Mode| {
+            let mut full = mode.clone();
+            for (&j, &entry) in meeting.iter().zip(k.entries()) {
+                full.set(j, entry);
+            }
+            full
+        };
+        let mut candidates: Vec<Mode> = Vec::new();
+        for mode in resolution.candidates.iter().chain(others) {
+            let mode = mode.as_mode().map(on_all);
+            candidates.extend(mode.filter(|mode| !candidates.contains(mode)));
+        }
+        let is_spiral = matches!(resolution.chosen, Some(Continuation::OutwardSpiral));
+        let asked = self.asked().filter(|asked| candidates.contains(asked));
+        let (mut after, leaving) = match &resolution.chosen {
+            Some(Continuation::Mode(chosen)) => (on_all(chosen), meeting.to_vec()),
+            Some(Continuation::OutwardSpiral) => match asked {
+                Some(asked) => (asked.clone(), meeting.to_vec()),
+                None => match self.start_spiral(meeting, mode, fields)? {
+                    Some((region, border)) => (region, vec![border]),
+                    None => return self.decide_by_higher_order(mode, meeting, Ok(resolution)),
+                },
+            },
+            None => return self.decide_by_higher_order(mode, meeting, Ok(resolution)),
+        };
+        let preferred = after.clone();
+        if !resolution.unique || is_spiral || candidates.len() > 1 {
+            if !candidates.contains(&after) {
+                candidates.push(after.clone());
+            }
+            after = match self.choose(meeting, after, candidates) {
+                Ok(after) => after,
+                Err(stop) => return Ok(Err(stop)),
+            };
+        }
+        let multipliers: &[f64] = if after == preferred && !is_spiral {
+            &resolution.multipliers
+        } else {
+            &[]
+        };
+        if let Some(decided) = self.decide_at_tangency(&after, meeting)? {
+            return Ok(decided);
+        }
+        let left = self.departures(&after, &leaving, multipliers)?;
+        self.decided = DecidedRoot {
+            multipliers: multipliers.to_vec(),
+            oscillates: after == preferred && resolution.oscillates,
+        };
+        Ok(Ok((after, left)))
+    }
+
+    /// Where the motion is to slide on one of the surfaces and both of its fields are tangent there: what higher
+    /// derivatives say of that surface.
+    fn decide_at_tangency(
+        &mut self,
+        after: &Mode,
+        meeting: &[usize],
+    ) -> Result<Option<Decided>, FieldError> {
+        let mut slid_on = after.sliding_set();
+        let (Some(j), None) = (slid_on.next(), slid_on.next()) else {
+            return Ok(None);
+        };
+        let decision = decide(
+            self.system,
+            j,
+            Arrival::Start,
+            self.t,
+            &self.x,
+            &after.signs(),
+        )?;
+        let is_tangent = decision.minus.order != 1 && decision.plus.order != 1;
+        if !is_tangent || decision.entry == 0 || self.system.sticks_at(j) {
+            return Ok(None);
+        }
+        let (after, mut left) = match self.follow_at_surface(after, j, decision) {
+            Ok(followed) => followed,
+            Err(stop) => return Ok(Some(Err(stop))),
+        };
+        let others: Vec<usize> = meeting.iter().copied().filter(|&k| k != j).collect();
+        left.extend(self.departures(&after, &others, &[])?);
+        Ok(Some(Ok((after, left))))
+    }
+
+    fn decide_by_higher_order(
+        &mut self,
+        mode: &Mode,
+        meeting: &[usize],
+        resolution: Result<Resolution, Undecided>,
+    ) -> Result<Decided, FieldError> {
+        let decision = decide_intersection(self.system, meeting, mode, self.t, &self.x)?;
+        if let Some((after, left)) = decision.unique() {
+            let left = left.iter().map(|&(j, l)| Left::Surface(j, l)).collect();
+            return Ok(Ok((after.clone(), left)));
+        }
+        Ok(Err(Stop::Intersection {
+            surfaces: meeting.to_vec(),
+            candidates: decision.candidates,
+            reason: resolution.err().unwrap_or(Undecided::NoOutcome),
+        }))
+    }
+
+    /// The surfaces of `meeting` that the motion in `after` leaves, with the leading derivatives of h.
+    pub(in crate::integrate) fn departures(
+        &mut self,
+        after: &Mode,
+        meeting: &[usize],
+        multipliers: &[f64],
+    ) -> Result<Lefts, FieldError> {
+        let mut left: Lefts = smallvec![];
+        let leaving: Vec<usize> = meeting
+            .iter()
+            .copied()
+            .filter(|&j| after.entries()[j] != 0)
+            .collect();
+        if leaving.is_empty() {
+            return Ok(left);
+        }
+        let (n, signs) = (self.x.len(), after.signs());
+        let mut velocity = vec![0.0; n];
+        self.velocity_in(after, multipliers, self.t, &self.x.clone(), &mut velocity)?;
+        let mut gradient = vec![0.0; n];
+        for j in leaving {
+            let ht = self
+                .system
+                .gradient(j, self.t, &self.x, &signs, &mut gradient)?;
+            let value = ht + dot(&gradient, &velocity);
+            let size = ht.abs() + dot_magnitude(&gradient, &velocity);
+            let leading = if value.abs() > DEPARTS_TANGENTIALLY * size
+                && self.departs_clearly(after, multipliers, j, value)?
+            {
+                Leading { order: 1, value }
+            } else if after.codimension() == 0 {
+                let side = after.entries()[j];
+                first_nonzero(self.system, j, side, 1, self.t, &self.x, &signs)?
+            } else {
+                // The normal component vanishes at the exit of a multiplier: its rate along the new motion.
+                let value = self.acceleration_of(after, multipliers, j, &velocity)?;
+                Leading { order: 2, value }
+            };
+            left.push(Left::Surface(j, leading));
+        }
+        Ok(left)
+    }
+
+    /// Is a normal component clear of rounding, compared with that beyond the surface? At the exit of a multiplier
+    /// all forces may balance, and nothing of the motion itself tells how large they are.
+    fn departs_clearly(
+        &mut self,
+        after: &Mode,
+        multipliers: &[f64],
+        j: usize,
+        value: f64,
+    ) -> Result<bool, FieldError> {
+        let beyond = after.with(j, -after.entries()[j]);
+        let (x, mut velocity) = (self.x.clone(), vec![0.0; self.x.len()]);
+        self.velocity_in(&beyond, multipliers, self.t, &x, &mut velocity)?;
+        let mut gradient = vec![0.0; x.len()];
+        let signs = beyond.signs();
+        let ht = self.system.gradient(j, self.t, &x, &signs, &mut gradient)?;
+        let other = ht + dot(&gradient, &velocity);
+        let is_rounding = value.abs() <= DEPARTS_TANGENTIALLY * other.abs();
+        Ok(!is_rounding)
+    }
+
+    /// The rate of dh_j/dt along the motion in `after`, which has this velocity.
+    fn acceleration_of(
+        &mut self,
+        after: &Mode,
+        multipliers: &[f64],
+        j: usize,
+        velocity: &[f64],
+    ) -> Result<f64, FieldError> {
+        let (n, signs) = (self.x.len(), after.signs());
+        let mut gradient = vec![0.0; n];
+        let ht = self
+            .system
+            .gradient(j, self.t, &self.x, &signs, &mut gradient)?;
+        let now = ht + dot(&gradient, velocity);
+        let dt = DRIFT_SHARE * self.stepper.interpolant().dt;
+        let pairs = self.x.iter().zip(velocity);
+        let ahead: Vec<f64> = pairs.map(|(x, v)| x + dt * v).collect();
+        let mut next = vec![0.0; n];
+        self.velocity_in(after, multipliers, self.t + dt, &ahead, &mut next)?;
+        let ht = self
+            .system
+            .gradient(j, self.t + dt, &ahead, &signs, &mut gradient)?;
+        Ok((ht + dot(&gradient, &next) - now) / dt)
+    }
+
+    /// The field of a mode at a point near the current one.
+    pub(in crate::integrate) fn velocity_in(
+        &mut self,
+        mode: &Mode,
+        multipliers: &[f64],
+        t: f64,
+        x: &[f64],
+        velocity: &mut [f64],
+    ) -> Result<(), FieldError> {
+        let (signs, mut x) = (mode.signs(), x.to_vec());
+        let set: Vec<usize> = mode.sliding_set().collect();
+        self.stats.n_field_evaluations += match set.as_slice() {
+            [] => crate::field::eval_on_side(self.system, t, &x, &signs, velocity)?,
+            &[j] => {
+                let mut field = SlidingField::new(self.system, j, &signs);
+                field.eval(t, &mut x, velocity)?;
+                field.n_evaluations()
+            }
+            _ => {
+                let field = IntersectionField::new(self.system, &set, &signs, multipliers);
+                let field = field.with_rule(self.options.sliding);
+                let mut field = field.with_scaling(&self.kappa(&set));
+                field.eval(t, &mut x, velocity)?;
+                field.n_evaluations()
+            }
+        };
+        Ok(())
+    }
+}
+
+/// All attracting continuations at an intersection that is reached, whatever the regularisation selects: Filippov
+/// solutions, and several if the solution is not unique. Not looked for where many surfaces meet.
+fn other_solutions(fields: &NormalFields, incoming: &Incoming) -> Vec<Continuation> {
+    let is_exit = matches!(incoming, Incoming::Exit { .. });
+    if is_exit || fields.m() > MOST_LISTED || has_one_mode_only(fields) {
+        return Vec::new();
+    }
+    let found = admissible(fields).into_iter();
+    found.map(|found| found.continuation).collect()
+}

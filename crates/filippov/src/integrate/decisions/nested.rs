@@ -1,0 +1,369 @@
+//! Switching functions that contain signs of others: they may jump where those change.
+//!
+//! On the far side of a surface h_j = 0 the signs of such functions are others than on the near side, and with them the
+//! field. If that field leads away from the surface, it is crossed. If it leads back, the motion would slide between two
+//! fields that differ in several signs at once; the run ends there, and names the surfaces. A surface that only bends there,
+//! as that of abs or maximum does, is slid on beyond if its field and its normal there allow it.
+
+use crate::error::FieldError;
+use crate::field::MeetingFields;
+use crate::integrate::decisions::transition::{Decided, Left, Lefts};
+use crate::integrate::integrator::Integrator;
+use crate::integrate::Stop;
+use crate::mode::Mode;
+use crate::switching::{decide, first_nonzero, Arrival, Undecided};
+use crate::tolerances::{EPS, MOST_MEETING, SURFACE_NOISE};
+
+impl Integrator<'_> {
+    /// What follows where the surfaces `fresh` are reached and others jump; `None` if no other does.
+    pub(in crate::integrate) fn decide_where_others_jump(
+        &mut self,
+        mode: &Mode,
+        fresh: &[usize],
+    ) -> Result<Option<Decided>, FieldError> {
+        if !self.system.has_nested_signs() {
+            return Ok(None);
+        }
+        let (fresh, jumping) = self.split_those_that_jump(mode, fresh)?;
+        let fresh = &fresh[..];
+        let mut beyond = mode.clone();
+        fresh
+            .iter()
+            .for_each(|&j| beyond.set(j, -mode.entries()[j]));
+        let (mut jumped, landed) = self.let_others_jump(mode, &mut beyond, (fresh, fresh))?;
+        jumped.extend(jumping);
+        if jumped.is_empty() {
+            if let Some(decided) = self.leave_at_bends(mode, fresh)? {
+                return Ok(Some(Ok(decided)));
+            }
+            return match fresh {
+                [j] if self.bends_what_is_slid_on(mode, &beyond)? => {
+                    Ok(self.leave_to(&beyond, *j, &landed)?.map(Ok))
+                }
+                _ => Ok(None),
+            };
+        }
+        if let [j] = fresh {
+            if let Some(decided) = self.leave_to(&beyond, *j, &landed)? {
+                return Ok(Some(Ok(decided)));
+            }
+        }
+        Ok(Some(Err(between(fresh, &jumped))))
+    }
+
+    /// Splits off those of the surfaces reached at once that are not zero beyond another of them: as `x - c*sign(x - c)` at
+    /// x = c, they jump before they can be crossed.
+    fn split_those_that_jump(
+        &mut self,
+        mode: &Mode,
+        fresh: &[usize],
+    ) -> Result<(Vec<usize>, Vec<usize>), FieldError> {
+        let (mut kept, mut jumping) = (fresh.to_vec(), Vec::new());
+        if fresh.len() < 2 {
+            return Ok((kept, jumping));
+        }
+        let old = self.surface_values(&mode.signs())?;
+        let residual = residual(&old, fresh);
+        for &j in fresh {
+            let signs = mode.with(j, -mode.entries()[j]).signs();
+            let h = self.surface_values(&signs)?;
+            for &k in fresh.iter().filter(|&&k| k != j) {
+                let size = self.system.surface_size(k, self.t, &self.x, &signs)?;
+                let is_zero = h[k].abs() <= SURFACE_NOISE * (size + h[k].abs()) + residual;
+                if !is_zero && kept.contains(&j) && !jumping.contains(&k) {
+                    jumping.push(k);
+                    kept.retain(|kept| *kept != k);
+                }
+            }
+        }
+        Ok((kept, jumping))
+    }
+
+    /// The mode of a start on the surfaces `meeting`, as decided with the signs of `mode`; others may jump with it.
+    pub(in crate::integrate) fn follow_jumps(
+        &mut self,
+        mode: &Mode,
+        meeting: &[usize],
+        decided: Decided,
+    ) -> Result<Decided, FieldError> {
+        let Ok((after, _)) = &decided else {
+            return Ok(decided);
+        };
+        if meeting.is_empty() || !self.system.has_nested_signs() {
+            return Ok(decided);
+        }
+        let mut beyond = after.clone();
+        let (jumped, landed) = self.let_others_jump(mode, &mut beyond, (meeting, meeting))?;
+        if jumped.is_empty() {
+            return self.compare_with_opposite(mode, meeting, decided);
+        }
+        if let [j] = meeting {
+            let mut opposite = mode.with(*j, -after.entries()[*j]);
+            let (_, on_opposite) = self.let_others_jump(mode, &mut opposite, (meeting, meeting))?;
+            let mut left = Vec::new();
+            for (mode, landed) in [(beyond, landed), (opposite, on_opposite)] {
+                if mode.entries()[*j] != 0 {
+                    left.extend(self.leave_to(&mode, *j, &landed)?);
+                }
+            }
+            let modes: Vec<Mode> = left.iter().map(|(mode, _)| mode.clone()).collect();
+            let chosen = match modes.as_slice() {
+                [] => None,
+                [only] => Some(only.clone()),
+                [preferred, ..] => match self.choose(meeting, preferred.clone(), modes.clone()) {
+                    Ok(chosen) => Some(chosen),
+                    Err(stop) => return Ok(Err(stop)),
+                },
+            };
+            if let Some(decided) = left
+                .into_iter()
+                .find(|(mode, _)| Some(mode) == chosen.as_ref())
+            {
+                return Ok(Ok(decided));
+            }
+        }
+        Ok(Err(between(meeting, &jumped)))
+    }
+
+    /// A start on one surface that the motion leaves: if others jump on its other side, it may lead away there too.
+    fn compare_with_opposite(
+        &mut self,
+        mode: &Mode,
+        meeting: &[usize],
+        decided: Decided,
+    ) -> Result<Decided, FieldError> {
+        let (Ok((after, _)), &[j]) = (&decided, meeting) else {
+            return Ok(decided);
+        };
+        let side = after.entries()[j];
+        let mut opposite = mode.with(j, -side);
+        let (jumped, landed) = self.let_others_jump(mode, &mut opposite, (meeting, meeting))?;
+        if side == 0 || jumped.is_empty() {
+            return Ok(decided);
+        }
+        let Some(other) = self.leave_to(&opposite, j, &landed)? else {
+            return Ok(decided);
+        };
+        let modes = vec![after.clone(), other.0.clone()];
+        Ok(match self.choose(meeting, after.clone(), modes) {
+            Ok(chosen) if chosen == other.0 => Ok(other),
+            Ok(_) => decided,
+            Err(stop) => Err(stop),
+        })
+    }
+
+    /// The motion that leaves h_j = 0 to its side in `mode`, if its field leads there. What it slides on besides, and
+    /// what jumped to zero, is decided anew.
+    fn leave_to(
+        &mut self,
+        mode: &Mode,
+        j: usize,
+        landed: &[usize],
+    ) -> Result<Option<(Mode, Lefts)>, FieldError> {
+        let mut sliding: Vec<usize> = mode.sliding_set().chain(landed.iter().copied()).collect();
+        sliding.sort_unstable();
+        sliding.dedup();
+        let mut after = mode.clone();
+        if !sliding.is_empty() {
+            match self.place_on(mode.clone(), &sliding, Some(mode))? {
+                Ok((placed, _)) => after = placed,
+                Err(_) => return Ok(None),
+            }
+        }
+        let leaving: Vec<usize> = sliding.into_iter().chain([j]).collect();
+        let left = self.departures(&after, &leaving, &[])?;
+        let leads_away = |l: &Left| match l {
+            // A surface that jumped to zero, and along which the motion goes.
+            Left::Surface(k, leading) if leading.order == 0 => *k != j,
+            Left::Surface(k, leading) => leading.sign() == after.entries()[*k],
+            Left::Exit(..) => true,
+        };
+        Ok(left.iter().all(leads_away).then_some((after, left)))
+    }
+
+    /// Has a surface that is slid on another normal in the second mode?
+    fn bends_what_is_slid_on(&self, mode: &Mode, beyond: &Mode) -> Result<bool, FieldError> {
+        let (mut near, mut far) = (vec![0.0; self.x.len()], vec![0.0; self.x.len()]);
+        for &j in self.motion.sliding() {
+            let (t, x) = (self.t, &self.x[..]);
+            self.system.gradient(j, t, x, &mode.signs(), &mut near)?;
+            self.system.gradient(j, t, x, &beyond.signs(), &mut far)?;
+            if near != far {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Where several surfaces are reached and one of them bends at another: the motion in a region that leads away from all
+    /// of them, if it is the only one. A surface along which the motion goes keeps its side.
+    pub(in crate::integrate) fn leave_at_bends(
+        &mut self,
+        mode: &Mode,
+        meeting: &[usize],
+    ) -> Result<Option<(Mode, Lefts)>, FieldError> {
+        let m = meeting.len();
+        let is_small = (2..=MOST_MEETING).contains(&m) && self.motion.sliding().is_empty();
+        if !is_small || !self.system.has_nested_signs() || !self.bends(mode, meeting)? {
+            return Ok(None);
+        }
+        let mut found = None;
+        for pattern in 0..1_usize << m {
+            let mut region = mode.clone();
+            for (bit, &j) in meeting.iter().enumerate() {
+                region.set(j, if pattern >> bit & 1 == 1 { 1 } else { -1 });
+            }
+            let mut settled = region.clone();
+            let (jumped, _) = self.let_others_jump(mode, &mut settled, (&[], meeting))?;
+            if !jumped.is_empty() {
+                continue;
+            }
+            let Some(left) = self.leaves_into(mode, &region, meeting)? else {
+                continue;
+            };
+            if found.replace((region, left)).is_some() {
+                return Ok(None);
+            }
+        }
+        Ok(found)
+    }
+
+    /// What vanishes at the start of a motion in `region` that leads away from all surfaces of `meeting`, if it does.
+    fn leaves_into(
+        &self,
+        mode: &Mode,
+        region: &Mode,
+        meeting: &[usize],
+    ) -> Result<Option<Lefts>, FieldError> {
+        let (mut left, signs) = (Lefts::new(), region.signs());
+        for &j in meeting {
+            let side = region.entries()[j];
+            let leading = first_nonzero(self.system, j, side, 0, self.t, &self.x, &signs)?;
+            let stays = leading.order == 0 && side == mode.entries()[j];
+            if leading.sign() != side && !stays {
+                return Ok(None);
+            }
+            left.push(Left::Surface(j, leading));
+        }
+        let is_left = |left: &Left| matches!(left, Left::Surface(_, leading) if leading.order > 0);
+        Ok(left.iter().any(is_left).then_some(left))
+    }
+
+    /// What follows where two surfaces are in one place and the field depends on one of them only, as on
+    /// `x + x*abs(x)` beside `x`: that one decides.
+    pub(in crate::integrate) fn decide_without_inner(
+        &mut self,
+        mode: &Mode,
+        meeting: &[usize],
+        corners: &MeetingFields,
+    ) -> Result<Option<Decided>, FieldError> {
+        let &[first, second] = meeting else {
+            return Ok(None);
+        };
+        if !self.system.has_nested_signs() {
+            return Ok(None);
+        }
+        let same = |a: usize, b: usize| corners.field(a) == corners.field(b);
+        let (j, k) = match (same(0, 1) && same(2, 3), same(0, 2) && same(1, 3)) {
+            (true, false) => (second, first),
+            (false, true) => (first, second),
+            _ => return Ok(None),
+        };
+        if !self.are_parallel(j, k, mode)? {
+            return Ok(None);
+        }
+        let arrival = match mode.entries()[j] {
+            0 => Arrival::Start,
+            side => Arrival::Region(side),
+        };
+        let decision = decide(self.system, j, arrival, self.t, &self.x, &mode.signs())?;
+        let (mut after, mut left) = match self.follow_at_surface(mode, j, decision) {
+            Ok(followed) => followed,
+            Err(stop) => return Ok(Some(Err(stop))),
+        };
+        if after.entries()[j] != 0 {
+            self.leave_together(j, k, &mut after, &mut left)?;
+        } else if after.entries()[k] == 0 {
+            after.set(k, 1);
+        }
+        Ok(Some(Ok((after, left))))
+    }
+
+    /// Has one of the surfaces another normal on the other side of one of them, or none at all?
+    fn bends(&self, mode: &Mode, meeting: &[usize]) -> Result<bool, FieldError> {
+        let n = self.x.len();
+        let (mut near, mut far) = (vec![0.0; n], vec![0.0; n]);
+        for &k in meeting {
+            let beyond = mode.with(k, -mode.entries()[k]).signs();
+            for &j in meeting.iter().filter(|&&j| j != k) {
+                let (t, x) = (self.t, &self.x[..]);
+                let rate = self.system.gradient(j, t, x, &mode.signs(), &mut near)?;
+                let other = self.system.gradient(j, t, x, &beyond, &mut far)?;
+                let is_flat = rate == 0.0 && near.iter().all(|&g| g == 0.0);
+                if is_flat || near != far || rate != other {
+                    return Ok(true);
+                }
+            }
+        }
+        Ok(false)
+    }
+
+    /// Gives all surfaces that jump between two modes the side that they are on afterwards; returns which, and those
+    /// of them that jump to zero, which keep their side. Those of `fixed` are not looked at; the point lies on those
+    /// of `reached`, up to what their values are.
+    fn let_others_jump(
+        &mut self,
+        before: &Mode,
+        after: &mut Mode,
+        (fixed, reached): (&[usize], &[usize]),
+    ) -> Result<(Vec<usize>, Vec<usize>), FieldError> {
+        let old = self.surface_values(&before.signs())?;
+        let residual = residual(&old, reached);
+        let (mut jumped, mut landed) = (Vec::new(), Vec::new());
+        // A jump may make others jump.
+        for _ in 0..old.len() {
+            let signs = after.signs();
+            let new = self.surface_values(&signs)?;
+            let mut is_final = true;
+            landed.clear();
+            for j in (0..new.len()).filter(|j| !fixed.contains(j)) {
+                let size = self.system.surface_size(j, self.t, &self.x, &signs)?;
+                let noise = SURFACE_NOISE * (size + old[j].abs() + new[j].abs()) + residual;
+                if (new[j] - old[j]).abs() <= noise {
+                    continue;
+                }
+                let side = if new[j] < 0.0 { -1 } else { 1 };
+                if new[j].abs() <= noise {
+                    landed.push(j);
+                } else if after.entries()[j] != side {
+                    after.set(j, side);
+                    jumped.push(j);
+                    is_final = false;
+                }
+            }
+            if is_final {
+                break;
+            }
+        }
+        jumped.extend(&landed);
+        Ok((jumped, landed))
+    }
+}
+
+/// How far functions may be from zero at a point that lies on the surfaces `reached` to this: their values, and some
+/// times as much for other slopes.
+fn residual(h: &[f64], reached: &[usize]) -> f64 {
+    SURFACE_NOISE / EPS * reached.iter().fold(0.0, |most, &j| h[j].abs().max(most))
+}
+
+/// Surfaces between whose sides the motion would slide while others jump.
+pub(in crate::integrate) fn between(meeting: &[usize], jumped: &[usize]) -> Stop {
+    let mut surfaces: Vec<usize> = meeting.iter().chain(jumped).copied().collect();
+    surfaces.sort_unstable();
+    surfaces.dedup();
+    Stop::Intersection {
+        surfaces,
+        candidates: Vec::new(),
+        reason: Undecided::NoOutcome,
+    }
+}

@@ -1,0 +1,203 @@
+//! Surfaces whose functions are zero all along the motion: those that neither field leaves, and those in the place of the
+//! one slid on.
+
+use crate::error::FieldError;
+use crate::event::{EventFunction, Monitored};
+use crate::integrate::decisions::choice::NOT_UNIQUE_AT;
+use crate::integrate::decisions::transition::{Left, Lefts};
+use crate::integrate::integrator::Integrator;
+use crate::integrate::{Warning, WarningCode};
+use crate::mode::Mode;
+use crate::switching::Leading;
+use crate::system::dot;
+use crate::tolerances::{BESIDE, COINCIDE, LEFT_RESTING, NEARLY_ZERO, TANGENT};
+
+impl Integrator<'_> {
+    /// Notes the surfaces that neither field leaves, and names those about which nothing was said yet.
+    pub(in crate::integrate) fn note_resting(&mut self, left: &[Left]) {
+        let resting = left.iter().filter_map(|left| match left {
+            Left::Surface(j, leading) if leading.order == 0 => Some(*j),
+            _ => None,
+        });
+        self.motion.resting = resting.collect();
+        for k in 0..self.motion.resting.len() {
+            self.warn_zero_surface(self.motion.resting[k]);
+        }
+    }
+
+    /// Names a surface whose function is zero all along the motion, unless something was said about it.
+    fn warn_zero_surface(&mut self, j: usize) {
+        let name = self.system.surface_name(j);
+        let zero = format!("{name} is zero all along the motion from here");
+        let is_named = |warning: &Warning| {
+            let not_unique = warning.text.strip_prefix(NOT_UNIQUE_AT);
+            let surfaces = not_unique.and_then(|text| text.split_once(" is not unique"));
+            warning.text.starts_with(&zero)
+                || surfaces.is_some_and(|(names, _)| names == format!("{name} = 0"))
+        };
+        if !self.warnings.iter().any(is_named) {
+            self.warnings.push(Warning {
+                t: self.t,
+                code: WarningCode::ZeroSurface,
+                text: format!("{zero}: its sign means nothing, and that of the mode is taken"),
+                candidates: Vec::new(),
+            });
+        }
+    }
+
+    /// Names the surfaces whose functions were zero all along the step just made, up to rounding: a function that becomes
+    /// zero without a sign in it, as one that is called may do.
+    pub(in crate::integrate) fn note_zero_surfaces(&mut self, t1: f64) -> Result<(), FieldError> {
+        for index in 0..self.motion.monitored.len() {
+            let m = self.motion.monitored[index];
+            let (end, _) = self.detector.right[index];
+            let EventFunction::Surface(j) = m.function else {
+                continue;
+            };
+            // Few functions come this far; the sizes in the noise are not computed for the others.
+            if m.deflation.is_some() || m.value.abs().max(end.abs()) > NEARLY_ZERO {
+                continue;
+            }
+            let noise = self.noise_of(m.function)?;
+            if m.value.abs().max(end.abs()) > noise {
+                continue;
+            }
+            let signs = self.motion.signs.clone();
+            self.stepper.interpolant().at(0.5, &mut self.detector.x);
+            let (middle, h) = (0.5 * (self.t + t1), &mut self.detector.h);
+            self.system.surfaces(middle, &self.detector.x, &signs, h)?;
+            if h[j].abs() <= noise {
+                self.warn_zero_surface(j);
+            }
+        }
+        Ok(())
+    }
+
+    /// Has the motion left a surface that it was to stay on, by more than the tolerance?
+    pub(in crate::integrate) fn has_left_resting(&mut self) -> Result<bool, FieldError> {
+        let signs = self.motion.signs.clone();
+        let h = self.surface_values(&signs)?;
+        let mut gradient = vec![0.0; self.x.len()];
+        for &j in &self.motion.resting {
+            self.system
+                .gradient(j, self.t, &self.x, &signs, &mut gradient)?;
+            let components = gradient.iter().zip(&self.x).enumerate();
+            let tolerance: f64 = components
+                .map(|(i, (g, x))| g.abs() * self.scale.of(i, *x, *x))
+                .sum();
+            // Bodies that touch have to be held apart at once.
+            let factor = if self.is_only_trigger(j) {
+                1.0
+            } else {
+                LEFT_RESTING
+            };
+            if h[j].abs() > factor * tolerance {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// The surfaces that are in the place of the one slid on, as `x` beside `x + x*abs(x)`: they vanish all along the
+    /// motion, and are no events.
+    pub(in crate::integrate) fn rest_on_coinciding(&mut self) -> Result<(), FieldError> {
+        let &[j] = self.motion.sliding() else {
+            return Ok(());
+        };
+        if !self.system.has_nested_signs() {
+            return Ok(());
+        }
+        // Beside the current point, so that surfaces that only touch are told apart.
+        let t = self.t + BESIDE * (1.0 + self.t.abs());
+        let shifts = (0..self.x.len()).map(|i| BESIDE * (1.0 + 1.0 / (2.0 + i as f64)));
+        let pairs = self.x.iter().zip(shifts);
+        let mut beside: Vec<f64> = pairs.map(|(x, d)| x + d * (1.0 + x.abs())).collect();
+        self.motion.project(t, &mut beside)?;
+        let signs = self.motion.signs.clone();
+        let mut h = vec![0.0; signs.len()];
+        self.system.surfaces(t, &beside, &signs, &mut h)?;
+        let here = self.surface_values(&signs)?;
+        for k in (0..h.len()).filter(|&k| k != j && self.motion.active[k]) {
+            let mut gradient = vec![0.0; beside.len()];
+            let rate = self.system.gradient(k, t, &beside, &signs, &mut gradient)?;
+            let size = rate.abs() + gradient.iter().fold(0.0_f64, |sum, g| sum + g.abs());
+            let coincides = h[k].abs().max(here[k].abs()) <= COINCIDE * size;
+            if coincides && size > 0.0 && !self.motion.resting.contains(&k) {
+                self.motion.resting.push(k);
+                let is_other = |m: &Monitored| m.function != EventFunction::Surface(k);
+                self.motion.monitored.retain(is_other);
+            }
+        }
+        Ok(())
+    }
+
+    /// The sides of the surfaces that the motion rested on, after a switch.
+    pub(in crate::integrate) fn leave_coinciding(
+        &mut self,
+        (mut after, mut left): (Mode, Lefts),
+    ) -> Result<(Mode, Lefts), FieldError> {
+        let &[j] = self.motion.sliding() else {
+            return Ok((after, left));
+        };
+        let is_nested = self.system.has_nested_signs();
+        if !is_nested || self.motion.resting.is_empty() || after.entries()[j] == 0 {
+            return Ok((after, left));
+        }
+        for k in self.motion.resting.clone() {
+            if left.iter().all(|left| left.surface() != k) {
+                self.leave_together(j, k, &mut after, &mut left)?;
+            }
+        }
+        Ok((after, left))
+    }
+
+    /// Surface k is left as surface j is, which is in the same place.
+    pub(in crate::integrate) fn leave_together(
+        &self,
+        j: usize,
+        k: usize,
+        after: &mut Mode,
+        left: &mut Lefts,
+    ) -> Result<(), FieldError> {
+        let leading = left.iter().find_map(|left| match left {
+            Left::Surface(of, leading) if *of == j => Some(*leading),
+            _ => None,
+        });
+        let Some(Leading { order, value }) = leading else {
+            return Ok(());
+        };
+        let (signs, n) = (after.signs(), self.x.len());
+        let (mut known, mut other) = (vec![0.0; n], vec![0.0; n]);
+        let (t, x) = (self.t, &self.x[..]);
+        let rates = [
+            self.system.gradient(j, t, x, &signs, &mut known)?,
+            self.system.gradient(k, t, x, &signs, &mut other)?,
+        ];
+        let ratio = (dot(&known, &other) + rates[0] * rates[1])
+            / (dot(&known, &known) + rates[0] * rates[0]);
+        if ratio.is_finite() && ratio != 0.0 {
+            after.set(k, if ratio * value > 0.0 { 1 } else { -1 });
+            let value = ratio * value;
+            left.push(Left::Surface(k, Leading { order, value }));
+        }
+        Ok(())
+    }
+
+    /// Have two surfaces the same normal, up to its length?
+    pub(in crate::integrate) fn are_parallel(
+        &self,
+        j: usize,
+        k: usize,
+        mode: &Mode,
+    ) -> Result<bool, FieldError> {
+        let (signs, n) = (mode.signs(), self.x.len());
+        let (mut one, mut other) = (vec![0.0; n + 1], vec![0.0; n + 1]);
+        for (j, row) in [(j, &mut one), (k, &mut other)] {
+            row[n] = self
+                .system
+                .gradient(j, self.t, &self.x, &signs, &mut row[..n])?;
+        }
+        let (product, squares) = (dot(&one, &other), dot(&one, &one) * dot(&other, &other));
+        Ok(squares > 0.0 && squares - product * product <= TANGENT * squares)
+    }
+}

@@ -1,0 +1,275 @@
+//! Bounds of monitored functions along pieces of the step.
+
+use std::cell::RefCell;
+
+use filippov_expr::{Enclosure, Interval};
+use smallvec::SmallVec;
+
+use crate::error::FieldError;
+use crate::event::certificate::{prove, Bound, Proof};
+use crate::event::isolate::PROBES;
+use crate::event::tube::Tube;
+use crate::event::{EventFunction, Monitored};
+use crate::field::{AffineBounds, IntersectionExit};
+use crate::integrate::detection::detect::Detector;
+use crate::integrate::integrator::Integrator;
+use crate::mode::Signs;
+use crate::options::SlidingRule;
+use crate::stepper::Interpolant;
+use crate::switching::{enclose_root, EnclosedRoot, IntervalVector, RootBounds, Vector};
+use crate::system::PiecewiseSystem;
+use crate::tolerances::{MARGIN, MOST_ENCLOSED, PROOF_DEPTH, ROOT_BOXES};
+
+/// The continuous extension of a step, as far as it bounds what is monitored.
+pub(in crate::integrate) struct BoundedCurve<'a> {
+    pub system: &'a dyn PiecewiseSystem,
+    pub interpolant: &'a Interpolant,
+    pub signs: &'a [f64],
+    pub sliding: &'a [usize],
+    /// How far the projection onto a curved surface moves the extension.
+    pub margin: &'a [f64],
+    /// The exit functions of the motion at the stages of the step.
+    pub stages: &'a [[f64; 7]],
+    /// Bounds of many multipliers, where the field is affine in the signs.
+    pub affine: Option<&'a AffineBounds>,
+    /// Whether the exit functions are those of the multipliers of the canopy.
+    pub by_multipliers: bool,
+    /// The normal components on pieces of this extension: they are asked for one after the other.
+    pub known_exits: &'a RefCell<Vec<Piece>>,
+    /// The multipliers on the pieces looked at, while sliding on an intersection: all exit functions ask for them.
+    pub known_roots: &'a RefCell<Vec<RootPiece>>,
+}
+
+/// Pieces whose multipliers are remembered within a step.
+const MOST_KNOWN_ROOTS: usize = 64;
+
+/// A piece with the bounds of both normal components.
+pub(in crate::integrate) type Piece = (f64, f64, [Enclosure; 2]);
+
+/// A piece with the bounds of the multipliers.
+pub(in crate::integrate) type RootPiece = (f64, f64, RootBounds);
+
+impl BoundedCurve<'_> {
+    /// The bounds of a function from theta = `a` to `b`, if the system can give any.
+    pub fn over(&self, m: &Monitored, a: f64, b: f64) -> Option<Bound> {
+        // An exit function is positive inside as it is, that of f+ with its sign changed.
+        let (enclosure, orientation) = match (m.function, self.sliding) {
+            (EventFunction::Surface(j), _) => {
+                let tube = Tube::new(self.interpolant, (a, b), self.margin);
+                let enclosure = self.system.enclose_surface(j, &tube, self.signs)?;
+                (enclosure, m.orientation)
+            }
+            (EventFunction::ExitMinus, &[j]) => (self.normal_components(j, a, b)?[0], 1.0),
+            (EventFunction::ExitPlus, &[j]) => (self.normal_components(j, a, b)?[1], -1.0),
+            (EventFunction::Exit(index), _) => return self.exit(index, a, b),
+            _ => return None,
+        };
+        Some(Bound::new(enclosure, orientation, self.interpolant.dt))
+    }
+
+    /// An exit function of sliding on an intersection, from bounds of the multipliers.
+    fn exit(&self, index: usize, a: f64, b: f64) -> Option<Bound> {
+        let m = self.sliding.len();
+        if !self.by_multipliers || m > MOST_ENCLOSED && self.affine.is_none() {
+            return None;
+        }
+        let mut known = self.known_roots.borrow_mut();
+        let place = match known.iter().position(|piece| (piece.0, piece.1) == (a, b)) {
+            Some(place) => place,
+            None => {
+                let piece = (a, b, self.enclosed_root(a, b)?);
+                if known.len() == MOST_KNOWN_ROOTS {
+                    known.clear();
+                }
+                known.push(piece);
+                known.len() - 1
+            }
+        };
+        let value = match &known[place].2 {
+            RootBounds::Proved(root) => exit_bound(IntersectionExit::of(index, m), root)?,
+            RootBounds::Unproved => Interval::ALL,
+            RootBounds::Singular => return None,
+        };
+        Some(Bound {
+            value,
+            slope: Interval::ALL,
+        })
+    }
+
+    /// Bounds of the normal components of all fields around the intersection.
+    fn all_components(&self, a: f64, b: f64) -> Option<SmallVec<[Interval; 24]>> {
+        let tube = Tube::new(self.interpolant, (a, b), self.margin);
+        let m = self.sliding.len();
+        let mut components = SmallVec::from_elem(Interval::ALL, m << m);
+        let mut signs = Signs::from_slice(self.signs);
+        for pattern in 0..1_usize << m {
+            for (i, &j) in self.sliding.iter().enumerate() {
+                signs[j] = if pattern >> i & 1 == 1 { 1.0 } else { -1.0 };
+            }
+            let below = (0..m).filter(|i| pattern >> i & 1 == 0);
+            for i in below {
+                let sides =
+                    self.system
+                        .enclose_normal_components(self.sliding[i], &tube, &signs)?;
+                components[pattern * m + i] = sides[0].value;
+                components[(pattern | 1 << i) * m + i] = sides[1].value;
+            }
+        }
+        Some(components)
+    }
+
+    fn normal_components(&self, j: usize, a: f64, b: f64) -> Option<[Enclosure; 2]> {
+        if let Some(known) = known_components(&self.known_exits.borrow(), a, b) {
+            return Some(known);
+        }
+        let tube = Tube::new(self.interpolant, (a, b), self.margin);
+        let components = self
+            .system
+            .enclose_normal_components(j, &tube, self.signs)?;
+        self.known_exits.borrow_mut().push((a, b, components));
+        Some(components)
+    }
+
+    /// The multipliers on a piece, from boxes around their values at the ends of the step.
+    fn enclosed_root(&self, a: f64, b: f64) -> Option<RootBounds> {
+        if let (Some(bounds), Some(affine)) = (self.affine, self.system.affine_signs()) {
+            let tube = Tube::new(self.interpolant, (a, b), self.margin);
+            let exits = self.stages.chunks_exact(2).take(self.sliding.len());
+            let middles = exits.map(|pair| 0.5 * (pair[0][0] + pair[0][6]) - 1.0);
+            let near: Vector = middles.collect();
+            let found = bounds.enclose(affine, self.sliding, &tube, self.signs, &near);
+            return Some(found.map_or(RootBounds::Unproved, |multipliers| {
+                RootBounds::Proved(EnclosedRoot {
+                    multipliers,
+                    diagonal: IntervalVector::new(),
+                })
+            }));
+        }
+        let components = self.all_components(a, b)?;
+        let exits = self.stages.chunks_exact(2).take(self.sliding.len());
+        let ends = exits.map(|pair| Interval::hull(pair[0][0] - 1.0, pair[0][6] - 1.0));
+        let ends: IntervalVector = ends.collect();
+        let boxes = ROOT_BOXES.into_iter().map(|radius| {
+            let wider = |l: &Interval| Interval::hull(l.lo - radius, l.hi + radius);
+            enclose_root(
+                &components,
+                &ends.iter().map(wider).collect::<IntervalVector>(),
+            )
+        });
+        let mut found = RootBounds::Unproved;
+        for bounds in boxes {
+            found = bounds;
+            if !matches!(found, RootBounds::Unproved) {
+                break;
+            }
+        }
+        Some(found)
+    }
+}
+
+/// The bounds over a piece that was looked at, or over two that make it up.
+fn known_components(known: &[Piece], a: f64, b: f64) -> Option<[Enclosure; 2]> {
+    if let Some(piece) = known.iter().find(|piece| (piece.0, piece.1) == (a, b)) {
+        return Some(piece.2);
+    }
+    let first = known.iter().find(|piece| piece.0 == a && piece.1 < b)?;
+    let second = known
+        .iter()
+        .find(|piece| (piece.0, piece.1) == (first.1, b))?;
+    Some([0, 1].map(|k| first.2[k].hull(second.2[k])))
+}
+
+/// Bounds of an exit function where the multipliers are bounded; none for the stability of three and more.
+fn exit_bound(exit: IntersectionExit, root: &EnclosedRoot) -> Option<Interval> {
+    Some(match exit {
+        IntersectionExit::Side { position, end } => {
+            Interval::point(1.0) + root.multipliers[position].scaled(-f64::from(end))
+        }
+        // The root is the only one in its box: it meets no other.
+        IntersectionExit::Fold => Interval::point(f64::MAX),
+        // Each entry is in units of its surface: only the sign counts.
+        IntersectionExit::Stability => match root.diagonal[..] {
+            [] => Interval::point(f64::MAX),
+            [first, second] => Interval::hull(-first.hi.min(second.hi), f64::MAX),
+            _ => return None,
+        },
+    })
+}
+
+impl Integrator<'_> {
+    /// What bounds over the step up to `reach` prove about a function.
+    pub(in crate::integrate) fn prove_clear(
+        &self,
+        index: usize,
+        value_at_end: f64,
+        reach: f64,
+    ) -> Proof {
+        let m = self.motion.monitored[index];
+        let curve = BoundedCurve {
+            system: self.system,
+            interpolant: self.stepper.interpolant(),
+            signs: &self.motion.signs,
+            sliding: self.motion.sliding(),
+            margin: &self.detector.margin,
+            stages: &self.detector.stages,
+            affine: self.motion.affine_bounds(),
+            by_multipliers: !self.slides_by_rule() && self.motion.has_bounds(),
+            known_exits: &self.detector.enclosed_exits,
+            known_roots: &self.detector.enclosed_roots,
+        };
+        // Next to a zero that is divided out the function itself may only rise.
+        let at_start = if m.deflation.is_some() {
+            f64::INFINITY
+        } else {
+            m.value
+        };
+        prove(
+            &mut |a, b| curve.over(&m, a, b),
+            reach,
+            (at_start, (reach == 1.0).then_some(value_at_end)),
+            m.noise,
+            PROOF_DEPTH,
+        )
+    }
+
+    /// Prepares the bounds of many multipliers, once per motion.
+    pub(in crate::integrate) fn prepare_bounds(&mut self) -> Result<(), FieldError> {
+        let (motion, system) = (&mut self.motion, self.system);
+        if motion.sliding.len() < 2
+            || !motion.has_bounds()
+            || motion.affine_bounds.is_some()
+            || self.options.sliding != SlidingRule::Canopy
+        {
+            return Ok(());
+        }
+        let mut bounds = None;
+        if let Some(affine) = system.affine_signs() {
+            let point = (self.t, &self.x[..]);
+            let (found, evaluations) =
+                AffineBounds::new(affine, &motion.sliding, point, &motion.signs)?;
+            self.stats.n_field_evaluations += evaluations;
+            bounds = found;
+        }
+        motion.affine_bounds = Some(bounds);
+        Ok(())
+    }
+
+    /// How far the motion lies beside the continuous extension, from the probes of the step.
+    pub(in crate::integrate) fn measure_margin(&mut self, dt: f64) -> Result<(), FieldError> {
+        let Detector { margin, x, .. } = &mut self.detector;
+        if self.motion.is_straight {
+            return Ok(());
+        }
+        margin.resize(x.len(), 0.0);
+        let mut moved = x.clone();
+        for theta in PROBES {
+            self.stepper.interpolant().at(theta, x);
+            moved.copy_from_slice(x);
+            self.motion.project(self.t + theta * dt, &mut moved)?;
+            for ((margin, x), moved) in margin.iter_mut().zip(&*x).zip(&moved) {
+                *margin = margin.max(MARGIN * (moved - x).abs());
+            }
+        }
+        Ok(())
+    }
+}

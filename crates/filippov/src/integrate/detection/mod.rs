@@ -1,0 +1,8 @@
+//! The event stage of a step: the first zero of what is monitored.
+
+pub(super) mod bounds;
+pub(super) mod curve;
+pub(super) mod detect;
+pub(super) mod multiple_zero;
+pub(super) mod search;
+pub(super) mod user_events;

@@ -1,0 +1,439 @@
+//! The search of a step for the first zero of one monitored function.
+
+use crate::error::FieldError;
+use crate::event::certificate::Proof;
+use crate::event::filter::may_vanish_between;
+use crate::event::isolate::{first_zero_sampled, Bracket, Evidence, Sampled, Zero, PROBES};
+use crate::event::locate::{refine, Located};
+use crate::event::proved::{expected_zero_proved, first_zero_proved, Proved};
+use crate::event::series::{LongestSeries, Near, Series, Zeros};
+use crate::event::{EventFunction, Monitored};
+use crate::integrate::detection::bounds::BoundedCurve;
+use crate::integrate::detection::curve::{grazes, Curve};
+use crate::integrate::integrator::Integrator;
+use crate::stepper::nested;
+use crate::tolerances::{
+    BEYOND_GUESS, BEYOND_TOUCH, EPS, POLE, RESOLVED_DEPTH, UNBOUNDED_DEPTH, UNPROVED_DEPTH,
+};
+
+/// What came of a search.
+pub(in crate::integrate) enum SearchOutcome {
+    /// There is no zero.
+    Nothing,
+    /// The function vanishes at this theta; whether it only touches zero.
+    At(f64, bool),
+    /// A touch that ends nothing: the search goes on from this theta.
+    Beyond(f64),
+    /// The sign changes without a zero.
+    Pole,
+}
+
+/// A piece of a step that was searched.
+pub(in crate::integrate) struct Searched {
+    pub function: EventFunction,
+    pub piece: (f64, f64),
+    /// Largest value among the samples.
+    pub scale: f64,
+    /// Rounding of the function.
+    pub noise: f64,
+    /// How well a zero is to be located.
+    pub width: f64,
+}
+
+impl Searched {
+    /// Is the zero clear of rounding: a crossing with a slope, or one that the motion is already behind?
+    fn is_clear(&self, zero: &Zero) -> bool {
+        match zero {
+            Zero::Crossing(bracket) => {
+                bracket.lo >= bracket.hi || bracket.is_steep(self.scale, self.noise)
+            }
+            Zero::Touch(_) => false,
+        }
+    }
+
+    /// What an isolated zero of `g` means, located to rounding.
+    pub fn outcome(&self, g: Sampled, zero: Option<Zero>) -> Result<SearchOutcome, FieldError> {
+        let (from, to) = self.piece;
+        Ok(match zero {
+            None => SearchOutcome::Nothing,
+            Some(Zero::Touch(theta)) if theta <= from => SearchOutcome::Nothing,
+            // A multiplier that touches its end goes on; it may leave later in the step.
+            Some(Zero::Touch(theta)) if matches!(self.function, EventFunction::Exit(_)) => {
+                let rest = theta + BEYOND_TOUCH * (to - from);
+                if rest >= to {
+                    SearchOutcome::Nothing
+                } else {
+                    SearchOutcome::Beyond(rest)
+                }
+            }
+            Some(Zero::Touch(theta)) => SearchOutcome::At(theta, true),
+            // Beyond the surface from the start, by the rounding of what moved the state: the switch is now.
+            Some(Zero::Crossing(bracket)) if bracket.lo >= bracket.hi => {
+                SearchOutcome::At(bracket.lo, false)
+            }
+            Some(Zero::Crossing(bracket)) => {
+                let Located { theta, residual } = refine(g, bracket, self.width)?;
+                if residual > POLE * self.scale {
+                    return Ok(SearchOutcome::Pole);
+                }
+                if bracket.is_steep(self.scale, self.noise) {
+                    return Ok(SearchOutcome::At(theta, false));
+                }
+                match grazes(g, theta, from, to, self.noise)? {
+                    Some(vertex) => SearchOutcome::At(vertex, true),
+                    None => SearchOutcome::At(theta, false),
+                }
+            }
+        })
+    }
+}
+
+impl Integrator<'_> {
+    /// The first zero of one monitored function on [from, to], refined to rounding.
+    pub(in crate::integrate) fn search(
+        &mut self,
+        (index, has_bounds): (usize, bool),
+        (from, to): (f64, f64),
+        dt: f64,
+    ) -> Result<Option<(f64, bool)>, FieldError> {
+        let m = self.motion.monitored[index];
+        let polynomial = match m.function {
+            EventFunction::Surface(j) if self.is_polynomial(&m) => {
+                if self.stepper.has_series() {
+                    return self.search_series(index, (from, to), dt);
+                }
+                Polynomial::Nested(self.affine_rows(j, &m, dt)?)
+            }
+            _ => Polynomial::None,
+        };
+        self.search_piece((index, has_bounds), &polynomial, None, (from, to), dt)
+    }
+
+    /// Is a function a polynomial along the step?
+    fn is_polynomial(&self, m: &Monitored) -> bool {
+        m.affine && self.motion.is_straight && matches!(m.function, EventFunction::Surface(_))
+    }
+
+    /// The first zero of one monitored function in a Taylor step up to `reach`, and how far it was searched: to the
+    /// same point, or to one behind a zero.
+    pub(in crate::integrate) fn search_along_series(
+        &mut self,
+        index: usize,
+        reach: f64,
+        dt: f64,
+    ) -> Result<(Option<(f64, bool)>, f64), FieldError> {
+        let m = self.motion.monitored[index];
+        if m.deflation.is_some() {
+            self.motion.monitored[index].noise = self.noise_of(m.function)?;
+        }
+        let (value, _) = self.detector.right[index];
+        let mut buffer = LongestSeries::default();
+        let rows = &mut buffer[..self.n_rows()];
+        if let (EventFunction::Surface(j), true) = (m.function, self.is_polynomial(&m)) {
+            self.affine_series(j, &m, dt, rows)?;
+            let polynomial = self.as_polynomial(&m, rows);
+            let mut near = None;
+            if let Polynomial::Quotient(series) | Polynomial::Powers(series) = &polynomial {
+                if value > 0.0 && series.is_far_from_zero() {
+                    return Ok((None, reach));
+                }
+                let mut zeros = (series.zeros(1.0), 1.0);
+                if let Zeros::Unknown = zeros.0 {
+                    near = series.near_zero();
+                    // A long step has several zeros: not far beyond the first there is one.
+                    if let Some(Near { theta, .. }) = near {
+                        let to = (BEYOND_GUESS * theta).min(1.0);
+                        zeros = (series.zeros(to), to);
+                    }
+                }
+                match zeros {
+                    (Zeros::Nowhere, 1.0) if value > 0.0 => return Ok((None, reach)),
+                    (Zeros::One(guess), to) if value < 0.0 || to < 1.0 => {
+                        if let Some(theta) = self.only_zero(index, series, (guess, to), dt)? {
+                            let searched = (theta + self.together(dt)).min(reach);
+                            return Ok((Some((theta, false)), searched));
+                        }
+                    }
+                    _ => {}
+                }
+            }
+            return self.search_near((index, true), &polynomial, near, reach, dt);
+        }
+        let has_series = self.exit_series(&m, rows);
+        // Beyond zero at the end: there is a zero, whether there are bounds or not.
+        let proof = if value <= 0.0 && has_series {
+            Proof::Open
+        } else {
+            self.prove_clear(index, value, reach)
+        };
+        if proof == Proof::Clear || proof == Proof::Silent && !self.exit_may_vanish(&m) {
+            return Ok((None, reach));
+        }
+        let near = if has_series {
+            Series::new(rows).near_zero()
+        } else {
+            None
+        };
+        let bounded = (index, proof == Proof::Open);
+        self.search_near(bounded, &Polynomial::None, near, reach, dt)
+    }
+
+    /// May an exit function about which there are no bounds vanish, to judge by its values at the stages?
+    fn exit_may_vanish(&self, m: &Monitored) -> bool {
+        let stages = m.function.exit_index();
+        let stages = stages.and_then(|index| self.detector.stages.get(index));
+        let is_known = m.deflation.is_none() && !self.stepper.is_taylor();
+        stages.is_none_or(|stages| !is_known || may_vanish_between(stages))
+    }
+
+    /// The only zero of a series up to `to`, near `guess`, to rounding; `None` if rounding matters for whether it is
+    /// one.
+    fn only_zero(
+        &mut self,
+        index: usize,
+        series: &Series,
+        (guess, to): (f64, f64),
+        dt: f64,
+    ) -> Result<Option<f64>, FieldError> {
+        let noise = self.noise_of(self.motion.monitored[index].function)?;
+        self.motion.monitored[index].noise = noise;
+        let g_lo = series.value(0.0);
+        let g_hi = match to {
+            1.0 => self.detector.right[index].0,
+            _ => series.value(to),
+        };
+        let mut bracket = Bracket {
+            lo: 0.0,
+            hi: to,
+            g_lo,
+            g_hi,
+            guess,
+            slope: g_hi - g_lo,
+        };
+        if g_lo <= noise || g_hi >= -noise || !bracket.is_steep(g_lo.max(-g_hi), noise) {
+            return Ok(None);
+        }
+        let width = 0.5 * EPS * (self.t.abs() / dt).max(1.0);
+        if let Some((theta, slope)) = series.newton(guess) {
+            (bracket.guess, bracket.slope) = (theta, slope);
+        }
+        let mut g = |theta: f64| Ok(series.value(theta));
+        Ok(Some(refine(&mut g, bracket, width)?.theta))
+    }
+
+    /// The first zero up to `reach`, looked for at first not far beyond where it is expected; and how far was
+    /// searched.
+    fn search_near(
+        &mut self,
+        (index, has_bounds): (usize, bool),
+        polynomial: &Polynomial,
+        near: Option<Near>,
+        reach: f64,
+        dt: f64,
+    ) -> Result<(Option<(f64, bool)>, f64), FieldError> {
+        let piece = near.map(|near| (0.0, BEYOND_GUESS * near.theta));
+        if let Some(piece) = piece.filter(|piece| has_bounds && piece.1 < reach) {
+            let zero = self.search_piece((index, true), polynomial, near, piece, dt)?;
+            if zero.is_some() || self.detector.uncertain {
+                return Ok((zero, piece.1));
+            }
+        }
+        let piece = (0.0, reach);
+        let zero = self.search_piece((index, has_bounds), polynomial, near, piece, dt)?;
+        let together = self.together(dt);
+        let searched = zero.map_or(reach, |(theta, _)| (theta + together).min(reach));
+        Ok((zero, searched))
+    }
+
+    /// The first zero of an affine h on a piece of a Taylor step.
+    fn search_series(
+        &mut self,
+        index: usize,
+        piece: (f64, f64),
+        dt: f64,
+    ) -> Result<Option<(f64, bool)>, FieldError> {
+        let m = self.motion.monitored[index];
+        let EventFunction::Surface(j) = m.function else {
+            return Ok(None);
+        };
+        let mut buffer = LongestSeries::default();
+        let rows = &mut buffer[..self.n_rows()];
+        self.affine_series(j, &m, dt, rows)?;
+        let polynomial = self.as_polynomial(&m, rows);
+        self.search_piece((index, true), &polynomial, None, piece, dt)
+    }
+
+    fn search_piece(
+        &mut self,
+        (index, has_bounds): (usize, bool),
+        polynomial: &Polynomial,
+        near: Option<Near>,
+        (from, to): (f64, f64),
+        dt: f64,
+    ) -> Result<Option<(f64, bool)>, FieldError> {
+        let m = self.motion.monitored[index];
+        let noise = self.noise_of(m.function)?;
+        self.motion.monitored[index].noise = noise;
+        let by_multipliers = !self.slides_by_rule() && self.motion.has_bounds();
+        let interpolant = self.stepper.interpolant();
+        let bounds = BoundedCurve {
+            system: self.system,
+            interpolant,
+            signs: &self.motion.signs,
+            sliding: &self.motion.sliding,
+            margin: &self.detector.margin,
+            stages: &self.detector.stages,
+            affine: self.motion.affine_bounds.as_ref().and_then(Option::as_ref),
+            by_multipliers,
+            known_exits: &self.detector.enclosed_exits,
+            known_roots: &self.detector.enclosed_roots,
+        };
+        let mut curve = Curve {
+            system: self.system,
+            field: &mut self.motion.field,
+            signs: &self.motion.signs,
+            interpolant,
+            is_straight: self.motion.is_straight,
+            h: &mut self.detector.h,
+            x: &mut self.detector.x,
+            exits: &mut self.detector.exits,
+            n_evaluations: &mut self.stats.n_surface_evaluations,
+        };
+        let (t, dt_step) = (self.t, dt);
+        let mut g = |theta: f64| {
+            let value = match polynomial {
+                Polynomial::Quotient(series) => return Ok(series.value(theta)),
+                Polynomial::Powers(series) | Polynomial::Deflated(series) => series.value(theta),
+                Polynomial::Nested(rows) => nested(rows, theta),
+                Polynomial::None => curve.value(&m, theta)?,
+            };
+            Ok(m.deflated(value, t + theta * dt_step, dt_step, noise))
+        };
+        let (start, end) = (m.value, self.detector.right[index].0);
+        let is_quotient = matches!(polynomial, Polynomial::Quotient(_));
+        let is_divided = m.deflation.is_some() && !is_quotient;
+        let mut over = |a, b| match polynomial {
+            Polynomial::Quotient(series)
+            | Polynomial::Powers(series)
+            | Polynomial::Deflated(series) => Some(series.bound(a, b)),
+            _ => bounds.over(&m, a, b),
+        };
+        let width = EPS * (t.abs() / dt).max(0.5 * to);
+        let is_bounded = match polynomial {
+            Polynomial::Nested(_) => false,
+            Polynomial::None => has_bounds,
+            _ => true,
+        };
+        if is_bounded && !is_divided && from == 0.0 {
+            let piece = (from, to);
+            let left = if is_quotient { g(0.0)? } else { start };
+            if let Some(near) = near {
+                let expected = expected_zero_proved(&mut g, &mut over, piece, left, noise, near)?;
+                let is_steep = |b: &Bracket| b.is_steep(left.max(-b.g_hi), noise);
+                if let Some(bracket) = expected.filter(is_steep) {
+                    return Ok(Some((refine(&mut g, bracket, width)?.theta, false)));
+                }
+            }
+            let right = if to == 1.0 { end } else { g(to)? };
+            let ends = (left, right);
+            let proved = first_zero_proved(&mut g, &mut over, piece, ends, noise, near)?;
+            let zero = match proved {
+                Proved::Nothing => return Ok(None),
+                Proved::Single(bracket) => Some(bracket),
+                Proved::Unknown => None,
+            };
+            let scale = left.max(right.abs());
+            if let Some(bracket) = zero.filter(|bracket| bracket.is_steep(scale, noise)) {
+                return Ok(Some((refine(&mut g, bracket, width)?.theta, false)));
+            }
+        }
+        let mut values = [f64::NAN; 5];
+        for (i, value) in values.iter_mut().enumerate() {
+            let theta = from + (to - from) * 0.25 * i as f64;
+            *value = match theta {
+                0.0 => m.deflated(start, t, dt, noise),
+                1.0 => m.deflated(end, t + dt, dt, noise),
+                _ => g(theta)?,
+            };
+        }
+        let evidence = match (m.function, is_bounded) {
+            (_, true) => Evidence::Bounds {
+                bounds: &mut over,
+                divided: is_divided,
+                patience: match m.function {
+                    EventFunction::Exit(_) => UNPROVED_DEPTH,
+                    _ => UNBOUNDED_DEPTH,
+                },
+            },
+            // Along the step an affine surface is a quintic; the quartic and its remainder describe it.
+            (EventFunction::Surface(_), _) if m.affine => Evidence::Probes(&[]),
+            (EventFunction::Surface(_), _) => Evidence::Probes(&PROBES),
+            _ => Evidence::Probes(&PROBES[..1]),
+        };
+        let isolated = first_zero_sampled(&mut g, from, to, values, noise, evidence)?;
+        self.detector.unresolved |= isolated.depth > RESOLVED_DEPTH && !is_bounded;
+        self.detector.uncertain |= isolated.exhausted || isolated.not_finite;
+        let searched = Searched {
+            function: m.function,
+            piece: (from, to),
+            scale: values.iter().fold(0.0_f64, |m, v| m.max(v.abs())),
+            noise,
+            width,
+        };
+        let is_clear = isolated.zero.is_some_and(|zero| searched.is_clear(&zero));
+        match searched.outcome(&mut g, isolated.zero)? {
+            SearchOutcome::Nothing => Ok(None),
+            SearchOutcome::At(theta, touch) => {
+                self.detector.blurred |= !is_clear;
+                Ok(Some((theta, touch)))
+            }
+            SearchOutcome::Beyond(rest) => {
+                self.search_piece((index, has_bounds), polynomial, None, (rest, to), dt)
+            }
+            SearchOutcome::Pole => {
+                self.detector.uncertain = true;
+                Ok(None)
+            }
+        }
+    }
+
+    /// An affine h along a Taylor step.
+    fn as_polynomial<'a>(&self, m: &Monitored, rows: &'a [f64]) -> Polynomial<'a> {
+        let series = Series::new(rows);
+        match m.deflation {
+            None => Polynomial::Powers(series),
+            Some(zero) if zero.t == self.t => {
+                Polynomial::Quotient(series.divided(zero.order as usize))
+            }
+            Some(_) => Polynomial::Deflated(series),
+        }
+    }
+
+    /// The rows of an affine h along the extension of a step of DOPRI5, in its nested form.
+    fn affine_rows(&self, j: usize, m: &Monitored, dt: f64) -> Result<[f64; 6], FieldError> {
+        let (point, signs) = ((self.t, &self.x[..]), &self.motion.signs);
+        let extension = self.stepper.interpolant().coefficients();
+        let mut rows = [0.0; 6];
+        let ht = self
+            .system
+            .gradient_products(j, point, signs, extension, &mut rows)?;
+        rows.iter_mut().for_each(|row| *row *= m.orientation);
+        rows[0] = m.value;
+        rows[1] += m.orientation * ht * dt;
+        Ok(rows)
+    }
+}
+
+/// A monitored function along a step, in the form of the step's continuous extension.
+enum Polynomial<'a> {
+    /// It is none.
+    None,
+    /// The nested form of DOPRI5.
+    Nested([f64; 6]),
+    /// A series.
+    Powers(Series<'a>),
+    /// A series; the zero at the start of this step is divided out.
+    Quotient(Series<'a>),
+    /// A series; a zero before this step is yet to be divided out.
+    Deflated(Series<'a>),
+}

@@ -1,0 +1,191 @@
+//! Steps by the method for stiff motions.
+
+use crate::error::FieldError;
+use crate::field::SmoothField;
+use crate::integrate::integrator::Integrator;
+use crate::stepper::{Attempt, Linearisation, StepMethod};
+use crate::tolerances::{AIM_MARGINS, EPS};
+
+/// How a motion is linearised.
+#[derive(Clone, Default)]
+pub(in crate::integrate) enum Derivatives {
+    /// It is not: an explicit method integrates it.
+    #[default]
+    None,
+    /// By the derivatives of the expression graph.
+    Exact(std::sync::Arc<crate::system::MotionJacobian>),
+    /// By differences of its field.
+    Differences,
+}
+
+impl Integrator<'_> {
+    /// Gives the motion that starts to the method for stiff motions.
+    #[cold]
+    #[inline(never)]
+    pub(in crate::integrate) fn start_implicit(&mut self) {
+        self.stepper.start_with(StepMethod::Rodas5p);
+        let by_graph = self.motion.has_canopy_field() && !self.motion.is_drawn_back();
+        let jacobian = by_graph
+            .then(|| self.system.motion_jacobian(self.motion.sliding()))
+            .flatten();
+        self.take_derivatives(jacobian.map_or(Derivatives::Differences, Derivatives::Exact));
+    }
+
+    pub(in crate::integrate) fn take_derivatives(&mut self, derivatives: Derivatives) {
+        if let Some(rodas5p) = &mut self.stepper.rodas5p {
+            rodas5p.restart(match &derivatives {
+                Derivatives::Exact(jacobian) => jacobian.linearisation(),
+                _ => Linearisation::dense(self.x.len()),
+            });
+        }
+        self.motion.derivatives = derivatives;
+    }
+
+    /// Finds the derivatives at the start of the step. Where they are not finite DOPRI5 takes the step.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    #[cold]
+    #[inline(never)]
+    pub(in crate::integrate) fn linearise(&mut self) -> Result<(), FieldError> {
+        self.stepper.go_on_with(StepMethod::Rodas5p);
+        let is_known = |rodas5p: &crate::stepper::Rodas5p| rodas5p.is_linearised();
+        if self.stepper.rodas5p.as_deref().is_none_or(is_known) {
+            return Ok(());
+        }
+        self.stats.n_jacobians += 1;
+        let is_finite = match self.motion.derivatives.clone() {
+            Derivatives::Exact(jacobian) => {
+                let signs = self.signs_and_multipliers()?;
+                let (system, t, x) = (self.system, self.t, &self.x);
+                let Some(rodas5p) = &mut self.stepper.rodas5p else {
+                    return Ok(());
+                };
+                rodas5p.linearise(|out| system.eval_jacobian(&jacobian, t, x, &signs, out))
+            }
+            _ => self.linearise_by_differences()?,
+        };
+        if !is_finite {
+            self.stepper.go_on_with(StepMethod::Dopri5);
+        }
+        Ok(())
+    }
+
+    /// The signs of the mode, with the signs that stand for the multipliers at the start of the step.
+    fn signs_and_multipliers(&mut self) -> Result<Vec<f64>, FieldError> {
+        let mut signs = self.motion.signs.to_vec();
+        if self.motion.sliding.is_empty() {
+            return Ok(signs);
+        }
+        let (mut x, mut rates) = (self.x.clone(), vec![0.0; self.x.len()]);
+        self.motion.field.eval(self.t, &mut x, &mut rates)?;
+        let multipliers = self.motion.multipliers();
+        for (k, &j) in self.motion.sliding.iter().enumerate() {
+            let at_signs = &self.motion.signs;
+            let ratio = self.system.stick_ratio(j, self.t, &self.x, at_signs);
+            signs[j] = ratio * multipliers.get(k).copied().unwrap_or(f64::NAN);
+        }
+        Ok(signs)
+    }
+
+    /// Derivatives by one difference per state and one in time. Where the field is not there on one side of the
+    /// start the other is taken.
+    fn linearise_by_differences(&mut self) -> Result<bool, FieldError> {
+        let (t, n) = (self.t, self.x.len());
+        let start = self.stepper.start_derivative().to_vec();
+        let mut columns = vec![0.0; n * n];
+        let mut at_rates = vec![0.0; n];
+        let field = &mut self.motion.field;
+        let mut difference = |i: Option<usize>, out: &mut [f64]| -> Result<(), FieldError> {
+            let value = i.map_or(t, |i| self.x[i]);
+            for side in [1.0, -1.0] {
+                // Radau5's choice (Hairer, Wanner 1996, section IV.8).
+                let moved = value + side * (EPS * value.abs().max(1e-5)).sqrt();
+                let mut x = self.x.clone();
+                let time = match i {
+                    Some(i) => {
+                        x[i] = moved;
+                        t
+                    }
+                    None => moved,
+                };
+                field.eval(time, &mut x, &mut at_rates)?;
+                for ((out, there), here) in out.iter_mut().zip(&at_rates).zip(&start) {
+                    *out = (there - here) / (moved - value);
+                }
+                if out.iter().all(|v| v.is_finite()) {
+                    break;
+                }
+            }
+            Ok(())
+        };
+        for (i, column) in columns.chunks_exact_mut(n).enumerate() {
+            difference(Some(i), column)?;
+        }
+        let mut in_time = vec![0.0; n];
+        difference(None, &mut in_time)?;
+        let Some(rodas5p) = &mut self.stepper.rodas5p else {
+            return Ok(false);
+        };
+        Ok(rodas5p.linearise(|out| {
+            out.fill(|values, time| {
+                for (place, value) in values.iter_mut().enumerate() {
+                    *value = -columns[place % n * n + place / n];
+                }
+                time.copy_from_slice(&in_time);
+            });
+        }))
+    }
+
+    /// Is the step to be taken anew, so that it ends just behind the event at `theta`? Inside of a step the extension of
+    /// a stiff motion lies beside the manifold to which the fast components keep; within the tolerance, but the
+    /// direction of the field there says nothing about the motion. At its end the step is on it.
+    #[cold]
+    #[inline(never)]
+    pub(in crate::integrate) fn aims_again(&mut self, theta: f64, dt: f64) -> bool {
+        let Some(margin) = AIM_MARGINS.get(self.n_aims) else {
+            return false;
+        };
+        let aimed = theta * dt * (1.0 + margin);
+        if aimed >= dt || theta * dt * margin <= EPS * self.t.abs() {
+            return false;
+        }
+        self.n_aims += 1;
+        self.dt = aimed;
+        true
+    }
+
+    /// Attempts a step by the method for stiff motions; by DOPRI5 if its matrix has no inverse.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    #[cold]
+    #[inline(never)]
+    pub(in crate::integrate) fn attempt_implicit(
+        &mut self,
+        dt: f64,
+    ) -> Result<Attempt, FieldError> {
+        let Some(rodas5p) = &mut self.stepper.rodas5p else {
+            return Ok(Attempt::NotFinite);
+        };
+        self.stats.n_factorisations += 1;
+        if !rodas5p.factor(dt) {
+            self.stepper.go_on_with(StepMethod::Dopri5);
+            return self.attempt_explicit(dt);
+        }
+        let stages = &mut self.detector.stages;
+        let observe = |stage: usize, field: &crate::integrate::motion::ModeField| {
+            for (exit, value) in stages.iter_mut().zip(field.last_exits()) {
+                exit[stage] = value;
+            }
+        };
+        let field = &mut self.motion.field;
+        let attempt = rodas5p.attempt(field, observe, self.t, &self.x, dt, &self.scale)?;
+        let is_beside = rodas5p.linearisation().is_exact() && !self.motion.is_straight;
+        if attempt == Attempt::NotFinite && is_beside {
+            // The field may not be there beside a curved surface: at its projection it is.
+            self.take_derivatives(Derivatives::Differences);
+        }
+        Ok(attempt)
+    }
+}
