@@ -3,7 +3,9 @@
 
 mod support;
 
-use filippov_expr::{BinaryOp, Enclosure, EnclosureProgram, Graph, Interval, Motion, UnaryOp};
+use filippov_expr::{
+    BinaryOp, Enclosure, EnclosureProgram, Graph, Interval, Motion, NodeId, UnaryOp,
+};
 use proptest::prelude::*;
 use support::{build, recipes, values, Point, N_STATES};
 
@@ -33,15 +35,36 @@ impl Motion for Line {
     }
 }
 
-fn enclosures(g: &Graph, nodes: &[filippov_expr::NodeId], line: &Line) -> Vec<Enclosure> {
+/// A point up to rounding.
+struct Rounded<'a>(&'a Point);
+
+impl Rounded<'_> {
+    fn around(value: f64) -> Interval {
+        Interval::around(value, 2.0 * f64::EPSILON * value.abs())
+    }
+}
+
+impl Motion for Rounded<'_> {
+    fn time(&self) -> Interval {
+        Rounded::around(self.0.t)
+    }
+
+    fn state(&self, index: usize) -> Enclosure {
+        Enclosure {
+            value: Rounded::around(self.0.x[index]),
+            rate: Interval::ZERO,
+        }
+    }
+}
+
+fn enclosures(
+    (g, nodes): (&Graph, &[NodeId]),
+    motion: &dyn Motion,
+    from: &Point,
+) -> Vec<Enclosure> {
     let program = EnclosureProgram::compile(g, nodes).unwrap();
     let mut out = vec![Enclosure::UNKNOWN; nodes.len()];
-    program.eval(
-        line,
-        &line.from.signs(g.n_surfaces()),
-        &line.from.p,
-        &mut out,
-    );
+    program.eval(motion, &from.signs(g.n_surfaces()), &from.p, &mut out);
     out
 }
 
@@ -57,20 +80,25 @@ proptest! {
     ) {
         let (g, nodes) = build(&recipe);
         let line = Line { from, direction, length };
-        let bounds = enclosures(&g, &nodes, &line);
-        let samples: Vec<Vec<f64>> = (0..=8).map(|k| values(&g, &nodes, &line.at(f64::from(k) / 8.0))).collect();
+        let bounds = enclosures((&g, &nodes), &line, &line.from);
+        let points: Vec<Point> = (0..=8).map(|k| line.at(f64::from(k) / 8.0)).collect();
+        let samples: Vec<Vec<f64>> = points.iter().map(|point| values(&g, &nodes, point)).collect();
+        // What rounding makes of the values: the width of their enclosures around single points.
+        let rounded: Vec<Vec<Enclosure>> = points.iter().map(|point| enclosures((&g, &nodes), &Rounded(point), point)).collect();
         for (k, bound) in bounds.iter().enumerate() {
             // input 0 moves in no known way
             if !bound.value.is_bounded() {
                 continue;
             }
-            for pair in samples.windows(2) {
+            for (pair, rounded) in samples.windows(2).zip(rounded.windows(2)) {
                 let (a, b) = (pair[0][k], pair[1][k]);
                 prop_assert!(bound.value.lo <= a && a <= bound.value.hi, "node {k}: {a} not in {:?}", bound.value);
                 if bound.rate.is_bounded() {
                     // the mean value theorem: a difference quotient is a rate
                     let quotient = (b - a) / (length / 8.0);
-                    let rounding = 1e-12 * (a.abs() + b.abs() + bound.value.hi - bound.value.lo + 1e-300) / length;
+                    let width: f64 = rounded.iter().map(|at| at[k].value.hi - at[k].value.lo).sum();
+                    let size = a.abs() + b.abs() + bound.value.hi - bound.value.lo + 1e-300;
+                    let rounding = (8.0 * width + 1e-12 * size) / length;
                     prop_assert!(
                         bound.rate.lo - rounding <= quotient && quotient <= bound.rate.hi + rounding,
                         "node {k}: {quotient} not in {:?}", bound.rate
@@ -137,7 +165,7 @@ fn bounds_are_tight_for_short_pieces() {
             direction: vec![1.0, 2.0, 0.0],
             length,
         };
-        let bound = enclosures(&g, &[h], &line)[0];
+        let bound = enclosures((&g, &[h]), &line, &line.from)[0];
         assert!(bound.value.lo <= exact && exact <= bound.value.hi);
         assert!(bound.value.hi - bound.value.lo < 6.0 * length);
         assert!(bound.rate.lo <= rate && rate <= bound.rate.hi);
