@@ -14,12 +14,13 @@ from multiprocessing.connection import Connection, wait
 from typing import Any
 
 from fuzz.comparisons import comparisons
-from fuzz.properties import violations
+from fuzz.properties import ends_early, violations
 from fuzz.systems import Case, build, random_case
 
 # A case takes milliseconds; Euler's method and a run to `max_wall_time` some seconds.
 LONGEST_CASE = 60.0
 SHOWN = 20
+EARLY = ", state moderate"
 
 
 def check(case: Case) -> tuple[str, list[str]]:
@@ -32,7 +33,7 @@ def check(case: Case) -> tuple[str, list[str]]:
     if seconds > 1.5 * problem.limits["max_wall_time"]:
         found.append(f"{seconds:.1f} s, max_wall_time is {problem.limits['max_wall_time']:g} s")
     found += comparisons(problem, sol, case.seed)
-    return sol._run.reason, found
+    return sol._run.reason + (EARLY if ends_early(sol) else ""), found
 
 
 def _work(connection: Connection) -> None:
@@ -116,12 +117,15 @@ def main() -> int:
     reasons: Counter[str] = Counter()
     features: Counter[str] = Counter()
     failed: list[int] = []
+    early: list[int] = []
     start = time.monotonic()
     in_time = itertools.takewhile(lambda _: time.monotonic() - start < arguments.seconds, seeds)
     for seed, reason, found in results(in_time, arguments.processes):
         case = random_case(seed)
         reasons[reason] += 1
         features.update(case.features)
+        if reason.endswith(EARLY):
+            early.append(seed)
         if found:
             failed.append(seed)
             if len(failed) <= SHOWN:
@@ -133,6 +137,8 @@ def main() -> int:
     print(f"{n_done} systems, seeds {seeds.start} to {seeds.start + n_done - 1}, {seconds:.0f} s")
     print("ended by:", ", ".join(f"{name} {count}" for name, count in reasons.most_common()))
     print("with:", ", ".join(f"{name} {count}" for name, count in features.most_common()))
+    if early:
+        print(f"{len(early)} named stops at states of moderate size, seeds {sorted(early)}")
     print(f"{len(failed)} violations" + (f", seeds {sorted(failed)}" if failed else ""))
     return 1 if failed else 0
 

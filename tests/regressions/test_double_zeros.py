@@ -93,3 +93,29 @@ def test_a_triple_zero_beside_a_kink_is_crossed(method: str) -> None:
     assert sol.success, sol.message
     assert sol.switches.t == pytest.approx(len(sol.switches) * [0.0], abs=1e-6)
     assert sol.y[1, -1] == pytest.approx(0.125 - np.sin(0.6) ** 2 / 2, abs=1e-7)
+
+
+def test_a_field_that_comes_to_rest_on_the_surface_keeps_the_motion_there() -> None:
+    """Beyond x = 0 the field vanishes on the surface: what is left of it by rounding leads nowhere."""
+
+    def rhs(t: float, x: Any) -> Any:
+        return [-0.667 * x[0] - 0.2 * x[0] ** 3 - 0.54 * np.heaviside(x[0], 0.5)]
+
+    for method in ("auto", "DOPRI5", "DOP853", "Rodas5P"):
+        sol = fl.solve_ivp(rhs, (0, 1), [0.09], method=method, rtol=1e-6, atol=1e-6)
+        assert sol.success, sol.message
+        assert [switch.kind for switch in sol.switches] == ["enter_sliding"]
+        assert sol.y[0, -1] == 0.0
+
+
+@pytest.mark.parametrize("method", ["auto", "DOPRI5"])
+def test_two_surfaces_in_one_place_one_of_them_a_kink_are_slid_on_together(method: str) -> None:
+    def rhs(t: float, x: Any) -> Any:
+        kink = np.maximum(x[0], -0.037 * np.cos(x[0]) * np.sin(x[0]))
+        jump = np.sign(x[0]) * np.where(x[0] < 0, 0.79 * np.sqrt(1 + x[0] ** 2), 0.5)
+        return [-0.54 * x[0] - 0.64 * kink - 0.802 * jump]
+
+    sol = fl.solve_ivp(rhs, (0, 5), [-0.98], method=method, rtol=1e-8, atol=1e-8)
+    assert sol.success, sol.message
+    assert str(sol.segments[-1].mode) == "00"
+    assert sol.y[0, -1] == 0.0

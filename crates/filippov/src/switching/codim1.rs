@@ -7,7 +7,7 @@ use super::stick::decide_sticking;
 use crate::error::FieldError;
 use crate::field::eval_on_side;
 use crate::system::PiecewiseSystem;
-use crate::tolerances::TANGENT;
+use crate::tolerances::{OF_ROUNDING, TANGENT};
 
 /// How the motion came to the surface, and which normal components are known to vanish.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,6 +38,16 @@ pub struct Decision {
 }
 
 impl Decision {
+    /// Is the surface left with no more than rounding of what the field beyond has?
+    pub fn leaves_with_rounding(&self) -> bool {
+        let (leaving, other) = match self.entry {
+            -1 => (self.minus, self.plus),
+            1 => (self.plus, self.minus),
+            _ => return false,
+        };
+        leaving.order == 1 && leaving.value.abs() <= OF_ROUNDING * other.value.abs()
+    }
+
     /// Is there no continuation? Both fields turn back to the surface, as at a two-fold that is invisible from both sides.
     pub fn turns_back(&self) -> bool {
         let leading = match self.entry {

@@ -38,6 +38,8 @@ pub struct SharedLoad {
 pub struct SharedLoads {
     normal: SparseRows,
     parts: Vec<Part>,
+    /// Surfaces whose signs have no effect, as kinks: they are in the place of others that are slid on.
+    idle: Vec<usize>,
 }
 
 /// Surfaces that act on one another.
@@ -55,14 +57,21 @@ enum PartLaw {
 impl SharedLoads {
     /// `None` if the jumps are not those of friction, or if too many contacts close one loop.
     pub fn new(normal: &SparseRows) -> Option<Self> {
-        let parts = parts_of(normal).into_iter().map(|(surfaces, block)| {
+        let mut position = vec![usize::MAX; normal.n_rows()];
+        let (acting, idle): (Vec<usize>, Vec<usize>) =
+            (0..normal.n_rows()).partition(|&j| has_effect(normal, j));
+        for (place, &j) in acting.iter().enumerate() {
+            position[j] = place;
+        }
+        let parts = parts_of(&normal.principal(&acting, &position)).into_iter();
+        let parts = parts.map(|(places, block)| {
             let mut solver = SparseSolver::default();
             let law = match solver.factor(&block) {
                 Ok(()) => PartLaw::Determined(Box::new(solver)),
                 Err(_) => PartLaw::Shared(Loop::new(&block)?),
             };
             Some(Part {
-                surfaces,
+                surfaces: places.into_iter().map(|place| acting[place]).collect(),
                 block,
                 law,
             })
@@ -70,6 +79,7 @@ impl SharedLoads {
         Some(SharedLoads {
             parts: parts.collect::<Option<_>>()?,
             normal: normal.clone(),
+            idle,
         })
     }
 
@@ -102,8 +112,29 @@ impl SharedLoads {
                 (signs[i], reserves[i]) = (sign, reserve);
             }
         }
-        Some(SharedLoad { signs, reserves })
+        self.idle.iter().for_each(|&i| signs[i] = 0.0);
+        let change: Vec<f64> = signs.iter().zip(here).map(|(s, here)| s - here).collect();
+        let slides = |&i: &usize| {
+            let rate = rates[i] + self.normal.dot(i, &change);
+            rate.abs() <= REDUNDANT_PIVOT.sqrt() * scale(&self.normal, i, rates[i], &change)
+        };
+        let all_slide = self.idle.iter().all(slides);
+        all_slide.then_some(SharedLoad { signs, reserves })
     }
+}
+
+/// The size of a rate and of what signs contribute to it, and of the rounding of signs of size 1.
+fn scale(normal: &SparseRows, i: usize, rate: f64, signs: &[f64]) -> f64 {
+    let of_signs: f64 = normal.row(i).map(|(_, value)| value.abs()).sum();
+    rate.abs() + normal.magnitude(i, signs) + EPS.sqrt() * of_signs
+}
+
+/// Does the sign of surface j act on any rate?
+fn has_effect(normal: &SparseRows, j: usize) -> bool {
+    (0..normal.n_rows()).any(|i| {
+        let mut entries = normal.row(i);
+        entries.any(|(k, value)| k == j && value.abs() > REDUNDANT_PIVOT * largest(normal, i))
+    })
 }
 
 /// The connected components: their surfaces in increasing order, and what couples them.
@@ -269,9 +300,7 @@ impl Loop {
         let rest: Vec<f64> = (0..nu.len())
             .map(|i| nu[i] + normal.dot(i, &first))
             .collect();
-        let unit = vec![EPS.sqrt(); nu.len()];
-        let size =
-            |i: usize| nu[i].abs() + normal.magnitude(i, &first) + normal.magnitude(i, &unit);
+        let size = |i: usize| scale(normal, i, nu[i], &first);
         if (0..nu.len()).any(|i| rest[i].abs() > REDUNDANT_PIVOT.sqrt() * size(i)) {
             return None;
         }

@@ -22,6 +22,10 @@ pub const PROPORTIONAL: f64 = 64.0 * EPS;
 /// known to its square root, are then no better after a Newton step.
 pub const DOUBLE_ROOT: f64 = 1e-14;
 
+/// A normal component below this fraction of that on the other side is looked at again on the surface itself: the point of a
+/// located event is on it up to some roundings only.
+pub const OF_ROUNDING: f64 = 1e-12;
+
 /// A multiplier counts as -1 or +1 at an exit within this distance; the event is located to better
 /// than that.
 pub const AT_SIDE: f64 = 1e-6;

@@ -4,7 +4,7 @@ use smallvec::{smallvec, SmallVec};
 
 use crate::error::FieldError;
 use crate::event::{Deflation, EventFunction};
-use crate::field::{eval_on_side, SmoothField};
+use crate::field::{eval_on_side, Projector, SmoothField};
 use crate::integrate::detection::detect::Found;
 use crate::integrate::integrator::Integrator;
 use crate::integrate::motion::ModeField;
@@ -219,7 +219,14 @@ impl Integrator<'_> {
         j: usize,
         arrival: Arrival,
     ) -> Result<Decided, FieldError> {
-        let decision = decide(self.system, j, arrival, self.t, &self.x, &mode.signs())?;
+        let signs = mode.signs();
+        let mut decision = decide(self.system, j, arrival, self.t, &self.x, &signs)?;
+        if decision.leaves_with_rounding() {
+            // A field that comes to rest on the surface: beside it, by rounding, it still points somewhere.
+            let mut projector = Projector::new(self.x.len(), signs.len());
+            projector.project(self.system, j, self.t, &mut self.x, &signs)?;
+            decision = decide(self.system, j, arrival, self.t, &self.x, &signs)?;
+        }
         Ok(self.follow_at_surface(mode, j, decision))
     }
 
