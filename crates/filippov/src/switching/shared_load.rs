@@ -4,9 +4,9 @@
 //! N s = -nu of their multipliers s then have many solutions or none, and those in [-1, 1] all give the same motion:
 //! for friction N = -S D with S symmetric and semidefinite, D > 0 and diagonal, and what N does not see moves nothing.
 //! Of the solutions one is taken that depends smoothly on the point, that of least norm (s, D C s) with C the
-//! largest entries of the rows of N, as in the damped relay problem (`relay.rs`), which finds it where the least one in the cube
-//! is at a border. The contacts give way
-//! together, where no solution in the cube is left: with S = L L^T and L w = nu that is so where some q has
+//! largest entries of the rows of N; the damped relay problem (`relay.rs`) finds the same one, and the least in the
+//! cube where that is at a border. The contacts give way together, where no solution in the cube is left: with
+//! S = L L^T and L w = nu that is so where some q has
 //!
 //! ```text
 //! |q . w| > sum over i of D_i |q . L_i|,      L_i the rows of L.
