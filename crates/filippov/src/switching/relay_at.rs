@@ -1,6 +1,7 @@
 //! The relay problem of a system at a point where surfaces meet.
 
-use super::relay::{solve_relay, RelayProblem, RelaySolution};
+use super::relay::{solve_relay, RelayProblem, RelaySolution, Uniqueness};
+use super::shared_load::stay_together;
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::system::PiecewiseSystem;
@@ -31,5 +32,14 @@ pub fn relay_at(
         n: parts.normal().clone(),
         noise: system.lie_tolerance(1),
     };
-    Ok((solve_relay(&problem, &before).ok(), evaluations))
+    let mut found = solve_relay(&problem, &before).ok();
+    if let Some(solution) = found.as_mut().filter(|found| found.n_sharing > 0) {
+        let sticking: Vec<usize> = (0..meeting.len())
+            .filter(|&i| solution.modes[i] == 0)
+            .collect();
+        if !stay_together(&problem.n, &parts.gradients, &sticking) {
+            solution.uniqueness = Uniqueness::Unknown;
+        }
+    }
+    Ok((found, evaluations))
 }

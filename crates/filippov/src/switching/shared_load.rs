@@ -184,6 +184,62 @@ fn is_semidefinite(block: &SparseRows) -> bool {
     is_symmetric && is_positive_definite(&with_diagonal(&scaled, &more))
 }
 
+/// Do the surfaces whose contacts share a load stay together? Their gradients depend on one another as the rows of N do, so
+/// that what is slid on are fewer surfaces than there are contacts. Rows of N alone may be dependent where motions differ.
+pub(super) fn stay_together(
+    normal: &SparseRows,
+    gradients: &SparseRows,
+    sticking: &[usize],
+) -> bool {
+    let mut position = vec![usize::MAX; normal.n_rows()];
+    for (place, &i) in sticking.iter().enumerate() {
+        position[i] = place;
+    }
+    let rows = |matrix: &SparseRows, places: &[usize]| {
+        let picked = places.iter().map(|&place| matrix.row(sticking[place]));
+        let picked = picked.map(|row| row.collect::<Vec<(usize, f64)>>());
+        rank(picked.collect(), matrix.n_columns())
+    };
+    let parts = parts_of(&normal.principal(sticking, &position)).into_iter();
+    let mut parts = parts.filter(|(_, block)| SparseSolver::default().factor(block).is_err());
+    parts.all(|(places, _)| rows(gradients, &places) == rows(normal, &places))
+}
+
+/// The rank of a few sparse rows, each taken in units of its largest entry.
+fn rank(rows: Vec<Vec<(usize, f64)>>, n_columns: usize) -> usize {
+    let mut rows: Vec<Vec<f64>> = rows
+        .into_iter()
+        .map(|entries| {
+            let size = entries
+                .iter()
+                .fold(0.0_f64, |size, (_, v)| size.max(v.abs()));
+            let mut row = vec![0.0; n_columns];
+            entries.iter().for_each(|&(j, v)| row[j] = v / size);
+            row
+        })
+        .collect();
+    let mut rank = 0;
+    while rank < rows.len() {
+        let largest = (rank..rows.len())
+            .flat_map(|i| (0..n_columns).map(move |j| (i, j)))
+            .max_by(|a, b| rows[a.0][a.1].abs().total_cmp(&rows[b.0][b.1].abs()));
+        let Some((i, j)) = largest.filter(|&(i, j)| rows[i][j].abs() > REDUNDANT_PIVOT) else {
+            break;
+        };
+        rows.swap(rank, i);
+        let pivot = rows[rank].clone();
+        for row in &mut rows[rank + 1..] {
+            let factor = row[j] / pivot[j];
+            row.iter_mut()
+                .zip(&pivot)
+                .for_each(|(v, p)| *v -= factor * p);
+            row[j] = 0.0;
+        }
+        rank += 1;
+    }
+    rank
+}
+
 /// Makes the solution of a relay problem whose motion alone is unique one of modes: what does not slip sticks, though
 /// its sign may be -1 or +1. Where the strength of all contacts together is just used up, the entries stay degenerate.
 pub(super) fn let_stick(problem: &RelayProblem, solution: &mut RelaySolution) {

@@ -62,7 +62,17 @@ impl Integrator<'_> {
             }
             self.let_go(mode, meeting, &mut found);
         }
-        let is_certain = matches!(found.uniqueness, Uniqueness::Certain | Uniqueness::OfMotion);
+        let is_certain = match found.uniqueness {
+            Uniqueness::Certain => true,
+            // Surfaces may be parallel at a point only: those that stay together are so along the motion.
+            Uniqueness::OfMotion if found.n_sharing > 0 && event.is_some() => {
+                let later = self.solve_relay_at(mode, meeting, true)?;
+                later.is_some_and(|later| {
+                    (later.uniqueness, &later.modes) == (found.uniqueness, &found.modes)
+                })
+            }
+            other => other == Uniqueness::OfMotion,
+        };
         if !is_certain && meeting.len() <= MOST_MEETING {
             return Ok(None);
         }
