@@ -3,7 +3,9 @@
 use super::Stop;
 use crate::action::{Actions, Trigger};
 use crate::error::{Error, FieldError};
+use crate::integrate::decisions::transition::Left;
 use crate::integrate::integrator::Integrator;
+use crate::mode::Mode;
 use crate::options::Options;
 use crate::system::PiecewiseSystem;
 
@@ -107,13 +109,23 @@ impl Integrator<'_> {
             Ok(placed) => placed,
             Err(stop) => return Ok(Some(stop)),
         };
-        let changed =
-            (0..before.entries().len()).filter(|&j| before.entries()[j] != after.entries()[j]);
-        let changed: Vec<usize> = changed.collect();
+        self.go_on_in(before, after, &left)
+    }
+
+    /// Records what changes between two modes, if anything does, and starts the motion in the second.
+    pub(super) fn go_on_in(
+        &mut self,
+        before: Mode,
+        after: Mode,
+        left: &[Left],
+    ) -> Result<Option<Stop>, FieldError> {
+        let entries = before.entries().iter().zip(after.entries()).enumerate();
+        let changed = entries.filter(|(_, (before, after))| before != after);
+        let changed: Vec<usize> = changed.map(|(j, _)| j).collect();
         if !changed.is_empty() {
             self.record(before, after.clone(), &changed);
         }
-        self.begin(after, &left)
+        self.begin(after, left)
     }
 
     /// Finds the mode of the initial state and starts the motion.

@@ -28,6 +28,14 @@ impl ErrorScale {
         self.atol[i] + self.rtol * if b < a { a } else { b }
     }
 
+    /// The tolerance for a function with this gradient at `y`: the sum of what those of the components amount to.
+    pub fn along(&self, gradient: &[f64], y: &[f64]) -> f64 {
+        let components = gradient.iter().zip(y).enumerate();
+        components
+            .map(|(i, (g, y))| g.abs() * self.of(i, *y, *y))
+            .sum()
+    }
+
     /// Largest component of `v` in units of the scale at `y`.
     pub fn largest(&self, v: &[f64], y: &[f64]) -> f64 {
         let components = v.iter().zip(y).enumerate();

@@ -323,13 +323,7 @@ impl Integrator<'_> {
         for &(j, value) in departing.iter().filter(|(j, _)| self.is_internal(*j)) {
             left.push(Left::Surface(j, Leading { order: 1, value }));
         }
-        let changed =
-            (0..before.entries().len()).filter(|&j| before.entries()[j] != after.entries()[j]);
-        let changed: Vec<usize> = changed.collect();
-        if !changed.is_empty() {
-            self.record(before, after.clone(), &changed);
-        }
-        self.begin(after, &left)
+        self.go_on_in(before, after, &left)
     }
 
     /// Does one action and records it.

@@ -164,10 +164,7 @@ impl Integrator<'_> {
         let mut gradient = vec![0.0; self.x.len()];
         self.system
             .gradient(j, self.t, &self.x, signs, &mut gradient)?;
-        let components = gradient.iter().zip(&self.x).enumerate();
-        let tolerance: f64 = components
-            .map(|(i, (g, x))| g.abs() * self.scale.of(i, *x, *x))
-            .sum();
+        let tolerance = self.scale.along(&gradient, &self.x);
         let is_near = h.abs() <= SLIPPED * tolerance;
         Ok((is_near && self.leaves_point_alone(j, signs)?).then_some(side))
     }
@@ -312,10 +309,7 @@ impl Integrator<'_> {
         let mut row = vec![0.0; self.x.len()];
         self.system
             .rate_gradient(j, self.t, &self.x, &mode.signs(), &mut row)?;
-        let components = row.iter().zip(&self.x).enumerate();
-        let tolerance: f64 = components
-            .map(|(i, (r, x))| r.abs() * self.scale.of(i, *x, *x))
-            .sum();
+        let tolerance = self.scale.along(&row, &self.x);
         Ok(speed.abs() <= SLOW * tolerance)
     }
 

@@ -81,10 +81,7 @@ impl Integrator<'_> {
         for &j in &self.motion.resting {
             self.system
                 .gradient(j, self.t, &self.x, &signs, &mut gradient)?;
-            let components = gradient.iter().zip(&self.x).enumerate();
-            let tolerance: f64 = components
-                .map(|(i, (g, x))| g.abs() * self.scale.of(i, *x, *x))
-                .sum();
+            let tolerance = self.scale.along(&gradient, &self.x);
             // Bodies that touch have to be held apart at once.
             let factor = if self.is_only_trigger(j) {
                 1.0

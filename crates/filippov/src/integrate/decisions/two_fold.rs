@@ -38,10 +38,7 @@ impl Integrator<'_> {
         let (distance, time) = (minus.rate - plus.rate, minus.time - plus.time);
         let pairs = along_minus.iter().zip(&along_plus);
         let gradient: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
-        let terms = gradient.iter().zip(&x).enumerate();
-        let tolerance: f64 = terms
-            .map(|(i, (g, x))| g.abs() * self.scale.of(i, *x, *x))
-            .sum();
+        let tolerance = self.scale.along(&gradient, &x);
         let size = dot_magnitude(&along_minus, &x) + dot_magnitude(&along_plus, &x);
         let rounding = TANGENT * (size + (minus.time.abs() + plus.time.abs()) * self.t.abs());
         if distance.abs() <= rounding {

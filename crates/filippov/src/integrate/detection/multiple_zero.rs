@@ -117,10 +117,7 @@ impl Integrator<'_> {
         let t = self.t + theta * self.stepper.interpolant().dt;
         self.system
             .gradient(j, t, &x, &self.motion.signs, &mut gradient)?;
-        let terms = gradient.iter().zip(&x).enumerate();
-        let tolerance: f64 = terms
-            .map(|(i, (g, x))| g.abs() * self.scale.of(i, *x, *x))
-            .sum();
+        let tolerance = self.scale.along(&gradient, &x);
         Ok(TOUCH_DEPTH * tolerance)
     }
 

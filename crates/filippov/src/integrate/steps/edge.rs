@@ -66,10 +66,7 @@ impl Integrator<'_> {
             let signs = &self.motion.signs;
             self.system
                 .gradient(j, self.t, &self.x, signs, &mut gradient)?;
-            let components = gradient.iter().zip(&self.x).enumerate();
-            let tolerance: f64 = components
-                .map(|(i, (g, x))| g.abs() * self.scale.of(i, *x, *x))
-                .sum();
+            let tolerance = self.scale.along(&gradient, &self.x);
             if m.rate < 0.0 && m.value <= ARRIVED * tolerance {
                 return Ok(Some(Found {
                     theta: 0.0,
