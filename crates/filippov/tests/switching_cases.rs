@@ -341,6 +341,7 @@ fn mirrored(row: &Row) -> (Vec<f64>, Vec<f64>, Arrival, i8, Vec<i8>) {
         ExitPlus => ExitMinus,
         Start => Start,
         Arrival::TwoFold => Arrival::TwoFold,
+        Arrival::Flat(side, [minus, plus]) => Arrival::Flat(-side, [*plus, *minus]),
     };
     (
         turned(plus),
@@ -412,6 +413,26 @@ fn small_but_genuine_values_are_no_tangency() {
         let decision = decide_at_origin(&traced(&[1.0], &[value]), Region(-1));
         assert_eq!(decision.entry, 1, "f+ = {value}");
     }
+}
+
+#[test]
+fn derivatives_known_to_vanish_are_rounding_and_not_looked_at() {
+    // Near a triple zero: what is left of the first two points back.
+    let system = traced(&[-1e-16, -1e-15, 3.0], &[-1e-16, -1e-15, 2.0]);
+    let decision = decide_at_origin(&system, Region(-1));
+    assert_eq!((decision.entry, decision.minus.order), (-1, 1));
+    let decision = decide_at_origin(&system, Arrival::Flat(-1, [2, 2]));
+    assert_eq!(
+        (decision.entry, decision.candidates.as_slice()),
+        (1, &[1][..])
+    );
+    assert_eq!((decision.minus.order, decision.plus.order), (3, 3));
+    // What is known of one side says nothing of the other.
+    let system = traced(&[-1e-16, -1e-15, 3.0], &[-2.0]);
+    assert_eq!(
+        decide_at_origin(&system, Arrival::Flat(-1, [2, 0])).entry,
+        0
+    );
 }
 
 /// A two-fold at the origin of h = x: f- = (y, p, r) and f+ = (z, q, s), so that the second

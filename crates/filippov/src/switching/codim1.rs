@@ -14,6 +14,8 @@ use crate::tolerances::{OF_ROUNDING, TANGENT};
 pub enum Arrival {
     /// From the region with this sign (+1 or -1).
     Region(i8),
+    /// From the region with this sign to a multiple zero of h: so many derivatives are known to vanish along f- and f+.
+    Flat(i8, [usize; 2]),
     /// Sliding, with the normal component of f- known to vanish.
     ExitMinus,
     /// Sliding, with the normal component of f+ known to vanish.
@@ -92,13 +94,17 @@ pub fn decide(
     }
     let exits = [Arrival::ExitMinus, Arrival::ExitPlus];
     let is_known = |exit: Arrival| arrival == exit || arrival == Arrival::TwoFold;
-    let vanishing = exits.map(|exit| usize::from(is_known(exit)));
+    let vanishing = match arrival {
+        Arrival::Flat(_, vanishing) => vanishing,
+        _ => exits.map(|exit| usize::from(is_known(exit))),
+    };
     let [minus, plus] = first_nonzero_of_both(system, j, vanishing, t, x, signs)?;
     let mut candidates = SmallVec::new();
     if minus.sign() < 0 {
         candidates.push(-1);
     }
-    if slides(system, j, minus, plus, t, x, signs)? {
+    let known = vanishing[0].min(vanishing[1]);
+    if slides(system, j, (minus, plus, known), t, x, signs)? {
         candidates.push(0);
     }
     if plus.sign() > 0 {
@@ -151,8 +157,7 @@ fn fields_agree(
 fn slides(
     system: &dyn PiecewiseSystem,
     j: usize,
-    minus: Leading,
-    plus: Leading,
+    (minus, plus, vanishing): (Leading, Leading, usize),
     t: f64,
     x: &[f64],
     signs: &[f64],
@@ -164,23 +169,24 @@ fn slides(
         // A side whose derivatives all vanish keeps the motion on the surface: lambda = -1 or +1.
         return Ok(minus.sign() >= 0 && plus.sign() <= 0);
     }
-    Ok(two_fold_slides(system, j, t, x, signs)?
+    // Where the second derivatives vanish, what is left of them by rounding says nothing.
+    Ok(vanishing < 2 && two_fold_slides(system, j, t, x, signs)?
         || (minus.order == plus.order
             && minus.order > 2
-            && attracts_along_all_motions(system, j, minus.order, t, x, signs)?))
+            && attracts_along_all_motions(system, j, (vanishing, minus.order), t, x, signs)?))
 }
 
-/// Do both normal components vanish to this order less 1 along every motion, whatever mixture of both fields it follows, and
+/// Do both normal components vanish to this order less 1 (`vanishing` of these derivatives are known to do so) along every motion, whatever mixture of both fields it follows, and
 /// point to the surface afterwards? So do those that share a factor like (t - 1)^2.
 fn attracts_along_all_motions(
     system: &dyn PiecewiseSystem,
     j: usize,
-    order: usize,
+    (vanishing, order): (usize, usize),
     t: f64,
     x: &[f64],
     signs: &[f64],
 ) -> Result<bool, FieldError> {
-    for length in 2..=order {
+    for length in 2.max(vanishing + 1)..=order {
         let tolerance = system.lie_tolerance(length);
         for letters in 0..1_u32 << length {
             let word: SmallVec<[i8; 8]> = (0..length)
@@ -279,7 +285,7 @@ fn choose(
         return Ok(*only);
     }
     let preferred = match arrival {
-        Arrival::Region(side) => side,
+        Arrival::Region(side) | Arrival::Flat(side, _) => side,
         Arrival::ExitMinus => -1,
         Arrival::ExitPlus => 1,
         Arrival::TwoFold => {
