@@ -29,7 +29,7 @@ mod stability;
 mod stick;
 
 pub use accumulation::{accumulate, Accumulation, Return};
-pub use codim1::{decide, weight_at_two_fold, Arrival, Decision};
+pub use codim1::{decide, weight_at_two_fold, Arrival, Decision, TwoFoldMotion};
 pub use enclosed_root::{enclose_root, EnclosedRoot, IntervalVector, RootBounds};
 pub use fold::{merged_root, MergedRoot};
 pub use hidden::{

@@ -35,12 +35,15 @@ impl Integrator<'_> {
             after = self.choose(&[j], after, candidates)?;
             decision.entry = after.entries()[j];
         }
+        if let (0, Some(motion)) = (decision.entry, decision.two_fold) {
+            self.decided.at_two_fold = Some(motion.multiplier());
+        }
         Ok((after, Left::after(j, &decision)))
     }
 
     /// Where the motion in `mode` touches surface j: the first derivative of h along the field beyond, if that
-    /// leaves the surface too. Then the solution is not unique.
-    pub(in crate::integrate) fn leaves_beyond(
+    /// leaves the surface too, or stays on it. Then the solution is not unique.
+    pub(in crate::integrate) fn goes_on_beyond(
         &self,
         mode: &Mode,
         j: usize,
@@ -57,7 +60,8 @@ impl Integrator<'_> {
         // A touch is located to the square root of rounding: a component of that size vanishes.
         let vanishing = usize::from(along.value.abs() <= DEPARTS_TANGENTIALLY * size);
         let leading = first_nonzero(self.system, j, beyond, vanishing, self.t, &self.x, &signs)?;
-        Ok((leading.sign() == beyond).then_some(leading))
+        let goes_on = leading.sign() == beyond || leading.order == 0;
+        Ok(goes_on.then_some(leading))
     }
 
     /// The mode that [`crate::Options::choices`] asks for at the next non-unique point.

@@ -26,6 +26,8 @@ pub(in crate::integrate) struct DecidedRoot {
     pub multipliers: Vec<f64>,
     /// The regularised motion oscillates around it.
     pub oscillates: bool,
+    /// The multiplier of sliding on one surface that begins at a two-fold.
+    pub at_two_fold: Option<f64>,
 }
 
 impl Integrator<'_> {
@@ -311,6 +313,7 @@ impl Integrator<'_> {
         self.decided = DecidedRoot {
             multipliers: multipliers.to_vec(),
             oscillates: after == preferred && resolution.oscillates,
+            at_two_fold: None,
         };
         Ok(Ok((after, left)))
     }
