@@ -69,6 +69,11 @@ impl MeetingFields {
         &self.set
     }
 
+    /// Are the fields of all patterns of all surfaces held one by one?
+    pub fn has_all_patterns(&self) -> bool {
+        self.groups.len() == 1
+    }
+
     /// Evaluates everything at a point; `signs` holds the sides of the other surfaces. Returns the number
     /// of evaluations of the right-hand side.
     ///

@@ -36,7 +36,7 @@ pub use hidden::{
     admissible, limit as limit_of_hidden_dynamics, Admissible, Outcome as HiddenOutcome,
 };
 pub use incoming::{ExitKind, Incoming};
-pub use intersection::{decide_intersection, IntersectionDecision};
+pub use intersection::{decide_intersection, region_at_rest, IntersectionDecision};
 pub use lie::{first_nonzero, normal_component, Leading};
 pub use normal_fields::{NormalFields, SignGroup};
 pub use p_matrix::is_p_matrix;

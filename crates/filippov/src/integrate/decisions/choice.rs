@@ -7,7 +7,9 @@ use crate::integrate::integrator::Integrator;
 use crate::integrate::{Stop, Warning, WarningCode};
 use crate::mode::Mode;
 use crate::options::NonUnique;
-use crate::switching::{first_nonzero, normal_component, Decision, Leading};
+use crate::switching::{
+    decide_intersection, first_nonzero, normal_component, Decision, Leading, Resolution, Undecided,
+};
 use crate::system::dot;
 use crate::tolerances::DEPARTS_TANGENTIALLY;
 
@@ -62,6 +64,51 @@ impl Integrator<'_> {
         let leading = first_nonzero(self.system, j, beyond, vanishing, self.t, &self.x, &signs)?;
         let goes_on = leading.sign() == beyond || leading.order == 0;
         Ok(goes_on.then_some(leading))
+    }
+
+    /// What follows at an intersection of which first-order data do not tell enough: the only mode of codimension 0 or 1 that
+    /// attracts. `rest` is a region whose field is at rest, which is a solution in any case.
+    pub(in crate::integrate) fn decide_by_higher_order(
+        &mut self,
+        mode: &Mode,
+        meeting: &[usize],
+        resolution: Result<Resolution, Undecided>,
+        rest: Option<Mode>,
+    ) -> Result<Decided, FieldError> {
+        let decision = decide_intersection(self.system, meeting, mode, self.t, &self.x)?;
+        let only = decision.unique();
+        let (after, left) = match (only, rest) {
+            (Some((after, left)), rest) => {
+                let mut candidates = vec![after.clone()];
+                candidates.extend(rest.filter(|rest| rest != after));
+                let left = left.iter().map(|&(j, l)| Left::Surface(j, l)).collect();
+                let mut chosen = after.clone();
+                if candidates.len() > 1 {
+                    chosen = match self.choose(meeting, chosen, candidates) {
+                        Ok(chosen) => chosen,
+                        Err(stop) => return Ok(Err(stop)),
+                    };
+                }
+                match &chosen == after {
+                    true => (chosen, left),
+                    false => self.rest_in(chosen, meeting)?,
+                }
+            }
+            // What stays on as many surfaces as there are states stays at the point.
+            (None, Some(rest))
+                if decision.candidates.is_empty() && meeting.len() == self.x.len() =>
+            {
+                self.rest_in(rest, meeting)?
+            }
+            _ => {
+                return Ok(Err(Stop::Intersection {
+                    surfaces: meeting.to_vec(),
+                    candidates: decision.candidates,
+                    reason: resolution.err().unwrap_or(Undecided::NoOutcome),
+                }));
+            }
+        };
+        Ok(Ok((after, left)))
     }
 
     /// The mode that [`crate::Options::choices`] asks for at the next non-unique point.

@@ -37,6 +37,21 @@ impl Integrator<'_> {
         Ok(())
     }
 
+    /// The motion in a region whose field is at rest where the surfaces of `meeting` vanish.
+    pub(in crate::integrate) fn rest_in(
+        &self,
+        region: Mode,
+        meeting: &[usize],
+    ) -> Result<(Mode, Lefts), FieldError> {
+        let (mut left, signs) = (Lefts::new(), region.signs());
+        for &j in meeting {
+            let side = region.entries()[j];
+            let leading = first_nonzero(self.system, j, side, 0, self.t, &self.x, &signs)?;
+            left.push(Left::Surface(j, leading));
+        }
+        Ok((region, left))
+    }
+
     /// Names a surface whose function is zero all along the motion, unless something was said about it.
     fn warn_zero_surface(&mut self, j: usize) {
         let name = self.system.surface_name(j);
