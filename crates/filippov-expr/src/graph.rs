@@ -145,19 +145,41 @@ impl Graph {
         if let Some(&id) = self.ids.get(&node) {
             return id;
         }
+        let is_absolute = self.is_absolute_value(&node);
+        self.insert_known(node, is_absolute)
+    }
+
+    /// As [`Graph::insert`], where it is known whether a new node is an absolute value.
+    pub(crate) fn insert_known(&mut self, node: Node, is_absolute: bool) -> NodeId {
+        if let Some(&id) = self.ids.get(&node) {
+            return id;
+        }
         let id = NodeId(self.nodes.len() as u32);
+        let mut facts = self.facts_of(&node);
+        facts.nonnegative |= is_absolute;
+        self.ids.insert(node, id);
+        self.nodes.push(node);
+        self.facts.push(facts);
+        id
+    }
+
+    /// What follows from the facts of the operands.
+    fn facts_of(&self, node: &Node) -> Facts {
         let mut operands = node.operands().map(|operand| self.facts(operand));
         let (a, b) = (
             operands.next().unwrap_or_default(),
             operands.next().unwrap_or_default(),
         );
-        drop(operands);
-        let mut facts = Facts::of(&node, a, b);
-        facts.nonnegative |= self.is_absolute_value(&node);
-        self.ids.insert(node, id);
-        self.nodes.push(node);
-        self.facts.push(facts);
-        id
+        Facts::of(node, a, b)
+    }
+
+    /// The nodes that were known to be absolute values when they were made; no other fact is more than what
+    /// follows from the operands.
+    pub(crate) fn absolute_values(&self) -> impl Iterator<Item = NodeId> + '_ {
+        let known = self.nodes.iter().zip(&self.facts).enumerate();
+        known.filter_map(|(k, (node, facts))| {
+            (facts.nonnegative && !self.facts_of(node).nonnegative).then_some(NodeId(k as u32))
+        })
     }
 
     /// Whether the node is `s_j * v` with the known sign s_j of v itself: |v|.

@@ -2,14 +2,16 @@
 //!
 //! Layout, little endian: 8 bytes of magic with the version; number of nodes (u32) and each node as a tag
 //! byte with its operands; number of surfaces (u32) and their nodes; number of known switches (u32), each
-//! node, surface and orientation (0: +1, 1: -1).
+//! node, surface and orientation (0: +1, 1: -1); number of known absolute values (u32) and their nodes.
+
+use rustc_hash::FxHashSet;
 
 use crate::error::ExprError;
 use crate::graph::Graph;
 use crate::node::{Node, NodeId};
 use crate::op::{BinaryOp, UnaryOp};
 
-const MAGIC: [u8; 8] = *b"FILEXPR\x01";
+const MAGIC: [u8; 8] = *b"FILEXPR\x02";
 
 const TAG_CONSTANT: u8 = 0;
 const TAG_TIME: u8 = 1;
@@ -64,6 +66,11 @@ impl Graph {
             number(&mut bytes, surface);
             bytes.push(u8::from(orientation < 0.0));
         }
+        let absolute: Vec<_> = self.absolute_values().collect();
+        number(&mut bytes, absolute.len() as u32);
+        for id in absolute {
+            number(&mut bytes, id.0);
+        }
         bytes
     }
 
@@ -85,7 +92,6 @@ impl Graph {
             .map(|k| reader.node(k))
             .collect::<Result<Vec<_>, _>>()?;
 
-        // Surfaces and switches come before the nodes are entered: they tell what is an absolute value.
         let mut graph = Graph::new();
         for _ in 0..reader.number()? {
             let function = reader.operand(n_nodes)?;
@@ -100,11 +106,15 @@ impl Graph {
             let orientation = if reader.byte()? == 0 { 1.0 } else { -1.0 };
             graph.surfaces.switches.insert(id, (surface, orientation));
         }
+        let mut absolute = FxHashSet::default();
+        for _ in 0..reader.number()? {
+            absolute.insert(reader.operand(n_nodes)?.index());
+        }
         if reader.offset != bytes.len() {
             return reader.damaged("more bytes than expected");
         }
         for (k, node) in nodes.into_iter().enumerate() {
-            if graph.insert(node).index() != k {
+            if graph.insert_known(node, absolute.contains(&k)).index() != k {
                 return reader.damaged("a node occurs twice");
             }
         }

@@ -134,11 +134,10 @@ impl Graph {
                     Some(known) => known,
                     None => {
                         let (function, flip) = self.spell(spelling, &form);
-                        let index = self.surfaces.functions.len() as u32;
-                        self.surfaces.functions.push(function);
-                        self.surfaces.switches.insert(function, (index, 1.0));
-                        self.surfaces.insert_form(key, (index, lead * flip));
-                        (index, lead * flip)
+                        let (index, orientation) = self.surface_of_spelling(function);
+                        let known = (index, lead * flip * orientation);
+                        self.surfaces.insert_form(key, known);
+                        known
                     }
                 };
                 (index, side * lead * orientation)
@@ -146,6 +145,18 @@ impl Graph {
         };
         self.surfaces.switches.insert(id, (index, orientation));
         Switching::Surface { index, orientation }
+    }
+
+    /// The surface of a function as it is spelled: a known one, or a new one. (A spelling can be known while
+    /// its linear form is not: the terms of long sums are matched up to rounding, and can cancel.)
+    fn surface_of_spelling(&mut self, function: NodeId) -> Side {
+        if let Some(known) = self.surfaces.switch_of(function) {
+            return known;
+        }
+        let index = self.surfaces.functions.len() as u32;
+        self.surfaces.functions.push(function);
+        self.surfaces.switches.insert(function, (index, 1.0));
+        (index, 1.0)
     }
 
     /// The sign of `a` as an expression: a constant, or `+-s_j` (times other signs, for a product with them).
@@ -327,13 +338,26 @@ impl Graph {
         }
     }
 
-    /// The surface on which an expression switches, if it is known already. No new nodes, no recursion.
+    /// The surface on which an expression switches, if it is known already, also when what does not change
+    /// the sign is stripped. No new nodes, no recursion.
     fn known_switch(&self, id: NodeId) -> Option<Side> {
-        self.surfaces.switch_of(id).or_else(|| {
-            let (key, lead) = LinearForm::of(self, id).key()?;
-            let (index, orientation) = self.surfaces.switch_of_form(&key)?;
-            Some((index, lead * orientation))
-        })
+        let mut current = id;
+        let mut side = 1.0;
+        loop {
+            if let Some((index, orientation)) = self.surfaces.switch_of(current) {
+                return Some((index, side * orientation));
+            }
+            let form = LinearForm::of(self, current);
+            if let Some((key, lead)) = form.key() {
+                if let Some((index, orientation)) = self.surfaces.switch_of_form(&key) {
+                    return Some((index, side * lead * orientation));
+                }
+            }
+            let (atom, coefficient) = form.single_atom()?;
+            let (inner, flip) = self.sign_carrier(atom)?;
+            side *= coefficient.signum() * flip;
+            current = inner;
+        }
     }
 
     /// The surface whose sign alone decides that of an atom: `s_j * (something positive)`, or a select

@@ -3,7 +3,9 @@
 
 mod support;
 
-use filippov_expr::{Backend, ExprError, Graph, Names, Node, NodeId, Program, Switching, Wrt};
+use filippov_expr::{
+    Backend, BinaryOp, ExprError, Graph, Names, Node, NodeId, Program, Switching, UnaryOp, Wrt,
+};
 use proptest::prelude::*;
 use support::{build, recipes};
 
@@ -65,7 +67,7 @@ proptest! {
     #[test]
     fn garbage_does_not_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
         prop_assert!(Graph::from_bytes(&bytes).is_err());
-        let mut with_magic = b"FILEXPR\x01".to_vec();
+        let mut with_magic = b"FILEXPR\x02".to_vec();
         with_magic.extend(bytes);
         if let Ok(graph) = Graph::from_bytes(&with_magic) {
             exercise(graph);
@@ -135,10 +137,10 @@ fn excess_bytes_and_repeated_nodes_are_refused() {
         Err(ExprError::Damaged { .. })
     ));
     let twice = [
-        b"FILEXPR\x01".as_slice(),
+        b"FILEXPR\x02".as_slice(),
         &2_u32.to_le_bytes(),
         &[1, 1],
-        &[0; 8],
+        &[0; 12],
     ]
     .concat();
     assert!(matches!(
@@ -149,4 +151,19 @@ fn excess_bytes_and_repeated_nodes_are_refused() {
         })
     ));
     assert_eq!(*g.node(NodeId(0)), Node::Time);
+}
+
+/// Whether a node is an absolute value is known or not when it is made, and stays so.
+#[test]
+fn what_was_known_of_absolute_values_is_kept() {
+    let mut g = Graph::new();
+    let t = g.time();
+    let sign = g.sign(t);
+    let angle = g.unary(UnaryOp::Atan, sign);
+    let size = g.mul(sign, angle);
+    let power = g.binary(BinaryOp::Pow, size, sign);
+    g.switch(angle);
+    let mut copy = Graph::from_bytes(&g.to_bytes()).unwrap();
+    assert_eq!(copy.to_bytes(), g.to_bytes());
+    assert_eq!(copy.switch(power), g.switch(power));
 }

@@ -403,3 +403,15 @@ fn quotient_by_nan_is_no_surface() {
     let quotient = g.div(nan, x);
     assert_eq!(g.switch(quotient), Switching::Constant(0.0));
 }
+
+/// |t| hypot(t, t) is made of a sign and of a product whose own sign was never asked for.
+#[test]
+fn absolute_values_times_products_have_no_surface_of_their_own() {
+    let mut g = Graph::new();
+    let t = g.time();
+    let size = g.abs(t);
+    let length = g.binary(BinaryOp::Hypot, t, t);
+    let product = g.mul(size, length);
+    assert_eq!(g.switch(product), Switching::Constant(1.0));
+    assert_eq!(g.n_surfaces(), 1);
+}
