@@ -150,6 +150,7 @@ fn segments_tile_the_interval_and_the_state_is_continuous() {
                 | Stop::StepTooSmall
                 | Stop::Intersection { .. }
                 | Stop::NonUnique { .. }
+                | Stop::InvisibleTwoFold { .. }
                 | Stop::NoProgress { .. }
         );
         prop_assert!(named, "{:?}", solution.stop);

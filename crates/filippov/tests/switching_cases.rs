@@ -222,6 +222,14 @@ const HIGHER: &[Row] = &[
         &[0],
     ),
     (
+        "IV sliding begins, of different orders",
+        &[0.0, 0.0, 0.0, 1.0],
+        &[0.0, -1.0],
+        Start,
+        0,
+        &[0],
+    ),
+    (
         "III from sliding, touch",
         &[2.0],
         &[0.0, 0.0, -1.0],

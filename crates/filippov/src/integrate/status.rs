@@ -4,7 +4,7 @@ use crate::error::FieldError;
 use crate::field::weights::RuleFailure;
 use crate::mode::Mode;
 use crate::options::SlidingRule;
-use crate::switching::Undecided;
+use crate::switching::{TwoFoldMotion, Undecided};
 use crate::tolerances::CHATTER_STEPS;
 
 /// Why a run ended. Whatever the reason, the solution up to that time is kept.
@@ -75,6 +75,13 @@ pub enum Stop {
         /// Which of its premises fails.
         reason: RuleFailure,
     },
+    /// The fields on both sides of a surface turn back to it, and no sliding that attracts starts here.
+    InvisibleTwoFold {
+        /// The surface.
+        surface: usize,
+        /// The motion that slides on from here, if second derivatives give one.
+        sliding: Option<TwoFoldMotion>,
+    },
     /// The continuation is not unique, and `NonUnique::Error` was asked for, or a choice is not among the
     /// candidates.
     NonUnique {
@@ -115,7 +122,7 @@ impl Stop {
             Stop::FieldRaised(_) => "field_raised",
             Stop::Intersection { .. } => "intersection",
             Stop::SlidingRule { .. } => "sliding_rule",
-            Stop::NonUnique { .. } => "non_unique",
+            Stop::NonUnique { .. } | Stop::InvisibleTwoFold { .. } => "non_unique",
         }
     }
 
@@ -209,13 +216,19 @@ impl Stop {
                 rule.name(),
                 names(surfaces)
             ),
-            Stop::NonUnique {
-                surfaces,
-                candidates,
-            } if candidates.is_empty() => format!(
-                "Stopped at t = {t:.10}: no motion continues from {}: the fields on both sides turn back to it, and \
-                 orbits wind around this point.",
-                names(surfaces),
+            Stop::InvisibleTwoFold { surface, sliding } => format!(
+                "Stopped at t = {t:.10}: neither side can be followed from {}, where the fields on both sides turn back to \
+                 it (an invisible two-fold). {}",
+                names(&[*surface]),
+                match sliding {
+                    Some(motion) if motion.repels() =>
+                        "Sliding goes on from here where both fields point away, so that it may leave to either side at \
+                         any time: the solution is not unique, and none is chosen.",
+                    Some(_) =>
+                        "To keep to the points where both fields are tangent is a solution; whether others wind around \
+                         them and away is not decided.",
+                    None => "Derivatives of second order do not tell what follows.",
+                }
             ),
             Stop::NonUnique {
                 surfaces,

@@ -31,7 +31,7 @@ pub struct Decision {
     pub entry: i8,
     /// All entries that are Filippov continuations; more than one where the point is not unique.
     pub candidates: SmallVec<[i8; 3]>,
-    /// How sliding would start, if this is a two-fold.
+    /// The sliding motion from here, if this is a two-fold: one that attracts, if there is one.
     pub two_fold: Option<TwoFoldMotion>,
     /// First non-vanishing derivative of h along f-.
     pub minus: Leading,
@@ -39,7 +39,8 @@ pub struct Decision {
     pub plus: Leading,
 }
 
-/// A sliding motion through a two-fold, where its multiplier is a quotient of two zeros.
+/// A sliding motion through a two-fold, where its multiplier is a quotient of two zeros. It starts there if it attracts. If
+/// it repels it is a solution too, but one that may leave to either side at any time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TwoFoldMotion {
     /// The share of f+, in (0, 1).
@@ -51,11 +52,13 @@ pub struct TwoFoldMotion {
 }
 
 impl TwoFoldMotion {
-    fn attracts(&self) -> bool {
+    /// Do both fields point to the surface along it?
+    pub fn attracts(&self) -> bool {
         self.minus > 0.0 && self.plus < 0.0
     }
 
-    fn repels(&self) -> bool {
+    /// Do both fields point away from the surface along it?
+    pub fn repels(&self) -> bool {
         self.minus < 0.0 && self.plus > 0.0
     }
 
@@ -76,7 +79,8 @@ impl Decision {
         leaving.order == 1 && leaving.value.abs() <= OF_ROUNDING * other.value.abs()
     }
 
-    /// Is there no continuation? Both fields turn back to the surface, as at a two-fold that is invisible from both sides.
+    /// Does neither side continue, nor sliding that attracts? Both fields turn back to the surface, at a two-fold that is
+    /// invisible from both sides.
     pub fn turns_back(&self) -> bool {
         let leading = match self.entry {
             -1 => self.minus,
@@ -133,9 +137,11 @@ pub fn decide(
     let mut two_fold = None;
     if minus.order != 1 && plus.order != 1 {
         let motions = two_fold_motions(system, j, t, x, signs)?;
-        two_fold = motions.into_iter().find(TwoFoldMotion::attracts);
+        let attracting = motions.iter().find(|motion| motion.attracts());
+        two_fold = attracting.or(motions.first()).copied();
     }
-    if two_fold.is_some() || slides(system, j, minus, plus, t, x, signs)? {
+    let attracts = two_fold.is_some_and(|motion| motion.attracts());
+    if attracts || slides(system, j, minus, plus, t, x, signs)? {
         candidates.push(0);
     }
     if plus.sign() > 0 || stays(plus, minus, 1) {
@@ -213,32 +219,34 @@ fn slides(
     if minus.order == 1 || plus.order == 1 {
         return Ok(minus.sign() >= 0 && plus.sign() <= 0);
     }
-    let is_higher = minus.order == plus.order && minus.order > 2;
-    Ok(is_higher && attracts_along_all_motions(system, j, minus.order, t, x, signs)?)
+    let orders = [minus.order, plus.order];
+    let is_higher = orders.iter().min() > Some(&1) && orders != [2, 2];
+    Ok(is_higher && attracts_along_all_motions(system, j, orders, t, x, signs)?)
 }
 
-/// Do both normal components vanish to this order less 1 along every motion, whatever mixture of both fields it follows, and
-/// point to the surface afterwards? So do those that share a factor like (t - 1)^2.
+/// Do both normal components vanish to these orders less 1 along every motion, whatever mixture of both fields it follows,
+/// and point to the surface afterwards? So do those that share a factor like (t - 1)^2.
 fn attracts_along_all_motions(
     system: &dyn PiecewiseSystem,
     j: usize,
-    order: usize,
+    orders: [usize; 2],
     t: f64,
     x: &[f64],
     signs: &[f64],
 ) -> Result<bool, FieldError> {
-    for length in 2..=order {
-        let tolerance = system.lie_tolerance(length);
-        for letters in 0..1_u32 << length {
-            let word: SmallVec<[i8; 8]> = (0..length)
-                .map(|k| if letters >> k & 1 == 0 { -1 } else { 1 })
-                .collect();
-            let lie = system.lie_derivative(j, j, &word, t, x, signs)?;
-            let is_zero = lie.value.abs() <= tolerance * lie.magnitude;
-            // The first letter says whose normal component it is.
-            let attracts = !is_zero && lie.value * f64::from(word[0]) < 0.0;
-            if !(if length < order { is_zero } else { attracts }) {
-                return Ok(false);
+    // The first letter says whose normal component it is.
+    for (first, order) in [-1, 1].into_iter().zip(orders) {
+        for length in 2..=order {
+            let tolerance = system.lie_tolerance(length);
+            for letters in 0..1_u32 << (length - 1) {
+                let others = (0..length - 1).map(|k| if letters >> k & 1 == 0 { -1 } else { 1 });
+                let word: SmallVec<[i8; 8]> = std::iter::once(first).chain(others).collect();
+                let lie = system.lie_derivative(j, j, &word, t, x, signs)?;
+                let is_zero = lie.value.abs() <= tolerance * lie.magnitude;
+                let attracts = !is_zero && lie.value * f64::from(first) < 0.0;
+                if !(if length < order { is_zero } else { attracts }) {
+                    return Ok(false);
+                }
             }
         }
     }

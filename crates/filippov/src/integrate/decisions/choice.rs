@@ -8,7 +8,8 @@ use crate::integrate::{Stop, Warning, WarningCode};
 use crate::mode::Mode;
 use crate::options::NonUnique;
 use crate::switching::{
-    decide_intersection, first_nonzero, normal_component, Decision, Leading, Resolution, Undecided,
+    decide_intersection, first_nonzero, normal_component, Decision, Leading, Resolution,
+    TwoFoldMotion, Undecided,
 };
 use crate::system::dot;
 use crate::tolerances::DEPARTS_TANGENTIALLY;
@@ -25,9 +26,9 @@ impl Integrator<'_> {
         mut decision: Decision,
     ) -> Decided {
         if decision.turns_back() {
-            return Err(Stop::NonUnique {
-                surfaces: vec![j],
-                candidates: Vec::new(),
+            return Err(Stop::InvisibleTwoFold {
+                surface: j,
+                sliding: decision.two_fold,
             });
         }
         let mut after = mode.with(j, decision.entry);
@@ -37,7 +38,8 @@ impl Integrator<'_> {
             after = self.choose(&[j], after, candidates)?;
             decision.entry = after.entries()[j];
         }
-        if let (0, Some(motion)) = (decision.entry, decision.two_fold) {
+        let starting = decision.two_fold.filter(TwoFoldMotion::attracts);
+        if let (0, Some(motion)) = (decision.entry, starting) {
             self.decided.at_two_fold = Some(motion.multiplier());
         }
         Ok((after, Left::after(j, &decision)))

@@ -11,7 +11,7 @@ use crate::integrate::motion::ModeField;
 use crate::integrate::Stop;
 use crate::mode::Mode;
 use crate::solution::Switch;
-use crate::switching::{decide, first_nonzero, Arrival, Decision, Kind, Leading};
+use crate::switching::{decide, first_nonzero, Arrival, Decision, Kind, Leading, TwoFoldMotion};
 use crate::tolerances::{MOST_SWITCHES_AT_ONE_TIME, NO_PROGRESS, SURFACE_NOISE};
 
 /// One value per surface; few are kept without allocation.
@@ -35,18 +35,17 @@ pub(in crate::integrate) enum Left {
 impl Left {
     /// What vanishes after the decision at surface `j`.
     pub fn after(j: usize, decision: &Decision) -> Lefts {
+        let starting = decision.two_fold.filter(TwoFoldMotion::attracts);
+        if let (0, Some(motion)) = (decision.entry, starting) {
+            let first = |value: f64| Leading { order: 1, value };
+            return smallvec![
+                Left::Exit(EventFunction::ExitMinus, first(motion.minus)),
+                Left::Exit(EventFunction::ExitPlus, first(motion.plus)),
+            ];
+        }
         match decision.entry {
             -1 => smallvec![Left::Surface(j, decision.minus)],
             1 => smallvec![Left::Surface(j, decision.plus)],
-            0 if decision.two_fold.is_some() => {
-                let rates = decision.two_fold.map(|motion| (motion.minus, motion.plus));
-                let (minus, plus) = rates.unwrap_or_default();
-                let first = |value: f64| Leading { order: 1, value };
-                smallvec![
-                    Left::Exit(EventFunction::ExitMinus, first(minus)),
-                    Left::Exit(EventFunction::ExitPlus, first(plus)),
-                ]
-            }
             _ => [
                 (EventFunction::ExitMinus, decision.minus),
                 (EventFunction::ExitPlus, decision.plus),
