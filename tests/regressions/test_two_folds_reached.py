@@ -21,8 +21,7 @@ def test_a_two_fold_that_all_sliding_motions_reach_ends_the_run_there(method: st
         ]
 
     sol = fl.solve_ivp(f, (0.0, 5.0), [-0.5, -0.5, -0.5], method=method, rtol=tolerance, atol=tolerance)
-    # Both fields are tangent where x0 = 0 and x2' = 0, and turn back to the surface. What slides on from there
-    # is repelled.
+    # Both fields are tangent where x0 = 0 and x2' = 0, and turn back. What slides on from there is repelled.
     end = -np.sqrt(0.24)
     two_fold = [0.0, (np.sin(end) - 0.58 * end) / 1.49, end]
     assert "may leave to either side at any time" in sol.message

@@ -66,6 +66,13 @@ pub enum Stop {
         /// Why the decision failed.
         reason: Undecided,
     },
+    /// The motion would slide between fields that differ in the sign of another function too, which jumps there.
+    SlidesAcrossJump {
+        /// The surfaces that it would slide on.
+        surfaces: Vec<usize>,
+        /// Those whose functions contain a sign of these, and jump.
+        jumping: Vec<usize>,
+    },
     /// Several surfaces meet, and the chosen combination of their fields does not slide there.
     SlidingRule {
         /// The surfaces.
@@ -120,7 +127,7 @@ impl Stop {
             Stop::Contact { .. } => "contact",
             Stop::NotFinite => "field_not_finite",
             Stop::FieldRaised(_) => "field_raised",
-            Stop::Intersection { .. } => "intersection",
+            Stop::Intersection { .. } | Stop::SlidesAcrossJump { .. } => "intersection",
             Stop::SlidingRule { .. } => "sliding_rule",
             Stop::NonUnique { .. } | Stop::InvisibleTwoFold { .. } => "non_unique",
         }
@@ -205,6 +212,13 @@ impl Stop {
                 } else {
                     format!("; candidates of lower codimension: {}", modes(candidates))
                 }
+            ),
+            Stop::SlidesAcrossJump { surfaces, jumping } => format!(
+                "Stopped at t = {t:.10}: from mode ({mode}) the motion would slide on {}, between fields that differ in the \
+                 sign of {} too, which jumps there; such sliding is not followed. Write a sign inside of another one out: \
+                 sign(g + c*sign(h)) as where(h > 0, sign(g + c), sign(g - c)).",
+                names(surfaces),
+                jumping.iter().map(|&j| surface_name(j)).collect::<Vec<_>>().join(", ")
             ),
             Stop::SlidingRule {
                 surfaces,
