@@ -185,3 +185,15 @@ def test_a_region_at_rest_where_two_surfaces_meet() -> None:
     assert stays.success, stays.message
     assert not stays.y.any()
     assert str(fl.System(fun, n=2).classify(0.0, [0.0, 0.0]).mode) == "++"
+
+
+def test_fields_that_start_slowly_beside_a_bend_leave_to_their_side() -> None:
+    # Above x1 = 0 the field is zero at t = 0 and leads down later, below down and to the left at once.
+    def f(t: float, x: Any) -> Any:
+        u = np.where(x[1] > 0, 0.5 * t, 0.3)
+        return [-0.66 * u - abs(x[0]), -0.1 * t - 0.6 * u]
+
+    sol = fl.solve_ivp(f, (0.0, 1.0), [0.0, 0.0], rtol=1e-9, atol=1e-9)
+    assert sol.success, sol.message
+    assert not sol.warnings
+    np.testing.assert_allclose(sol.y[:, -1], [-0.198 * (np.e - 1.0), -0.05 - 0.18], rtol=1e-8)

@@ -258,7 +258,9 @@ impl Integrator<'_> {
             Ok(resolution) if !resolution.degenerate => resolution,
             // Both say the same, and vanish somewhere in between: higher derivatives do not make them two.
             Err(Undecided::Proportional)
-                if fields.telling().len() == meeting.len() && rest.is_none() =>
+                if fields.telling().len() == meeting.len()
+                    && rest.is_none()
+                    && !fields.lead_to_one_side() =>
             {
                 return Ok(Err(Stop::Intersection {
                     surfaces: meeting.to_vec(),
