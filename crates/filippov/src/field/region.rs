@@ -1,10 +1,12 @@
 //! The field of a region.
 
+use smallvec::SmallVec;
+
 use super::SmoothField;
 use crate::error::FieldError;
 use crate::mode::Signs;
 use crate::system::PiecewiseSystem;
-use crate::tolerances::{EPS, SIDE_OFFSET, SIDE_REACH};
+use crate::tolerances::{EPS, OFFSET_ROUNDING, SIDE_OFFSET, SIDE_REACH, STEPS_INSIDE};
 
 /// The smooth field of one region: f(t, x, s) with fixed signs.
 pub struct RegionField<'a> {
@@ -85,17 +87,33 @@ pub fn move_inside<S: PiecewiseSystem + ?Sized>(
     let mut moved = x.to_vec();
     let mut h = vec![0.0; system.n_surfaces()];
     let mut gradient = vec![0.0; x.len()];
-    system.surfaces(t, x, signs, &mut h)?;
-    for (j, h) in h.iter().enumerate() {
-        system.gradient(j, t, x, signs, &mut gradient)?;
-        let norm2: f64 = gradient.iter().map(|g| g * g).sum();
-        let wanted = offset * norm2.sqrt();
-        if norm2 > 0.0 && signs[j] * h < wanted && h.abs() <= reach * norm2.sqrt() {
-            let shift = (signs[j] * wanted - h) / norm2;
-            moved
-                .iter_mut()
-                .zip(&gradient)
-                .for_each(|(x, g)| *x += shift * g);
+    let mut is_moved: SmallVec<[bool; 8]> = SmallVec::from_elem(false, h.len());
+    for _ in 0..STEPS_INSIDE {
+        let mut is_there = true;
+        system.surfaces(t, &moved, signs, &mut h)?;
+        for (j, h) in h.iter().enumerate() {
+            system.gradient(j, t, &moved, signs, &mut gradient)?;
+            let norm2: f64 = gradient.iter().map(|g| g * g).sum();
+            let wanted = offset * norm2.sqrt();
+            let missing = wanted - signs[j] * h;
+            // A curved surface makes the first step too long or too short; what is left is rounding.
+            let is_off = if is_moved[j] {
+                missing.abs() > OFFSET_ROUNDING * wanted
+            } else {
+                missing > 0.0 && h.abs() <= reach * norm2.sqrt()
+            };
+            if norm2 > 0.0 && is_off {
+                let shift = signs[j] * missing / norm2;
+                moved
+                    .iter_mut()
+                    .zip(&gradient)
+                    .for_each(|(x, g)| *x += shift * g);
+                is_moved[j] = true;
+                is_there = false;
+            }
+        }
+        if is_there {
+            break;
         }
     }
     Ok(moved)
@@ -150,4 +168,41 @@ pub fn eval_off_surface<S: PiecewiseSystem + ?Sized>(
         }
     }
     Ok(evaluations)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use filippov_expr::{Backend, BinaryOp, Graph, Names};
+
+    use super::RegionField;
+    use crate::field::SmoothField;
+    use crate::system::TracedSystem;
+
+    /// x' = 1 + (|x|^2 - 1)^(3/2): it exists only outside of the unit circle.
+    fn outside_of_the_circle() -> TracedSystem {
+        let mut g = Graph::new();
+        let (x, y, one) = (g.state(0), g.state(1), g.constant(1.0));
+        let (x2, y2, exponent) = (g.mul(x, x), g.mul(y, y), g.constant(1.5));
+        let radius = g.add(x2, y2);
+        let h = g.sub(radius, one);
+        g.declare_surface(h);
+        let power = g.binary(BinaryOp::Pow, h, exponent);
+        let fast = g.add(one, power);
+        TracedSystem::new(g, vec![fast, one], vec![], Names::default(), Backend::Auto).unwrap()
+    }
+
+    #[test]
+    fn a_stage_far_behind_a_curved_surface_is_continued_from_the_surface_at_once() {
+        let system = outside_of_the_circle();
+        let mut field = RegionField::new(&system, &[1.0]);
+        let (mut x, mut dx) = ([0.7, 0.5], [0.0; 2]);
+        field.eval(0.0, &mut x, &mut dx).unwrap();
+        assert!(dx[0].is_nan());
+        field.set_departing(true);
+        field.eval(0.0, &mut x, &mut dx).unwrap();
+        assert!((dx[0] - 1.0).abs() < 1e-12);
+        // The two that do not exist, and one inside of the region.
+        assert_eq!(field.n_evaluations(), 3);
+    }
 }

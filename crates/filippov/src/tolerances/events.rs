@@ -72,6 +72,13 @@ pub const TURNS_BACK: f64 = 0.5;
 /// `EPS` times the size of the state; grown by 16 up to five times.
 pub const SIDE_OFFSET: f64 = 8.0;
 
+/// Most steps of Newton's method by which a point is moved into a region: from a distance like that of a stage behind a
+/// curved surface, each squares what is missing.
+pub const STEPS_INSIDE: usize = 5;
+
+/// A point that was moved is where it was to go up to this share of the offset, which is near to rounding.
+pub const OFFSET_ROUNDING: f64 = 0.75;
+
 /// A point counts as on a surface up to rounding within this multiple of the offset.
 pub const SIDE_REACH: f64 = 1.25;
 
