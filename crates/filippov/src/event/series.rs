@@ -10,8 +10,9 @@ use crate::tolerances::{EPS, SAME_VALUE, TAYLOR_LARGEST_ORDER};
 const GUESS_SAMPLES: u32 = 3;
 const GUESS_STEPS: u32 = 3;
 
-/// How often an interval is halved whose coefficients do not tell its zeros apart: a long step has a few.
-const HALVINGS: u32 = 4;
+/// How often an interval is halved whose coefficients do not tell its zeros apart: a long step has a few, and comes near
+/// to others.
+const HALVINGS: u32 = 10;
 
 /// Room for the coefficients of a step of the highest order.
 pub type LongestSeries = [f64; MOST_COEFFICIENTS];
@@ -95,25 +96,24 @@ impl<'a> Series<'a> {
         self.0[0] + falling > 0.0
     }
 
-    /// The first zero on [0, `reach`], by the signs of the Bernstein coefficients there, which change at least as
-    /// often as those of the polynomial (Descartes' rule); where they say nothing, by those of its halves.
+    /// The first zero on [0, 1] before `reach`, by the signs of the Bernstein coefficients, which change at least as
+    /// often as those of the polynomial (Descartes' rule); where they say nothing, by those of the halves. The pieces do
+    /// not depend on `reach`: neither does a zero.
     pub fn first_zero(&self, reach: f64) -> FirstZero {
         let mut coefficients = LongestSeries::default();
         let b = &mut coefficients[..self.0.len()];
-        // The coefficient of degree i is the sum of C(i, k)/C(n, k) c_k reach^k.
-        let (mut size, mut power) = (0.0, 1.0);
+        // The coefficient of degree i is the sum of C(i, k)/C(n, k) c_k.
+        let mut size = 0.0;
         let weights = &INVERSE_BINOMIALS[b.len() - 1];
         for ((b, c), weight) in b.iter_mut().zip(self.0).zip(weights) {
-            let c = c * power;
             size += c.abs();
             *b = weight * c;
-            power *= reach;
         }
         sum_binomially(b);
         if b.iter().all(|&b| b > 0.0) {
             return FirstZero::Nowhere;
         }
-        first_zero_between(b, (0.0, reach), 16.0 * EPS * size, HALVINGS)
+        first_zero_between(b, (0.0, 1.0), reach, 16.0 * EPS * size, HALVINGS)
     }
 
     /// About where the polynomial, positive at 0, first falls through zero on [0, 1], found by a few samples and
@@ -182,8 +182,18 @@ impl<'a> Series<'a> {
 }
 
 /// The first zero of a polynomial with Bernstein coefficients `b` from `lo` to `hi`. Of a coefficient within `noise` of
-/// zero the sign may be lost in rounding: between the positive and the negative ones there may be one.
-fn first_zero_between(b: &mut [f64], (lo, hi): (f64, f64), noise: f64, halvings: u32) -> FirstZero {
+/// zero the sign may be lost in rounding: between the positive and the negative ones there may be one. From `reach` on
+/// nothing is looked for.
+fn first_zero_between(
+    b: &mut [f64],
+    (lo, hi): (f64, f64),
+    reach: f64,
+    noise: f64,
+    halvings: u32,
+) -> FirstZero {
+    if lo >= reach {
+        return FirstZero::Nowhere;
+    }
     let degree = b.len() - 1;
     let positive = b.iter().take_while(|&&b| b > noise).count();
     if positive > degree {
@@ -204,8 +214,8 @@ fn first_zero_between(b: &mut [f64], (lo, hi): (f64, f64), noise: f64, halvings:
     let first = &mut first[..=degree];
     halve(b, first);
     let middle = 0.5 * (lo + hi);
-    match first_zero_between(first, (lo, middle), noise, halvings - 1) {
-        FirstZero::Nowhere => first_zero_between(b, (middle, hi), noise, halvings - 1),
+    match first_zero_between(first, (lo, middle), reach, noise, halvings - 1) {
+        FirstZero::Nowhere => first_zero_between(b, (middle, hi), reach, noise, halvings - 1),
         found => found,
     }
 }
@@ -305,7 +315,9 @@ mod tests {
             panic!("not found");
         };
         assert!(lo < 0.3 && 0.3 < hi && hi < 0.9 && (guess - 0.3).abs() < 0.2);
-        assert_eq!(series.first_zero(0.2), FirstZero::Nowhere);
+        assert_eq!(series.first_zero(0.2), series.first_zero(1.0));
+        let late = [0.72, -1.7, 1.0]; // (0.8 - theta) (0.9 - theta)
+        assert_eq!(Series::new(&late).first_zero(0.4), FirstZero::Nowhere);
         assert_eq!(
             Series::new(&[0.3, -1.2, 1.25]).first_zero(1.0),
             FirstZero::Nowhere
