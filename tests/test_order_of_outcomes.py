@@ -197,6 +197,22 @@ def test_a_touch_is_no_reset_and_no_crossing():
     assert sol.y[0, -1] == pytest.approx(1.0, abs=1e-9)
 
 
+def test_a_field_at_rest_on_the_surface_is_a_solution_of_its_own():
+    rest = lambda above: fl.solve_ivp(lambda t, x: [np.where(x[0] > 0, above(t), x[0])], (0, 1), [0.0])  # noqa: E731
+    pressed = rest(lambda t: -1.0)
+    assert str(pressed.mode_at(0.5)) == "0"
+    assert pressed.warnings == []
+    leaves = rest(lambda t: 1.0)
+    assert leaves.y[0, -1] == pytest.approx(1.0)
+    assert leaves.warnings[0].code == "non_unique"
+    turned_back = rest(lambda t: -t)
+    assert str(turned_back.mode_at(0.5)) == "-"
+    assert turned_back.warnings == []
+    touch = fl.solve_ivp(lambda t, x: [np.where(x[0] > 0, 2 * t - 2, 0.0)], (0, 2), [1.0])
+    assert touch.y[0, -1] == pytest.approx(1.0)
+    assert touch.warnings[0].code == "non_unique"
+
+
 def test_a_triple_zero_is_a_crossing():
     # x = (t - 1)^3
     sol = fl.solve_ivp(lambda t, x: [3.0 * (t - 1.0) ** 2, np.sign(x[0])], (0, 2), [-1.0, 0.0])

@@ -73,6 +73,14 @@ def test_a_start_at_rest_sticks_below_the_static_limit(pull, end):
     assert sol.y[0, -1] == pytest.approx(end, abs=1e-12)
 
 
+@pytest.mark.parametrize("method", ["auto", "Taylor", "DOPRI5", "DOP853"])
+def test_a_growing_pull_breaks_the_contact_at_the_static_limit(method):
+    # The pull t/2 holds at the kinetic limit 1 from t = 2 on, and breaks away at 3.
+    sol = fl.solve_ivp(lambda t, x: [0.5 * t - fl.stick(x[0], 1.5)], (0, 4), [0.3], method)
+    assert sol.switches.kind.tolist() == ["enter_sliding", "exit_sliding"]
+    assert abs(sol.switches.t[-1] - 3.0) < 1e-12
+
+
 def test_the_static_limit_may_vary():
     # The pull t reaches the limit 1 + r exp(-t) at the root of t = 1 + 0.5 exp(-t).
     law = fl.Stick(lambda t, x: x[0], lambda t, x: 1.0 + 0.5 * np.exp(-t))

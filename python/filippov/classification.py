@@ -51,7 +51,8 @@ class Classification:
     spirals : bool
         Whether the motion may wind around the intersection, further out with each turn.
     leaf : str
-        At an intersection the rule that decided: ``start/only``, ``start/several``, or ``higher-order``.
+        At an intersection the rule that decided: ``start/only``, ``start/several``, ``higher-order``, or
+        ``rest`` of a region at rest.
     reason : str
         Why there is no decision; empty if there is one.
     normal_components : ndarray, shape (2, ..., 2, m)

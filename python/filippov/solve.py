@@ -39,7 +39,7 @@ from filippov.system import System
 from filippov.trace import trace_event
 from filippov.trace.fingerprint import fingerprint
 
-__all__ = ["solve_ivp"]
+__all__ = ["solve_ivp", "solve_prepared"]
 
 Array = npt.NDArray[np.float64]
 CoreEvent = tuple[Callable[[float, Array], float] | int, float, int, str]
@@ -225,14 +225,32 @@ def solve_ivp(
         "max_wall_time": max_wall_time,
         "progress": progress,
     }
-    changed = {name: value for name, value in given.items() if value is not _DEFAULTS[name]}
-    return _solve(fun, t_span, y0, changed, events, args, params, surfaces, resets)
+    return _solve(fun, t_span, y0, _changed(given), events, args, params, surfaces, resets)
 
 
-# Most calls change none of the options, or a few: only those are checked.
 _DEFAULTS: dict[str, Any] = {
     name: parameter.default for name, parameter in inspect.signature(solve_ivp).parameters.items()
 }
+_NO_OPTIONS = frozenset({"fun", "t_span", "y0", "events", "args", "params", "surfaces", "resets", "unknown"})
+_OPTIONS = frozenset(_DEFAULTS) - _NO_OPTIONS
+
+
+def solve_prepared(
+    system: System,
+    t_span: Any,
+    y0: npt.ArrayLike,
+    params: Mapping[str, float] | None,
+    options: Mapping[str, Any],
+) -> Solution:
+    """Solve as `solve_ivp` does, sooner if only options are given: most of them are not looked at."""
+    if options.keys() <= _OPTIONS:
+        return _solve(system, t_span, y0, _changed(options), None, (), params, None, None)
+    return solve_ivp(system, t_span, y0, params=params, **options)
+
+
+def _changed(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the options that are not their defaults: most calls change a few, and only those are checked."""
+    return {name: value for name, value in options.items() if value is not _DEFAULTS[name]}
 
 
 def _solve(

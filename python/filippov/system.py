@@ -294,12 +294,12 @@ class System(Points):
         -------
         Solution
         """
-        from filippov.solve import solve_ivp
+        from filippov.solve import solve_prepared
 
         if self._params:
             named = {name: options.pop(name) for name in self._params if name in options}
             params = {**(params or {}), **named}
-        return solve_ivp(self, t_span, y0, params=params, **options)
+        return solve_prepared(self, t_span, y0, params, options)
 
     def ensemble(
         self,

@@ -114,3 +114,29 @@ def test_sliding_ends_where_a_function_gets_another_sign_on_one_of_its_sides() -
     assert not sol.success
     assert "x[1] - 0.1 = 0" in sol.message
     assert sol.y[0, -1] == pytest.approx(0.48, abs=1e-6)
+
+
+def test_sliding_along_a_jump_of_another_sign_stops_with_the_way_to_write_it() -> None:
+    """Filippov's solution is the combination of the two fields beside x0 = 0.1; Euler's method agrees."""
+
+    def f(t: float, x: Any, inner: Any) -> Any:
+        s = np.sign(x[0] - 0.1)
+        return [-2.0 * s + 0.4 * inner(x, s) + 0.3, inner(x, s) + 0.5 * s]
+
+    nested = fl.solve_ivp(lambda t, x: f(t, x, lambda x, s: np.sign(x[0] + 0.2 * s)), (0.0, 2.0), [1.0, 0.0])
+    assert not nested.success
+    assert nested.sol(nested.t[-1])[0] == pytest.approx(0.1)
+    assert "slide on x[0] - 0.1 = 0" in nested.message
+    assert "the sign of x[0] + 0.2*sign(x[0] - 0.1) too" in nested.message
+    assert "where(h > 0, sign(g + c), sign(g - c))" in nested.message
+
+    def written_out(x: Any, s: Any) -> Any:
+        return np.where(x[0] > 0.1, np.sign(x[0] + 0.2), np.sign(x[0] - 0.2))
+
+    sol = fl.solve_ivp(lambda t, x: f(t, x, written_out), (0.0, 2.0), [1.0, 0.0])
+    assert sol.success, sol.message
+    above, below = np.array([-1.3, 1.5]), np.array([1.9, -1.5])
+    share = below[0] / (below[0] - above[0])
+    arrival = 0.9 / 1.3
+    slid = share * above + (1.0 - share) * below
+    np.testing.assert_allclose(sol.y[:, -1], [0.1, 1.5 * arrival + (2.0 - arrival) * slid[1]], rtol=1e-9)

@@ -3,7 +3,7 @@
 use rustc_hash::FxHashMap;
 
 use crate::graph::Graph;
-use crate::node::{Node, NodeId};
+use crate::node::{Facts, Node, NodeId};
 
 impl Graph {
     /// Whether the value varies along a motion: it contains the time, a state, a sign or an input.
@@ -32,6 +32,29 @@ impl Graph {
     /// Nothing that contains a sign or an input is affine.
     pub fn is_affine(&self, id: NodeId) -> bool {
         self.facts(id).affine
+    }
+
+    /// As [`is_affine`](Self::is_affine) while no sign changes: signs count as constants, and of a select both branches
+    /// are affine.
+    pub fn is_affine_between_switches(&self, id: NodeId) -> bool {
+        let operands = |id: NodeId| self.node(id).operands().collect::<Vec<_>>();
+        let mut known: FxHashMap<NodeId, Facts> = FxHashMap::default();
+        for id in self.reachable_by([id], operands) {
+            let node = self.node(id);
+            let mut of = node.operands().map(|operand| known[&operand]);
+            let a = of.next().unwrap_or_default();
+            let b = of.next().unwrap_or_default();
+            let mut facts = Facts::of(node, a, b);
+            match node {
+                Node::Sign(_) => (facts.varies, facts.affine) = (false, true),
+                Node::Select { .. } => {
+                    (facts.varies, facts.affine) = (a.varies || b.varies, a.affine && b.affine);
+                }
+                _ => {}
+            }
+            known.insert(id, facts);
+        }
+        known[&id].affine
     }
 
     /// The values with some signs fixed: `Sign(j)` becomes the number, and a select on it the branch taken,

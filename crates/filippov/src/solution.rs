@@ -229,7 +229,11 @@ impl Solution {
             &[j] => {
                 let mut field = SlidingField::new(system, j, &mode.signs());
                 let components = field.normal_components(t, &mut y)?;
-                let lambda = in_interval(components.multiplier());
+                // At a two-fold from which sliding starts it is a quotient of two zeros, and known from the run.
+                let lambda = match (components.minus - components.plus, near) {
+                    (0.0, &[known, ..]) => known,
+                    _ => in_interval(components.multiplier()),
+                };
                 // Near a two-fold it is a quotient of rounding errors.
                 let share = (components.minus - components.plus).abs();
                 let beyond = 0.5 * (lambda.abs() - 1.0) * share;

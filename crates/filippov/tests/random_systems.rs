@@ -150,6 +150,8 @@ fn segments_tile_the_interval_and_the_state_is_continuous() {
                 | Stop::StepTooSmall
                 | Stop::Intersection { .. }
                 | Stop::NonUnique { .. }
+                | Stop::InvisibleTwoFold { .. }
+                | Stop::SlidesAcrossJump { .. }
                 | Stop::NoProgress { .. }
         );
         prop_assert!(named, "{:?}", solution.stop);

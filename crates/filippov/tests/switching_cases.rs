@@ -8,7 +8,7 @@ use filippov::switching::{decide, Arrival, Decision};
 use filippov::{ClosureSystem, PiecewiseSystem, TracedSystem};
 use filippov_expr::{Backend, Graph, Names, NodeId};
 
-use Arrival::{ExitMinus, ExitPlus, Region, Start};
+use Arrival::{ExitMinus, ExitPlus, Region, Start, TwoFold};
 
 /// Label, derivatives of h along f-, along f+, arrival, the entry that follows, all candidates.
 type Row = (
@@ -222,6 +222,14 @@ const HIGHER: &[Row] = &[
         &[0],
     ),
     (
+        "IV sliding begins, of different orders",
+        &[0.0, 0.0, 0.0, 1.0],
+        &[0.0, -1.0],
+        Start,
+        0,
+        &[0],
+    ),
+    (
         "III from sliding, touch",
         &[2.0],
         &[0.0, 0.0, -1.0],
@@ -262,6 +270,66 @@ const HIGHER: &[Row] = &[
         &[0],
     ),
 ];
+
+/// All derivatives along f- vanish.
+const RESTING: &[Row] = &[
+    ("f+ leaves, at a start", &[0.0], &[1.0], Start, 1, &[-1, 1]),
+    (
+        "f+ leaves, from R-",
+        &[0.0],
+        &[1.0],
+        Region(-1),
+        -1,
+        &[-1, 1],
+    ),
+    ("f+ presses", &[0.0], &[-1.0], Region(1), 0, &[0]),
+    (
+        "f+ leaves tangentially, at a start",
+        &[0.0],
+        &[0.0, 1.0],
+        Start,
+        1,
+        &[-1, 1],
+    ),
+    (
+        "f+ leaves tangentially, from R+",
+        &[0.0],
+        &[0.0, 1.0],
+        Region(1),
+        1,
+        &[-1, 1],
+    ),
+    (
+        "f+ turns back, at a start",
+        &[0.0],
+        &[0.0, -1.0],
+        Start,
+        -1,
+        &[-1],
+    ),
+    (
+        "f+ presses no more",
+        &[0.0],
+        &[0.0, 1.0],
+        ExitPlus,
+        1,
+        &[-1, 1],
+    ),
+    (
+        "f+ presses no more, both components zero",
+        &[0.0],
+        &[0.0, 1.0],
+        TwoFold,
+        1,
+        &[-1, 1],
+    ),
+];
+
+/// All rows.
+fn rows() -> impl Iterator<Item = &'static Row> {
+    let low = FIRST_ORDER.iter().chain(TANGENCIES).chain(RESTING);
+    low.chain(HIGHER)
+}
 
 fn polynomial(derivatives: &[f64], t: f64) -> f64 {
     let mut term = 1.0;
@@ -340,7 +408,7 @@ fn mirrored(row: &Row) -> (Vec<f64>, Vec<f64>, Arrival, i8, Vec<i8>) {
         ExitMinus => ExitPlus,
         ExitPlus => ExitMinus,
         Start => Start,
-        Arrival::TwoFold => Arrival::TwoFold,
+        TwoFold => TwoFold,
         Arrival::Flat(side, [minus, plus]) => Arrival::Flat(-side, [*plus, *minus]),
     };
     (
@@ -354,14 +422,14 @@ fn mirrored(row: &Row) -> (Vec<f64>, Vec<f64>, Arrival, i8, Vec<i8>) {
 
 #[test]
 fn traced_systems_decide_every_row() {
-    for row in FIRST_ORDER.iter().chain(TANGENCIES).chain(HIGHER) {
+    for row in rows() {
         check(row, &traced(row.1, row.2));
     }
 }
 
 #[test]
 fn mirror_images_are_decided_alike() {
-    for row in FIRST_ORDER.iter().chain(TANGENCIES).chain(HIGHER) {
+    for row in rows() {
         let (minus, plus, arrival, entry, candidates) = mirrored(row);
         let decision = decide_at_origin(&traced(&minus, &plus), arrival);
         assert_eq!(
@@ -375,7 +443,7 @@ fn mirror_images_are_decided_alike() {
 
 #[test]
 fn scaled_fields_are_decided_alike() {
-    for row in FIRST_ORDER.iter().chain(TANGENCIES).chain(HIGHER) {
+    for row in rows() {
         for scale in [1e-6, 1e6] {
             let scaled = |values: &[f64]| values.iter().map(|v| scale * v).collect::<Vec<_>>();
             let decision = decide_at_origin(&traced(&scaled(row.1), &scaled(row.2)), row.3);
@@ -392,7 +460,7 @@ fn scaled_fields_are_decided_alike() {
 #[test]
 fn closures_decide_up_to_second_derivatives() {
     // Their derivatives are differences: orders above 2 are beyond them.
-    for row in FIRST_ORDER.iter().chain(TANGENCIES) {
+    for row in FIRST_ORDER.iter().chain(TANGENCIES).chain(RESTING) {
         with_closures(row.1, row.2, |system| check(row, system));
     }
 }
@@ -433,48 +501,6 @@ fn derivatives_known_to_vanish_are_rounding_and_not_looked_at() {
         decide_at_origin(&system, Arrival::Flat(-1, [2, 0])).entry,
         0
     );
-}
-
-/// A two-fold at the origin of h = x: f- = (y, p, r) and f+ = (z, q, s), so that the second
-/// derivatives of h along the fields are L-L-h = p, L+L-h = q, L-L+h = r, L+L+h = s.
-fn two_fold(p: f64, q: f64, r: f64, s: f64, arrival: Arrival) -> Decision {
-    let system = ClosureSystem::new(
-        3,
-        1,
-        move |_t, x, signs, dx| {
-            let field = if signs[0] > 0.0 {
-                [x[2], q, s]
-            } else {
-                [x[1], p, r]
-            };
-            dx.copy_from_slice(&field);
-        },
-        |_t, x, h| h[0] = x[0],
-    );
-    decide(&system, 0, arrival, 0.0, &[0.0; 3], &[1.0]).unwrap()
-}
-
-#[test]
-fn two_folds() {
-    // Invisible from both sides and attracting along every mixture: sliding begins.
-    assert_eq!(two_fold(1.0, 0.5, -0.5, -1.0, Start).candidates[..], [0]);
-    // Visible from both sides: two ways out, kept to where it comes from.
-    let away = two_fold(-1.0, 0.5, -0.5, 1.0, Region(-1));
-    assert_eq!(
-        (away.entry, away.candidates.as_slice()),
-        (-1, [-1, 1].as_slice())
-    );
-    assert_eq!(two_fold(-1.0, 0.5, -0.5, 1.0, Region(1)).entry, 1);
-    // Visible from one side: that side.
-    assert_eq!(
-        two_fold(-1.0, -0.5, -0.5, -1.0, Region(-1)).candidates[..],
-        [-1]
-    );
-    assert_eq!(two_fold(1.0, 0.5, 0.5, 1.0, Region(1)).candidates[..], [1]);
-    // Invisible, but the mixture that keeps to the surface drifts into the repelling part: no sliding.
-    assert!(!two_fold(1.0, -3.0, 3.0, -1.0, Start)
-        .candidates
-        .contains(&-1));
 }
 
 #[test]

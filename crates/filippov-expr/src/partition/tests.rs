@@ -94,3 +94,28 @@ fn motion() {
         assert_eq!(g.depends_on_motion(id), varies);
     }
 }
+
+#[test]
+fn between_switches_a_sign_is_a_constant() {
+    let mut g = Graph::new();
+    let (t, x, y, p) = (g.time(), g.state(0), g.state(1), g.parameter(0));
+    let sign = g.sign(x);
+    let force = g.mul(sign, y);
+    let pull = g.mul(p, t);
+    let sum = g.add(force, pull);
+    let larger = g.maximum(y, pull);
+    let wave = g.unary(UnaryOp::Sin, t);
+    let bent = g.mul(larger, wave);
+    let product = g.mul(y, t);
+    let power = g.mul(sign, product);
+    for (node, is_affine) in [
+        (sum, true),
+        (larger, true),
+        (force, true),
+        (bent, false),
+        (power, false),
+    ] {
+        assert_eq!(g.is_affine_between_switches(node), is_affine);
+        assert!(!g.is_affine(node));
+    }
+}

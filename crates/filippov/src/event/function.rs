@@ -46,6 +46,8 @@ pub struct Deflation {
     pub leading: f64,
     /// The value that the function has there all the same, by rounding or errors of the step before.
     pub residual: f64,
+    /// The motion did not slide before: but for rounding, nothing moved it off the surface.
+    pub is_clean: bool,
     /// Rounding that blurred it where it was found to be a multiple one: closer zeros belong to it.
     pub blur: f64,
 }
@@ -108,6 +110,7 @@ impl Monitored {
             order,
             leading,
             residual,
+            is_clean,
             ..
         }) = self.deflation
         else {
@@ -116,9 +119,10 @@ impl Monitored {
         let limit = leading * dt.powi(order);
         let elapsed = (time - t) / dt;
         let power = elapsed.powi(order);
-        // Closer to the zero than rounding can resolve, the limit is the better value; a value that is clear of rounding says
-        // that there is more than the leading term.
-        if elapsed <= 0.0 || limit.abs() * power <= noise && value.abs() <= 4.0 * noise {
+        // Closer to the zero than rounding can resolve, the limit is the better value; but beside a multiple zero a value that
+        // is clear of rounding says that there is more than the leading term.
+        let says_more = is_clean && order > 1 && value.abs() > 4.0 * noise;
+        if elapsed <= 0.0 || limit.abs() * power <= noise && !says_more {
             limit
         } else if residual < -noise {
             // What the function starts below zero fades out where it is far above that.

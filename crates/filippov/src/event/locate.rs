@@ -43,7 +43,6 @@ pub fn refine(g: Sampled, bracket: Bracket, width: f64) -> Result<Located, Field
     let mut at = guess.clamp(lo, hi);
     let length = hi - lo;
     let mut last_move = length;
-    let mut last_below = g_hi;
     let mut steepest = slope.abs();
     while best.1 != 0.0 && hi - lo > width.max(EPS * hi.abs()) && at > lo && at < hi {
         let value = g(at)?;
@@ -54,7 +53,7 @@ pub fn refine(g: Sampled, bracket: Bracket, width: f64) -> Result<Located, Field
         if value > 0.0 {
             lo = at;
         } else {
-            (hi, last_below) = (at, value);
+            hi = at;
         }
         let chord = previous.map_or(slope, |(x, v)| (value - v) / (at - x));
         steepest = chord.abs().max(slope.abs());
@@ -80,10 +79,6 @@ pub fn refine(g: Sampled, bracket: Bracket, width: f64) -> Result<Located, Field
         last_move = (next - at).abs();
         (previous, slope) = (Some((at, value)), chord);
         at = next;
-    }
-    // Down to the end where the function is still positive it jumps: it is behind that.
-    if best.0 == bracket.lo && best.1 != 0.0 && hi - lo <= width.max(EPS * hi.abs()) {
-        best = (hi, last_below);
     }
     Ok(Located {
         theta: best.0,

@@ -4,11 +4,15 @@ use filippov_expr::Interval;
 
 use super::certificate::Bound;
 use crate::stepper::{shift, Expansion};
-use crate::tolerances::{EPS, TAYLOR_LARGEST_ORDER};
+use crate::tolerances::{EPS, SAME_VALUE, TAYLOR_LARGEST_ORDER};
 
 /// Samples, and steps of Newton's method, in the search for about where a zero is.
 const GUESS_SAMPLES: u32 = 3;
 const GUESS_STEPS: u32 = 3;
+
+/// How often an interval is halved whose coefficients do not tell its zeros apart: a long step has a few, and comes near
+/// to others.
+const HALVINGS: u32 = 10;
 
 /// Room for the coefficients of a step of the highest order.
 pub type LongestSeries = [f64; MOST_COEFFICIENTS];
@@ -33,13 +37,20 @@ const INVERSE_BINOMIALS: [LongestSeries; MOST_COEFFICIENTS] = {
 #[derive(Clone, Copy, Debug)]
 pub struct Series<'a>(&'a [f64]);
 
-/// What is known about the zeros of a polynomial on [0, 1].
+/// What is known about the first zero of a polynomial that is positive at 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Zeros {
+pub enum FirstZero {
     /// There is none: it is positive.
     Nowhere,
-    /// There is exactly one, where it falls from positive to negative values; very roughly here.
-    One(f64),
+    /// Between `lo` and `hi` it falls from positive to negative values, once; before there is no zero.
+    Between {
+        /// Where it is positive.
+        lo: f64,
+        /// Where it is negative.
+        hi: f64,
+        /// Very roughly where it vanishes.
+        guess: f64,
+    },
     /// Nothing.
     Unknown,
 }
@@ -72,42 +83,37 @@ impl<'a> Series<'a> {
         self.0.iter().rev().fold(0.0, |value, c| value * theta + c)
     }
 
+    /// Is the polynomial `left` at 0 and `right` at 1, up to rounding?
+    pub fn leads_between(&self, left: f64, right: f64) -> bool {
+        let sum: f64 = self.0.iter().sum();
+        let size: f64 = self.0.iter().map(|c| c.abs()).sum();
+        (self.0[0] - left).abs().max((sum - right).abs()) <= SAME_VALUE * size
+    }
+
     /// Is the polynomial positive on [0, 1] for its falling terms alone?
     pub fn is_far_from_zero(&self) -> bool {
         let falling: f64 = self.0[1..].iter().map(|c| c.min(0.0)).sum();
         self.0[0] + falling > 0.0
     }
 
-    /// What is known about the zeros on [0, `to`], by the signs of the Bernstein coefficients there, which change at
-    /// least as often as those of the polynomial (Descartes' rule).
-    pub fn zeros(&self, to: f64) -> Zeros {
+    /// The first zero on [0, 1] before `reach`, by the signs of the Bernstein coefficients, which change at least as
+    /// often as those of the polynomial (Descartes' rule); where they say nothing, by those of the halves. The pieces do
+    /// not depend on `reach`: neither does a zero.
+    pub fn first_zero(&self, reach: f64) -> FirstZero {
         let mut coefficients = LongestSeries::default();
         let b = &mut coefficients[..self.0.len()];
-        // The coefficient of degree i is the sum of C(i, k)/C(n, k) c_k to^k.
-        let degree = b.len() - 1;
-        let (mut size, mut power) = (0.0, 1.0);
-        let weights = &INVERSE_BINOMIALS[degree];
+        // The coefficient of degree i is the sum of C(i, k)/C(n, k) c_k.
+        let mut size = 0.0;
+        let weights = &INVERSE_BINOMIALS[b.len() - 1];
         for ((b, c), weight) in b.iter_mut().zip(self.0).zip(weights) {
-            let c = c * power;
             size += c.abs();
             *b = weight * c;
-            power *= to;
         }
         sum_binomially(b);
         if b.iter().all(|&b| b > 0.0) {
-            return Zeros::Nowhere;
+            return FirstZero::Nowhere;
         }
-        // Of the coefficient between the positive and the negative ones the sign may be lost in rounding.
-        let noise = 16.0 * EPS * size;
-        let positive = b.iter().take_while(|&&b| b > noise).count();
-        let negative = b.iter().rev().take_while(|&&b| b < -noise).count();
-        if positive == 0 || negative == 0 || positive + negative < degree {
-            return Zeros::Unknown;
-        }
-        // Where the polygon of the coefficients falls through zero.
-        let (left, right) = (positive - 1, degree + 1 - negative);
-        let share = b[left] / (b[left] - b[right]) * (right - left) as f64;
-        Zeros::One(to * (left as f64 + share) / degree as f64)
+        first_zero_between(b, (0.0, 1.0), reach, 16.0 * EPS * size, HALVINGS)
     }
 
     /// About where the polynomial, positive at 0, first falls through zero on [0, 1], found by a few samples and
@@ -175,6 +181,64 @@ impl<'a> Series<'a> {
     }
 }
 
+/// The first zero of a polynomial with Bernstein coefficients `b` from `lo` to `hi`. Of a coefficient within `noise` of
+/// zero the sign may be lost in rounding: between the positive and the negative ones there may be one. From `reach` on
+/// nothing is looked for.
+fn first_zero_between(
+    b: &mut [f64],
+    (lo, hi): (f64, f64),
+    reach: f64,
+    noise: f64,
+    halvings: u32,
+) -> FirstZero {
+    if lo >= reach {
+        return FirstZero::Nowhere;
+    }
+    let degree = b.len() - 1;
+    let positive = b.iter().take_while(|&&b| b > noise).count();
+    if positive > degree {
+        return FirstZero::Nowhere;
+    }
+    let negative = b.iter().rev().take_while(|&&b| b < -noise).count();
+    if positive > 0 && negative > 0 && positive + negative >= degree {
+        // Where the polygon of the coefficients falls through zero.
+        let (left, right) = (positive - 1, degree + 1 - negative);
+        let share = b[left] / (b[left] - b[right]) * (right - left) as f64;
+        let guess = lo + (hi - lo) * (left as f64 + share) / degree as f64;
+        return FirstZero::Between { lo, hi, guess };
+    }
+    if halvings == 0 || positive == 0 {
+        return FirstZero::Unknown;
+    }
+    let mut first = LongestSeries::default();
+    let first = &mut first[..=degree];
+    halve(b, first);
+    let middle = 0.5 * (lo + hi);
+    match first_zero_between(first, (lo, middle), reach, noise, halvings - 1) {
+        FirstZero::Nowhere => first_zero_between(b, (middle, hi), reach, noise, halvings - 1),
+        found => found,
+    }
+}
+
+/// Makes Bernstein coefficients those of the second half, and `first` those of the first one: de Casteljau's means of
+/// neighbours, halved at the end.
+fn halve(b: &mut [f64], first: &mut [f64]) {
+    let mut scale = 1.0;
+    for (end, first) in (1..=b.len()).rev().zip(first) {
+        *first = scale * b[0];
+        scale *= 0.5;
+        let row = &mut b[..end];
+        for i in 1..row.len() {
+            row[i - 1] += row[i];
+        }
+    }
+    scale = 1.0;
+    for b in b.iter_mut().rev() {
+        *b *= scale;
+        scale *= 0.5;
+    }
+}
+
 /// Rows of the triangle that are summed at a time.
 const ROWS: usize = 4;
 
@@ -204,7 +268,7 @@ fn sum_binomially(mut b: &mut [f64]) {
 
 #[cfg(test)]
 mod tests {
-    use super::{Series, Zeros};
+    use super::{FirstZero, Series};
 
     #[test]
     fn a_polynomial_is_above_what_it_stays_above() {
@@ -214,22 +278,22 @@ mod tests {
             let series = Series::new(&coefficients);
             let lowest = (0..=100).map(|k| series.value(f64::from(k) * 0.01));
             assert_eq!(lowest.fold(f64::INFINITY, f64::min) > 1e-9, is_above);
-            assert_eq!(series.zeros(1.0), Zeros::Unknown);
+            let nowhere = series.first_zero(1.0) == FirstZero::Nowhere;
+            assert_eq!(nowhere, is_above);
         }
         assert!(Series::new(&[1.0, -0.5, 1.0, -0.4]).is_far_from_zero());
         // Bernstein coefficients tell where the falling terms do not.
         let turning = [1.0, -1.5, 1.0, 0.0];
         let series = Series::new(&turning);
         assert!(!series.is_far_from_zero());
-        assert_eq!(series.zeros(1.0), Zeros::Nowhere);
-        assert_eq!(Series::new(&[1.0, -2.5, 1.6]).zeros(1.0), Zeros::Unknown);
+        assert_eq!(series.first_zero(1.0), FirstZero::Nowhere);
     }
 
     #[test]
     fn one_change_of_sign_is_one_zero() {
         // (1 - 2 theta) (1 + theta + theta^2)
         let series = Series::new(&[1.0, -1.0, -1.0, -2.0]);
-        let Zeros::One(guess) = series.zeros(1.0) else {
+        let FirstZero::Between { guess, .. } = series.first_zero(1.0) else {
             panic!("not found");
         };
         let (zero, slope) = series.newton(guess).unwrap();
@@ -237,7 +301,8 @@ mod tests {
         assert!((zero - 0.5).abs() < 1e-6 && (slope + 3.5).abs() < 1e-2);
         // Touching zero, or vanishing at an end, is not decided.
         for coefficients in [[0.25, -1.0, 1.0], [1.0, -1.0, 0.0], [0.0, 1.0, -2.0]] {
-            assert_eq!(Series::new(&coefficients).zeros(1.0), Zeros::Unknown);
+            let series = Series::new(&coefficients);
+            assert_eq!(series.first_zero(1.0), FirstZero::Unknown);
         }
     }
 
@@ -246,12 +311,64 @@ mod tests {
         // (0.3 - theta) (0.9 - theta)
         let coefficients = [0.27, -1.2, 1.0];
         let series = Series::new(&coefficients);
-        assert_eq!(series.zeros(1.0), Zeros::Unknown);
-        let Zeros::One(guess) = series.zeros(0.4) else {
+        let FirstZero::Between { lo, hi, guess } = series.first_zero(1.0) else {
             panic!("not found");
         };
-        assert!((guess - 0.3).abs() < 0.1);
-        assert_eq!(series.zeros(0.2), Zeros::Nowhere);
+        assert!(lo < 0.3 && 0.3 < hi && hi < 0.9 && (guess - 0.3).abs() < 0.2);
+        assert_eq!(series.first_zero(0.2), series.first_zero(1.0));
+        let late = [0.72, -1.7, 1.0]; // (0.8 - theta) (0.9 - theta)
+        assert_eq!(Series::new(&late).first_zero(0.4), FirstZero::Nowhere);
+        assert_eq!(
+            Series::new(&[0.3, -1.2, 1.25]).first_zero(1.0),
+            FirstZero::Nowhere
+        );
+    }
+
+    /// Products (r1 - theta) ... (rn - theta), also with roots outside of [0, 1] and pairs of complex ones.
+    #[test]
+    fn the_first_zero_of_a_product_is_between_its_neighbours() {
+        let mut state = 1_u64;
+        let mut random = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let mut n_found = 0;
+        for _ in 0..2000 {
+            let mut coefficients = vec![1.0];
+            let mut roots = Vec::new();
+            for _ in 0..1 + (6.0 * random()) as usize {
+                let (root, width) = (3.0 * random() - 1.0, random());
+                let factor = if random() < 0.3 {
+                    vec![root * root + width, -2.0 * root, 1.0]
+                } else if root > 0.0 {
+                    roots.push(root);
+                    vec![root, -1.0]
+                } else {
+                    vec![-root, 1.0]
+                };
+                let mut product = vec![0.0; coefficients.len() + factor.len() - 1];
+                for (i, c) in coefficients.iter().enumerate() {
+                    for (k, f) in factor.iter().enumerate() {
+                        product[i + k] += c * f;
+                    }
+                }
+                coefficients = product;
+            }
+            roots.sort_by(f64::total_cmp);
+            let inside: Vec<f64> = roots.into_iter().filter(|r| *r < 1.0).collect();
+            match Series::new(&coefficients).first_zero(1.0) {
+                FirstZero::Nowhere => assert!(inside.is_empty()),
+                FirstZero::Between { lo, hi, guess } => {
+                    n_found += 1;
+                    assert!(lo < inside[0] && inside[0] < hi && lo <= guess && guess <= hi);
+                    assert!(inside.get(1).is_none_or(|second| *second > hi));
+                }
+                FirstZero::Unknown => {}
+            }
+        }
+        assert!(n_found > 800);
     }
 
     #[test]

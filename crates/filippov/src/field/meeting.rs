@@ -69,6 +69,11 @@ impl MeetingFields {
         &self.set
     }
 
+    /// Are the fields of all patterns of all surfaces held one by one?
+    pub fn has_all_patterns(&self) -> bool {
+        self.groups.len() == 1
+    }
+
     /// Evaluates everything at a point; `signs` holds the sides of the other surfaces. Returns the number
     /// of evaluations of the right-hand side.
     ///
@@ -210,6 +215,19 @@ impl MeetingFields {
             over_groups(&|row| self.components[row * m + i].abs()) > TANGENT_TO_ALL * size
         };
         (0..m).filter(is_telling).collect()
+    }
+
+    /// Has a normal component one sign in all fields where it is not zero, so that no mixture of all of them stays on its
+    /// surface? Asked where all patterns are held one by one.
+    pub fn lead_to_one_side(&self) -> bool {
+        let m = self.set.len();
+        let components = |i: usize| self.components.iter().skip(i).step_by(m);
+        self.has_all_patterns()
+            && (0..m).any(|i| {
+                let largest = components(i).fold(0.0_f64, |most, v| most.max(v.abs()));
+                let clear = |sign: f64| components(i).any(|v| sign * v > TANGENT_TO_ALL * largest);
+                !(clear(1.0) && clear(-1.0))
+            })
     }
 
     /// Writes the weights prod_i (1 + k_i lambda_i)/2 of the canopy, those of each group after the other.

@@ -56,6 +56,9 @@ pub struct SlidingField<'a> {
     restoring: Option<f64>,
     n_evaluations: u64,
     last: NormalComponents,
+    last_time: f64,
+    /// The time at which sliding starts at a two-fold, and the share of f+ there.
+    two_fold: Option<(f64, f64)>,
 }
 
 impl<'a> SlidingField<'a> {
@@ -73,6 +76,8 @@ impl<'a> SlidingField<'a> {
                 minus: f64::NAN,
                 plus: f64::NAN,
             },
+            last_time: f64::NAN,
+            two_fold: None,
         }
     }
 
@@ -89,6 +94,30 @@ impl<'a> SlidingField<'a> {
         self.signs.copy_from_slice(signs);
         self.sides.restart();
         self.n_evaluations = 0;
+        self.two_fold = None;
+    }
+
+    /// Sliding starts at a two-fold, where the share of f+ is a quotient of two zeros and is given as this multiplier.
+    pub fn begin_at_two_fold(&mut self, t: f64, multiplier: f64) {
+        self.two_fold = Some((t, 0.5 * (1.0 + multiplier)));
+    }
+
+    /// Does sliding start at a two-fold, and at this time?
+    pub fn is_at_two_fold(&self, t: f64) -> bool {
+        self.two_fold.is_some_and(|(start, _)| start == t)
+    }
+
+    /// The share of f+ at time t, with these normal components.
+    fn weight_plus(&self, t: f64, components: NormalComponents) -> f64 {
+        match self.two_fold {
+            Some((start, weight)) if start == t => weight,
+            _ => components.weight_plus(),
+        }
+    }
+
+    /// The multiplier of the last evaluation.
+    pub fn multiplier(&self) -> f64 {
+        2.0 * self.weight_plus(self.last_time, self.last) - 1.0
     }
 
     /// The surface slid on.
@@ -143,6 +172,7 @@ impl<'a> SlidingField<'a> {
             minus: sides.normal_minus,
             plus: sides.normal_plus,
         };
+        self.last_time = t;
         Ok(self.last)
     }
 }
@@ -168,7 +198,7 @@ impl SmoothField for SlidingField<'_> {
         dx: &mut [f64],
     ) -> Result<(), FieldError> {
         let a = self.normal_components_at(t, x)?;
-        let weight_plus = a.weight_plus();
+        let weight_plus = self.weight_plus(t, a);
         let sides = self.sides.f_minus.iter().zip(&self.sides.f_plus);
         for (dx, (minus, plus)) in dx.iter_mut().zip(sides) {
             *dx = minus + weight_plus * (plus - minus);

@@ -4,8 +4,8 @@ use crate::error::FieldError;
 use crate::field::{eval_on_side, MeetingFields};
 use crate::mode::Mode;
 use crate::switching::{
-    decide, decide_intersection, relay_at, resolve, Arrival, Continuation, Incoming, Leading,
-    NormalFields, Resolution, Undecided, Uniqueness,
+    decide, decide_intersection, region_at_rest, relay_at, resolve, Arrival, Continuation,
+    Incoming, Leading, Resolution, Undecided, Uniqueness,
 };
 use crate::system::{dot, dot_magnitude, surfaces_that_matter, PiecewiseSystem};
 use crate::tolerances::{MOST_MEETING, SURFACE_NOISE};
@@ -203,7 +203,8 @@ fn on_surface(
     mode: &Mode,
     j: usize,
 ) -> Result<Option<Classification>, FieldError> {
-    let Some(fields) = fields_around(system, t, x, mode, &[j])? else {
+    let corners = corners_around(system, t, x, mode, &[j])?;
+    let Ok(fields) = corners.normal_fields() else {
         return Ok(None);
     };
     let decision = decide(system, j, Arrival::Start, t, x, &mode.signs())?;
@@ -247,7 +248,8 @@ fn at_intersection(
         point.undecided = Some(Undecided::TooMany { n: largest });
         return Ok(Some(point));
     }
-    let Some(fields) = fields_around(system, t, x, mode, &meeting)? else {
+    let corners = corners_around(system, t, x, mode, &meeting)?;
+    let Ok(fields) = corners.normal_fields() else {
         return Ok(None);
     };
     let scaling = meeting
@@ -278,6 +280,9 @@ fn at_intersection(
             point.candidates = decision.candidates;
         }
     }
+    if let Some(rest) = region_at_rest(system, &corners, mode, t, x)? {
+        point.add_rest(rest, x.len());
+    }
     Ok(Some(point))
 }
 
@@ -307,6 +312,21 @@ fn decided_by_relay(
 }
 
 impl Classification {
+    /// Adds a region whose field is at rest.
+    fn add_rest(&mut self, rest: Mode, n: usize) {
+        // What stays on as many surfaces as there are states stays at the point.
+        let is_only = self.candidates.is_empty() && self.surfaces.len() == n;
+        if is_only {
+            self.mode = Some(rest.clone());
+            self.leaf = "rest";
+            self.undecided = None;
+        }
+        self.unique = is_only || self.unique && self.candidates.contains(&rest);
+        if !self.candidates.contains(&rest) {
+            self.candidates.push(rest);
+        }
+    }
+
     fn take(&mut self, resolution: Resolution, on_all: impl Fn(&Mode) -> Mode) {
         let candidates = &resolution.candidates;
         self.spirals = candidates.contains(&Continuation::OutwardSpiral);
@@ -319,15 +339,15 @@ impl Classification {
     }
 }
 
-/// Normal components of all fields around the point; `None` if one is not finite.
-fn fields_around(
+/// All fields around the point.
+fn corners_around(
     system: &dyn PiecewiseSystem,
     t: f64,
     x: &[f64],
     mode: &Mode,
     surfaces: &[usize],
-) -> Result<Option<NormalFields>, FieldError> {
+) -> Result<MeetingFields, FieldError> {
     let mut corners = MeetingFields::new(system, surfaces);
     corners.evaluate(system, t, x, &mode.signs())?;
-    Ok(corners.normal_fields().ok())
+    Ok(corners)
 }

@@ -411,7 +411,7 @@ impl<'a> Motion<'a> {
     pub fn multipliers(&self) -> SmallVec<[f64; 2]> {
         match &self.field {
             ModeField::Region(_) => SmallVec::new(),
-            ModeField::Sliding(field) => smallvec![field.last().multiplier()],
+            ModeField::Sliding(field) => smallvec![field.multiplier()],
             ModeField::Intersection(field) => SmallVec::from_slice(field.multipliers()),
             ModeField::Contact(field) => field.lambdas().into(),
         }

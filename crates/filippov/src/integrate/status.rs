@@ -4,7 +4,7 @@ use crate::error::FieldError;
 use crate::field::weights::RuleFailure;
 use crate::mode::Mode;
 use crate::options::SlidingRule;
-use crate::switching::Undecided;
+use crate::switching::{TwoFoldMotion, Undecided};
 use crate::tolerances::CHATTER_STEPS;
 
 /// Why a run ended. Whatever the reason, the solution up to that time is kept.
@@ -66,6 +66,13 @@ pub enum Stop {
         /// Why the decision failed.
         reason: Undecided,
     },
+    /// The motion would slide between fields that differ in the sign of another function too, which jumps there.
+    SlidesAcrossJump {
+        /// The surfaces that it would slide on.
+        surfaces: Vec<usize>,
+        /// Those whose functions contain a sign of these, and jump.
+        jumping: Vec<usize>,
+    },
     /// Several surfaces meet, and the chosen combination of their fields does not slide there.
     SlidingRule {
         /// The surfaces.
@@ -74,6 +81,13 @@ pub enum Stop {
         rule: SlidingRule,
         /// Which of its premises fails.
         reason: RuleFailure,
+    },
+    /// The fields on both sides of a surface turn back to it, and no sliding that attracts starts here.
+    InvisibleTwoFold {
+        /// The surface.
+        surface: usize,
+        /// The motion that slides on from here, if second derivatives give one.
+        sliding: Option<TwoFoldMotion>,
     },
     /// The continuation is not unique, and `NonUnique::Error` was asked for, or a choice is not among the
     /// candidates.
@@ -113,9 +127,9 @@ impl Stop {
             Stop::Contact { .. } => "contact",
             Stop::NotFinite => "field_not_finite",
             Stop::FieldRaised(_) => "field_raised",
-            Stop::Intersection { .. } => "intersection",
+            Stop::Intersection { .. } | Stop::SlidesAcrossJump { .. } => "intersection",
             Stop::SlidingRule { .. } => "sliding_rule",
-            Stop::NonUnique { .. } => "non_unique",
+            Stop::NonUnique { .. } | Stop::InvisibleTwoFold { .. } => "non_unique",
         }
     }
 
@@ -199,6 +213,13 @@ impl Stop {
                     format!("; candidates of lower codimension: {}", modes(candidates))
                 }
             ),
+            Stop::SlidesAcrossJump { surfaces, jumping } => format!(
+                "Stopped at t = {t:.10}: from mode ({mode}) the motion would slide on {}, between fields that differ in the \
+                 sign of {} too, which jumps there; such sliding is not followed. Write a sign inside of another one out: \
+                 sign(g + c*sign(h)) as where(h > 0, sign(g + c), sign(g - c)).",
+                names(surfaces),
+                jumping.iter().map(|&j| surface_name(j)).collect::<Vec<_>>().join(", ")
+            ),
             Stop::SlidingRule {
                 surfaces,
                 rule,
@@ -209,13 +230,19 @@ impl Stop {
                 rule.name(),
                 names(surfaces)
             ),
-            Stop::NonUnique {
-                surfaces,
-                candidates,
-            } if candidates.is_empty() => format!(
-                "Stopped at t = {t:.10}: no motion continues from {}: the fields on both sides turn back to it, and \
-                 orbits wind around this point.",
-                names(surfaces),
+            Stop::InvisibleTwoFold { surface, sliding } => format!(
+                "Stopped at t = {t:.10}: neither side can be followed from {}, where the fields on both sides turn back to \
+                 it (an invisible two-fold). {}",
+                names(&[*surface]),
+                match sliding {
+                    Some(motion) if motion.repels() =>
+                        "Sliding goes on from here where both fields point away, so that it may leave to either side at \
+                         any time: the solution is not unique, and none is chosen.",
+                    Some(_) =>
+                        "To keep to the points where both fields are tangent is a solution; whether others wind around \
+                         them and away is not decided.",
+                    None => "Derivatives of second order do not tell what follows.",
+                }
             ),
             Stop::NonUnique {
                 surfaces,

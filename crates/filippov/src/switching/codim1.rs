@@ -33,10 +33,41 @@ pub struct Decision {
     pub entry: i8,
     /// All entries that are Filippov continuations; more than one where the point is not unique.
     pub candidates: SmallVec<[i8; 3]>,
+    /// The sliding motion from here, if this is a two-fold: one that attracts, if there is one.
+    pub two_fold: Option<TwoFoldMotion>,
     /// First non-vanishing derivative of h along f-.
     pub minus: Leading,
     /// First non-vanishing derivative of h along f+.
     pub plus: Leading,
+}
+
+/// A sliding motion through a two-fold, where its multiplier is a quotient of two zeros. It starts there if it attracts. If
+/// it repels it is a solution too, but one that may leave to either side at any time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TwoFoldMotion {
+    /// The share of f+, in (0, 1).
+    pub weight: f64,
+    /// The rate at which the normal component of f- grows along the motion.
+    pub minus: f64,
+    /// The same of f+.
+    pub plus: f64,
+}
+
+impl TwoFoldMotion {
+    /// Do both fields point to the surface along it?
+    pub fn attracts(&self) -> bool {
+        self.minus > 0.0 && self.plus < 0.0
+    }
+
+    /// Do both fields point away from the surface along it?
+    pub fn repels(&self) -> bool {
+        self.minus < 0.0 && self.plus > 0.0
+    }
+
+    /// lambda at the two-fold.
+    pub fn multiplier(&self) -> f64 {
+        2.0 * self.weight - 1.0
+    }
 }
 
 impl Decision {
@@ -50,7 +81,8 @@ impl Decision {
         leaving.order == 1 && leaving.value.abs() <= OF_ROUNDING * other.value.abs()
     }
 
-    /// Is there no continuation? Both fields turn back to the surface, as at a two-fold that is invisible from both sides.
+    /// Does neither side continue, nor sliding that attracts? Both fields turn back to the surface, at a two-fold that is
+    /// invisible from both sides.
     pub fn turns_back(&self) -> bool {
         let leading = match self.entry {
             -1 => self.minus,
@@ -77,7 +109,11 @@ impl Decision {
 ///
 /// which contains the cases I to III of Dieci and Lopez (2009), section 3. Where both normal
 /// components vanish (their case IV, a two-fold) the sliding motion has its own test, see
-/// `two_fold_slides`.
+/// `two_fold_motions`.
+///
+/// A field all of whose derivatives vanish, as at an equilibrium on the surface, keeps the motion on it for ever: that
+/// is a solution whatever the other field does. Where this presses the motion onto the surface, s = 0 counts as pointing
+/// to it, and the motion slides with lambda = -1 or +1; elsewhere it is in the region of the field that keeps it.
 ///
 /// # Errors
 /// If a function of the user raises.
@@ -100,14 +136,22 @@ pub fn decide(
     };
     let [minus, plus] = first_nonzero_of_both(system, j, vanishing, t, x, signs)?;
     let mut candidates = SmallVec::new();
-    if minus.sign() < 0 {
+    if minus.sign() < 0 || stays(minus, plus, -1) {
         candidates.push(-1);
     }
     let known = vanishing[0].min(vanishing[1]);
-    if slides(system, j, (minus, plus, known), t, x, signs)? {
+    let mut two_fold = None;
+    // Where the second derivatives vanish, what is left of them by rounding says nothing.
+    if minus.order != 1 && plus.order != 1 && known < 2 {
+        let motions = two_fold_motions(system, j, t, x, signs)?;
+        let attracting = motions.iter().find(|motion| motion.attracts());
+        two_fold = attracting.or(motions.first()).copied();
+    }
+    let attracts = two_fold.is_some_and(|motion| motion.attracts());
+    if attracts || slides(system, j, (minus, plus, known), t, x, signs)? {
         candidates.push(0);
     }
-    if plus.sign() > 0 {
+    if plus.sign() > 0 || stays(plus, minus, 1) {
         candidates.push(1);
     }
     if minus.order == 0 && plus.order == 0 {
@@ -115,17 +159,33 @@ pub fn decide(
         // of them is a Filippov solution.
         let agree = fields_agree(system, j, t, x, signs)?;
         candidates = if agree { smallvec![] } else { smallvec![-1, 1] };
+        two_fold = None;
     }
-    let entry = choose(system, j, arrival, &candidates, t, x, signs)?;
+    let entry = choose(
+        system,
+        j,
+        arrival,
+        (&candidates, [minus, plus]),
+        t,
+        x,
+        signs,
+    )?;
     if candidates.is_empty() {
         candidates.push(entry);
     }
     Ok(Decision {
         entry,
         candidates,
+        two_fold,
         minus,
         plus,
     })
+}
+
+/// Does the field of this side keep the motion on the surface, where the other one does not press it there?
+fn stays(own: Leading, other: Leading, side: i8) -> bool {
+    let is_pressed = other.order == 1 && other.sign() == side;
+    own.order == 0 && !is_pressed
 }
 
 /// Do both sides have the same field here, up to rounding?
@@ -157,66 +217,47 @@ fn fields_agree(
 fn slides(
     system: &dyn PiecewiseSystem,
     j: usize,
-    (minus, plus, vanishing): (Leading, Leading, usize),
+    (minus, plus, known): (Leading, Leading, usize),
     t: f64,
     x: &[f64],
     signs: &[f64],
 ) -> Result<bool, FieldError> {
-    if minus.order == 0 && plus.order == 0 {
-        return Ok(false);
-    }
-    if minus.order <= 1 || plus.order <= 1 {
-        // A side whose derivatives all vanish keeps the motion on the surface: lambda = -1 or +1.
+    if minus.order == 1 || plus.order == 1 {
         return Ok(minus.sign() >= 0 && plus.sign() <= 0);
     }
-    // Where the second derivatives vanish, what is left of them by rounding says nothing.
-    Ok(vanishing < 2 && two_fold_slides(system, j, t, x, signs)?
-        || (minus.order == plus.order
-            && minus.order > 2
-            && attracts_along_all_motions(system, j, (vanishing, minus.order), t, x, signs)?))
+    let orders = [minus.order, plus.order];
+    let is_higher = orders.iter().min() > Some(&1) && orders != [2, 2];
+    Ok(is_higher && attracts_along_all_motions(system, j, (orders, known), t, x, signs)?)
 }
 
-/// Do both normal components vanish to this order less 1 (`vanishing` of these derivatives are known to do so) along every motion, whatever mixture of both fields it follows, and
-/// point to the surface afterwards? So do those that share a factor like (t - 1)^2.
+/// Do both normal components vanish to these orders less 1 along every motion, whatever mixture of both fields it follows,
+/// and point to the surface afterwards? So do those that share a factor like (t - 1)^2. `known` derivatives are known to
+/// vanish.
 fn attracts_along_all_motions(
     system: &dyn PiecewiseSystem,
     j: usize,
-    (vanishing, order): (usize, usize),
+    (orders, known): ([usize; 2], usize),
     t: f64,
     x: &[f64],
     signs: &[f64],
 ) -> Result<bool, FieldError> {
-    for length in 2.max(vanishing + 1)..=order {
-        let tolerance = system.lie_tolerance(length);
-        for letters in 0..1_u32 << length {
-            let word: SmallVec<[i8; 8]> = (0..length)
-                .map(|k| if letters >> k & 1 == 0 { -1 } else { 1 })
-                .collect();
-            let lie = system.lie_derivative(j, j, &word, t, x, signs)?;
-            let is_zero = lie.value.abs() <= tolerance * lie.magnitude;
-            // The first letter says whose normal component it is.
-            let attracts = !is_zero && lie.value * f64::from(word[0]) < 0.0;
-            if !(if length < order { is_zero } else { attracts }) {
-                return Ok(false);
+    // The first letter says whose normal component it is.
+    for (first, order) in [-1, 1].into_iter().zip(orders) {
+        for length in 2.max(known + 1)..=order {
+            let tolerance = system.lie_tolerance(length);
+            for letters in 0..1_u32 << (length - 1) {
+                let others = (0..length - 1).map(|k| if letters >> k & 1 == 0 { -1 } else { 1 });
+                let word: SmallVec<[i8; 8]> = std::iter::once(first).chain(others).collect();
+                let lie = system.lie_derivative(j, j, &word, t, x, signs)?;
+                let is_zero = lie.value.abs() <= tolerance * lie.magnitude;
+                let attracts = !is_zero && lie.value * f64::from(first) < 0.0;
+                if !(if length < order { is_zero } else { attracts }) {
+                    return Ok(false);
+                }
             }
         }
     }
     Ok(true)
-}
-
-/// Does sliding start at a two-fold, where both normal components vanish? It needs a motion that is slid along with
-/// B- > 0 > B+ (Dieci, Lopez 2009, case IV).
-fn two_fold_slides(
-    system: &dyn PiecewiseSystem,
-    j: usize,
-    t: f64,
-    x: &[f64],
-    signs: &[f64],
-) -> Result<bool, FieldError> {
-    let motions = two_fold_motions(system, j, t, x, signs)?;
-    Ok(motions
-        .iter()
-        .any(|&[_, minus, plus]| minus > 0.0 && plus < 0.0))
 }
 
 /// The weight of f+ in the motion through a two-fold along which the normal components stay nearest to zero.
@@ -231,13 +272,13 @@ pub fn weight_at_two_fold(
     signs: &[f64],
 ) -> Result<Option<f64>, FieldError> {
     let motions = two_fold_motions(system, j, t, x, signs)?;
-    let rate = |motion: &[f64; 3]| motion[1].abs() + motion[2].abs();
+    let rate = |motion: &TwoFoldMotion| motion.minus.abs() + motion.plus.abs();
     let slowest = motions.iter().min_by(|a, b| rate(a).total_cmp(&rate(b)));
-    Ok(slowest.map(|&[weight, ..]| weight))
+    Ok(slowest.map(|motion| motion.weight))
 }
 
-/// The sliding motions through a two-fold: the weight w of f+ in (0, 1), and the rates at which the normal components
-/// grow along the motion.
+/// The sliding motions through a two-fold. Sliding starts there if it attracts along one of them, B- > 0 > B+ (Dieci,
+/// Lopez 2009, case IV).
 ///
 /// With the derivatives p = L-L-h, q = L+L-h, r = L-L+h, s = L+L+h these rates are B- = p + w (q - p) and
 /// B+ = r + w (s - r), and w = B- / (B- - B+) must hold: a quadratic in w.
@@ -247,7 +288,7 @@ fn two_fold_motions(
     t: f64,
     x: &[f64],
     signs: &[f64],
-) -> Result<SmallVec<[[f64; 3]; 2]>, FieldError> {
+) -> Result<SmallVec<[TwoFoldMotion; 2]>, FieldError> {
     let lie = |word: [i8; 2]| -> Result<f64, FieldError> {
         Ok(system.lie_derivative(j, j, &word, t, x, signs)?.value)
     };
@@ -266,17 +307,21 @@ fn two_fold_motions(
     let rounding = TANGENT * (p.abs() + q.abs() + r.abs() + s.abs());
     let rate = |value: f64| if value.abs() > rounding { value } else { 0.0 };
     Ok(inside
-        .map(|w| [w, rate(p + w * (q - p)), rate(r + w * (s - r))])
+        .map(|w| TwoFoldMotion {
+            weight: w,
+            minus: rate(p + w * (q - p)),
+            plus: rate(r + w * (s - r)),
+        })
         .collect())
 }
 
-/// Among several candidates: the side that the motion comes from; at a start the one that the
-/// regularised field moves to from the middle of the transition, lambda = 0.
+/// Among several candidates: the side that the motion comes from; at a start the one that the regularised field moves to
+/// from the middle of the transition, lambda = 0; where this does not tell, one that leads away before one at rest.
 fn choose(
     system: &dyn PiecewiseSystem,
     j: usize,
     arrival: Arrival,
-    candidates: &[i8],
+    (candidates, sides): (&[i8], [Leading; 2]),
     t: f64,
     x: &[f64],
     signs: &[f64],
@@ -285,31 +330,61 @@ fn choose(
         return Ok(*only);
     }
     let preferred = match arrival {
-        Arrival::Region(side) | Arrival::Flat(side, _) => side,
-        Arrival::ExitMinus => -1,
-        Arrival::ExitPlus => 1,
+        Arrival::Region(side) | Arrival::Flat(side, _) => Some(side),
+        Arrival::ExitMinus => Some(-1),
+        Arrival::ExitPlus => Some(1),
         Arrival::TwoFold => {
             // Sliding goes on, and repels: the motion leaves to the side whose field has the larger share.
             let motions = two_fold_motions(system, j, t, x, signs)?;
-            let repels = |motion: &&[f64; 3]| motion[1] < 0.0 && motion[2] > 0.0;
-            match motions.iter().find(repels) {
-                Some([weight, ..]) if *weight < 0.5 => -1,
-                _ => 1,
-            }
+            let repelling = motions.iter().find(|motion| motion.repels());
+            repelling.map(|motion| if motion.weight < 0.5 { -1 } else { 1 })
         }
-        Arrival::Start => {
-            let minus = normal_component(system, j, j, -1, t, x, signs)?.value;
-            let plus = normal_component(system, j, j, 1, t, x, signs)?.value;
-            if minus + plus < 0.0 {
-                -1
-            } else {
-                1
-            }
-        }
+        Arrival::Start => from_the_middle(system, j, t, x, signs)?,
     };
-    Ok(match candidates {
-        [] => preferred,
-        _ if candidates.contains(&preferred) => preferred,
-        _ => candidates[0],
+    let is_candidate = |entry: &i8| candidates.contains(entry);
+    if candidates.is_empty() {
+        return Ok(preferred.filter(|&entry| entry != 0).unwrap_or(1));
+    }
+    if let Some(preferred) = preferred.filter(is_candidate) {
+        return Ok(preferred);
+    }
+    let away = [(1, sides[1]), (-1, sides[0])].map(|(side, leading)| (side, leading.order > 0));
+    let leaving = away
+        .into_iter()
+        .filter_map(|(side, leaves)| leaves.then_some(side));
+    let first = leaving.chain([0, 1]).find(is_candidate);
+    Ok(first.unwrap_or(candidates[0]))
+}
+
+/// Where the regularised motion goes from the middle of the transition, to -1 or +1 or onto the surface at a two-fold. It
+/// follows the mean of both fields at first: the first derivative of h along that, of the first two.
+fn from_the_middle(
+    system: &dyn PiecewiseSystem,
+    j: usize,
+    t: f64,
+    x: &[f64],
+    signs: &[f64],
+) -> Result<Option<i8>, FieldError> {
+    let side = |value: f64| if value < 0.0 { -1 } else { 1 };
+    let minus = normal_component(system, j, j, -1, t, x, signs)?;
+    let plus = normal_component(system, j, j, 1, t, x, signs)?;
+    let rate = minus.value + plus.value;
+    if rate.abs() > system.lie_tolerance(1) * (minus.magnitude + plus.magnitude) {
+        return Ok(Some(side(rate)));
+    }
+    let (mut rate, mut size) = (0.0, 0.0);
+    for word in [[-1, -1], [-1, 1], [1, -1], [1, 1]] {
+        let lie = system.lie_derivative(j, j, &word, t, x, signs)?;
+        rate += lie.value;
+        size += lie.magnitude;
+    }
+    let motions = two_fold_motions(system, j, t, x, signs)?;
+    let is_clear = rate.abs() > system.lie_tolerance(2) * size;
+    let between = |motion: &TwoFoldMotion| {
+        motion.attracts() && (!is_clear || motion.multiplier() * rate >= 0.0)
+    };
+    Ok(match motions.iter().any(between) {
+        true => Some(0),
+        false => is_clear.then(|| side(rate)),
     })
 }

@@ -4,8 +4,10 @@ use super::codim2::Bilinear;
 use super::lie::{first_nonzero, normal_component, Leading};
 use super::normal_fields::NormalFields;
 use crate::error::FieldError;
+use crate::field::MeetingFields;
 use crate::mode::Mode;
 use crate::system::PiecewiseSystem;
+use crate::tolerances::TANGENT;
 
 /// Largest number of surfaces whose modes are enumerated.
 const MOST_SURFACES: usize = 6;
@@ -76,6 +78,45 @@ pub fn decide_intersection(
     }
     decision.may_stay = may_stay(system, meeting, mode, t, x)?;
     Ok(decision)
+}
+
+/// A region at the intersection of some surfaces whose field is at rest at this point, which is a solution whatever the
+/// others do. Looked for where all fields around the point are known one by one.
+///
+/// # Errors
+/// If a function of the user raises.
+pub fn region_at_rest(
+    system: &dyn PiecewiseSystem,
+    corners: &MeetingFields,
+    mode: &Mode,
+    t: f64,
+    x: &[f64],
+) -> Result<Option<Mode>, FieldError> {
+    let meeting = corners.set();
+    if !corners.has_all_patterns() || meeting.iter().any(|&j| system.sticks_at(j)) {
+        return Ok(None);
+    }
+    let patterns = 0..1_usize << meeting.len();
+    let size = |pattern: usize| {
+        let entries = corners.field(pattern).iter();
+        entries.fold(0.0_f64, |most, v| most.max(v.abs()))
+    };
+    let largest = patterns.clone().map(size).fold(0.0, f64::max);
+    'patterns: for pattern in patterns.filter(|&pattern| size(pattern) <= TANGENT * largest) {
+        let mut region = mode.clone();
+        for (bit, &j) in meeting.iter().enumerate() {
+            region.set(j, if pattern >> bit & 1 == 1 { 1 } else { -1 });
+        }
+        let signs = region.signs();
+        for &j in meeting {
+            let side = region.entries()[j];
+            if first_nonzero(system, j, side, 0, t, x, &signs)?.order > 0 {
+                continue 'patterns;
+            }
+        }
+        return Ok(Some(region));
+    }
+    Ok(None)
 }
 
 fn region_attracts(

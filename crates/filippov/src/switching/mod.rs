@@ -29,14 +29,14 @@ mod stability;
 mod stick;
 
 pub use accumulation::{accumulate, Accumulation, Return};
-pub use codim1::{decide, weight_at_two_fold, Arrival, Decision};
+pub use codim1::{decide, weight_at_two_fold, Arrival, Decision, TwoFoldMotion};
 pub use enclosed_root::{enclose_root, EnclosedRoot, IntervalVector, RootBounds};
 pub use fold::{merged_root, MergedRoot};
 pub use hidden::{
     admissible, limit as limit_of_hidden_dynamics, Admissible, Outcome as HiddenOutcome,
 };
 pub use incoming::{ExitKind, Incoming};
-pub use intersection::{decide_intersection, IntersectionDecision};
+pub use intersection::{decide_intersection, region_at_rest, IntersectionDecision};
 pub use lie::{first_nonzero, normal_component, Leading};
 pub use normal_fields::{NormalFields, SignGroup};
 pub use p_matrix::is_p_matrix;

@@ -46,6 +46,7 @@ pub(super) fn decide_sticking(
     Ok(Decision {
         entry,
         candidates: smallvec::smallvec![entry],
+        two_fold: None,
         minus,
         plus,
     })

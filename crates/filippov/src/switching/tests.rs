@@ -1,4 +1,4 @@
-//! The words for what happened. The decisions have their table in `tests/switching_cases.rs`.
+//! The words for what happened. The decisions have their table in `tests/switching_cases.rs` and `tests/two_folds.rs`.
 
 use super::Kind;
 use crate::Mode;

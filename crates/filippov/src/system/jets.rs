@@ -14,6 +14,7 @@ pub struct MotionJets {
     n_states: usize,
     surfaces: Vec<usize>,
     n_exits: usize,
+    has_affine_exits: bool,
     /// Of sliding on several surfaces.
     equations: Option<MultiplierEquations>,
 }
@@ -45,6 +46,9 @@ impl MotionJets {
         let mut functions: Vec<NodeId> =
             surfaces.iter().map(|&j| graph.surface(j as u32)).collect();
         functions.extend(&exits);
+        // Multipliers of several surfaces stand in the place of signs, and are no constants.
+        let has_affine_exits =
+            sliding.len() == 1 && exits.iter().all(|&f| graph.is_affine_between_switches(f));
         let make = move |backend| compile(&graph, &field, &functions, &multipliers, order, backend);
         Some(MotionJets {
             program: Tiered::from(make, backend),
@@ -52,6 +56,7 @@ impl MotionJets {
             n_states,
             surfaces,
             n_exits: exits.len(),
+            has_affine_exits,
             equations,
         })
     }
@@ -91,6 +96,12 @@ impl MotionJets {
     /// sign changed; on several 1 + lambda and 1 - lambda for each.
     pub fn exit(&self, index: usize) -> Option<usize> {
         (index < self.n_exits).then_some(self.n_states + self.surfaces.len() + index)
+    }
+
+    /// Are the exit functions affine in (t, x) while no other surface switches? Then along a step they are polynomials
+    /// as the states are.
+    pub fn has_affine_exits(&self) -> bool {
+        self.has_affine_exits
     }
 
     pub(super) fn eval(&self, t: f64, x: &[f64], signs: &[f64], p: &[f64], out: &mut [f64]) {

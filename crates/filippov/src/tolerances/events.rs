@@ -125,3 +125,7 @@ pub const BEYOND_GUESS: f64 = 1.1;
 
 /// Halvings of a step whose bounds have to decide everything; beyond that samples help.
 pub const PROVED_DEPTH: u32 = 6;
+
+/// A series and a function agree at the ends of a step up to this share of the terms of the series: above what rounding
+/// does to sums of large terms, far below what another function would give.
+pub const SAME_VALUE: f64 = 1e-10;

@@ -7,7 +7,10 @@ use crate::integrate::integrator::Integrator;
 use crate::integrate::{Stop, Warning, WarningCode};
 use crate::mode::Mode;
 use crate::options::NonUnique;
-use crate::switching::{first_nonzero, normal_component, Decision, Leading};
+use crate::switching::{
+    decide_intersection, first_nonzero, normal_component, Decision, Leading, Resolution,
+    TwoFoldMotion, Undecided,
+};
 use crate::system::dot;
 use crate::tolerances::DEPARTS_TANGENTIALLY;
 
@@ -23,9 +26,9 @@ impl Integrator<'_> {
         mut decision: Decision,
     ) -> Decided {
         if decision.turns_back() {
-            return Err(Stop::NonUnique {
-                surfaces: vec![j],
-                candidates: Vec::new(),
+            return Err(Stop::InvisibleTwoFold {
+                surface: j,
+                sliding: decision.two_fold,
             });
         }
         let mut after = mode.with(j, decision.entry);
@@ -35,12 +38,16 @@ impl Integrator<'_> {
             after = self.choose(&[j], after, candidates)?;
             decision.entry = after.entries()[j];
         }
+        let starting = decision.two_fold.filter(TwoFoldMotion::attracts);
+        if let (0, Some(motion)) = (decision.entry, starting) {
+            self.decided.at_two_fold = Some(motion.multiplier());
+        }
         Ok((after, Left::after(j, &decision)))
     }
 
     /// Where the motion in `mode` touches surface j: the first derivative of h along the field beyond, if that
-    /// leaves the surface too. Then the solution is not unique.
-    pub(in crate::integrate) fn leaves_beyond(
+    /// leaves the surface too, or stays on it. Then the solution is not unique.
+    pub(in crate::integrate) fn goes_on_beyond(
         &self,
         mode: &Mode,
         j: usize,
@@ -60,7 +67,53 @@ impl Integrator<'_> {
             along.value.abs() <= DEPARTS_TANGENTIALLY * size,
         ));
         let leading = first_nonzero(self.system, j, beyond, vanishing, self.t, &self.x, &signs)?;
-        Ok((leading.sign() == beyond).then_some(leading))
+        let goes_on = leading.sign() == beyond || leading.order == 0;
+        Ok(goes_on.then_some(leading))
+    }
+
+    /// What follows at an intersection of which first-order data do not tell enough: the only mode of codimension 0 or 1 that
+    /// attracts. `rest` is a region whose field is at rest, which is a solution in any case.
+    pub(in crate::integrate) fn decide_by_higher_order(
+        &mut self,
+        mode: &Mode,
+        meeting: &[usize],
+        resolution: Result<Resolution, Undecided>,
+        rest: Option<Mode>,
+    ) -> Result<Decided, FieldError> {
+        let decision = decide_intersection(self.system, meeting, mode, self.t, &self.x)?;
+        let only = decision.unique();
+        let (after, left) = match (only, rest) {
+            (Some((after, left)), rest) => {
+                let mut candidates = vec![after.clone()];
+                candidates.extend(rest.filter(|rest| rest != after));
+                let left = left.iter().map(|&(j, l)| Left::Surface(j, l)).collect();
+                let mut chosen = after.clone();
+                if candidates.len() > 1 {
+                    chosen = match self.choose(meeting, chosen, candidates) {
+                        Ok(chosen) => chosen,
+                        Err(stop) => return Ok(Err(stop)),
+                    };
+                }
+                match &chosen == after {
+                    true => (chosen, left),
+                    false => self.rest_in(chosen, meeting)?,
+                }
+            }
+            // What stays on as many surfaces as there are states stays at the point.
+            (None, Some(rest))
+                if decision.candidates.is_empty() && meeting.len() == self.x.len() =>
+            {
+                self.rest_in(rest, meeting)?
+            }
+            _ => {
+                return Ok(Err(Stop::Intersection {
+                    surfaces: meeting.to_vec(),
+                    candidates: decision.candidates,
+                    reason: resolution.err().unwrap_or(Undecided::NoOutcome),
+                }));
+            }
+        };
+        Ok(Ok((after, left)))
     }
 
     /// The mode that [`crate::Options::choices`] asks for at the next non-unique point.

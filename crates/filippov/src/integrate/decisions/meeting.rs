@@ -12,9 +12,8 @@ use crate::integrate::motion::{Law, ModeField};
 use crate::integrate::Stop;
 use crate::mode::Mode;
 use crate::switching::{
-    admissible, decide, decide_intersection, first_nonzero, has_one_mode_only, merged_root,
-    resolve, Arrival, Continuation, ExitKind, Incoming, Leading, NormalFields, Resolution,
-    Undecided,
+    admissible, decide, first_nonzero, has_one_mode_only, merged_root, region_at_rest, resolve,
+    Arrival, Continuation, ExitKind, Incoming, Leading, NormalFields, Resolution, Undecided,
 };
 use crate::system::{dot, dot_magnitude};
 use crate::tolerances::{DEPARTS_TANGENTIALLY, DRIFT_SHARE, EPS, MOST_LISTED, MOST_MEETING};
@@ -26,6 +25,8 @@ pub(in crate::integrate) struct DecidedRoot {
     pub multipliers: Vec<f64>,
     /// The regularised motion oscillates around it.
     pub oscillates: bool,
+    /// The multiplier of sliding on one surface that begins at a two-fold.
+    pub at_two_fold: Option<f64>,
 }
 
 impl Integrator<'_> {
@@ -252,17 +253,22 @@ impl Integrator<'_> {
         if let Some(decided) = self.decide_without_inner(mode, meeting, fields)? {
             return Ok(decided);
         }
+        let rest = region_at_rest(self.system, fields, mode, self.t, &self.x)?;
         let resolution = match resolution {
             Ok(resolution) if !resolution.degenerate => resolution,
             // Both say the same, and vanish somewhere in between: higher derivatives do not make them two.
-            Err(Undecided::Proportional) if fields.telling().len() == meeting.len() => {
+            Err(Undecided::Proportional)
+                if fields.telling().len() == meeting.len()
+                    && rest.is_none()
+                    && !fields.lead_to_one_side() =>
+            {
                 return Ok(Err(Stop::Intersection {
                     surfaces: meeting.to_vec(),
                     candidates: Vec::new(),
                     reason: Undecided::Proportional,
                 }));
             }
-            other => return self.decide_by_higher_order(mode, meeting, other),
+            other => return self.decide_by_higher_order(mode, meeting, other, rest),
         };
         let on_all = |k: &Mode| {
             let mut full = mode.clone();
@@ -276,6 +282,7 @@ impl Integrator<'_> {
             let mode = mode.as_mode().map(on_all);
             candidates.extend(mode.filter(|mode| !candidates.contains(mode)));
         }
+        candidates.extend(rest.clone().filter(|mode| !candidates.contains(mode)));
         let is_spiral = matches!(resolution.chosen, Some(Continuation::OutwardSpiral));
         let asked = self.asked().filter(|asked| candidates.contains(asked));
         let (mut after, leaving) = match &resolution.chosen {
@@ -284,10 +291,12 @@ impl Integrator<'_> {
                 Some(asked) => (asked.clone(), meeting.to_vec()),
                 None => match self.start_spiral(meeting, mode, fields)? {
                     Some((region, border)) => (region, vec![border]),
-                    None => return self.decide_by_higher_order(mode, meeting, Ok(resolution)),
+                    None => {
+                        return self.decide_by_higher_order(mode, meeting, Ok(resolution), rest)
+                    }
                 },
             },
-            None => return self.decide_by_higher_order(mode, meeting, Ok(resolution)),
+            None => return self.decide_by_higher_order(mode, meeting, Ok(resolution), rest),
         };
         let preferred = after.clone();
         if !resolution.unique || is_spiral || candidates.len() > 1 {
@@ -311,6 +320,7 @@ impl Integrator<'_> {
         self.decided = DecidedRoot {
             multipliers: multipliers.to_vec(),
             oscillates: after == preferred && resolution.oscillates,
+            at_two_fold: None,
         };
         Ok(Ok((after, left)))
     }
@@ -345,24 +355,6 @@ impl Integrator<'_> {
         let others: Vec<usize> = meeting.iter().copied().filter(|&k| k != j).collect();
         left.extend(self.departures(&after, &others, &[])?);
         Ok(Some(Ok((after, left))))
-    }
-
-    fn decide_by_higher_order(
-        &mut self,
-        mode: &Mode,
-        meeting: &[usize],
-        resolution: Result<Resolution, Undecided>,
-    ) -> Result<Decided, FieldError> {
-        let decision = decide_intersection(self.system, meeting, mode, self.t, &self.x)?;
-        if let Some((after, left)) = decision.unique() {
-            let left = left.iter().map(|&(j, l)| Left::Surface(j, l)).collect();
-            return Ok(Ok((after.clone(), left)));
-        }
-        Ok(Err(Stop::Intersection {
-            surfaces: meeting.to_vec(),
-            candidates: decision.candidates,
-            reason: resolution.err().unwrap_or(Undecided::NoOutcome),
-        }))
     }
 
     /// The surfaces of `meeting` that the motion in `after` leaves, with the leading derivatives of h.

@@ -11,7 +11,7 @@ use crate::integrate::decisions::transition::{Decided, Left, Lefts};
 use crate::integrate::integrator::Integrator;
 use crate::integrate::Stop;
 use crate::mode::Mode;
-use crate::switching::{decide, first_nonzero, Arrival, Undecided};
+use crate::switching::{decide, first_nonzero, Arrival};
 use crate::tolerances::{EPS, MOST_MEETING, SURFACE_NOISE};
 
 impl Integrator<'_> {
@@ -356,14 +356,13 @@ fn residual(h: &[f64], reached: &[usize]) -> f64 {
     SURFACE_NOISE / EPS * reached.iter().fold(0.0, |most, &j| h[j].abs().max(most))
 }
 
-/// Surfaces between whose sides the motion would slide while others jump.
+/// The motion would slide between the sides of these surfaces while others jump.
 pub(in crate::integrate) fn between(meeting: &[usize], jumped: &[usize]) -> Stop {
-    let mut surfaces: Vec<usize> = meeting.iter().chain(jumped).copied().collect();
-    surfaces.sort_unstable();
-    surfaces.dedup();
-    Stop::Intersection {
-        surfaces,
-        candidates: Vec::new(),
-        reason: Undecided::NoOutcome,
+    let mut jumping: Vec<usize> = jumped.to_vec();
+    jumping.sort_unstable();
+    jumping.dedup();
+    Stop::SlidesAcrossJump {
+        surfaces: meeting.to_vec(),
+        jumping,
     }
 }

@@ -8,21 +8,48 @@ use crate::integrate::decisions::transition::{Left, Lefts};
 use crate::integrate::integrator::Integrator;
 use crate::integrate::{Warning, WarningCode};
 use crate::mode::Mode;
-use crate::switching::Leading;
+use crate::switching::{first_nonzero, Leading};
 use crate::system::dot;
 use crate::tolerances::{BESIDE, COINCIDE, LEFT_RESTING, NEARLY_ZERO, TANGENT};
 
 impl Integrator<'_> {
-    /// Notes the surfaces that neither field leaves, and names those about which nothing was said yet.
-    pub(in crate::integrate) fn note_resting(&mut self, left: &[Left]) {
+    /// Notes the surfaces that the motion in `mode` does not leave, and names those that the field beyond would not leave
+    /// either and about which nothing was said yet.
+    pub(in crate::integrate) fn note_resting(
+        &mut self,
+        mode: &Mode,
+        left: &[Left],
+    ) -> Result<(), FieldError> {
         let resting = left.iter().filter_map(|left| match left {
             Left::Surface(j, leading) if leading.order == 0 => Some(*j),
             _ => None,
         });
         self.motion.resting = resting.collect();
+        let signs = mode.signs();
         for k in 0..self.motion.resting.len() {
-            self.warn_zero_surface(self.motion.resting[k]);
+            let j = self.motion.resting[k];
+            let beyond = -mode.entries()[j];
+            let leading = first_nonzero(self.system, j, beyond, 0, self.t, &self.x, &signs)?;
+            if leading.order == 0 {
+                self.warn_zero_surface(j);
+            }
         }
+        Ok(())
+    }
+
+    /// The motion in a region whose field is at rest where the surfaces of `meeting` vanish.
+    pub(in crate::integrate) fn rest_in(
+        &self,
+        region: Mode,
+        meeting: &[usize],
+    ) -> Result<(Mode, Lefts), FieldError> {
+        let (mut left, signs) = (Lefts::new(), region.signs());
+        for &j in meeting {
+            let side = region.entries()[j];
+            let leading = first_nonzero(self.system, j, side, 0, self.t, &self.x, &signs)?;
+            left.push(Left::Surface(j, leading));
+        }
+        Ok((region, left))
     }
 
     /// Names a surface whose function is zero all along the motion, unless something was said about it.

@@ -11,7 +11,7 @@ use crate::integrate::motion::ModeField;
 use crate::integrate::Stop;
 use crate::mode::Mode;
 use crate::solution::Switch;
-use crate::switching::{decide, first_nonzero, Arrival, Decision, Kind, Leading};
+use crate::switching::{decide, first_nonzero, Arrival, Decision, Kind, Leading, TwoFoldMotion};
 use crate::tolerances::{MOST_SWITCHES_AT_ONE_TIME, NO_PROGRESS, SURFACE_NOISE};
 
 /// One value per surface; few are kept without allocation.
@@ -35,6 +35,14 @@ pub(in crate::integrate) enum Left {
 impl Left {
     /// What vanishes after the decision at surface `j`.
     pub fn after(j: usize, decision: &Decision) -> Lefts {
+        let starting = decision.two_fold.filter(TwoFoldMotion::attracts);
+        if let (0, Some(motion)) = (decision.entry, starting) {
+            let first = |value: f64| Leading { order: 1, value };
+            return smallvec![
+                Left::Exit(EventFunction::ExitMinus, first(motion.minus)),
+                Left::Exit(EventFunction::ExitPlus, first(motion.plus)),
+            ];
+        }
         match decision.entry {
             -1 => smallvec![Left::Surface(j, decision.minus)],
             1 => smallvec![Left::Surface(j, decision.plus)],
@@ -81,6 +89,7 @@ impl Left {
                     order,
                     leading: leading.coefficient().abs(),
                     residual: 0.0,
+                    is_clean: false,
                     blur: 0.0,
                 },
             )
@@ -339,7 +348,7 @@ impl Integrator<'_> {
         let mut left = Lefts::new();
         let signs = mode.signs();
         if let (&[j], []) = (surfaces, self.motion.sliding()) {
-            if let Some(leading) = self.leaves_beyond(mode, j, vanishing)? {
+            if let Some(leading) = self.goes_on_beyond(mode, j, vanishing)? {
                 let beyond = mode.with(j, -mode.entries()[j]);
                 let candidates = vec![mode.clone(), beyond.clone()];
                 match self.choose(&[j], mode.clone(), candidates) {
@@ -388,15 +397,26 @@ impl Integrator<'_> {
             left.iter().filter_map(|l| l.deflation(self.t)).collect();
         self.stats.n_field_evaluations += self.motion.field.n_evaluations();
         self.remember_pace();
-        self.note_resting(left);
+        self.note_resting(&mode, left)?;
+        let slid = !self.motion.sliding().is_empty();
         self.motion.restart(self.system, self.t, mode, &deflations);
+        let zeros = self.motion.monitored.iter_mut();
+        for zero in zeros.filter_map(|m| m.deflation.as_mut()) {
+            zero.is_clean = !slid;
+        }
         self.choose_stepper();
         let decided = std::mem::take(&mut self.decided);
-        if let ModeField::Intersection(field) = &mut self.motion.field {
-            field.begin(&decided.multipliers, decided.oscillates);
-            for &(index, slack) in &self.slacks {
-                field.set_slack(index, slack);
+        match (&mut self.motion.field, decided.at_two_fold) {
+            (ModeField::Intersection(field), _) => {
+                field.begin(&decided.multipliers, decided.oscillates);
+                for &(index, slack) in &self.slacks {
+                    field.set_slack(index, slack);
+                }
             }
+            (ModeField::Sliding(field), Some(multiplier)) => {
+                field.begin_at_two_fold(self.t, multiplier);
+            }
+            _ => {}
         }
         self.motion.project(self.t, &mut self.x)?;
         self.rest_on_coinciding()?;

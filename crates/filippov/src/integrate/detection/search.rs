@@ -8,7 +8,7 @@ use crate::event::isolate::{
 };
 use crate::event::locate::{refine, Located};
 use crate::event::proved::{expected_zero_proved, first_zero_proved, Proved};
-use crate::event::series::{LongestSeries, Near, Series, Zeros};
+use crate::event::series::{FirstZero, LongestSeries, Near, Series};
 use crate::event::{EventFunction, Monitored};
 use crate::integrate::detection::bounds::BoundedCurve;
 use crate::integrate::detection::curve::{grazes, Curve};
@@ -134,6 +134,16 @@ impl Integrator<'_> {
         m.affine && self.motion.is_straight && matches!(m.function, EventFunction::Surface(_))
     }
 
+    /// Are the exit functions polynomials along a Taylor step? Where the motion sticks its limits are others than those of
+    /// the series.
+    fn has_polynomial_exits(&self) -> bool {
+        let jets = self.motion.jets.as_ref();
+        let sticks = |j: &usize| self.system.sticks_at(*j);
+        self.motion.is_straight
+            && jets.is_some_and(|jets| jets.has_affine_exits())
+            && !self.motion.sliding().iter().any(sticks)
+    }
+
     /// The first zero of one monitored function in a Taylor step up to `reach`, and how far it was searched: to the
     /// same point, or to one behind a zero.
     pub(in crate::integrate) fn search_along_series(
@@ -149,33 +159,36 @@ impl Integrator<'_> {
         let (value, _) = self.detector.right[index];
         let mut buffer = LongestSeries::default();
         let rows = &mut buffer[..self.n_rows()];
-        if let (EventFunction::Surface(j), true) = (m.function, self.is_polynomial(&m)) {
-            self.affine_series(j, &m, dt, rows)?;
+        let is_polynomial = match m.function {
+            EventFunction::Surface(j) if self.is_polynomial(&m) => {
+                self.affine_series(j, &m, dt, rows)?;
+                true
+            }
+            EventFunction::ExitMinus | EventFunction::ExitPlus if m.deflation.is_none() => {
+                self.has_polynomial_exits()
+                    && self.exit_series(&m, rows)
+                    && Series::new(rows).leads_between(m.value, value)
+            }
+            _ => false,
+        };
+        if is_polynomial {
             let polynomial = self.as_polynomial(&m, rows);
             let mut near = None;
             if let Polynomial::Quotient(series) | Polynomial::Powers(series) = &polynomial {
                 if value > 0.0 && series.is_far_from_zero() {
                     return Ok((None, reach));
                 }
-                let mut zeros = (series.zeros(1.0), 1.0);
-                if let Zeros::Unknown = zeros.0 {
-                    near = series.near_zero();
-                    // A long step has several zeros: not far beyond the first there is one.
-                    if let Some(Near { theta, .. }) = near {
-                        let to = (BEYOND_GUESS * theta).min(1.0);
-                        zeros = (series.zeros(to), to);
-                    }
-                }
-                match zeros {
-                    (Zeros::Nowhere, 1.0) if value > 0.0 => return Ok((None, reach)),
-                    (Zeros::One(guess), to) if value < 0.0 || to < 1.0 => {
-                        if let Some(theta) = self.only_zero(index, series, (guess, to), dt)? {
+                match series.first_zero(reach) {
+                    FirstZero::Nowhere if value > 0.0 || reach < 1.0 => return Ok((None, reach)),
+                    FirstZero::Between { lo, hi, guess } if value < 0.0 || hi < 1.0 => {
+                        if let Some(theta) = self.only_zero(index, series, (lo, guess, hi), dt)? {
                             let searched = (theta + self.together(dt)).min(reach);
                             return Ok((Some((theta, false)), searched));
                         }
                     }
                     _ => {}
                 }
+                near = series.near_zero();
             }
             return self.search_near((index, true), &polynomial, near, reach, dt);
         }
@@ -206,35 +219,36 @@ impl Integrator<'_> {
         stages.is_none_or(|stages| !is_known || may_vanish_between(stages))
     }
 
-    /// The only zero of a series up to `to`, near `guess`, to rounding; `None` if rounding matters for whether it is
-    /// one.
+    /// The only zero of a series between two points, near a guess, to rounding; `None` if rounding matters for whether
+    /// it is one.
     fn only_zero(
         &mut self,
         index: usize,
         series: &Series,
-        (guess, to): (f64, f64),
+        (lo, guess, hi): (f64, f64, f64),
         dt: f64,
     ) -> Result<Option<f64>, FieldError> {
         let noise = self.noise_of(self.motion.monitored[index].function)?;
         self.motion.monitored[index].noise = noise;
-        let g_lo = series.value(0.0);
-        let g_hi = match to {
+        let g_lo = series.value(lo);
+        let g_hi = match hi {
             1.0 => self.detector.right[index].0,
-            _ => series.value(to),
+            _ => series.value(hi),
         };
         let mut bracket = Bracket {
-            lo: 0.0,
-            hi: to,
+            lo,
+            hi,
             g_lo,
             g_hi,
             guess,
-            slope: g_hi - g_lo,
+            slope: (g_hi - g_lo) / (hi - lo),
         };
         if g_lo <= noise || g_hi >= -noise || !bracket.is_steep(g_lo.max(-g_hi), noise) {
             return Ok(None);
         }
         let width = 0.5 * EPS * (self.t.abs() / dt).max(1.0);
-        if let Some((theta, slope)) = series.newton(guess) {
+        let near = series.newton(guess);
+        if let Some((theta, slope)) = near.filter(|(theta, _)| (lo..=hi).contains(theta)) {
             (bracket.guess, bracket.slope) = (theta, slope);
         }
         let mut g = |theta: f64| Ok(series.value(theta));

@@ -3,6 +3,7 @@
 use crate::error::FieldError;
 use crate::field::SmoothField;
 use crate::integrate::integrator::Integrator;
+use crate::integrate::motion::ModeField;
 use crate::stepper::{Attempt, Linearisation, StepMethod};
 use crate::tolerances::{AIM_MARGINS, EPS};
 
@@ -51,6 +52,15 @@ impl Integrator<'_> {
         self.stepper.go_on_with(StepMethod::Rodas5p);
         let is_known = |rodas5p: &crate::stepper::Rodas5p| rodas5p.is_linearised();
         if self.stepper.rodas5p.as_deref().is_none_or(is_known) {
+            return Ok(());
+        }
+        let begins_at_two_fold = match &self.motion.field {
+            ModeField::Sliding(field) => field.is_at_two_fold(self.t),
+            _ => false,
+        };
+        if begins_at_two_fold {
+            // The equation of the multiplier is 0 = 0.
+            self.stepper.go_on_with(StepMethod::Dopri5);
             return Ok(());
         }
         self.stats.n_jacobians += 1;
