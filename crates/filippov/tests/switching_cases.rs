@@ -1,335 +1,17 @@
-//! The decision at one surface, one row per textbook case (`docs/theory/switching.md`, section 3.1).
+//! The decision at one surface, one row of `switching_rows` per textbook case (`docs/theory/switching.md`, section 3.1).
 //!
 //! On h = x0 the fields are f- = a(t) and f+ = b(t) with Taylor coefficients a = [A1, B1, C1, ...] and
 //! b = [A2, B2, C2, ...], so that the derivatives of h along them are these numbers.
 #![allow(clippy::unwrap_used)]
 
+mod switching_rows;
+
 use filippov::switching::{decide, Arrival, Decision};
 use filippov::{ClosureSystem, PiecewiseSystem, TracedSystem};
 use filippov_expr::{Backend, Graph, Names, NodeId};
 
+use switching_rows::{rows, Row, FIRST_ORDER, RESTING, TANGENCIES};
 use Arrival::{ExitMinus, ExitPlus, Region, Start, TwoFold};
-
-/// Label, derivatives of h along f-, along f+, arrival, the entry that follows, all candidates.
-type Row = (
-    &'static str,
-    &'static [f64],
-    &'static [f64],
-    Arrival,
-    i8,
-    &'static [i8],
-);
-
-const FIRST_ORDER: &[Row] = &[
-    ("I (+,+) from R-", &[1.0], &[2.0], Region(-1), 1, &[1]),
-    ("I (-,-) from R+", &[-1.0], &[-2.0], Region(1), -1, &[-1]),
-    ("I (+,-) from R-", &[1.0], &[-3.0], Region(-1), 0, &[0]),
-    ("I (+,-) from R+", &[1.0], &[-3.0], Region(1), 0, &[0]),
-    ("I (+,-) at a start", &[1.0], &[-3.0], Start, 0, &[0]),
-    ("I (+,+) at a start", &[1.0], &[3.0], Start, 1, &[1]),
-    ("I (-,-) at a start", &[-1.0], &[-3.0], Start, -1, &[-1]),
-    ("I (-,+), rising mean", &[-1.0], &[3.0], Start, 1, &[-1, 1]),
-    (
-        "I (-,+), falling mean",
-        &[-3.0],
-        &[1.0],
-        Start,
-        -1,
-        &[-1, 1],
-    ),
-];
-
-/// A second derivative decides.
-const TANGENCIES: &[Row] = &[
-    (
-        "II from sliding, B1 < 0",
-        &[0.0, -1.0],
-        &[-2.0],
-        ExitMinus,
-        -1,
-        &[-1],
-    ),
-    (
-        "II from R-, grazing",
-        &[0.0, -1.0],
-        &[-2.0],
-        Region(-1),
-        -1,
-        &[-1],
-    ),
-    (
-        "II from R-, next to repulsion",
-        &[0.0, -1.0],
-        &[2.0],
-        Region(-1),
-        -1,
-        &[-1, 1],
-    ),
-    (
-        "II from R+, B1 < 0",
-        &[0.0, -1.0],
-        &[-2.0],
-        Region(1),
-        -1,
-        &[-1],
-    ),
-    (
-        "II from R+, B1 > 0",
-        &[0.0, 1.0],
-        &[-2.0],
-        Region(1),
-        0,
-        &[0],
-    ),
-    (
-        "II at a start, B1 > 0, A2 > 0",
-        &[0.0, 1.0],
-        &[2.0],
-        Start,
-        1,
-        &[1],
-    ),
-    (
-        "III from sliding, B2 > 0",
-        &[2.0],
-        &[0.0, 1.0],
-        ExitPlus,
-        1,
-        &[1],
-    ),
-    (
-        "III from R+, grazing",
-        &[2.0],
-        &[0.0, 1.0],
-        Region(1),
-        1,
-        &[1],
-    ),
-    (
-        "III from R+, next to repulsion",
-        &[-2.0],
-        &[0.0, 1.0],
-        Region(1),
-        1,
-        &[-1, 1],
-    ),
-    (
-        "III from R-, B2 > 0",
-        &[2.0],
-        &[0.0, 1.0],
-        Region(-1),
-        1,
-        &[1],
-    ),
-    (
-        "III from R-, B2 < 0",
-        &[2.0],
-        &[0.0, -1.0],
-        Region(-1),
-        0,
-        &[0],
-    ),
-    (
-        "III at a start, B2 < 0, A1 < 0",
-        &[-2.0],
-        &[0.0, -1.0],
-        Start,
-        -1,
-        &[-1],
-    ),
-    (
-        "IV fold away from both",
-        &[0.0, -1.0],
-        &[0.0, 1.0],
-        Region(-1),
-        -1,
-        &[-1, 1],
-    ),
-    (
-        "IV the same from R+",
-        &[0.0, -1.0],
-        &[0.0, 1.0],
-        Region(1),
-        1,
-        &[-1, 1],
-    ),
-    (
-        "IV both to R-",
-        &[0.0, -1.0],
-        &[0.0, -2.0],
-        Region(-1),
-        -1,
-        &[-1],
-    ),
-    (
-        "IV both to R+",
-        &[0.0, 1.0],
-        &[0.0, 2.0],
-        Region(1),
-        1,
-        &[1],
-    ),
-    (
-        "IV sliding begins",
-        &[0.0, 1.0],
-        &[0.0, -2.0],
-        Start,
-        0,
-        &[0],
-    ),
-];
-
-/// Third and higher derivatives decide.
-const HIGHER: &[Row] = &[
-    (
-        "II from sliding, touch",
-        &[0.0, 0.0, 1.0],
-        &[-2.0],
-        ExitMinus,
-        0,
-        &[0],
-    ),
-    (
-        "II from R-, cubic contact",
-        &[0.0, 0.0, 1.0],
-        &[2.0],
-        Region(-1),
-        1,
-        &[1],
-    ),
-    (
-        "II from R-, cubic onto sliding",
-        &[0.0, 0.0, 1.0],
-        &[-2.0],
-        Region(-1),
-        0,
-        &[0],
-    ),
-    (
-        "II from sliding, odd order 3",
-        &[0.0, 0.0, 0.0, -1.0],
-        &[-2.0],
-        ExitMinus,
-        -1,
-        &[-1],
-    ),
-    (
-        "II from sliding, even order 4",
-        &[0.0, 0.0, 0.0, 0.0, 1.0],
-        &[-2.0],
-        ExitMinus,
-        0,
-        &[0],
-    ),
-    (
-        "IV sliding begins, of different orders",
-        &[0.0, 0.0, 0.0, 1.0],
-        &[0.0, -1.0],
-        Start,
-        0,
-        &[0],
-    ),
-    (
-        "III from sliding, touch",
-        &[2.0],
-        &[0.0, 0.0, -1.0],
-        ExitPlus,
-        0,
-        &[0],
-    ),
-    (
-        "III from R+, cubic contact",
-        &[-2.0],
-        &[0.0, 0.0, -1.0],
-        Region(1),
-        -1,
-        &[-1],
-    ),
-    (
-        "III from R+, cubic onto sliding",
-        &[2.0],
-        &[0.0, 0.0, -1.0],
-        Region(1),
-        0,
-        &[0],
-    ),
-    (
-        "III from sliding, odd order 3",
-        &[2.0],
-        &[0.0, 0.0, 0.0, 1.0],
-        ExitPlus,
-        1,
-        &[1],
-    ),
-    (
-        "III from sliding, even order 4",
-        &[2.0],
-        &[0.0, 0.0, 0.0, 0.0, -1.0],
-        ExitPlus,
-        0,
-        &[0],
-    ),
-];
-
-/// All derivatives along f- vanish.
-const RESTING: &[Row] = &[
-    ("f+ leaves, at a start", &[0.0], &[1.0], Start, 1, &[-1, 1]),
-    (
-        "f+ leaves, from R-",
-        &[0.0],
-        &[1.0],
-        Region(-1),
-        -1,
-        &[-1, 1],
-    ),
-    ("f+ presses", &[0.0], &[-1.0], Region(1), 0, &[0]),
-    (
-        "f+ leaves tangentially, at a start",
-        &[0.0],
-        &[0.0, 1.0],
-        Start,
-        1,
-        &[-1, 1],
-    ),
-    (
-        "f+ leaves tangentially, from R+",
-        &[0.0],
-        &[0.0, 1.0],
-        Region(1),
-        1,
-        &[-1, 1],
-    ),
-    (
-        "f+ turns back, at a start",
-        &[0.0],
-        &[0.0, -1.0],
-        Start,
-        -1,
-        &[-1],
-    ),
-    (
-        "f+ presses no more",
-        &[0.0],
-        &[0.0, 1.0],
-        ExitPlus,
-        1,
-        &[-1, 1],
-    ),
-    (
-        "f+ presses no more, both components zero",
-        &[0.0],
-        &[0.0, 1.0],
-        TwoFold,
-        1,
-        &[-1, 1],
-    ),
-];
-
-/// All rows.
-fn rows() -> impl Iterator<Item = &'static Row> {
-    let low = FIRST_ORDER.iter().chain(TANGENCIES).chain(RESTING);
-    low.chain(HIGHER)
-}
 
 fn polynomial(derivatives: &[f64], t: f64) -> f64 {
     let mut term = 1.0;
@@ -409,6 +91,7 @@ fn mirrored(row: &Row) -> (Vec<f64>, Vec<f64>, Arrival, i8, Vec<i8>) {
         ExitPlus => ExitMinus,
         Start => Start,
         TwoFold => TwoFold,
+        Arrival::Flat(side, [minus, plus]) => Arrival::Flat(-side, [*plus, *minus]),
     };
     (
         turned(plus),
@@ -480,6 +163,26 @@ fn small_but_genuine_values_are_no_tangency() {
         let decision = decide_at_origin(&traced(&[1.0], &[value]), Region(-1));
         assert_eq!(decision.entry, 1, "f+ = {value}");
     }
+}
+
+#[test]
+fn derivatives_known_to_vanish_are_rounding_and_not_looked_at() {
+    // Near a triple zero: what is left of the first two points back.
+    let system = traced(&[-1e-16, -1e-15, 3.0], &[-1e-16, -1e-15, 2.0]);
+    let decision = decide_at_origin(&system, Region(-1));
+    assert_eq!((decision.entry, decision.minus.order), (-1, 1));
+    let decision = decide_at_origin(&system, Arrival::Flat(-1, [2, 2]));
+    assert_eq!(
+        (decision.entry, decision.candidates.as_slice()),
+        (1, &[1][..])
+    );
+    assert_eq!((decision.minus.order, decision.plus.order), (3, 3));
+    // What is known of one side says nothing of the other.
+    let system = traced(&[-1e-16, -1e-15, 3.0], &[-2.0]);
+    assert_eq!(
+        decide_at_origin(&system, Arrival::Flat(-1, [2, 0])).entry,
+        0
+    );
 }
 
 #[test]

@@ -61,14 +61,20 @@ impl Bound {
         if slope.hi < 0.0 {
             return Verdict::Falling;
         }
-        let steepest = slope.hi.max(-slope.lo);
-        if middle.is_some_and(|middle| middle - 0.5 * length * steepest > noise) {
+        let reach = 0.5 * length * self.steepest();
+        if middle.is_some_and(|middle| middle - reach > noise) {
             return Verdict::Clear;
         }
-        if value.hi.max(-value.lo) <= HUGGING * noise {
+        let size = value.hi.max(-value.lo);
+        if middle.map_or(size, |middle| size.min(middle.abs() + reach)) <= HUGGING * noise {
             return Verdict::Unavailable;
         }
         Verdict::Open
+    }
+
+    /// The largest slope, up or down.
+    pub fn steepest(&self) -> f64 {
+        self.slope.hi.max(-self.slope.lo)
     }
 }
 

@@ -46,6 +46,10 @@ pub struct Deflation {
     pub leading: f64,
     /// The value that the function has there all the same, by rounding or errors of the step before.
     pub residual: f64,
+    /// The motion did not slide before: but for rounding, nothing moved it off the surface.
+    pub is_clean: bool,
+    /// Rounding that blurred it where it was found to be a multiple one: closer zeros belong to it.
+    pub blur: f64,
 }
 
 /// A monitored function with its state at the start of the step.
@@ -70,6 +74,14 @@ pub struct Monitored {
 }
 
 impl Monitored {
+    /// The switching function that it is, if it is one.
+    pub fn surface(&self) -> Option<usize> {
+        match self.function {
+            EventFunction::Surface(j) => Some(j),
+            _ => None,
+        }
+    }
+
     /// Predicted time to the next zero, from value, rate and curvature; infinite if none is ahead.
     pub fn time_to_zero(&self) -> f64 {
         let (value, rate, curvature) = (self.value, self.rate, self.curvature);
@@ -98,6 +110,8 @@ impl Monitored {
             order,
             leading,
             residual,
+            is_clean,
+            ..
         }) = self.deflation
         else {
             return value;
@@ -105,8 +119,10 @@ impl Monitored {
         let limit = leading * dt.powi(order);
         let elapsed = (time - t) / dt;
         let power = elapsed.powi(order);
-        // Closer to the zero than rounding can resolve, the limit is the better value.
-        if elapsed <= 0.0 || limit.abs() * power <= noise {
+        // Closer to the zero than rounding can resolve, the limit is the better value; but beside a multiple zero a value that
+        // is clear of rounding says that there is more than the leading term.
+        let says_more = is_clean && order > 1 && value.abs() > 4.0 * noise;
+        if elapsed <= 0.0 || limit.abs() * power <= noise && !says_more {
             limit
         } else if residual < -noise {
             // What the function starts below zero fades out where it is far above that.

@@ -2,7 +2,10 @@
 
 use super::certificate::{Bounds, Verdict};
 use crate::error::FieldError;
-use crate::tolerances::{MAX_DEPTH, MOST_SAMPLES, MOST_UNPROVED, QUARTIC_REMAINDER};
+use crate::tolerances::{
+    CANCELLED, FLAT_PIECE, HUGGING, MAX_DEPTH, MOST_OPEN, MOST_SAMPLES, MOST_UNPROVED,
+    QUARTIC_REMAINDER,
+};
 
 /// A scalar function of theta.
 pub type Sampled<'a> = &'a mut dyn FnMut(f64) -> Result<f64, FieldError>;
@@ -46,13 +49,18 @@ impl Bracket {
         }
     }
 
-    /// Does the function fall too steeply to turn back within the noise? With the slope c in the
+    /// Does the function fall too steeply to turn back within the noise? With the mean slope c of the
     /// bracket and second derivatives of at most 1e3 times the `scale` of its values, the lowest
     /// point ahead is c^2 / (2e3 scale) below zero.
     pub fn is_steep(&self, scale: f64, noise: f64) -> bool {
-        let slope = (self.g_lo - self.g_hi) / (self.hi - self.lo);
-        slope * slope > 2e3 * scale * noise
+        is_steep((self.g_lo - self.g_hi) / (self.hi - self.lo), scale, noise)
     }
+}
+
+/// Does a function with this slope at its zero not turn back within the noise, if its second derivatives are at most 1e3
+/// times the `scale` of its values?
+pub fn is_steep(slope: f64, scale: f64, noise: f64) -> bool {
+    slope * slope > 2e3 * scale * noise
 }
 
 /// The result of a search, with the number of bisections it took.
@@ -98,12 +106,12 @@ pub enum Evidence<'a> {
     /// The quartic is believed where it also agrees at these points of the piece (in [0, 1]). A polynomial
     /// of low degree needs none.
     Probes(&'a [f64]),
-    /// Bounds of the function before division by a zero at the start; `divided` says whether there is one.
+    /// Bounds of the function before division by a zero at the start, of order `divided` if there is one, else 0.
     Bounds {
         /// The bounds.
         bounds: Bounds<'a>,
-        /// The samples are of a quotient.
-        divided: bool,
+        /// The order of the zero that the samples are divided by.
+        divided: i32,
         /// Where the bounds say nothing after that many bisections, the samples decide.
         patience: u32,
     },
@@ -132,12 +140,16 @@ pub fn first_zero_sampled(
             ..Isolated::default()
         });
     }
+    let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
     let mut search = Search {
         g,
         noise,
         evidence,
         budget: MOST_SAMPLES,
         unproved: 0,
+        open: 0,
+        start: a,
+        flat: (FLAT_PIECE * largest).max(CANCELLED * noise),
         result: Isolated {
             not_finite: !values.iter().all(|v| v.is_finite()),
             ..Isolated::default()
@@ -161,6 +173,12 @@ struct Search<'a, 'b> {
     budget: u32,
     /// Pieces of which nothing could be proved so far.
     unproved: u32,
+    /// Flat ones among the pieces that shorter ones may decide.
+    open: u32,
+    /// Where the search starts.
+    start: f64,
+    /// A piece with values below this is flat.
+    flat: f64,
     result: Isolated,
 }
 
@@ -218,6 +236,10 @@ impl Search<'_, '_> {
                 self.unproved += 1;
                 depth >= self.patience() || self.unproved > MOST_UNPROVED
             }
+            Verdict::Open if self.is_flat(b, &v) => {
+                self.open += 1;
+                self.open > MOST_OPEN
+            }
             _ => false,
         };
         let remainder =
@@ -250,6 +272,16 @@ impl Search<'_, '_> {
         }
     }
 
+    /// May the piece lie beside a multiple zero, so that bounds of the function are far wider than itself?
+    fn is_flat(&self, end: f64, values: &[f64; 5]) -> bool {
+        let power = match self.evidence {
+            Evidence::Bounds { divided: 2.., .. } => return true,
+            Evidence::Bounds { divided: 1, .. } => end - self.start,
+            _ => 1.0,
+        };
+        values.iter().all(|v| v.abs() * power <= self.flat)
+    }
+
     /// What the bounds prove about a piece.
     fn verdict(&mut self, a: f64, b: f64, middle: f64) -> Verdict {
         let Evidence::Bounds {
@@ -258,10 +290,18 @@ impl Search<'_, '_> {
         else {
             return Verdict::Unavailable;
         };
-        let middle = (!*divided).then_some(middle);
-        bounds(a, b).map_or(Verdict::Unavailable, |bound| {
-            bound.verdict(b - a, middle, self.noise)
-        })
+        let middle = (*divided == 0).then_some(middle);
+        let Some(bound) = bounds(a, b) else {
+            return Verdict::Unavailable;
+        };
+        let verdict = bound.verdict(b - a, middle, self.noise);
+        // From the zero that is divided out the function rises no faster than this.
+        let hugs =
+            *divided > 0 && a == self.start && bound.steepest() * (b - a) <= HUGGING * self.noise;
+        match verdict {
+            Verdict::Open if hugs => Verdict::Unavailable,
+            _ => verdict,
+        }
     }
 
     /// Does the quartic agree with g at the probes, to half the margin?

@@ -11,6 +11,8 @@ pub struct Located {
     pub theta: f64,
     /// How far from zero the function may still be there: large at a pole or a jump.
     pub residual: f64,
+    /// The slope there, of the last two secants the steeper one.
+    pub slope: f64,
 }
 
 /// The zero of `g` in the bracket, within `width` or to rounding.
@@ -41,6 +43,7 @@ pub fn refine(g: Sampled, bracket: Bracket, width: f64) -> Result<Located, Field
     let mut at = guess.clamp(lo, hi);
     let length = hi - lo;
     let mut last_move = length;
+    let mut steepest = slope.abs();
     while best.1 != 0.0 && hi - lo > width.max(EPS * hi.abs()) && at > lo && at < hi {
         let value = g(at)?;
         if value.abs() < best.1.abs() {
@@ -53,6 +56,7 @@ pub fn refine(g: Sampled, bracket: Bracket, width: f64) -> Result<Located, Field
             hi = at;
         }
         let chord = previous.map_or(slope, |(x, v)| (value - v) / (at - x));
+        steepest = chord.abs().max(slope.abs());
         let secant = at - value / chord;
         let inside = secant > lo && secant < hi;
         let step = (secant - at).abs();
@@ -64,6 +68,7 @@ pub fn refine(g: Sampled, bracket: Bracket, width: f64) -> Result<Located, Field
             return Ok(Located {
                 theta: secant,
                 residual: value.abs() * doubt,
+                slope: steepest,
             });
         }
         let next = if inside && step <= 0.5 * last_move {
@@ -78,5 +83,6 @@ pub fn refine(g: Sampled, bracket: Bracket, width: f64) -> Result<Located, Field
     Ok(Located {
         theta: best.0,
         residual: best.1.abs(),
+        slope: steepest,
     })
 }

@@ -361,6 +361,11 @@ impl<'a> Integrator<'a> {
             if !self.resolve_multiple_zero(event, dt)? {
                 found = None;
             }
+            if self.detector.uncertain {
+                self.count_rejection(sliding);
+                self.halve_step(dt);
+                return Ok(None);
+            }
         }
         if sliding && self.system.has_nested_signs() {
             let (mut end, mut t) = (self.stepper.end().to_vec(), t1);

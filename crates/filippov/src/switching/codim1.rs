@@ -14,6 +14,8 @@ use crate::tolerances::{OF_ROUNDING, TANGENT};
 pub enum Arrival {
     /// From the region with this sign (+1 or -1).
     Region(i8),
+    /// From the region with this sign to a multiple zero of h: so many derivatives are known to vanish along f- and f+.
+    Flat(i8, [usize; 2]),
     /// Sliding, with the normal component of f- known to vanish.
     ExitMinus,
     /// Sliding, with the normal component of f+ known to vanish.
@@ -128,20 +130,25 @@ pub fn decide(
     }
     let exits = [Arrival::ExitMinus, Arrival::ExitPlus];
     let is_known = |exit: Arrival| arrival == exit || arrival == Arrival::TwoFold;
-    let vanishing = exits.map(|exit| usize::from(is_known(exit)));
+    let vanishing = match arrival {
+        Arrival::Flat(_, vanishing) => vanishing,
+        _ => exits.map(|exit| usize::from(is_known(exit))),
+    };
     let [minus, plus] = first_nonzero_of_both(system, j, vanishing, t, x, signs)?;
     let mut candidates = SmallVec::new();
     if minus.sign() < 0 || stays(minus, plus, -1) {
         candidates.push(-1);
     }
+    let known = vanishing[0].min(vanishing[1]);
     let mut two_fold = None;
-    if minus.order != 1 && plus.order != 1 {
+    // Where the second derivatives vanish, what is left of them by rounding says nothing.
+    if minus.order != 1 && plus.order != 1 && known < 2 {
         let motions = two_fold_motions(system, j, t, x, signs)?;
         let attracting = motions.iter().find(|motion| motion.attracts());
         two_fold = attracting.or(motions.first()).copied();
     }
     let attracts = two_fold.is_some_and(|motion| motion.attracts());
-    if attracts || slides(system, j, minus, plus, t, x, signs)? {
+    if attracts || slides(system, j, (minus, plus, known), t, x, signs)? {
         candidates.push(0);
     }
     if plus.sign() > 0 || stays(plus, minus, 1) {
@@ -210,8 +217,7 @@ fn fields_agree(
 fn slides(
     system: &dyn PiecewiseSystem,
     j: usize,
-    minus: Leading,
-    plus: Leading,
+    (minus, plus, known): (Leading, Leading, usize),
     t: f64,
     x: &[f64],
     signs: &[f64],
@@ -221,22 +227,23 @@ fn slides(
     }
     let orders = [minus.order, plus.order];
     let is_higher = orders.iter().min() > Some(&1) && orders != [2, 2];
-    Ok(is_higher && attracts_along_all_motions(system, j, orders, t, x, signs)?)
+    Ok(is_higher && attracts_along_all_motions(system, j, (orders, known), t, x, signs)?)
 }
 
 /// Do both normal components vanish to these orders less 1 along every motion, whatever mixture of both fields it follows,
-/// and point to the surface afterwards? So do those that share a factor like (t - 1)^2.
+/// and point to the surface afterwards? So do those that share a factor like (t - 1)^2. `known` derivatives are known to
+/// vanish.
 fn attracts_along_all_motions(
     system: &dyn PiecewiseSystem,
     j: usize,
-    orders: [usize; 2],
+    (orders, known): ([usize; 2], usize),
     t: f64,
     x: &[f64],
     signs: &[f64],
 ) -> Result<bool, FieldError> {
     // The first letter says whose normal component it is.
     for (first, order) in [-1, 1].into_iter().zip(orders) {
-        for length in 2..=order {
+        for length in 2.max(known + 1)..=order {
             let tolerance = system.lie_tolerance(length);
             for letters in 0..1_u32 << (length - 1) {
                 let others = (0..length - 1).map(|k| if letters >> k & 1 == 0 { -1 } else { 1 });
@@ -323,7 +330,7 @@ fn choose(
         return Ok(*only);
     }
     let preferred = match arrival {
-        Arrival::Region(side) => Some(side),
+        Arrival::Region(side) | Arrival::Flat(side, _) => Some(side),
         Arrival::ExitMinus => Some(-1),
         Arrival::ExitPlus => Some(1),
         Arrival::TwoFold => {

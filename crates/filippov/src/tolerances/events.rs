@@ -17,6 +17,18 @@ pub const STAGE_SPREAD: f64 = 0.75;
 /// it are wider than itself.
 pub const HUGGING: f64 = 1e4;
 
+/// A piece on which a function stays below this share of its values over the step may lie beside a multiple zero, where bounds
+/// of it are wider than itself on all but the shortest pieces: beside a zero of order five u^5 has a slope whose terms are
+/// of the size of u or u^2.
+pub const FLAT_PIECE: f64 = 1e-2;
+
+/// The same for a piece on which it stays below this multiple of its rounding: its terms cancel to seven digits.
+pub const CANCELLED: f64 = 1e8;
+
+/// After that many flat pieces of a step that bounds leave open, or pieces behind a multiple zero at its start, samples
+/// decide: beside a simple zero there are a few.
+pub const MOST_OPEN: u32 = 16;
+
 /// The motion on a curved surface lies beside the continuous extension by at most this multiple of the
 /// distances at the probes of the step ...
 pub const MARGIN: f64 = 2.0;
@@ -100,16 +112,9 @@ pub const JUMP_SHARE: f64 = 0.9;
 /// below zero touches it: accumulated rounding alone is up to a hundredth of the tightest tolerances.
 pub const TOUCH_DEPTH: f64 = 1e-2;
 
-/// A function that comes near to zero in this last share of a step is left to the next one.
-pub const AT_THE_END: f64 = 0.05;
-
-/// Rounding above this share of the value of a function at the start of a step is that beside a pole, or the step is so near
-/// to the zero that it shows nothing of what lies around it.
-pub const BESIDE_A_POLE: f64 = 1e-6;
-
-/// A crossing is one at a triple zero where the rate falls below this share of what it is where the function is clear of
-/// rounding: at a simple zero it hardly changes on the way.
-pub const FLAT: f64 = 0.1;
+/// One term of the expansion around a zero explains the value where the function is clear of rounding if it differs from it by
+/// no more than this share: two terms may matter, and the zero is known to rounding only.
+pub const EXPLAINED: f64 = 0.5;
 
 /// After a touch of an exit function the search goes on from this share of the step behind it.
 pub const BEYOND_TOUCH: f64 = 0.02;

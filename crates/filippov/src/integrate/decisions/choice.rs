@@ -51,6 +51,7 @@ impl Integrator<'_> {
         &self,
         mode: &Mode,
         j: usize,
+        vanishing: [usize; 2],
     ) -> Result<Option<Leading>, FieldError> {
         let (beyond, signs) = (-mode.entries()[j], mode.signs());
         let along = normal_component(self.system, j, j, beyond, self.t, &self.x, &signs)?;
@@ -62,7 +63,9 @@ impl Integrator<'_> {
             .gradient(j, self.t, &self.x, &signs, &mut gradient)?;
         let size = (dot(&field, &field) * dot(&gradient, &gradient)).sqrt();
         // A touch is located to the square root of rounding: a component of that size vanishes.
-        let vanishing = usize::from(along.value.abs() <= DEPARTS_TANGENTIALLY * size);
+        let vanishing = vanishing[usize::from(beyond > 0)].max(usize::from(
+            along.value.abs() <= DEPARTS_TANGENTIALLY * size,
+        ));
         let leading = first_nonzero(self.system, j, beyond, vanishing, self.t, &self.x, &signs)?;
         let goes_on = leading.sign() == beyond || leading.order == 0;
         Ok(goes_on.then_some(leading))

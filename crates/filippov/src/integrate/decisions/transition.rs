@@ -89,6 +89,8 @@ impl Left {
                     order,
                     leading: leading.coefficient().abs(),
                     residual: 0.0,
+                    is_clean: false,
+                    blur: 0.0,
                 },
             )
         })
@@ -177,14 +179,15 @@ impl Integrator<'_> {
         if let Some(done) = self.pass_double_zero(event, &mode, &surfaces)? {
             return Ok(done);
         }
+        let vanishing = std::mem::take(&mut self.detector.vanishing);
         let at_two_fold = self.arrives_at_two_fold(event, &surfaces)?;
         if event.touch && !at_two_fold {
-            return self.graze(&mode, &surfaces);
+            return self.graze(&mode, &surfaces, vanishing);
         }
         let arrival = if at_two_fold {
             Some(Arrival::TwoFold)
         } else {
-            self.arrival(event, &surfaces)
+            self.arrival(event, &surfaces, vanishing)
         };
         let fresh = SmallVec::<[usize; 4]>::from_slice(&surfaces);
         for &j in self.motion.sliding() {
@@ -278,9 +281,15 @@ impl Integrator<'_> {
     }
 
     /// How the motion arrived, if one surface decides.
-    fn arrival(&self, event: &Found, surfaces: &[usize]) -> Option<Arrival> {
+    fn arrival(&self, event: &Found, surfaces: &[usize], vanishing: [usize; 2]) -> Option<Arrival> {
         match (self.motion.sliding(), surfaces, event.functions.as_slice()) {
-            ([], &[j], _) => Some(Arrival::Region(self.motion.mode.entries()[j])),
+            ([], &[j], _) => {
+                let side = self.motion.mode.entries()[j];
+                Some(match vanishing {
+                    [0, 0] => Arrival::Region(side),
+                    _ => Arrival::Flat(side, vanishing),
+                })
+            }
             ([_], [], [EventFunction::ExitMinus, ..]) => Some(Arrival::ExitMinus),
             ([_], [], [EventFunction::ExitPlus, ..]) => Some(Arrival::ExitPlus),
             _ => None,
@@ -330,11 +339,16 @@ impl Integrator<'_> {
     }
 
     /// A touch: recorded, the mode stays.
-    fn graze(&mut self, mode: &Mode, surfaces: &[usize]) -> Result<Option<Stop>, FieldError> {
+    fn graze(
+        &mut self,
+        mode: &Mode,
+        surfaces: &[usize],
+        vanishing: [usize; 2],
+    ) -> Result<Option<Stop>, FieldError> {
         let mut left = Lefts::new();
         let signs = mode.signs();
         if let (&[j], []) = (surfaces, self.motion.sliding()) {
-            if let Some(leading) = self.goes_on_beyond(mode, j)? {
+            if let Some(leading) = self.goes_on_beyond(mode, j, vanishing)? {
                 let beyond = mode.with(j, -mode.entries()[j]);
                 let candidates = vec![mode.clone(), beyond.clone()];
                 match self.choose(&[j], mode.clone(), candidates) {
@@ -349,7 +363,8 @@ impl Integrator<'_> {
         }
         for &j in surfaces {
             let side = mode.entries()[j];
-            let leading = first_nonzero(self.system, j, side, 1, self.t, &self.x, &signs)?;
+            let known = vanishing[usize::from(side > 0)].max(1);
+            let leading = first_nonzero(self.system, j, side, known, self.t, &self.x, &signs)?;
             if leading.sign() == side {
                 left.push(Left::Surface(j, leading));
             }
@@ -383,7 +398,12 @@ impl Integrator<'_> {
         self.stats.n_field_evaluations += self.motion.field.n_evaluations();
         self.remember_pace();
         self.note_resting(&mode, left)?;
+        let slid = !self.motion.sliding().is_empty();
         self.motion.restart(self.system, self.t, mode, &deflations);
+        let zeros = self.motion.monitored.iter_mut();
+        for zero in zeros.filter_map(|m| m.deflation.as_mut()) {
+            zero.is_clean = !slid;
+        }
         self.choose_stepper();
         let decided = std::mem::take(&mut self.decided);
         match (&mut self.motion.field, decided.at_two_fold) {

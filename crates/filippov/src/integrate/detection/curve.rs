@@ -77,5 +77,8 @@ pub(in crate::integrate) fn grazes(
     let slope = (above - below) / (2.0 * d);
     let curvature = (above - 2.0 * here + below) / (d * d);
     let depth = slope * slope / (2.0 * curvature);
-    Ok((curvature > 0.0 && depth <= noise).then(|| (theta - slope / curvature).clamp(from, to)))
+    let vertex = theta - slope / curvature;
+    // Away from its three points the parabola says nothing.
+    let turns = curvature > 0.0 && depth <= noise && (vertex - theta).abs() <= d;
+    Ok(turns.then_some(vertex))
 }

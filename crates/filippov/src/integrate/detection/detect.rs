@@ -27,6 +27,10 @@ pub(in crate::integrate) struct Detector {
     pub blurred: bool,
     /// How far below zero the touch that was found may be, else 0.
     pub depth: f64,
+    /// Rounding of the function whose multiple zero was found, over the step, else 0.
+    pub blur: f64,
+    /// How many derivatives along f- and f+ vanish at the multiple zero that was found.
+    pub vanishing: [usize; 2],
     /// Length of the next step, if the event stage knows better than the error control.
     pub next_dt: Option<f64>,
     /// Exit functions computed in the search of this step, by theta.
@@ -69,6 +73,8 @@ impl Detector {
             uncertain: false,
             blurred: false,
             depth: 0.0,
+            blur: 0.0,
+            vanishing: [0; 2],
             next_dt: None,
             exits: Vec::new(),
             h: vec![0.0; d],
@@ -137,6 +143,7 @@ impl Detector {
         for (m, &(value, rate)) in monitored.iter_mut().zip(&self.right) {
             (m.value, m.rate) = (value, rate);
             if let Some(zero) = &mut m.deflation {
+                zero.blur = self.blur;
                 zero.residual = if value.abs() <= self.depth {
                     value
                 } else {
@@ -181,6 +188,8 @@ impl Integrator<'_> {
         self.detector.uncertain = false;
         self.detector.blurred = false;
         self.detector.depth = 0.0;
+        self.detector.blur = 0.0;
+        self.detector.vanishing = [0; 2];
         self.detector.exits.clear();
         self.detector.enclosed_exits.get_mut().clear();
         self.detector.enclosed_roots.get_mut().clear();
@@ -236,7 +245,7 @@ impl Integrator<'_> {
             let m = self.motion.monitored[index];
             let (value, rate) = self.detector.right[index];
             if m.deflation.is_some() {
-                self.motion.monitored[index].noise = self.noise_of(m.function)?;
+                self.motion.monitored[index].noise = self.noise_beside(&m)?;
             }
             let proof = if is_polynomial(&m) {
                 Proof::Silent
@@ -318,6 +327,12 @@ impl Integrator<'_> {
         let step = (self.t, &self.x[..], self.stepper.end());
         self.detector
             .noise(self.system, &self.motion, function, step)
+    }
+
+    /// The same, or what blurred the zero that is divided out.
+    pub(in crate::integrate) fn noise_beside(&mut self, m: &Monitored) -> Result<f64, FieldError> {
+        let blur = m.deflation.map_or(0.0, |zero| zero.blur);
+        Ok(self.noise_of(m.function)?.max(blur))
     }
 
     /// All switching functions at the probes of the step.

@@ -2,24 +2,73 @@
 //!
 //! Around a multiple zero a switching function is within its rounding for a while, and what is found there is some point of
 //! that interval. The zero itself is one of a derivative, which has no such interval: that of the rate at a touch, of the
-//! second derivative at a triple zero. Two crossings between which the function falls by less than errors of the step,
+//! second derivative at a triple zero, of that of order k - 1 at a zero of order k. Two crossings between which the function falls by less than errors of the step,
 //! as it does at a touch, are a touch too.
+
+use smallvec::SmallVec;
 
 use crate::error::FieldError;
 use crate::event::{EventFunction, Monitored};
 use crate::integrate::detection::detect::Found;
 use crate::integrate::integrator::Integrator;
 use crate::stepper::StepMethod;
-use crate::system::LieValue;
-use crate::tolerances::{AT_THE_END, BESIDE_A_POLE, EPS, FLAT, MOST_HALVINGS, TOUCH_DEPTH};
+use crate::tolerances::{EPS, EXPLAINED, MAX_LIE_ORDER, MOST_HALVINGS, TOUCH_DEPTH};
 
 /// Which derivative of a switching function vanishes at its multiple zero.
 #[derive(Clone, Copy)]
 enum Derivative {
     /// The rate along the extension.
-    First,
-    /// The second along the field.
-    Second,
+    Rate,
+    /// That of this order along the field.
+    Lie(usize),
+}
+
+/// Where rounding, or errors of the step, blur a zero.
+struct Blur {
+    /// The nearest point looked at where the function is clear of zero, and its value there; 0 if it is blurred up to the
+    /// start of the step.
+    left: (f64, f64),
+    /// The same to the right.
+    right: (f64, f64),
+    /// The zero that was found.
+    theta: f64,
+    /// The length of the step.
+    dt: f64,
+    /// How well a zero is to be located.
+    width: f64,
+}
+
+impl Blur {
+    /// The larger value where the function is clear of zero.
+    fn size(&self) -> f64 {
+        self.left.1.abs().max(self.right.1.abs())
+    }
+
+    /// tau^k / k! for the time tau from the zero that was found to where the function is clear of zero.
+    fn power(&self, k: usize) -> f64 {
+        let reach = (self.theta - self.left.0).max(self.right.0 - self.theta) * self.dt;
+        (1..=k).map(|i| reach / i as f64).product()
+    }
+
+    /// Does the last one of the derivatives at `zero` alone explain the values where the function is clear of zero?
+    fn is_explained(&self, derivatives: &[f64], zero: f64) -> bool {
+        let term = |k: usize, time: f64| {
+            let power: f64 = (1..=k).map(|i| time / i as f64).product();
+            derivatives[k - 1] * power
+        };
+        let order = derivatives.len();
+        let clear = [self.left, self.right]
+            .into_iter()
+            .filter(|(_, value)| *value != 0.0);
+        let mut ratios = clear.map(|(at, value)| {
+            let time = (at - zero) * self.dt;
+            let largest = (1..order).map(|k| term(k, time).abs()).fold(0.0, f64::max);
+            (term(order, time) / value, largest / value.abs())
+        });
+        ratios.all(|(last, largest)| {
+            (last - 1.0).abs() <= EXPLAINED && (order == 1 || largest <= last.abs())
+        })
+    }
 }
 
 impl Integrator<'_> {
@@ -44,7 +93,7 @@ impl Integrator<'_> {
     }
 
     /// Looks at what lies around a zero of one surface that may be a multiple one, and moves it there. Returns whether it is
-    /// one: the next step tells where the function comes near to zero at the end of this one only.
+    /// in this step: a zero behind its end is left to the next one.
     #[cold]
     #[inline(never)]
     pub(in crate::integrate) fn resolve_multiple_zero(
@@ -65,9 +114,6 @@ impl Integrator<'_> {
         }
         let (m, theta) = (*m, event.theta);
         let noise = self.noise_of(function)?;
-        if noise > BESIDE_A_POLE * self.along(&m, 0.0)?.0.abs() {
-            return Ok(true);
-        }
         let depth = noise.max(self.depth_of_touches(j, theta)?);
         // Up to where it is clear of zero on both sides.
         let least = 4.0 * EPS * (1.0 + self.t.abs() / dt);
@@ -78,32 +124,133 @@ impl Integrator<'_> {
             right = self.along(&m, behind)?.0;
             width *= 4.0;
         }
-        (width, before) = (least, before);
-        while before > 0.0 && self.along(&m, before)?.0 <= noise {
+        width = least;
+        let mut left = 0.0;
+        while before > 0.0 && left <= noise {
             before = (theta - width).max(0.0);
+            left = self.along(&m, before)?.0;
             width *= 4.0;
         }
+        let or_zero = |is_clear: bool, value: f64| if is_clear { value } else { 0.0 };
+        let blur = Blur {
+            left: (before, or_zero(left > noise, left)),
+            right: (behind, or_zero(right > noise || right < -depth, right)),
+            theta,
+            dt,
+            width: least,
+        };
         if right > noise {
-            let zero = self.zero_of(&m, Derivative::First, (before, behind), least)?;
+            let zero = self.zero_of(&m, Derivative::Rate, (before, behind), least)?;
             let Some(vertex) = zero else { return Ok(true) };
-            if self.along(&m, vertex)?.0 >= -depth {
-                (event.theta, event.touch) = (vertex, true);
-                self.detector.depth = depth;
+            if self.along(&m, vertex)?.0 < -depth {
+                return Ok(true);
             }
+            (event.theta, event.touch) = (vertex, true);
+            self.detector.depth = depth;
         } else if right < -depth {
             event.touch = false;
-            if let Some(zero) = self.triple_zero(&m, (before, behind), least)? {
-                event.theta = zero;
-            }
-        } else {
-            // Near to zero up to the end of the step.
-            let is_last = self.t + dt >= self.horizon;
-            if !is_last && 1.0 - before < AT_THE_END {
-                return Ok(false);
-            }
-            event.touch |= self.turns_back(&m, (before, theta), depth)?;
         }
+        let Some((order, zero)) = self.multiplicity(&m, &blur)? else {
+            return Ok(true);
+        };
+        if zero > 1.0 {
+            // A step that ended below zero would be taken for one behind a crossing.
+            self.detector.uncertain = right < -noise && before > 0.0;
+            return Ok(false);
+        }
+        // Errors of the step move a touch along with the extension.
+        let is_placed = event.touch && right > noise && order == 2;
+        if !is_placed {
+            (event.theta, event.touch) = (zero.max(0.0), order % 2 == 0);
+        }
+        if event.touch {
+            self.detector.depth = depth;
+        }
+        self.detector.blur = noise;
+        self.detector.vanishing = self.vanishing(&m, &blur, order, event.theta)?;
         Ok(true)
+    }
+
+    /// The order of the zero in a blur and where it is, if it is a multiple one: the first order whose derivative alone
+    /// explains the values where the function is clear of rounding. The derivative before it vanishes at the zero.
+    fn multiplicity(
+        &mut self,
+        m: &Monitored,
+        blur: &Blur,
+    ) -> Result<Option<(usize, f64)>, FieldError> {
+        if !self.motion.sliding.is_empty() || blur.size() == 0.0 {
+            return Ok(None);
+        }
+        let highest = self.system.max_lie_order().min(MAX_LIE_ORDER);
+        let side = self.motion.mode.entries()[m.surface().unwrap_or(0)];
+        for order in 1..=highest {
+            let is_odd = order % 2 == 1;
+            // Positive before, the function tells by its value behind whether its sign changes.
+            let changes = blur.right.1 < 0.0;
+            if blur.right.1 != 0.0 && changes != is_odd {
+                continue;
+            }
+            let zero = if order == 1 {
+                Some(blur.theta)
+            } else {
+                self.zero_of_derivative(m, order, blur)?
+            };
+            let Some(zero) = zero else { continue };
+            let mut terms = SmallVec::<[f64; MAX_LIE_ORDER]>::new();
+            for k in 1..=order {
+                let at = zero.clamp(0.0, 1.0);
+                terms.push(self.lie_along(m, (k, side), at)?);
+            }
+            if blur.is_explained(&terms, zero) {
+                return Ok((order > 1).then_some((order, zero)));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Where the derivative before this order vanishes, as far as it is in the blur; behind the end of the step its tangent
+    /// tells.
+    fn zero_of_derivative(
+        &mut self,
+        m: &Monitored,
+        order: usize,
+        blur: &Blur,
+    ) -> Result<Option<f64>, FieldError> {
+        let ends = (blur.left.0, blur.right.0);
+        let found = self.zero_of(m, Derivative::Lie(order - 1), ends, blur.width)?;
+        if found.is_some() || blur.left.1 > 0.0 && blur.right.1 != 0.0 {
+            return Ok(found);
+        }
+        let side = self.motion.mode.entries()[m.surface().unwrap_or(0)];
+        let end = if blur.right.1 == 0.0 { ends.1 } else { ends.0 };
+        let value = self.lie_along(m, (order - 1, side), end)?;
+        let slope = self.lie_along(m, (order, side), end)? * blur.dt;
+        let zero = end - value / slope;
+        let reach = 2.0 * (ends.1 - ends.0);
+        let is_near = zero > ends.0 - reach && zero < ends.1 + reach;
+        Ok(is_near.then_some(zero))
+    }
+
+    /// How many derivatives of the function vanish at its zero of this order, along the field of either side.
+    fn vanishing(
+        &mut self,
+        m: &Monitored,
+        blur: &Blur,
+        order: usize,
+        zero: f64,
+    ) -> Result<[usize; 2], FieldError> {
+        let mut counts = [order - 1; 2];
+        let own = self.motion.mode.entries()[m.surface().unwrap_or(0)];
+        let other = usize::from(own < 0);
+        let last = self.lie_along(m, (order, own), zero)? * blur.power(order);
+        for k in 1..order {
+            let term = self.lie_along(m, (k, -own), zero)? * blur.power(k);
+            if term.abs() > last.abs() {
+                counts[other] = k - 1;
+                break;
+            }
+        }
+        Ok(counts)
     }
 
     /// How far below zero a function may be at a touch: errors of the step make it so. A series has none where it matters.
@@ -123,7 +270,7 @@ impl Integrator<'_> {
 
     /// Value and rate of a switching function along the extension, in the sense of the mode.
     fn along(&mut self, m: &Monitored, theta: f64) -> Result<(f64, f64), FieldError> {
-        let EventFunction::Surface(j) = m.function else {
+        let Some(j) = m.surface() else {
             return Ok((f64::NAN, f64::NAN));
         };
         let (mut x, mut velocity) = (vec![0.0; self.x.len()], vec![0.0; self.x.len()]);
@@ -143,53 +290,27 @@ impl Integrator<'_> {
         Ok((m.orientation * h[j], m.orientation * rates[j]))
     }
 
-    /// A Lie derivative of a switching function along the field of the region.
-    fn lie_along(&self, m: &Monitored, order: usize, theta: f64) -> Result<LieValue, FieldError> {
-        let EventFunction::Surface(j) = m.function else {
-            return Ok(LieValue {
-                value: f64::NAN,
-                magnitude: f64::NAN,
-            });
+    /// A Lie derivative of this order of a switching function along the field of a side, in the sense of the mode.
+    fn lie_along(
+        &self,
+        m: &Monitored,
+        (order, side): (usize, i8),
+        theta: f64,
+    ) -> Result<f64, FieldError> {
+        let Some(j) = m.surface() else {
+            return Ok(f64::NAN);
         };
         let mut x = vec![0.0; self.x.len()];
         let extension = self.stepper.interpolant();
         extension.at(theta, &mut x);
         let t = self.t + theta * extension.dt;
-        let word = [self.motion.mode.entries()[j]; 2];
-        self.system
-            .lie_derivative(j, j, &word[..order], t, &x, &self.motion.signs)
-    }
-
-    /// Where the rate nearly vanishes between two points, without a change of sign: there the second derivative has one.
-    fn triple_zero(
-        &mut self,
-        m: &Monitored,
-        (lo, hi): (f64, f64),
-        width: f64,
-    ) -> Result<Option<f64>, FieldError> {
-        if !self.motion.sliding.is_empty() {
-            return Ok(None);
-        }
-        let Some(zero) = self.zero_of(m, Derivative::Second, (lo, hi), width)? else {
-            return Ok(None);
-        };
-        let rate = self.along(m, zero)?.1;
-        let is_flat = rate.abs() < FLAT * self.along(m, lo)?.1.abs()
-            && rate.abs() < FLAT * self.along(m, hi)?.1.abs();
-        Ok(is_flat.then_some(zero))
-    }
-
-    /// Does the function fall to no less than this depth from `theta` on, continued as the parabola through `before`?
-    fn turns_back(
-        &mut self,
-        m: &Monitored,
-        (before, theta): (f64, f64),
-        depth: f64,
-    ) -> Result<bool, FieldError> {
-        let dt = self.stepper.interpolant().dt;
-        let (first, last) = (self.along(m, before)?.1, self.along(m, theta)?.1);
-        let curvature = (last - first) / ((theta - before) * dt);
-        Ok(curvature > 0.0 && last * last <= 2.0 * curvature * depth)
+        let mut signs = self.motion.signs.clone();
+        signs[j] = f64::from(side);
+        let word = [side; MAX_LIE_ORDER];
+        let lie = self
+            .system
+            .lie_derivative(j, j, &word[..order], t, &x, &signs)?;
+        Ok(m.orientation * lie.value)
     }
 
     /// Where a derivative changes its sign between two points; `None` if it does not.
@@ -200,9 +321,10 @@ impl Integrator<'_> {
         (mut lo, mut hi): (f64, f64),
         width: f64,
     ) -> Result<Option<f64>, FieldError> {
+        let side = self.motion.mode.entries()[m.surface().unwrap_or(0)];
         let mut at = |theta: f64| match which {
-            Derivative::First => Ok(self.along(m, theta)?.1),
-            Derivative::Second => Ok(self.lie_along(m, 2, theta)?.value),
+            Derivative::Rate => Ok(self.along(m, theta)?.1),
+            Derivative::Lie(order) => self.lie_along(m, (order, side), theta),
         };
         let (mut left, mut right) = (at(lo)?, at(hi)?);
         let changes = left * right < 0.0;

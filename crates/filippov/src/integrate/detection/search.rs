@@ -3,7 +3,9 @@
 use crate::error::FieldError;
 use crate::event::certificate::Proof;
 use crate::event::filter::may_vanish_between;
-use crate::event::isolate::{first_zero_sampled, Bracket, Evidence, Sampled, Zero, PROBES};
+use crate::event::isolate::{
+    first_zero_sampled, is_steep, Bracket, Evidence, Sampled, Zero, PROBES,
+};
 use crate::event::locate::{refine, Located};
 use crate::event::proved::{expected_zero_proved, first_zero_proved, Proved};
 use crate::event::series::{FirstZero, LongestSeries, Near, Series};
@@ -20,12 +22,23 @@ use crate::tolerances::{
 pub(in crate::integrate) enum SearchOutcome {
     /// There is no zero.
     Nothing,
-    /// The function vanishes at this theta; whether it only touches zero.
-    At(f64, bool),
+    /// The function vanishes at this theta.
+    At(f64, AtZero),
     /// A touch that ends nothing: the search goes on from this theta.
     Beyond(f64),
     /// The sign changes without a zero.
     Pole,
+}
+
+/// How a function vanishes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::integrate) enum AtZero {
+    /// It changes its sign, and is steep enough for rounding not to blur that.
+    Steep,
+    /// It changes its sign where rounding blurs it.
+    Blurred,
+    /// It only touches zero.
+    Touch,
 }
 
 /// A piece of a step that was searched.
@@ -41,13 +54,12 @@ pub(in crate::integrate) struct Searched {
 }
 
 impl Searched {
-    /// Is the zero clear of rounding: a crossing with a slope, or one that the motion is already behind?
-    fn is_clear(&self, zero: &Zero) -> bool {
-        match zero {
-            Zero::Crossing(bracket) => {
-                bracket.lo >= bracket.hi || bracket.is_steep(self.scale, self.noise)
-            }
-            Zero::Touch(_) => false,
+    /// A crossing by its slope: beside a multiple zero it is flat, however steep the function is on the way there.
+    fn kind(&self, zero: &Located) -> AtZero {
+        if is_steep(zero.slope, self.scale, self.noise) {
+            AtZero::Steep
+        } else {
+            AtZero::Blurred
         }
     }
 
@@ -66,22 +78,30 @@ impl Searched {
                     SearchOutcome::Beyond(rest)
                 }
             }
-            Some(Zero::Touch(theta)) => SearchOutcome::At(theta, true),
+            Some(Zero::Touch(theta)) => SearchOutcome::At(theta, AtZero::Touch),
             // Beyond the surface from the start, by the rounding of what moved the state: the switch is now.
             Some(Zero::Crossing(bracket)) if bracket.lo >= bracket.hi => {
-                SearchOutcome::At(bracket.lo, false)
+                let is_clear = bracket.g_lo.abs() > self.noise;
+                let kind = if is_clear {
+                    AtZero::Steep
+                } else {
+                    AtZero::Blurred
+                };
+                SearchOutcome::At(bracket.lo, kind)
             }
             Some(Zero::Crossing(bracket)) => {
-                let Located { theta, residual } = refine(g, bracket, self.width)?;
-                if residual > POLE * self.scale {
+                let located = refine(g, bracket, self.width)?;
+                let theta = located.theta;
+                if located.residual > POLE * self.scale {
                     return Ok(SearchOutcome::Pole);
                 }
                 if bracket.is_steep(self.scale, self.noise) {
-                    return Ok(SearchOutcome::At(theta, false));
+                    let kind = self.kind(&located);
+                    return Ok(SearchOutcome::At(theta, kind));
                 }
                 match grazes(g, theta, from, to, self.noise)? {
-                    Some(vertex) => SearchOutcome::At(vertex, true),
-                    None => SearchOutcome::At(theta, false),
+                    Some(vertex) => SearchOutcome::At(vertex, AtZero::Touch),
+                    None => SearchOutcome::At(theta, AtZero::Blurred),
                 }
             }
         })
@@ -134,7 +154,7 @@ impl Integrator<'_> {
     ) -> Result<(Option<(f64, bool)>, f64), FieldError> {
         let m = self.motion.monitored[index];
         if m.deflation.is_some() {
-            self.motion.monitored[index].noise = self.noise_of(m.function)?;
+            self.motion.monitored[index].noise = self.noise_beside(&m)?;
         }
         let (value, _) = self.detector.right[index];
         let mut buffer = LongestSeries::default();
@@ -232,7 +252,9 @@ impl Integrator<'_> {
             (bracket.guess, bracket.slope) = (theta, slope);
         }
         let mut g = |theta: f64| Ok(series.value(theta));
-        Ok(Some(refine(&mut g, bracket, width)?.theta))
+        let located = refine(&mut g, bracket, width)?;
+        self.detector.blurred |= !is_steep(located.slope, g_lo.max(-g_hi), noise);
+        Ok(Some(located.theta))
     }
 
     /// The first zero up to `reach`, looked for at first not far beyond where it is expected; and how far was
@@ -286,7 +308,7 @@ impl Integrator<'_> {
         dt: f64,
     ) -> Result<Option<(f64, bool)>, FieldError> {
         let m = self.motion.monitored[index];
-        let noise = self.noise_of(m.function)?;
+        let noise = self.noise_beside(&m)?;
         self.motion.monitored[index].noise = noise;
         let by_multipliers = !self.slides_by_rule() && self.motion.has_bounds();
         let interpolant = self.stepper.interpolant();
@@ -325,7 +347,10 @@ impl Integrator<'_> {
         };
         let (start, end) = (m.value, self.detector.right[index].0);
         let is_quotient = matches!(polynomial, Polynomial::Quotient(_));
-        let is_divided = m.deflation.is_some() && !is_quotient;
+        let divided = match m.deflation {
+            Some(zero) if !is_quotient => zero.order,
+            _ => 0,
+        };
         let mut over = |a, b| match polynomial {
             Polynomial::Quotient(series)
             | Polynomial::Powers(series)
@@ -338,14 +363,17 @@ impl Integrator<'_> {
             Polynomial::None => has_bounds,
             _ => true,
         };
-        if is_bounded && !is_divided && from == 0.0 {
+        if is_bounded && divided == 0 && from == 0.0 {
             let piece = (from, to);
             let left = if is_quotient { g(0.0)? } else { start };
             if let Some(near) = near {
                 let expected = expected_zero_proved(&mut g, &mut over, piece, left, noise, near)?;
-                let is_steep = |b: &Bracket| b.is_steep(left.max(-b.g_hi), noise);
-                if let Some(bracket) = expected.filter(is_steep) {
-                    return Ok(Some((refine(&mut g, bracket, width)?.theta, false)));
+                let falls = |b: &Bracket| b.is_steep(left.max(-b.g_hi), noise);
+                if let Some(bracket) = expected.filter(falls) {
+                    let located = refine(&mut g, bracket, width)?;
+                    self.detector.blurred |=
+                        !is_steep(located.slope, left.max(-bracket.g_hi), noise);
+                    return Ok(Some((located.theta, false)));
                 }
             }
             let right = if to == 1.0 { end } else { g(to)? };
@@ -358,7 +386,9 @@ impl Integrator<'_> {
             };
             let scale = left.max(right.abs());
             if let Some(bracket) = zero.filter(|bracket| bracket.is_steep(scale, noise)) {
-                return Ok(Some((refine(&mut g, bracket, width)?.theta, false)));
+                let located = refine(&mut g, bracket, width)?;
+                self.detector.blurred |= !is_steep(located.slope, scale, noise);
+                return Ok(Some((located.theta, false)));
             }
         }
         let mut values = [f64::NAN; 5];
@@ -373,7 +403,7 @@ impl Integrator<'_> {
         let evidence = match (m.function, is_bounded) {
             (_, true) => Evidence::Bounds {
                 bounds: &mut over,
-                divided: is_divided,
+                divided,
                 patience: match m.function {
                     EventFunction::Exit(_) => UNPROVED_DEPTH,
                     _ => UNBOUNDED_DEPTH,
@@ -394,12 +424,11 @@ impl Integrator<'_> {
             noise,
             width,
         };
-        let is_clear = isolated.zero.is_some_and(|zero| searched.is_clear(&zero));
         match searched.outcome(&mut g, isolated.zero)? {
             SearchOutcome::Nothing => Ok(None),
-            SearchOutcome::At(theta, touch) => {
-                self.detector.blurred |= !is_clear;
-                Ok(Some((theta, touch)))
+            SearchOutcome::At(theta, kind) => {
+                self.detector.blurred |= kind != AtZero::Steep;
+                Ok(Some((theta, kind == AtZero::Touch)))
             }
             SearchOutcome::Beyond(rest) => {
                 self.search_piece((index, has_bounds), polynomial, None, (rest, to), dt)

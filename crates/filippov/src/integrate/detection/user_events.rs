@@ -248,7 +248,7 @@ impl Integrator<'_> {
                 };
                 let evidence = Evidence::Bounds {
                     bounds: &mut bounds,
-                    divided,
+                    divided: i32::from(divided),
                     patience: UNBOUNDED_DEPTH,
                 };
                 let mut values = [0.0; 5];

@@ -62,8 +62,11 @@ impl Integrator<'_> {
                 slope: end - m.value,
             };
             let mut theta = refine(&mut side, bracket, EPS)?.theta;
+            // Rounding may blur the zero far beyond the rounding of the step: growing strides get out of that.
+            let mut stride = 4.0 * EPS;
             while side(theta)? < 0.0 && theta > 0.0 {
-                theta *= 1.0 - 4.0 * EPS;
+                theta *= 1.0 - stride;
+                stride = (2.0 * stride).min(0.5);
             }
             longest *= theta;
         }
