@@ -81,6 +81,12 @@ impl Decision {
         leaving.order == 1 && leaving.value.abs() <= OF_ROUNDING * other.value.abs()
     }
 
+    /// The motion that sliding starts with at a two-fold, if it does.
+    pub fn starts_at_two_fold(&self) -> Option<TwoFoldMotion> {
+        let starts = |motion: &TwoFoldMotion| self.entry == 0 && motion.attracts();
+        self.two_fold.filter(starts)
+    }
+
     /// Does neither side continue, nor sliding that attracts? Both fields turn back to the surface, at a two-fold that is
     /// invisible from both sides.
     pub fn turns_back(&self) -> bool {

@@ -8,8 +8,7 @@ use crate::integrate::{Stop, Warning, WarningCode};
 use crate::mode::Mode;
 use crate::options::NonUnique;
 use crate::switching::{
-    decide_intersection, first_nonzero, normal_component, Decision, Leading, Resolution,
-    TwoFoldMotion, Undecided,
+    decide_intersection, first_nonzero, normal_component, Decision, Leading, Resolution, Undecided,
 };
 use crate::system::dot;
 use crate::tolerances::DEPARTS_TANGENTIALLY;
@@ -38,8 +37,7 @@ impl Integrator<'_> {
             after = self.choose(&[j], after, candidates)?;
             decision.entry = after.entries()[j];
         }
-        let starting = decision.two_fold.filter(TwoFoldMotion::attracts);
-        if let (0, Some(motion)) = (decision.entry, starting) {
+        if let Some(motion) = decision.starts_at_two_fold() {
             self.decided.at_two_fold = Some(motion.multiplier());
         }
         Ok((after, Left::after(j, &decision)))

@@ -11,7 +11,7 @@ use crate::integrate::motion::ModeField;
 use crate::integrate::Stop;
 use crate::mode::Mode;
 use crate::solution::Switch;
-use crate::switching::{decide, first_nonzero, Arrival, Decision, Kind, Leading, TwoFoldMotion};
+use crate::switching::{decide, first_nonzero, Arrival, Decision, Kind, Leading};
 use crate::tolerances::{MOST_SWITCHES_AT_ONE_TIME, NO_PROGRESS, SURFACE_NOISE};
 
 /// One value per surface; few are kept without allocation.
@@ -35,8 +35,7 @@ pub(in crate::integrate) enum Left {
 impl Left {
     /// What vanishes after the decision at surface `j`.
     pub fn after(j: usize, decision: &Decision) -> Lefts {
-        let starting = decision.two_fold.filter(TwoFoldMotion::attracts);
-        if let (0, Some(motion)) = (decision.entry, starting) {
+        if let Some(motion) = decision.starts_at_two_fold() {
             let first = |value: f64| Leading { order: 1, value };
             return smallvec![
                 Left::Exit(EventFunction::ExitMinus, first(motion.minus)),

@@ -2,8 +2,8 @@
 //!
 //! Around a multiple zero a switching function is within its rounding for a while, and what is found there is some point of
 //! that interval. The zero itself is one of a derivative, which has no such interval: that of the rate at a touch, of the
-//! second derivative at a triple zero, of that of order k - 1 at a zero of order k. Two crossings between which the function falls by less than errors of the step,
-//! as it does at a touch, are a touch too.
+//! second derivative at a triple zero, of that of order k - 1 at a zero of order k. Two crossings between which the function
+//! falls by less than errors of the step, as it does at a touch, are a touch too.
 
 use smallvec::SmallVec;
 
