@@ -23,6 +23,8 @@ pub(in crate::integrate) struct Detector {
     pub unresolved: bool,
     /// A monitored function could not be searched; the step has to be shortened.
     pub uncertain: bool,
+    /// An exit function was not searched though nothing was proved about it.
+    pub dismissed: bool,
     /// Rounding blurs the zero that was found: it may be a multiple one.
     pub blurred: bool,
     /// How far below zero the touch that was found may be, else 0.
@@ -71,6 +73,7 @@ impl Detector {
             stages: Vec::new(),
             unresolved: false,
             uncertain: false,
+            dismissed: false,
             blurred: false,
             depth: 0.0,
             blur: 0.0,
@@ -186,6 +189,7 @@ impl Integrator<'_> {
         let end = (t1, self.stepper.end(), self.stepper.end_derivative());
         self.detector.unresolved = false;
         self.detector.uncertain = false;
+        self.detector.dismissed = false;
         self.detector.blurred = false;
         self.detector.depth = 0.0;
         self.detector.blur = 0.0;
@@ -222,6 +226,7 @@ impl Integrator<'_> {
                 self.keep_earliest(&mut found, index, zero, dt);
             }
         }
+        self.look_before_exit(&mut found, dt)?;
         if found.is_none() && self.one_sided && !self.detector.uncertain {
             self.detect_beyond(dt, &mut found)?;
         }
@@ -287,6 +292,8 @@ impl Integrator<'_> {
             };
             if suspect {
                 self.detector.suspects.push((index, proof == Proof::Open));
+            } else if proof == Proof::Silent {
+                self.detector.dismissed |= matches!(m.function, EventFunction::Exit(_));
             }
         }
         Ok(())
@@ -313,10 +320,48 @@ impl Integrator<'_> {
                 reach = searched;
             }
         }
+        self.look_before_exit(&mut found, dt)?;
         if found.is_none() && self.one_sided && !self.detector.uncertain {
             self.detect_beyond(dt, &mut found)?;
         }
         Ok(found)
+    }
+
+    /// Where an exit function of sliding on an intersection vanishes, others may have vanished before that were dismissed
+    /// without a proof: as the determinant of their equations vanishes the multipliers go to infinity, some of them past
+    /// their ends, within so short a time that nothing else in the step tells.
+    fn look_before_exit(&mut self, found: &mut Option<Found>, dt: f64) -> Result<(), FieldError> {
+        let is_exit = |f: &EventFunction| matches!(f, EventFunction::Exit(_));
+        let Some(theta) = found
+            .as_ref()
+            .filter(|event| self.detector.dismissed && event.functions.iter().any(is_exit))
+            .map(|event| event.theta)
+        else {
+            return Ok(());
+        };
+        let n_sides = 2 * self.motion.sliding.len();
+        let mut before = None;
+        let mut gap = 0.5 * theta;
+        while before.is_none() && gap > self.together(dt) {
+            let at = theta - gap;
+            self.stepper.interpolant().at(at, &mut self.detector.x);
+            let x = &mut self.detector.x;
+            let exits = self.motion.field.exits(self.t + at * dt, x)?;
+            let is_beyond = exits.iter().take(n_sides).any(|&exit| exit <= 0.0);
+            before = is_beyond.then_some(at);
+            gap *= 0.25;
+        }
+        let Some(before) = before else {
+            return Ok(());
+        };
+        for index in 0..self.motion.monitored.len() {
+            let function = self.motion.monitored[index].function;
+            if matches!(function, EventFunction::Exit(side) if side < n_sides) {
+                let zero = self.search((index, false), (0.0, before), dt)?;
+                self.keep_earliest(found, index, zero, dt);
+            }
+        }
+        Ok(())
     }
 
     /// Rounding of a monitored function over the step.
