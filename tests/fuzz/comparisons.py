@@ -157,7 +157,7 @@ def _euler(problem: Problem, sol: fl.Solution) -> Iterator[str]:
         return
     if any(mode.codimension > 1 for mode in sol.segments.mode):
         return
-    # The motion may wind around a point, where coarse steps are whole turns behind and the differences between
+    # The motion may wind around a point, where coarse steps are whole turns behind and differences between
     # them say little. What is wrong with the solution stays so with steps sixteen times as short.
     for refinements in ((1, 4, 16), (16, 64, 256)):
         ends = [_euler_end(problem, k) for k in refinements]
