@@ -55,3 +55,13 @@ def test_euler_is_asked_for_steps_short_enough_to_tell() -> None:
     wrong: Any = SimpleNamespace(y=sol.y + 0.6, **{name: getattr(sol, name) for name in names})
     [found] = comparisons(problem, wrong, seed)
     assert found.startswith("euler: ends at")
+
+
+def test_the_end_of_a_segment_belongs_to_the_next_one() -> None:
+    """Seed 321175: resets before sliding, the last of them one rounding error of time before it."""
+    case = random_case(321175)
+    sol = build(case.source).solve()
+    [k] = [k for k, segment in enumerate(sol.segments) if 0.0 < segment.duration < 2e-16]
+    assert sol.segments[k + 1].mode.is_sliding
+    assert not sol.segments[k].mode.is_sliding
+    assert not check(case)[1]
