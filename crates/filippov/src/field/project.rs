@@ -3,7 +3,7 @@
 use crate::error::FieldError;
 use crate::switching::{Matrix, Vector};
 use crate::system::{dot, dot_magnitude, PiecewiseSystem};
-use crate::tolerances::SURFACE_NOISE;
+use crate::tolerances::{DEPENDENT_GRADIENTS, SURFACE_NOISE};
 
 /// Scratch space of the projection.
 #[derive(Clone, Debug)]
@@ -64,7 +64,8 @@ impl Projector {
     }
 
     /// Moves `x` onto all surfaces of `set` at once, x <- x - N^T (N N^T)^-1 h with the gradients as the rows of N,
-    /// repeated until every |h| is at the level of rounding, at most eight times.
+    /// repeated until every |h| is at the level of rounding, at most eight times. Of surfaces in one place, as
+    /// x^2 + y^2 - 1 and hypot(x, y) - 1, the first stands for all.
     ///
     /// # Errors
     /// If a function of the user raises.
@@ -119,7 +120,8 @@ impl Projector {
         Ok(())
     }
 
-    /// (N N^T)^-1 h; `None` if the gradients are dependent or h is not finite.
+    /// (N N^T)^-1 h, where gradients that depend on others before them are left out: their surfaces are in the place of
+    /// those. `None` if h is not finite.
     fn shifts(&self, set: &[usize], n: usize) -> Option<Vector> {
         let row = |i: usize| &self.rows[i * n..(i + 1) * n];
         let mut gram = Matrix::zeros(set.len());
@@ -128,8 +130,51 @@ impl Projector {
                 gram[(i, j)] = dot(row(i), row(j));
             }
         }
-        let h: Vector = set.iter().map(|&j| self.h[j]).collect();
-        gram.solve(&h)
-            .filter(|shifts| shifts.iter().all(|v| v.is_finite()))
+        let kept = gram.independent_rows(DEPENDENT_GRADIENTS);
+        let h: Vector = kept.iter().map(|&i| self.h[set[i]]).collect();
+        let found = gram.principal(&kept).solve(&h)?;
+        let mut shifts = Vector::from_elem(0.0, set.len());
+        for (&i, shift) in kept.iter().zip(found) {
+            shifts[i] = shift;
+        }
+        shifts.iter().all(|v| v.is_finite()).then_some(shifts)
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::TracedSystem;
+    use filippov_expr::{Backend, Graph, Names, UnaryOp};
+
+    /// Beside the surface x^2 + y^2 = 0.64 the products of its gradient and that of hypot(x, y) - 0.8 are those of dependent
+    /// vectors up to rounding, which must not decide how far a point is moved.
+    #[test]
+    fn surfaces_in_one_place_are_projected_onto_as_one() {
+        let mut g = Graph::new();
+        let (x, y) = (g.state(0), g.state(1));
+        let (xx, yy) = (g.mul(x, x), g.mul(y, y));
+        let square = g.add(xx, yy);
+        let (limit, radius) = (g.constant(0.64), g.constant(0.8));
+        let length = g.unary(UnaryOp::Sqrt, square);
+        let (h0, h1) = (g.sub(square, limit), g.sub(length, radius));
+        let field = vec![g.sign(h0), g.sign(h1)];
+        let names = Names::default();
+        let system = TracedSystem::new(g, field, Vec::new(), names, Backend::Auto).unwrap();
+        assert_eq!(system.n_surfaces(), 2);
+        let (mut projector, signs) = (Projector::new(2, 2), [1.0, 1.0]);
+        let mut h = [0.0; 2];
+        for k in 0..50_000 {
+            let angle = 1e-4 * f64::from(k);
+            let r = 0.8 + 1e-8 * (1e-3 * f64::from(k)).sin();
+            let mut x = [r * angle.cos(), r * angle.sin()];
+            projector
+                .project_onto(&system, &[0, 1], 0.0, &mut x, &signs)
+                .unwrap();
+            system.surfaces(0.0, &x, &signs, &mut h).unwrap();
+            assert!(h[0].abs().max(h[1].abs()) < 4e-15, "{h:?} at {angle}");
+            assert!((x[1].atan2(x[0]) - angle).sin().abs() < 1e-15);
+        }
     }
 }

@@ -44,6 +44,27 @@ impl Matrix {
         Elimination::of(self).determinant()
     }
 
+    /// Of the vectors whose products a_i . a_j these are, those that do not depend on earlier ones: whose distance from
+    /// the span of these has a square above `least` of that of their length. Cholesky's factors, row by row.
+    pub fn independent_rows(&self, least: f64) -> SmallVec<[usize; 4]> {
+        let mut kept: SmallVec<[usize; 4]> = SmallVec::new();
+        let mut factors: SmallVec<[Vector; 4]> = SmallVec::new();
+        for i in 0..self.n {
+            let mut row = Vector::new();
+            for (k, &j) in kept.iter().enumerate() {
+                let known: f64 = row.iter().zip(&factors[k]).map(|(a, b)| a * b).sum();
+                row.push((self[(i, j)] - known) / factors[k][k]);
+            }
+            let square = self[(i, i)] - row.iter().map(|a| a * a).sum::<f64>();
+            if square > least * self[(i, i)] {
+                row.push(square.sqrt());
+                kept.push(i);
+                factors.push(row);
+            }
+        }
+        kept
+    }
+
     /// Solves A x = b; `None` if a pivot vanishes.
     pub fn solve(&self, b: &[f64]) -> Option<Vector> {
         Elimination::of(self).solve(b)
