@@ -1,5 +1,6 @@
 //! Square matrices of the size of an intersection: elimination, minors, stability.
 
+use crate::tolerances::PROPORTIONAL;
 use std::ops::{Index, IndexMut};
 
 use smallvec::SmallVec;
@@ -103,10 +104,14 @@ impl Matrix {
     }
 
     /// The sets of indices each of which acts on all others of its set, directly or through others: by rows and
-    /// columns sorted into these sets the matrix is block triangular.
+    /// columns sorted into these sets the matrix is block triangular. An entry that is rounding of its row does not act.
     pub fn strong_parts(&self) -> Vec<Vec<usize>> {
         let n = self.n;
-        let mut acts: Vec<bool> = self.entries.iter().map(|&v| v != 0.0).collect();
+        let mut acts = Vec::with_capacity(n * n);
+        for row in self.entries.chunks_exact(n) {
+            let size = row.iter().fold(0.0_f64, |size, v| size.max(v.abs()));
+            acts.extend(row.iter().map(|v| v.abs() > PROPORTIONAL * size));
+        }
         for k in 0..n {
             for i in (0..n).filter(|&i| i != k) {
                 if acts[i * n + k] {
