@@ -1,7 +1,7 @@
 """Sliding on several surfaces where the jump of the field across one of them vanishes at an instant.
 
-Seen from the others, which are slid on, it is a two-fold: from there on the field leads away from the surface on both
-sides, and there are two solutions. The motion before has no multiplier there, it is 0/0.
+Seen from the others, which are slid on, it is a two-fold: from there on the field leads away from the surface
+on both sides, and there are two solutions. The motion before has no multiplier there, it is 0/0.
 """
 
 from __future__ import annotations

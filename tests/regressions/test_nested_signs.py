@@ -144,7 +144,7 @@ def test_sliding_along_a_jump_of_another_sign_stops_with_the_way_to_write_it() -
 
 @pytest.mark.parametrize("method", ["DOPRI5", "Taylor", "Rodas5P"])
 def test_sliding_ends_where_its_surface_bends_into_the_place_of_another(method: str) -> None:
-    """On x[0] = max(x[1], 0.4) the motion comes to 0.4, where it meets x[0] = 0.4, and nothing holds it on either."""
+    """On x[0] = max(x[1], 0.4) it comes to 0.4, where it meets x[0] = 0.4; nothing holds it on either."""
 
     def fun(t: float, x: Any) -> list[Any]:
         above = np.sign(x[0] - np.maximum(x[1], 0.4))

@@ -34,7 +34,7 @@ def test_stable_for_one_scaling_only(y0: Any) -> None:
 
 @pytest.mark.parametrize("method", ["DOPRI5", "Taylor", "Rodas5P"])
 def test_rounding_does_not_couple_the_surfaces(method: str) -> None:
-    """On x[0] = 0 the normal of the circle is (0, 1) up to the rounding of x[0], and the first two surfaces are no part of it."""
+    """On x[0] = 0 the normal of the circle is (0, 1), up to the rounding of x[0]: that couples nothing."""
 
     def fun(t: float, x: Any) -> list[Any]:
         third = np.sign(x[2])
