@@ -64,7 +64,8 @@ impl Projector {
     }
 
     /// Moves `x` onto all surfaces of `set` at once, x <- x - N^T (N N^T)^-1 h with the gradients as the rows of N,
-    /// repeated until every |h| is at the level of rounding, at most eight times.
+    /// repeated until every |h| is at the level of rounding, at most eight times. A surface whose gradient depends on those
+    /// of others is in the place of them, and goes with them.
     ///
     /// # Errors
     /// If a function of the user raises.
@@ -119,7 +120,7 @@ impl Projector {
         Ok(())
     }
 
-    /// (N N^T)^-1 h; `None` if the gradients are dependent or h is not finite.
+    /// (N N^T)^-1 h; `None` if h or a gradient is not finite.
     fn shifts(&self, set: &[usize], n: usize) -> Option<Vector> {
         let row = |i: usize| &self.rows[i * n..(i + 1) * n];
         let mut gram = Matrix::zeros(set.len());
@@ -129,7 +130,8 @@ impl Projector {
             }
         }
         let h: Vector = set.iter().map(|&j| self.h[j]).collect();
-        gram.solve(&h)
-            .filter(|shifts| shifts.iter().all(|v| v.is_finite()))
+        let shifts = gram.solve_gram(&h);
+        let is_finite = shifts.iter().all(|v| v.is_finite());
+        is_finite.then_some(shifts)
     }
 }

@@ -1,9 +1,10 @@
 //! Square matrices of the size of an intersection: elimination, minors, stability.
 
-use crate::tolerances::PROPORTIONAL;
 use std::ops::{Index, IndexMut};
 
 use smallvec::SmallVec;
+
+use crate::tolerances::{DEPENDENT, PROPORTIONAL};
 
 /// A vector of the size of an intersection.
 pub type Vector = SmallVec<[f64; 4]>;
@@ -48,6 +49,37 @@ impl Matrix {
     /// Solves A x = b; `None` if a pivot vanishes.
     pub fn solve(&self, b: &[f64]) -> Option<Vector> {
         Elimination::of(self).solve(b)
+    }
+
+    /// Solves A x = b for the matrix of inner products of some vectors. Those that depend on earlier ones, up to rounding,
+    /// have no share in x.
+    pub fn solve_gram(&self, b: &[f64]) -> Vector {
+        let n = self.n;
+        // A = L L^T, row by row; a dependent row stays zero.
+        let mut factor = Matrix::zeros(n);
+        for i in 0..n {
+            for j in 0..i {
+                let sum: f64 = (0..j).map(|k| factor[(i, k)] * factor[(j, k)]).sum();
+                if factor[(j, j)] > 0.0 {
+                    factor[(i, j)] = (self[(i, j)] - sum) / factor[(j, j)];
+                }
+            }
+            let rest = self[(i, i)] - (0..i).map(|k| factor[(i, k)].powi(2)).sum::<f64>();
+            if rest > DEPENDENT * self[(i, i)] {
+                factor[(i, i)] = rest.sqrt();
+            }
+        }
+        let mut x = Vector::from_slice(b);
+        let over = |value: f64, pivot: f64| if pivot > 0.0 { value / pivot } else { 0.0 };
+        for i in 0..n {
+            let known: f64 = (0..i).map(|k| factor[(i, k)] * x[k]).sum();
+            x[i] = over(x[i] - known, factor[(i, i)]);
+        }
+        for i in (0..n).rev() {
+            let known: f64 = (i + 1..n).map(|k| factor[(k, i)] * x[k]).sum();
+            x[i] = over(x[i] - known, factor[(i, i)]);
+        }
+        x
     }
 
     /// The inverse; `None` if a pivot vanishes.
@@ -297,5 +329,34 @@ impl Elimination {
             x[i] = (x[i] - rest) / a[(i, i)];
         }
         x.iter().all(|v| v.is_finite()).then_some(x)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_vector_that_depends_on_others_has_no_share() {
+        // Rows (1, 0), (3, 0), (0, 2) and h = (1, 3, 4): the second one says the same as the first.
+        let rows = [[1.0, 0.0], [3.0, 0.0], [0.0, 2.0]];
+        let mut gram = Matrix::zeros(3);
+        for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
+            gram[(i, j)] = rows[i][0] * rows[j][0] + rows[i][1] * rows[j][1];
+        }
+        let shifts = gram.solve_gram(&[1.0, 3.0, 4.0]);
+        assert_eq!(shifts.as_slice(), [1.0, 0.0, 1.0]);
+    }
+
+    #[test]
+    fn rounding_couples_nothing() {
+        let mut matrix = Matrix::zeros(2);
+        (matrix[(0, 0)], matrix[(1, 1)]) = (-1.0, -2.0);
+        (matrix[(0, 1)], matrix[(1, 0)]) = (1e-17, -3e-16);
+        assert_eq!(matrix.strong_parts(), [vec![0], vec![1]]);
+        matrix[(1, 0)] = -3e-3;
+        assert_eq!(matrix.strong_parts().len(), 2);
+        matrix[(0, 1)] = 1e-3;
+        assert_eq!(matrix.strong_parts(), [vec![0, 1]]);
     }
 }

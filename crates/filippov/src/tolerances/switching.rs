@@ -287,3 +287,7 @@ pub const LEFT_RESTING: f64 = 1e3;
 /// Normal components have vanished that are below this part of what they were a moment before, which is the square root of
 /// rounding: at a zero that is known to rounding they are some 1e-8 of it.
 pub const VANISHED: f64 = 1e-3;
+
+/// A gradient depends on others where the square of its part orthogonal to them is below this fraction of its own: the
+/// rounding of inner products.
+pub const DEPENDENT: f64 = 64.0 * EPS;

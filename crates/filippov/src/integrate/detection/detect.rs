@@ -15,6 +15,9 @@ use crate::integrate::motion::{Exits, Motion};
 use crate::system::PiecewiseSystem;
 use crate::tolerances::{EPS, EXTRAPOLATION, ONE_SIDED_AIM, SURFACE_NOISE};
 
+/// A function is clear of a zero that was divided out beyond this multiple of its rounding.
+const CLEAR_OF_NOISE: f64 = 1e3;
+
 /// Scratch space of the event stage, and values at the end of the step.
 pub(in crate::integrate) struct Detector {
     /// The exit functions of the motion at the seven stages.
@@ -127,7 +130,7 @@ impl Detector {
             m.curvature = (rate - m.rate) / dt;
             (m.value, m.rate) = (value, rate);
             // A zero that rounding still blurs stays divided out.
-            if m.deflation.is_some() && value > 1e3 * m.noise {
+            if m.deflation.is_some() && value > CLEAR_OF_NOISE * m.noise {
                 m.deflation = None;
                 cleared = true;
             }
@@ -209,9 +212,19 @@ impl Integrator<'_> {
             // There will be a search: the extension that it needs serves the filter too.
             self.extend()?;
         }
-        if self.stepper.has_series() {
-            return self.detect_along_series(dt);
+        let mut found = if self.stepper.has_series() {
+            self.detect_along_series(dt)?
+        } else {
+            self.detect_among_suspects(dt)?
+        };
+        if found.is_none() && !self.detector.uncertain {
+            found = self.wrong_from_the_start()?;
         }
+        Ok(found)
+    }
+
+    /// The earliest event of a step without series: the filter, then a search for what it lets through.
+    fn detect_among_suspects(&mut self, dt: f64) -> Result<Option<Found>, FieldError> {
         self.collect_suspects(dt)?;
         let mut found: Option<Found> = None;
         if !self.detector.suspects.is_empty() {
@@ -226,6 +239,27 @@ impl Integrator<'_> {
             self.detect_beyond(dt, &mut found)?;
         }
         Ok(found)
+    }
+
+    /// A surface that the motion was to leave to one side and is on the other side of, without a zero in between: rounding
+    /// decided on the side, and it is decided anew.
+    fn wrong_from_the_start(&mut self) -> Result<Option<Found>, FieldError> {
+        for index in 0..self.motion.monitored.len() {
+            let m = self.motion.monitored[index];
+            let (value, _) = self.detector.right[index];
+            let is_surface = matches!(m.function, EventFunction::Surface(_));
+            if m.deflation.is_none() || !is_surface || value >= 0.0 {
+                continue;
+            }
+            if value < -CLEAR_OF_NOISE * self.noise_beside(&m)? {
+                return Ok(Some(Found {
+                    theta: 0.0,
+                    functions: smallvec![m.function],
+                    touch: false,
+                }));
+            }
+        }
+        Ok(None)
     }
 
     /// The filter: which functions may vanish within the step?
@@ -273,7 +307,7 @@ impl Integrator<'_> {
                         t, order, leading, ..
                     } = deflation;
                     // A multiple zero stays within rounding for long: the end has to be clear of it.
-                    let clear = order == 1 || order == 2 && value > 1e3 * noise;
+                    let clear = order == 1 || order == 2 && value > CLEAR_OF_NOISE * noise;
                     let leading = leading * dt.powi(order);
                     let known = m.affine && t == self.t && clear;
                     !known || may_vanish_deflated(leading, order, value, rate * dt)
