@@ -140,3 +140,20 @@ def test_sliding_along_a_jump_of_another_sign_stops_with_the_way_to_write_it() -
     arrival = 0.9 / 1.3
     slid = share * above + (1.0 - share) * below
     np.testing.assert_allclose(sol.y[:, -1], [0.1, 1.5 * arrival + (2.0 - arrival) * slid[1]], rtol=1e-9)
+
+
+@pytest.mark.parametrize("method", ["DOPRI5", "Taylor", "Rodas5P"])
+def test_sliding_ends_where_its_surface_bends_into_the_place_of_another(method: str) -> None:
+    """On x[0] = max(x[1], 0.4) it comes to 0.4, where it meets x[0] = 0.4; nothing holds it on either."""
+
+    def fun(t: float, x: Any) -> list[Any]:
+        above = np.sign(x[0] - np.maximum(x[1], 0.4))
+        level = np.sign(1.3 * x[0] - 0.52)
+        return [-0.5 - 0.1 * level, -1.0 + 1.24 * above]
+
+    sol = fl.solve_ivp(fun, (0.0, 2.0), [1.0, 0.8], method=method)
+    assert sol.success, sol.message
+    last = sol.switches[-1]
+    assert (last.kind, str(last.mode_after)) == ("exit_sliding", "---")
+    assert last.t == pytest.approx(1.0, abs=1e-12)
+    np.testing.assert_allclose(sol.y[:, -1], [0.0, -1.84], rtol=0, atol=1e-9)

@@ -18,6 +18,9 @@ pub struct AffineLaw<'a> {
     h: Vec<f64>,
     /// The scaling of the surfaces, for the stability of the root of three and more.
     kappa: Vec<f64>,
+    /// The sizes of the rows of N for two surfaces, when they were first looked at: in these units its determinant goes
+    /// through zero where a row does.
+    sizes: Option<[f64; 2]>,
     multipliers: Vec<f64>,
     /// The multipliers last found are not the only ones: redundant contacts share their load.
     shared: Option<SharedLoad>,
@@ -36,6 +39,7 @@ impl<'a> AffineLaw<'a> {
             signs,
             h: vec![0.0; system.n_surfaces()],
             kappa: vec![1.0; set.len()],
+            sizes: None,
             multipliers: vec![f64::NAN; set.len()],
             shared: None,
             loads: None,
@@ -124,7 +128,7 @@ impl<'a> AffineLaw<'a> {
 
     /// The exit functions of the root, as those of the canopy: the determinant of N with the sign of a stable one,
     /// and the stability ([`root_ends`]). Only for a few surfaces; the friction of many bodies is stable for good.
-    pub fn ends(&self, oscillates: &mut Option<bool>) -> [f64; 2] {
+    pub fn ends(&mut self, oscillates: &mut Option<bool>) -> [f64; 2] {
         let (normal, m) = (self.parts.normal(), self.parts.surfaces().len());
         if m > MOST_MEETING || self.is_shared() {
             return [1.0, 1.0];
@@ -137,11 +141,11 @@ impl<'a> AffineLaw<'a> {
             return root_ends((&jacobian, false), &self.kappa, oscillates);
         }
         let size = |i: usize| {
-            normal
-                .row(i)
-                .fold(0.0_f64, |size, (_, v)| size.max(v.abs()))
+            let entries = normal.row(i).map(|(_, v)| v.abs());
+            entries.fold(f64::MIN_POSITIVE, f64::max)
         };
-        let unit = jacobian.with_rows_scaled(&[1.0 / size(0), 1.0 / size(1)]);
+        let sizes = *self.sizes.get_or_insert_with(|| [size(0), size(1)]);
+        let unit = jacobian.with_rows_scaled(&sizes.map(|size| 1.0 / size));
         [unit.determinant(), -unit[(0, 0)].min(unit[(1, 1)])]
     }
 

@@ -14,6 +14,8 @@ use crate::tolerances::TRACKED_CHANGE;
 pub struct Canopy {
     fields: MeetingFields,
     weights: Vec<f64>,
+    /// The surfaces, counted within the set, whose equations said anything since the motion began.
+    telling: Vec<usize>,
     /// The scaling of the surfaces, for the stability of the root of three and more.
     kappa: Vec<f64>,
 }
@@ -24,6 +26,7 @@ impl Canopy {
         Canopy {
             fields: MeetingFields::new(system, set),
             weights: Vec::new(),
+            telling: Vec::new(),
             kappa: vec![1.0; set.len()],
         }
     }
@@ -52,6 +55,18 @@ impl Canopy {
         self.fields.normal_fields().is_ok()
     }
 
+    /// The surfaces whose equations say anything. One that did once does so for the rest of the motion: where its normal
+    /// components vanish at an instant, it is not tangent to all fields, but about to lose what holds the motion there.
+    fn telling(&mut self) -> Vec<usize> {
+        for row in self.fields.telling() {
+            if !self.telling.contains(&row) {
+                self.telling.push(row);
+            }
+        }
+        self.telling.sort_unstable();
+        self.telling.clone()
+    }
+
     /// Finds the multipliers that continue the first of those in `tracked` that can be continued, and writes the field. Returns the
     /// multipliers with the exit functions of the root ([`root_ends`]); `None` if there is no root.
     pub fn solve(
@@ -61,7 +76,7 @@ impl Canopy {
         dx: &mut [f64],
     ) -> Option<(Vec<f64>, [f64; 2])> {
         let fields = self.fields.normal_fields().ok()?;
-        let telling = self.fields.telling();
+        let telling = self.telling();
         let (lambda, ends) = if telling.len() < fields.m() {
             // Sliding of higher order: some equations hold for all multipliers, and only their ends end it.
             (least_multipliers(&fields, &telling)?, [1.0, 1.0])

@@ -3,7 +3,7 @@
 use crate::error::FieldError;
 use crate::switching::{Matrix, Vector};
 use crate::system::{dot, dot_magnitude, PiecewiseSystem};
-use crate::tolerances::{DEPENDENT_GRADIENTS, SURFACE_NOISE};
+use crate::tolerances::SURFACE_NOISE;
 
 /// Scratch space of the projection.
 #[derive(Clone, Debug)]
@@ -64,8 +64,8 @@ impl Projector {
     }
 
     /// Moves `x` onto all surfaces of `set` at once, x <- x - N^T (N N^T)^-1 h with the gradients as the rows of N,
-    /// repeated until every |h| is at the level of rounding, at most eight times. Of surfaces in one place, as
-    /// x^2 + y^2 - 1 and hypot(x, y) - 1, the first stands for all.
+    /// repeated until every |h| is at the level of rounding, at most eight times. A surface whose gradient depends on those
+    /// of others is in the place of them, and goes with them.
     ///
     /// # Errors
     /// If a function of the user raises.
@@ -120,8 +120,7 @@ impl Projector {
         Ok(())
     }
 
-    /// (N N^T)^-1 h, where gradients that depend on others before them are left out: their surfaces are in the place of
-    /// those. `None` if h is not finite.
+    /// (N N^T)^-1 h; `None` if h or a gradient is not finite.
     fn shifts(&self, set: &[usize], n: usize) -> Option<Vector> {
         let row = |i: usize| &self.rows[i * n..(i + 1) * n];
         let mut gram = Matrix::zeros(set.len());
@@ -130,14 +129,10 @@ impl Projector {
                 gram[(i, j)] = dot(row(i), row(j));
             }
         }
-        let kept = gram.independent_rows(DEPENDENT_GRADIENTS);
-        let h: Vector = kept.iter().map(|&i| self.h[set[i]]).collect();
-        let found = gram.principal(&kept).solve(&h)?;
-        let mut shifts = Vector::from_elem(0.0, set.len());
-        for (&i, shift) in kept.iter().zip(found) {
-            shifts[i] = shift;
-        }
-        shifts.iter().all(|v| v.is_finite()).then_some(shifts)
+        let h: Vector = set.iter().map(|&j| self.h[j]).collect();
+        let shifts = gram.solve_gram(&h);
+        let is_finite = shifts.iter().all(|v| v.is_finite());
+        is_finite.then_some(shifts)
     }
 }
 

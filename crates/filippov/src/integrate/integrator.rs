@@ -238,12 +238,11 @@ impl<'a> Integrator<'a> {
             dt = remaining;
         }
         if dt < SHORTEST_STEP * self.t.abs() && dt < remaining {
-            if let Some(event) = self.lost_root() {
-                self.dt = f64::NAN;
-                self.one_sided = false;
-                return self.switch(&event);
+            let mut lost = self.lost_jump()?.or_else(|| self.lost_root());
+            if lost.is_none() {
+                lost = self.lost_share()?;
             }
-            if let Some(event) = self.lost_share()? {
+            if let Some(event) = lost {
                 self.dt = f64::NAN;
                 self.one_sided = false;
                 return self.switch(&event);

@@ -2,11 +2,12 @@
 
 use smallvec::{smallvec, SmallVec};
 
-use super::lie::{first_nonzero_of_both, normal_component, Leading};
+use super::lie::{first_nonzero, first_nonzero_of_both, normal_component, Leading};
 use super::stick::decide_sticking;
 use crate::error::FieldError;
 use crate::field::eval_on_side;
-use crate::system::PiecewiseSystem;
+use crate::mode::Signs;
+use crate::system::{dot_magnitude, PiecewiseSystem};
 use crate::tolerances::{OF_ROUNDING, TANGENT};
 
 /// How the motion came to the surface, and which normal components are known to vanish.
@@ -140,7 +141,8 @@ pub fn decide(
         Arrival::Flat(_, vanishing) => vanishing,
         _ => exits.map(|exit| usize::from(is_known(exit))),
     };
-    let [minus, plus] = first_nonzero_of_both(system, j, vanishing, t, x, signs)?;
+    let firsts = first_nonzero_of_both(system, j, vanishing, t, x, signs)?;
+    let [minus, plus] = without_rounding(system, j, (arrival, firsts), t, x, signs)?;
     let mut candidates = SmallVec::new();
     if minus.sign() < 0 || stays(minus, plus, -1) {
         candidates.push(-1);
@@ -186,6 +188,38 @@ pub fn decide(
         minus,
         plus,
     })
+}
+
+/// The same derivatives, where those of first order are more than the rounding of t and x makes of them. Looked at where
+/// nothing is known of the point but that it is on the surface, and where one is small beside the other.
+fn without_rounding(
+    system: &dyn PiecewiseSystem,
+    j: usize,
+    (arrival, mut firsts): (Arrival, [Leading; 2]),
+    t: f64,
+    x: &[f64],
+    signs: &[f64],
+) -> Result<[Leading; 2], FieldError> {
+    if system.lie_tolerance(2) > TANGENT {
+        return Ok(firsts);
+    }
+    let largest = firsts[0].value.abs().max(firsts[1].value.abs());
+    for (index, side) in [-1, 1].into_iter().enumerate() {
+        let Leading { order, value } = firsts[index];
+        let is_small = value.abs() <= OF_ROUNDING * largest;
+        if order != 1 || !(is_small || arrival == Arrival::Start) {
+            continue;
+        }
+        let mut signs = Signs::from_slice(signs);
+        signs[j] = f64::from(side);
+        let mut gradient = vec![0.0; x.len()];
+        let partials = system.rate_gradient(j, t, x, &signs, &mut gradient)?;
+        let size = dot_magnitude(&gradient, x) + (partials.time * t).abs();
+        if value.abs() <= TANGENT * size {
+            firsts[index] = first_nonzero(system, j, side, 1, t, x, &signs)?;
+        }
+    }
+    Ok(firsts)
 }
 
 /// Does the field of this side keep the motion on the surface, where the other one does not press it there?

@@ -4,6 +4,8 @@ use std::ops::{Index, IndexMut};
 
 use smallvec::SmallVec;
 
+use crate::tolerances::{DEPENDENT, PROPORTIONAL};
+
 /// A vector of the size of an intersection.
 pub type Vector = SmallVec<[f64; 4]>;
 
@@ -44,30 +46,40 @@ impl Matrix {
         Elimination::of(self).determinant()
     }
 
-    /// Of the vectors whose products a_i . a_j these are, those that do not depend on earlier ones: whose distance from
-    /// the span of these has a square above `least` of that of their length. Cholesky's factors, row by row.
-    pub fn independent_rows(&self, least: f64) -> SmallVec<[usize; 4]> {
-        let mut kept: SmallVec<[usize; 4]> = SmallVec::new();
-        let mut factors: SmallVec<[Vector; 4]> = SmallVec::new();
-        for i in 0..self.n {
-            let mut row = Vector::new();
-            for (k, &j) in kept.iter().enumerate() {
-                let known: f64 = row.iter().zip(&factors[k]).map(|(a, b)| a * b).sum();
-                row.push((self[(i, j)] - known) / factors[k][k]);
-            }
-            let square = self[(i, i)] - row.iter().map(|a| a * a).sum::<f64>();
-            if square > least * self[(i, i)] {
-                row.push(square.sqrt());
-                kept.push(i);
-                factors.push(row);
-            }
-        }
-        kept
-    }
-
     /// Solves A x = b; `None` if a pivot vanishes.
     pub fn solve(&self, b: &[f64]) -> Option<Vector> {
         Elimination::of(self).solve(b)
+    }
+
+    /// Solves A x = b for the matrix of inner products of some vectors. Those that depend on earlier ones, up to rounding,
+    /// have no share in x.
+    pub fn solve_gram(&self, b: &[f64]) -> Vector {
+        let n = self.n;
+        // A = L L^T, row by row; a dependent row stays zero.
+        let mut factor = Matrix::zeros(n);
+        for i in 0..n {
+            for j in 0..i {
+                let sum: f64 = (0..j).map(|k| factor[(i, k)] * factor[(j, k)]).sum();
+                if factor[(j, j)] > 0.0 {
+                    factor[(i, j)] = (self[(i, j)] - sum) / factor[(j, j)];
+                }
+            }
+            let rest = self[(i, i)] - (0..i).map(|k| factor[(i, k)].powi(2)).sum::<f64>();
+            if rest > DEPENDENT * self[(i, i)] {
+                factor[(i, i)] = rest.sqrt();
+            }
+        }
+        let mut x = Vector::from_slice(b);
+        let over = |value: f64, pivot: f64| if pivot > 0.0 { value / pivot } else { 0.0 };
+        for i in 0..n {
+            let known: f64 = (0..i).map(|k| factor[(i, k)] * x[k]).sum();
+            x[i] = over(x[i] - known, factor[(i, i)]);
+        }
+        for i in (0..n).rev() {
+            let known: f64 = (i + 1..n).map(|k| factor[(k, i)] * x[k]).sum();
+            x[i] = over(x[i] - known, factor[(i, i)]);
+        }
+        x
     }
 
     /// The inverse; `None` if a pivot vanishes.
@@ -124,10 +136,14 @@ impl Matrix {
     }
 
     /// The sets of indices each of which acts on all others of its set, directly or through others: by rows and
-    /// columns sorted into these sets the matrix is block triangular.
+    /// columns sorted into these sets the matrix is block triangular. An entry that is rounding of its row does not act.
     pub fn strong_parts(&self) -> Vec<Vec<usize>> {
         let n = self.n;
-        let mut acts: Vec<bool> = self.entries.iter().map(|&v| v != 0.0).collect();
+        let mut acts = Vec::with_capacity(n * n);
+        for row in self.entries.chunks_exact(n) {
+            let size = row.iter().fold(0.0_f64, |size, v| size.max(v.abs()));
+            acts.extend(row.iter().map(|v| v.abs() > PROPORTIONAL * size));
+        }
         for k in 0..n {
             for i in (0..n).filter(|&i| i != k) {
                 if acts[i * n + k] {
@@ -313,5 +329,34 @@ impl Elimination {
             x[i] = (x[i] - rest) / a[(i, i)];
         }
         x.iter().all(|v| v.is_finite()).then_some(x)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_vector_that_depends_on_others_has_no_share() {
+        // Rows (1, 0), (3, 0), (0, 2) and h = (1, 3, 4): the second one says the same as the first.
+        let rows = [[1.0, 0.0], [3.0, 0.0], [0.0, 2.0]];
+        let mut gram = Matrix::zeros(3);
+        for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
+            gram[(i, j)] = rows[i][0] * rows[j][0] + rows[i][1] * rows[j][1];
+        }
+        let shifts = gram.solve_gram(&[1.0, 3.0, 4.0]);
+        assert_eq!(shifts.as_slice(), [1.0, 0.0, 1.0]);
+    }
+
+    #[test]
+    fn rounding_couples_nothing() {
+        let mut matrix = Matrix::zeros(2);
+        (matrix[(0, 0)], matrix[(1, 1)]) = (-1.0, -2.0);
+        (matrix[(0, 1)], matrix[(1, 0)]) = (1e-17, -3e-16);
+        assert_eq!(matrix.strong_parts(), [vec![0], vec![1]]);
+        matrix[(1, 0)] = -3e-3;
+        assert_eq!(matrix.strong_parts().len(), 2);
+        matrix[(0, 1)] = 1e-3;
+        assert_eq!(matrix.strong_parts(), [vec![0, 1]]);
     }
 }

@@ -19,10 +19,6 @@ pub const EPS: f64 = f64::EPSILON;
 /// magnitudes it is made of: the rounding of the state plus that of a few operations.
 pub const SURFACE_NOISE: f64 = 16.0 * EPS;
 
-/// Gradients are dependent if the square of the distance of one from the span of others is below this fraction of its
-/// own square: products of gradients, which a projection solves with, know no more.
-pub const DEPENDENT_GRADIENTS: f64 = 64.0 * EPS;
-
 /// A Lie derivative counts as zero below this fraction of the sum of the magnitudes it is made of.
 /// Points handed in by a user or found as a root carry a few rounding errors, amplified by at most
 /// some thousands through the derivatives; a genuine value this small would be

@@ -283,3 +283,11 @@ pub const MOST_DOUBLINGS: usize = 20;
 /// A motion that was to stay on a surface has left it where h is above this multiple of the tolerance: errors of many
 /// steps add up.
 pub const LEFT_RESTING: f64 = 1e3;
+
+/// Normal components have vanished that are below this part of what they were a moment before, which is the square root of
+/// rounding: at a zero that is known to rounding they are some 1e-8 of it.
+pub const VANISHED: f64 = 1e-3;
+
+/// A gradient depends on others where the square of its part orthogonal to them is below this fraction of its own: the
+/// rounding of inner products.
+pub const DEPENDENT: f64 = 64.0 * EPS;

@@ -84,6 +84,12 @@ impl Integrator<'_> {
         if fresh.is_empty() && self.slides_by_rule() {
             return self.leave_by_rule(mode, meeting);
         }
+        if fresh.is_empty() {
+            let decided = self.decide_where_jump_vanishes(event, mode, meeting)?;
+            if let Some(decided) = decided {
+                return Ok(decided);
+            }
+        }
         if let Some(decided) = self.decide_by_relay(Some(event), mode, meeting)? {
             return Ok(decided);
         }

@@ -13,3 +13,4 @@ pub(super) mod root_ends;
 pub(super) mod spiral;
 pub(super) mod transition;
 pub(super) mod two_fold;
+pub(super) mod vanishing_jump;

@@ -36,15 +36,13 @@ impl Integrator<'_> {
             if let Some(decided) = self.leave_at_bends(mode, fresh)? {
                 return Ok(Some(Ok(decided)));
             }
-            return match fresh {
-                [j] if self.bends_what_is_slid_on(mode, &beyond)? => {
-                    Ok(self.leave_to(&beyond, *j, &landed)?.map(Ok))
-                }
-                _ => Ok(None),
+            return match self.bends_what_is_slid_on(mode, &beyond)? {
+                true => Ok(self.leave_to(&beyond, fresh, &landed)?.map(Ok)),
+                false => Ok(None),
             };
         }
-        if let [j] = fresh {
-            if let Some(decided) = self.leave_to(&beyond, *j, &landed)? {
+        if fresh.len() == 1 {
+            if let Some(decided) = self.leave_to(&beyond, fresh, &landed)? {
                 return Ok(Some(Ok(decided)));
             }
         }
@@ -103,7 +101,7 @@ impl Integrator<'_> {
             let mut left = Vec::new();
             for (mode, landed) in [(beyond, landed), (opposite, on_opposite)] {
                 if mode.entries()[*j] != 0 {
-                    left.extend(self.leave_to(&mode, *j, &landed)?);
+                    left.extend(self.leave_to(&mode, meeting, &landed)?);
                 }
             }
             let modes: Vec<Mode> = left.iter().map(|(mode, _)| mode.clone()).collect();
@@ -141,7 +139,7 @@ impl Integrator<'_> {
         if side == 0 || jumped.is_empty() {
             return Ok(decided);
         }
-        let Some(other) = self.leave_to(&opposite, j, &landed)? else {
+        let Some(other) = self.leave_to(&opposite, meeting, &landed)? else {
             return Ok(decided);
         };
         let modes = vec![after.clone(), other.0.clone()];
@@ -152,12 +150,12 @@ impl Integrator<'_> {
         })
     }
 
-    /// The motion that leaves h_j = 0 to its side in `mode`, if its field leads there. What it slides on besides, and
-    /// what jumped to zero, is decided anew.
+    /// The motion that leaves the surfaces `reached` to their sides in `mode`, if its field leads there. What it slides on
+    /// besides, and what jumped to zero, is decided anew.
     fn leave_to(
         &mut self,
         mode: &Mode,
-        j: usize,
+        reached: &[usize],
         landed: &[usize],
     ) -> Result<Option<(Mode, Lefts)>, FieldError> {
         let mut sliding: Vec<usize> = mode.sliding_set().chain(landed.iter().copied()).collect();
@@ -170,11 +168,11 @@ impl Integrator<'_> {
                 Err(_) => return Ok(None),
             }
         }
-        let leaving: Vec<usize> = sliding.into_iter().chain([j]).collect();
+        let leaving: Vec<usize> = sliding.iter().chain(reached).copied().collect();
         let left = self.departures(&after, &leaving, &[])?;
         let leads_away = |l: &Left| match l {
             // A surface that jumped to zero, and along which the motion goes.
-            Left::Surface(k, leading) if leading.order == 0 => *k != j,
+            Left::Surface(k, leading) if leading.order == 0 => !reached.contains(k),
             Left::Surface(k, leading) => leading.sign() == after.entries()[*k],
             Left::Exit(..) => true,
         };

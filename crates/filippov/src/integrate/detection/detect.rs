@@ -15,6 +15,9 @@ use crate::integrate::motion::{Exits, Motion};
 use crate::system::PiecewiseSystem;
 use crate::tolerances::{EPS, EXTRAPOLATION, ONE_SIDED_AIM, SURFACE_NOISE};
 
+/// A function is clear of a zero that was divided out beyond this multiple of its rounding.
+const CLEAR_OF_NOISE: f64 = 1e3;
+
 /// Scratch space of the event stage, and values at the end of the step.
 pub(in crate::integrate) struct Detector {
     /// The exit functions of the motion at the seven stages.
@@ -130,7 +133,7 @@ impl Detector {
             m.curvature = (rate - m.rate) / dt;
             (m.value, m.rate) = (value, rate);
             // A zero that rounding still blurs stays divided out.
-            if m.deflation.is_some() && value > 1e3 * m.noise {
+            if m.deflation.is_some() && value > CLEAR_OF_NOISE * m.noise {
                 m.deflation = None;
                 cleared = true;
             }
@@ -213,9 +216,19 @@ impl Integrator<'_> {
             // There will be a search: the extension that it needs serves the filter too.
             self.extend()?;
         }
-        if self.stepper.has_series() {
-            return self.detect_along_series(dt);
+        let mut found = if self.stepper.has_series() {
+            self.detect_along_series(dt)?
+        } else {
+            self.detect_among_suspects(dt)?
+        };
+        if found.is_none() && !self.detector.uncertain {
+            found = self.wrong_from_the_start()?;
         }
+        Ok(found)
+    }
+
+    /// The earliest event of a step without series: the filter, then a search for what it lets through.
+    fn detect_among_suspects(&mut self, dt: f64) -> Result<Option<Found>, FieldError> {
         self.collect_suspects(dt)?;
         let mut found: Option<Found> = None;
         if !self.detector.suspects.is_empty() {
@@ -231,6 +244,27 @@ impl Integrator<'_> {
             self.detect_beyond(dt, &mut found)?;
         }
         Ok(found)
+    }
+
+    /// A surface that the motion was to leave to one side and is on the other side of, without a zero in between: rounding
+    /// decided on the side, and it is decided anew.
+    fn wrong_from_the_start(&mut self) -> Result<Option<Found>, FieldError> {
+        for index in 0..self.motion.monitored.len() {
+            let m = self.motion.monitored[index];
+            let (value, _) = self.detector.right[index];
+            let is_surface = matches!(m.function, EventFunction::Surface(_));
+            if m.deflation.is_none() || !is_surface || value >= 0.0 {
+                continue;
+            }
+            if value < -CLEAR_OF_NOISE * self.noise_beside(&m)? {
+                return Ok(Some(Found {
+                    theta: 0.0,
+                    functions: smallvec![m.function],
+                    touch: false,
+                }));
+            }
+        }
+        Ok(None)
     }
 
     /// The filter: which functions may vanish within the step?
@@ -278,7 +312,7 @@ impl Integrator<'_> {
                         t, order, leading, ..
                     } = deflation;
                     // A multiple zero stays within rounding for long: the end has to be clear of it.
-                    let clear = order == 1 || order == 2 && value > 1e3 * noise;
+                    let clear = order == 1 || order == 2 && value > CLEAR_OF_NOISE * noise;
                     let leading = leading * dt.powi(order);
                     let known = m.affine && t == self.t && clear;
                     !known || may_vanish_deflated(leading, order, value, rate * dt)
@@ -325,43 +359,6 @@ impl Integrator<'_> {
             self.detect_beyond(dt, &mut found)?;
         }
         Ok(found)
-    }
-
-    /// Where an exit function of sliding on an intersection vanishes, others may have vanished before that were dismissed
-    /// without a proof: as the determinant of their equations vanishes the multipliers go to infinity, some of them past
-    /// their ends, within so short a time that nothing else in the step tells.
-    fn look_before_exit(&mut self, found: &mut Option<Found>, dt: f64) -> Result<(), FieldError> {
-        let is_exit = |f: &EventFunction| matches!(f, EventFunction::Exit(_));
-        let Some(theta) = found
-            .as_ref()
-            .filter(|event| self.detector.dismissed && event.functions.iter().any(is_exit))
-            .map(|event| event.theta)
-        else {
-            return Ok(());
-        };
-        let n_sides = 2 * self.motion.sliding.len();
-        let mut before = None;
-        let mut gap = 0.5 * theta;
-        while before.is_none() && gap > self.together(dt) {
-            let at = theta - gap;
-            self.stepper.interpolant().at(at, &mut self.detector.x);
-            let x = &mut self.detector.x;
-            let exits = self.motion.field.exits(self.t + at * dt, x)?;
-            let is_beyond = exits.iter().take(n_sides).any(|&exit| exit <= 0.0);
-            before = is_beyond.then_some(at);
-            gap *= 0.25;
-        }
-        let Some(before) = before else {
-            return Ok(());
-        };
-        for index in 0..self.motion.monitored.len() {
-            let function = self.motion.monitored[index].function;
-            if matches!(function, EventFunction::Exit(side) if side < n_sides) {
-                let zero = self.search((index, false), (0.0, before), dt)?;
-                self.keep_earliest(found, index, zero, dt);
-            }
-        }
-        Ok(())
     }
 
     /// Rounding of a monitored function over the step.
