@@ -6,13 +6,16 @@
 //! as that of abs or maximum does, is slid on beyond if its field and its normal there allow it.
 
 use crate::error::FieldError;
-use crate::field::MeetingFields;
+use crate::field::{eval_on_side, MeetingFields};
 use crate::integrate::decisions::transition::{Decided, Left, Lefts};
 use crate::integrate::integrator::Integrator;
 use crate::integrate::Stop;
 use crate::mode::Mode;
-use crate::switching::{decide, first_nonzero, Arrival};
-use crate::tolerances::{EPS, MOST_MEETING, SURFACE_NOISE};
+use crate::switching::{
+    decide, decide_intersection, first_nonzero, normal_component, Arrival, Undecided,
+};
+use crate::system::{dot, dot_magnitude};
+use crate::tolerances::{AT_SIDE, EPS, MOST_MEETING, SURFACE_NOISE, TANGENT};
 
 impl Integrator<'_> {
     /// What follows where the surfaces `fresh` are reached and others jump; `None` if no other does.
@@ -36,10 +39,12 @@ impl Integrator<'_> {
             if let Some(decided) = self.leave_at_bends(mode, fresh)? {
                 return Ok(Some(Ok(decided)));
             }
-            return match self.bends_what_is_slid_on(mode, &beyond)? {
-                true => Ok(self.leave_to(&beyond, fresh, &landed)?.map(Ok)),
-                false => Ok(None),
-            };
+            if self.bends_what_is_slid_on(mode, &beyond)? {
+                return Ok(self.leave_to(&beyond, fresh, &landed)?.map(Ok));
+            }
+            let mut meeting = [fresh, self.motion.sliding()].concat();
+            meeting.sort_unstable();
+            return Ok(self.leave_along_bends(mode, &meeting)?.map(Ok));
         }
         if fresh.len() == 1 {
             if let Some(decided) = self.leave_to(&beyond, fresh, &landed)? {
@@ -226,6 +231,80 @@ impl Integrator<'_> {
         Ok(found)
     }
 
+    /// Where three and more surfaces whose normals lie in one plane meet, some of which bend at others: the motion in a region or
+    /// along one surface that leads away, if it is the only one and nothing stays, as one of the functions rises along all
+    /// fields, or falls. Multipliers of several surfaces are not looked for: normals and regions are others on every side.
+    pub(in crate::integrate) fn leave_along_bends(
+        &mut self,
+        mode: &Mode,
+        meeting: &[usize],
+    ) -> Result<Option<(Mode, Lefts)>, FieldError> {
+        let m = meeting.len();
+        let is_small = (3..=MOST_MEETING).contains(&m);
+        if !is_small || !self.system.has_nested_signs() || !self.bends(mode, meeting)? {
+            return Ok(None);
+        }
+        let n = self.x.len();
+        let (mut field, mut normals) = (vec![0.0; n], Vec::with_capacity(m << m));
+        let (mut rises, mut falls) = (vec![true; m], vec![true; m]);
+        for pattern in 0..1_usize << m {
+            let mut region = mode.clone();
+            for (bit, &j) in meeting.iter().enumerate() {
+                region.set(j, if pattern >> bit & 1 == 1 { 1 } else { -1 });
+            }
+            let (signs, t, x) = (region.signs(), self.t, &self.x[..]);
+            self.stats.n_field_evaluations += eval_on_side(self.system, t, x, &signs, &mut field)?;
+            for (bit, &j) in meeting.iter().enumerate() {
+                let mut normal = vec![0.0; n + 1];
+                normal[n] = self.system.gradient(j, t, x, &signs, &mut normal[..n])?;
+                let rate = normal[n] + dot(&normal[..n], &field);
+                let size = normal[n].abs() + dot_magnitude(&normal[..n], &field);
+                rises[bit] &= rate > TANGENT * size;
+                falls[bit] &= rate < -TANGENT * size;
+                normals.push(normal);
+            }
+        }
+        let stays = !rises.iter().chain(&falls).any(|&one_way| one_way);
+        if stays || !are_in_one_plane(normals) {
+            return Ok(None);
+        }
+        let decision = decide_intersection(self.system, meeting, mode, self.t, &self.x)?;
+        let ([only], [left]) = (&decision.candidates[..], &decision.left[..]) else {
+            return Ok(None);
+        };
+        let left = left.iter().map(|&(j, l)| Left::Surface(j, l)).collect();
+        Ok(Some((only.clone(), left)))
+    }
+
+    /// The decision where surfaces meet, unless it is to slide on one of them where the fields do not hold the motion: at a
+    /// bend normals are others on every side, which its equations know nothing of.
+    pub(in crate::integrate) fn unless_not_held(
+        &self,
+        decided: Decided,
+        meeting: &[usize],
+    ) -> Result<Decided, FieldError> {
+        let known = decided.as_ref().ok();
+        let slides = known.filter(|(after, _)| after.codimension() == 1);
+        let Some((after, _)) = slides.filter(|_| self.system.has_nested_signs()) else {
+            return Ok(decided);
+        };
+        let signs = after.signs();
+        let Some(j) = after.sliding_set().find(|&j| !self.system.sticks_at(j)) else {
+            return Ok(decided);
+        };
+        let along = |side| normal_component(self.system, j, j, side, self.t, &self.x, &signs);
+        let (minus, plus) = (along(-1)?, along(1)?);
+        let error = AT_SIDE * (minus.magnitude + plus.magnitude);
+        if minus.value >= -error && plus.value <= error {
+            return Ok(decided);
+        }
+        Ok(Err(Stop::Intersection {
+            surfaces: meeting.to_vec(),
+            candidates: Vec::new(),
+            reason: Undecided::NoOutcome,
+        }))
+    }
+
     /// What vanishes at the start of a motion in `region` that leads away from all surfaces of `meeting`, if it does.
     fn leaves_into(
         &self,
@@ -346,6 +425,33 @@ impl Integrator<'_> {
         jumped.extend(&landed);
         Ok((jumped, landed))
     }
+}
+
+/// Do vectors lie in one plane, up to rounding?
+fn are_in_one_plane(mut vectors: Vec<Vec<f64>>) -> bool {
+    let sizes: Vec<f64> = vectors.iter().map(|v| dot(v, v)).collect();
+    for _ in 0..2 {
+        // The longest one spans, and goes out of all.
+        let longest = vectors
+            .iter()
+            .max_by(|a, b| dot(a, a).total_cmp(&dot(b, b)));
+        let Some(axis) = longest.cloned() else {
+            return true;
+        };
+        let square = dot(&axis, &axis);
+        if square == 0.0 {
+            return true;
+        }
+        for vector in &mut vectors {
+            let share = dot(vector, &axis) / square;
+            vector
+                .iter_mut()
+                .zip(&axis)
+                .for_each(|(v, a)| *v -= share * a);
+        }
+    }
+    let rests = vectors.iter().map(|v| dot(v, v)).zip(sizes);
+    rests.into_iter().all(|(rest, size)| rest <= TANGENT * size)
 }
 
 /// How far functions may be from zero at a point that lies on the surfaces `reached` to this: their values, and some

@@ -70,10 +70,19 @@ impl Integrator<'_> {
                 let decision = decide(self.system, *j, arrival, self.t, &self.x, &signs)?;
                 Ok(self.follow_at_surface(&mode, *j, decision))
             }
-            _ => match self.leave_at_bends(&mode, meeting)? {
-                Some(left) => Ok(Ok(left)),
-                None => self.decide_at_start(&mode, meeting),
-            },
+            _ => {
+                let mut left = self.leave_at_bends(&mode, meeting)?;
+                if left.is_none() {
+                    left = self.leave_along_bends(&mode, meeting)?;
+                }
+                match left {
+                    Some(left) => Ok(Ok(left)),
+                    None => {
+                        let decided = self.decide_at_start(&mode, meeting)?;
+                        self.unless_not_held(decided, meeting)
+                    }
+                }
+            }
         }
     }
 

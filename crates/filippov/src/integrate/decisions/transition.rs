@@ -199,7 +199,10 @@ impl Integrator<'_> {
         let decided = match (jumping, surfaces.as_slice(), arrival) {
             (Some(decided), ..) => decided,
             (_, &[j], Some(arrival)) => self.decide_at_surface(&mode, j, arrival)?,
-            _ => self.decide_at_intersection(event, &mode, &surfaces, &fresh)?,
+            _ => {
+                let decided = self.decide_at_intersection(event, &mode, &surfaces, &fresh)?;
+                self.unless_not_held(decided, &surfaces)?
+            }
         };
         let (after, left) = match decided {
             Ok(decided) => self.leave_coinciding(decided)?,
