@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from fuzz.__main__ import check
 from fuzz.comparisons import comparisons
+from fuzz.properties import violations
 from fuzz.systems import build, random_case
 
 N = 240
@@ -65,3 +66,12 @@ def test_the_end_of_a_segment_belongs_to_the_next_one() -> None:
     assert sol.segments[k + 1].mode.is_sliding
     assert not sol.segments[k].mode.is_sliding
     assert not check(case)[1]
+
+
+def test_errors_of_long_steps_are_told_from_wrong_motions() -> None:
+    """Seed 604312: a step of DOPRI5 whose error nearly vanishes, though not that of its extension."""
+    problem = build(random_case(604312).source)
+    sol = problem.solve()
+    assert not list(violations(problem, sol))
+    wrong = build(problem.source.replace("-1.54*", "-1.53*"))
+    assert any("off the field's" in found for found in violations(wrong, sol))
