@@ -256,7 +256,14 @@ impl Integrator<'_> {
         if let Some(rest) = self.impacts_end(first, &after)? {
             return self.come_to_rest(rest, after);
         }
-        self.begin(after, &left)
+        let t = self.t;
+        let stop = self.begin(after, &left)?;
+        if self.t == t {
+            // Contact that begins with a speed below the tolerance takes that away.
+            self.recorder.jump(t, &self.x);
+            self.recorder.set_jump(first, &arrived, &self.x);
+        }
+        Ok(stop)
     }
 
     /// The surface of an action, and whether the motion goes through it from here.
