@@ -174,7 +174,9 @@ def _switches(problem: Problem, sol: fl.Solution) -> Iterator[str]:
 
 
 def _inner_times(segment: fl.Segment) -> Array:
-    return segment.t_start + segment.duration * np.array([0.08, 0.3, 0.55, 0.9])
+    times = segment.t_start + segment.duration * np.array([0.08, 0.3, 0.55, 0.9])
+    # In a segment of few rounding errors some are its end, which belongs to the next one.
+    return times[times < segment.t_end]
 
 
 def _signs(checked: Checked, segment: fl.Segment) -> Iterator[str]:

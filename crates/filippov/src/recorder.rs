@@ -123,11 +123,6 @@ impl Recorder {
         }
     }
 
-    /// Has a segment begun?
-    pub fn has_segments(&self) -> bool {
-        !self.segments.is_empty()
-    }
-
     pub fn begin_segment(
         &mut self,
         t: f64,

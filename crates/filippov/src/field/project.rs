@@ -135,3 +135,41 @@ impl Projector {
         is_finite.then_some(shifts)
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::TracedSystem;
+    use filippov_expr::{Backend, Graph, Names, UnaryOp};
+
+    /// Beside the surface x^2 + y^2 = 0.64 the products of its gradient and that of hypot(x, y) - 0.8 are those of dependent
+    /// vectors up to rounding, which must not decide how far a point is moved.
+    #[test]
+    fn surfaces_in_one_place_are_projected_onto_as_one() {
+        let mut g = Graph::new();
+        let (x, y) = (g.state(0), g.state(1));
+        let (xx, yy) = (g.mul(x, x), g.mul(y, y));
+        let square = g.add(xx, yy);
+        let (limit, radius) = (g.constant(0.64), g.constant(0.8));
+        let length = g.unary(UnaryOp::Sqrt, square);
+        let (h0, h1) = (g.sub(square, limit), g.sub(length, radius));
+        let field = vec![g.sign(h0), g.sign(h1)];
+        let names = Names::default();
+        let system = TracedSystem::new(g, field, Vec::new(), names, Backend::Auto).unwrap();
+        assert_eq!(system.n_surfaces(), 2);
+        let (mut projector, signs) = (Projector::new(2, 2), [1.0, 1.0]);
+        let mut h = [0.0; 2];
+        for k in 0..50_000 {
+            let angle = 1e-4 * f64::from(k);
+            let r = 0.8 + 1e-8 * (1e-3 * f64::from(k)).sin();
+            let mut x = [r * angle.cos(), r * angle.sin()];
+            projector
+                .project_onto(&system, &[0, 1], 0.0, &mut x, &signs)
+                .unwrap();
+            system.surfaces(0.0, &x, &signs, &mut h).unwrap();
+            assert!(h[0].abs().max(h[1].abs()) < 4e-15, "{h:?} at {angle}");
+            assert!((x[1].atan2(x[0]) - angle).sin().abs() < 1e-15);
+        }
+    }
+}

@@ -3,6 +3,7 @@
 use crate::error::FieldError;
 use crate::event::EventFunction;
 use crate::field::{IntersectionExit, MeetingFields};
+use crate::integrate::decisions::spiral::Leap;
 use crate::integrate::decisions::transition::Decided;
 use crate::integrate::detection::detect::Found;
 use crate::integrate::integrator::Integrator;
@@ -24,6 +25,8 @@ pub(in crate::integrate) struct DecidedRoot {
     pub oscillates: bool,
     /// The multiplier of sliding on one surface that begins at a two-fold.
     pub at_two_fold: Option<f64>,
+    /// The motion begins with the laps of an outward spiral.
+    pub leap: Option<Leap>,
 }
 
 impl Integrator<'_> {
@@ -299,12 +302,12 @@ impl Integrator<'_> {
         candidates.extend(rest.clone().filter(|mode| !candidates.contains(mode)));
         let is_spiral = matches!(resolution.chosen, Some(Continuation::OutwardSpiral));
         let asked = self.asked().filter(|asked| candidates.contains(asked));
-        let (mut after, leaving) = match &resolution.chosen {
-            Some(Continuation::Mode(chosen)) => (on_all(chosen), meeting.to_vec()),
+        let (mut after, leap) = match &resolution.chosen {
+            Some(Continuation::Mode(chosen)) => (on_all(chosen), None),
             Some(Continuation::OutwardSpiral) => match asked {
-                Some(asked) => (asked.clone(), meeting.to_vec()),
-                None => match self.start_spiral(meeting, mode, fields)? {
-                    Some((region, border)) => (region, vec![border]),
+                Some(asked) => (asked.clone(), None),
+                None => match self.outward_leap(meeting, mode, fields)? {
+                    Some(leap) => (leap.region.clone(), Some(leap)),
                     None => {
                         return self.decide_by_higher_order(mode, meeting, Ok(resolution), rest)
                     }
@@ -330,11 +333,15 @@ impl Integrator<'_> {
         if let Some(decided) = self.decide_at_tangency(&after, meeting)? {
             return Ok(decided);
         }
-        let left = self.departures(&after, &leaving, multipliers)?;
+        let left = match &leap {
+            Some(leap) => self.departures_after(leap)?,
+            None => self.departures(&after, meeting, multipliers)?,
+        };
         self.decided = DecidedRoot {
             multipliers: multipliers.to_vec(),
             oscillates: after == preferred && resolution.oscillates,
             at_two_fold: None,
+            leap,
         };
         Ok(Ok((after, left)))
     }

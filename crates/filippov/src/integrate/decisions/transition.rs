@@ -392,12 +392,13 @@ impl Integrator<'_> {
         mode: Mode,
         left: &[Left],
     ) -> Result<Option<Stop>, FieldError> {
-        let deflations: SmallVec<[_; 2]> =
-            left.iter().filter_map(|l| l.deflation(self.t)).collect();
         self.stats.n_field_evaluations += self.motion.field.n_evaluations();
         self.remember_pace();
-        self.note_resting(&mode, left)?;
         let slid = !self.motion.sliding().is_empty();
+        let leaps = self.begin_with_leap()?;
+        let deflations: SmallVec<[_; 2]> =
+            left.iter().filter_map(|l| l.deflation(self.t)).collect();
+        self.note_resting(&mode, left)?;
         self.motion.restart(self.system, self.t, mode, &deflations);
         let zeros = self.motion.monitored.iter_mut();
         for zero in zeros.filter_map(|m| m.deflation.as_mut()) {
@@ -421,13 +422,15 @@ impl Integrator<'_> {
         self.rest_on_coinciding()?;
         self.evaluate_start()?;
         self.note_oscillation();
-        let multipliers = self.motion.multipliers();
-        self.recorder.begin_segment(
-            self.t,
-            &self.motion.mode,
-            multipliers,
-            &self.motion.discrete,
-        );
+        if !leaps {
+            let multipliers = self.motion.multipliers();
+            self.recorder.begin_segment(
+                self.t,
+                &self.motion.mode,
+                multipliers,
+                &self.motion.discrete,
+            );
+        }
         if let Some(stop) = self.refusal() {
             return Ok(Some(stop));
         }

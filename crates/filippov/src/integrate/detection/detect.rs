@@ -26,6 +26,8 @@ pub(in crate::integrate) struct Detector {
     pub unresolved: bool,
     /// A monitored function could not be searched; the step has to be shortened.
     pub uncertain: bool,
+    /// An exit function was not searched though nothing was proved about it.
+    pub dismissed: bool,
     /// Rounding blurs the zero that was found: it may be a multiple one.
     pub blurred: bool,
     /// How far below zero the touch that was found may be, else 0.
@@ -74,6 +76,7 @@ impl Detector {
             stages: Vec::new(),
             unresolved: false,
             uncertain: false,
+            dismissed: false,
             blurred: false,
             depth: 0.0,
             blur: 0.0,
@@ -189,6 +192,7 @@ impl Integrator<'_> {
         let end = (t1, self.stepper.end(), self.stepper.end_derivative());
         self.detector.unresolved = false;
         self.detector.uncertain = false;
+        self.detector.dismissed = false;
         self.detector.blurred = false;
         self.detector.depth = 0.0;
         self.detector.blur = 0.0;
@@ -235,6 +239,7 @@ impl Integrator<'_> {
                 self.keep_earliest(&mut found, index, zero, dt);
             }
         }
+        self.look_before_exit(&mut found, dt)?;
         if found.is_none() && self.one_sided && !self.detector.uncertain {
             self.detect_beyond(dt, &mut found)?;
         }
@@ -321,6 +326,8 @@ impl Integrator<'_> {
             };
             if suspect {
                 self.detector.suspects.push((index, proof == Proof::Open));
+            } else if proof == Proof::Silent {
+                self.detector.dismissed |= matches!(m.function, EventFunction::Exit(_));
             }
         }
         Ok(())
@@ -347,6 +354,7 @@ impl Integrator<'_> {
                 reach = searched;
             }
         }
+        self.look_before_exit(&mut found, dt)?;
         if found.is_none() && self.one_sided && !self.detector.uncertain {
             self.detect_beyond(dt, &mut found)?;
         }

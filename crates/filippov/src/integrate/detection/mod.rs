@@ -3,6 +3,7 @@
 pub(super) mod bounds;
 pub(super) mod curve;
 pub(super) mod detect;
+pub(super) mod missed_exits;
 pub(super) mod multiple_zero;
 pub(super) mod search;
 pub(super) mod user_events;

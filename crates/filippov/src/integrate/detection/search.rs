@@ -199,7 +199,11 @@ impl Integrator<'_> {
         } else {
             self.prove_clear(index, value, reach)
         };
-        if proof == Proof::Clear || proof == Proof::Silent && !self.exit_may_vanish(&m) {
+        if proof == Proof::Silent && !self.exit_may_vanish(&m) {
+            self.detector.dismissed |= matches!(m.function, EventFunction::Exit(_));
+            return Ok((None, reach));
+        }
+        if proof == Proof::Clear {
             return Ok((None, reach));
         }
         let near = if has_series {
