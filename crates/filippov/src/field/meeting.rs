@@ -5,7 +5,7 @@ use super::weights::product_weights;
 use crate::error::FieldError;
 use crate::switching::{Matrix, NormalFields, SignGroup, Undecided};
 use crate::system::{dot, PiecewiseSystem};
-use crate::tolerances::TANGENT_TO_ALL;
+use crate::tolerances::{TANGENT, TANGENT_TO_ALL};
 
 /// The fields around an intersection of m surfaces, and the gradients of the switching functions.
 ///
@@ -190,6 +190,34 @@ impl MeetingFields {
         let lengths = self.gradients.chunks_exact(self.n);
         let factors: Vec<f64> = lengths.map(|g| 1.0 / dot(g, g).sqrt()).collect();
         Ok(self.normal_fields()?.scaled(&factors))
+    }
+
+    /// Does the field depend on the sign of surface `i` of the set, by more than rounding?
+    pub fn depends_on(&self, i: usize) -> bool {
+        let size = self
+            .fields
+            .iter()
+            .fold(0.0_f64, |size, v| size.max(v.abs()));
+        let mut first = 0;
+        for group in &self.groups {
+            let patterns = 0..1_usize << group.len();
+            let start = first;
+            first += patterns.len();
+            let Some(bit) = group.iter().position(|&member| member == i) else {
+                continue;
+            };
+            return patterns
+                .filter(|pattern| pattern >> bit & 1 == 1)
+                .any(|up| {
+                    let (up, down) = (
+                        self.field(start + up),
+                        self.field(start + (up ^ (1 << bit))),
+                    );
+                    let mut pairs = up.iter().zip(down);
+                    pairs.any(|(a, b)| (a - b).abs() > TANGENT * size)
+                });
+        }
+        false
     }
 
     /// The surfaces, counted within the set, whose equation says anything about the multipliers. To the others

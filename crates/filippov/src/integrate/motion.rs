@@ -217,6 +217,8 @@ pub(super) struct Motion<'a> {
     law: Law<'a>,
     /// Surfaces that the motion stays on by either field, so that h is zero all along: not monitored.
     pub resting: SmallVec<[usize; 2]>,
+    /// This run has met kinks in the place of other surfaces.
+    pub meets_kinks: bool,
     actions: &'a Actions<'a>,
     /// The discrete states.
     pub discrete: Vec<f64>,
@@ -248,6 +250,7 @@ impl<'a> Motion<'a> {
             sticks: false,
             law,
             resting: SmallVec::new(),
+            meets_kinks: false,
             actions,
             discrete: actions.discrete.clone(),
             signs,

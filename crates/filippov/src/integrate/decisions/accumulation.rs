@@ -128,6 +128,12 @@ impl Integrator<'_> {
         if let Some(decided) = self.decide_where_others_jump(mode, meeting)? {
             return Ok(decided);
         }
+        let without_kinks = self.decide_without_kinks(mode, meeting, |this, others| {
+            this.decide_at_limit(mode, others)
+        })?;
+        if let Some(decided) = without_kinks {
+            return Ok(decided);
+        }
         let fields = self.corners(meeting, mode)?;
         let telling = fields.telling();
         let stays = fields.normal_fields().is_ok_and(|fields| {

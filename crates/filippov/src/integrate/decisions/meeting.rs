@@ -1,23 +1,20 @@
 //! Where surfaces meet: what follows at an intersection, from the switching stage.
 
-use smallvec::smallvec;
-
 use crate::error::FieldError;
 use crate::event::EventFunction;
-use crate::field::{IntersectionExit, IntersectionField, MeetingFields, SlidingField, SmoothField};
+use crate::field::{IntersectionExit, MeetingFields};
 use crate::integrate::decisions::spiral::Leap;
-use crate::integrate::decisions::transition::{Decided, Left, Lefts};
+use crate::integrate::decisions::transition::Decided;
 use crate::integrate::detection::detect::Found;
 use crate::integrate::integrator::Integrator;
 use crate::integrate::motion::{Law, ModeField};
 use crate::integrate::Stop;
 use crate::mode::Mode;
 use crate::switching::{
-    admissible, decide, first_nonzero, has_one_mode_only, merged_root, region_at_rest, resolve,
-    Arrival, Continuation, ExitKind, Incoming, Leading, NormalFields, Resolution, Undecided,
+    admissible, decide, has_one_mode_only, merged_root, region_at_rest, resolve, Arrival,
+    Continuation, ExitKind, Incoming, NormalFields, Resolution, Undecided,
 };
-use crate::system::{dot, dot_magnitude};
-use crate::tolerances::{DEPARTS_TANGENTIALLY, DRIFT_SHARE, EPS, MOST_LISTED, MOST_MEETING};
+use crate::tolerances::{DRIFT_SHARE, EPS, MOST_LISTED, MOST_MEETING};
 
 /// The root at which a motion on an intersection begins.
 #[derive(Default)]
@@ -41,6 +38,14 @@ impl Integrator<'_> {
         meeting: &[usize],
         fresh: &[usize],
     ) -> Result<Decided, FieldError> {
+        let without_kinks = self.decide_without_kinks(mode, meeting, |this, others| {
+            let is_other = |j: &usize| others.contains(j);
+            let fresh: Vec<usize> = fresh.iter().copied().filter(is_other).collect();
+            this.decide_at_intersection(event, mode, others, &fresh)
+        })?;
+        if let Some(decided) = without_kinks {
+            return Ok(decided);
+        }
         let decided = self.decide_with_static_friction(event, mode, meeting, fresh)?;
         self.decide_with_kinetic_friction(decided, meeting)
     }
@@ -125,6 +130,12 @@ impl Integrator<'_> {
         mode: &Mode,
         meeting: &[usize],
     ) -> Result<Decided, FieldError> {
+        let without_kinks = self.decide_without_kinks(mode, meeting, |this, others| {
+            this.decide_at_start(mode, others)
+        })?;
+        if let Some(decided) = without_kinks {
+            return Ok(decided);
+        }
         if let Some(decided) = self.decide_by_relay(None, mode, meeting)? {
             return Ok(decided);
         }
@@ -259,9 +270,6 @@ impl Integrator<'_> {
         resolution: Result<Resolution, Undecided>,
         others: &[Continuation],
     ) -> Result<Decided, FieldError> {
-        if let Some(decided) = self.decide_without_inner(mode, meeting, fields)? {
-            return Ok(decided);
-        }
         let rest = region_at_rest(self.system, fields, mode, self.t, &self.x)?;
         let resolution = match resolution {
             Ok(resolution) if !resolution.degenerate => resolution,
@@ -368,123 +376,6 @@ impl Integrator<'_> {
         let others: Vec<usize> = meeting.iter().copied().filter(|&k| k != j).collect();
         left.extend(self.departures(&after, &others, &[])?);
         Ok(Some(Ok((after, left))))
-    }
-
-    /// The surfaces of `meeting` that the motion in `after` leaves, with the leading derivatives of h.
-    pub(in crate::integrate) fn departures(
-        &mut self,
-        after: &Mode,
-        meeting: &[usize],
-        multipliers: &[f64],
-    ) -> Result<Lefts, FieldError> {
-        let mut left: Lefts = smallvec![];
-        let leaving: Vec<usize> = meeting
-            .iter()
-            .copied()
-            .filter(|&j| after.entries()[j] != 0)
-            .collect();
-        if leaving.is_empty() {
-            return Ok(left);
-        }
-        let (n, signs) = (self.x.len(), after.signs());
-        let mut velocity = vec![0.0; n];
-        self.velocity_in(after, multipliers, self.t, &self.x.clone(), &mut velocity)?;
-        let mut gradient = vec![0.0; n];
-        for j in leaving {
-            let ht = self
-                .system
-                .gradient(j, self.t, &self.x, &signs, &mut gradient)?;
-            let value = ht + dot(&gradient, &velocity);
-            let size = ht.abs() + dot_magnitude(&gradient, &velocity);
-            let leading = if value.abs() > DEPARTS_TANGENTIALLY * size
-                && self.departs_clearly(after, multipliers, j, value)?
-            {
-                Leading { order: 1, value }
-            } else if after.codimension() == 0 {
-                let side = after.entries()[j];
-                first_nonzero(self.system, j, side, 1, self.t, &self.x, &signs)?
-            } else {
-                // The normal component vanishes at the exit of a multiplier: its rate along the new motion.
-                let value = self.acceleration_of(after, multipliers, j, &velocity)?;
-                Leading { order: 2, value }
-            };
-            left.push(Left::Surface(j, leading));
-        }
-        Ok(left)
-    }
-
-    /// Is a normal component clear of rounding, compared with that beyond the surface? At the exit of a multiplier
-    /// all forces may balance, and nothing of the motion itself tells how large they are.
-    fn departs_clearly(
-        &mut self,
-        after: &Mode,
-        multipliers: &[f64],
-        j: usize,
-        value: f64,
-    ) -> Result<bool, FieldError> {
-        let beyond = after.with(j, -after.entries()[j]);
-        let (x, mut velocity) = (self.x.clone(), vec![0.0; self.x.len()]);
-        self.velocity_in(&beyond, multipliers, self.t, &x, &mut velocity)?;
-        let mut gradient = vec![0.0; x.len()];
-        let signs = beyond.signs();
-        let ht = self.system.gradient(j, self.t, &x, &signs, &mut gradient)?;
-        let other = ht + dot(&gradient, &velocity);
-        let is_rounding = value.abs() <= DEPARTS_TANGENTIALLY * other.abs();
-        Ok(!is_rounding)
-    }
-
-    /// The rate of dh_j/dt along the motion in `after`, which has this velocity.
-    fn acceleration_of(
-        &mut self,
-        after: &Mode,
-        multipliers: &[f64],
-        j: usize,
-        velocity: &[f64],
-    ) -> Result<f64, FieldError> {
-        let (n, signs) = (self.x.len(), after.signs());
-        let mut gradient = vec![0.0; n];
-        let ht = self
-            .system
-            .gradient(j, self.t, &self.x, &signs, &mut gradient)?;
-        let now = ht + dot(&gradient, velocity);
-        let dt = DRIFT_SHARE * self.stepper.interpolant().dt;
-        let pairs = self.x.iter().zip(velocity);
-        let ahead: Vec<f64> = pairs.map(|(x, v)| x + dt * v).collect();
-        let mut next = vec![0.0; n];
-        self.velocity_in(after, multipliers, self.t + dt, &ahead, &mut next)?;
-        let ht = self
-            .system
-            .gradient(j, self.t + dt, &ahead, &signs, &mut gradient)?;
-        Ok((ht + dot(&gradient, &next) - now) / dt)
-    }
-
-    /// The field of a mode at a point near the current one.
-    pub(in crate::integrate) fn velocity_in(
-        &mut self,
-        mode: &Mode,
-        multipliers: &[f64],
-        t: f64,
-        x: &[f64],
-        velocity: &mut [f64],
-    ) -> Result<(), FieldError> {
-        let (signs, mut x) = (mode.signs(), x.to_vec());
-        let set: Vec<usize> = mode.sliding_set().collect();
-        self.stats.n_field_evaluations += match set.as_slice() {
-            [] => crate::field::eval_on_side(self.system, t, &x, &signs, velocity)?,
-            &[j] => {
-                let mut field = SlidingField::new(self.system, j, &signs);
-                field.eval(t, &mut x, velocity)?;
-                field.n_evaluations()
-            }
-            _ => {
-                let field = IntersectionField::new(self.system, &set, &signs, multipliers);
-                let field = field.with_rule(self.options.sliding);
-                let mut field = field.with_scaling(&self.kappa(&set));
-                field.eval(t, &mut x, velocity)?;
-                field.n_evaluations()
-            }
-        };
-        Ok(())
     }
 }
 

@@ -3,6 +3,8 @@
 pub(super) mod accumulation;
 pub(super) mod between_sides;
 pub(super) mod choice;
+pub(super) mod coinciding;
+pub(super) mod departures;
 pub(super) mod leave_by_rule;
 pub(super) mod meeting;
 pub(super) mod nested;

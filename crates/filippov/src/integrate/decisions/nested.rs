@@ -6,14 +6,12 @@
 //! as that of abs or maximum does, is slid on beyond if its field and its normal there allow it.
 
 use crate::error::FieldError;
-use crate::field::{eval_on_side, MeetingFields};
+use crate::field::eval_on_side;
 use crate::integrate::decisions::transition::{Decided, Left, Lefts};
 use crate::integrate::integrator::Integrator;
 use crate::integrate::Stop;
 use crate::mode::Mode;
-use crate::switching::{
-    decide, decide_intersection, first_nonzero, normal_component, Arrival, Undecided,
-};
+use crate::switching::{decide_intersection, first_nonzero, normal_component, Undecided};
 use crate::system::{dot, dot_magnitude};
 use crate::tolerances::{AT_SIDE, EPS, MOST_MEETING, SURFACE_NOISE, TANGENT};
 
@@ -324,46 +322,6 @@ impl Integrator<'_> {
         }
         let is_left = |left: &Left| matches!(left, Left::Surface(_, leading) if leading.order > 0);
         Ok(left.iter().any(is_left).then_some(left))
-    }
-
-    /// What follows where two surfaces are in one place and the field depends on one of them only, as on
-    /// `x + x*abs(x)` beside `x`: that one decides.
-    pub(in crate::integrate) fn decide_without_inner(
-        &mut self,
-        mode: &Mode,
-        meeting: &[usize],
-        corners: &MeetingFields,
-    ) -> Result<Option<Decided>, FieldError> {
-        let &[first, second] = meeting else {
-            return Ok(None);
-        };
-        if !self.system.has_nested_signs() {
-            return Ok(None);
-        }
-        let same = |a: usize, b: usize| corners.field(a) == corners.field(b);
-        let (j, k) = match (same(0, 1) && same(2, 3), same(0, 2) && same(1, 3)) {
-            (true, false) => (second, first),
-            (false, true) => (first, second),
-            _ => return Ok(None),
-        };
-        if !self.are_parallel(j, k, mode)? {
-            return Ok(None);
-        }
-        let arrival = match mode.entries()[j] {
-            0 => Arrival::Start,
-            side => Arrival::Region(side),
-        };
-        let decision = decide(self.system, j, arrival, self.t, &self.x, &mode.signs())?;
-        let (mut after, mut left) = match self.follow_at_surface(mode, j, decision) {
-            Ok(followed) => followed,
-            Err(stop) => return Ok(Some(Err(stop))),
-        };
-        if after.entries()[j] != 0 {
-            self.leave_together(j, k, &mut after, &mut left)?;
-        } else if after.entries()[k] == 0 {
-            after.set(k, 1);
-        }
-        Ok(Some(Ok((after, left))))
     }
 
     /// Has one of the surfaces another normal on the other side of one of them, or none at all?

@@ -2,15 +2,14 @@
 //! one slid on.
 
 use crate::error::FieldError;
-use crate::event::{EventFunction, Monitored};
+use crate::event::EventFunction;
 use crate::integrate::decisions::choice::NOT_UNIQUE_AT;
 use crate::integrate::decisions::transition::{Left, Lefts};
 use crate::integrate::integrator::Integrator;
 use crate::integrate::{Warning, WarningCode};
 use crate::mode::Mode;
-use crate::switching::{first_nonzero, Leading};
-use crate::system::dot;
-use crate::tolerances::{BESIDE, COINCIDE, LEFT_RESTING, NEARLY_ZERO, TANGENT};
+use crate::switching::first_nonzero;
+use crate::tolerances::{LEFT_RESTING, NEARLY_ZERO};
 
 impl Integrator<'_> {
     /// Notes the surfaces that the motion in `mode` does not leave, and names those that the field beyond would not leave
@@ -120,108 +119,5 @@ impl Integrator<'_> {
             }
         }
         Ok(false)
-    }
-
-    /// The surfaces that are in the place of the one slid on, as `x` beside `x + x*abs(x)`: they vanish all along the
-    /// motion, and are no events.
-    pub(in crate::integrate) fn rest_on_coinciding(&mut self) -> Result<(), FieldError> {
-        let &[j] = self.motion.sliding() else {
-            return Ok(());
-        };
-        if !self.system.has_nested_signs() {
-            return Ok(());
-        }
-        // Beside the current point, so that surfaces that only touch are told apart.
-        let t = self.t + BESIDE * (1.0 + self.t.abs());
-        let shifts = (0..self.x.len()).map(|i| BESIDE * (1.0 + 1.0 / (2.0 + i as f64)));
-        let pairs = self.x.iter().zip(shifts);
-        let mut beside: Vec<f64> = pairs.map(|(x, d)| x + d * (1.0 + x.abs())).collect();
-        self.motion.project(t, &mut beside)?;
-        let signs = self.motion.signs.clone();
-        let mut h = vec![0.0; signs.len()];
-        self.system.surfaces(t, &beside, &signs, &mut h)?;
-        let here = self.surface_values(&signs)?;
-        for k in (0..h.len()).filter(|&k| k != j && self.motion.active[k]) {
-            let mut gradient = vec![0.0; beside.len()];
-            let rate = self.system.gradient(k, t, &beside, &signs, &mut gradient)?;
-            let size = rate.abs() + gradient.iter().fold(0.0_f64, |sum, g| sum + g.abs());
-            let coincides = h[k].abs().max(here[k].abs()) <= COINCIDE * size;
-            if coincides && size > 0.0 && !self.motion.resting.contains(&k) {
-                self.motion.resting.push(k);
-                let is_other = |m: &Monitored| m.function != EventFunction::Surface(k);
-                self.motion.monitored.retain(is_other);
-            }
-        }
-        Ok(())
-    }
-
-    /// The sides of the surfaces that the motion rested on, after a switch.
-    pub(in crate::integrate) fn leave_coinciding(
-        &mut self,
-        (mut after, mut left): (Mode, Lefts),
-    ) -> Result<(Mode, Lefts), FieldError> {
-        let &[j] = self.motion.sliding() else {
-            return Ok((after, left));
-        };
-        let is_nested = self.system.has_nested_signs();
-        if !is_nested || self.motion.resting.is_empty() || after.entries()[j] == 0 {
-            return Ok((after, left));
-        }
-        for k in self.motion.resting.clone() {
-            if left.iter().all(|left| left.surface() != k) {
-                self.leave_together(j, k, &mut after, &mut left)?;
-            }
-        }
-        Ok((after, left))
-    }
-
-    /// Surface k is left as surface j is, which is in the same place.
-    pub(in crate::integrate) fn leave_together(
-        &self,
-        j: usize,
-        k: usize,
-        after: &mut Mode,
-        left: &mut Lefts,
-    ) -> Result<(), FieldError> {
-        let leading = left.iter().find_map(|left| match left {
-            Left::Surface(of, leading) if *of == j => Some(*leading),
-            _ => None,
-        });
-        let Some(Leading { order, value }) = leading else {
-            return Ok(());
-        };
-        let (signs, n) = (after.signs(), self.x.len());
-        let (mut known, mut other) = (vec![0.0; n], vec![0.0; n]);
-        let (t, x) = (self.t, &self.x[..]);
-        let rates = [
-            self.system.gradient(j, t, x, &signs, &mut known)?,
-            self.system.gradient(k, t, x, &signs, &mut other)?,
-        ];
-        let ratio = (dot(&known, &other) + rates[0] * rates[1])
-            / (dot(&known, &known) + rates[0] * rates[0]);
-        if ratio.is_finite() && ratio != 0.0 {
-            after.set(k, if ratio * value > 0.0 { 1 } else { -1 });
-            let value = ratio * value;
-            left.push(Left::Surface(k, Leading { order, value }));
-        }
-        Ok(())
-    }
-
-    /// Have two surfaces the same normal, up to its length?
-    pub(in crate::integrate) fn are_parallel(
-        &self,
-        j: usize,
-        k: usize,
-        mode: &Mode,
-    ) -> Result<bool, FieldError> {
-        let (signs, n) = (mode.signs(), self.x.len());
-        let (mut one, mut other) = (vec![0.0; n + 1], vec![0.0; n + 1]);
-        for (j, row) in [(j, &mut one), (k, &mut other)] {
-            row[n] = self
-                .system
-                .gradient(j, self.t, &self.x, &signs, &mut row[..n])?;
-        }
-        let (product, squares) = (dot(&one, &other), dot(&one, &one) * dot(&other, &other));
-        Ok(squares > 0.0 && squares - product * product <= TANGENT * squares)
     }
 }
