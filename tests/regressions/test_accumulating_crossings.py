@@ -69,3 +69,44 @@ def test_twisting_controller_reaches_the_origin_in_finite_time() -> None:
         assert (limit.kind, limit.mode_after) == ("accumulation", (0, 0))
         assert limit.t == pytest.approx(12.264208764653926, abs=1e-8)
         assert np.abs(sol.y[:, sol.t >= limit.t]).max() < 1e-12
+
+
+@pytest.mark.parametrize("method", ["auto", "DOPRI5", "Rodas5P"])
+@pytest.mark.parametrize("rtol", [1e-6, 1e-8, 1e-10])
+def test_lines_that_meet_at_an_instant_only_are_not_met_before(method: str, rtol: float) -> None:
+    """Three moving curves in the plane shrink to a point around the motion; nearby they do not meet."""
+
+    def fun(t: float, x: Any) -> list[Any]:
+        first = np.where(x[1] + 0.4 * np.sin(0.97 * t) > 0, 0.1 * np.exp(-(x[0] ** 2)), -1.11)
+        second = np.sign(np.exp(x[0]) - 1.0 - 0.8 * x[1])
+        third = np.where(0.5 * x[1] + 0.5 * x[0] > -0.383, -0.451 * np.sqrt(1.0 + x[1] ** 2), 0.9)
+        return [
+            0.239 - 0.912 * x[0] + 1.199 * x[1] + 1.78 * first - 1.65 * second - 1.63 * third,
+            0.6 * np.sin(2.069 * t) - 0.3 * x[1] - 1.54 * first - 1.79 * second + 1.42 * third,
+        ]
+
+    sol = fl.solve_ivp(fun, (0.0, 2.0), [-1.4, 0.5], method=method, rtol=rtol, atol=rtol)
+    assert sol.success, sol.message
+    (limit,) = [switch for switch in sol.switches if switch.kind == "accumulation"]
+    # Where 0.4 sin(0.97 t) = -y, x + y = -0.766 and exp(x) - 1 = 0.8 y.
+    assert limit.t == pytest.approx(1.8392148713, abs=3e-8)
+    for side in ("left", "right"):
+        np.testing.assert_allclose(sol.sol(limit.t, side=side), limit.y_after, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("method", ["auto", "DOPRI5", "DOP853", "Rodas5P"])
+def test_a_limit_that_no_sliding_leaves_stops_by_name(method: str) -> None:
+    """All fields are tangent to the first surface there, and not along any motion that slides on both."""
+
+    def fun(t: float, x: Any) -> list[Any]:
+        above, side = np.heaviside(x[1] + 0.8, 0.5), np.sign(x[2] + 0.049)
+        return [
+            1.0 - 0.3 * x[0] - 0.8 * x[1] - 0.2 * x[0] ** 3 - 0.67 * above - 1.22 * side,
+            -0.794 * x[1] + 1.3 * x[2] + 0.649 * np.arctan(x[2] - x[0]),
+            -0.32 * x[2] + 1.02 * x[0] - 1.85 * above - 0.84 * side,
+        ]
+
+    sol = fl.solve_ivp(fun, (4.14, 5.0), [1.1623, -0.79999, -0.0489], method=method, rtol=1e-6, atol=1e-6)
+    assert not sol.success
+    assert "all fields are tangent to surface 0 of the intersection" in sol.message
+    np.testing.assert_allclose(sol.y[:, -1], [1.1621, -0.8, -0.049], rtol=0, atol=1e-4)

@@ -291,3 +291,14 @@ pub const VANISHED: f64 = 1e-3;
 /// A gradient depends on others where the square of its part orthogonal to them is below this fraction of its own: the
 /// rounding of inner products.
 pub const DEPENDENT: f64 = 64.0 * EPS;
+
+/// Equations that say nothing are looked at again after this part of the time that is left: what changes at the rate of the
+/// motion is then clear of `TANGENT_TO_ALL`.
+pub const TANGENT_FOR: f64 = 1e-4;
+
+/// Where the modes are tried for a moment, how long that is, as a part of the time that is left: a triple zero is then clear
+/// of rounding, and nothing else has changed much.
+pub const LOOK_AHEAD: f64 = 1e-4;
+
+/// Most surfaces that meet of which all modes are tried.
+pub const MOST_TRIED: usize = 3;

@@ -3,15 +3,17 @@
 use smallvec::SmallVec;
 
 use crate::error::FieldError;
-use crate::field::Projector;
+use crate::field::{MeetingFields, Projector};
 use crate::integrate::decisions::transition::Decided;
 use crate::integrate::integrator::Integrator;
 use crate::integrate::Stop;
 use crate::mode::Mode;
 use crate::solution::Switch;
-use crate::switching::{accumulate, admissible, least_multipliers, Kind, Return};
+use crate::switching::{accumulate, admissible, least_multipliers, Kind, Return, Undecided};
 use crate::system::dot;
-use crate::tolerances::{LONGEST_TURN, MOST_MEETING, NEAREST_ACCUMULATION};
+use crate::tolerances::{
+    LONGEST_TURN, MOST_MEETING, NEAREST_ACCUMULATION, SURFACE_NOISE, TANGENT_FOR,
+};
 
 /// The limit of accumulating switches.
 pub(in crate::integrate) struct Limit {
@@ -67,11 +69,28 @@ impl Integrator<'_> {
         let mut projector = Projector::new(x.len(), self.system.n_surfaces());
         let signs = self.motion.mode.signs();
         projector.project_onto(self.system, &meeting, limit.time, &mut x, &signs)?;
-        Ok(Some(Limit {
+        let limit = Limit {
             t: limit.time,
             x,
             meeting,
-        }))
+        };
+        Ok(self.is_on_all(&limit)?.then_some(limit))
+    }
+
+    /// Do the surfaces meet at the limit? Three lines in a plane need not.
+    fn is_on_all(&self, limit: &Limit) -> Result<bool, FieldError> {
+        let (signs, mut h) = (
+            self.motion.mode.signs(),
+            vec![0.0; self.system.n_surfaces()],
+        );
+        self.system.surfaces(limit.t, &limit.x, &signs, &mut h)?;
+        for &j in &limit.meeting {
+            let size = self.system.surface_size(j, limit.t, &limit.x, &signs)?;
+            if h[j].abs() > SURFACE_NOISE * size {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 
     /// The current point as a limit: crossings of several surfaces follow one another without any progress of
@@ -136,8 +155,18 @@ impl Integrator<'_> {
         }
         let fields = self.corners(meeting, mode)?;
         let telling = fields.telling();
+        let silent = (0..meeting.len()).find(|place| !telling.contains(place));
+        if let Some(surface) = silent {
+            if !self.stays_tangent(mode, meeting, &telling)? {
+                return Ok(Err(Stop::Intersection {
+                    surfaces: meeting.to_vec(),
+                    candidates: Vec::new(),
+                    reason: Undecided::Tangent { surface },
+                }));
+            }
+        }
         let stays = fields.normal_fields().is_ok_and(|fields| {
-            if telling.len() < meeting.len() {
+            if silent.is_some() {
                 return least_multipliers(&fields, &telling).is_some();
             }
             let found = admissible(&fields);
@@ -155,6 +184,28 @@ impl Integrator<'_> {
             )));
         }
         self.decide_at_start(mode, meeting)
+    }
+
+    /// Do the equations that say nothing at the limit say nothing either a moment later, along the motion on all surfaces?
+    fn stays_tangent(
+        &mut self,
+        mode: &Mode,
+        meeting: &[usize],
+        telling: &[usize],
+    ) -> Result<bool, FieldError> {
+        let mut after = mode.clone();
+        meeting.iter().for_each(|&j| after.set(j, 0));
+        let (x, mut velocity) = (self.x.clone(), vec![0.0; self.x.len()]);
+        self.velocity_in(&after, &[], self.t, &x, &mut velocity)?;
+        let moment = TANGENT_FOR * (self.t_end - self.t);
+        let pairs = x.iter().zip(&velocity);
+        let mut ahead: Vec<f64> = pairs.map(|(x, v)| x + moment * v).collect();
+        let t = self.t + moment;
+        let mut projector = Projector::new(x.len(), self.system.n_surfaces());
+        projector.project_onto(self.system, meeting, t, &mut ahead, &after.signs())?;
+        let mut later = MeetingFields::new(self.system, meeting);
+        self.stats.n_field_evaluations += later.evaluate(self.system, t, &ahead, &after.signs())?;
+        Ok(later.telling() == telling)
     }
 
     /// Distance of a switch to the intersection, h_j in units of its gradient.

@@ -104,6 +104,11 @@ impl Integrator<'_> {
                 self.rest_in(rest, meeting)?
             }
             _ => {
+                if decision.candidates.is_empty() {
+                    if let Some(decided) = self.decide_by_trial(mode, meeting)? {
+                        return Ok(decided);
+                    }
+                }
                 return Ok(Err(Stop::Intersection {
                     surfaces: meeting.to_vec(),
                     candidates: decision.candidates,

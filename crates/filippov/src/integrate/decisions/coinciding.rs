@@ -53,12 +53,27 @@ impl Integrator<'_> {
     }
 
     /// Have two of the surfaces the same normal, or has one none?
-    fn have_parallels(&self, meeting: &[usize], mode: &Mode) -> Result<bool, FieldError> {
+    pub(in crate::integrate) fn have_parallels(
+        &self,
+        meeting: &[usize],
+        mode: &Mode,
+    ) -> Result<bool, FieldError> {
         let rows = meeting.iter().map(|&j| self.normal(j, mode));
         let rows: Vec<Vec<f64>> = rows.collect::<Result<_, _>>()?;
         let pairs = (0..rows.len()).flat_map(|j| (0..j).map(move |k| (j, k)));
         let mut pairs = pairs.map(|(j, k)| parallel(&rows[j], &rows[k]));
         Ok(pairs.any(|parallel| parallel))
+    }
+
+    /// Have two surfaces the same normal here, without being in one place?
+    pub(in crate::integrate) fn touch_one_another(
+        &mut self,
+        j: usize,
+        k: usize,
+        mode: &Mode,
+    ) -> Result<bool, FieldError> {
+        let are_parallel = self.have_parallels(&[j, k], mode)?;
+        Ok(are_parallel && self.in_the_place_of(j, &[k], mode)?.is_empty())
     }
 
     /// The meeting without its kinks, decided by `decide`, or by one surface where only that is left; `None` where

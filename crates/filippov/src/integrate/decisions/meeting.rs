@@ -46,6 +46,9 @@ impl Integrator<'_> {
         if let Some(decided) = without_kinks {
             return Ok(decided);
         }
+        if let Some(decided) = self.decide_where_two_touch(mode, meeting)? {
+            return Ok(decided);
+        }
         let decided = self.decide_with_static_friction(event, mode, meeting, fresh)?;
         self.decide_with_kinetic_friction(decided, meeting)
     }

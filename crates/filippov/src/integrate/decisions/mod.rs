@@ -6,6 +6,7 @@ pub(super) mod choice;
 pub(super) mod coinciding;
 pub(super) mod departures;
 pub(super) mod leave_by_rule;
+pub(super) mod look_ahead;
 pub(super) mod meeting;
 pub(super) mod nested;
 pub(super) mod placement;

@@ -24,8 +24,8 @@ impl Integrator<'_> {
         mode: &Mode,
         meeting: &[usize],
     ) -> Result<Option<Decided>, FieldError> {
-        // From a start on two surfaces the motion may also spiral outwards: their trees know.
-        if event.is_none() && meeting.len() == 2 {
+        // From a start on two surfaces the motion may also spiral outwards: their trees know. Between parallel ones it cannot.
+        if event.is_none() && meeting.len() == 2 && !self.have_parallels(meeting, mode)? {
             return Ok(None);
         }
         let exits = event.is_some_and(|event| {
