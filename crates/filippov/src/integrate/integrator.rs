@@ -453,8 +453,15 @@ impl<'a> Integrator<'a> {
         };
         self.stepper.interpolant().at(theta, &mut self.x);
         self.motion.project(t_stop, &mut self.x)?;
-        self.recorder
-            .step(self.stepper.interpolant(), t_stop, &self.x);
+        let extension = self.stepper.interpolant();
+        if self.motion.is_in_contact() && theta > 0.0 {
+            // Contact has taken velocities from the state, which no surface tells of later.
+            let mut extension = extension.clone();
+            extension.lead_to(theta, &self.x);
+            self.recorder.step(&extension, t_stop, &self.x);
+        } else {
+            self.recorder.step(extension, t_stop, &self.x);
+        }
         self.t = t_stop;
         self.recent_dt = 0.0;
         self.chatter = None;

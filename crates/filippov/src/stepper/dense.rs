@@ -89,6 +89,17 @@ impl Interpolant {
         evaluate(self.basis, &self.coefficients, self.n, theta, y);
     }
 
+    /// Makes the state at theta > 0 this one by a motion that is even in time, so that the start stays.
+    pub fn lead_to(&mut self, theta: f64, y: &[f64]) {
+        let n = self.n;
+        let mut here = vec![0.0; n];
+        self.at(theta, &mut here);
+        let linear = &mut self.coefficients[n..2 * n];
+        for (c, (y, here)) in linear.iter_mut().zip(y.iter().zip(&here)) {
+            *c += (y - here) / theta;
+        }
+    }
+
     /// The coefficients d0, d1, .. of component `i` in powers of theta - `centre`.
     pub fn expanded(&self, i: usize, centre: f64) -> Expansion {
         let r = |k: usize| self.coefficients[k * self.n + i];
