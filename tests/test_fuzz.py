@@ -6,10 +6,11 @@ from collections import Counter
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from fuzz.__main__ import check
 from fuzz.comparisons import comparisons
-from fuzz.properties import violations
+from fuzz.properties import is_at_two_fold, look_at, violations
 from fuzz.systems import build, random_case
 
 N = 240
@@ -75,3 +76,25 @@ def test_errors_of_long_steps_are_told_from_wrong_motions() -> None:
     assert not list(violations(problem, sol))
     wrong = build(problem.source.replace("-1.54*", "-1.53*"))
     assert any("off the field's" in found for found in violations(wrong, sol))
+
+
+@pytest.mark.parametrize(
+    ("seed", "what"),
+    [
+        (530054, "a motion that turns stiff takes explicit methods more steps than they may take"),
+        (557795, "neither field leaves the surface at the start, and errors do"),
+        (632498, "the last stretch to a two-fold is straight, its multiplier a quotient of errors"),
+    ],
+)
+def test_what_is_said_or_no_larger_than_errors_is_no_violation(seed: int, what: str) -> None:
+    assert not check(random_case(seed))[1], what
+
+
+def test_multipliers_are_known_away_from_two_folds() -> None:
+    problem = build(random_case(632498).source)
+    sol = problem.solve()
+    checked = look_at(problem, sol)
+    [sliding] = [segment for segment in sol.segments if segment.mode.is_sliding and segment.duration > 1.0]
+    times = np.linspace(sliding.t_start, sliding.t_end, 12)[1:-1]
+    assert not any(is_at_two_fold(checked, sliding.mode, t) for t in times)
+    assert is_at_two_fold(checked, sliding.mode, sol.t[-1] - 1e-3)

@@ -7,6 +7,7 @@ from typing import Any
 import filippov as fl
 import numpy as np
 import pytest
+import scipy.integrate
 
 
 def oscillator(t: float, x: Any) -> Any:
@@ -204,3 +205,35 @@ def test_series_that_end_at_a_surface_invent_no_switch_there(tolerance: float) -
     sol = reference.solve("disode_planar", tolerance, method="Taylor")
     assert sol.success
     assert len(sol.switches) == len(reference.of_problem("disode_planar").switches) == 7
+
+
+PULSES: dict[str, tuple[Any, list[float]]] = {
+    "in time": (lambda t, x: [np.exp(-4.0 * (t - 7.3) ** 2) - 0.1 * x[0]], [0.0]),
+    "in the state": (lambda t, x: [-1.0 - 2.0 * x[1], -0.5 * x[1] + 3.0 * np.exp(-(x[0] ** 2))], [11.0, 0.0]),
+    "a front": (lambda t, x: [-1.0, np.tanh(5.0 * x[0]) - 0.3 * x[1]], [9.3, 0.0]),
+    "a gate": (lambda t, x: [-1.0 - 0.5 * x[1], 1 / (1 + np.exp(4 * x[0])) - 0.2 * x[1]], [9.7, 0.0]),
+    "while sliding": (
+        lambda t, x: [-np.sign(x[0]), np.exp(-4.0 * (t - 7.3) ** 2) - 0.1 * x[1]],
+        [0.01, 0.0],
+    ),
+}
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8, 1e-10, 1e-12])
+@pytest.mark.parametrize("name", PULSES)
+def test_what_no_coefficient_tells_from_afar_is_not_stepped_over(name: str, tolerance: float) -> None:
+    fun, y0 = PULSES[name]
+
+    def smooth(t: float, x: Any) -> Any:
+        rates = np.array(fun(t, x), dtype=float)
+        if name == "while sliding":
+            rates[0] = 0.0
+        return rates
+
+    start = [0.0, *y0[1:]] if name == "while sliding" else y0
+    options = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-13, "max_step": 0.02}
+    exact = scipy.integrate.solve_ivp(smooth, (0.0, 15.0), start, **options).y[:, -1]
+    sol = fl.solve_ivp(fun, (0.0, 15.0), y0, method="Taylor", rtol=tolerance, atol=tolerance)
+    assert sol.success, sol.message
+    assert sol.stats["n_steps_taylor"] == sol.stats["n_steps"]
+    np.testing.assert_allclose(sol.y[:, -1], exact, rtol=0, atol=10.0 * tolerance)

@@ -53,6 +53,24 @@ impl Graph {
     }
 }
 
+impl Graph {
+    /// May the values change where no Taylor coefficient tells? Exponential functions, and what is made of them, come up
+    /// from below rounding: far from a pulse exp(-t^2) all coefficients are as good as zero.
+    pub fn hides_changes(&self, nodes: &[NodeId]) -> bool {
+        use UnaryOp::{Cosh, Exp, Exp2, Expm1, Sinh, Tanh};
+        let all = self.reachable_by(nodes.iter().copied(), |id| {
+            self.node(id).operands().collect::<Vec<_>>()
+        });
+        all.into_iter().any(|id| match *self.node(id) {
+            Node::Unary(op, a) => {
+                matches!(op, Exp | Expm1 | Exp2 | Sinh | Cosh | Tanh) && self.facts(a).varies
+            }
+            Node::Binary(BinaryOp::Pow, _, b) => self.facts(b).varies,
+            _ => false,
+        })
+    }
+}
+
 /// Taylor coefficients of the motion of a field, and of other functions along it.
 ///
 /// # Example

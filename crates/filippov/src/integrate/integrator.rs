@@ -123,7 +123,11 @@ impl<'a> Integrator<'a> {
         let operations = |order| Some(system.motion_jets(&[], order)?.operations());
         let taylor = uses_series.then(|| {
             let order = Taylor::order_for(options.rtol, operations);
-            Taylor::new(n, order)
+            let taylor = Taylor::new(n, order);
+            match system.hides_changes() {
+                true => taylor.wary_over(t_span.1 - t_span.0),
+                false => taylor,
+            }
         });
         let mut stepper = Stepper::new(n, taylor);
         match options.method {

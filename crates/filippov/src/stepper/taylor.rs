@@ -8,7 +8,7 @@ use crate::error::FieldError;
 use crate::field::SmoothField;
 use crate::tolerances::{
     TAYLOR_DEAR, TAYLOR_LARGEST_ORDER, TAYLOR_NOISE, TAYLOR_ORDER_CHEAP, TAYLOR_ORDER_DEAR,
-    TAYLOR_SHARE, TAYLOR_SLOW,
+    TAYLOR_SHARE, TAYLOR_SLOW, WARY_GROWTH, WARY_POINTS, WARY_START,
 };
 
 /// A Taylor step of variable length.
@@ -16,7 +16,7 @@ use crate::tolerances::{
 /// With coefficients up to order N in units of the tolerance, |c_k|, the step is as long as the last two
 /// allow: |c_k| dt^k <= 1/10 for k = N - 1 and N. The first term left out is smaller by the ratio of the step to the
 /// radius of convergence. That the series describes the motion is then checked at the end of the step, where
-/// its derivative has to be the field.
+/// its derivative has to be the field; where the field may change though no coefficient tells, in between too.
 ///
 /// Reference: Jorba, Zou, *A software package for the numerical integration of ODEs by means of high-order
 /// Taylor methods*, Exp. Math. 14 (2005).
@@ -33,6 +33,10 @@ pub struct Taylor {
     defect: Vec<f64>,
     /// Error of the attempted step in units of the tolerance.
     error: f64,
+    /// The longest step at present, if the field may change where no coefficient tells.
+    wary: Option<f64>,
+    /// A state within the step, and the rate there.
+    inner: [Vec<f64>; 2],
 }
 
 impl Taylor {
@@ -62,7 +66,17 @@ impl Taylor {
             step: Step::new(n, Interpolant::powers(n, order)),
             defect: vec![0.0; n],
             error: 0.0,
+            wary: None,
+            inner: Default::default(),
         }
+    }
+
+    /// The same for a field that may change where no coefficient tells: first steps are short beside this time span.
+    #[must_use]
+    pub fn wary_over(mut self, span: f64) -> Self {
+        self.wary = Some(WARY_START * span);
+        self.inner = [vec![0.0; self.n], vec![0.0; self.n]];
+        self
     }
 
     /// The step that was attempted last.
@@ -136,7 +150,8 @@ impl Taylor {
             return f64::NAN;
         }
         let size = |k: usize| TAYLOR_SHARE * scale.largest(self.row(k), y);
-        reach([self.order, self.order - 1].map(|k| (size(k), k)))
+        let longest = reach([self.order, self.order - 1].map(|k| (size(k), k)));
+        longest.min(self.wary.unwrap_or(f64::INFINITY))
     }
 
     /// The derivative at the start of the step, to be replaced.
@@ -165,19 +180,56 @@ impl Taylor {
             4 => self.sum_few::<4>(y),
             _ => self.sum(y),
         }
+        let inner = match self.wary {
+            Some(_) => self.inner_error(field, t, scale)?,
+            None => 0.0,
+        };
         field.eval(t + dt, &mut self.step.end, &mut self.step.end_derivative)?;
         // The defect is the derivative of the first term left out: order + 1 times that term over the step.
         let share = 1.0 / (self.order + 1) as f64;
         for (defect, rate) in self.defect.iter_mut().zip(&self.step.end_derivative) {
             *defect = share * (*defect - dt * rate);
         }
-        self.error = scale.norm(&self.defect, &self.step.end);
+        self.error = scale.norm(&self.defect, &self.step.end).max(inner);
+        if let Some(longest) = &mut self.wary {
+            *longest = match self.error <= 1.0 {
+                true => longest.max(WARY_GROWTH * dt),
+                false => longest.min(dt),
+            };
+        }
         let is_finite = self.error.is_finite() && self.step.end.iter().all(|y| y.is_finite());
         Ok(if is_finite {
             Attempt::Error(self.error)
         } else {
             Attempt::NotFinite
         })
+    }
+
+    /// What the field adds to the state that the series does not know of, as far as some points in the step tell.
+    fn inner_error(
+        &mut self,
+        field: &mut impl SmoothField,
+        t: f64,
+        scale: &ErrorScale,
+    ) -> Result<f64, FieldError> {
+        let dt = self.step.interpolant.dt;
+        let [x, rate] = &mut self.inner;
+        let mut largest = 0.0_f64;
+        for theta in WARY_POINTS {
+            self.step.interpolant.at(theta, x);
+            field.eval(t + theta * dt, x, rate)?;
+            rate.iter_mut().for_each(|rate| *rate *= dt);
+            let rows = self.step.interpolant.coefficients().chunks_exact(self.n);
+            let mut power = 1.0;
+            for (k, row) in rows.enumerate().skip(1) {
+                let pairs = rate.iter_mut().zip(row);
+                pairs.for_each(|(rate, c)| *rate -= k as f64 * power * c);
+                power *= theta;
+            }
+            let share = 1.0 / WARY_POINTS.len() as f64;
+            largest = largest.max(share * scale.norm(rate, x));
+        }
+        Ok(largest)
     }
 
     /// Writes the coefficients in powers of theta, their sum, which is the end of the step, and the derivative in

@@ -37,6 +37,8 @@ pub(super) struct Model {
     /// Do switching functions contain signs of others?
     pub is_nested: bool,
     pub is_analytic: bool,
+    /// May they change where no Taylor coefficient tells?
+    pub hides_changes: bool,
     gradients: Vec<OnceLock<CompiledGradient>>,
     both_sides: Vec<OnceLock<TieredProgram>>,
     first_lie: Vec<OnceLock<TieredProgram>>,
@@ -113,6 +115,7 @@ impl Model {
         Ok(Model {
             n_states: field.len(),
             is_analytic: graph.is_analytic(&field) && graph.is_analytic(&surfaces),
+            hides_changes: graph.hides_changes(&field) || graph.hides_changes(&surfaces),
             only_state: match surfaces[..] {
                 [h] => graph.as_state(h),
                 _ => None,

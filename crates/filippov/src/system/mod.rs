@@ -288,6 +288,11 @@ pub trait PiecewiseSystem: Sync {
         false
     }
 
+    /// May fields or switching functions change where no Taylor coefficient tells, as pulses exp(-t^2) do?
+    fn hides_changes(&self) -> bool {
+        true
+    }
+
     /// Taylor coefficients up to `order` of the motions on these surfaces, in a region if there are none; `None`
     /// if the system has none.
     fn motion_jets(&self, sliding: &[usize], order: usize) -> Option<Arc<MotionJets>> {

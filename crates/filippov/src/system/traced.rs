@@ -396,6 +396,10 @@ impl PiecewiseSystem for TracedSystem {
         self.model.is_analytic
     }
 
+    fn hides_changes(&self) -> bool {
+        self.model.hides_changes
+    }
+
     fn motion_jets(&self, sliding: &[usize], order: usize) -> Option<Arc<MotionJets>> {
         self.model.motion_jets(sliding, order)
     }

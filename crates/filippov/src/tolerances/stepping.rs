@@ -48,3 +48,12 @@ pub const TAYLOR_LARGEST_ORDER: usize = 24;
 /// A Taylor step that is shorter than this, in units of the rounding of the time, means that the motion comes to a
 /// point where its field has no series.
 pub const TAYLOR_SHORTEST: f64 = 1e4;
+
+/// Where functions may change though no Taylor coefficient tells, steps grow by at most this factor ...
+pub const WARY_GROWTH: f64 = 4.0;
+
+/// ... from this part of the time span on, ...
+pub const WARY_START: f64 = 1e-3;
+
+/// ... and the field is compared with the series at these points of the step, too.
+pub const WARY_POINTS: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
