@@ -3,7 +3,8 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use filippov::{
-    not_finite, state_text, Mode, PiecewiseSystem, Segment, Side, Solution, Stats, Stop,
+    as_multiplier, not_finite, state_text, Mode, PiecewiseSystem, Segment, Side, Solution, Stats,
+    Stop,
 };
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
@@ -109,7 +110,7 @@ impl Run {
         let mut out = vec![f64::NAN; self.n_visible];
         let values = segment.mode.sliding_set().zip(&segment.multipliers);
         for (j, &value) in values.filter(|(j, _)| *j < self.n_visible) {
-            out[j] = if value.is_finite() { value } else { f64::NAN };
+            out[j] = as_multiplier(value);
         }
         Ok((out.clone(), out))
     }

@@ -60,7 +60,7 @@ pub use integrate::{
 };
 pub use mode::{Mode, Signs};
 pub use options::{Keep, Method, NonUnique, Options, SlidingRule, Stabilization};
-pub use solution::{Segment, Side, Solution, Switch, UserZero};
+pub use solution::{as_multiplier, Segment, Side, Solution, Switch, UserZero};
 pub use switching::Kind;
 pub use system::{
     AffineParts, AffineSigns, BothSides, ClosureSystem, Law, LawAction, LawMap, Laws, LieValue,

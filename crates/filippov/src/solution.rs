@@ -210,16 +210,6 @@ impl Solution {
         };
         let set: Vec<usize> = mode.sliding_set().collect();
         let near = self.multipliers_near(t, side);
-        let in_interval = |lambda: f64| {
-            // At an exit it is one up to the rounding of the time. Where both fields are tangent there is none.
-            if !lambda.is_finite() {
-                f64::NAN
-            } else if lambda.abs() < 1.0 + AT_SIDE {
-                lambda.clamp(-1.0, 1.0)
-            } else {
-                lambda
-            }
-        };
         if near.iter().any(|lambda| lambda.is_nan()) {
             // Contact: the forces depend on the actions of the run.
             return Ok(set.into_iter().zip(near.iter().copied()).collect());
@@ -232,7 +222,7 @@ impl Solution {
                 // At a two-fold from which sliding starts it is a quotient of two zeros, and known from the run.
                 let lambda = match (components.minus - components.plus, near) {
                     (0.0, &[known, ..]) => known,
-                    _ => in_interval(components.multiplier()),
+                    _ => as_multiplier(components.multiplier()),
                 };
                 // Near a two-fold it is a quotient of rounding errors.
                 let share = (components.minus - components.plus).abs();
@@ -258,7 +248,7 @@ impl Solution {
                 let values = field
                     .multipliers()
                     .iter()
-                    .map(|&lambda| in_interval(lambda));
+                    .map(|&lambda| as_multiplier(lambda));
                 set.into_iter().zip(values).collect()
             }
         })
@@ -288,5 +278,17 @@ impl Solution {
         }
         (self.t, self.y) = (t_out, y_out);
         Ok(())
+    }
+}
+
+/// A multiplier as it is reported: at an exit it is one up to the rounding of the time, or up to what it may go beyond where
+/// forces balance. NaN where there is none, as where both fields are tangent.
+pub fn as_multiplier(lambda: f64) -> f64 {
+    if !lambda.is_finite() {
+        f64::NAN
+    } else if lambda.abs() < 1.0 + 2.0 * AT_SIDE {
+        lambda.clamp(-1.0, 1.0)
+    } else {
+        lambda
     }
 }

@@ -1,5 +1,7 @@
 //! Fields and normal components of both sides of a surface.
 
+use filippov_expr::{Graph, NodeId};
+
 use super::{dot, PiecewiseSystem};
 use crate::error::FieldError;
 use crate::field::{eval_off_surface, eval_on_side};
@@ -86,4 +88,17 @@ impl BothSides {
     pub fn is_finite(&self) -> bool {
         self.normal_minus.is_finite() && self.normal_plus.is_finite()
     }
+}
+
+/// Components at the signs -1 and +1 moved to -ratio and +ratio, as static friction above kinetic has them.
+pub(super) fn stretched(
+    graph: &mut Graph,
+    [minus, plus]: [NodeId; 2],
+    ratio: NodeId,
+) -> [NodeId; 2] {
+    let half = graph.constant(0.5);
+    let (sum, difference) = (graph.add(minus, plus), graph.sub(plus, minus));
+    let (middle, half_jump) = (graph.mul(half, sum), graph.mul(half, difference));
+    let reach = graph.mul(ratio, half_jump);
+    [graph.sub(middle, reach), graph.add(middle, reach)]
 }

@@ -9,6 +9,7 @@ use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 
 use super::affine_model::AffineModel;
+use super::both_sides::stretched;
 use super::jacobian::MotionJacobian;
 use super::jets::MotionJets;
 use super::tiered::{compile, Tiered, TieredProgram};
@@ -491,13 +492,4 @@ impl Model {
         cache.programs.insert(key, Arc::clone(&lie));
         lie
     }
-}
-
-/// Components at the signs -1 and +1 moved to -ratio and +ratio.
-fn stretched(graph: &mut Graph, [minus, plus]: [NodeId; 2], ratio: NodeId) -> [NodeId; 2] {
-    let half = graph.constant(0.5);
-    let (sum, difference) = (graph.add(minus, plus), graph.sub(plus, minus));
-    let (middle, half_jump) = (graph.mul(half, sum), graph.mul(half, difference));
-    let reach = graph.mul(ratio, half_jump);
-    [graph.sub(middle, reach), graph.add(middle, reach)]
 }

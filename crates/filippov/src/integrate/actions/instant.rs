@@ -10,12 +10,11 @@
 //!    crosses. (A count, or a phase that is set back, at a section.)
 //! 4. The mode is decided for the last state ([`crate::integrate::decisions::placement`]).
 
-use smallvec::{smallvec, SmallVec};
+use smallvec::SmallVec;
 
 use crate::action::Trigger;
 use crate::error::FieldError;
 use crate::event::EventFunction;
-use crate::field::SmoothField;
 use crate::integrate::decisions::placement::Sides;
 use crate::integrate::decisions::transition::{located_surfaces, Left, Values};
 use crate::integrate::detection::detect::Found;
@@ -23,11 +22,8 @@ use crate::integrate::integrator::Integrator;
 use crate::integrate::Stop;
 use crate::mode::Mode;
 use crate::solution::Switch;
-use crate::switching::{first_nonzero, Kind, Leading};
-use crate::system::dot;
-use crate::tolerances::{
-    DEPARTS_TANGENTIALLY, MOST_ACTIONS_AT_ONE_TIME, PENETRATION, SURFACE_NOISE,
-};
+use crate::switching::{Kind, Leading};
+use crate::tolerances::{MOST_ACTIONS_AT_ONE_TIME, PENETRATION, SURFACE_NOISE};
 
 /// The surfaces in one instant, as far as they trigger actions.
 struct Approach {
@@ -416,55 +412,6 @@ impl Integrator<'_> {
         Ok(due)
     }
 
-    /// Does the motion lead from this side through a surface that the point lies on? A body that is pressed on
-    /// without velocity does not: it stays.
-    fn goes_through(
-        &mut self,
-        j: usize,
-        side: i8,
-        mode: &Mode,
-        on_surface: &[bool],
-    ) -> Result<bool, FieldError> {
-        let mode = mode.with(j, side);
-        let leading = match self.rate_of_sliding(j, on_surface)? {
-            Some(value) => Leading { order: 1, value },
-            None => first_nonzero(self.system, j, side, 0, self.t, &self.x, &mode.signs())?,
-        };
-        if leading.sign() != -side {
-            return Ok(false);
-        }
-        let is_still = leading.order != 1 || self.is_slow(j, leading.value, &mode)?;
-        Ok(!is_still || !self.can_stay(j, &mode)?)
-    }
-
-    /// The rate of h_j where the motion slides on, at a point on its surfaces; `None` if it does not, or h_j is tangent.
-    fn rate_of_sliding(
-        &mut self,
-        j: usize,
-        on_surface: &[bool],
-    ) -> Result<Option<f64>, FieldError> {
-        let sliding = self.motion.sliding();
-        let may_slide = sliding.iter().all(|&k| k != j && on_surface[k]);
-        if sliding.is_empty() || !may_slide || self.motion.is_in_contact() {
-            return Ok(None);
-        }
-        let rate = self.rates_here()?[j];
-        let is_admissible = self
-            .motion
-            .field
-            .last_exits()
-            .iter()
-            .all(|&exit| exit > 0.0);
-        let mut gradient = vec![0.0; self.x.len()];
-        let signs = &self.motion.signs;
-        let ht = self
-            .system
-            .gradient(j, self.t, &self.x, signs, &mut gradient)?;
-        let size = ht.abs() + dot(&gradient, &gradient).sqrt();
-        let is_clear = rate.abs() > DEPARTS_TANGENTIALLY * size;
-        Ok((is_admissible && is_clear).then_some(rate))
-    }
-
     /// The sides of a mode; where it is in contact, the free side.
     fn free_sides(&self, mode: &Mode) -> Vec<i8> {
         let mut sides = mode.entries().to_vec();
@@ -477,19 +424,6 @@ impl Integrator<'_> {
             }
         }
         sides
-    }
-
-    /// The rates of all switching functions along the motion that arrives here.
-    fn rates_here(&mut self) -> Result<Values, FieldError> {
-        let d = self.system.n_surfaces();
-        let (mut h, mut rates): (Values, Values) = (smallvec![0.0; d], smallvec![0.0; d]);
-        let mut velocity = vec![0.0; self.x.len()];
-        let mut x = self.x.clone();
-        self.motion.field.eval(self.t, &mut x, &mut velocity)?;
-        let signs = &self.motion.signs;
-        self.system
-            .surface_rates(self.t, &self.x, signs, &velocity, &mut h, &mut rates)?;
-        Ok(rates)
     }
 }
 

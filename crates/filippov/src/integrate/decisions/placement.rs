@@ -223,11 +223,7 @@ impl Integrator<'_> {
         for &j in smooth {
             let side = self.trigger_side(j, memory);
             mode.set(j, side);
-            let signs = mode.signs();
-            let leading = match self.rate_where_it_slides(j, &mode, &meeting, memory)? {
-                Some(value) => Leading { order: 1, value },
-                None => first_nonzero(self.system, j, side, 0, self.t, &self.x, &signs)?,
-            };
+            let leading = self.leading_along(j, &mode, &meeting, memory)?;
             let is_slow = leading.order == 1 && self.is_slow(j, leading.value, &mode)?;
             let is_still = leading.order != 1 || is_slow;
             let stays = leading.sign() != side || is_slow;
@@ -265,34 +261,48 @@ impl Integrator<'_> {
         }))
     }
 
-    /// The rate of h_j along the motion that slides on surfaces of `meeting`, where it does and is not tangent to h_j.
-    fn rate_where_it_slides(
+    /// The first derivative of h_j that does not vanish along the motion that follows on the surfaces of `meeting`.
+    pub(in crate::integrate) fn leading_along(
         &mut self,
         j: usize,
         mode: &Mode,
         meeting: &[usize],
         memory: Option<&Mode>,
+    ) -> Result<Leading, FieldError> {
+        let (side, mut after) = (mode.entries()[j], mode.clone());
+        if !meeting.is_empty() {
+            // A trial: what is not unique is told when it is decided.
+            let (n_warnings, n_choices) = (self.warnings.len(), self.n_choices);
+            let decided = self.place_on(mode.clone(), meeting, memory)?;
+            self.warnings.truncate(n_warnings);
+            self.n_choices = n_choices;
+            let multipliers = std::mem::take(&mut self.decided).multipliers;
+            if let Ok((decided, _)) = decided {
+                after = decided;
+            }
+            if after.codimension() > 0 {
+                if let Some(value) = self.rate_in(j, &after, &multipliers)? {
+                    return Ok(Leading { order: 1, value });
+                }
+            }
+        }
+        first_nonzero(self.system, j, side, 0, self.t, &self.x, &after.signs())
+    }
+
+    /// The rate of h_j along sliding in a mode, where that is not tangent to it.
+    fn rate_in(
+        &mut self,
+        j: usize,
+        after: &Mode,
+        multipliers: &[f64],
     ) -> Result<Option<f64>, FieldError> {
-        if meeting.is_empty() {
-            return Ok(None);
-        }
-        // A trial: what is not unique is told when it is decided.
-        let (n_warnings, n_choices) = (self.warnings.len(), self.n_choices);
-        let decided = self.place_on(mode.clone(), meeting, memory)?;
-        self.warnings.truncate(n_warnings);
-        self.n_choices = n_choices;
-        let multipliers = std::mem::take(&mut self.decided).multipliers;
-        let Ok((after, _)) = decided else {
-            return Ok(None);
-        };
-        if after.codimension() == 0 {
-            return Ok(None);
-        }
         let (x, mut velocity) = (self.x.clone(), vec![0.0; self.x.len()]);
-        self.velocity_in(&after, &multipliers, self.t, &x, &mut velocity)?;
+        self.velocity_in(after, multipliers, self.t, &x, &mut velocity)?;
         let mut gradient = vec![0.0; x.len()];
         let signs = after.signs();
-        let ht = self.system.gradient(j, self.t, &x, &signs, &mut gradient)?;
+        let ht = self
+            .system
+            .gradient(j, self.t, &self.x, &signs, &mut gradient)?;
         let rate = ht + dot(&gradient, &velocity);
         let size = ht.abs() + dot_magnitude(&gradient, &velocity);
         Ok((rate.abs() > DEPARTS_TANGENTIALLY * size).then_some(rate))
