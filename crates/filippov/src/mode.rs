@@ -53,6 +53,16 @@ impl Mode {
         Mode { entries }
     }
 
+    /// The same mode on the sides of these surfaces that a pattern says: +1 where the bit of a surface is set, else -1.
+    #[must_use]
+    pub(crate) fn on_sides(&self, surfaces: &[usize], pattern: usize) -> Mode {
+        let mut mode = self.clone();
+        for (bit, &j) in surfaces.iter().enumerate() {
+            mode.set(j, if pattern >> bit & 1 == 1 { 1 } else { -1 });
+        }
+        mode
+    }
+
     /// The signs handed to the field: +1.0 or -1.0 per surface, a zero entry as +1.0.
     pub fn signs(&self) -> Signs {
         let mut signs = Signs::from_elem(1.0, self.entries.len());

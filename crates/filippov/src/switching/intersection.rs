@@ -58,10 +58,7 @@ pub fn decide_intersection(
         return Ok(decision);
     }
     for pattern in 0..1_usize << m {
-        let mut candidate = mode.clone();
-        for (bit, &j) in meeting.iter().enumerate() {
-            candidate.set(j, if pattern >> bit & 1 == 1 { 1 } else { -1 });
-        }
+        let candidate = mode.on_sides(meeting, pattern);
         if let Some(left) = region_attracts(system, meeting, &candidate, t, x)? {
             decision.candidates.push(candidate.clone());
             decision.left.push(left);
@@ -103,10 +100,7 @@ pub fn region_at_rest(
     };
     let largest = patterns.clone().map(size).fold(0.0, f64::max);
     'patterns: for pattern in patterns.filter(|&pattern| size(pattern) <= TANGENT * largest) {
-        let mut region = mode.clone();
-        for (bit, &j) in meeting.iter().enumerate() {
-            region.set(j, if pattern >> bit & 1 == 1 { 1 } else { -1 });
-        }
+        let region = mode.on_sides(meeting, pattern);
         let signs = region.signs();
         for &j in meeting {
             let side = region.entries()[j];

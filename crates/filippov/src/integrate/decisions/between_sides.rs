@@ -20,10 +20,7 @@ impl Integrator<'_> {
         }
         let mut h = vec![0.0; self.motion.signs.len()];
         for pattern in 0..1_usize << sliding.len() {
-            let mut side = self.motion.mode.clone();
-            for (bit, &j) in sliding.iter().enumerate() {
-                side.set(j, if pattern >> bit & 1 == 1 { 1 } else { -1 });
-            }
+            let side = self.motion.mode.on_sides(&sliding, pattern);
             let signs = side.signs();
             self.system.surfaces(t, x, &signs, &mut h)?;
             for k in (0..h.len()).filter(|k| !sliding.contains(k) && self.motion.active[*k]) {

@@ -110,11 +110,7 @@ impl Integrator<'_> {
         let mut velocity = vec![0.0; x.len()];
         // The midpoint rule.
         for share in [0.5, 1.0] {
-            let mut from = if share == 0.5 {
-                self.x.clone()
-            } else {
-                x.clone()
-            };
+            let mut from = x.clone();
             let t = self.t + (share - 0.5) * time;
             field.eval(t, &mut from, &mut velocity)?;
             let pairs = x.iter_mut().zip(self.x.iter().zip(&velocity));

@@ -210,10 +210,7 @@ impl Integrator<'_> {
         }
         let mut found = None;
         for pattern in 0..1_usize << m {
-            let mut region = mode.clone();
-            for (bit, &j) in meeting.iter().enumerate() {
-                region.set(j, if pattern >> bit & 1 == 1 { 1 } else { -1 });
-            }
+            let region = mode.on_sides(meeting, pattern);
             let mut settled = region.clone();
             let (jumped, _) = self.let_others_jump(mode, &mut settled, (&[], meeting))?;
             if !jumped.is_empty() {
@@ -246,10 +243,7 @@ impl Integrator<'_> {
         let (mut field, mut normals) = (vec![0.0; n], Vec::with_capacity(m << m));
         let (mut rises, mut falls) = (vec![true; m], vec![true; m]);
         for pattern in 0..1_usize << m {
-            let mut region = mode.clone();
-            for (bit, &j) in meeting.iter().enumerate() {
-                region.set(j, if pattern >> bit & 1 == 1 { 1 } else { -1 });
-            }
+            let region = mode.on_sides(meeting, pattern);
             let (signs, t, x) = (region.signs(), self.t, &self.x[..]);
             self.stats.n_field_evaluations += eval_on_side(self.system, t, x, &signs, &mut field)?;
             for (bit, &j) in meeting.iter().enumerate() {
