@@ -5,7 +5,8 @@ use std::fmt;
 use smallvec::SmallVec;
 
 /// The signs handed to a field; few are kept without allocation.
-pub type Signs = SmallVec<[f64; 8]>;
+pub type Signs = SmallVec<[f64; FEW]>;
+const FEW: usize = 8;
 
 /// A mode: one entry per surface, +1 where h > 0, -1 where h < 0, 0 while sliding on h = 0.
 #[derive(PartialEq, Eq, Hash)]
@@ -65,13 +66,17 @@ impl Mode {
 
     /// The signs handed to the field: +1.0 or -1.0 per surface, a zero entry as +1.0.
     pub fn signs(&self) -> Signs {
-        let mut signs = Signs::from_elem(1.0, self.entries.len());
-        for (sign, &entry) in signs.iter_mut().zip(&self.entries) {
-            if entry < 0 {
-                *sign = -1.0;
+        let sign = |&entry: &i8| if entry < 0 { -1.0 } else { 1.0 };
+        match self.entries.len() {
+            n @ ..=FEW => {
+                let mut few = [1.0; FEW];
+                few.iter_mut()
+                    .zip(&self.entries)
+                    .for_each(|(to, entry)| *to = sign(entry));
+                Signs::from_buf_and_len(few, n)
             }
+            _ => self.entries.iter().map(sign).collect(),
         }
-        signs
     }
 
     /// Sets entry `j`.

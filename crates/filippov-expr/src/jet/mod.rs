@@ -14,6 +14,8 @@ mod plan;
 mod recurrence;
 mod unrolled;
 
+use rustc_hash::FxHashMap;
+
 use crate::error::ExprError;
 use crate::graph::Graph;
 use crate::node::{Node, NodeId};
@@ -68,6 +70,44 @@ impl Graph {
             Node::Binary(BinaryOp::Pow, _, b) => self.facts(b).varies,
             _ => false,
         })
+    }
+}
+
+/// Factors of a product of which the first coefficients of a series tell.
+const MOST_FACTORS: u32 = 4;
+
+impl Graph {
+    /// Do the first coefficients of their series tell of all that the values do, wherever that is? They do of waves, of
+    /// states and of time, and of sums and products of a few of them. Quotients and high powers have narrow peaks, whose
+    /// coefficients elsewhere are small: of these they may not.
+    pub fn is_told_by_series(&self, nodes: &[NodeId]) -> bool {
+        let all = self.reachable_by(nodes.iter().copied(), |id| {
+            self.node(id).operands().collect::<Vec<_>>()
+        });
+        // The factors of the products that make up a value, none if it is told otherwise.
+        let mut known: FxHashMap<NodeId, Option<u32>> = FxHashMap::default();
+        for id in all {
+            let factors = match *self.node(id) {
+                _ if !self.facts(id).varies => Some(0),
+                Node::Time | Node::State(_) => Some(1),
+                Node::Sign(_) => Some(0),
+                Node::Unary(UnaryOp::Neg | UnaryOp::Sin | UnaryOp::Cos, a) => known[&a],
+                Node::Binary(BinaryOp::Add | BinaryOp::Sub, a, b) => {
+                    known[&a].zip(known[&b]).map(|(a, b)| a.max(b))
+                }
+                Node::Binary(BinaryOp::Mul, a, b) => {
+                    let factors = known[&a].zip(known[&b]).map(|(a, b)| a + b);
+                    factors.filter(|&factors| factors <= MOST_FACTORS)
+                }
+                Node::Binary(BinaryOp::Div, a, b) if !self.facts(b).varies => known[&a],
+                Node::Select { plus, minus, .. } => {
+                    known[&plus].zip(known[&minus]).map(|(a, b)| a.max(b))
+                }
+                _ => None,
+            };
+            known.insert(id, factors);
+        }
+        nodes.iter().all(|id| known[id].is_some())
     }
 }
 

@@ -10,6 +10,14 @@ use crate::tolerances::{EPS, SAME_VALUE, TAYLOR_LARGEST_ORDER};
 const GUESS_SAMPLES: u32 = 3;
 const GUESS_STEPS: u32 = 3;
 
+/// How often a bracket of a zero is improved at most: Halley's method takes three steps, halving all others.
+const ZERO_STEPS: u32 = 64;
+
+/// Of the first coefficient, how much the last terms together may make up to be left out of the proof that there is no zero.
+const REST_BESIDE: f64 = 0.125;
+/// The same where there is one, which has to be told from others.
+const REST_AT_ZERO: f64 = 1e-5;
+
 /// How often an interval is halved whose coefficients do not tell its zeros apart: a long step has a few, and comes near
 /// to others.
 const HALVINGS: u32 = 10;
@@ -37,6 +45,13 @@ const INVERSE_BINOMIALS: [LongestSeries; MOST_COEFFICIENTS] = {
 #[derive(Clone, Copy, Debug)]
 pub struct Series<'a>(&'a [f64]);
 
+/// How many terms stand for a polynomial on [0, 1], and how large the others may be together.
+#[derive(Clone, Copy)]
+struct FirstTerms {
+    used: usize,
+    rest: f64,
+}
+
 /// What is known about the first zero of a polynomial that is positive at 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FirstZero {
@@ -50,6 +65,8 @@ pub enum FirstZero {
         hi: f64,
         /// Very roughly where it vanishes.
         guess: f64,
+        /// What was left out of the polynomial.
+        doubt: f64,
     },
     /// Nothing.
     Unknown,
@@ -83,37 +100,85 @@ impl<'a> Series<'a> {
         self.0.iter().rev().fold(0.0, |value, c| value * theta + c)
     }
 
-    /// Is the polynomial `left` at 0 and `right` at 1, up to rounding?
-    pub fn leads_between(&self, left: f64, right: f64) -> bool {
-        let sum: f64 = self.0.iter().sum();
-        let size: f64 = self.0.iter().map(|c| c.abs()).sum();
-        (self.0[0] - left).abs().max((sum - right).abs()) <= SAME_VALUE * size
+    /// The values at 0 and 1.
+    pub fn ends(&self) -> [f64; 2] {
+        [self.0[0], self.0.iter().sum()]
     }
 
-    /// Is the polynomial positive on [0, 1] for its falling terms alone?
-    pub fn is_far_from_zero(&self) -> bool {
-        let falling: f64 = self.0[1..].iter().map(|c| c.min(0.0)).sum();
-        self.0[0] + falling > 0.0
+    /// Is the polynomial `left` at 0 and `right` at 1, up to rounding?
+    pub fn leads_between(&self, left: f64, right: f64) -> bool {
+        let [start, end] = self.ends();
+        let size: f64 = self.0.iter().map(|c| c.abs()).sum();
+        (start - left).abs().max((end - right).abs()) <= SAME_VALUE * size
+    }
+
+    /// Is the polynomial above `margin` on [0, 1], as its Bernstein coefficients tell?
+    pub fn stays_above(&self, margin: f64) -> bool {
+        let first = self.first_terms(REST_BESIDE * (self.0[0] - margin));
+        let mut coefficients = LongestSeries::default();
+        let b = &mut coefficients[..first.used];
+        to_bernstein(self.0, b);
+        b.iter().all(|&b| b > margin + first.rest)
+    }
+
+    /// The first terms: the others together are smaller than `spare` all along.
+    fn first_terms(&self, spare: f64) -> FirstTerms {
+        let (mut rest, mut used) = (0.0, self.0.len());
+        while used > 2 {
+            let with_last = rest + self.0[used - 1].abs();
+            if with_last >= spare {
+                break;
+            }
+            (rest, used) = (with_last, used - 1);
+        }
+        FirstTerms { used, rest }
     }
 
     /// The first zero on [0, 1] before `reach`, by the signs of the Bernstein coefficients, which change at least as
     /// often as those of the polynomial (Descartes' rule); where they say nothing, by those of the halves. The pieces do
     /// not depend on `reach`: neither does a zero.
-    pub fn first_zero(&self, reach: f64) -> FirstZero {
-        let mut coefficients = LongestSeries::default();
-        let b = &mut coefficients[..self.0.len()];
-        // The coefficient of degree i is the sum of C(i, k)/C(n, k) c_k.
-        let mut size = 0.0;
-        let weights = &INVERSE_BINOMIALS[b.len() - 1];
-        for ((b, c), weight) in b.iter_mut().zip(self.0).zip(weights) {
-            size += c.abs();
-            *b = weight * c;
+    ///
+    /// What is told holds for every function within `margin` of the polynomial, but that it may have more zeros than one
+    /// where the polynomial is within `doubt` of zero, which is in one place: see [`is_single`](Self::is_single).
+    pub fn first_zero(&self, reach: f64, margin: f64) -> FirstZero {
+        let first = self.first_terms(REST_AT_ZERO * self.0[0]);
+        match self.first_zero_of(first, reach, margin) {
+            FirstZero::Unknown if first.rest > 0.0 => {
+                let all = self.first_terms(0.0);
+                self.first_zero_of(all, reach, margin)
+            }
+            found => found,
         }
-        sum_binomially(b);
-        if b.iter().all(|&b| b > 0.0) {
+    }
+
+    fn first_zero_of(&self, first: FirstTerms, reach: f64, margin: f64) -> FirstZero {
+        let mut coefficients = LongestSeries::default();
+        let b = &mut coefficients[..first.used];
+        let size = to_bernstein(self.0, b);
+        let doubt = margin + first.rest;
+        if b.iter().all(|&b| b > doubt) {
             return FirstZero::Nowhere;
         }
-        first_zero_between(b, (0.0, 1.0), reach, 16.0 * EPS * size, HALVINGS)
+        let noise = 16.0 * EPS * size + doubt;
+        let mut found = first_zero_between(b, (0.0, 1.0), reach, noise, HALVINGS);
+        if let FirstZero::Between { doubt, .. } = &mut found {
+            *doubt = first.rest;
+        }
+        found
+    }
+
+    /// Is a zero with this slope the only one in the place where polynomials within `doubt` of this one have theirs?
+    /// Within 4 doubt / slope of it the polynomial falls, and beyond that it is further than `doubt` from zero, if its
+    /// second derivative is small enough.
+    pub fn is_single(&self, slope: f64, doubt: f64) -> bool {
+        // Sums of k (k - 1) |c_k|.
+        let (mut bend, mut weight, mut step) = (0.0, 2.0, 4.0);
+        for c in self.0.iter().skip(2) {
+            bend += weight * c.abs();
+            weight += step;
+            step += 2.0;
+        }
+        8.0 * bend * doubt <= slope * slope
     }
 
     /// About where the polynomial, positive at 0, first falls through zero on [0, 1], found by a few samples and
@@ -157,6 +222,47 @@ impl<'a> Series<'a> {
         (value, slope)
     }
 
+    /// The only zero between two points, where the polynomial falls, within `width` of it; and the slope there. By
+    /// Halley's method from a guess, kept in the bracket: an error e becomes one of order e^3.
+    pub fn only_zero(&self, (mut lo, mut hi): (f64, f64), guess: f64, width: f64) -> (f64, f64) {
+        let (mut at, length) = (guess.clamp(lo, hi), hi - lo);
+        let (mut slope, mut before) = (f64::NAN, f64::INFINITY);
+        for _ in 0..ZERO_STEPS {
+            let (value, here, half_bend) = self.with_bend(at);
+            slope = here;
+            if value > 0.0 {
+                lo = at;
+            } else {
+                hi = at;
+            }
+            let newton = value / slope;
+            let bend = newton * half_bend / slope;
+            let next = at - newton / (1.0 - bend);
+            let step = (next - at).abs();
+            let converges = bend.abs() < 0.25 && next >= lo && next <= hi && step <= 0.5 * before;
+            let doubt = bend.abs() + step / length;
+            if converges && step * doubt * doubt <= 0.125 * width || value == 0.0 {
+                return (next, slope);
+            }
+            (at, before) = match converges {
+                true => (next, step),
+                false => (0.5 * (lo + hi), 0.5 * (hi - lo)),
+            };
+        }
+        (at, slope)
+    }
+
+    /// Value, slope and half the second derivative.
+    fn with_bend(&self, theta: f64) -> (f64, f64, f64) {
+        let (mut value, mut slope, mut half_bend) = (0.0, 0.0, 0.0);
+        for c in self.0.iter().rev() {
+            half_bend = half_bend * theta + slope;
+            slope = slope * theta + value;
+            value = value * theta + c;
+        }
+        (value, slope, half_bend)
+    }
+
     /// Bounds of value and slope from theta = `a` to `b`, rounding included.
     pub fn bound(&self, a: f64, b: f64) -> Bound {
         let mut coefficients = Expansion::from_slice(self.0);
@@ -179,6 +285,20 @@ impl<'a> Series<'a> {
             slope: Interval::around(slope, slope_spread + 16.0 * EPS * size),
         }
     }
+}
+
+/// The Bernstein coefficients, as many as `b` has, of the first coefficients of a polynomial; returns the sum of the sizes
+/// of these.
+fn to_bernstein(coefficients: &[f64], b: &mut [f64]) -> f64 {
+    // The coefficient of degree i is the sum of C(i, k)/C(n, k) c_k.
+    let mut size = 0.0;
+    let weights = &INVERSE_BINOMIALS[b.len() - 1];
+    for ((b, c), weight) in b.iter_mut().zip(coefficients).zip(weights) {
+        size += c.abs();
+        *b = weight * c;
+    }
+    sum_binomially(b);
+    size
 }
 
 /// The first zero of a polynomial with Bernstein coefficients `b` from `lo` to `hi`. Of a coefficient within `noise` of
@@ -205,7 +325,13 @@ fn first_zero_between(
         let (left, right) = (positive - 1, degree + 1 - negative);
         let share = b[left] / (b[left] - b[right]) * (right - left) as f64;
         let guess = lo + (hi - lo) * (left as f64 + share) / degree as f64;
-        return FirstZero::Between { lo, hi, guess };
+        let doubt = 0.0;
+        return FirstZero::Between {
+            lo,
+            hi,
+            guess,
+            doubt,
+        };
     }
     if halvings == 0 || positive == 0 {
         return FirstZero::Unknown;
@@ -278,22 +404,21 @@ mod tests {
             let series = Series::new(&coefficients);
             let lowest = (0..=100).map(|k| series.value(f64::from(k) * 0.01));
             assert_eq!(lowest.fold(f64::INFINITY, f64::min) > 1e-9, is_above);
-            let nowhere = series.first_zero(1.0) == FirstZero::Nowhere;
+            let nowhere = series.first_zero(1.0, 0.0) == FirstZero::Nowhere;
             assert_eq!(nowhere, is_above);
         }
-        assert!(Series::new(&[1.0, -0.5, 1.0, -0.4]).is_far_from_zero());
         // Bernstein coefficients tell where the falling terms do not.
         let turning = [1.0, -1.5, 1.0, 0.0];
         let series = Series::new(&turning);
-        assert!(!series.is_far_from_zero());
-        assert_eq!(series.first_zero(1.0), FirstZero::Nowhere);
+        assert!(series.stays_above(0.0) && !series.stays_above(0.5));
+        assert_eq!(series.first_zero(1.0, 0.0), FirstZero::Nowhere);
     }
 
     #[test]
     fn one_change_of_sign_is_one_zero() {
         // (1 - 2 theta) (1 + theta + theta^2)
         let series = Series::new(&[1.0, -1.0, -1.0, -2.0]);
-        let FirstZero::Between { guess, .. } = series.first_zero(1.0) else {
+        let FirstZero::Between { guess, .. } = series.first_zero(1.0, 0.0) else {
             panic!("not found");
         };
         let (zero, slope) = series.newton(guess).unwrap();
@@ -302,7 +427,7 @@ mod tests {
         // Touching zero, or vanishing at an end, is not decided.
         for coefficients in [[0.25, -1.0, 1.0], [1.0, -1.0, 0.0], [0.0, 1.0, -2.0]] {
             let series = Series::new(&coefficients);
-            assert_eq!(series.first_zero(1.0), FirstZero::Unknown);
+            assert_eq!(series.first_zero(1.0, 0.0), FirstZero::Unknown);
         }
     }
 
@@ -311,15 +436,15 @@ mod tests {
         // (0.3 - theta) (0.9 - theta)
         let coefficients = [0.27, -1.2, 1.0];
         let series = Series::new(&coefficients);
-        let FirstZero::Between { lo, hi, guess } = series.first_zero(1.0) else {
+        let FirstZero::Between { lo, hi, guess, .. } = series.first_zero(1.0, 0.0) else {
             panic!("not found");
         };
         assert!(lo < 0.3 && 0.3 < hi && hi < 0.9 && (guess - 0.3).abs() < 0.2);
-        assert_eq!(series.first_zero(0.2), series.first_zero(1.0));
+        assert_eq!(series.first_zero(0.2, 0.0), series.first_zero(1.0, 0.0));
         let late = [0.72, -1.7, 1.0]; // (0.8 - theta) (0.9 - theta)
-        assert_eq!(Series::new(&late).first_zero(0.4), FirstZero::Nowhere);
+        assert_eq!(Series::new(&late).first_zero(0.4, 0.0), FirstZero::Nowhere);
         assert_eq!(
-            Series::new(&[0.3, -1.2, 1.25]).first_zero(1.0),
+            Series::new(&[0.3, -1.2, 1.25]).first_zero(1.0, 0.0),
             FirstZero::Nowhere
         );
     }
@@ -358,9 +483,9 @@ mod tests {
             }
             roots.sort_by(f64::total_cmp);
             let inside: Vec<f64> = roots.into_iter().filter(|r| *r < 1.0).collect();
-            match Series::new(&coefficients).first_zero(1.0) {
+            match Series::new(&coefficients).first_zero(1.0, 0.0) {
                 FirstZero::Nowhere => assert!(inside.is_empty()),
-                FirstZero::Between { lo, hi, guess } => {
+                FirstZero::Between { lo, hi, guess, .. } => {
                     n_found += 1;
                     assert!(lo < inside[0] && inside[0] < hi && lo <= guess && guess <= hi);
                     assert!(inside.get(1).is_none_or(|second| *second > hi));

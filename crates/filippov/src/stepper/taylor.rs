@@ -258,7 +258,7 @@ impl Taylor {
         }
     }
 
-    /// As [`sum`](Self::sum), for few states: the sums stay in registers.
+    /// As [`sum`](Self::sum), for few states: they stay in registers.
     fn sum_few<const N: usize>(&mut self, y: &[f64]) {
         let dt = self.step.interpolant.dt;
         let (scaled, _) = self
@@ -266,12 +266,15 @@ impl Taylor {
             .interpolant
             .coefficients_mut()
             .as_chunks_mut::<N>();
-        scaled[0].copy_from_slice(y);
+        let Some((first, scaled)) = scaled.split_first_mut() else {
+            return;
+        };
+        first.copy_from_slice(y);
         let mut power = dt;
         let rows = self.rows[self.width..].chunks_exact(self.width);
-        for (to, from) in scaled[1..].iter_mut().zip(rows) {
-            for (to, from) in to.iter_mut().zip(&from[..N]) {
-                *to = from * power;
+        for (to, from) in scaled.iter_mut().zip(rows) {
+            if let Some(from) = from.first_chunk::<N>() {
+                *to = from.map(|c| c * power);
             }
             power *= dt;
         }
@@ -282,6 +285,9 @@ impl Taylor {
                 slope[i] += k * row[i];
             }
             k -= 1.0;
+        }
+        for (y1, y) in y1.iter_mut().zip(first) {
+            *y1 += *y;
         }
         self.step.end.copy_from_slice(&y1);
         self.defect.copy_from_slice(&slope);

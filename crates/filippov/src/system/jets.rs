@@ -15,6 +15,7 @@ pub struct MotionJets {
     surfaces: Vec<usize>,
     n_exits: usize,
     has_affine_exits: bool,
+    tells_of_exits: bool,
     /// Of sliding on several surfaces.
     equations: Option<MultiplierEquations>,
 }
@@ -49,6 +50,7 @@ impl MotionJets {
         // Multipliers of several surfaces stand in the place of signs, and are no constants.
         let has_affine_exits =
             sliding.len() == 1 && exits.iter().all(|&f| graph.is_affine_between_switches(f));
+        let tells_of_exits = !graph.hides_changes(&field) && graph.is_told_by_series(&exits);
         let make = move |backend| compile(&graph, &field, &functions, &multipliers, order, backend);
         Some(MotionJets {
             program: Tiered::from(make, backend),
@@ -57,6 +59,7 @@ impl MotionJets {
             surfaces,
             n_exits: exits.len(),
             has_affine_exits,
+            tells_of_exits,
             equations,
         })
     }
@@ -102,6 +105,11 @@ impl MotionJets {
     /// as the states are.
     pub fn has_affine_exits(&self) -> bool {
         self.has_affine_exits
+    }
+
+    /// Do the coefficients of the exit functions tell of all that these do in a step?
+    pub fn tells_of_exits(&self) -> bool {
+        self.tells_of_exits
     }
 
     pub(super) fn eval(&self, t: f64, x: &[f64], signs: &[f64], p: &[f64], out: &mut [f64]) {

@@ -1,5 +1,6 @@
 //! The event stage of a step: the first zero of what is monitored.
 
+pub(super) mod along_series;
 pub(super) mod bounds;
 pub(super) mod curve;
 pub(super) mod detect;

@@ -1,14 +1,12 @@
 //! The search of a step for the first zero of one monitored function.
 
 use crate::error::FieldError;
-use crate::event::certificate::Proof;
-use crate::event::filter::may_vanish_between;
 use crate::event::isolate::{
     first_zero_sampled, is_steep, Bracket, Evidence, Sampled, Zero, PROBES,
 };
 use crate::event::locate::{refine, Located};
 use crate::event::proved::{expected_zero_proved, first_zero_proved, Proved};
-use crate::event::series::{FirstZero, LongestSeries, Near, Series};
+use crate::event::series::{Near, Series};
 use crate::event::{EventFunction, Monitored};
 use crate::integrate::detection::bounds::BoundedCurve;
 use crate::integrate::detection::curve::{grazes, Curve};
@@ -130,140 +128,13 @@ impl Integrator<'_> {
     }
 
     /// Is a function a polynomial along the step?
-    fn is_polynomial(&self, m: &Monitored) -> bool {
+    pub(in crate::integrate) fn is_polynomial(&self, m: &Monitored) -> bool {
         m.affine && self.motion.is_straight && matches!(m.function, EventFunction::Surface(_))
-    }
-
-    /// Are the exit functions polynomials along a Taylor step? Where the motion sticks its limits are others than those of
-    /// the series.
-    fn has_polynomial_exits(&self) -> bool {
-        let jets = self.motion.jets.as_ref();
-        let sticks = |j: &usize| self.system.sticks_at(*j);
-        self.motion.is_straight
-            && jets.is_some_and(|jets| jets.has_affine_exits())
-            && !self.motion.sliding().iter().any(sticks)
-    }
-
-    /// The first zero of one monitored function in a Taylor step up to `reach`, and how far it was searched: to the
-    /// same point, or to one behind a zero.
-    pub(in crate::integrate) fn search_along_series(
-        &mut self,
-        index: usize,
-        reach: f64,
-        dt: f64,
-    ) -> Result<(Option<(f64, bool)>, f64), FieldError> {
-        let m = self.motion.monitored[index];
-        if m.deflation.is_some() {
-            self.motion.monitored[index].noise = self.noise_beside(&m)?;
-        }
-        let (value, _) = self.detector.right[index];
-        let mut buffer = LongestSeries::default();
-        let rows = &mut buffer[..self.n_rows()];
-        let is_polynomial = match m.function {
-            EventFunction::Surface(j) if self.is_polynomial(&m) => {
-                self.affine_series(j, &m, dt, rows)?;
-                true
-            }
-            EventFunction::ExitMinus | EventFunction::ExitPlus if m.deflation.is_none() => {
-                self.has_polynomial_exits()
-                    && self.exit_series(&m, rows)
-                    && Series::new(rows).leads_between(m.value, value)
-            }
-            _ => false,
-        };
-        if is_polynomial {
-            let polynomial = self.as_polynomial(&m, rows);
-            let mut near = None;
-            if let Polynomial::Quotient(series) | Polynomial::Powers(series) = &polynomial {
-                if value > 0.0 && series.is_far_from_zero() {
-                    return Ok((None, reach));
-                }
-                match series.first_zero(reach) {
-                    FirstZero::Nowhere if value > 0.0 || reach < 1.0 => return Ok((None, reach)),
-                    FirstZero::Between { lo, hi, guess } if value < 0.0 || hi < 1.0 => {
-                        if let Some(theta) = self.only_zero(index, series, (lo, guess, hi), dt)? {
-                            let searched = (theta + self.together(dt)).min(reach);
-                            return Ok((Some((theta, false)), searched));
-                        }
-                    }
-                    _ => {}
-                }
-                near = series.near_zero();
-            }
-            return self.search_near((index, true), &polynomial, near, reach, dt);
-        }
-        let has_series = self.exit_series(&m, rows);
-        // Beyond zero at the end: there is a zero, whether there are bounds or not.
-        let proof = if value <= 0.0 && has_series {
-            Proof::Open
-        } else {
-            self.prove_clear(index, value, reach)
-        };
-        if proof == Proof::Silent && !self.exit_may_vanish(&m) {
-            self.detector.dismissed |= matches!(m.function, EventFunction::Exit(_));
-            return Ok((None, reach));
-        }
-        if proof == Proof::Clear {
-            return Ok((None, reach));
-        }
-        let near = if has_series {
-            Series::new(rows).near_zero()
-        } else {
-            None
-        };
-        let bounded = (index, proof == Proof::Open);
-        self.search_near(bounded, &Polynomial::None, near, reach, dt)
-    }
-
-    /// May an exit function about which there are no bounds vanish, to judge by its values at the stages?
-    fn exit_may_vanish(&self, m: &Monitored) -> bool {
-        let stages = m.function.exit_index();
-        let stages = stages.and_then(|index| self.detector.stages.get(index));
-        let is_known = m.deflation.is_none() && !self.stepper.is_taylor();
-        stages.is_none_or(|stages| !is_known || may_vanish_between(stages))
-    }
-
-    /// The only zero of a series between two points, near a guess, to rounding; `None` if rounding matters for whether
-    /// it is one.
-    fn only_zero(
-        &mut self,
-        index: usize,
-        series: &Series,
-        (lo, guess, hi): (f64, f64, f64),
-        dt: f64,
-    ) -> Result<Option<f64>, FieldError> {
-        let noise = self.noise_of(self.motion.monitored[index].function)?;
-        self.motion.monitored[index].noise = noise;
-        let g_lo = series.value(lo);
-        let g_hi = match hi {
-            1.0 => self.detector.right[index].0,
-            _ => series.value(hi),
-        };
-        let mut bracket = Bracket {
-            lo,
-            hi,
-            g_lo,
-            g_hi,
-            guess,
-            slope: (g_hi - g_lo) / (hi - lo),
-        };
-        if g_lo <= noise || g_hi >= -noise || !bracket.is_steep(g_lo.max(-g_hi), noise) {
-            return Ok(None);
-        }
-        let width = 0.5 * EPS * (self.t.abs() / dt).max(1.0);
-        let near = series.newton(guess);
-        if let Some((theta, slope)) = near.filter(|(theta, _)| (lo..=hi).contains(theta)) {
-            (bracket.guess, bracket.slope) = (theta, slope);
-        }
-        let mut g = |theta: f64| Ok(series.value(theta));
-        let located = refine(&mut g, bracket, width)?;
-        self.detector.blurred |= !is_steep(located.slope, g_lo.max(-g_hi), noise);
-        Ok(Some(located.theta))
     }
 
     /// The first zero up to `reach`, looked for at first not far beyond where it is expected; and how far was
     /// searched.
-    fn search_near(
+    pub(in crate::integrate) fn search_near(
         &mut self,
         (index, has_bounds): (usize, bool),
         polynomial: &Polynomial,
@@ -285,25 +156,7 @@ impl Integrator<'_> {
         Ok((zero, searched))
     }
 
-    /// The first zero of an affine h on a piece of a Taylor step.
-    fn search_series(
-        &mut self,
-        index: usize,
-        piece: (f64, f64),
-        dt: f64,
-    ) -> Result<Option<(f64, bool)>, FieldError> {
-        let m = self.motion.monitored[index];
-        let EventFunction::Surface(j) = m.function else {
-            return Ok(None);
-        };
-        let mut buffer = LongestSeries::default();
-        let rows = &mut buffer[..self.n_rows()];
-        self.affine_series(j, &m, dt, rows)?;
-        let polynomial = self.as_polynomial(&m, rows);
-        self.search_piece((index, true), &polynomial, None, piece, dt)
-    }
-
-    fn search_piece(
+    pub(in crate::integrate) fn search_piece(
         &mut self,
         (index, has_bounds): (usize, bool),
         polynomial: &Polynomial,
@@ -445,7 +298,7 @@ impl Integrator<'_> {
     }
 
     /// An affine h along a Taylor step.
-    fn as_polynomial<'a>(&self, m: &Monitored, rows: &'a [f64]) -> Polynomial<'a> {
+    pub(in crate::integrate) fn as_polynomial<'a>(&self, m: &Monitored, rows: &'a [f64]) -> Polynomial<'a> {
         let series = Series::new(rows);
         match m.deflation {
             None => Polynomial::Powers(series),
@@ -472,7 +325,7 @@ impl Integrator<'_> {
 }
 
 /// A monitored function along a step, in the form of the step's continuous extension.
-enum Polynomial<'a> {
+pub(in crate::integrate) enum Polynomial<'a> {
     /// It is none.
     None,
     /// The nested form of DOPRI5.
