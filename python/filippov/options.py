@@ -90,8 +90,17 @@ _REPEATABLE = frozenset(
         *("sliding", "nonunique", "keep", "dense_output", "stabilization"),
     )
 )
-_KNOWN: dict[tuple[Any, ...], Options] = {}
+_PLAIN = frozenset({str, float, int, bool})
+_KNOWN: dict[tuple[Any, ...] | None, Options] = {}
 _MOST_KNOWN = 64
+
+
+def repeatable_key(given: Mapping[str, Any]) -> tuple[Any, ...] | None:
+    """Return what tells these options from others; ``None`` if that is not known from names and values."""
+    types = [*map(type, given.values())]
+    # With the types: 1, 1.0 and True are equal.
+    is_plain = _REPEATABLE.issuperset(given) and _PLAIN.issuperset(types)
+    return (*given.items(), *types) if is_plain else None
 
 
 def check_options(given: Mapping[str, Any], t_span: tuple[float, float], n: int) -> Options:
@@ -117,10 +126,8 @@ def check_options(given: Mapping[str, Any], t_span: tuple[float, float], n: int)
     """
     if not given:
         return _DEFAULT_OPTIONS
-    values = given.values()
-    is_repeatable = _REPEATABLE.issuperset(given) and {*map(type, values)} <= {str, float, int, bool}
-    key = (*given, *values, *map(type, values)) if is_repeatable else None
-    if key is not None and key in _KNOWN:
+    key = repeatable_key(given)
+    if key in _KNOWN:
         return _KNOWN[key]
     checked: dict[str, Any] = {}
     for name, value in given.items():
@@ -156,7 +163,7 @@ def check_t_span(t_span: Any) -> tuple[float, float]:
     """
     if type(t_span) is tuple and len(t_span) == 2:
         t0, t1 = t_span
-        if {type(t0), type(t1)} <= {float, int} and math.isfinite(t0) and math.isfinite(t1):
+        if type(t0) in (float, int) and type(t1) in (float, int) and math.isfinite(t0) and math.isfinite(t1):
             return float(t0), float(t1)
     try:
         ends = [_real(end) for end in t_span]

@@ -280,8 +280,13 @@ def numbered_states(n: int) -> tuple[str, ...]:
     return tuple(f"x[{i}]" for i in range(n))
 
 
+_NO_PARAMETERS: Array = np.zeros(0)
+
+
 def parameter_vector(values: dict[str, float]) -> Array:
     """Return the parameter values in the order in which they were declared."""
+    if not values:
+        return _NO_PARAMETERS
     return np.array(list(values.values()), dtype=np.float64)
 
 

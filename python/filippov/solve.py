@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Hashable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from filippov._core import Run, TracedSystem
+from filippov._core import Run, RunOptions, TracedSystem
 from filippov._core import solve as run_core
 from filippov.backward import ReversedRun, reversed_function
 from filippov.branches import explore
@@ -30,6 +30,7 @@ from filippov.options import (
     check_unknown,
     check_y0,
     fit_kappa,
+    repeatable_key,
 )
 from filippov.prepare import Prepared, parameter_vector
 from filippov.solution import AnyRun, Solution
@@ -235,6 +236,20 @@ _NO_OPTIONS = frozenset({"fun", "t_span", "y0", "events", "args", "params", "sur
 _OPTIONS = frozenset(_DEFAULTS) - _NO_OPTIONS
 
 
+class _Call(NamedTuple):
+    """What follows from a system and options alone, kept for the next call with these."""
+
+    prepared: Prepared
+    options: Options
+    core_options: RunOptions
+    parameters: Array
+    actions: list[Any]
+    states: tuple[str, ...]
+
+
+_MOST_CALLS = 64
+
+
 def solve_prepared(
     system: System,
     t_span: Any,
@@ -242,10 +257,36 @@ def solve_prepared(
     params: Mapping[str, float] | None,
     options: Mapping[str, Any],
 ) -> Solution:
-    """Solve as `solve_ivp` does, sooner if only options are given: most of them are not looked at."""
-    if options.keys() <= _OPTIONS:
-        return _solve(system, t_span, y0, _changed(options), None, (), params, None, None)
-    return solve_ivp(system, t_span, y0, params=params, **options)
+    """Solve as `solve_ivp` does, sooner if only options are given, most of all those of an earlier call."""
+    if not options.keys() <= _OPTIONS:
+        return solve_ivp(system, t_span, y0, params=params, **options)
+    key = None if params else repeatable_key(options)
+    call = None if key is None else system._calls.get(key)
+    if call is not None:
+        (t0, t1), state = check_t_span(t_span), check_y0(y0)
+        prepared = call.prepared
+        if t0 < t1 and len(state) == prepared.core.n_states:
+            run = run_core(prepared.core, t0, t1, state, call.parameters, call.core_options, [], call.actions)
+            return _present(run, system, prepared, call.options, t0, call.states, False, None)
+    solution = _solve(system, t_span, y0, _changed(options), None, (), params, None, None)
+    if key is not None and call is None and len(system._calls) < _MOST_CALLS:
+        _keep_call(system, key, options, np.size(y0))
+    return solution
+
+
+def _keep_call(system: System, key: Hashable, given: Mapping[str, Any], n: int) -> None:
+    values = system.parameter_values(None)
+    options = check_options(_changed(given), (0.0, 1.0), n)
+    if options.nonunique != "branch":
+        prepared = system.prepare(n, 0.0, None, values)
+        system._calls[key] = _Call(
+            prepared,
+            options,
+            options.for_core(),
+            parameter_vector(values),
+            list(prepared.actions),
+            system.state_names(n),
+        )
 
 
 def _changed(options: Mapping[str, Any]) -> dict[str, Any]:
@@ -278,40 +319,53 @@ def _solve(
         prepared, specs = _backward(system, prepared, specs, state, values, t0)
     found = core_events(specs or [], prepared, t0 if t1 >= t0 else -t0, state, constants, values)
 
+    states = system.state_names(n)
+
     def follow(choices: tuple[Mode, ...]) -> Solution:
         run = _run(prepared, t0, t1, state, values, options, found, choices)
-        if options.progress is not None and len(run.t):
-            options.progress(float(run.t[-1]))
-        solution = Solution.from_run(
-            run,
-            prepared,
-            t0=t0,
-            states=system.state_names(n),
-            has_events=specs is not None,
-            dense_output=options.dense_output and options.keep == "steps",
-        )
-        if run.status < 0:
-            _raise_if_asked(run, solution, options)
-            if run.reason == "field_not_finite" and isinstance(run, Run):
-                solution.message += system.line_not_finite(run, values)
-        return solution
+        return _present(run, system, prepared, options, t0, states, specs is not None, values)
 
     solution = follow(())
-    _warn_of_memory(solution, prepared)
     if options.nonunique == "branch":
         _add_branches(solution, follow, options.max_branches)
     return solution
 
 
+def _present(
+    run: AnyRun,
+    system: System,
+    prepared: Prepared,
+    options: Options,
+    t0: float,
+    states: tuple[str, ...],
+    has_events: bool,
+    values: dict[str, float] | None,
+) -> Solution:
+    """Present what the core computed; raise what the options ask to raise."""
+    if options.progress is not None and len(run.t):
+        options.progress(float(run.t[-1]))
+    dense_output = options.dense_output and options.keep == "steps"
+    solution = Solution.from_run(
+        run, prepared, t0=t0, states=states, has_events=has_events, dense_output=dense_output
+    )
+    if run.status < 0:
+        _raise_if_asked(run, solution, options)
+        if run.reason == "field_not_finite" and isinstance(run, Run):
+            given = system.parameter_values(None) if values is None else values
+            solution.message += system.line_not_finite(run, given)
+    if prepared.remembers:
+        _warn_of_memory(solution, prepared)
+    return solution
+
+
 def _warn_of_memory(solution: Solution, prepared: Prepared) -> None:
     """Warn where a function with an ``if`` assigns what other calls of it may read."""
-    if prepared.remembers:
-        text = (
-            f"fun assigns {', '.join(prepared.remembers)}, outside of itself: a trace does not remember what "
-            "an earlier call left there. For a relay with two thresholds use fl.Hysteresis; else keep such "
-            "values out of fun"
-        )
-        solution.warnings.append(RunWarning(float(solution.t[0]), "memory", text, ()))
+    text = (
+        f"fun assigns {', '.join(prepared.remembers)}, outside of itself: a trace does not remember what "
+        "an earlier call left there. For a relay with two thresholds use fl.Hysteresis; else keep such "
+        "values out of fun"
+    )
+    solution.warnings.append(RunWarning(float(solution.t[0]), "memory", text, ()))
 
 
 def _add_branches(

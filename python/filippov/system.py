@@ -232,6 +232,7 @@ class System(Points):
         self._states = tuple(str(name) for name in states) if states is not None else None
         self._n = check_n(n)
         self._prepared: Prepared | None = None
+        self._calls: dict[Any, Any] = {}  # what earlier calls of `solve` need again, by their options
         if self._states is not None:
             if self._n is None:
                 self._n = len(self._states)
@@ -461,7 +462,7 @@ class System(Points):
         if self._prepared is None and self._n is not None:
             self._prepared_now()
         prepared = self._prepared
-        state["_prepared"] = None
+        state["_prepared"], state["_calls"] = None, {}
         if prepared is not None and isinstance(prepared.core, TracedSystem):
             state["_source"] = None
             state["_traced"] = packed(prepared)

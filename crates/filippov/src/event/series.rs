@@ -15,8 +15,6 @@ const ZERO_STEPS: u32 = 64;
 
 /// Of the first coefficient, how much the last terms together may make up to be left out of the proof that there is no zero.
 const REST_BESIDE: f64 = 0.125;
-/// The same where there is one, which has to be told from others.
-const REST_AT_ZERO: f64 = 1e-5;
 
 /// How often an interval is halved whose coefficients do not tell its zeros apart: a long step has a few, and comes near
 /// to others.
@@ -25,6 +23,8 @@ const HALVINGS: u32 = 10;
 /// Room for the coefficients of a step of the highest order.
 pub type LongestSeries = [f64; MOST_COEFFICIENTS];
 const MOST_COEFFICIENTS: usize = TAYLOR_LARGEST_ORDER + 1;
+/// Room that is yet empty.
+pub const NO_TERMS: LongestSeries = [0.0; MOST_COEFFICIENTS];
 
 /// 1 / C(n, k) for every degree n.
 const INVERSE_BINOMIALS: [LongestSeries; MOST_COEFFICIENTS] = {
@@ -65,8 +65,6 @@ pub enum FirstZero {
         hi: f64,
         /// Very roughly where it vanishes.
         guess: f64,
-        /// What was left out of the polynomial.
-        doubt: f64,
     },
     /// Nothing.
     Unknown,
@@ -112,10 +110,14 @@ impl<'a> Series<'a> {
         (start - left).abs().max((end - right).abs()) <= SAME_VALUE * size
     }
 
-    /// Is the polynomial above `margin` on [0, 1], as its Bernstein coefficients tell?
+    /// Is the polynomial above `margin` on [0, 1], as its falling terms tell, or its Bernstein coefficients?
     pub fn stays_above(&self, margin: f64) -> bool {
+        let falling: f64 = self.0[1..].iter().map(|c| c.min(0.0)).sum();
+        if self.0[0] + falling > margin {
+            return true;
+        }
         let first = self.first_terms(REST_BESIDE * (self.0[0] - margin));
-        let mut coefficients = LongestSeries::default();
+        let mut coefficients = NO_TERMS;
         let b = &mut coefficients[..first.used];
         to_bernstein(self.0, b);
         b.iter().all(|&b| b > margin + first.rest)
@@ -136,35 +138,23 @@ impl<'a> Series<'a> {
 
     /// The first zero on [0, 1] before `reach`, by the signs of the Bernstein coefficients, which change at least as
     /// often as those of the polynomial (Descartes' rule); where they say nothing, by those of the halves. The pieces do
-    /// not depend on `reach`: neither does a zero.
+    /// not depend on `reach`: neither does a zero. With it comes how large the last terms are together, which are left out
+    /// if they are below `spare` times the first.
     ///
     /// What is told holds for every function within `margin` of the polynomial, but that it may have more zeros than one
-    /// where the polynomial is within `doubt` of zero, which is in one place: see [`is_single`](Self::is_single).
-    pub fn first_zero(&self, reach: f64, margin: f64) -> FirstZero {
-        let first = self.first_terms(REST_AT_ZERO * self.0[0]);
-        match self.first_zero_of(first, reach, margin) {
-            FirstZero::Unknown if first.rest > 0.0 => {
-                let all = self.first_terms(0.0);
-                self.first_zero_of(all, reach, margin)
-            }
-            found => found,
-        }
-    }
-
-    fn first_zero_of(&self, first: FirstTerms, reach: f64, margin: f64) -> FirstZero {
-        let mut coefficients = LongestSeries::default();
-        let b = &mut coefficients[..first.used];
+    /// where the polynomial is as small as what was left out: see [`is_single`](Self::is_single).
+    pub fn first_zero(&self, reach: f64, margin: f64, spare: f64) -> (FirstZero, f64) {
+        let FirstTerms { used, rest } = self.first_terms(spare * self.0[0]);
+        let mut coefficients = NO_TERMS;
+        let b = &mut coefficients[..used];
         let size = to_bernstein(self.0, b);
-        let doubt = margin + first.rest;
+        let doubt = margin + rest;
         if b.iter().all(|&b| b > doubt) {
-            return FirstZero::Nowhere;
+            return (FirstZero::Nowhere, rest);
         }
         let noise = 16.0 * EPS * size + doubt;
-        let mut found = first_zero_between(b, (0.0, 1.0), reach, noise, HALVINGS);
-        if let FirstZero::Between { doubt, .. } = &mut found {
-            *doubt = first.rest;
-        }
-        found
+        let found = first_zero_between(b, (0.0, 1.0), reach, noise, HALVINGS);
+        (found, rest)
     }
 
     /// Is a zero with this slope the only one in the place where polynomials within `doubt` of this one have theirs?
@@ -314,36 +304,39 @@ fn first_zero_between(
     if lo >= reach {
         return FirstZero::Nowhere;
     }
-    let degree = b.len() - 1;
-    let positive = b.iter().take_while(|&&b| b > noise).count();
-    if positive > degree {
+    if b.iter().all(|&b| b > noise) {
         return FirstZero::Nowhere;
     }
-    let negative = b.iter().rev().take_while(|&&b| b < -noise).count();
-    if positive > 0 && negative > 0 && positive + negative >= degree {
-        // Where the polygon of the coefficients falls through zero.
-        let (left, right) = (positive - 1, degree + 1 - negative);
-        let share = b[left] / (b[left] - b[right]) * (right - left) as f64;
-        let guess = lo + (hi - lo) * (left as f64 + share) / degree as f64;
-        let doubt = 0.0;
-        return FirstZero::Between {
-            lo,
-            hi,
-            guess,
-            doubt,
-        };
+    if let Some(found) = only_change(b, (lo, hi), noise) {
+        return found;
     }
-    if halvings == 0 || positive == 0 {
+    if halvings == 0 || b[0] <= noise {
         return FirstZero::Unknown;
     }
-    let mut first = LongestSeries::default();
-    let first = &mut first[..=degree];
+    let mut first = NO_TERMS;
+    let first = &mut first[..b.len()];
     halve(b, first);
     let middle = 0.5 * (lo + hi);
     match first_zero_between(first, (lo, middle), reach, noise, halvings - 1) {
         FirstZero::Nowhere => first_zero_between(b, (middle, hi), reach, noise, halvings - 1),
         found => found,
     }
+}
+
+/// The zero of a polynomial with Bernstein coefficients `b` from `lo` to `hi`, if they change their sign once. One
+/// coefficient within `noise` of zero may be among those that do.
+fn only_change(b: &[f64], (lo, hi): (f64, f64), noise: f64) -> Option<FirstZero> {
+    let degree = b.len() - 1;
+    let positive = b.iter().take_while(|&&b| b > noise).count();
+    let negative = b.iter().rev().take_while(|&&b| b < -noise).count();
+    if positive == 0 || negative == 0 || positive + negative < degree {
+        return None;
+    }
+    // Where the polygon of the coefficients falls through zero.
+    let (left, right) = (positive - 1, degree + 1 - negative);
+    let share = b[left] / (b[left] - b[right]) * (right - left) as f64;
+    let guess = lo + (hi - lo) * (left as f64 + share) / degree as f64;
+    Some(FirstZero::Between { lo, hi, guess })
 }
 
 /// Makes Bernstein coefficients those of the second half, and `first` those of the first one: de Casteljau's means of
@@ -404,21 +397,21 @@ mod tests {
             let series = Series::new(&coefficients);
             let lowest = (0..=100).map(|k| series.value(f64::from(k) * 0.01));
             assert_eq!(lowest.fold(f64::INFINITY, f64::min) > 1e-9, is_above);
-            let nowhere = series.first_zero(1.0, 0.0) == FirstZero::Nowhere;
+            let nowhere = series.first_zero(1.0, 0.0, 0.0).0 == FirstZero::Nowhere;
             assert_eq!(nowhere, is_above);
         }
         // Bernstein coefficients tell where the falling terms do not.
         let turning = [1.0, -1.5, 1.0, 0.0];
         let series = Series::new(&turning);
         assert!(series.stays_above(0.0) && !series.stays_above(0.5));
-        assert_eq!(series.first_zero(1.0, 0.0), FirstZero::Nowhere);
+        assert_eq!(series.first_zero(1.0, 0.0, 0.0).0, FirstZero::Nowhere);
     }
 
     #[test]
     fn one_change_of_sign_is_one_zero() {
         // (1 - 2 theta) (1 + theta + theta^2)
         let series = Series::new(&[1.0, -1.0, -1.0, -2.0]);
-        let FirstZero::Between { guess, .. } = series.first_zero(1.0, 0.0) else {
+        let FirstZero::Between { guess, .. } = series.first_zero(1.0, 0.0, 0.0).0 else {
             panic!("not found");
         };
         let (zero, slope) = series.newton(guess).unwrap();
@@ -427,7 +420,7 @@ mod tests {
         // Touching zero, or vanishing at an end, is not decided.
         for coefficients in [[0.25, -1.0, 1.0], [1.0, -1.0, 0.0], [0.0, 1.0, -2.0]] {
             let series = Series::new(&coefficients);
-            assert_eq!(series.first_zero(1.0, 0.0), FirstZero::Unknown);
+            assert_eq!(series.first_zero(1.0, 0.0, 0.0).0, FirstZero::Unknown);
         }
     }
 
@@ -436,15 +429,21 @@ mod tests {
         // (0.3 - theta) (0.9 - theta)
         let coefficients = [0.27, -1.2, 1.0];
         let series = Series::new(&coefficients);
-        let FirstZero::Between { lo, hi, guess, .. } = series.first_zero(1.0, 0.0) else {
+        let FirstZero::Between { lo, hi, guess } = series.first_zero(1.0, 0.0, 0.0).0 else {
             panic!("not found");
         };
         assert!(lo < 0.3 && 0.3 < hi && hi < 0.9 && (guess - 0.3).abs() < 0.2);
-        assert_eq!(series.first_zero(0.2, 0.0), series.first_zero(1.0, 0.0));
-        let late = [0.72, -1.7, 1.0]; // (0.8 - theta) (0.9 - theta)
-        assert_eq!(Series::new(&late).first_zero(0.4, 0.0), FirstZero::Nowhere);
         assert_eq!(
-            Series::new(&[0.3, -1.2, 1.25]).first_zero(1.0, 0.0),
+            series.first_zero(0.2, 0.0, 0.0).0,
+            series.first_zero(1.0, 0.0, 0.0).0
+        );
+        let late = [0.72, -1.7, 1.0]; // (0.8 - theta) (0.9 - theta)
+        assert_eq!(
+            Series::new(&late).first_zero(0.4, 0.0, 0.0).0,
+            FirstZero::Nowhere
+        );
+        assert_eq!(
+            Series::new(&[0.3, -1.2, 1.25]).first_zero(1.0, 0.0, 0.0).0,
             FirstZero::Nowhere
         );
     }
@@ -483,9 +482,9 @@ mod tests {
             }
             roots.sort_by(f64::total_cmp);
             let inside: Vec<f64> = roots.into_iter().filter(|r| *r < 1.0).collect();
-            match Series::new(&coefficients).first_zero(1.0, 0.0) {
+            match Series::new(&coefficients).first_zero(1.0, 0.0, 0.0).0 {
                 FirstZero::Nowhere => assert!(inside.is_empty()),
-                FirstZero::Between { lo, hi, guess, .. } => {
+                FirstZero::Between { lo, hi, guess } => {
                     n_found += 1;
                     assert!(lo < inside[0] && inside[0] < hi && lo <= guess && guess <= hi);
                     assert!(inside.get(1).is_none_or(|second| *second > hi));

@@ -261,6 +261,9 @@ impl PiecewiseSystem for TracedSystem {
     }
 
     fn surface_size(&self, j: usize, t: f64, x: &[f64], signs: &[f64]) -> Result<f64, FieldError> {
+        if let Some(i) = self.model.only_state {
+            return Ok(x[i].abs());
+        }
         let size = self.with_gradient((j, signs), (t, x), |time, states, values| {
             let entries = states.iter().zip(values);
             let size: f64 = entries.map(|(&i, value)| (value * x[i]).abs()).sum();

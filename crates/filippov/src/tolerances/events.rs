@@ -133,3 +133,7 @@ pub const SAME_VALUE: f64 = 1e-10;
 /// A function may lie beside its series by so many times what it does at both ends of the step and in the middle: the
 /// terms left out grow towards the end, and those next to the last that is kept may cancel there.
 pub const SERIES_MARGIN: f64 = 8.0;
+
+/// Terms of a series that together are below this share of the first one are left out where its zeros are told apart: the
+/// work grows with the square of their number. The fewer zeros are then too close to others to be told apart by the rest.
+pub const SMALL_REST: f64 = 1e-5;

@@ -5,12 +5,12 @@ use crate::event::certificate::Proof;
 use crate::event::filter::may_vanish_between;
 use crate::event::isolate::{is_steep, Bracket};
 use crate::event::locate::refine;
-use crate::event::series::{FirstZero, LongestSeries, Near, Series};
+use crate::event::series::{FirstZero, Near, Series, NO_TERMS};
 use crate::event::{EventFunction, Monitored};
 use crate::integrate::detection::curve::Curve;
 use crate::integrate::detection::search::Polynomial;
 use crate::integrate::integrator::Integrator;
-use crate::tolerances::{EPS, SERIES_MARGIN};
+use crate::tolerances::{EPS, SERIES_MARGIN, SMALL_REST};
 
 /// How a series stands for a monitored function.
 #[derive(Clone, Copy, Debug)]
@@ -19,6 +19,14 @@ struct Likeness {
     margin: f64,
     /// They are the same: the function is a polynomial along the step.
     is_exact: bool,
+}
+
+/// Where a zero is, about where, and how large the terms are that were left out to find it.
+struct Between {
+    lo: f64,
+    hi: f64,
+    guess: f64,
+    rest: f64,
 }
 
 impl Integrator<'_> {
@@ -35,7 +43,7 @@ impl Integrator<'_> {
             self.motion.monitored[index].noise = self.noise_beside(&m)?;
         }
         let (value, _) = self.detector.right[index];
-        let mut buffer = LongestSeries::default();
+        let mut buffer = NO_TERMS;
         let rows = &mut buffer[..self.n_rows()];
         let mut has_series = false;
         let likeness = match m.function {
@@ -63,15 +71,30 @@ impl Integrator<'_> {
                 if value > 0.0 && series.stays_above(margin) {
                     return Ok((None, reach));
                 }
-                match series.first_zero(reach, margin) {
-                    FirstZero::Nowhere if value > 0.0 || reach < 1.0 => return Ok((None, reach)),
-                    found @ FirstZero::Between { hi, .. } if value < 0.0 || hi < 1.0 => {
-                        if let Some(theta) = self.only_zero(index, series, likeness, found)? {
-                            let searched = (theta + self.together(dt)).min(reach);
-                            return Ok((Some((theta, false)), searched));
+                // Leaving small terms out is cheaper, and hardly ever too rough.
+                for spare in [SMALL_REST, 0.0] {
+                    let (found, rest) = series.first_zero(reach, margin, spare);
+                    match found {
+                        FirstZero::Nowhere if value > 0.0 || reach < 1.0 => {
+                            return Ok((None, reach));
                         }
+                        FirstZero::Between { lo, hi, guess } if value < 0.0 || hi < 1.0 => {
+                            let between = Between {
+                                lo,
+                                hi,
+                                guess,
+                                rest,
+                            };
+                            if let Some(theta) = self.only_zero(index, series, likeness, between)? {
+                                let searched = (theta + self.together(dt)).min(reach);
+                                return Ok((Some((theta, false)), searched));
+                            }
+                        }
+                        _ => {}
                     }
-                    _ => {}
+                    if rest == 0.0 {
+                        break;
+                    }
                 }
                 near = series.near_zero();
             }
@@ -154,17 +177,13 @@ impl Integrator<'_> {
         index: usize,
         series: &Series,
         likeness: Likeness,
-        found: FirstZero,
-    ) -> Result<Option<f64>, FieldError> {
-        let FirstZero::Between {
+        Between {
             lo,
             hi,
             guess,
-            doubt: left_out,
-        } = found
-        else {
-            return Ok(None);
-        };
+            rest,
+        }: Between,
+    ) -> Result<Option<f64>, FieldError> {
         let m = self.motion.monitored[index];
         let noise = self.noise_of(m.function)?;
         self.motion.monitored[index].noise = noise;
@@ -182,7 +201,7 @@ impl Integrator<'_> {
         let (dt, n_rows) = (self.stepper.interpolant().dt, self.n_rows() as f64);
         let width = 0.5 * EPS * (self.t.abs() / dt).max(1.0);
         let (mut theta, mut slope) = series.only_zero((lo, hi), guess, width);
-        if left_out > 0.0 && !series.is_single(slope, left_out) {
+        if rest > 0.0 && !series.is_single(slope, rest) {
             return Ok(None);
         }
         if !likeness.is_exact {
@@ -253,7 +272,7 @@ impl Integrator<'_> {
         let EventFunction::Surface(j) = m.function else {
             return Ok(None);
         };
-        let mut buffer = LongestSeries::default();
+        let mut buffer = NO_TERMS;
         let rows = &mut buffer[..self.n_rows()];
         self.affine_series(j, &m, dt, rows)?;
         let polynomial = self.as_polynomial(&m, rows);

@@ -298,7 +298,11 @@ impl Integrator<'_> {
     }
 
     /// An affine h along a Taylor step.
-    pub(in crate::integrate) fn as_polynomial<'a>(&self, m: &Monitored, rows: &'a [f64]) -> Polynomial<'a> {
+    pub(in crate::integrate) fn as_polynomial<'a>(
+        &self,
+        m: &Monitored,
+        rows: &'a [f64],
+    ) -> Polynomial<'a> {
         let series = Series::new(rows);
         match m.deflation {
             None => Polynomial::Powers(series),
