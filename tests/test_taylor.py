@@ -8,6 +8,7 @@ import filippov as fl
 import numpy as np
 import pytest
 import scipy.integrate
+import scipy.optimize
 
 
 def oscillator(t: float, x: Any) -> Any:
@@ -92,17 +93,69 @@ def test_long_systems_are_computed_by_loops() -> None:
     assert fl.solve_ivp(ring, (0, 0.1), y0).stats["method"] == "DOPRI5"
 
 
+@pytest.mark.parametrize("shape", ["exponential", "rational"])
 @pytest.mark.parametrize("width", [0.3, 0.03, 1e-3])
-def test_pulses_that_no_coefficient_sees_are_found(width: float) -> None:
-    """From rest at t = 0 the series of the exit function is constant; a blow at t = 5 starts the mass."""
+def test_pulses_that_no_coefficient_sees_are_found(width: float, shape: str) -> None:
+    """From rest at t = 0 the exit function's series tells little of the blow that starts the mass."""
 
     def mass(t: float, v: Any) -> Any:
-        return [3.0 * np.exp(-(((t - 5.0) / width) ** 2)) - np.sign(v[0])]
+        square = ((t - 5.0) / width) ** 2
+        return [3.0 * (np.exp(-square) if shape == "exponential" else 1 / (1 + square)) - np.sign(v[0])]
 
     sol = fl.solve_ivp(mass, (0, 10), [0.0], rtol=1e-9, atol=1e-12)
-    start = 5.0 - width * np.sqrt(np.log(3.0))
+    half_width = np.sqrt(np.log(3.0)) if shape == "exponential" else np.sqrt(2.0)
     assert sol.switches.kind.tolist() == ["exit_sliding", "enter_sliding"]
-    assert sol.switches.t[0] == pytest.approx(start, abs=1e-10)
+    assert sol.switches.t[0] == pytest.approx(5.0 - width * half_width, abs=1e-10)
+
+
+@pytest.mark.parametrize("excess", [-1e-6, -1e-10, 0.0, 1e-10, 1e-8, 1e-4])
+def test_a_force_that_just_overcomes_friction_or_just_does_not(excess: float) -> None:
+    """The exit function touches zero, or dips below it by as much: the mass stays, or starts there."""
+
+    def mass(t: float, v: Any) -> Any:
+        return [(1.0 + excess) * np.sin(t) - np.sign(v[0])]
+
+    sol = fl.solve_ivp(mass, (0.0, 3.0), [0.0], method="Taylor", rtol=1e-10, atol=1e-12)
+    assert sol.success
+    if excess <= 0.0:
+        assert "exit_sliding" not in sol.switches.kind.tolist()
+        assert abs(sol.y[0, -1]) < 1e-15
+    else:
+        start = np.arcsin(1.0 / (1.0 + excess))
+        assert sol.switches.kind.tolist()[0] == "exit_sliding"
+        # An error e of the force is e / slope in time; the slope is the square root of twice the excess.
+        assert sol.switches.t[0] == pytest.approx(start, abs=1e-15 / np.sqrt(2 * excess) + 1e-14)
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-8, 1e-12])
+@pytest.mark.parametrize("seed", range(12))
+def test_rest_ends_where_the_sum_of_waves_first_overcomes_friction(seed: int, tolerance: float) -> None:
+    rng = np.random.default_rng(seed)
+    size, rate, phase = rng.uniform(0.1, 0.6, 4), rng.uniform(0.3, 6.0, 4), rng.uniform(0, 2 * np.pi, 4)
+    product = rng.uniform(-0.5, 0.5)
+
+    def force(t: Any) -> Any:
+        waves = [a * np.sin(w * t + p) for a, w, p in zip(size, rate, phase, strict=True)]
+        return sum(waves) + product * waves[0] * waves[1] * np.cos(2.5 * t)
+
+    limit = 1.05 * abs(force(0.0)) + 0.3
+    t = np.linspace(0.0, 40.0, 400_001)
+    over = np.flatnonzero(np.abs(force(t)) > limit)
+    sol = fl.solve_ivp(
+        lambda t, v: [force(t) - limit * np.sign(v[0])],
+        (0.0, 40.0),
+        [0.0],
+        method="Taylor",
+        rtol=tolerance,
+        atol=tolerance,
+    )
+    if not len(over):
+        assert "exit_sliding" not in sol.switches.kind.tolist()
+        return
+    k = over[0]
+    start = scipy.optimize.brentq(lambda t: abs(force(t)) - limit, t[k - 1], t[k], xtol=1e-15)
+    assert sol.switches.kind.tolist()[0] == "exit_sliding"
+    assert sol.switches.t[0] == pytest.approx(start, abs=1e-12)
 
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-8, 1e-12])

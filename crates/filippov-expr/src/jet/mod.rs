@@ -12,14 +12,12 @@ mod looped;
 mod multipliers;
 mod plan;
 mod recurrence;
+mod telling;
 mod unrolled;
-
-use rustc_hash::FxHashMap;
 
 use crate::error::ExprError;
 use crate::graph::Graph;
-use crate::node::{Node, NodeId};
-use crate::op::{BinaryOp, UnaryOp};
+use crate::node::NodeId;
 use crate::program::{Backend, Program};
 
 use looped::Looped;
@@ -28,88 +26,6 @@ use plan::Plan;
 
 /// Programs with more nodes than this are not unrolled: they would take longer to compile than they save.
 const MOST_UNROLLED: usize = 6000;
-
-impl Graph {
-    /// Do the values have a Taylor series wherever they are finite? Roots, powers, logarithms and some inverse
-    /// functions do not: they end, or bend sharply, at a finite value.
-    pub fn is_analytic(&self, nodes: &[NodeId]) -> bool {
-        use BinaryOp::{Atan2, Hypot, Pow};
-        use UnaryOp::{Acos, Acosh, Asin, Atanh, Cbrt, Log, Log10, Log1p, Log2, Sqrt};
-        let all = self.reachable_by(nodes.iter().copied(), |id| {
-            self.node(id).operands().collect::<Vec<_>>()
-        });
-        !all.into_iter().any(|id| match *self.node(id) {
-            Node::Unary(op, a) => {
-                let is_edged = matches!(
-                    op,
-                    Sqrt | Cbrt | Log | Log1p | Log2 | Log10 | Asin | Acos | Acosh | Atanh
-                );
-                is_edged && self.facts(a).varies
-            }
-            Node::Binary(op, a, b) => {
-                let is_edged = matches!(op, Pow | Atan2 | Hypot);
-                is_edged && (self.facts(a).varies || self.facts(b).varies)
-            }
-            _ => false,
-        })
-    }
-}
-
-impl Graph {
-    /// May the values change where no Taylor coefficient tells? Exponential functions, and what is made of them, come up
-    /// from below rounding: far from a pulse exp(-t^2) all coefficients are as good as zero.
-    pub fn hides_changes(&self, nodes: &[NodeId]) -> bool {
-        use UnaryOp::{Cosh, Exp, Exp2, Expm1, Sinh, Tanh};
-        let all = self.reachable_by(nodes.iter().copied(), |id| {
-            self.node(id).operands().collect::<Vec<_>>()
-        });
-        all.into_iter().any(|id| match *self.node(id) {
-            Node::Unary(op, a) => {
-                matches!(op, Exp | Expm1 | Exp2 | Sinh | Cosh | Tanh) && self.facts(a).varies
-            }
-            Node::Binary(BinaryOp::Pow, _, b) => self.facts(b).varies,
-            _ => false,
-        })
-    }
-}
-
-/// Factors of a product of which the first coefficients of a series tell.
-const MOST_FACTORS: u32 = 4;
-
-impl Graph {
-    /// Do the first coefficients of their series tell of all that the values do, wherever that is? They do of waves, of
-    /// states and of time, and of sums and products of a few of them. Quotients and high powers have narrow peaks, whose
-    /// coefficients elsewhere are small: of these they may not.
-    pub fn is_told_by_series(&self, nodes: &[NodeId]) -> bool {
-        let all = self.reachable_by(nodes.iter().copied(), |id| {
-            self.node(id).operands().collect::<Vec<_>>()
-        });
-        // The factors of the products that make up a value, none if it is told otherwise.
-        let mut known: FxHashMap<NodeId, Option<u32>> = FxHashMap::default();
-        for id in all {
-            let factors = match *self.node(id) {
-                _ if !self.facts(id).varies => Some(0),
-                Node::Time | Node::State(_) => Some(1),
-                Node::Sign(_) => Some(0),
-                Node::Unary(UnaryOp::Neg | UnaryOp::Sin | UnaryOp::Cos, a) => known[&a],
-                Node::Binary(BinaryOp::Add | BinaryOp::Sub, a, b) => {
-                    known[&a].zip(known[&b]).map(|(a, b)| a.max(b))
-                }
-                Node::Binary(BinaryOp::Mul, a, b) => {
-                    let factors = known[&a].zip(known[&b]).map(|(a, b)| a + b);
-                    factors.filter(|&factors| factors <= MOST_FACTORS)
-                }
-                Node::Binary(BinaryOp::Div, a, b) if !self.facts(b).varies => known[&a],
-                Node::Select { plus, minus, .. } => {
-                    known[&plus].zip(known[&minus]).map(|(a, b)| a.max(b))
-                }
-                _ => None,
-            };
-            known.insert(id, factors);
-        }
-        nodes.iter().all(|id| known[id].is_some())
-    }
-}
 
 /// Taylor coefficients of the motion of a field, and of other functions along it.
 ///

@@ -6,6 +6,7 @@
 //! [`certificate`]). Where it cannot, the continuous extension is [`isolate`]d: sampled and bisected
 //! until each piece provably has no zero, or exactly one. [`locate`] then finds that one to rounding.
 
+mod bernstein;
 pub mod certificate;
 pub mod filter;
 pub mod function;

@@ -2,9 +2,12 @@
 
 use filippov_expr::Interval;
 
+use super::bernstein::{first_zero_between, to_bernstein, HALVINGS};
 use super::certificate::Bound;
 use crate::stepper::{shift, Expansion};
-use crate::tolerances::{EPS, SAME_VALUE, TAYLOR_LARGEST_ORDER};
+use crate::tolerances::{EPS, SAME_VALUE};
+
+pub use super::bernstein::{FirstZero, NO_TERMS};
 
 /// Samples, and steps of Newton's method, in the search for about where a zero is.
 const GUESS_SAMPLES: u32 = 3;
@@ -16,31 +19,6 @@ const ZERO_STEPS: u32 = 64;
 /// Of the first coefficient, how much the last terms together may make up to be left out of the proof that there is no zero.
 const REST_BESIDE: f64 = 0.125;
 
-/// How often an interval is halved whose coefficients do not tell its zeros apart: a long step has a few, and comes near
-/// to others.
-const HALVINGS: u32 = 10;
-
-/// Room for the coefficients of a step of the highest order.
-pub type LongestSeries = [f64; MOST_COEFFICIENTS];
-const MOST_COEFFICIENTS: usize = TAYLOR_LARGEST_ORDER + 1;
-/// Room that is yet empty.
-pub const NO_TERMS: LongestSeries = [0.0; MOST_COEFFICIENTS];
-
-/// 1 / C(n, k) for every degree n.
-const INVERSE_BINOMIALS: [LongestSeries; MOST_COEFFICIENTS] = {
-    let mut table = [[1.0; MOST_COEFFICIENTS]; MOST_COEFFICIENTS];
-    let mut n = 0;
-    while n < MOST_COEFFICIENTS {
-        let mut k = 0;
-        while k < n {
-            table[n][k + 1] = table[n][k] * (k + 1) as f64 / (n - k) as f64;
-            k += 1;
-        }
-        n += 1;
-    }
-    table
-};
-
 /// A polynomial in theta, lowest coefficient first; there is at least one, and no more than of a step.
 #[derive(Clone, Copy, Debug)]
 pub struct Series<'a>(&'a [f64]);
@@ -50,24 +28,6 @@ pub struct Series<'a>(&'a [f64]);
 struct FirstTerms {
     used: usize,
     rest: f64,
-}
-
-/// What is known about the first zero of a polynomial that is positive at 0.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum FirstZero {
-    /// There is none: it is positive.
-    Nowhere,
-    /// Between `lo` and `hi` it falls from positive to negative values, once; before there is no zero.
-    Between {
-        /// Where it is positive.
-        lo: f64,
-        /// Where it is negative.
-        hi: f64,
-        /// Very roughly where it vanishes.
-        guess: f64,
-    },
-    /// Nothing.
-    Unknown,
 }
 
 /// Where a zero is expected.
@@ -277,114 +237,6 @@ impl<'a> Series<'a> {
     }
 }
 
-/// The Bernstein coefficients, as many as `b` has, of the first coefficients of a polynomial; returns the sum of the sizes
-/// of these.
-fn to_bernstein(coefficients: &[f64], b: &mut [f64]) -> f64 {
-    // The coefficient of degree i is the sum of C(i, k)/C(n, k) c_k.
-    let mut size = 0.0;
-    let weights = &INVERSE_BINOMIALS[b.len() - 1];
-    for ((b, c), weight) in b.iter_mut().zip(coefficients).zip(weights) {
-        size += c.abs();
-        *b = weight * c;
-    }
-    sum_binomially(b);
-    size
-}
-
-/// The first zero of a polynomial with Bernstein coefficients `b` from `lo` to `hi`. Of a coefficient within `noise` of
-/// zero the sign may be lost in rounding: between the positive and the negative ones there may be one. From `reach` on
-/// nothing is looked for.
-fn first_zero_between(
-    b: &mut [f64],
-    (lo, hi): (f64, f64),
-    reach: f64,
-    noise: f64,
-    halvings: u32,
-) -> FirstZero {
-    if lo >= reach {
-        return FirstZero::Nowhere;
-    }
-    if b.iter().all(|&b| b > noise) {
-        return FirstZero::Nowhere;
-    }
-    if let Some(found) = only_change(b, (lo, hi), noise) {
-        return found;
-    }
-    if halvings == 0 || b[0] <= noise {
-        return FirstZero::Unknown;
-    }
-    let mut first = NO_TERMS;
-    let first = &mut first[..b.len()];
-    halve(b, first);
-    let middle = 0.5 * (lo + hi);
-    match first_zero_between(first, (lo, middle), reach, noise, halvings - 1) {
-        FirstZero::Nowhere => first_zero_between(b, (middle, hi), reach, noise, halvings - 1),
-        found => found,
-    }
-}
-
-/// The zero of a polynomial with Bernstein coefficients `b` from `lo` to `hi`, if they change their sign once. One
-/// coefficient within `noise` of zero may be among those that do.
-fn only_change(b: &[f64], (lo, hi): (f64, f64), noise: f64) -> Option<FirstZero> {
-    let degree = b.len() - 1;
-    let positive = b.iter().take_while(|&&b| b > noise).count();
-    let negative = b.iter().rev().take_while(|&&b| b < -noise).count();
-    if positive == 0 || negative == 0 || positive + negative < degree {
-        return None;
-    }
-    // Where the polygon of the coefficients falls through zero.
-    let (left, right) = (positive - 1, degree + 1 - negative);
-    let share = b[left] / (b[left] - b[right]) * (right - left) as f64;
-    let guess = lo + (hi - lo) * (left as f64 + share) / degree as f64;
-    Some(FirstZero::Between { lo, hi, guess })
-}
-
-/// Makes Bernstein coefficients those of the second half, and `first` those of the first one: de Casteljau's means of
-/// neighbours, halved at the end.
-fn halve(b: &mut [f64], first: &mut [f64]) {
-    let mut scale = 1.0;
-    for (end, first) in (1..=b.len()).rev().zip(first) {
-        *first = scale * b[0];
-        scale *= 0.5;
-        let row = &mut b[..end];
-        for i in 1..row.len() {
-            row[i - 1] += row[i];
-        }
-    }
-    scale = 1.0;
-    for b in b.iter_mut().rev() {
-        *b *= scale;
-        scale *= 0.5;
-    }
-}
-
-/// Rows of the triangle that are summed at a time.
-const ROWS: usize = 4;
-
-/// Makes entry i the sum of C(i, k) b_k: a triangle of sums of neighbours, some rows of it at a time.
-fn sum_binomially(mut b: &mut [f64]) {
-    while b.len() > 1 {
-        let end = ROWS.min(b.len());
-        let (first, rest) = std::mem::take(&mut b).split_at_mut(end);
-        // The entry before in each row.
-        let mut before = [0.0; ROWS];
-        for (i, entry) in first.iter_mut().enumerate() {
-            for neighbour in &mut before[..i] {
-                *entry += std::mem::replace(neighbour, *entry);
-            }
-            before[i] = *entry;
-        }
-        for entry in rest.iter_mut() {
-            let mut sum = *entry;
-            for neighbour in &mut before {
-                sum += std::mem::replace(neighbour, sum);
-            }
-            *entry = sum;
-        }
-        b = rest;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::{FirstZero, Series};
@@ -493,6 +345,72 @@ mod tests {
             }
         }
         assert!(n_found > 800);
+    }
+
+    /// Products of random roots, with small terms of higher order that may make one zero into three.
+    #[test]
+    fn what_is_left_out_does_not_hide_a_zero() {
+        let mut state = 7_u64;
+        let mut random = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let (mut n_single, mut n_doubted) = (0, 0);
+        for _ in 0..4000 {
+            // A fall at `root`, flat there to some degree, and a wave of small size.
+            let (root, flatness) = (0.3 + 0.4 * random(), 10_f64.powf(-8.0 * random()));
+            let cubic = [
+                root * root * root + flatness * root,
+                -3.0 * root * root - flatness,
+                3.0 * root,
+                -1.0,
+            ];
+            let size = 10_f64.powf(-4.0 - 5.0 * random());
+            let mut coefficients = cubic.to_vec();
+            coefficients.extend((0..8).map(|_| size * (2.0 * random() - 1.0)));
+            let series = Series::new(&coefficients);
+            let (FirstZero::Between { lo, hi, guess }, rest) = series.first_zero(1.0, 0.0, 1e-3)
+            else {
+                continue;
+            };
+            let (zero, slope) = series.only_zero((lo, hi), guess, 1e-15);
+            if !series.is_single(slope, rest) {
+                n_doubted += 1;
+                continue;
+            }
+            n_single += 1;
+            let is_right = |i: u32| {
+                let theta = f64::from(i) / 2000.0;
+                let clear = (theta - zero).abs() < 1e-9 || theta > hi;
+                clear || (series.value(theta) > 0.0) == (theta < zero)
+            };
+            assert!((0..=2000).all(is_right));
+        }
+        assert!(n_single > 500 && n_doubted > 100);
+    }
+
+    #[test]
+    fn the_only_zero_is_found_to_rounding() {
+        // (1 - theta/r) (1 + theta^2), its factor also to the third power, and a wave around its bend.
+        for root in [1e-3, 0.2, 0.5, 0.999] {
+            let simple = [1.0, -1.0 / root, 1.0, -1.0 / root];
+            let (zero, slope) = Series::new(&simple).only_zero((0.0, 1.0), 0.7, 1e-16);
+            assert!((zero - root).abs() < 1e-15 && slope < 0.0);
+            let triple = [1.0, -3.0 / root, 3.0 / (root * root), -1.0 / root.powi(3)];
+            let (zero, _) = Series::new(&triple).only_zero((0.0, 1.0), 0.7, 1e-16);
+            assert!((zero - root).abs() < 1e-4);
+        }
+        let mut wave = [0.0; 24];
+        let mut term = 1.0;
+        for (k, c) in wave.iter_mut().enumerate() {
+            // cos(3 theta), which has no second derivative where it vanishes.
+            *c = [term, 0.0, -term, 0.0][k % 4];
+            term *= 3.0 / (k + 1) as f64;
+        }
+        let (zero, slope) = Series::new(&wave).only_zero((0.0, 1.0), 0.3, 1e-16);
+        assert!((zero - std::f64::consts::FRAC_PI_6).abs() < 1e-15 && (slope + 3.0).abs() < 1e-9);
     }
 
     #[test]
