@@ -357,3 +357,43 @@ def test_defaults_given_explicitly_are_the_defaults() -> None:
     }
     assert set(defaults) == set(Options._fields)
     assert check_options(defaults, (0.0, 1.0), 1) == check_options({}, (0.0, 1.0), 1)
+
+
+def test_calls_that_repeat_their_options_are_those_of_solve_ivp() -> None:
+    """What such a call needs is kept with the system, and with nothing that may differ from call to call."""
+    system = fl.System(oscillator, n=2, params={"F": 0.4, "omega": 1 / 3})
+    options = {"rtol": 1e-8, "atol": 1e-9, "dense_output": False}
+    for y0, t_span in (([1.0, 2.0], (0, 20)), ((3, -1), (0.5, 9.0)), (np.array([0.0, 0.1]), [0.0, 7.0])):
+        for F in (None, 0.4, 0.7):
+            given = {} if F is None else {"F": F}
+            again = [system.solve(t_span, y0, **given, **options) for _ in range(3)]
+            fresh = fl.System(oscillator, n=2, params={"F": 0.4, "omega": 1 / 3})
+            alone = fl.solve_ivp(fresh, t_span, y0, params=given, **options)
+            for sol in again:
+                assert sol.t.tolist() == alone.t.tolist()
+                assert sol.y.tolist() == alone.y.tolist()
+                assert sol.sol is None
+    assert system.solve((0, 20), [1.0, 2.0], rtol=1e-8, atol=1e-9).sol is not None
+    copy = pickle.loads(pickle.dumps(system))
+    assert (
+        copy.solve((0, 20), [1, 2], **options).y.tolist()
+        == system.solve((0, 20), [1, 2], **options).y.tolist()
+    )
+    for wrong in ([1.0], [1.0, 2.0, 3.0], [1.0, np.nan], "ab"):
+        with pytest.raises(fl.InputError, match="y0"):
+            system.solve((0, 20), wrong, **options)
+    with pytest.raises(fl.InputError, match="t_span"):
+        system.solve((0, np.inf), [1.0, 2.0], **options)
+    with pytest.raises(fl.InputError, match="t1 < t0"):
+        system.solve((20, 0), [1.0, 2.0], **options)
+    assert system.solve((3, 3), [1.0, 2.0], **options).t.tolist() == [3.0]
+    with pytest.raises(fl.InputError, match="rtol"):
+        system.solve((0, 20), [1.0, 2.0], rtol=True, atol=1e-9, dense_output=False)
+
+
+def test_a_repeated_call_names_the_line_that_is_not_finite() -> None:
+    system = fl.System(lambda t, x: [np.sqrt(0.5 - t)], n=1)
+    first, second = (system.solve((0, 5), [0.5], rtol=1e-6) for _ in range(2))
+    assert not second.success
+    assert "sqrt" in second.message
+    assert first.message == second.message

@@ -12,12 +12,13 @@ import numpy as np
 import numpy.typing as npt
 
 from filippov._core import Run, solve_many
+from filippov.core_events import core_events
 from filippov.errors import InputError, Interrupted
 from filippov.events import normalise_events
-from filippov.options import check_options, check_t_span, check_unknown, finite_array
+from filippov.options import check_options, check_t_span, finite_array
 from filippov.prepare import Prepared
 from filippov.solution import Solution
-from filippov.solve import core_events
+from filippov.unknown import check_unknown
 
 if TYPE_CHECKING:
     from filippov.system import System

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import inspect
 import math
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +12,7 @@ import numpy.typing as npt
 
 from filippov._core import RunOptions
 from filippov.errors import InputError, ToleranceError
+from filippov.unknown import did_you_mean
 
 __all__ = ["Options", "check_options", "check_t_span", "check_y0"]
 
@@ -28,7 +28,6 @@ _POLICIES = {
     "zeno": (("accumulate",), ()),
     "keep": (("steps", "switches", "last"), ()),
 }
-_SCIPY_ONLY = ("jac", "jac_sparsity", "lband", "uband", "min_step")
 _SMALLEST_RTOL = float(100 * np.finfo(float).eps)
 
 
@@ -259,30 +258,6 @@ def check_params(params: Any) -> dict[str, float]:
         if not math.isfinite(checked[name]):
             raise InputError(f"params: {name!r} must be finite, it is {value!r}")
     return checked
-
-
-def check_unknown(
-    unknown: Mapping[str, Any], function: Callable[..., Any], parameters: Iterable[str] = ()
-) -> None:
-    """Refuse unknown keywords with a suggestion; a system takes `parameters` too. SciPy's own are ignored."""
-    for name in unknown:
-        if name == "vectorized":  # SciPy's promise that columns may be handed over; no change of the result
-            continue
-        if name not in _SCIPY_ONLY:
-            known = [*parameters, *inspect.signature(function).parameters]
-            hint = did_you_mean(name, known)
-            of_system = f"; the parameters of the system are {', '.join(parameters)}" if parameters else ""
-            what = f"{function.__name__}() got an unexpected keyword argument {name!r}"
-            raise TypeError(f"{what}{hint}{of_system}")
-        warnings.warn(f"{name}: has no effect with an explicit method", UserWarning, stacklevel=3)
-
-
-def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """Return ``"; did you mean 'rtol'?"`` for the nearest known name, or an empty text."""
-    from difflib import get_close_matches  # only needed for a message
-
-    nearest = get_close_matches(name, list(known), n=1)
-    return f"; did you mean {nearest[0]!r}?" if nearest else ""
 
 
 def _check_policy(name: str, value: Any) -> str:

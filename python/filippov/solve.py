@@ -9,25 +9,19 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from filippov._core import Run, RunOptions, TracedSystem
+from filippov._core import Run, RunOptions
 from filippov._core import solve as run_core
 from filippov.backward import ReversedRun, reversed_function
 from filippov.branches import explore
+from filippov.core_events import CoreEvent, core_events
 from filippov.errors import InputError, Interrupted, NonUniqueError
-from filippov.events import (
-    EventSpec,
-    bind_function,
-    check_scalar_function,
-    normalise_events,
-    selective,
-)
+from filippov.events import EventSpec, normalise_events
 from filippov.modes import Mode
 from filippov.options import (
     Options,
     check_args,
     check_options,
     check_t_span,
-    check_unknown,
     check_y0,
     fit_kappa,
     repeatable_key,
@@ -37,13 +31,11 @@ from filippov.solution import AnyRun, Solution
 from filippov.start import StandingRun
 from filippov.switches import RunWarning
 from filippov.system import System
-from filippov.trace import trace_event
-from filippov.trace.fingerprint import fingerprint
+from filippov.unknown import check_unknown
 
 __all__ = ["solve_ivp", "solve_prepared"]
 
 Array = npt.NDArray[np.float64]
-CoreEvent = tuple[Callable[[float, Array], float] | int, float, int, str]
 
 
 def solve_ivp(
@@ -440,51 +432,6 @@ def _run(
     if options.t_eval is not None:
         options = options._replace(t_eval=-options.t_eval)
     return ReversedRun(run_core(prepared.core, -t0, -t1, y0, p, options.for_core(), events))
-
-
-def core_events(
-    specs: list[EventSpec],
-    prepared: Prepared,
-    t0: float,
-    y0: Array,
-    args: tuple[Any, ...],
-    values: dict[str, float],
-) -> list[CoreEvent]:
-    """Turn events into nodes of the traced system where possible, else keep them as functions."""
-    events: list[CoreEvent] = []
-    for index, spec in enumerate(specs):
-        g = bind_function(spec.g, args, values)
-        check_scalar_function(g, t0, y0, f"events: entry {index} ({spec.name})")
-        node = _event_node(prepared, spec, t0, y0, args, values)
-        events.append((g if node is None else node, spec.direction, spec.terminal, spec.name))
-    return events
-
-
-def _event_node(
-    prepared: Prepared,
-    spec: EventSpec,
-    t0: float,
-    y0: Array,
-    args: tuple[Any, ...],
-    values: dict[str, float],
-) -> int | None:
-    """Return the handle of an event that could be traced; then no Python is called during the run."""
-    if prepared.trace is None or not isinstance(prepared.core, TracedSystem):
-        return None
-
-    def key() -> Hashable | None:
-        read = fingerprint(spec.g, args)
-        return None if read is None else (t0, y0.tobytes(), tuple(values.items()), read)
-
-    before = key()
-    known = prepared.trace.events.find(before) if before is not None else None
-    if known is None:
-        g = selective(spec.g, values)
-        node = trace_event(prepared.trace, g, args, t0=t0, y0=y0, parameters=values)
-        known = (None if node is None else prepared.core.event(node),)
-        if before is not None and before == key():
-            prepared.trace.events.keep(before, known)
-    return known[0]
 
 
 def _raise_if_asked(run: AnyRun, solution: Solution, options: Options) -> None:

@@ -16,13 +16,13 @@ from filippov.forms import Source, base_source, check_surfaces, fields_source, r
 from filippov.options import (
     check_args,
     check_params,
-    did_you_mean,
 )
 from filippov.points import Points
 from filippov.prepare import Prepared, check_n, numbered_states, packed, prepare, unpacked
 from filippov.resets import check_resets
 from filippov.solution import Solution
 from filippov.trace.explain import deepest_user_line
+from filippov.unknown import did_you_mean
 
 if TYPE_CHECKING:
     from filippov.ensemble import Ensemble

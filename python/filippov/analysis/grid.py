@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from filippov.errors import InputError
-from filippov.options import did_you_mean
+from filippov.unknown import did_you_mean
 
 if TYPE_CHECKING:
     from filippov.system import System

@@ -12,7 +12,8 @@ import numpy as np
 from filippov.analysis.points import Observation
 from filippov.analysis.sections import Phase, as_section
 from filippov.errors import InputError
-from filippov.options import Options, check_options, check_t_span, did_you_mean
+from filippov.options import Options, check_options, check_t_span
+from filippov.unknown import did_you_mean
 
 if TYPE_CHECKING:
     from filippov.system import System

@@ -20,8 +20,8 @@ from filippov.events import (
     selective,
 )
 from filippov.modes import Mode
-from filippov.options import did_you_mean
 from filippov.prepare import Prepared
+from filippov.unknown import did_you_mean
 
 __all__ = ["Phase", "Place", "Section", "Tangency", "as_section"]
 

@@ -207,6 +207,9 @@ impl Integrator<'_> {
         if !likeness.is_exact {
             // One step of Newton's method with the slope of the series. What it errs by: by how far that may be off.
             let step = -self.value_along(&m, theta)? / slope;
+            if step.is_nan() {
+                return Ok(None);
+            }
             let doubt = (likeness.margin * n_rows / slope).abs() + step.abs() / (hi - lo);
             theta += step;
             if step.abs() * doubt > width {

@@ -1,0 +1,36 @@
+"""Names that do not exist: refused, with the one that was probably meant."""
+
+from __future__ import annotations
+
+import inspect
+import warnings
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+__all__ = ["check_unknown", "did_you_mean"]
+
+_SCIPY_ONLY = ("jac", "jac_sparsity", "lband", "uband", "min_step")
+
+
+def check_unknown(
+    unknown: Mapping[str, Any], function: Callable[..., Any], parameters: Iterable[str] = ()
+) -> None:
+    """Refuse unknown keywords with a suggestion; a system takes `parameters` too. SciPy's own are ignored."""
+    for name in unknown:
+        if name == "vectorized":  # SciPy's promise that columns may be handed over; no change of the result
+            continue
+        if name not in _SCIPY_ONLY:
+            known = [*parameters, *inspect.signature(function).parameters]
+            hint = did_you_mean(name, known)
+            of_system = f"; the parameters of the system are {', '.join(parameters)}" if parameters else ""
+            what = f"{function.__name__}() got an unexpected keyword argument {name!r}"
+            raise TypeError(f"{what}{hint}{of_system}")
+        warnings.warn(f"{name}: has no effect with an explicit method", UserWarning, stacklevel=3)
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Return ``"; did you mean 'rtol'?"`` for the nearest known name, or an empty text."""
+    from difflib import get_close_matches  # only needed for a message
+
+    nearest = get_close_matches(name, list(known), n=1)
+    return f"; did you mean {nearest[0]!r}?" if nearest else ""
