@@ -185,6 +185,8 @@ struct KnownMode {
     active: SmallVec<[bool; 8]>,
     /// Its Taylor series, once they were asked for and if there are any.
     jets: Option<Option<Arc<MotionJets>>>,
+    /// What is monitored, where nothing rests and there is no contact.
+    monitored: Option<SmallVec<[Monitored; 2]>>,
 }
 
 /// One piece of constant mode.
@@ -314,6 +316,7 @@ impl<'a> Motion<'a> {
                 mode: self.mode.clone(),
                 active,
                 jets: None,
+                monitored: None,
             });
             self.known.len() - 1
         });
@@ -333,6 +336,31 @@ impl<'a> Motion<'a> {
     ) {
         self.recall(system);
         self.sticks = self.sliding.len() > 1 && self.sliding.iter().any(|&j| system.sticks_at(j));
+        let is_plain = self.resting.is_empty()
+            && matches!(self.field, ModeField::Region(_) | ModeField::Sliding(_));
+        let known = self.known[self.current].monitored.as_ref();
+        self.monitored.clear();
+        match known.filter(|_| is_plain) {
+            Some(known) => self.monitored.extend_from_slice(known),
+            None => {
+                self.list_monitored(system);
+                if is_plain {
+                    let listed = SmallVec::from_slice(&self.monitored);
+                    self.known[self.current].monitored = Some(listed);
+                }
+            }
+        }
+        for (function, deflation) in deflations.iter().rev() {
+            let own = self
+                .monitored
+                .iter_mut()
+                .filter(|m| m.function == *function);
+            own.for_each(|m| m.deflation = Some(*deflation));
+        }
+        self.note_departure();
+    }
+
+    fn list_monitored(&mut self, system: &dyn PiecewiseSystem) {
         let signs = &self.signs;
         let monitor = |function, orientation, affine| Monitored {
             function,
@@ -341,13 +369,9 @@ impl<'a> Motion<'a> {
             rate: f64::NAN,
             curvature: 0.0,
             affine,
-            deflation: deflations
-                .iter()
-                .find(|(f, _)| *f == function)
-                .map(|(_, d)| *d),
+            deflation: None,
             noise: 0.0,
         };
-        self.monitored.clear();
         let surfaces = (0..signs.len()).filter(|&j| {
             self.active[j] && self.mode.entries()[j] != 0 && !self.resting.contains(&j)
         });
@@ -362,7 +386,6 @@ impl<'a> Motion<'a> {
         });
         self.monitored
             .extend(exits.map(|exit| monitor(exit, 1.0, false)));
-        self.note_departure();
     }
 
     /// Tells the field of a region whether the motion still departs from a surface.
