@@ -130,7 +130,7 @@ pub const PROVED_DEPTH: u32 = 6;
 /// does to sums of large terms, far below what another function would give.
 pub const SAME_VALUE: f64 = 1e-10;
 
-/// A function may lie beside its series by so many times what it does at both ends of the step and in the middle: the
+/// A function may lie beside its series by so many times what it does at both ends of the step and at a point within: the
 /// terms left out grow towards the end, and those next to the last that is kept may cancel there.
 pub const SERIES_MARGIN: f64 = 8.0;
 

@@ -144,8 +144,12 @@ impl Integrator<'_> {
             return Ok(None);
         }
         let [start, end] = series.ends();
-        let middle = series.value(0.5) - self.value_along(m, 0.5)?;
-        let gaps = [start - m.value, middle, end - value_at_end];
+        let mut gaps = [start - m.value, end - value_at_end, 0.0];
+        // Within the step the function is known at a zero of the other one. At its own it will be.
+        let known = self.detector.exits.first().map(|known| known.0);
+        if let Some(theta) = known.or((value_at_end > 0.0).then_some(0.5)) {
+            gaps[2] = series.value(theta) - self.value_along(m, theta)?;
+        }
         let widest = gaps.into_iter().fold(0.0, |w: f64, gap| w.max(gap.abs()));
         let is_known = !gaps.iter().any(|gap| gap.is_nan());
         Ok(is_known.then_some(Likeness {
@@ -206,10 +210,12 @@ impl Integrator<'_> {
         }
         if !likeness.is_exact {
             // One step of Newton's method with the slope of the series. What it errs by: by how far that may be off.
-            let step = -self.value_along(&m, theta)? / slope;
-            if step.is_nan() {
+            let value = self.value_along(&m, theta)?;
+            let is_alike = SERIES_MARGIN * value.abs() <= doubt;
+            if !is_alike {
                 return Ok(None);
             }
+            let step = -value / slope;
             let doubt = (likeness.margin * n_rows / slope).abs() + step.abs() / (hi - lo);
             theta += step;
             if step.abs() * doubt > width {
