@@ -110,3 +110,31 @@ def test_a_limit_that_no_sliding_leaves_stops_by_name(method: str) -> None:
     assert not sol.success
     assert "all fields are tangent to surface 0 of the intersection" in sol.message
     np.testing.assert_allclose(sol.y[:, -1], [1.1621, -0.8, -0.049], rtol=0, atol=1e-4)
+
+
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-9])
+@pytest.mark.parametrize("method", ["auto", "DOPRI5", "DOP853"])
+def test_a_run_that_ends_at_a_limit_says_how_it_came_there(method: str, tolerance: float) -> None:
+    """Seed 702170: what follows is refused by name; the way to the limit is an accumulation, no motion."""
+
+    def fun(t: float, x: Any) -> list[Any]:
+        inside = x[0] ** 2 + x[1] ** 2 - 0.4
+        nested = x[0] - 0.8 * np.sign(x[0] - 0.1)
+        near = np.where(inside > 0, -0.32, -0.44)
+        far = np.where(nested > 0, 0.309, -1.06)
+        bend = 0.2 * far * np.cos(0.3 * t + x[1]) - np.sign(inside) * abs(nested)
+        return [
+            -0.36 * x[0] - 0.5 * x[1] - 0.98 * near + bend,
+            -0.66 * x[1] - 0.18 * x[0] - 0.447 - 0.68 * near * np.exp(-(x[1] ** 2)) - 1.28 * far,
+        ]
+
+    sol = fl.solve_ivp(fun, (0.0, 3.0), [-0.63, 1.0], method=method, rtol=tolerance, atol=tolerance)
+    assert not sol.success
+    assert "which jumps there" in sol.message
+    last = sol.switches[-1]
+    assert last.kind == "accumulation"
+    assert last.t == sol.t[-1] == sol.segments[-1].t_end
+    np.testing.assert_allclose(last.y_after, [0.1, np.sqrt(0.39)], rtol=0, atol=1e-12)
+    # Before it the motion follows its field: a step ends where the next one starts.
+    before = sol.t[-2]
+    assert before == sol.switches[-2].t

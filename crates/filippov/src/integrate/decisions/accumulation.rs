@@ -125,10 +125,9 @@ impl Integrator<'_> {
         self.motion.mode = before.clone();
         self.move_straight(limit.t, limit.x)?;
         self.stats.n_switches += 1;
-        let (after, left) = match self.decide_at_limit(&before, &limit.meeting)? {
-            Ok(decided) => decided,
-            Err(stop) => return Ok(Some(stop)),
-        };
+        let decided = self.decide_at_limit(&before, &limit.meeting)?;
+        // Where nothing is decided the run ends at the limit, having come there all the same.
+        let after = decided.as_ref().map_or(&before, |(after, _)| after).clone();
         self.recorder.switch(Switch {
             t: self.t,
             y_before: SmallVec::from_slice(&self.x),
@@ -136,10 +135,13 @@ impl Integrator<'_> {
             kind: Kind::Accumulation,
             surfaces: limit.meeting.into(),
             mode_before: before,
-            mode_after: after.clone(),
+            mode_after: after,
             note: String::new(),
         });
-        self.begin(after, &left)
+        match decided {
+            Ok((after, left)) => self.begin(after, &left),
+            Err(stop) => Ok(Some(stop)),
+        }
     }
 
     /// What follows at the limit: sliding on all surfaces if that is possible.
