@@ -241,6 +241,16 @@ impl<'a> Series<'a> {
 mod tests {
     use super::{FirstZero, Series};
 
+    /// Numbers between 0 and 1.
+    fn random_numbers(mut state: u64) -> impl FnMut() -> f64 {
+        move || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        }
+    }
+
     #[test]
     fn a_polynomial_is_above_what_it_stays_above() {
         // (theta - 0.4)^2 + d
@@ -303,13 +313,7 @@ mod tests {
     /// Products (r1 - theta) ... (rn - theta), also with roots outside of [0, 1] and pairs of complex ones.
     #[test]
     fn the_first_zero_of_a_product_is_between_its_neighbours() {
-        let mut state = 1_u64;
-        let mut random = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            (state >> 11) as f64 / (1_u64 << 53) as f64
-        };
+        let mut random = random_numbers(1);
         let mut n_found = 0;
         for _ in 0..2000 {
             let mut coefficients = vec![1.0];
@@ -350,13 +354,7 @@ mod tests {
     /// Products of random roots, with small terms of higher order that may make one zero into three.
     #[test]
     fn what_is_left_out_does_not_hide_a_zero() {
-        let mut state = 7_u64;
-        let mut random = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            (state >> 11) as f64 / (1_u64 << 53) as f64
-        };
+        let mut random = random_numbers(7);
         let (mut n_single, mut n_doubted) = (0, 0);
         for _ in 0..4000 {
             // A fall at `root`, flat there to some degree, and a wave of small size.
