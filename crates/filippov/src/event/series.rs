@@ -180,6 +180,9 @@ impl<'a> Series<'a> {
         for _ in 0..ZERO_STEPS {
             let (value, here, half_bend) = self.with_bend(at);
             slope = here;
+            if value == 0.0 {
+                break;
+            }
             if value > 0.0 {
                 lo = at;
             } else {
@@ -191,7 +194,7 @@ impl<'a> Series<'a> {
             let step = (next - at).abs();
             let converges = bend.abs() < 0.25 && next >= lo && next <= hi && step <= 0.5 * before;
             let doubt = bend.abs() + step / length;
-            if converges && step * doubt * doubt <= 0.125 * width || value == 0.0 {
+            if converges && step * doubt * doubt <= 0.125 * width {
                 return (next, slope);
             }
             (at, before) = match converges {
@@ -398,6 +401,8 @@ mod tests {
             assert!((zero - root).abs() < 1e-15 && slope < 0.0);
             let triple = [1.0, -3.0 / root, 3.0 / (root * root), -1.0 / root.powi(3)];
             let (zero, _) = Series::new(&triple).only_zero((0.0, 1.0), 0.7, 1e-16);
+            assert!((zero - root).abs() < 1e-4);
+            let (zero, _) = Series::new(&triple).only_zero((0.0, 1.0), root, 1e-16);
             assert!((zero - root).abs() < 1e-4);
         }
         let mut wave = [0.0; 24];
