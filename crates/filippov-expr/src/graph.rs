@@ -193,8 +193,14 @@ impl Graph {
         }
     }
 
-    /// All nodes that the roots are made of, in increasing order; `operands` says which operands of a node
-    /// are followed.
+    /// All nodes that the roots are made of, in increasing order.
+    pub(crate) fn all_below(&self, roots: &[NodeId]) -> Vec<NodeId> {
+        self.reachable_by(roots.iter().copied(), |id| {
+            self.node(id).operands().collect::<Vec<_>>()
+        })
+    }
+
+    /// The same, as far as `operands` says which operands of a node are followed.
     pub(crate) fn reachable_by<I: IntoIterator<Item = NodeId>>(
         &self,
         roots: impl IntoIterator<Item = NodeId>,

@@ -19,9 +19,7 @@ impl Graph {
 
     /// Whether the value contains a parameter with this index or a higher one.
     pub fn depends_on_parameters_from(&self, id: NodeId, first: u32) -> bool {
-        let operands = |id: NodeId| self.node(id).operands().collect::<Vec<_>>();
-        let nodes = self.reachable_by([id], operands);
-        nodes
+        self.all_below(&[id])
             .into_iter()
             .any(|id| matches!(*self.node(id), Node::Parameter(i) if i >= first))
     }
@@ -37,9 +35,8 @@ impl Graph {
     /// As [`is_affine`](Self::is_affine) while no sign changes: signs count as constants, and of a select both branches
     /// are affine.
     pub fn is_affine_between_switches(&self, id: NodeId) -> bool {
-        let operands = |id: NodeId| self.node(id).operands().collect::<Vec<_>>();
         let mut known: FxHashMap<NodeId, Facts> = FxHashMap::default();
-        for id in self.reachable_by([id], operands) {
+        for id in self.all_below(&[id]) {
             let node = self.node(id);
             let mut of = node.operands().map(|operand| known[&operand]);
             let a = of.next().unwrap_or_default();

@@ -15,9 +15,7 @@ impl Graph {
     pub fn is_analytic(&self, nodes: &[NodeId]) -> bool {
         use BinaryOp::{Atan2, Hypot, Pow};
         use UnaryOp::{Acos, Acosh, Asin, Atanh, Cbrt, Log, Log10, Log1p, Log2, Sqrt};
-        let all = self.reachable_by(nodes.iter().copied(), |id| {
-            self.node(id).operands().collect::<Vec<_>>()
-        });
+        let all = self.all_below(nodes);
         !all.into_iter().any(|id| match *self.node(id) {
             Node::Unary(op, a) => {
                 let is_edged = matches!(
@@ -38,9 +36,7 @@ impl Graph {
     /// from below rounding: far from a pulse exp(-t^2) all coefficients are as good as zero.
     pub fn hides_changes(&self, nodes: &[NodeId]) -> bool {
         use UnaryOp::{Cosh, Exp, Exp2, Expm1, Sinh, Tanh};
-        let all = self.reachable_by(nodes.iter().copied(), |id| {
-            self.node(id).operands().collect::<Vec<_>>()
-        });
+        let all = self.all_below(nodes);
         all.into_iter().any(|id| match *self.node(id) {
             Node::Unary(op, a) => {
                 matches!(op, Exp | Expm1 | Exp2 | Sinh | Cosh | Tanh) && self.facts(a).varies
@@ -54,12 +50,9 @@ impl Graph {
     /// states and of time, and of sums and products of a few of them. Quotients and high powers have narrow peaks, whose
     /// coefficients elsewhere are small: of these they may not.
     pub fn is_told_by_series(&self, nodes: &[NodeId]) -> bool {
-        let all = self.reachable_by(nodes.iter().copied(), |id| {
-            self.node(id).operands().collect::<Vec<_>>()
-        });
         // The factors of the products that make up a value, none if it is told otherwise.
         let mut known: FxHashMap<NodeId, Option<u32>> = FxHashMap::default();
-        for id in all {
+        for id in self.all_below(nodes) {
             let factors = match *self.node(id) {
                 _ if !self.facts(id).varies => Some(0),
                 Node::Time | Node::State(_) => Some(1),

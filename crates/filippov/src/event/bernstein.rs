@@ -69,10 +69,7 @@ pub(super) fn first_zero_between(
     noise: f64,
     halvings: u32,
 ) -> FirstZero {
-    if lo >= reach {
-        return FirstZero::Nowhere;
-    }
-    if b.iter().all(|&b| b > noise) {
+    if lo >= reach || b.iter().all(|&b| b > noise) {
         return FirstZero::Nowhere;
     }
     if let Some(found) = only_change(b, (lo, hi), noise) {

@@ -5,7 +5,7 @@ use filippov_expr::Interval;
 use super::bernstein::{first_zero_between, to_bernstein, HALVINGS};
 use super::certificate::Bound;
 use crate::stepper::{shift, Expansion};
-use crate::tolerances::{EPS, SAME_VALUE};
+use crate::tolerances::{EPS, REST_BESIDE, SAME_VALUE};
 
 pub use super::bernstein::{FirstZero, NO_TERMS};
 
@@ -15,9 +15,6 @@ const GUESS_STEPS: u32 = 3;
 
 /// How often a bracket of a zero is improved at most: Halley's method takes three steps, halving all others.
 const ZERO_STEPS: u32 = 64;
-
-/// Of the first coefficient, how much the last terms together may make up to be left out of the proof that there is no zero.
-const REST_BESIDE: f64 = 0.125;
 
 /// A polynomial in theta, lowest coefficient first; there is at least one, and no more than of a step.
 #[derive(Clone, Copy, Debug)]

@@ -350,6 +350,7 @@ impl<'a> Motion<'a> {
                 }
             }
         }
+        // Of several for one function the first counts.
         for (function, deflation) in deflations.iter().rev() {
             let own = self
                 .monitored
@@ -360,6 +361,7 @@ impl<'a> Motion<'a> {
         self.note_departure();
     }
 
+    /// Lists what is monitored in this mode, wherever its motion starts.
     fn list_monitored(&mut self, system: &dyn PiecewiseSystem) {
         let signs = &self.signs;
         let monitor = |function, orientation, affine| Monitored {
