@@ -269,7 +269,7 @@ fn at_intersection(
     match resolve(&fields, &Incoming::Start, &scaling) {
         Ok(resolution) if !resolution.degenerate => point.take(resolution, on_all),
         other => {
-            let decision = decide_intersection(system, &meeting, mode, t, x)?;
+            let decision = decide_intersection(system, &meeting, mode, false, (t, x))?;
             if let Some((only, _)) = decision.unique() {
                 point.mode = Some(only.clone());
                 point.unique = true;

@@ -30,30 +30,46 @@ pub struct Cycle {
 }
 
 impl Cycle {
+    /// The period of the latest returns, the newest last, if there is one by now.
+    pub(super) fn period(&self, latest: &VecDeque<Return>) -> Option<usize> {
+        (1..=self.longest).find(|&q| self.repeats(q, latest) && self.is_settled(q, latest))
+    }
+
+    /// Do as many returns in a row agree with those `q` before as have to?
+    fn repeats(&self, q: usize, latest: &VecDeque<Return>) -> bool {
+        let in_a_row = q.max(LEAST_AGREEMENTS);
+        if latest.len() < in_a_row + q {
+            return false;
+        }
+        let before = latest.iter().rev().skip(q);
+        let mut pairs = latest.iter().rev().zip(before).take(in_a_row);
+        pairs.all(|(a, b)| self.agree(&a.y, &b.y))
+    }
+
     /// Do two states agree?
     fn agree(&self, a: &[f64], b: &[f64]) -> bool {
-        self.distance(a, b) <= 1.0
+        (0..a.len()).all(|i| self.apart(i, a[i], b[i]) <= 1.0)
     }
 
     /// The largest difference of two states, in units of what counts as agreement.
     fn distance(&self, a: &[f64], b: &[f64]) -> f64 {
-        let mut largest = 0.0;
-        for (i, (a, b)) in a.iter().zip(b).enumerate() {
-            let modulus = self.moduli[i];
-            let mut difference = a - b;
-            let mut size = a.abs();
-            if modulus > 0.0 {
-                difference -= modulus * (difference / modulus).round();
-                size = modulus;
-            }
-            let here = difference.abs() / (self.atol[i] + self.rtol * size);
-            // Nothing agrees with what is not a number.
-            if here.is_nan() && difference != 0.0 {
-                return f64::NAN;
-            }
-            largest = f64::max(largest, here);
+        let apart = (0..a.len()).map(|i| self.apart(i, a[i], b[i]));
+        apart.fold(0.0, f64::max)
+    }
+
+    /// The difference of component i in these units. That of what is not finite is no number: it does not agree.
+    fn apart(&self, i: usize, a: f64, b: f64) -> f64 {
+        let modulus = self.moduli[i];
+        let mut difference = a - b;
+        let mut size = a.abs();
+        if modulus > 0.0 {
+            difference -= modulus * (difference / modulus).round();
+            size = modulus;
         }
-        largest
+        if difference == 0.0 {
+            return 0.0;
+        }
+        difference.abs() / (self.atol[i] + self.rtol * size)
     }
 
     /// Is `q` the period, and not a divisor of it, to which the returns still come together?
@@ -86,38 +102,4 @@ fn comes_to_zero([a, b, c]: [f64; 3]) -> bool {
         return second > COMING_TOGETHER * c;
     }
     second * ratio / (1.0 - ratio) > 0.5 * c
-}
-
-/// How often in a row returns have agreed with those `q` before, q = 1, 2, ...
-pub(super) struct Agreements {
-    counts: Vec<u64>,
-}
-
-impl Agreements {
-    pub fn new(longest: usize) -> Self {
-        Agreements {
-            counts: vec![0; longest],
-        }
-    }
-
-    /// Takes the newest return, the last of `latest`; returns the period if there is one by now.
-    pub fn take(&mut self, cycle: &Cycle, latest: &VecDeque<Return>) -> Option<usize> {
-        let (newest, before) = (latest.back()?, latest.len() - 1);
-        let mut period = None;
-        for (index, count) in self.counts.iter_mut().enumerate() {
-            let q = index + 1;
-            if q > before {
-                break;
-            }
-            let agrees = cycle.agree(&newest.y, &latest[before - q].y);
-            *count = if agrees { *count + 1 } else { 0 };
-            if period.is_none()
-                && *count >= LEAST_AGREEMENTS.max(q as u64)
-                && cycle.is_settled(q, latest)
-            {
-                period = Some(q);
-            }
-        }
-        period
-    }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::cycle::{Agreements, Cycle};
+use super::cycle::Cycle;
 use super::{Place, Section};
 use crate::action::Clock;
 use crate::integrate::Stop;
@@ -12,7 +12,7 @@ use crate::switching::Kind;
 use crate::tolerances::SAME_TICK;
 
 /// A return to the section.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Return {
     /// Its time.
     pub t: f64,
@@ -44,11 +44,10 @@ pub(crate) struct Observer {
     clock: Option<(Clock, f64)>,
     transient: u64,
     most: u64,
-    cycle: Option<(Cycle, Agreements)>,
+    cycle: Option<Cycle>,
     returns: Returns,
-    /// The last returns, for the test of periodicity.
+    /// The last returns, as many as the test of periodicity needs and at least one: the oldest makes room for the next.
     latest: VecDeque<Return>,
-    /// How many of them the test needs.
     remembered: usize,
     /// Time of the start, and of the last return.
     t_start: f64,
@@ -77,16 +76,15 @@ impl Observer {
             _ => None,
         };
         let longest = section.cycle.as_ref().map_or(0, |cycle| cycle.longest);
-        let cycle = section.cycle.clone();
         Observer {
             surface,
             clock,
             transient: section.transient,
             most: section.most,
-            cycle: cycle.map(|cycle| (cycle, Agreements::new(longest))),
+            cycle: section.cycle.clone(),
             returns: Returns::default(),
             latest: VecDeque::new(),
-            remembered: 4 * longest,
+            remembered: (4 * longest).max(1),
             t_start,
             t_return: t_start,
             since: t_start,
@@ -168,34 +166,38 @@ impl Observer {
             // It begins here, and belongs to what follows.
             self.modes.pop();
         }
-        let found = Return {
-            t,
-            y: y.to_vec(),
-            duration: t - self.t_return,
-            sliding: std::mem::take(&mut self.slid),
-            modes: std::mem::take(&mut self.modes),
+        let mut found = if self.latest.len() < self.remembered {
+            Return::default()
+        } else {
+            self.latest.pop_front().unwrap_or_default()
         };
+        found.t = t;
+        found.y.clear();
+        found.y.extend_from_slice(y);
+        found.duration = t - self.t_return;
+        found.sliding = std::mem::take(&mut self.slid);
+        std::mem::swap(&mut found.modes, &mut self.modes);
+        self.modes.clear();
         (self.t_return, self.since) = (t, t);
         self.returns.count += 1;
-        let is_kept = self.returns.count > self.transient;
-        if let Some((cycle, agreements)) = &mut self.cycle {
-            if self.latest.len() >= self.remembered {
-                self.latest.pop_front();
-            }
-            self.latest.push_back(found.clone());
-            let period = agreements.take(cycle, &self.latest);
-            self.returns.period = period.unwrap_or(0);
-            if let (Some(period), true) = (period, cycle.ends_run) {
-                let first = self.latest.len() - period;
-                self.returns.kept = self.latest.drain(first..).collect();
-                (self.has_ended, self.is_periodic) = (true, true);
-                return;
-            }
-        }
-        if is_kept {
-            self.returns.kept.push(found);
+        if self.returns.count > self.transient {
+            self.returns.kept.push(found.clone());
             self.has_ended = self.returns.kept.len() as u64 >= self.most;
         }
+        self.latest.push_back(found);
+        if self.cycle.as_ref().is_some_and(|cycle| cycle.ends_run) {
+            self.find_period();
+            if self.returns.period > 0 {
+                let first = self.latest.len() - self.returns.period;
+                self.returns.kept = self.latest.drain(first..).collect();
+                (self.has_ended, self.is_periodic) = (true, true);
+            }
+        }
+    }
+
+    fn find_period(&mut self) {
+        let period = self.cycle.as_ref().and_then(|c| c.period(&self.latest));
+        self.returns.period = period.unwrap_or(0);
     }
 
     fn pass_time(&mut self, t: f64) {
@@ -214,7 +216,10 @@ impl Observer {
         self.has_ended.then_some(reason)
     }
 
-    pub fn into_returns(self) -> Returns {
+    pub fn into_returns(mut self) -> Returns {
+        if !self.is_periodic {
+            self.find_period();
+        }
         self.returns
     }
 }

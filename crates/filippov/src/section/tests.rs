@@ -3,7 +3,6 @@
 use std::collections::VecDeque;
 use std::f64::consts::PI;
 
-use super::cycle::Agreements;
 use super::{Cycle, Place, Return, Returns, Section};
 use crate::action::{Actions, Clock};
 use crate::switching::Kind;
@@ -181,20 +180,18 @@ fn a_phase_counts_up_to_its_modulus() {
 /// The period first found in the returns y(0), y(1), ..., and after how many of them.
 fn first_period(y: impl Fn(i32) -> [f64; 2]) -> (usize, i32) {
     let test = cycle(true).expect("there is one");
-    let mut agreements = Agreements::new(test.longest);
     let mut latest = VecDeque::new();
     for k in 0..300_000 {
         latest.push_back(Return {
             t: f64::from(k),
             y: y(k).to_vec(),
             duration: 1.0,
-            sliding: 0.0,
-            modes: Vec::new(),
+            ..Return::default()
         });
         if latest.len() > 4 * test.longest {
             latest.pop_front();
         }
-        if let Some(period) = agreements.take(&test, &latest) {
+        if let Some(period) = test.period(&latest) {
             return (period, k);
         }
     }

@@ -7,7 +7,7 @@ use crate::error::FieldError;
 use crate::field::MeetingFields;
 use crate::mode::Mode;
 use crate::system::PiecewiseSystem;
-use crate::tolerances::TANGENT;
+use crate::tolerances::{AT_SIDE, TANGENT};
 
 /// Largest number of surfaces whose modes are enumerated.
 const MOST_SURFACES: usize = 6;
@@ -37,7 +37,8 @@ impl IntersectionDecision {
 ///
 /// A region k attracts if f^k leaves every surface on the side k; sliding on j attracts if it
 /// is attractive there and its field leaves every other surface on the side of the mode
-/// (Guglielmi, Hairer 2022; `docs/theory/switching.md`).
+/// (Guglielmi, Hairer 2022; `docs/theory/switching.md`). Where the motion has slid on all of them until now (`ends`), it does
+/// not stay with a multiplier at its end.
 ///
 /// # Errors
 /// If a function of the user raises.
@@ -45,8 +46,8 @@ pub fn decide_intersection(
     system: &dyn PiecewiseSystem,
     meeting: &[usize],
     mode: &Mode,
-    t: f64,
-    x: &[f64],
+    ends: bool,
+    (t, x): (f64, &[f64]),
 ) -> Result<IntersectionDecision, FieldError> {
     let mut decision = IntersectionDecision {
         candidates: Vec::new(),
@@ -73,7 +74,8 @@ pub fn decide_intersection(
             }
         }
     }
-    decision.may_stay = may_stay(system, meeting, mode, t, x)?;
+    let room = if ends { AT_SIDE } else { 0.0 };
+    decision.may_stay = may_stay(system, meeting, mode, room, (t, x))?;
     Ok(decision)
 }
 
@@ -161,14 +163,14 @@ fn sliding_attracts(
     Ok(Some(left))
 }
 
-/// Could the motion stay on the intersection of two surfaces? It cannot if one normal component has
-/// one sign over the whole square of multipliers. For more surfaces: not excluded.
+/// Could the motion stay on the intersection of two surfaces, its multipliers at least `room` away from their ends? It
+/// cannot if one normal component has one sign over the whole square of multipliers. For more surfaces: not excluded.
 fn may_stay(
     system: &dyn PiecewiseSystem,
     meeting: &[usize],
     mode: &Mode,
-    t: f64,
-    x: &[f64],
+    room: f64,
+    (t, x): (f64, &[f64]),
 ) -> Result<bool, FieldError> {
     let &[i, j] = meeting else { return Ok(true) };
     let mut values = Vec::with_capacity(8);
@@ -180,6 +182,7 @@ fn may_stay(
     }
     let fields = NormalFields::new(2, values);
     Ok(fields.map_or(true, |fields| {
-        Bilinear::of_fields(&fields).sliding_root().is_some()
+        let root = Bilinear::of_fields(&fields).sliding_root();
+        root.is_some_and(|root| root.point.iter().all(|v| v.abs() < 1.0 - room))
     }))
 }

@@ -46,7 +46,7 @@ pub const LATEST_SWITCHES: usize = 8 * LONGEST_TURN;
 
 /// Returns to a section have to agree with those one period before so many times in a row, and at least one period
 /// long: a single agreement may be a turning point.
-pub const LEAST_AGREEMENTS: u64 = 2;
+pub const LEAST_AGREEMENTS: usize = 2;
 
 /// Returns whose distance shrinks faster and faster still come together if it shrinks by this part of itself. Less is
 /// what the errors of the steps make of a distance that stays, which are ten times smaller than what counts as agreement.

@@ -78,7 +78,8 @@ impl Integrator<'_> {
         resolution: Result<Resolution, Undecided>,
         rest: Option<Mode>,
     ) -> Result<Decided, FieldError> {
-        let decision = decide_intersection(self.system, meeting, mode, self.t, &self.x)?;
+        let ends = meeting.iter().all(|j| self.motion.sliding().contains(j));
+        let decision = decide_intersection(self.system, meeting, mode, ends, (self.t, &self.x))?;
         let only = decision.unique();
         let (after, left) = match (only, rest) {
             (Some((after, left)), rest) => {

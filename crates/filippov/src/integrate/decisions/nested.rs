@@ -260,7 +260,7 @@ impl Integrator<'_> {
         if stays || !are_in_one_plane(normals) {
             return Ok(None);
         }
-        let decision = decide_intersection(self.system, meeting, mode, self.t, &self.x)?;
+        let decision = decide_intersection(self.system, meeting, mode, false, (self.t, &self.x))?;
         let ([only], [left]) = (&decision.candidates[..], &decision.left[..]) else {
             return Ok(None);
         };
