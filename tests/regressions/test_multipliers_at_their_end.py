@@ -1,4 +1,4 @@
-"""Sliding on two surfaces that ends with a multiplier at its end does not stay there, whatever rounding says."""
+"""Sliding on two surfaces ends where a multiplier comes to its end, however numbers round."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ AFTER = 0.5
 
 @pytest.mark.parametrize("start", [0.37 * k for k in range(60)])
 def test_a_sign_of_the_other_surface_is_all_that_held_one(start: float) -> None:
-    """Only the sign of the second moves the first: both components of that vanish where the sign reaches its end."""
+    """Only the sign of the second moves the first: both components of that vanish where it is 1."""
 
     def rhs(t: float, x: Sequence[Any]) -> list[Any]:
         time = t - start
