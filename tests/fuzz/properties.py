@@ -300,10 +300,13 @@ def _equation(checked: Checked, segment: fl.Segment) -> Iterator[str]:
     def field(t: float, x: Array) -> Array:
         return np.array(problem.rhs(t, x))
 
-    for share in (0.1, 0.5, 0.8):
-        a = segment.t_start + share * segment.duration
-        # On a surface that it does not leave, the function has no meaning: the sign of 0.
-        if any(h is not None and abs(h(a, sol.sol(a))) < 1e-12 * checked.scale for h in checked.surfaces):
+    times = [segment.t_start + share * segment.duration for share in (0.1, 0.5, 0.8)]
+    values = [[abs(h(a, sol.sol(a))) for a in times] for h in checked.surfaces if h is not None]
+    # On a surface that it does not leave, the function has no meaning: the sign of 0, or of the errors of steps.
+    if any(max(of_one) < 10.0 * checked.tolerance for of_one in values):
+        return
+    for place, a in enumerate(times):
+        if any(of_one[place] < 1e-12 * checked.scale for of_one in values):
             return
         error = _off_the_field(checked, segment, field, a)
         if error > 0.0:
