@@ -302,7 +302,7 @@ def _equation(checked: Checked, segment: fl.Segment) -> Iterator[str]:
 
     times = [segment.t_start + share * segment.duration for share in (0.1, 0.5, 0.8)]
     values = [[abs(h(a, sol.sol(a))) for a in times] for h in checked.surfaces if h is not None]
-    # On a surface that it does not leave, the function has no meaning: the sign of 0, or of the errors of steps.
+    # On a surface that it does not leave, the function has no meaning: the sign of 0, or of errors of steps.
     if any(max(of_one) < 10.0 * checked.tolerance for of_one in values):
         return
     for place, a in enumerate(times):
