@@ -154,7 +154,8 @@ impl Observer {
     pub fn returned(&mut self, t: f64, y: &[f64]) {
         let mode = self.modes.last().cloned();
         self.note(t, y);
-        self.modes = mode.into_iter().collect();
+        self.modes.clear();
+        self.modes.extend(mode);
     }
 
     fn note(&mut self, t: f64, y: &[f64]) {
@@ -178,6 +179,7 @@ impl Observer {
         found.sliding = std::mem::take(&mut self.slid);
         std::mem::swap(&mut found.modes, &mut self.modes);
         self.modes.clear();
+        self.modes.reserve(found.modes.len());
         (self.t_return, self.since) = (t, t);
         self.returns.count += 1;
         if self.returns.count > self.transient {

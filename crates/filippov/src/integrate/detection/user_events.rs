@@ -1,5 +1,7 @@
 //! Zeros of a user's own functions.
 
+use smallvec::SmallVec;
+
 use crate::error::FieldError;
 use crate::event::certificate::Bound;
 use crate::event::isolate::{first_zero_sampled, Evidence, Zero};
@@ -128,14 +130,14 @@ impl Integrator<'_> {
                 _ if at == theta => t_stop,
                 _ => (t0 + at * dt).min(t_stop),
             };
-            let mut y = vec![0.0; self.x.len()];
+            let mut y: SmallVec<[f64; 8]> = SmallVec::from_elem(0.0, self.x.len());
             self.stepper.interpolant().at(at, &mut y);
             self.motion.project(t, &mut y)?;
             if let Some(stop) = self.record_zero(index, t, &y) {
                 self.sample(t)?;
                 self.recorder.step(self.stepper.interpolant(), t, &y);
                 self.t = t;
-                self.x = y;
+                self.x.copy_from_slice(&y);
                 return Ok(Some(stop));
             }
         }
