@@ -46,6 +46,9 @@ impl Integrator<'_> {
         if let Some(decided) = without_kinks {
             return Ok(decided);
         }
+        if let Some(decided) = self.decide_apart(mode, meeting)? {
+            return Ok(decided);
+        }
         if let Some(decided) = self.decide_where_two_touch(mode, meeting)? {
             return Ok(decided);
         }
@@ -137,6 +140,9 @@ impl Integrator<'_> {
             this.decide_at_start(mode, others)
         })?;
         if let Some(decided) = without_kinks {
+            return Ok(decided);
+        }
+        if let Some(decided) = self.decide_apart(mode, meeting)? {
             return Ok(decided);
         }
         if let Some(decided) = self.decide_by_relay(None, mode, meeting)? {

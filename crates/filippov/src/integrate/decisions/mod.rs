@@ -1,6 +1,7 @@
 //! The switching stage: from a located event, or a start, to the motion that follows.
 
 pub(super) mod accumulation;
+pub(super) mod apart;
 pub(super) mod between_sides;
 pub(super) mod choice;
 pub(super) mod coinciding;

@@ -42,13 +42,37 @@ impl Integrator<'_> {
         let zeros = (0..on_surface.len()).filter(|&j| on_surface[j] && !self.is_internal(j));
         let (smooth, zeros): (Vec<usize>, Vec<usize>) =
             zeros.partition(|&j| self.is_only_trigger(j));
-        // An inactive surface has the sign of the side that it moves to.
-        let meeting = surfaces_that_matter(self.system, &mode, zeros);
+        let meeting = surfaces_that_matter(self.system, &mode, zeros.clone());
         if !smooth.is_empty() {
             return self.place_on_triggers(mode, &smooth, meeting, memory);
         }
         let decided = self.place_on(mode.clone(), &meeting, memory)?;
-        self.follow_jumps(&mode, &meeting, decided)
+        let decided = self.follow_jumps(&mode, &meeting, decided)?;
+        let is_new = |j: &usize| memory.is_none_or(|memory| memory.entries()[*j] == 0);
+        let inactive = zeros.into_iter().filter(|j| !meeting.contains(j));
+        self.take_sides(decided, inactive.filter(is_new))
+    }
+
+    /// Gives surfaces that do not matter the sides that a motion in a region moves to.
+    fn take_sides(
+        &self,
+        decided: Decided,
+        inactive: impl Iterator<Item = usize>,
+    ) -> Result<Decided, FieldError> {
+        let Ok((mut after, left)) = decided else {
+            return Ok(decided);
+        };
+        if after.codimension() == 0 {
+            let signs = after.signs();
+            for j in inactive {
+                let side = after.entries()[j];
+                let leading = first_nonzero(self.system, j, side, 0, self.t, &self.x, &signs)?;
+                if leading.order > 0 {
+                    after.set(j, leading.sign());
+                }
+            }
+        }
+        Ok(Ok((after, left)))
     }
 
     /// The mode where these surfaces matter and vanish.

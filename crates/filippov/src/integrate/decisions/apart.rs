@@ -1,0 +1,125 @@
+//! Surfaces that meet and are decided one by one, where first-order data say nothing.
+//!
+//! Where a normal component vanishes, as where an integrator leaves its limit, the fields around the point tell no more than
+//! rounding does. Higher derivatives of one surface may, and where the signs of the others do not change them, the others
+//! need not be known.
+
+use crate::error::FieldError;
+use crate::integrate::decisions::transition::{Decided, Left, Lefts};
+use crate::integrate::integrator::Integrator;
+use crate::mode::Mode;
+use crate::switching::{decide, Arrival, Decision, Leading};
+use crate::system::dot_magnitude;
+use crate::tolerances::{DOUBTFUL, MOST_MEETING, TANGENT};
+
+impl Integrator<'_> {
+    /// What follows where the surfaces of `meeting` vanish, if first-order data are doubtful and each surface is decided
+    /// whatever the signs of those that are not; `None` if not. One that is left has its sign for those decided later.
+    pub(in crate::integrate) fn decide_apart(
+        &mut self,
+        mode: &Mode,
+        meeting: &[usize],
+    ) -> Result<Option<Decided>, FieldError> {
+        let is_few = (2..=MOST_MEETING).contains(&meeting.len());
+        let sticks = meeting.iter().any(|&j| self.system.sticks_at(j));
+        if !is_few || sticks || self.slides_by_rule() || !self.is_doubtful(mode, meeting)? {
+            return Ok(None);
+        }
+        let (mut after, mut open) = (mode.clone(), meeting.to_vec());
+        let mut slid = Vec::new();
+        while !open.is_empty() {
+            let free = [&open[..], &slid[..]].concat();
+            let mut settled = None;
+            for (place, &j) in open.iter().enumerate() {
+                if let Some(decision) = self.decide_alone(j, mode, &after, &free)? {
+                    settled = Some((place, decision.entry));
+                    break;
+                }
+            }
+            let Some((place, entry)) = settled else {
+                return Ok(None);
+            };
+            let j = open.remove(place);
+            after.set(j, entry);
+            if entry == 0 {
+                slid.push(j);
+            }
+        }
+        let mut left = Lefts::new();
+        for &j in meeting {
+            // Once more, as the signs of others are known by now.
+            let Some(decision) = self.decide_alone(j, mode, &after, &slid)? else {
+                return Ok(None);
+            };
+            let of_one = Left::after(j, &decision).into_iter();
+            // The exit functions of sliding on several surfaces are others.
+            left.extend(of_one.filter(|l| slid.len() < 2 || matches!(l, Left::Surface(..))));
+        }
+        Ok(Some(Ok((after, left))))
+    }
+
+    /// The only way on at surface `j`, if it is the same for all signs of the others among `free`; those not among them
+    /// have the signs of `after`. `mode` is the one before.
+    fn decide_alone(
+        &mut self,
+        j: usize,
+        mode: &Mode,
+        after: &Mode,
+        free: &[usize],
+    ) -> Result<Option<Decision>, FieldError> {
+        let others: Vec<usize> = free.iter().copied().filter(|&k| k != j).collect();
+        let arrival = match mode.entries()[j] {
+            0 => Arrival::Start,
+            side => Arrival::Region(side),
+        };
+        let mut found: Option<Decision> = None;
+        for pattern in 0..1_usize << others.len() {
+            let signs = after.on_sides(&others, pattern).signs();
+            let decision = decide(self.system, j, arrival, self.t, &self.x, &signs)?;
+            let is_clear = decision.candidates.len() == 1
+                && !decision.turns_back()
+                && decision.starts_at_two_fold().is_none();
+            if !is_clear || found.as_ref().is_some_and(|found| !agree(found, &decision)) {
+                return Ok(None);
+            }
+            found = Some(decision);
+        }
+        Ok(found)
+    }
+
+    /// Does a normal component vanish at some surface, or are all of one no more than what the rounding of time and state
+    /// makes of zero?
+    fn is_doubtful(&mut self, mode: &Mode, meeting: &[usize]) -> Result<bool, FieldError> {
+        let corners = self.corners(meeting, mode)?;
+        let Ok(fields) = corners.normal_fields() else {
+            return Ok(false);
+        };
+        for (i, &j) in meeting.iter().enumerate() {
+            let [least, most] = fields.row_range(i);
+            let largest = fields.row_size(i);
+            let vanishes = |v: f64| v.abs() <= DOUBTFUL * largest;
+            if vanishes(least) || vanishes(most) || self.is_rounding(j, largest, mode)? {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Is a rate of h_j of this size no more than rounding of time and state makes of zero?
+    fn is_rounding(&self, j: usize, rate: f64, mode: &Mode) -> Result<bool, FieldError> {
+        let (mut gradient, signs) = (vec![0.0; self.x.len()], mode.signs());
+        let partials = self
+            .system
+            .rate_gradient(j, self.t, &self.x, &signs, &mut gradient)?;
+        let size = dot_magnitude(&gradient, &self.x) + (partials.time * self.t).abs();
+        Ok(rate <= TANGENT * size)
+    }
+}
+
+/// Do two decisions say the same, up to rounding?
+fn agree(one: &Decision, other: &Decision) -> bool {
+    let same = |a: Leading, b: Leading| {
+        a.order == b.order && (a.value - b.value).abs() <= DOUBTFUL * a.value.abs()
+    };
+    one.entry == other.entry && same(one.minus, other.minus) && same(one.plus, other.plus)
+}
