@@ -112,3 +112,14 @@ def test_non_unique_intersection_is_reported() -> None:
         assert str(mode) in sol.warnings[0].message
     with pytest.raises(fl.NonUniqueError):
         away.solve((0, 1), [0.0, 0.0, 0.0], nonunique="error")
+
+
+def test_a_target_reached_along_the_switching_curve_names_the_surface_that_says_nothing() -> None:
+    """Time-optimal control of x'' = u: at the origin x' = 0, and no field moves the switching function."""
+    sol = fl.solve_ivp(
+        lambda t, x: [x[1], -np.sign(x[0] + 0.5 * x[1] * abs(x[1]))], (0.0, 5.0), [1.0, 0.0], rtol=1e-9
+    )
+    assert sol.status == -1
+    assert sol.t[-1] == pytest.approx(2.0, abs=1e-6)
+    assert sol.y[:, -1] == pytest.approx([0.0, 0.0], abs=1e-6)
+    assert "all fields are tangent to x[0] + " in sol.message

@@ -205,8 +205,9 @@ impl Stop {
                 reason,
             } => format!(
                 "Stopped at t = {t:.10}: the motion arrived at the intersection of {} from mode ({mode}), and what \
-                 follows is not decided: {reason}{}.",
+                 follows is not decided: {}{}.",
                 names(surfaces),
+                reason.named(|place| names(&surfaces[place..=place])),
                 if candidates.is_empty() {
                     String::new()
                 } else {

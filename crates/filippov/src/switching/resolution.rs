@@ -174,6 +174,20 @@ pub enum Undecided {
 }
 
 impl Undecided {
+    /// The reason in words, with the surfaces of the intersection by their names.
+    pub fn named(&self, name: impl Fn(usize) -> String) -> String {
+        match *self {
+            Undecided::Tangent { surface } => format!(
+                "all fields are tangent to {} here; first-order data do not decide",
+                name(surface)
+            ),
+            Undecided::NotArriving { surface } => {
+                format!("the motion before does not arrive at {}", name(surface))
+            }
+            _ => self.to_string(),
+        }
+    }
+
     /// The reason for a part of an intersection, with its surfaces counted within the whole.
     pub(super) fn in_whole(self, part: &[usize]) -> Self {
         let place = |surface: usize| part.get(surface).copied().unwrap_or(surface);

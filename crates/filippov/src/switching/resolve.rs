@@ -103,7 +103,11 @@ fn decide(
     kappa: &[f64],
 ) -> Result<Resolution, Undecided> {
     if fields.m() == 2 && Bilinear::of_fields(fields).is_undetermined() {
-        return Err(Undecided::Proportional);
+        let tangent = (0..2).find(|&surface| fields.row_size(surface) == 0.0);
+        return Err(match tangent {
+            Some(surface) => Undecided::Tangent { surface },
+            None => Undecided::Proportional,
+        });
     }
     let mut resolution = match (fields.m(), incoming) {
         (_, Incoming::Start) => start(fields, kappa),
