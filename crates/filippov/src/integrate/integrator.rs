@@ -439,7 +439,7 @@ impl<'a> Integrator<'a> {
         let Some(event) = found else {
             self.recorder
                 .step(self.stepper.interpolant(), t1, self.stepper.end());
-            self.note_zero_surfaces(t1)?;
+            let zero = self.zero_surface(t1)?;
             let turns_stiff =
                 self.stiffness.is_due(self.stats.n_steps) && self.look_at_stiffness(dt)?;
             self.stepper.accept(&mut self.x);
@@ -452,6 +452,9 @@ impl<'a> Integrator<'a> {
             }
             if !self.motion.resting.is_empty() && self.has_left_resting()? {
                 return self.go_on_from_here();
+            }
+            if let Some(j) = zero {
+                return self.settle_on(j);
             }
             return Ok(chatter);
         };

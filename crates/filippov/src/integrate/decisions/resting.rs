@@ -3,10 +3,11 @@
 
 use crate::error::FieldError;
 use crate::event::EventFunction;
+use crate::field::Projector;
 use crate::integrate::decisions::choice::NOT_UNIQUE_AT;
 use crate::integrate::decisions::transition::{Left, Lefts};
 use crate::integrate::integrator::Integrator;
-use crate::integrate::{Warning, WarningCode};
+use crate::integrate::{Stop, Warning, WarningCode};
 use crate::mode::Mode;
 use crate::switching::first_nonzero;
 use crate::tolerances::{LEFT_RESTING, NEARLY_ZERO};
@@ -51,17 +52,21 @@ impl Integrator<'_> {
         Ok((region, left))
     }
 
-    /// Names a surface whose function is zero all along the motion, unless something was said about it.
-    fn warn_zero_surface(&mut self, j: usize) {
+    /// Was something said about a surface whose function is zero all along the motion?
+    fn is_named(&self, j: usize) -> bool {
         let name = self.system.surface_name(j);
-        let zero = format!("{name} is zero all along the motion from here");
-        let is_named = |warning: &Warning| {
+        self.warnings.iter().any(|warning| {
             let not_unique = warning.text.strip_prefix(NOT_UNIQUE_AT);
             let surfaces = not_unique.and_then(|text| text.split_once(" is not unique"));
-            warning.text.starts_with(&zero)
+            warning.text.starts_with(&zero_from_here(&name))
                 || surfaces.is_some_and(|(names, _)| names == format!("{name} = 0"))
-        };
-        if !self.warnings.iter().any(is_named) {
+        })
+    }
+
+    /// Names a surface whose function is zero all along the motion, unless something was said about it.
+    fn warn_zero_surface(&mut self, j: usize) {
+        if !self.is_named(j) {
+            let zero = zero_from_here(&self.system.surface_name(j));
             self.warnings.push(Warning {
                 t: self.t,
                 code: WarningCode::ZeroSurface,
@@ -71,9 +76,12 @@ impl Integrator<'_> {
         }
     }
 
-    /// Names the surfaces whose functions were zero all along the step just made, up to rounding: a function that becomes
-    /// zero without a sign in it, as one that is called may do.
-    pub(in crate::integrate) fn note_zero_surfaces(&mut self, t1: f64) -> Result<(), FieldError> {
+    /// A surface whose function was zero all along the step just made, up to rounding, and about which nothing was said: a
+    /// function that becomes zero without a sign in it, as one that is called may do, or a rest that is reached.
+    pub(in crate::integrate) fn zero_surface(
+        &mut self,
+        t1: f64,
+    ) -> Result<Option<usize>, FieldError> {
         for index in 0..self.motion.monitored.len() {
             let m = self.motion.monitored[index];
             let (end, _) = self.detector.right[index];
@@ -92,11 +100,24 @@ impl Integrator<'_> {
             self.stepper.interpolant().at(0.5, &mut self.detector.x);
             let (middle, h) = (0.5 * (self.t + t1), &mut self.detector.h);
             self.system.surfaces(middle, &self.detector.x, &signs, h)?;
-            if h[j].abs() <= noise {
-                self.warn_zero_surface(j);
+            if h[j].abs() <= noise && !self.is_named(j) {
+                return Ok(Some(j));
             }
         }
-        Ok(())
+        Ok(None)
+    }
+
+    /// Goes on where h_j has become zero: along the surface, if the fields hold the motion there, as where it has come to rest
+    /// by a root of the distance. Beside the surface it would follow what the root makes of rounding.
+    pub(in crate::integrate) fn settle_on(&mut self, j: usize) -> Result<Option<Stop>, FieldError> {
+        let signs = self.motion.signs.clone();
+        let mut projector = Projector::new(self.x.len(), signs.len());
+        projector.project(self.system, j, self.t, &mut self.x, &signs)?;
+        let stop = self.go_on_from_here()?;
+        if !self.motion.sliding().contains(&j) {
+            self.warn_zero_surface(j);
+        }
+        Ok(stop)
     }
 
     /// Has the motion left a surface that it was to stay on, by more than the tolerance?
@@ -120,4 +141,8 @@ impl Integrator<'_> {
         }
         Ok(false)
     }
+}
+
+fn zero_from_here(name: &str) -> String {
+    format!("{name} is zero all along the motion from here")
 }
