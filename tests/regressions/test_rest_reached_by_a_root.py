@@ -1,4 +1,4 @@
-"""Laws with a root of the distance come to rest in finite time, wherever the rest is; the run goes on along it."""
+"""A root of the distance brings a motion to rest in finite time, wherever the rest is; it goes on from there."""
 
 from __future__ import annotations
 
