@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import filippov as fl
@@ -327,3 +328,100 @@ def test_a_function_that_remembers_is_warned_of() -> None:
         warning = next(w for w in sol.warnings if w.code == "memory")
         assert "is_on" in warning.message
         assert "fl.Hysteresis" in warning.message
+
+
+class Thermostat:
+    """A relay that an object remembers, in the object itself or in a dict of its own."""
+
+    def __init__(self) -> None:
+        self.power = 2.0
+        self.state = {"power": 2.0}
+
+    def __call__(self, t: Any, x: Any) -> Any:
+        if x[0] > 21:
+            self.power = 0.0
+        elif x[0] < 19:
+            self.power = 2.0
+        return [0.1 * (10 - x[0]) + self.power]
+
+    def field(self, t: Any, x: Any) -> Any:
+        state = self.state
+        if x[0] > 21:
+            state["power"] = 0.0
+        elif x[0] < 19:
+            state["power"] = 2.0
+        return [0.1 * (10 - x[0]) + state["power"]]
+
+
+settings = {"power": 2.0}
+
+
+def _in_a_global(t: Any, x: Any) -> Any:
+    if x[0] > 21:
+        settings["power"] = 0.0
+    elif x[0] < 19:
+        settings["power"] = 2.0
+    return [0.1 * (10 - x[0]) + settings["power"]]
+
+
+def _in_a_default(t: Any, x: Any, power: Any = [2.0]) -> Any:  # noqa: B006
+    if x[0] > 21:
+        power[0] = 0.0
+    elif x[0] < 19:
+        power[0] = 2.0
+    return [0.1 * (10 - x[0]) + power[0]]
+
+
+def _in_a_first_argument(power: Any, t: Any, x: Any) -> Any:
+    if x[0] > 21:
+        power[0] = 0.0
+    elif x[0] < 19:
+        power[0] = 2.0
+    return [0.1 * (10 - x[0]) + power[0]]
+
+
+def _in_a_closure() -> Any:
+    power = [2.0]
+
+    def fun(t: Any, x: Any) -> Any:
+        if x[0] > 21:
+            power[0] -= power[0]
+        elif x[0] < 19:
+            power[0] = 2.0
+        return [0.1 * (10 - x[0]) + power[0]]
+
+    return fun
+
+
+@pytest.mark.parametrize(
+    ("fun", "name"),
+    [
+        (_in_a_global, "settings[...]"),
+        (_in_a_default, "power[...]"),
+        (_in_a_closure(), "power[...]"),
+        (partial(_in_a_first_argument, [2.0]), "power[...]"),
+        (Thermostat(), "power"),
+        (Thermostat().field, "state[...]"),
+    ],
+)
+def test_memory_in_objects_is_warned_of(fun: Any, name: str) -> None:
+    [message] = [w.message for w in fl.solve_ivp(fun, (0, 5), [15.0]).warnings if w.code == "memory"]
+    assert name in message
+
+
+def test_arrays_of_the_call_are_not_memory() -> None:
+    gains, table = [2.0, 3.0], {"low": 0, "high": 1}
+
+    def fun(t: Any, x: Any, out: Any = None) -> Any:
+        out = np.zeros_like(x) if out is None else out
+        copied = gains[:]
+        copied[0] = x[1]
+        out[0] = copied[0] if x[0] > gains[0] else -gains[1]
+        out[table["high"]] = gains[0]
+        out[1] -= gains[1] * x[1]
+        x[0] = 0.0
+        return out
+
+    sol = fl.solve_ivp(fun, (0, 1), [1.0, 2.0])
+    assert sol.success
+    assert not sol.warnings
