@@ -7,6 +7,7 @@ cannot be traced, the same field with the sign vector as data.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import lru_cache, partial
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -217,13 +218,10 @@ def _check_table(fields: Mapping[Any, Any], n_surfaces: int) -> dict[tuple[int, 
 def _as_field(field: Any, name: str) -> Callable[[Any, Any, Mapping[str, Any]], Any]:
     """Return ``call(t, x, params)`` of a function ``f(t, x)`` or of a constant vector."""
     if callable(field):
-        names_cache: dict[tuple[str, ...], list[str]] = {}
+        names_of = lru_cache(partial(accepted_names, field))
 
         def call(t: Any, x: Any, params: Mapping[str, Any]) -> Any:
-            key = tuple(params)
-            if key not in names_cache:
-                names_cache[key] = accepted_names(field, key)
-            return field(t, x, **{entry: params[entry] for entry in names_cache[key]})
+            return field(t, x, **{entry: params[entry] for entry in names_of(tuple(params))})
 
         return call
     try:

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from filippov._core import TracedSystem
 from filippov.analysis.dataset import as_json
 from filippov.analysis.grid import Grid
+from filippov.analysis.identity import identity_of
 from filippov.analysis.points import (
     Observation,
     Table,
@@ -251,13 +252,15 @@ class Plan(NamedTuple):
     def identity(self) -> dict[str, str]:
         """Return what the result follows from, as digests and text."""
         core = self.prepared.core
-        code = core.to_bytes() if isinstance(core, TracedSystem) else repr(self.prepared.surfaces).encode()
-        maps = [
-            action._replace(
-                map=_digest(action.map.to_bytes()) if isinstance(action.map, TracedSystem) else ""
-            )
-            for action in self.prepared.actions
-        ]
+        source = self.system._source
+        if self.prepared.pinned is not None and source is not None:
+            # What is valid for some parameter values only does not show what the functions do for others.
+            code = identity_of([core.n_states, *source], "a function of the system").encode()
+            maps = []
+        else:
+            surfaces = repr(self.prepared.surfaces).encode()
+            code = core.to_bytes() if isinstance(core, TracedSystem) else surfaces
+            maps = [action._replace(map=_digest_of_traced(action.map)) for action in self.prepared.actions]
         digests = [sha256() for _ in range(3)]
         for start, stop in self.grid.blocks():
             y0, p, clocks, spans = self.points(start, stop)
@@ -268,8 +271,8 @@ class Plan(NamedTuple):
         place = self.place
         if place is not None:
             function = place.function
-            traced = _digest(function.to_bytes()) if isinstance(function, TracedSystem) else ""
-            place = place._replace(function=traced)
+            called = identity_of(function, "section") if place.is_called else ""
+            place = place._replace(function=called or _digest_of_traced(function))
         return {
             "system": _digest(code),
             "resets": as_json(maps),
@@ -286,6 +289,10 @@ class Plan(NamedTuple):
 
 def _digest(data: bytes) -> str:
     return sha256(data).hexdigest()
+
+
+def _digest_of_traced(function: Any) -> str:
+    return _digest(function.to_bytes()) if isinstance(function, TracedSystem) else ""
 
 
 def plan_of(

@@ -28,7 +28,7 @@ from zipfile import BadZipFile
 import numpy as np
 import numpy.typing as npt
 
-from filippov.analysis.dataset import REASONS, coordinates_of, dims_of, shape_of, variables_of
+from filippov.analysis.dataset import REASONS, as_json, coordinates_of, dims_of, shape_of, variables_of
 from filippov.analysis.optional import need
 from filippov.analysis.plan import Plan
 from filippov.analysis.points import COLUMNS, Table
@@ -94,6 +94,7 @@ class Store:
                 "n_points": plan.n_points,
                 "chunk_size": size,
                 "identity": identity,
+                "t_span": as_json(plan.t_span),
             }
             self._write(file, (json.dumps(new, indent=1) + "\n").encode())
         record = self.record()
@@ -104,6 +105,8 @@ class Store:
             )
         known = record["identity"]
         changed = [name for name in identity if identity[name] != known.get(name)]
+        if "params" in changed and "t_span" in changed and record.get("t_span") == as_json(plan.t_span):
+            changed.remove("t_span")  # the ends of the runs follow from a period that parameters give
         if changed:
             raise InputError(
                 f"store: {self.path} holds another sweep, which differs in {', '.join(changed)}; give "
