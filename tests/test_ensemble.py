@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import filippov as fl
@@ -103,6 +104,11 @@ def test_one_state_for_all_and_slices(system: fl.System) -> None:
         ({"y0": np.zeros((2, 2)), "rtol": -1.0}, "rtol"),
         ({"y0": np.zeros((2, 2)), "t_span": (1.0, 0.0)}, "t_span"),
         ({"y0": np.zeros((0, 2))}, "y0"),
+        ({"y0": [[1.0 + 1.0j, 0.0]]}, "y0: .* not complex"),
+        ({"y0": [1.0, 0.0], "params": {"F": np.array([1.0j, 1.0])}}, r"params\['F'\]: .* not complex"),
+        ({"y0": np.ma.array([[1.0, 0.0]], mask=[[False, True]])}, "y0: has masked entries"),
+        ({"y0": [1.0, 0.0], "params": [1, 2]}, "params: a dict"),
+        ({"y0": np.zeros((2, 2)), "kappa": [1.0, 2.0]}, "kappa: one entry per surface"),
     ],
 )
 def test_wrong_arguments_are_named(system: fl.System, arguments: dict[str, Any], message: str) -> None:
@@ -110,10 +116,48 @@ def test_wrong_arguments_are_named(system: fl.System, arguments: dict[str, Any],
         system.ensemble(**{"t_span": (0.0, 1.0), **arguments})
 
 
-def test_parameters_that_branch_differently_are_refused() -> None:
-    def branching(t: float, x: Any, a: float) -> Any:
-        return [-x[0] if a > 0 else x[0]]
+def branching(t: float, x: Any, a: float) -> Any:
+    return [-x[0] if a > 0 else x[0]]
 
-    system = fl.System(branching, n=1, params={"a": 1.0})
-    with pytest.raises(fl.InputError, match="branches on parameter"):
-        system.ensemble((0, 1), [1.0], {"a": [1.0, -1.0]})
+
+def black_box(t: float, x: Any, a: float) -> Any:
+    return [math.cos(t) - a * (1 if x[0] > 0 else -1)]
+
+
+@pytest.mark.parametrize("fun", [branching, black_box])
+def test_functions_that_hold_for_some_parameters_only(fun: Any) -> None:
+    """Each member is as in a run of its own; neighbours with equal values share a system."""
+    system = fl.System(fun, n=1, params={"a": 1.0}, surfaces=[] if fun is branching else lambda t, x: x[0])
+    force = [1.0, 1.0, -1.0, 2.0, 0.5]
+    runs = system.ensemble((0, 3), [1.0], {"a": force}, threads=2)
+    for member, a in zip(runs, force, strict=True):
+        np.testing.assert_array_equal(member.y, system.solve((0, 3), [1.0], {"a": a}, keep="last").y)
+    np.testing.assert_array_equal(runs.y, [member.y[:, -1] for member in runs])
+
+
+def test_an_event_that_cannot_be_traced_reads_the_parameters_of_its_member(system: fl.System) -> None:
+    def level(t: float, x: Any, F: float) -> float:
+        return float(x[0]) - F
+
+    force = [0.2, 0.5]
+    runs = system.ensemble((0, 10), [1.0, 2.0], {"F": force}, events=level)
+    for member, F in zip(runs, force, strict=True):
+        alone = system.solve((0, 10), [1.0, 2.0], {"F": F}, events=level)
+        assert member.t_events is not None
+        np.testing.assert_array_equal(member.t_events[0], alone.t_events[0])
+    assert all(len(member.t_events[0]) for member in runs)
+
+
+def test_unknown_keywords_are_named(system: fl.System) -> None:
+    for name, value in (("surfaces", lambda t, x: x[0]), ("args", (1,)), ("resets", ()), ("fun", oscillator)):
+        with pytest.raises(fl.InputError, match=f"^{name}: belongs to the System"):
+            system.ensemble((0, 1), [1.0, 2.0], **{name: value})
+    with pytest.raises(TypeError, match="unexpected keyword argument 'rtoll'; did you mean 'rtol'"):
+        system.ensemble((0, 1), [1.0, 2.0], rtoll=1e-6)
+    assert system.ensemble((0, 1), [1.0, 2.0], surfaces=None, vectorized=True).success.all()
+
+
+def test_more_threads_than_members(system: fl.System) -> None:
+    np.testing.assert_array_equal(
+        system.ensemble((0, 1), starts(3), threads=2**70).y, system.ensemble((0, 1), starts(3), threads=1).y
+    )

@@ -357,3 +357,41 @@ def test_names_of_states_are_given_once() -> None:
 def test_an_event_that_raises_is_named(g: Any) -> None:
     with pytest.raises(fl.InputError, match=r"events: entry 0 .* raised"):
         fl.solve_ivp(lambda t, x: [-x[0]], (0, 1), [1.0], events=g)
+
+
+_MASKED = np.ma.array([0.5, 0.7], mask=[False, True])
+
+
+def _decay(t: float, x: Any, a: float = 1.0) -> Any:
+    return [-a * x[0], -x[1]]
+
+
+@pytest.mark.parametrize(
+    ("call", "name"),
+    [
+        (lambda: fl.solve_ivp(_decay, (0, 1), _MASKED), "y0"),
+        (lambda: fl.solve_ivp(_decay, (0, 1), [1.0, 2.0], t_eval=_MASKED), "t_eval"),
+        (lambda: fl.solve_ivp(_decay, (0, 1), [1.0, 2.0], atol=_MASKED), "atol"),
+        (lambda: fl.solve_ivp(_decay, (0, 1), [1.0, 2.0], params={"a": _MASKED[1]}), "params"),
+        (lambda: fl.Reset(times=_MASKED, map=lambda t, x: x), "resets: times"),
+        (lambda: fl.sweep(fl.System(_decay, n=2), (0, 1), np.ma.array([_MASKED, _MASKED])), "y0"),
+        (lambda: fl.sweep(fl.system(_decay), (0, 1), [1.0, 2.0], {"a": _MASKED}), "params: a"),
+    ],
+)
+def test_masked_entries_are_refused(call: Any, name: str) -> None:
+    """The numbers under a mask were taken."""
+    with pytest.raises(fl.InputError, match=rf"^{name}: "):
+        call()
+
+
+@pytest.mark.parametrize(
+    ("call", "name"),
+    [
+        (lambda: fl.solve_ivp(_decay, (0, 1), [1.0, 2.0], t_eval=np.array([0.5 + 1j])), "t_eval"),
+        (lambda: fl.Reset(times=np.array([0.5 + 1j]), map=lambda t, x: x), "resets: times"),
+        (lambda: fl.sweep(fl.System(_decay, n=2), (0, 1), np.ones((2, 2)) * 1j), "y0"),
+    ],
+)
+def test_complex_numbers_are_refused(call: Any, name: str) -> None:
+    with pytest.raises(fl.InputError, match=rf"^{name}: .* not complex"):
+        call()

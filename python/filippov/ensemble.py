@@ -6,16 +6,17 @@ import inspect
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from filippov._core import Run, solve_many
-from filippov.core_events import core_events
+from filippov.arrays import finite_array
+from filippov.core_events import CoreEvent, core_events
 from filippov.errors import InputError, Interrupted
-from filippov.events import normalise_events
-from filippov.options import check_options, check_t_span, finite_array
+from filippov.events import EventSpec, normalise_events
+from filippov.options import OPTIONS, check_options, check_t_span, fit_kappa
 from filippov.prepare import Prepared
 from filippov.solution import Solution
 from filippov.unknown import check_unknown
@@ -43,9 +44,9 @@ class Ensemble(Sequence[Solution]):
     An index gives the `Solution` of a member, with what `keep` left of it; its `message` says why it ended.
     """
 
-    def __init__(self, runs: Sequence[Run], prepared: Prepared, **origin: Any) -> None:
+    def __init__(self, runs: Sequence[Run], prepared: Sequence[Prepared], **origin: Any) -> None:
         self._runs = runs
-        self._prepared = prepared
+        self._prepared = prepared  # one per member
         self._origin = origin
 
     def __len__(self) -> int:
@@ -58,7 +59,7 @@ class Ensemble(Sequence[Solution]):
     def __getitem__(self, index: int | slice) -> Solution | list[Solution]:
         if isinstance(index, slice):
             return [self[i] for i in range(*index.indices(len(self)))]
-        return Solution.from_run(self._runs[index], self._prepared, **self._origin)
+        return Solution.from_run(self._runs[index], self._prepared[index], **self._origin)
 
     def __iter__(self) -> Iterator[Solution]:
         return (self[i] for i in range(len(self)))
@@ -99,46 +100,38 @@ def run_ensemble(
     options: Mapping[str, Any],
 ) -> Ensemble:
     """Run an ensemble; all arguments as in `System.ensemble`."""
-    from filippov.solve import solve_ivp
-
     t0, t1 = check_t_span(t_span)
     if t1 <= t0:
         raise InputError("t_span: an ensemble runs forward, t1 > t0")
     states, values = _members(system, y0, params)
     n = states.shape[1]
-    for name in ("nonunique", "progress"):
-        if options.get(name) in ("branch", True) or callable(options.get(name)):
-            raise InputError(f"{name}: {options[name]!r} is not for an ensemble")
-    known = inspect.signature(solve_ivp).parameters
-    unknown = {name: value for name, value in options.items() if name not in known}
-    system.refuse_undeclared(unknown)
-    check_unknown(unknown, solve_ivp, system.params)
-    checked = check_options({"keep": "last", **options}, (t0, t1), n)
-    first = dict(zip(values, values_of_row(values, 0), strict=True))
-    prepared = system.prepare(n, t0, states[0], first)
-    for row in range(1, len(states)):
-        if not prepared.is_valid_for(n, dict(zip(values, values_of_row(values, row), strict=True))):
-            raise InputError(
-                "params: the function branches on parameter values, and members differ in that; run an "
-                "ensemble for each side"
-            )
+    checked = check_options({"keep": "last", **_known(options, system)}, (t0, t1), n)
+    n_threads = min(check_threads(threads), len(states))
     specs = normalise_events(events)
-    found = core_events(specs or [], prepared, t0, states[0], (), first)
     table = np.column_stack(list(values.values())) if values else np.empty((len(states), 0))
-    runs, raised = solve_many(
-        prepared.core,
-        t0,
-        t1,
-        np.ascontiguousarray(states),
-        np.ascontiguousarray(table, dtype=float),
-        checked.for_core(),
-        found,
-        list(prepared.actions),
-        check_threads(threads),
-    )
+    groups = _groups(system, t0, states, tuple(values), table, specs or [])
+    for group in groups:
+        fit_kappa(checked.kappa, group.prepared.surfaces)
+    runs: list[Run] = []
+    raised: BaseException | None = None
+    for group in groups:
+        done, raised = solve_many(
+            group.prepared.core,
+            t0,
+            t1,
+            np.ascontiguousarray(states[group.members]),
+            np.ascontiguousarray(table[group.members], dtype=float),
+            checked.for_core(),
+            group.events,
+            list(group.prepared.actions),
+            n_threads,
+        )
+        runs += done
+        if raised is not None:
+            break
     ensemble = Ensemble(
         runs,
-        prepared,
+        [group.prepared for group in groups for _ in range(len(states))[group.members]],
         t0=t0,
         states=system.state_names(n),
         has_events=specs is not None,
@@ -154,15 +147,61 @@ def run_ensemble(
     return ensemble
 
 
-def values_of_row(values: Mapping[str, Array], row: int) -> list[float]:
-    """Return the parameter values of one member."""
-    return [float(column[row]) for column in values.values()]
+class _Group(NamedTuple):
+    """Neighbouring members with the system and the events that are valid for them."""
+
+    members: slice
+    prepared: Prepared
+    events: list[CoreEvent]
+
+
+def _groups(
+    system: System, t0: float, states: Array, names: tuple[str, ...], table: Array, specs: list[EventSpec]
+) -> list[_Group]:
+    """Return the members in groups, usually one.
+
+    A function that branches on parameter values, or cannot be traced, is prepared for every combination of
+    values anew, and an event that cannot be traced is called with those of its members.
+    """
+    count = len(states)
+    groups: list[_Group] = []
+    start = 0
+    while start < count:
+        values = dict(zip(names, table[start].tolist(), strict=True))
+        prepared = system.prepare(states.shape[1], t0, states[start].copy(), values)
+        events = core_events(specs, prepared, t0, states[start], (), values)
+        stop = count
+        if prepared.pinned is not None or any(callable(event[0]) for event in events):
+            differs = (table[start:] != table[start]).any(axis=1)
+            stop = start + int(differs.argmax()) if differs.any() else count
+        groups.append(_Group(slice(start, stop), prepared, events))
+        start = stop
+    return groups
+
+
+def _known(options: Mapping[str, Any], system: System) -> dict[str, Any]:
+    """Return the options of a run; refuse those that are unknown, or not for an ensemble."""
+    from filippov.solve import solve_ivp
+
+    for name in ("fun", "surfaces", "args", "resets"):
+        if options.get(name) is not None:
+            raise InputError(f"{name}: belongs to the System; give it to that")
+    for name in ("nonunique", "progress"):
+        if options.get(name) in ("branch", True) or callable(options.get(name)):
+            raise InputError(f"{name}: {options[name]!r} is not for an ensemble")
+    known = set(inspect.signature(solve_ivp).parameters) - {"unknown"}
+    unknown = {name: value for name, value in options.items() if name not in known}
+    system.refuse_undeclared(unknown)
+    check_unknown(unknown, solve_ivp, system.params)
+    return {name: value for name, value in options.items() if name in OPTIONS}
 
 
 def _members(
     system: System, y0: npt.ArrayLike, params: Mapping[str, npt.ArrayLike] | None
 ) -> tuple[Array, dict[str, Array]]:
     """Return the initial states (one row per member) and the parameter columns, all of one length."""
+    if params is not None and not isinstance(params, Mapping):
+        raise InputError(f"params: a dict of names and values is needed, not {type(params).__name__}")
     states = finite_array(y0, "y0")
     if states.ndim not in (1, 2) or 0 in states.shape:
         raise InputError(f"y0: shape (n_members, n) or (n,) is needed, not {states.shape}")

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from filippov._core import RunOptions
+from filippov.arrays import real_array, refuse_masked
 from filippov.errors import InputError, ToleranceError
 from filippov.unknown import did_you_mean
 
@@ -183,6 +184,7 @@ def check_y0(y0: Any, name: str = "y0") -> Array:
     """
     if type(y0) in (list, tuple) and {*map(type, y0)} == {float} and math.isfinite(sum(y0)):
         return np.array(y0)
+    refuse_masked(y0, name)
     try:
         state = np.asarray(y0)
     except ValueError as error:
@@ -206,25 +208,6 @@ def check_y0(y0: Any, name: str = "y0") -> Array:
         index = int(np.flatnonzero(~np.isfinite(state))[0])
         raise InputError(f"{name}: must be finite, but {name}[{index}] is {state[index]}", state=state)
     return state
-
-
-def finite_array(value: Any, name: str) -> Array:
-    """Return an array of finite floats of any shape.
-
-    Raises
-    ------
-    InputError
-        If `value` is none.
-    """
-    try:
-        array = np.array(value)
-        if array.dtype.kind not in "fiub":
-            array = array.astype(float)
-    except (TypeError, ValueError):
-        raise InputError(f"{name}: an array of real numbers is needed, not {value!r}") from None
-    if not np.isfinite(array).all():
-        raise InputError(f"{name}: must be finite")
-    return array.astype(np.float64)
 
 
 def check_args(args: Any) -> tuple[Any, ...]:
@@ -360,6 +343,7 @@ def _check_rtol(rtol: Any) -> float:
 def _check_atol(atol: Any, n: int) -> float | Array:
     if type(atol) is float and 0.0 <= atol < math.inf:
         return atol
+    refuse_masked(atol, "atol")
     try:
         raw = np.asarray(atol)
     except ValueError:
@@ -387,10 +371,7 @@ def _check_first_step(first_step: Any, t_span: tuple[float, float]) -> float | N
 def _check_t_eval(t_eval: Any, t_span: tuple[float, float]) -> Array | None:
     if t_eval is None:
         return None
-    try:
-        times = np.array(t_eval, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError("t_eval: a sequence of real numbers is needed") from None
+    times = real_array(t_eval, "t_eval", "a sequence of real numbers")
     if times.ndim != 1:
         raise InputError(f"t_eval: must be one-dimensional, it has shape {times.shape}")
     if not np.isfinite(times).all():
@@ -452,6 +433,7 @@ def _real(value: Any) -> float:
     if (
         isinstance(value, (str, bytes, bool, np.bool_, complex))
         or np.iscomplexobj(value)
+        or np.ma.is_masked(value)
         or np.ndim(value) != 0
     ):
         raise TypeError
@@ -479,3 +461,5 @@ _CHECKS: dict[str, Callable[[Any, tuple[float, float], int], Any]] = {
     "dense_output": lambda value, t_span, n: bool(value),
     "progress": lambda value, t_span, n: _check_progress(value, t_span),
 }
+# Their names.
+OPTIONS = frozenset(_CHECKS)

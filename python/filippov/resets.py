@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from filippov.arrays import real_array
 from filippov.errors import InputError
 from filippov.events import check_direction, function_name
 
@@ -165,10 +166,7 @@ def check_map_value(value: Any, n: int, what: str) -> None:
 
 
 def _check_times(times: Any) -> Array:
-    try:
-        values = np.atleast_1d(np.array(times, dtype=np.float64))
-    except (TypeError, ValueError):
-        raise InputError("resets: times is a sequence of real numbers") from None
+    values = np.atleast_1d(real_array(times, "resets: times", "a sequence of real numbers"))
     if values.ndim != 1 or not np.isfinite(values).all():
         raise InputError("resets: times is a sequence of finite numbers")
     if (np.diff(values) <= 0.0).any():

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from filippov.arrays import finite_array
 from filippov.classification import classify
 from filippov.errors import InputError
 from filippov.implicit import zero_curves, zero_triangles
 from filippov.kinds import part_curve, part_triangles
-from filippov.options import check_time, finite_array
+from filippov.options import check_time
 from filippov.prepare import Prepared, parameter_vector
 from filippov.system import System
 

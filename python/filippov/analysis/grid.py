@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from filippov.arrays import real_array, refuse_masked
 from filippov.errors import InputError
 from filippov.unknown import did_you_mean
 
@@ -215,6 +216,7 @@ _NEEDED = "a number or a one-dimensional array of numbers is needed"
 
 def _values(value: Any, name: str) -> Array:
     """Return numbers of any kind; points that are not finite fail, and stop no other."""
+    refuse_masked(value, name)
     try:
         array = np.asarray(value)
         if array.dtype.kind not in "fiub":
@@ -250,12 +252,7 @@ def _starts(system: System, y0: Any) -> tuple[list[Axis], Any, tuple[str, ...]]:
             return rows
 
         return axes, product, states
-    try:
-        array = np.asarray(y0, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(
-            f"y0: a state, several, or a mapping of names of states is needed, not {y0!r}"
-        ) from None
+    array = real_array(y0, "y0", "a state, several, or a mapping of names of states")
     if array.ndim not in (1, 2) or 0 in array.shape:
         raise InputError(f"y0: shape (n,) or (k, n) is needed, not {array.shape}")
     n = array.shape[-1]

@@ -246,7 +246,7 @@ def run_plan(
 ) -> Any:
     """Run what is missing of a plan; return the whole as a Dataset."""
     executor = as_executor(executor)
-    count = 1 if executor is not None and threads is None else check_threads(threads)
+    count = 1 if executor is not None and threads is None else min(check_threads(threads), plan.n_points)
     if chunk_size is not None and (
         isinstance(chunk_size, bool) or not isinstance(chunk_size, int | np.integer) or chunk_size < 1
     ):
