@@ -329,6 +329,44 @@ def test_progress_is_reported() -> None:
     assert reached[-1] == 2.0
 
 
+class Raising:
+    """Raises at the first call, at every call, or at the one with the end."""
+
+    def __init__(self, error: BaseException, when: str) -> None:
+        self.error, self.when, self.n_calls = error, when, 0
+
+    def __call__(self, t: float) -> None:
+        self.n_calls += 1
+        if {"once": self.n_calls == 1, "always": True, "at the end": t == 2.0}[self.when]:
+            raise self.error
+
+
+@pytest.mark.parametrize("when", ["once", "always"])
+def test_what_progress_raises_during_a_run_is_raised(when: str) -> None:
+    def forced(t: float, x: Any) -> Any:
+        return [x[1], -x[0] + np.sin(t / 3) - 0.4 * np.sign(x[1])]
+
+    error = ValueError("mine")
+    with pytest.raises(ValueError, match="mine") as caught:
+        fl.solve_ivp(forced, (0, 1e6), [1.0, 2.0], progress=Raising(error, when))
+    assert caught.value is error
+    assert 0.0 < error.partial.t[-1] < 1e6  # type: ignore[attr-defined]
+    stop = KeyboardInterrupt()
+    with pytest.raises(KeyboardInterrupt) as stopped:
+        fl.solve_ivp(forced, (0, 1e6), [1.0, 2.0], progress=Raising(stop, when))
+    assert stopped.value.__cause__ is stop
+    assert 0.0 < stopped.value.partial.t[-1] < 1e6  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("kind", [ValueError, KeyboardInterrupt])
+def test_what_progress_raises_at_the_end_has_the_solution(kind: Any) -> None:
+    expected = fl.solve_ivp(relay, (0, 2), [1.0])
+    with pytest.raises(kind) as caught:
+        fl.solve_ivp(relay, (0, 2), [1.0], progress=Raising(kind("mine"), "at the end"))
+    assert caught.value.partial.success  # type: ignore[attr-defined]
+    np.testing.assert_array_equal(caught.value.partial.y, expected.y)  # type: ignore[attr-defined]
+
+
 def test_progress_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
     fl.solve_ivp(relay, (0, 2), [1.0], progress=True)
     assert "100.0 %" in capsys.readouterr().err

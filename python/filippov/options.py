@@ -13,6 +13,7 @@ import numpy.typing as npt
 from filippov._core import RunOptions
 from filippov.arrays import real_array, refuse_masked
 from filippov.errors import InputError, ToleranceError
+from filippov.progress import Report, print_progress
 from filippov.unknown import did_you_mean
 
 __all__ = ["Options", "check_options", "check_t_span", "check_y0"]
@@ -50,7 +51,7 @@ class Options(NamedTuple):
     t_eval: Array | None
     dense_output: bool
     keep: str
-    progress: Callable[..., Any] | None
+    progress: Report | None
     max_branches: int
 
     def for_core(self, choices: Sequence[tuple[int, ...]] = ()) -> RunOptions:
@@ -394,15 +395,13 @@ def _check_max_wall_time(max_wall_time: Any) -> float | None:
     return None if max_wall_time is None else _positive("max_wall_time", max_wall_time)
 
 
-def _check_progress(progress: Any, t_span: tuple[float, float]) -> Callable[..., Any] | None:
+def _check_progress(progress: Any, t_span: tuple[float, float]) -> Report | None:
     if progress is None or progress is False:
         return None
     if progress is True:
-        from filippov.progress import print_progress
-
-        return print_progress(t_span)
+        return Report(print_progress(t_span))
     if callable(progress):
-        return progress  # type: ignore[no-any-return]
+        return Report(progress)
     raise InputError("progress: True, False, or a function of the time reached, is needed")
 
 

@@ -1,4 +1,4 @@
-"""Progress of a run, printed to the standard error stream."""
+"""Progress of a run: told to a function of the user, or printed to the standard error stream."""
 
 from __future__ import annotations
 
@@ -6,7 +6,28 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-__all__ = ["print_progress"]
+__all__ = ["Report", "print_progress"]
+
+
+class Report:
+    """A function of the time reached that keeps what it raised: the core knows only that it raised.
+
+    Parameters
+    ----------
+    function : callable
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
+        self.error: BaseException | None = None
+
+    def __call__(self, t: float) -> None:
+        """Tell the time reached."""
+        try:
+            self._function(t)
+        except BaseException as error:
+            self.error = error
+            raise
 
 
 def print_progress(t_span: tuple[float, float]) -> Callable[..., None]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Hashable, Mapping
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,6 +28,7 @@ from filippov.options import (
     repeatable_key,
 )
 from filippov.prepare import Prepared, parameter_vector
+from filippov.progress import Report
 from filippov.solution import AnyRun, Solution
 from filippov.start import StandingRun
 from filippov.switches import RunWarning
@@ -152,7 +154,8 @@ def solve_ivp(
     max_wall_time : float, optional
         Longest time that the run may take, in seconds.
     progress : bool or callable, optional
-        Print how far the run is, or call a function of the time reached.
+        Print how far the run is, or call a function of the time reached. What that raises ends the run, and
+        is raised again with the solution up to there as `partial`.
 
     Returns
     -------
@@ -170,7 +173,7 @@ def solve_ivp(
     NonUniqueError
         With ``nonunique="error"``; `partial` is the solution up to there, `candidates` the modes that follow.
     KeyboardInterrupt
-        On Ctrl-C; `partial` is the solution up to there.
+        On Ctrl-C, also in `progress`; `partial` is the solution up to there.
 
     Notes
     -----
@@ -334,20 +337,33 @@ def _present(
     values: dict[str, float] | None,
 ) -> Solution:
     """Present what the core computed; raise what the options ask to raise."""
-    if options.progress is not None and len(run.t):
-        options.progress(float(run.t[-1]))
     dense_output = options.dense_output and options.keep == "steps"
     solution = Solution.from_run(
         run, prepared, t0=t0, states=states, has_events=has_events, dense_output=dense_output
     )
-    if run.status < 0:
-        _raise_if_asked(run, solution, options)
-        if run.reason == "field_not_finite" and isinstance(run, Run):
-            given = system.parameter_values(None) if values is None else values
-            solution.message += system.line_not_finite(run, given)
+    if run.reason == "field_not_finite" and isinstance(run, Run):
+        given = system.parameter_values(None) if values is None else values
+        solution.message += system.line_not_finite(run, given)
     if prepared.remembers:
         _warn_of_memory(solution, prepared)
+    if options.progress is not None:
+        _report_end(options.progress, run, solution)
+    if run.status < 0:
+        _raise_if_asked(run, solution, options)
     return solution
+
+
+def _report_end(report: Report, run: AnyRun, solution: Solution) -> None:
+    """Tell `progress` the end of a run; raise what it raised then or before, with what was computed."""
+    if report.error is None and run.reason != "interrupted" and len(run.t):
+        with suppress(BaseException):
+            report(float(run.t[-1]))
+    error: Any = report.error
+    if isinstance(error, KeyboardInterrupt):
+        raise Interrupted(run.message or "interrupted", partial=solution) from error
+    if error is not None:
+        error.partial = solution
+        raise error
 
 
 def _warn_of_memory(solution: Solution, prepared: Prepared) -> None:
