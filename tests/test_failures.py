@@ -283,3 +283,38 @@ def test_friction_in_two_directions_does_not_run_for_ever() -> None:
     core = fl.solve_ivp(with_a_small_core, (0, 10), start, method="Rodas5P")
     assert core.success, core.message
     assert core.y[:, -1] == pytest.approx([math.sqrt(5.0), 2.0 * math.sqrt(5.0), 0.0, 0.0], abs=1e-5)
+
+
+def _fails_late(t: float, x: Any) -> float:
+    if t > 0.5:
+        raise RuntimeError("mine")
+    return float(x[0])
+
+
+def _fails_at_impact(t: float, x: Any) -> Any:
+    if float(t) > 0.1:
+        raise RuntimeError("mine")
+    return [x[0], -x[1]]
+
+
+def _field_fails(t: float, x: Any) -> Any:
+    return [x[1], -9.8 + 0.0 * _fails_late(t, x)]
+
+
+@pytest.mark.parametrize(
+    ("fun", "options", "what"),
+    [
+        (lambda t, x: [x[1], -9.8], {"events": _fails_late}, "the event '_fails_late'"),
+        (
+            lambda t, x: [x[1], -9.8],
+            {"resets": fl.Reset(lambda t, x: x[0], _fails_at_impact)},
+            "the map of the reset '_fails_at_impact'",
+        ),
+        (lambda t, x: [x[1], -9.8 * math.cos(x[0])], {"surfaces": _fails_late}, "surface 0"),
+        (_field_fails, {"surfaces": [], "events": _fails_late}, "the right-hand side"),
+    ],
+)
+def test_the_function_that_raised_is_named(fun: Any, options: dict[str, Any], what: str) -> None:
+    sol = fl.solve_ivp(fun, (0, 5), [1.0, 2.0], **options)
+    assert f": {what} raised an exception" in sol.message
+    assert isinstance(sol.error, RuntimeError)

@@ -52,6 +52,10 @@ def by_complex(t: Any, x: Any) -> Any:
     return x[1], abs(x[0] + 1j * x[1])
 
 
+def by_filling_in_one_line(t: Any, x: Any) -> Any:
+    dx = np.zeros(2); dx[0] = x[1]; return dx  # fmt: skip # noqa: E702
+
+
 def by_filling(t: Any, x: Any) -> Any:
     dx = np.zeros(2)
     dx[0] = x[1]
@@ -172,6 +176,8 @@ def by_condition_order(t: Any, x: Any) -> Any:
         (by_int, "int(x[0])", "jumps at every integer"),
         (by_complex, "abs(x[0] + 1j * x[1])", "real and imaginary parts"),
         (by_filling, "dx[0] = x[1]", "np.zeros_like(x)"),
+        (by_filling, "dx[0] = x[1]", "or return a list"),
+        (by_filling_in_one_line, "dx[0] = x[1]", "np.zeros_like(x)"),
         (by_filling_slice, "dx[:] = -x", "np.zeros_like(x)"),
         (by_adding_in_place, "dx += x", "np.zeros_like(x)"),
         (by_adding_plain_objects, "dx += np.array", "np.zeros_like(x)"),
@@ -436,3 +442,10 @@ def test_a_start_on_the_surface_is_no_difference() -> None:
 
 def test_without_a_start_the_origin_is_used() -> None:
     assert trace(lambda t, x: (x[1], -np.sign(x[1])), 2, t0=0.0, y0=None).system.n_surfaces == 1
+
+
+def test_an_array_filled_by_a_function_without_source() -> None:
+    """As one typed at the prompt."""
+    names: dict[str, Any] = {"np": np}
+    exec("def typed(t, x):\n    dx = np.zeros(2)\n    dx[0] = x[1]\n    return dx", names)
+    assert "np.zeros_like(x)" in refuse(names["typed"])

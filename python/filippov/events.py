@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Callable, Iterable
+from types import CodeType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -129,6 +130,25 @@ def selective(function: Callable[..., Any], values: dict[str, float]) -> Callabl
     if len(named) == len(values):
         return function
     return lambda t, x, *args, **params: function(t, x, *args, **{name: params[name] for name in named})
+
+
+def raised_by(error: BaseException, functions: Iterable[tuple[str, Any]]) -> str:
+    """Return the name of that of some functions in which an exception was raised; empty if in none.
+
+    Functions made by one line of code cannot be told apart: these are all named.
+    """
+    names: dict[CodeType, list[str]] = {}
+    for name, function in functions:
+        plain = function if hasattr(function, "__code__") else getattr(function, "__call__", None)  # noqa: B004
+        code = getattr(plain, "__code__", None)
+        if code is not None:
+            names.setdefault(code, []).append(name)
+    traceback = error.__traceback__
+    while traceback is not None:
+        if traceback.tb_frame.f_code in names:
+            return " or ".join(dict.fromkeys(names[traceback.tb_frame.f_code]))
+        traceback = traceback.tb_next
+    return ""
 
 
 def accepted_names(function: Callable[..., Any], names: Any) -> list[str]:

@@ -56,6 +56,13 @@ class Source(NamedTuple):
     black_box: bool = False
     resets: tuple[Reset, ...] = ()
 
+    def named_functions(self) -> list[tuple[str, Any]]:
+        """Return the functions with what they are called in messages; `fun` may call others of them."""
+        named: list[tuple[str, Any]] = [("the right-hand side", self.fun)]
+        named += [(f"the map of the reset {reset.name!r}", reset.map) for reset in self.resets]
+        named += [(f"h of the reset {reset.name!r}", reset.h) for reset in self.resets]
+        return named + [(f"surface {j}", surface) for j, surface in enumerate(self.surfaces)]
+
 
 def fields_source(fields: Any, surfaces: Any) -> Source:
     """Return the source of ``x' = f_s(t, x)`` with one field per sign vector `s`.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, NamedTuple
 
@@ -16,7 +16,7 @@ from filippov.backward import ReversedRun, reversed_function
 from filippov.branches import explore
 from filippov.core_events import CoreEvent, core_events
 from filippov.errors import InputError, Interrupted, NonUniqueError
-from filippov.events import EventSpec, normalise_events
+from filippov.events import EventSpec, normalise_events, raised_by
 from filippov.modes import Mode
 from filippov.options import (
     Options,
@@ -310,6 +310,7 @@ def _solve(
     system, values = _as_system(fun, n, constants, params, surfaces, resets)
     prepared = system.prepare(n, t0, state, values)
     fit_kappa(options.kappa, prepared.surfaces)
+    functions = [(f"the event {spec.name!r}", spec.g) for spec in specs or []]
     if t1 < t0:
         prepared, specs = _backward(system, prepared, specs, state, values, t0)
     found = core_events(specs or [], prepared, t0 if t1 >= t0 else -t0, state, constants, values)
@@ -318,7 +319,7 @@ def _solve(
 
     def follow(choices: tuple[Mode, ...]) -> Solution:
         run = _run(prepared, t0, t1, state, values, options, found, choices)
-        return _present(run, system, prepared, options, t0, states, specs is not None, values)
+        return _present(run, system, prepared, options, t0, states, specs is not None, values, functions)
 
     solution = follow(())
     if options.nonunique == "branch":
@@ -335,6 +336,7 @@ def _present(
     states: tuple[str, ...],
     has_events: bool,
     values: dict[str, float] | None,
+    events: Sequence[tuple[str, Any]] = (),
 ) -> Solution:
     """Present what the core computed; raise what the options ask to raise."""
     dense_output = options.dense_output and options.keep == "steps"
@@ -344,6 +346,11 @@ def _present(
     if run.reason == "field_not_finite" and isinstance(run, Run):
         given = system.parameter_values(None) if values is None else values
         solution.message += system.line_not_finite(run, given)
+    if run.error is not None:
+        own = [] if system._source is None else system._source.named_functions()
+        raising = raised_by(run.error, [*own, *events])
+        if raising:
+            solution.message = solution.message.replace("the right-hand side", raising, 1)
     if prepared.remembers:
         _warn_of_memory(solution, prepared)
     if options.progress is not None:

@@ -34,8 +34,8 @@ BLACK_BOX = (
 )
 CLOCKS = "rounding towards zero is not traced; write np.floor, np.ceil, np.rint, np.mod or fl.sawtooth(t, T)"
 ZEROS = (
-    "make the array with np.zeros_like(x) (or np.zeros(n, dtype=object)), so that it can hold traced values; "
-    "np.zeros(n) and np.empty(n) hold only plain numbers"
+    "make the array with np.zeros_like(x) (or np.zeros(n, dtype=object)), so that it can hold traced values, "
+    "or return a list; np.zeros(n) and np.empty(n) hold only plain numbers"
 )
 MASK = "write np.where(mask, a, b) instead of selecting elements by a condition"
 TABLE = "a table lookup cannot be traced: write the pieces with np.where, np.select or np.piecewise"
@@ -292,8 +292,10 @@ def _of_math(line: UserLine) -> str:
 
 def _of_filling(line: UserLine) -> str:
     """Advice for traced values that are put into an array of plain numbers."""
-    found = re.match(r"(\w+)\s*(\[.*?\]|\.flat\[.*?\]|\.fill\(|[-+*/]=)", line.text)
-    array = line.frame.f_locals.get(found.group(1)) if found else None
-    if isinstance(array, np.ndarray) and array.dtype != object:
+    found = re.findall(r"(?:^|[;:])\s*(\w+)\s*(?:\[.*?\]|\.flat\[.*?\]|\.fill\(|[-+*/]=)", line.text)
+    values = line.frame.f_locals
+    # A function typed at the prompt has no source: any array of its own may be meant.
+    arrays = [values.get(name) for name in found] if line.text else list(values.values())
+    if any(isinstance(array, np.ndarray) and array.dtype.kind in "fiu" for array in arrays):
         return ZEROS
     return ""
