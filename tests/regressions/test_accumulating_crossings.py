@@ -108,7 +108,7 @@ def test_a_limit_that_no_sliding_leaves_stops_by_name(method: str) -> None:
 
     sol = fl.solve_ivp(fun, (4.14, 5.0), [1.1623, -0.79999, -0.0489], method=method, rtol=1e-6, atol=1e-6)
     assert not sol.success
-    assert "all fields are tangent to surface 0 of the intersection" in sol.message
+    assert "all fields are tangent to x[1] + 0.8 = 0 here" in sol.message
     np.testing.assert_allclose(sol.y[:, -1], [1.1621, -0.8, -0.049], rtol=0, atol=1e-4)
 
 
