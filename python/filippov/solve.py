@@ -93,7 +93,7 @@ def solve_ivp(
         high accuracy where there are no series. ``"Rodas5P"``: for stiff motions, in every mode; Jacobians
         from the traced function, by differences for a black box. ``"Midpoint"``: the rule of order 2 as Dieci
         and Lopez use it, which never evaluates the field of a region beyond a surface; for comparisons.
-        ``sol.stats["method"]`` says what took the steps.
+        ``sol.stats["method"]`` says what took the steps ("none" if there was no step).
     t_eval : array_like, shape (k,), optional
         Times at which `y` is given, strictly sorted. It does not influence the steps. Default: the ends of
         the steps.

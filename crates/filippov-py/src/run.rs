@@ -407,8 +407,11 @@ fn methods(stats: &Stats) -> String {
         .into_iter()
         .filter_map(|(name, count)| (count > 0).then_some(name))
         .collect();
-    if explicit > 0 || names.is_empty() {
+    if explicit > 0 {
         names.push("DOPRI5");
+    }
+    if names.is_empty() {
+        names.push("none");
     }
     names.join(", ")
 }

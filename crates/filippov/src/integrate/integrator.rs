@@ -40,7 +40,7 @@ use crate::stepper::{
     Attempt, Controller, Dop853, ErrorScale, Midpoint, Rodas5p, StepMethod, Stepper, Taylor,
 };
 use crate::system::PiecewiseSystem;
-use crate::tolerances::{EPS, SHORTEST_STEP};
+use crate::tolerances::{EPS, SHORTEST_STEP, SHORTEST_STEP_AT_ZERO};
 
 /// Most steps between two looks at the clock and at the caller's wish to stop.
 const LONGEST_POLL: u64 = 64;
@@ -241,7 +241,8 @@ impl<'a> Integrator<'a> {
             }
             dt = remaining;
         }
-        if dt < SHORTEST_STEP * self.t.abs() && dt < remaining {
+        let shortest = (SHORTEST_STEP * self.t.abs()).max(SHORTEST_STEP_AT_ZERO);
+        if dt < shortest && dt < remaining {
             let mut lost = self.lost_jump()?.or_else(|| self.lost_root());
             if lost.is_none() {
                 lost = self.lost_share()?;

@@ -1,6 +1,7 @@
 //! Step size control.
 
-/// The weights of the error norm: atol_i + rtol max(|y0_i|, |y1_i|).
+/// The weights of the error norm: atol_i + rtol max(|y0_i|, |y1_i|). A component that is zero at both ends and has no
+/// absolute tolerance does not count: nothing tells its size.
 #[derive(Clone, Debug)]
 pub struct ErrorScale {
     rtol: f64,
@@ -15,14 +16,25 @@ impl ErrorScale {
         } else {
             atol.to_vec()
         };
-        // At rest in 0 an error of 0 is none, also without an absolute tolerance.
+        // A tolerance of zero would be one that nothing keeps, and nothing can be divided by.
         let atol = atol.into_iter().map(|a| a.max(f64::MIN_POSITIVE)).collect();
         ErrorScale { rtol, atol }
     }
 
-    /// The scale of component `i`.
+    /// The scale of component `i`; infinite where it does not count.
     #[inline]
     pub fn of(&self, i: usize, y0: f64, y1: f64) -> f64 {
+        let tolerance = self.tolerance(i, y0, y1);
+        if tolerance == f64::MIN_POSITIVE {
+            f64::INFINITY
+        } else {
+            tolerance
+        }
+    }
+
+    /// What component `i` may err by.
+    #[inline]
+    pub fn tolerance(&self, i: usize, y0: f64, y1: f64) -> f64 {
         // Not `f64::max`: a NaN must survive, and one comparison is cheaper.
         let (a, b) = (y0.abs(), y1.abs());
         self.atol[i] + self.rtol * if b < a { a } else { b }
@@ -32,7 +44,7 @@ impl ErrorScale {
     pub fn along(&self, gradient: &[f64], y: &[f64]) -> f64 {
         let components = gradient.iter().zip(y).enumerate();
         components
-            .map(|(i, (g, y))| g.abs() * self.of(i, *y, *y))
+            .map(|(i, (g, y))| g.abs() * self.tolerance(i, *y, *y))
             .sum()
     }
 
@@ -45,14 +57,22 @@ impl ErrorScale {
 
     /// Root mean square of `v` in units of the scale at `y`.
     pub fn norm(&self, v: &[f64], y: &[f64]) -> f64 {
-        let sum: f64 = v
-            .iter()
-            .zip(y)
-            .enumerate()
-            .map(|(i, (v, y))| (v / self.of(i, *y, *y)).powi(2))
-            .sum();
-        (sum / v.len() as f64).sqrt()
+        root_mean_square(v.len(), |i| v[i] / self.of(i, y[i], y[i]))
     }
+}
+
+/// Root mean square of n ratios; where their squares overflow, the largest of them.
+#[inline(always)]
+pub(super) fn root_mean_square(n: usize, ratio: impl Fn(usize) -> f64) -> f64 {
+    let mut sum = 0.0;
+    for i in 0..n {
+        let ratio = ratio(i);
+        sum += ratio * ratio;
+    }
+    if sum == f64::INFINITY {
+        return (0..n).map(|i| ratio(i).abs()).fold(0.0, f64::max);
+    }
+    (sum / n as f64).sqrt()
 }
 
 /// The PI controller of DOPRI5 (Hairer, Norsett, Wanner, section IV.2): after an accepted step

@@ -1,6 +1,7 @@
 //! DOP853: one step, its error estimate and its continuous extension of order 7.
 
 use super::coefficients_dop853::{A, D, E3, E5, NODES};
+use super::controller::root_mean_square;
 use super::dopri5::{jumps_between, stiffness_of};
 use super::{Attempt, ErrorScale, Interpolant, Step};
 use crate::error::FieldError;
@@ -106,19 +107,18 @@ impl Dop853 {
 
     /// |e5|^2 / (|e5|^2 + |e3|^2/100)^(1/2), the norms in units of the tolerance: e5 where the two agree about the order.
     fn error(&self, y: &[f64], dt: f64, scale: &ErrorScale) -> f64 {
-        let (mut fifth, mut third) = (0.0, 0.0);
-        for (i, (y0, y1)) in y.iter().zip(&self.step.end).enumerate() {
-            let of = |weights: &[f64; 12]| -> f64 {
+        let norm = |weights: &[f64; 12]| {
+            root_mean_square(y.len(), |i| {
                 let terms = weights.iter().zip(&self.k);
-                terms.map(|(w, k)| w * k[i]).sum::<f64>() / scale.of(i, *y0, *y1)
-            };
-            fifth += of(&E5).powi(2);
-            third += of(&E3).powi(2);
+                let change = dt * terms.map(|(w, k)| w * k[i]).sum::<f64>();
+                change / scale.of(i, y[i], self.step.end[i])
+            })
+        };
+        let (fifth, third) = (norm(&E5), norm(&E3));
+        if fifth == 0.0 {
+            return if third.is_finite() { 0.0 } else { third };
         }
-        if fifth == 0.0 && third == 0.0 {
-            return 0.0;
-        }
-        dt.abs() * fifth / ((fifth + 0.01 * third) * y.len() as f64).sqrt()
+        fifth * (fifth / fifth.hypot(0.1 * third))
     }
 
     /// y0 + x (F0 + u (F1 + x (F2 + u (F3 + x (F4 + u (F5 + x F6)))))) with u = 1 - x, in powers of x = theta.

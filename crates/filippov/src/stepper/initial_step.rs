@@ -3,6 +3,7 @@
 use super::ErrorScale;
 use crate::error::FieldError;
 use crate::field::SmoothField;
+use crate::tolerances::SMALLEST_GUESS;
 
 /// Hairer's guess of the first step of a method of order 5, from two derivatives.
 ///
@@ -25,7 +26,7 @@ pub fn initial_step(
     } else {
         0.01 * d0 / d1
     };
-    let guess = guess.min(longest);
+    let guess = guess.max(SMALLEST_GUESS).min(longest);
     let mut moved: Vec<f64> = y.iter().zip(dy).map(|(y, dy)| y + guess * dy).collect();
     let mut dy_moved = vec![0.0; y.len()];
     field.eval(t + guess, &mut moved, &mut dy_moved)?;
@@ -40,7 +41,8 @@ pub fn initial_step(
     } else {
         (0.01 / fastest).powf(0.2)
     };
-    Ok(step.min(100.0 * guess).min(longest))
+    let step = step.min(100.0 * guess).max(SMALLEST_GUESS);
+    Ok(step.min(longest))
 }
 
 /// The first step after a restart: at most `proposal`, the step of the motion before, and at most what

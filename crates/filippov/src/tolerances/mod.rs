@@ -31,6 +31,9 @@ pub const MAX_LIE_ORDER: usize = 6;
 /// Shortest step in units of the rounding of time.
 pub const SHORTEST_STEP: f64 = 16.0 * EPS;
 
+/// Shortest step where the time is zero: below it numbers lose digits, and a step that is rounded to zero is no step.
+pub const SHORTEST_STEP_AT_ZERO: f64 = f64::MIN_POSITIVE;
+
 /// A motion that can go no further towards the edge of its field has arrived at a surface that is nearer
 /// than this fraction of the tolerance.
 pub const ARRIVED: f64 = 1e-3;

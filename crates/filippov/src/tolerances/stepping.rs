@@ -1,5 +1,10 @@
 //! Thresholds of steps and their lengths.
 
+use super::{EPS, SHORTEST_STEP_AT_ZERO};
+
+/// The first guess of a step is no shorter than this: it may still be shortened by many factors before the time ends it.
+pub const SMALLEST_GUESS: f64 = SHORTEST_STEP_AT_ZERO / EPS;
+
 /// A motion of that many times the last step shows which step suits its mode.
 pub const MANY: f64 = 8.0;
 

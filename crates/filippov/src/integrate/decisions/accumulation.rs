@@ -232,7 +232,7 @@ impl Integrator<'_> {
             .x
             .iter()
             .enumerate()
-            .map(|(i, x)| self.scale.of(i, *x, *x));
+            .map(|(i, x)| self.scale.tolerance(i, *x, *x));
         scales
             .fold(f64::INFINITY, f64::min)
             .max(NEAREST_ACCUMULATION)

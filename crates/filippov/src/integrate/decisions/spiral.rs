@@ -97,7 +97,7 @@ impl Integrator<'_> {
             .x
             .iter()
             .enumerate()
-            .map(|(i, x)| self.scale.of(i, *x, *x));
+            .map(|(i, x)| self.scale.tolerance(i, *x, *x));
         SPIRAL_START * scales.fold(f64::INFINITY, f64::min)
     }
 

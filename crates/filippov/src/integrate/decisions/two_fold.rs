@@ -62,7 +62,7 @@ impl Integrator<'_> {
             return Ok(None);
         };
         let moves = |(i, (a, b)): (usize, (&f64, &f64))| {
-            (a - b).abs() <= 10.0 * AT_TWO_FOLD * self.scale.of(i, *a, *b)
+            (a - b).abs() <= 10.0 * AT_TWO_FOLD * self.scale.tolerance(i, *a, *b)
         };
         let is_near = end.iter().zip(&self.x).enumerate().all(moves);
         let is_ahead = t > self.t && t <= self.horizon;

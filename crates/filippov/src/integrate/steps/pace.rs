@@ -5,7 +5,7 @@ use crate::integrate::decisions::transition::Left;
 use crate::integrate::integrator::Integrator;
 use crate::stepper::{initial_step, restart_step, tiny_step, ErrorScale};
 use crate::switching::Leading;
-use crate::tolerances::{FAMILIAR, MANY, MAX_LIE_ORDER, REACH, SEVERAL};
+use crate::tolerances::{FAMILIAR, MANY, MAX_LIE_ORDER, REACH, SEVERAL, SMALLEST_GUESS};
 
 /// How the last motion in a mode went.
 #[derive(Clone, Copy, Debug)]
@@ -58,7 +58,7 @@ impl Integrator<'_> {
     pub(in crate::integrate) fn first_step(&mut self, left: &[Left]) -> Result<f64, FieldError> {
         let remaining = (self.t_end - self.t).max(f64::MIN_POSITIVE);
         if let (Some(first), true) = (self.options.first_step, self.dt.is_nan()) {
-            return Ok(first.min(remaining));
+            return Ok(first.max(SMALLEST_GUESS).min(remaining));
         }
         let longest = remaining.min(self.options.max_step);
         if self.motion.jets.is_some() {
