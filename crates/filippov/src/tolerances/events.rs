@@ -65,6 +65,10 @@ pub const MOST_SAMPLES: u32 = 1000;
 /// Zeros of the user's functions in one step; with more the step is too long for them.
 pub const MOST_ZEROS: usize = 64;
 
+/// Pieces of a step that are cut in two because one of the user's functions is not finite in a part of them: about twenty
+/// ends of where it is finite, each found to rounding. With more the step is too long for it.
+pub const MOST_CUTS: u32 = 1000;
+
 /// A search that needed more bisections than this met a function that the step does not resolve;
 /// the step may not grow then.
 pub const RESOLVED_DEPTH: u32 = 3;

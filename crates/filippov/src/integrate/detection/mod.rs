@@ -8,3 +8,4 @@ pub(super) mod missed_exits;
 pub(super) mod multiple_zero;
 pub(super) mod search;
 pub(super) mod user_events;
+pub(super) mod user_zeros;

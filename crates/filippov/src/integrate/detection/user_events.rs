@@ -3,18 +3,12 @@
 use smallvec::SmallVec;
 
 use crate::error::FieldError;
-use crate::event::certificate::Bound;
-use crate::event::isolate::{first_zero_sampled, Evidence, Zero};
-use crate::event::locate::refine;
-use crate::event::tube::Tube;
 use crate::event::{UserEvent, UserFunction};
 use crate::integrate::integrator::Integrator;
 use crate::integrate::motion::Motion;
 use crate::integrate::Stop;
 use crate::stepper::Interpolant;
-use crate::tolerances::{
-    EPS, MOST_ZEROS, PIECES_OF_SERIES, SAME_TICK, SURFACE_NOISE, UNBOUNDED_DEPTH,
-};
+use crate::tolerances::{EPS, SAME_TICK};
 
 /// A zero of a user's function.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,16 +21,16 @@ pub struct UserZero {
 
 /// The user's functions and their zeros so far.
 pub(in crate::integrate) struct UserEvents<'a> {
-    events: &'a [UserEvent<'a>],
+    pub(super) events: &'a [UserEvent<'a>],
     /// Value at the start of the step, per event.
-    left: Vec<f64>,
+    pub(super) left: Vec<f64>,
     /// Value at the start of the step before, per event.
     before: Vec<f64>,
     /// Time of the last zero, per event: divided out while it is the start of the search.
-    last: Vec<f64>,
+    pub(super) last: Vec<f64>,
     zeros: Vec<Vec<UserZero>>,
     /// No step has been taken yet: a zero at the very start counts, as in SciPy.
-    at_start: bool,
+    pub(super) at_start: bool,
     /// The only function is that of the section: its zeros are returns.
     pub(in crate::integrate) is_section: bool,
 }
@@ -166,16 +160,6 @@ impl Integrator<'_> {
         is_last.then_some(Stop::TerminalEvent(index))
     }
 
-    /// How many pieces of a step are searched one after the other for zeros of a user's function.
-    fn sampled_pieces(&self, index: usize) -> u32 {
-        let is_sampled = !self.user_events.events[index].function.has_bounds();
-        if is_sampled && self.stepper.has_series() {
-            PIECES_OF_SERIES
-        } else {
-            1
-        }
-    }
-
     /// Records the zeros of functions that are within rounding of zero where the state is about to jump; returns the
     /// reason if one of them ends the run.
     pub(in crate::integrate) fn record_zeros_here(&mut self) -> Option<Stop> {
@@ -199,7 +183,7 @@ impl Integrator<'_> {
         None
     }
 
-    fn user_value(&mut self, index: usize, theta: f64) -> Result<f64, FieldError> {
+    pub(super) fn user_value(&mut self, index: usize, theta: f64) -> Result<f64, FieldError> {
         let function = self.user_events.events[index].function;
         value_along(
             function,
@@ -208,98 +192,10 @@ impl Integrator<'_> {
             theta,
         )
     }
-
-    /// All zeros in (0, theta], in no order. A function that is not finite has none in this step.
-    fn search_user_zeros(&mut self, theta: f64) -> Result<Option<Vec<(f64, usize)>>, FieldError> {
-        let mut zeros = Vec::new();
-        for index in 0..self.user_events.events.len() {
-            let (t0, dt) = (self.stepper.interpolant().t0, self.stepper.interpolant().dt);
-            let start = self.user_events.left[index];
-            let mut from = 0.0;
-            let mut divided = self.user_events.last[index] == t0 || start == 0.0;
-            let mut sign = if divided { 0.0 } else { start.signum() };
-            let mut pieces = self.sampled_pieces(index);
-            loop {
-                // A function without bounds is sampled: on a long step in pieces.
-                let to = theta - (theta - from) * (pieces - 1) as f64 / pieces as f64;
-                if divided {
-                    let probe = from + 1e-7 * (to - from);
-                    sign = self.user_value(index, probe)?.signum();
-                }
-                if self.user_events.at_start && start == 0.0 && from == 0.0 {
-                    let direction = self.user_events.events[index].direction;
-                    if sign != 0.0 && direction * sign >= 0.0 {
-                        zeros.push((0.0, index));
-                    }
-                }
-                let limit = (to - from) * 1e-7;
-                let function = self.user_events.events[index].function;
-                let (interpolant, motion) = (self.stepper.interpolant(), &mut self.motion);
-                let mut g = |at: f64| {
-                    if !divided {
-                        return Ok(sign * value_along(function, interpolant, motion, at)?);
-                    }
-                    // The zero at the start is divided out; its limit is the difference quotient.
-                    let away = (at - from).max(limit);
-                    Ok(sign * value_along(function, interpolant, motion, from + away)? / away)
-                };
-                let margin = &self.detector.margin;
-                let mut bounds = |a: f64, b: f64| {
-                    let enclosure = function.enclose(&Tube::new(interpolant, (a, b), margin))?;
-                    Some(Bound::new(enclosure, sign, dt))
-                };
-                let evidence = Evidence::Bounds {
-                    bounds: &mut bounds,
-                    divided: i32::from(divided),
-                    patience: UNBOUNDED_DEPTH,
-                };
-                let mut values = [0.0; 5];
-                for (i, value) in values.iter_mut().enumerate() {
-                    *value = g(from + (to - from) * 0.25 * i as f64)?;
-                }
-                // Rounding of a function whose terms are not known: that of its values.
-                let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-                let noise = SURFACE_NOISE * largest;
-                let isolated = first_zero_sampled(&mut g, from, to, values, noise, evidence)?;
-                if isolated.exhausted && !isolated.not_finite {
-                    return Ok(None);
-                }
-                // Zero up to rounding where the motion may end, as a switching function at its switch.
-                let ends_there = pieces == 1 && largest > 0.0 && values[4].abs() <= noise;
-                let at = match isolated.zero {
-                    Some(Zero::Crossing(bracket)) => {
-                        let width = 0.5 * EPS * (t0.abs() / dt).max(1.0);
-                        refine(&mut g, bracket, width)?.theta
-                    }
-                    _ if ends_there => theta,
-                    _ if pieces == 1 => break,
-                    _ => {
-                        (from, divided, pieces) = (to, false, pieces - 1);
-                        continue;
-                    }
-                };
-                // A zero at the end of the step is there to the bit: the next step knows it.
-                let is_last = at >= theta - self.together(dt);
-                let at = if is_last { theta } else { at };
-                let direction = self.user_events.events[index].direction;
-                if direction * sign <= 0.0 {
-                    zeros.push((at, index));
-                }
-                if zeros.len() > MOST_ZEROS {
-                    return Ok(None);
-                }
-                if at <= from || is_last {
-                    break;
-                }
-                (from, divided) = (at, true);
-            }
-        }
-        Ok(Some(zeros))
-    }
 }
 
 /// The value of a user's function along the motion.
-fn value_along(
+pub(super) fn value_along(
     function: &dyn UserFunction,
     interpolant: &Interpolant,
     motion: &mut Motion,
