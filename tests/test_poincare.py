@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import time
 from typing import Any
 
 import filippov as fl
@@ -26,6 +27,17 @@ def friction() -> fl.System:
 @pytest.fixture(scope="module")
 def drill() -> fl.System:
     return fl.System(fl.problems.get("drill_string").fun, n=3, params={"u": 2.0})
+
+
+def test_a_longest_period_beyond_all_returns(friction: fl.System) -> None:
+    few = fl.poincare(friction, fl.Phase(1.0), (0, 5), [1.0, 2.0], until_periodic=True)
+    for longest in (10**9, 2**62):
+        start = time.perf_counter()
+        same = fl.poincare(
+            friction, fl.Phase(1.0), (0, 5), [1.0, 2.0], until_periodic=True, longest_period=longest
+        )
+        assert time.perf_counter() - start < 1.0
+        assert same.y.values.tolist() == few.y.values.tolist()
 
 
 @pytest.mark.parametrize(

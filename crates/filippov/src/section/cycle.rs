@@ -32,7 +32,9 @@ pub struct Cycle {
 impl Cycle {
     /// The period of the latest returns, the newest last, if there is one by now.
     pub(super) fn period(&self, latest: &VecDeque<Return>) -> Option<usize> {
-        (1..=self.longest).find(|&q| self.repeats(q, latest) && self.is_settled(q, latest))
+        // A longer one would need more returns than there are.
+        let longest = self.longest.min(latest.len() / 2);
+        (1..=longest).find(|&q| self.repeats(q, latest) && self.is_settled(q, latest))
     }
 
     /// Do as many returns in a row agree with those `q` before as have to?

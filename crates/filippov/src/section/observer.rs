@@ -84,7 +84,7 @@ impl Observer {
             cycle: section.cycle.clone(),
             returns: Returns::default(),
             latest: VecDeque::new(),
-            remembered: (4 * longest).max(1),
+            remembered: longest.saturating_mul(4).max(1),
             t_start,
             t_return: t_start,
             since: t_start,
