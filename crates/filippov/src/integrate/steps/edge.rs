@@ -80,7 +80,8 @@ impl Integrator<'_> {
 
     /// Warns where the field jumps over a step far shorter than its predecessors.
     pub(in crate::integrate) fn note_jump(&mut self, dt: f64) {
-        let is_short = dt < JUMP_SHRINK * self.recent_dt;
+        // A step up to a known time is short for that reason.
+        let is_short = dt < JUMP_SHRINK * self.recent_dt && dt < self.horizon - self.t;
         // Towards a fold of the multipliers the field of an intersection bends like a square root, and towards a
         // two-fold the multiplier is a quotient of small numbers.
         let may_bend = self.motion.sliding.len() > 1 || self.approaches_two_fold();
