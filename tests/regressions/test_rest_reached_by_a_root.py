@@ -1,4 +1,4 @@
-"""A root of the distance brings a motion to rest in finite time, wherever that is; the run goes on from there."""
+"""A root of the distance brings a motion to rest in finite time, wherever; the run goes on from there."""
 
 from __future__ import annotations
 
