@@ -1,7 +1,5 @@
 //! Zeros of a user's own functions.
 
-use smallvec::SmallVec;
-
 use crate::error::FieldError;
 use crate::event::{UserEvent, UserFunction};
 use crate::integrate::integrator::Integrator;
@@ -124,14 +122,14 @@ impl Integrator<'_> {
                 _ if at == theta => t_stop,
                 _ => (t0 + at * dt).min(t_stop),
             };
-            let mut y: SmallVec<[f64; 8]> = SmallVec::from_elem(0.0, self.x.len());
+            let mut y = vec![0.0; self.x.len()];
             self.stepper.interpolant().at(at, &mut y);
             self.motion.project(t, &mut y)?;
             if let Some(stop) = self.record_zero(index, t, &y) {
                 self.sample(t)?;
                 self.recorder.step(self.stepper.interpolant(), t, &y);
                 self.t = t;
-                self.x.copy_from_slice(&y);
+                self.x = y;
                 return Ok(Some(stop));
             }
         }
