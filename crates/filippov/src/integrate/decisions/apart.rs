@@ -61,7 +61,7 @@ impl Integrator<'_> {
     /// The only way on at surface `j`, if it is the same for all signs of the others among `free`; those not among them
     /// have the signs of `after`. `mode` is the one before.
     fn decide_alone(
-        &mut self,
+        &self,
         j: usize,
         mode: &Mode,
         after: &Mode,
