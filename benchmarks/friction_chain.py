@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import argparse
 import resource
+from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
 
 import filippov as fl
 import numpy as np
+import numpy.typing as npt
 from measure import Line, interleaved, report, write_section
 
 SIZES = (10, 100, 1000)
@@ -21,10 +23,10 @@ T_END = 40.0
 LIMIT = 1.2
 
 
-def chain(d: int) -> fl.System:
+def chain(d: int) -> Callable[[float, Any], list[Any]]:
     """Return d unit masses between springs, with Coulomb friction to the ground, pushed at the right end."""
 
-    def field(t: float, x: Any) -> Any:
+    def field(t: float, x: Any) -> list[Any]:
         q, v = x[:d], x[d:]
         left = [0.0, *q[:-1]]
         right = [*q[1:], q[-1]]
@@ -32,7 +34,12 @@ def chain(d: int) -> fl.System:
         rates[-1] = rates[-1] + 1.5 * np.sin(0.5 * t)
         return [*v, *rates]
 
-    return fl.System(field, n=2 * d)
+    return field
+
+
+def start_of_chain(d: int) -> npt.NDArray[np.float64]:
+    """Return its initial state: all masses move."""
+    return np.concatenate([np.zeros(d), 0.1 * np.linspace(1, 2, d)])
 
 
 def main() -> None:
@@ -43,7 +50,7 @@ def main() -> None:
     arguments = parser.parse_args()
     runs, steps, memory = {}, {}, {}
     for d in SIZES:
-        system, start = chain(d), np.concatenate([np.zeros(d), 0.1 * np.linspace(1, 2, d)])
+        system, start = fl.System(chain(d), n=2 * d), start_of_chain(d)
 
         def run(system: fl.System = system, start: Any = start) -> fl.Solution:
             return system.solve((0, T_END), start, dense_output=False)

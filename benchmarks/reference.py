@@ -61,7 +61,7 @@ def load(file: str, run_id: str = "main") -> Reference:
     )
 
 
-def max_event_error(reference: Reference, times: Iterable[float]) -> float:
-    """Return the largest error of the event times; infinite if their number is not that of the reference."""
+def max_event_error(expected: Array, times: Iterable[float]) -> float:
+    """Return the largest error of the event times; infinite if there are not as many as expected."""
     found = np.fromiter(times, dtype=np.float64)
-    return float(np.abs(found - reference.t).max()) if len(found) == len(reference.t) else np.inf
+    return float(np.abs(found - expected).max()) if len(found) == len(expected) else np.inf

@@ -138,7 +138,7 @@ class _Sweep:
 
     def __init__(self, reference: Reference, candidates: Sequence[Candidate], repeats: int) -> None:
         self._errors = {
-            c.name: [max_event_error(reference, c.event_times(tol)) for tol in c.tolerances]
+            c.name: [max_event_error(reference.t, c.event_times(tol)) for tol in c.tolerances]
             for c in candidates
         }
         calls = {

@@ -1,149 +1,277 @@
-"""Work against precision: every method on problems of the papers, and a black box beside the traced field.
+"""Work against precision: every method of ours and the loops of others, on problems of the papers.
 
-Run ``python benchmarks/work_precision.py``: a picture, ``work_precision.png``, and a table in ``README.md``
+Run ``python benchmarks/work_precision.py``: a picture, ``work_precision.png``, and tables in ``README.md``
 unless ``--no-write`` is given. An error is the largest of those of the times of the switches; a run that does
-not find the switches of the reference has none. Evaluations are those of the field; a series counts by its
-operations.
+not find the switches of the reference has none. SciPy, numba and heyoka are left out where they are missing.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import filippov as fl
 import numpy as np
 import numpy.typing as npt
+from friction_chain import chain, start_of_chain
 from measure import at_equal_error, interleaved, table, write_section
-from reference import Reference, load, max_event_error
+from modes import MODELS, Model, Outcome, friction_chain
+from reference import load, max_event_error
 
 Array = npt.NDArray[np.float64]
+Surface = Callable[[Any, Any], Any]
+Solve = Callable[[float], Outcome]
 
 PICTURE = Path(__file__).with_name("work_precision.png")
 TOLERANCES = [10.0**-k for k in range(3, 14)]
 METHODS = ("Taylor", "DOP853", "DOPRI5", "Rodas5P")
-BLACK_BOX = "DOPRI5, black box"
+PEERS = ("scipy", "numba", "heyoka")
 TARGETS = (1e-6, 1e-9)
+COUNTS = ("evaluations", "steps", "searches")
+
+BLOCKS, CHAIN_END = 10, 20.0
 
 
 class Case(NamedTuple):
-    """A problem, with its reference; and its switching functions where the black box needs them."""
+    """A problem: ours, that of the papers with the times of its switches, and its modes by hand.
+
+    Attributes
+    ----------
+    title : str
+        The heading.
+    system : System
+        Traced and compiled.
+    opaque : callable
+        The same function, not to be traced.
+    surfaces : tuple of callable
+        Its switching functions, for the black box.
+    t_span, y0 : sequence of float
+        The interval and the initial state.
+    times : ndarray, shape (k,)
+        The times of the switches.
+    model : Model
+        The modes by hand.
+    """
 
     title: str
-    name: str
-    file: str
-    run_id: str = "main"
-    surfaces: tuple[Callable[[Any, Any], Any], ...] = ()
+    system: fl.System
+    opaque: Callable[[float, Any], Any]
+    surfaces: tuple[Surface, ...]
+    t_span: tuple[float, float]
+    y0: Any
+    times: Array
+    model: Model
 
 
-CASES = (
-    Case("DISODE45, problem 1", "disode_planar", "A_disode45_problem1"),
-    Case("DISODE45, problem 3: relay", "relay_feedback", "C_disode45_problem3", "main", (lambda t, x: x[0],)),
-    Case("DISODE45, problem 4: two masses", "two_masses", "D_disode45_problem4"),
-    Case("dry friction, transient", "dry_friction", "E_pk_dry_friction", "transient", (lambda t, x: x[1],)),
-    Case("drill string, u = 3", "drill_string", "G_pk_drill_string", "transient_u3"),
-    Case("stick-slip on a belt, Dieci and Lopez 6.1", "dieci_lopez_6_1", "H_dl_example_6_1", "outer_start"),
-)
+def component(i: int, offset: float = 0.0) -> Surface:
+    """Return the switching function ``x[i] - offset``."""
+    return lambda t, x: x[i] - offset
 
 
-class Curve(NamedTuple):
-    """One method on one problem: a row per tolerance."""
-
-    errors: list[float]
-    evaluations: list[int]
-    seconds: Array
-
-
-def solver(case: Case, method: str) -> Callable[[float], fl.Solution]:
-    """Return the call that solves a problem at a tolerance."""
-    problem = fl.problems.get(case.name)
-    if method != BLACK_BOX:
-        system = fl.System(problem.fun, n=len(problem.y0), args=problem.args)
-        return lambda tol: system.solve(problem.t_span, problem.y0, method=method, rtol=tol, atol=tol)
+def of_problem(title: str, name: str, file: str, surfaces: tuple[Surface, ...], run_id: str = "main") -> Case:
+    """Return a problem of the papers."""
+    problem = fl.problems.get(name)
 
     def opaque(t: float, x: Any) -> Any:
         return problem.fun(float(t), np.array(x, dtype=float), *problem.args)
 
-    def solve(tol: float) -> fl.Solution:
-        return fl.solve_ivp(
-            opaque, problem.t_span, problem.y0, "DOPRI5", surfaces=case.surfaces, rtol=tol, atol=tol
-        )
+    system = fl.System(problem.fun, n=len(problem.y0), args=problem.args)
+    times = load(file, run_id).t
+    return Case(title, system, opaque, surfaces, problem.t_span, problem.y0, times, MODELS[name])
+
+
+def of_chain() -> Case:
+    """Return the chain of masses; its reference is our own at 1e-13, which the loops of others confirm."""
+    field, y0 = chain(BLOCKS), start_of_chain(BLOCKS)
+    system = fl.System(field, n=2 * BLOCKS)
+    times = system.solve((0.0, CHAIN_END), y0, method="Taylor", rtol=1e-13, atol=1e-13).switches.t
+    surfaces = tuple(component(BLOCKS + i) for i in range(BLOCKS))
+
+    def opaque(t: float, x: Any) -> Any:
+        return field(float(t), np.array(x, dtype=float))
+
+    return Case(
+        f"chain of {BLOCKS} masses with friction",
+        system,
+        opaque,
+        surfaces,
+        (0.0, CHAIN_END),
+        y0,
+        times,
+        friction_chain(BLOCKS, CHAIN_END),
+    )
+
+
+def cases() -> Iterator[Case]:
+    """Yield the problems."""
+    friction, speed = "E_pk_dry_friction", (component(1),)
+    disode = [
+        ("problem 1", "disode_planar", "A_disode45_problem1", (lambda t, x: x[1] - 0.2 - np.sin(2 * x[0]),)),
+        (
+            "problem 2: pounding",
+            "structural_pounding",
+            "B_disode45_problem2",
+            (component(0, 0.005), component(1)),
+        ),
+        ("problem 3: relay", "relay_feedback", "C_disode45_problem3", (component(0),)),
+        ("problem 4: two masses", "two_masses", "D_disode45_problem4", tuple(map(component, range(4)))),
+    ]
+    for title, name, file, surfaces in disode:
+        yield of_problem(f"DISODE45, {title}", name, file, surfaces)
+    yield of_problem("dry friction, transient", "dry_friction", friction, speed, "transient")
+    for label in ("I", "II", "III"):
+        name, run_id = f"dry_friction_attractor_{label}", f"attractor_{label}"
+        yield of_problem(f"dry friction, attractor {label}", name, friction, speed, run_id)
+    discs = (component(1), component(2))
+    yield of_problem("drill string, u = 3", "drill_string", "G_pk_drill_string", discs, "transient_u3")
+    belt = (component(1, 0.2),)
+    yield of_problem("block on a belt", "dieci_lopez_6_1", "H_dl_example_6_1", belt, "outer_start")
+    yield of_chain()
+
+
+def ours(case: Case, method: str) -> Solve:
+    """Return our call with a method."""
+
+    def solve(tolerance: float) -> Outcome:
+        return outcome_of(case.system.solve(case.t_span, case.y0, method=method, rtol=tolerance, atol=tolerance))
 
     return solve
 
 
+def black_box(case: Case) -> Solve:
+    """Return our call with the function as it is, its switching functions declared."""
+
+    def solve(tolerance: float) -> Outcome:
+        options = {"surfaces": case.surfaces, "rtol": tolerance, "atol": tolerance}
+        return outcome_of(fl.solve_ivp(case.opaque, case.t_span, case.y0, "DOPRI5", **options))
+
+    return solve
+
+
+def outcome_of(sol: fl.Solution) -> Outcome:
+    """Return the times and counts of a run of ours."""
+    return Outcome(sol.switches.t, sol.nfev, sol.stats["n_steps"], sol.stats["n_surface_evaluations"])
+
+
+def peers(case: Case, available: Callable[[str], bool]) -> Iterator[tuple[str, Solve]]:
+    """Yield the loops around other codes."""
+    if available("scipy"):
+        import loop_scipy
+
+        for method in loop_scipy.METHODS:
+            yield f"SciPy {method}", loop_scipy.switching_loop(case.model, method)
+    if available("numba"):
+        import loop_numba
+
+        yield "numba DOPRI5", loop_numba.switching_loop(case.model)
+    if available("heyoka") and case.model.t_end != CHAIN_END:
+        # Of the chain it would have to compile hundreds of modes.
+        import loop_heyoka
+
+        loops = {tolerance: loop_heyoka.switching_loop(case.model, tolerance) for tolerance in TOLERANCES}
+        yield "heyoka", lambda tolerance: loops[tolerance]()
+
+
+class Curve(NamedTuple):
+    """One code on one problem: a row per tolerance."""
+
+    errors: list[float]
+    counts: Array
+    seconds: Array
+
+
 def measured(case: Case, repeats: int) -> dict[str, Curve]:
-    """Return the curves of all methods."""
-    reference: Reference = load(case.file, case.run_id)
-    methods = (*METHODS, BLACK_BOX) if case.surfaces else METHODS
-    solvers = {method: solver(case, method) for method in methods}
+    """Return the curves of all codes."""
+    solvers: dict[str, Solve] = {method: ours(case, method) for method in METHODS}
+    solvers["DOPRI5, black box"] = black_box(case)
+    solvers |= dict(peers(case, lambda name: find_spec(name) is not None))
+    runs = {name: [solve(tolerance) for tolerance in TOLERANCES] for name, solve in solvers.items()}
     calls = {
-        (method, tol): (lambda solve=solve, tol=tol: solve(tol))
-        for method, solve in solvers.items()
-        for tol in TOLERANCES
+        (name, tolerance): (lambda solve=solve, tolerance=tolerance: solve(tolerance))
+        for name, solve in solvers.items()
+        for tolerance in TOLERANCES
     }
     times = interleaved(calls, repeats)
-    curves = {}
-    for method, solve in solvers.items():
-        runs = [solve(tol) for tol in TOLERANCES]
-        curves[method] = Curve(
-            [max_event_error(reference, run.switches.t) for run in runs],
-            [run.nfev for run in runs],
-            np.array([np.median(times[method, tol]) for tol in TOLERANCES]),
+    return {
+        name: Curve(
+            [max_event_error(case.times, run.times) for run in found],
+            np.array([run[1:] for run in found], dtype=float),
+            np.array([np.median(times[name, tolerance]) for tolerance in TOLERANCES]),
         )
-    return curves
+        for name, found in runs.items()
+    }
 
 
-def rows_of(case: Case, curves: dict[str, Curve]) -> list[list[str]]:
-    """Return the rows of a problem: how often the switches were right, time and evaluations at two errors."""
+def table_of(curves: dict[str, Curve]) -> list[str]:
+    """Return the table of a problem: how often the switches were right, time and counts at each target."""
+    head = ["code", "right switches"]
+    for target in TARGETS:
+        head += [f"us at {target:.0e}", *COUNTS]
     rows = []
-    for method, curve in curves.items():
-        cells = [case.title, method, f"{np.isfinite(curve.errors).sum()}/{len(TOLERANCES)}"]
+    for name, curve in curves.items():
+        cells = [name, f"{np.isfinite(curve.errors).sum()}/{len(TOLERANCES)}"]
         for target in TARGETS:
-            try:
-                seconds = at_equal_error(curve.errors, curve.seconds, target)
-                n = at_equal_error(curve.errors, np.array(curve.evaluations, dtype=float), target)
-                cells.append(f"{1e6 * float(seconds):.0f} us, {float(n):.0f}")
-            except ValueError:
-                cells.append("-")
+            cells += [_at(curve, 1e6 * curve.seconds, target), *(_at(curve, n, target) for n in curve.counts.T)]
         rows.append(cells)
-    return rows
+    return table(head, rows)
+
+
+def _at(curve: Curve, values: Array, target: float) -> str:
+    try:
+        value = float(at_equal_error(curve.errors, values, target))
+    except ValueError:
+        return "-"
+    return f"{value:.0f}" if np.isfinite(value) else "-"
 
 
 def draw(results: dict[str, dict[str, Curve]], path: Path) -> None:
     """Draw time against error, a panel per problem."""
     from matplotlib import pyplot
 
-    figure, axes = pyplot.subplots(2, 3, figsize=(12.0, 7.0), layout="constrained", sharex=True)
-    for ax, (title, curves) in zip(axes.flat, results.items(), strict=True):
-        for (method, curve), marker in zip(curves.items(), "osD^v", strict=False):
-            ax.loglog(curve.errors, 1e6 * curve.seconds, marker=marker, markersize=4, label=method)
+    figure, axes = pyplot.subplots(3, 4, figsize=(14.0, 9.0), layout="constrained")
+    panels = list(axes.flat)
+    handles: dict[str, Any] = {}
+    for ax, (title, curves) in zip(panels, results.items(), strict=False):
+        for name, curve in curves.items():
+            is_ours = name.startswith((*METHODS, "DOPRI5"))
+            style = {"marker": "o", "markersize": 3} if is_ours else {"marker": "x", "linestyle": "--"}
+            color = f"C{list(ORDER).index(name)}"
+            (line,) = ax.loglog(curve.errors, 1e6 * curve.seconds, color=color, label=name, **style)
+            handles.setdefault(name, line)
         ax.set_title(title, fontsize="medium", loc="left")
         ax.grid(alpha=0.3)
-    for ax in axes[-1]:
-        ax.set_xlabel("largest error of the switching times")
-    for ax in axes[:, 0]:
-        ax.set_ylabel("microseconds per run")
-    handles, labels = max((ax.get_legend_handles_labels() for ax in axes.flat), key=lambda pair: len(pair[1]))
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), frameon=False)
-    figure.savefig(path, dpi=120)
+    for ax in panels[len(results) :]:
+        ax.axis("off")
+    panels[len(results)].legend(handles.values(), handles.keys(), loc="center", frameon=False)
+    figure.supxlabel("largest error of the switching times")
+    figure.supylabel("microseconds per run")
+    figure.savefig(path, dpi=110)
+
+
+ORDER = (*METHODS, "DOPRI5, black box", "SciPy RK45", "SciPy DOP853", "numba DOPRI5", "heyoka")
 
 
 def main() -> None:
-    """Measure, print, draw, and write the table to ``README.md``."""
+    """Measure, print, draw, and write the tables to ``README.md``."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--no-write", action="store_true", help="leave README.md and the picture as they are")
-    parser.add_argument("--repeats", type=int, default=7, help="rounds of interleaved samples (default 7)")
+    parser.add_argument("--repeats", type=int, default=5, help="rounds of interleaved samples (default 5)")
     arguments = parser.parse_args()
-    results = {case.title: measured(case, arguments.repeats) for case in CASES}
-    head = ["problem", "method", "right switches", *(f"time, evaluations at {t:.0e}" for t in TARGETS)]
-    text = table(head, [row for case in CASES for row in rows_of(case, results[case.title])])
-    print("\n".join(text))
+    for name in PEERS:
+        if find_spec(name) is None:
+            print(f"{name} is missing, its loops are left out: pip install filippov[bench]")
+    results, text = {}, []
+    for case in cases():
+        results[case.title] = measured(case, arguments.repeats)
+        rows = [f"**{case.title}**, {len(case.times)} switches", "", *table_of(results[case.title]), ""]
+        print(*rows, sep="\n", flush=True)
+        text += rows
     if not arguments.no_write:
         draw(results, PICTURE)
-        write_section("work", [*text, "", "![work against precision](work_precision.png)"])
+        write_section("work", [*text, "![work against precision](work_precision.png)"])
 
 
 if __name__ == "__main__":
