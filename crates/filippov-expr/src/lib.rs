@@ -47,6 +47,7 @@ mod linear;
 #[cfg(feature = "native")]
 mod native;
 mod node;
+mod on_surface;
 mod op;
 mod partition;
 mod print;

@@ -72,6 +72,27 @@ impl Bound {
         Verdict::Open
     }
 
+    /// The least value that the function can have on a piece of this length, by its bounds and by its values at the ends,
+    /// as far as they are known.
+    pub fn lowest(&self, length: f64, left: Option<f64>, right: Option<f64>) -> f64 {
+        let (fall, rise) = (self.slope.lo.min(0.0), self.slope.hi.max(0.0));
+        // It lies above the lines from both ends that are as steep as its slope allows.
+        let by_ends = match (left, right) {
+            (Some(left), Some(right)) if rise > fall => {
+                let at = ((left - right + rise * length) / (rise - fall)).clamp(0.0, length);
+                (left + fall * at).min(right - rise * (length - at))
+            }
+            (Some(left), _) => left + fall * length,
+            (None, Some(right)) => right - rise * length,
+            (None, None) => f64::NEG_INFINITY,
+        };
+        if by_ends > self.value.lo {
+            by_ends
+        } else {
+            self.value.lo
+        }
+    }
+
     /// The largest slope, up or down.
     pub fn steepest(&self) -> f64 {
         self.slope.hi.max(-self.slope.lo)
@@ -118,8 +139,10 @@ fn prove_between(
         return Proof::Silent;
     };
     let verdict = bound.verdict(b - a, None, noise);
+    let known = |value: Option<f64>| value.filter(|v| v.is_finite());
     match verdict {
         Verdict::Clear => Proof::Clear,
+        Verdict::Open if bound.lowest(b - a, known(left), known(right)) > noise => Proof::Clear,
         Verdict::Rising if above(left) => Proof::Clear,
         Verdict::Falling if above(right) => Proof::Clear,
         Verdict::Unbounded if depth == 0 => Proof::Silent,

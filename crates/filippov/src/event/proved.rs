@@ -107,6 +107,9 @@ fn proved(
     };
     match bound.verdict(b - a, None, noise) {
         Verdict::Clear if right > 0.0 => return Ok(Proved::Nothing),
+        Verdict::Open if bound.lowest(b - a, Some(left), Some(right)) > noise => {
+            return Ok(Proved::Nothing)
+        }
         Verdict::Rising if right > 0.0 => return Ok(Proved::Nothing),
         Verdict::Falling if right > 0.0 => return Ok(Proved::Nothing),
         Verdict::Falling => {

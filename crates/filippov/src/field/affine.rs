@@ -2,6 +2,7 @@
 
 use super::canopy::root_ends;
 use crate::error::FieldError;
+use crate::sparse::SparseRows;
 use crate::switching::{solve_relay, Matrix, RelayProblem, SharedLoad, SharedLoads};
 use crate::system::{AffineParts, AffineSigns, PiecewiseSystem};
 use crate::tolerances::{MOST_MEETING, SURFACE_NOISE};
@@ -21,6 +22,10 @@ pub struct AffineLaw<'a> {
     /// The sizes of the rows of N for two surfaces, when they were first looked at: in these units its determinant goes
     /// through zero where a row does.
     sizes: Option<[f64; 2]>,
+    /// The exit functions of the root, where they are the same all along the motion and were computed.
+    known_ends: Option<[f64; 2]>,
+    /// No two gradients have a state in common.
+    is_orthogonal: bool,
     multipliers: Vec<f64>,
     /// The multipliers last found are not the only ones: redundant contacts share their load.
     shared: Option<SharedLoad>,
@@ -33,9 +38,12 @@ impl<'a> AffineLaw<'a> {
         let affine = system.affine_signs()?;
         let mut signs = signs.to_vec();
         set.iter().for_each(|&j| signs[j] = 0.0);
+        let parts = affine.affine_parts(set)?;
         Some(AffineLaw {
             system: affine,
-            parts: affine.affine_parts(set)?,
+            is_orthogonal: has_disjoint_rows(&parts.gradients),
+            parts,
+            known_ends: None,
             signs,
             h: vec![0.0; system.n_surfaces()],
             kappa: vec![1.0; set.len()],
@@ -49,6 +57,12 @@ impl<'a> AffineLaw<'a> {
     /// Sets the scaling of the surfaces.
     pub fn set_scaling(&mut self, kappa: &[f64]) {
         self.kappa.copy_from_slice(kappa);
+        self.known_ends = None;
+    }
+
+    /// A motion begins.
+    pub fn begin(&mut self) {
+        self.known_ends = None;
     }
 
     /// Writes the sliding field at (t, x); NaN, also in the multipliers, where it is not determined. Returns the
@@ -129,10 +143,19 @@ impl<'a> AffineLaw<'a> {
     /// The exit functions of the root, as those of the canopy: the determinant of N with the sign of a stable one,
     /// and the stability ([`root_ends`]). Only for a few surfaces; the friction of many bodies is stable for good.
     pub fn ends(&mut self, oscillates: &mut Option<bool>) -> [f64; 2] {
-        let (normal, m) = (self.parts.normal(), self.parts.surfaces().len());
-        if m > MOST_MEETING || self.is_shared() {
+        if self.parts.surfaces().len() > MOST_MEETING || self.is_shared() {
             return [1.0, 1.0];
         }
+        let ends = self
+            .known_ends
+            .unwrap_or_else(|| self.present_ends(oscillates));
+        self.known_ends = self.parts.is_steady().then_some(ends);
+        ends
+    }
+
+    /// Those of the last evaluation.
+    fn present_ends(&mut self, oscillates: &mut Option<bool>) -> [f64; 2] {
+        let (normal, m) = (self.parts.normal(), self.parts.surfaces().len());
         let mut jacobian = Matrix::zeros(m);
         for i in 0..m {
             normal.row(i).for_each(|(j, v)| jacobian[(i, j)] = v);
@@ -149,6 +172,11 @@ impl<'a> AffineLaw<'a> {
         [unit.determinant(), -unit[(0, 0)].min(unit[(1, 1)])]
     }
 
+    /// Does one sweep of [`project`](Self::project) do, with gradients that are known for good?
+    pub fn projects_at_once(&self) -> bool {
+        self.is_orthogonal && self.parts.is_settled()
+    }
+
     /// Moves `x` onto all surfaces, one after the other along their gradients, until all |h| are at the level of
     /// rounding (Kaczmarz's method). The gradients are those of the last evaluation.
     ///
@@ -160,9 +188,12 @@ impl<'a> AffineLaw<'a> {
             let mut is_near = true;
             let gradients = &self.parts.gradients;
             // Moves of earlier rows change h of later ones: to first order by their common states.
-            let start = x.to_vec();
+            let start = (!self.is_orthogonal).then(|| x.to_vec());
             for (row, &j) in self.parts.surfaces().iter().enumerate() {
-                let moved: f64 = gradients.row(row).map(|(i, g)| g * (x[i] - start[i])).sum();
+                let moved = start.as_ref().map_or(0.0, |start| {
+                    let entries = gradients.row(row);
+                    entries.map(|(i, g)| g * (x[i] - start[i])).sum::<f64>()
+                });
                 let h = self.h[j] + moved;
                 let square: f64 = gradients.row(row).map(|(_, g)| g * g).sum();
                 if square == 0.0 || h.abs() <= 0.25 * SURFACE_NOISE * gradients.magnitude(row, x) {
@@ -177,4 +208,12 @@ impl<'a> AffineLaw<'a> {
         }
         Ok(())
     }
+}
+
+fn has_disjoint_rows(matrix: &SparseRows) -> bool {
+    let mut columns: Vec<usize> = (0..matrix.n_rows())
+        .flat_map(|row| matrix.columns(row).to_vec())
+        .collect();
+    columns.sort_unstable();
+    columns.windows(2).all(|pair| pair[0] != pair[1])
 }

@@ -160,6 +160,9 @@ impl<'a> IntersectionField<'a> {
     pub fn begin(&mut self, lambda: &[f64], oscillates: bool) {
         self.tracked = vec![(f64::INFINITY, lambda.to_vec())];
         self.oscillates = oscillates.then_some(true);
+        if let Some(law) = &mut self.affine {
+            law.begin();
+        }
     }
 
     /// Lets the multiplier of an exit function go beyond its end by this much.
@@ -261,7 +264,9 @@ impl<'a> IntersectionField<'a> {
             return Ok(());
         }
         match &mut self.affine {
-            Some(law) if self.set.len() > MOST_MEETING || law.is_shared() => {
+            Some(law)
+                if self.set.len() > MOST_MEETING || law.is_shared() || law.projects_at_once() =>
+            {
                 law.project(t, x, &self.signs)
             }
             _ => self

@@ -114,8 +114,21 @@ impl<'a> ModeField<'a> {
                 field.normal_components(t, x)?;
             }
             ModeField::Intersection(_) | ModeField::Contact(_) => {
-                let mut rates = vec![0.0; x.len()];
-                self.eval(t, x, &mut rates)?;
+                self.eval(t, x, &mut vec![0.0; x.len()])?;
+            }
+        }
+        Ok(self.last_exits())
+    }
+
+    /// The exit functions at a point (t, x) of the surfaces slid on.
+    pub fn exits_at(&mut self, t: f64, x: &mut [f64]) -> Result<Exits, FieldError> {
+        match self {
+            ModeField::Region(_) => {}
+            ModeField::Sliding(field) => {
+                field.normal_components_at(t, x)?;
+            }
+            ModeField::Intersection(_) | ModeField::Contact(_) => {
+                self.eval_unprojected(t, x, &mut vec![0.0; x.len()])?;
             }
         }
         Ok(self.last_exits())

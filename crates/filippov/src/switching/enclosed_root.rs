@@ -18,6 +18,8 @@ pub type IntervalVector = SmallVec<[Interval; 8]>;
 pub struct EnclosedRoot {
     /// The multipliers.
     pub multipliers: IntervalVector,
+    /// Their derivatives in time; empty if there are no bounds of them.
+    pub rates: IntervalVector,
     /// The diagonal of G in a box around them, where G is invertible; empty if G is constant.
     pub diagonal: IntervalVector,
 }
@@ -56,6 +58,7 @@ pub fn enclose_root(components: &[Interval], guess: &[Interval]) -> RootBounds {
         if pairs.all(|(k, l)| k.lo > l.lo && k.hi < l.hi) {
             return RootBounds::Proved(EnclosedRoot {
                 multipliers: image,
+                rates: IntervalVector::new(),
                 diagonal,
             });
         }

@@ -167,10 +167,24 @@ impl NormalFields {
 
     /// The least and the largest component normal to surface j, over all patterns, and so over the cube.
     pub fn row_range(&self, j: usize) -> [f64; 2] {
+        self.range_over(j, |_, _| true)
+    }
+
+    /// The same over the patterns of one side of surface j.
+    pub fn side_range(&self, j: usize, side: i8) -> [f64; 2] {
+        self.range_over(j, |group, pattern| {
+            let bit = group.members.iter().position(|&member| member == j);
+            bit.is_none_or(|bit| (pattern >> bit & 1 == 1) == (side > 0))
+        })
+    }
+
+    fn range_over(&self, j: usize, counts: impl Fn(&SignGroup, usize) -> bool) -> [f64; 2] {
         let ranges = self.groups.iter().map(|group| {
-            let row = || group.values.iter().skip(j).step_by(self.m);
-            let low = row().fold(f64::INFINITY, |low, &v| low.min(v));
-            [low, row().fold(f64::NEG_INFINITY, |high, &v| high.max(v))]
+            let row = group.values.iter().skip(j).step_by(self.m).enumerate();
+            let row = row.filter(|&(pattern, _)| counts(group, pattern));
+            row.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], (_, &v)| {
+                [low.min(v), high.max(v)]
+            })
         });
         ranges.fold([0.0; 2], |[low, high], [l, h]| [low + l, high + h])
     }

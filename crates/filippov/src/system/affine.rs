@@ -12,7 +12,7 @@
 //!
 //! References: Piiroinen, Kuznetsov (2008), (21)-(24), with s = 1 - 2 mu; Guglielmi, Hairer (2022), section 7.
 
-use filippov_expr::{Interval, Motion};
+use filippov_expr::{Enclosure, Motion};
 
 use super::PiecewiseSystem;
 use crate::error::FieldError;
@@ -86,9 +86,9 @@ pub trait AffineSigns: PiecewiseSystem {
         false
     }
 
-    /// Rigorous bounds of dh_j/dt along a piece of motion; entries of `signs` may be any numbers on surfaces that
+    /// Rigorous bounds of dh_j/dt, and of its derivative, along a piece of motion; entries of `signs` may be any numbers on surfaces that
     /// [`affine_parts`](Self::affine_parts) accepts together. `None` if there are none.
-    fn enclose_rate(&self, j: usize, motion: &dyn Motion, signs: &[f64]) -> Option<Interval> {
+    fn enclose_rate(&self, j: usize, motion: &dyn Motion, signs: &[f64]) -> Option<Enclosure> {
         let _ = (j, motion, signs);
         None
     }
@@ -143,6 +143,12 @@ pub struct AffineParts {
     rates: Vec<f64>,
     multipliers: Vec<f64>,
     solver: SparseSolver,
+    /// Gradients and jumps are the same at every evaluation.
+    is_steady: bool,
+    /// N is that of gradients and jumps, and does not change any more.
+    is_formed: bool,
+    /// `solver` has factored it.
+    is_factored: bool,
 }
 
 impl AffineParts {
@@ -161,7 +167,27 @@ impl AffineParts {
             rates: vec![0.0; m],
             multipliers: vec![f64::NAN; m],
             solver: SparseSolver::default(),
+            is_steady: false,
+            is_formed: false,
+            is_factored: false,
         }
+    }
+
+    /// The same where gradients and jumps are the same at every evaluation: N is formed and factored once.
+    #[must_use]
+    pub fn steady(mut self, is_steady: bool) -> Self {
+        self.is_steady = is_steady;
+        self
+    }
+
+    /// Are gradients and jumps the same at every evaluation?
+    pub fn is_steady(&self) -> bool {
+        self.is_steady
+    }
+
+    /// Are they, and are they known by now?
+    pub fn is_settled(&self) -> bool {
+        self.is_steady && self.is_formed
     }
 
     /// Moves the jumps from signs of size 1 to these sizes, one per surface.
@@ -182,7 +208,10 @@ impl AffineParts {
         signs: &[f64],
     ) -> Result<u64, FieldError> {
         let evaluations = system.fill_affine_parts(t, x, signs, self)?;
-        self.normal.update(&self.gradients, &self.jumps);
+        if !self.is_formed {
+            self.normal.update(&self.gradients, &self.jumps);
+            (self.is_formed, self.is_factored) = (self.is_steady, false);
+        }
         for (row, &j) in self.surfaces.iter().enumerate() {
             self.signs[row] = signs[j];
             self.rates[row] = self.time_rates[row] + self.gradients.dot(row, &self.field);
@@ -231,17 +260,20 @@ impl AffineParts {
     pub fn slide(&mut self, dx: &mut [f64]) -> Result<(), SingularSliding> {
         self.multipliers.clear();
         self.multipliers.extend(self.rates.iter().map(|rate| -rate));
-        if !self.normal.matrix.is_finite() {
-            self.multipliers.fill(f64::NAN);
-            dx.fill(f64::NAN);
-            return Ok(());
-        }
-        if let Err(singular) = self.solver.factor(&self.normal.matrix) {
-            self.multipliers.fill(f64::NAN);
-            let surfaces = singular.unknowns.iter().map(|&row| self.surfaces[row]);
-            return Err(SingularSliding {
-                surfaces: surfaces.collect(),
-            });
+        if !self.is_factored {
+            if !self.normal.matrix.is_finite() {
+                self.multipliers.fill(f64::NAN);
+                dx.fill(f64::NAN);
+                return Ok(());
+            }
+            if let Err(singular) = self.solver.factor(&self.normal.matrix) {
+                self.multipliers.fill(f64::NAN);
+                let surfaces = singular.unknowns.iter().map(|&row| self.surfaces[row]);
+                return Err(SingularSliding {
+                    surfaces: surfaces.collect(),
+                });
+            }
+            self.is_factored = self.is_formed;
         }
         self.solver.solve(&mut self.multipliers);
         for (lambda, here) in self.multipliers.iter_mut().zip(&self.signs) {

@@ -7,7 +7,7 @@
 use std::sync::OnceLock;
 
 use filippov_expr::{
-    Backend, Enclosure, EnclosureProgram, Gradient, Graph, Interval, Motion, NodeId, SignDependence,
+    Backend, Enclosure, EnclosureProgram, Gradient, Graph, Motion, NodeId, SignDependence,
 };
 
 use super::affine::AffineParts;
@@ -173,19 +173,19 @@ impl AffineModel {
         self.is_steady[j]
     }
 
-    /// Bounds of dh_j/dt along a piece of motion.
+    /// Bounds of dh_j/dt, and of its derivative, along a piece of motion.
     pub fn enclose_rate(
         &self,
         j: usize,
         motion: &dyn Motion,
         signs: &[f64],
         parameters: &[f64],
-    ) -> Option<Interval> {
+    ) -> Option<Enclosure> {
         let compile = || EnclosureProgram::compile(&self.graph, &[self.rates[j]]).ok();
         let program = self.enclosing[j].get_or_init(compile).as_ref()?;
         let mut out = [Enclosure::UNKNOWN];
         program.eval(motion, signs, parameters, &mut out);
-        Some(out[0].value)
+        Some(out[0])
     }
 
     /// Evaluates everything that varies.

@@ -235,7 +235,7 @@ impl Model {
         self.affine_signs.get_or_init(make)
     }
 
-    /// The normal components and the fields of both sides, as one program that shares what they have
+    /// The normal components and the fields of both sides on surface `j`, as one program that shares what they have
     /// in common.
     pub fn both_sides(&self, j: usize) -> &Program {
         let both = self.both_sides[j].get_or_init(|| {
@@ -247,6 +247,7 @@ impl Model {
                 let mut signs = vec![None; graph.n_surfaces()];
                 signs[j] = Some(side);
                 let field = graph.at_signs(&self.field, &signs);
+                let field = graph.on_surface(&field, j as u32);
                 outputs.push(graph.directional(h, &field));
                 fields.extend(field);
             }
@@ -296,7 +297,7 @@ impl Model {
         both.program()
     }
 
-    /// The derivative of a node along the field with sign `side` at surface `j`, and its terms: that in t, then one
+    /// The derivative of a node along the field with sign `side` on surface `j`, and its terms: that in t, then one
     /// per state that moves the node.
     fn derivative_terms(
         &self,
@@ -310,6 +311,7 @@ impl Model {
         let Gradient { time, states } = graph.gradient(node);
         let moving = states.iter().map(|(i, _)| self.field[*i as usize]);
         let field = graph.at_signs(&moving.collect::<Vec<_>>(), &signs);
+        let field = graph.on_surface(&field, j as u32);
         let mut terms = vec![time];
         let velocities = states.iter().zip(field);
         terms.extend(velocities.map(|(&(_, partial), v)| graph.mul(partial, v)));

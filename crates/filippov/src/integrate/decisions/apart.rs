@@ -8,7 +8,7 @@ use crate::error::FieldError;
 use crate::integrate::decisions::transition::{Decided, Left, Lefts};
 use crate::integrate::integrator::Integrator;
 use crate::mode::Mode;
-use crate::switching::{decide, Arrival, Decision, Leading};
+use crate::switching::{decide, Arrival, Decision, Leading, NormalFields};
 use crate::system::dot_magnitude;
 use crate::tolerances::{DOUBTFUL, MOST_MEETING, TANGENT};
 
@@ -22,11 +22,28 @@ impl Integrator<'_> {
     ) -> Result<Option<Decided>, FieldError> {
         let is_few = (2..=MOST_MEETING).contains(&meeting.len());
         let sticks = meeting.iter().any(|&j| self.system.sticks_at(j));
-        if !is_few || sticks || self.slides_by_rule() || !self.is_doubtful(mode, meeting)? {
+        if !is_few || sticks || self.slides_by_rule() {
             return Ok(None);
         }
-        let (mut after, mut open) = (mode.clone(), meeting.to_vec());
-        let mut slid = Vec::new();
+        let corners = self.corners(meeting, mode)?;
+        let Ok(fields) = corners.normal_fields() else {
+            return Ok(None);
+        };
+        if !self.is_doubtful(&fields, mode, meeting)? {
+            return Ok(None);
+        }
+        let (mut after, mut open, mut slid) = (mode.clone(), Vec::new(), Vec::new());
+        for (i, &j) in meeting.iter().enumerate() {
+            // Such a surface is slid on, whatever the others do: the usual case, and cheaper so.
+            let is_rounding = self.is_rounding(j, fields.row_size(i), mode)?;
+            if clearly_attracts(&fields, i) && !is_rounding {
+                after.set(j, 0);
+                slid.push(j);
+            } else {
+                open.push(j);
+            }
+        }
+        let decided: Vec<usize> = open.clone();
         while !open.is_empty() {
             let free = [&open[..], &slid[..]].concat();
             let mut settled = None;
@@ -46,14 +63,15 @@ impl Integrator<'_> {
             }
         }
         let mut left = Lefts::new();
-        for &j in meeting {
+        let slides_alone = slid.len() == 1;
+        for &j in if slides_alone { meeting } else { &decided[..] } {
             // Once more, as the signs of others are known by now.
             let Some(decision) = self.decide_alone(j, mode, &after, &slid)? else {
                 return Ok(None);
             };
             let of_one = Left::after(j, &decision).into_iter();
             // The exit functions of sliding on several surfaces are others.
-            left.extend(of_one.filter(|l| slid.len() < 2 || matches!(l, Left::Surface(..))));
+            left.extend(of_one.filter(|l| slides_alone || matches!(l, Left::Surface(..))));
         }
         Ok(Some(Ok((after, left))))
     }
@@ -89,11 +107,12 @@ impl Integrator<'_> {
 
     /// Does a normal component vanish at some surface, or are all of one no more than what the rounding of time and state
     /// makes of zero?
-    fn is_doubtful(&mut self, mode: &Mode, meeting: &[usize]) -> Result<bool, FieldError> {
-        let corners = self.corners(meeting, mode)?;
-        let Ok(fields) = corners.normal_fields() else {
-            return Ok(false);
-        };
+    fn is_doubtful(
+        &self,
+        fields: &NormalFields,
+        mode: &Mode,
+        meeting: &[usize],
+    ) -> Result<bool, FieldError> {
         for (i, &j) in meeting.iter().enumerate() {
             let [least, most] = fields.row_range(i);
             let largest = fields.row_size(i);
@@ -114,6 +133,15 @@ impl Integrator<'_> {
         let size = dot_magnitude(&gradient, &self.x) + (partials.time * self.t).abs();
         Ok(rate <= TANGENT * size)
     }
+}
+
+/// Do the fields of either side of surface `i`, counted within the set, push to it, all of one side alike and none of them
+/// within rounding?
+fn clearly_attracts(fields: &NormalFields, i: usize) -> bool {
+    let rounding = DOUBTFUL * fields.row_size(i);
+    let [minus, plus] = [-1, 1].map(|side| fields.side_range(i, side));
+    let is_alike = |[least, most]: [f64; 2]| most - least <= rounding;
+    minus[0] > rounding && plus[1] < -rounding && is_alike(minus) && is_alike(plus)
 }
 
 /// Do two decisions say the same, up to rounding?

@@ -40,6 +40,9 @@ pub(in crate::integrate) struct BoundedCurve<'a> {
     pub known_roots: &'a RefCell<Vec<RootPiece>>,
 }
 
+/// What stands for a value that is positive and not otherwise known: finite also after it was rounded outwards.
+const FAR: f64 = 1e300;
+
 /// Pieces whose multipliers are remembered within a step.
 const MOST_KNOWN_ROOTS: usize = 64;
 
@@ -85,15 +88,14 @@ impl BoundedCurve<'_> {
                 known.len() - 1
             }
         };
-        let value = match &known[place].2 {
-            RootBounds::Proved(root) => exit_bound(IntersectionExit::of(index, m), root)?,
-            RootBounds::Unproved => Interval::ALL,
-            RootBounds::Singular => return None,
-        };
-        Some(Bound {
-            value,
-            slope: Interval::ALL,
-        })
+        match &known[place].2 {
+            RootBounds::Proved(root) => {
+                let enclosure = exit_bound(IntersectionExit::of(index, m), root)?;
+                Some(Bound::new(enclosure, 1.0, self.interpolant.dt))
+            }
+            RootBounds::Unproved => Some(Bound::new(Enclosure::UNKNOWN, 1.0, 1.0)),
+            RootBounds::Singular => None,
+        }
     }
 
     /// Bounds of the normal components of all fields around the intersection.
@@ -138,9 +140,10 @@ impl BoundedCurve<'_> {
             let middles = exits.map(|pair| 0.5 * (pair[0][0] + pair[0][6]) - 1.0);
             let near: Vector = middles.collect();
             let found = bounds.enclose(affine, self.sliding, &tube, self.signs, &near);
-            return Some(found.map_or(RootBounds::Unproved, |multipliers| {
+            return Some(found.map_or(RootBounds::Unproved, |found| {
                 RootBounds::Proved(EnclosedRoot {
-                    multipliers,
+                    multipliers: found.values,
+                    rates: found.rates,
                     diagonal: IntervalVector::new(),
                 })
             }));
@@ -180,20 +183,25 @@ fn known_components(known: &[Piece], a: f64, b: f64) -> Option<[Enclosure; 2]> {
 }
 
 /// Bounds of an exit function where the multipliers are bounded; none for the stability of three and more.
-fn exit_bound(exit: IntersectionExit, root: &EnclosedRoot) -> Option<Interval> {
-    Some(match exit {
+fn exit_bound(exit: IntersectionExit, root: &EnclosedRoot) -> Option<Enclosure> {
+    let mut rate = Interval::ALL;
+    let value = match exit {
         IntersectionExit::Side { position, end } => {
+            if let Some(bounds) = root.rates.get(position) {
+                rate = bounds.scaled(-f64::from(end));
+            }
             Interval::point(1.0) + root.multipliers[position].scaled(-f64::from(end))
         }
         // The root is the only one in its box: it meets no other.
-        IntersectionExit::Fold => Interval::point(f64::MAX),
+        IntersectionExit::Fold => Interval::point(FAR),
         // Each entry is in units of its surface: only the sign counts.
         IntersectionExit::Stability => match root.diagonal[..] {
-            [] => Interval::point(f64::MAX),
-            [first, second] => Interval::hull(-first.hi.min(second.hi), f64::MAX),
+            [] => Interval::point(FAR),
+            [first, second] => Interval::hull(-first.hi.min(second.hi), FAR),
             _ => return None,
         },
-    })
+    };
+    Some(Enclosure { value, rate })
 }
 
 impl Integrator<'_> {

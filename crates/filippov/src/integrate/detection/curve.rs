@@ -33,11 +33,10 @@ impl Curve<'_, '_> {
         let at = match known {
             Some(at) => at,
             None => {
-                let exits = match &mut *self.field {
-                    ModeField::Sliding(field) if self.is_straight => {
-                        field.normal_components_at(t, self.x)?.exits()
-                    }
-                    field => field.exits(t, self.x)?,
+                let exits = if self.is_straight {
+                    self.field.exits_at(t, self.x)?
+                } else {
+                    self.field.exits(t, self.x)?
                 };
                 self.exits.push((theta, exits));
                 self.exits.len() - 1

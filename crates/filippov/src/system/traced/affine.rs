@@ -1,6 +1,6 @@
 //! A traced system whose field is affine in signs.
 
-use filippov_expr::{Interval, Motion};
+use filippov_expr::{Enclosure, Motion};
 
 use super::TracedSystem;
 use crate::error::FieldError;
@@ -8,7 +8,8 @@ use crate::system::{AffineParts, AffineSigns, PiecewiseSystem};
 
 impl AffineSigns for TracedSystem {
     fn affine_parts(&self, surfaces: &[usize]) -> Option<AffineParts> {
-        self.model.affine_signs().parts(surfaces)
+        let parts = self.model.affine_signs().parts(surfaces)?;
+        Some(parts.steady(surfaces.iter().all(|&j| self.is_steady(j))))
     }
 
     fn fill_affine_parts(
@@ -41,7 +42,7 @@ impl AffineSigns for TracedSystem {
         !self.model.sticks_at(j) && self.model.affine_signs().is_steady(j)
     }
 
-    fn enclose_rate(&self, j: usize, motion: &dyn Motion, signs: &[f64]) -> Option<Interval> {
+    fn enclose_rate(&self, j: usize, motion: &dyn Motion, signs: &[f64]) -> Option<Enclosure> {
         let model = self.model.affine_signs();
         self.with_values(|p| model.enclose_rate(j, motion, signs, p))
     }
