@@ -82,6 +82,9 @@ bench: $(BENCH_STAMP) ## run the benchmarks
 	$(PY) benchmarks/speed.py
 	$(PY) benchmarks/friction_chain.py
 	$(PY) benchmarks/work_precision.py
+	$(PY) benchmarks/accuracy.py
+	$(PY) benchmarks/stiff.py
+	$(PY) benchmarks/counts.py
 	$(PY) benchmarks/diagram.py
 
 demo: $(BUILD_STAMP) ## simulate and plot a stick-slip oscillator

@@ -1,8 +1,8 @@
 """Counts of a run beside its time: evaluations, steps, searches, instructions and allocations.
 
-Run ``python benchmarks/counts.py``; the table also goes into ``README.md`` unless ``--no-write`` is given. Instructions and
-allocations are counted by callgrind; without valgrind they are left out. They are those of ``System.solve`` called
-again, Python included, without dense output.
+Run ``python benchmarks/counts.py``; the table also goes into ``README.md`` unless ``--no-write`` is given.
+Instructions and allocations are counted by callgrind; without valgrind they are left out. They are those of
+``System.solve`` called again, Python included, without dense output.
 """
 
 from __future__ import annotations
@@ -14,12 +14,15 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import filippov as fl
+from friction_chain import chain, start_of_chain
 from measure import table, write_section
 
+CHAIN = "chain of 10 masses"
 PROBLEMS = (
     "disode_planar",
     "structural_pounding",
@@ -28,17 +31,17 @@ PROBLEMS = (
     "dry_friction",
     "drill_string",
     "dieci_lopez_6_1",
-    "friction_chain",
+    CHAIN,
 )
 METHODS = ("Taylor", "DOP853", "DOPRI5", "Rodas5P")
 TOLERANCE = 1e-9
 WARM = 30  # runs after which everything that will be compiled is
-COUNTED = 20  # runs
+COUNTED = 10  # runs
 ALLOCATORS = re.compile(r"^cfn=\(\d+\) (malloc|calloc|realloc|posix_memalign|aligned_alloc)$")
 
 
 class Counted(NamedTuple):
-    """What callgrind counted, per run."""
+    """What callgrind counted."""
 
     instructions: float
     allocations: float
@@ -46,28 +49,33 @@ class Counted(NamedTuple):
 
 def runner(name: str, method: str) -> fl.Solution:
     """Solve a problem that was prepared before."""
+    system, t_span, y0 = prepared(name)
+    return system.solve(t_span, y0, method=method, rtol=TOLERANCE, atol=TOLERANCE, dense_output=False)
+
+
+@cache
+def prepared(name: str) -> tuple[fl.System, tuple[float, float], Any]:
+    """Return the system of a problem, its interval and its initial state."""
+    if name == CHAIN:
+        return fl.System(chain(10), n=20), (0.0, 20.0), start_of_chain(10)
     problem = fl.problems.get(name)
-    if name not in _SYSTEMS:
-        _SYSTEMS[name] = fl.System(problem.fun, n=len(problem.y0), args=problem.args)
-    return _SYSTEMS[name].solve(
-        problem.t_span, problem.y0, method=method, rtol=TOLERANCE, atol=TOLERANCE, dense_output=False
-    )
-
-
-_SYSTEMS: dict[str, fl.System] = {}
+    return fl.System(problem.fun, n=len(problem.y0), args=problem.args), problem.t_span, problem.y0
 
 
 def be_counted(name: str) -> None:
-    """Run a problem by every method under callgrind, with a dump for each."""
-    control = ["callgrind_control", str(os.getpid())]
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "check": True}
-    for method in METHODS:
-        for _ in range(WARM):
+    """Run a problem by every method under callgrind, with a dump for each; before them two of no run."""
+
+    def control(request: str) -> None:
+        command = ["callgrind_control", request, str(os.getpid())]
+        subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=True)
+
+    for method in ("", "", *METHODS):
+        for _ in range(WARM if method else 0):
             runner(name, method)
-        subprocess.run([*control, "--zero"], **quiet)
-        for _ in range(COUNTED):
+        control("--zero")
+        for _ in range(COUNTED if method else 0):
             runner(name, method)
-        subprocess.run([*control, f"--dump={method}"], **quiet)
+        control("--dump")
 
 
 def counted(name: str) -> dict[str, Counted]:
@@ -78,11 +86,16 @@ def counted(name: str) -> dict[str, Counted]:
         environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
         subprocess.run(command, env=environment, capture_output=True, check=True)
         dumps = sorted(Path(folder).glob("out.*"), key=lambda path: int(path.suffix[1:]))
-        return {method: read(dump) for method, dump in zip(METHODS, dumps, strict=False)}
+        # The second one of no run is what the dump itself takes.
+        _, idle, *found = [read(dump) for dump in dumps[: 2 + len(METHODS)]]
+    return {
+        method: Counted(*((total - nothing) / COUNTED for total, nothing in zip(totals, idle, strict=True)))
+        for method, totals in zip(METHODS, found, strict=True)
+    }
 
 
 def read(dump: Path) -> Counted:
-    """Return the totals of a dump, per run."""
+    """Return the totals of a dump."""
     instructions, allocations, names = 0, 0, {}
     allocates = False
     for line in dump.read_text(encoding="utf-8").splitlines():
@@ -96,7 +109,7 @@ def read(dump: Path) -> Counted:
             allocations += int(line[len("calls=") :].split()[0])
         elif line.startswith("totals:"):
             instructions = int(line.split()[1])
-    return Counted(instructions / COUNTED, allocations / COUNTED)
+    return Counted(instructions, allocations)
 
 
 def rows(name: str, has_valgrind: bool) -> list[list[str]]:

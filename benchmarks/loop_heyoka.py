@@ -1,8 +1,8 @@
-"""The modes of `modes` around heyoka's adaptive Taylor integrator: an integrator per mode, its events terminal.
+"""The modes of `modes` around heyoka's adaptive Taylor integrator: one per mode, its events terminal.
 
 An integrator is compiled when its mode is first met: run once before a measurement. An event is a zero of a
-polynomial, isolated with proof. A motion that leaves a surface starts a rounding error beside it: on it, the loop
-would find the surface again for ever.
+polynomial, isolated with proof. A motion that leaves a surface starts a rounding error beside it: on it, the
+loop would find the surface again for ever.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """The modes of `modes` in a DOPRI5 loop compiled by numba.
 
-Events are looked for in the signs at the ends of the steps, and located on the continuous extension of order 4 that
-costs no evaluation (Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, II.6). Step control as
-in DOPRI5; the length of the last step is kept across switches. Of two events in one step the first is taken.
+Events are looked for in the signs at the ends of the steps, and located on the continuous extension of order
+4 that costs no evaluation (Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, II.6). Step
+control as in DOPRI5; the length of the last step is kept across switches. Of two events in one step the first
+is taken.
 """
 
 from __future__ import annotations
@@ -75,10 +76,15 @@ def switching_loop(model: Model) -> Callable[[float], Outcome]:
         low, g_low = 0.0, max(g[e], 1e-300)  # positive also where the motion has just left this surface
         events(mode, t + h, end, g)
         high, g_high = 1.0, g[e]
-        theta, kept = 0.5, 0
-        for count in range(80):
+        theta, kept, count = 0.5, 0, 3
+        for _ in range(80):
+            count += 1
             # Halves first where the value at the start tells nothing.
-            theta = 0.5 * (low + high) if g_low < 1e-3 * -g_high else (low * g_high - high * g_low) / (g_high - g_low)
+            theta = (
+                0.5 * (low + high)
+                if g_low < 1e-3 * -g_high
+                else (low * g_high - high * g_low) / (g_high - g_low)
+            )
             _extension(x, end, k, h, theta, at)
             events(mode, t + theta * h, at, g)
             value = g[e]
@@ -92,7 +98,7 @@ def switching_loop(model: Model) -> Callable[[float], Outcome]:
                 kept = -1
             if value == 0.0 or high - low < 4e-16:
                 break
-        return theta, count + 3
+        return theta, count
 
     @njit
     def loop(tolerance: float, y0: Array, start: Any, times: Array) -> tuple[int, int, int, int]:

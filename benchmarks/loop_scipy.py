@@ -36,7 +36,9 @@ def switching_loop(model: Model, method: str) -> Callable[[float], Outcome]:
                 (t, model.t_end),
                 x,
                 method=method,
-                events=[_terminal((events, mode, space, searches), k) for k in range(events(mode, t, x, space))],
+                events=[
+                    _terminal((events, mode, space, searches), k) for k in range(events(mode, t, x, space))
+                ],
                 rtol=tolerance,
                 atol=tolerance,
                 max_step=model.longest if 0 in mode else np.inf,

@@ -1,8 +1,8 @@
 """The modes of each problem as a user derives them by hand, for the loops of the other codes.
 
-A mode is a list of integers, changed in place; what they mean is said beside each problem. Every event function is
-positive in its mode and falls to zero at its event. The functions are written once for numbers, for numba and
-for the expressions of heyoka: that is why they fill lists, and why `Operations` holds what differs.
+A mode is a list of integers, changed in place; what they mean is said beside each problem. Every event
+function is positive in its mode and falls to zero at its event. The functions are written once for numbers,
+numba and the expressions of heyoka: that is why they fill lists, and why `Operations` holds what differs.
 """
 
 from __future__ import annotations
@@ -22,7 +22,9 @@ class Operations(NamedTuple):
     sin: Any
     cos: Any
     exp: Any
-    positive: Any  # the larger of a value and zero: a stage may lie beyond a surface where a power does not exist
+    positive: (
+        Any  # the larger of a value and zero: a stage may lie beyond a surface where a power does not exist
+    )
     beside: float  # how far beside a surface a motion starts that leaves it, where it cannot start on it
     compiled: Any  # wraps each function
 
@@ -40,7 +42,7 @@ NUMBERS = Operations(math.sin, math.cos, math.exp, positive, 0.0, _as_it_is)
 
 
 class Functions(NamedTuple):
-    """The functions of a problem: `field` and `events` fill their last argument, `after` changes mode and state.
+    """A problem: `field` and `events` fill their last argument, `after` changes mode and state.
 
     Attributes
     ----------
@@ -250,7 +252,7 @@ def dry_friction(operations: Operations, force: float, omega: float) -> Function
 
 
 def two_masses(operations: Operations) -> Functions:
-    """Problem 4 of DISODE45; mode: directions of both masses, 0 at rest, and the sides of y = 0 that they are on."""
+    """Problem 4 of DISODE45; mode: directions of both masses, 0 at rest, and the signs of both positions."""
     compiled = operations.compiled
 
     @compiled
@@ -267,7 +269,7 @@ def two_masses(operations: Operations) -> Functions:
 
 
 def friction_chain(d: int, t_end: float) -> Model:
-    """Return d masses between springs on rough ground, the last one pushed; mode: their directions, 0 at rest."""
+    """Return d masses between springs on rough ground; mode: their directions, 0 at rest."""
 
     def functions(operations: Operations) -> Functions:
         sin, compiled = operations.sin, operations.compiled
@@ -350,7 +352,7 @@ def _bodies(d: int, drive: Any, friction: Any, has_ground: bool, operations: Ope
 
 
 def drill_string(operations: Operations, voltage: float) -> Functions:
-    """The drill string while its upper disc turns forward, as it does; mode: direction of the lower disc, 0 at rest."""
+    """The drill string, its upper disc always turning; mode: the direction of the lower disc, 0 at rest."""
     exp, beside, compiled = operations.exp, operations.beside, operations.compiled
 
     @compiled

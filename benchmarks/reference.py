@@ -35,10 +35,8 @@ class Reference(NamedTuple):
     y_end: Array
 
 
-def load(file: str, run_id: str = "main") -> Reference:
+def load(file: str, run_id: str = "main", all_signs: bool = False) -> Reference:
     """Return a reference solution.
-
-    Sign changes at which the field is smooth, which the files of ``tests/data`` mark by a note, are left out.
 
     Parameters
     ----------
@@ -46,6 +44,9 @@ def load(file: str, run_id: str = "main") -> Reference:
         Name of the file in ``tests/data`` without its ending.
     run_id : str, optional
         Which of its runs.
+    all_signs : bool, optional
+        With the sign changes at which the field is smooth, which the files of ``tests/data`` mark by a note.
+        A run records them where a switching function is declared.
 
     Returns
     -------
@@ -53,7 +54,7 @@ def load(file: str, run_id: str = "main") -> Reference:
     """
     data = json.loads((_DATA / f"{file}.json").read_text())
     run = next(run for run in data["runs"] if run["id"] == run_id)
-    switches = [event for event in run["events"] if "field smooth" not in event.get("note", "")]
+    switches = [event for event in run["events"] if all_signs or "field smooth" not in event.get("note", "")]
     return Reference(
         t=np.array([float(event["t"]) for event in switches]),
         y=np.array([[float(value) for value in event["y"]] for event in switches]),

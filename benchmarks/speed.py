@@ -14,7 +14,7 @@ from typing import Any
 
 import filippov as fl
 import numpy as np
-from measure import Line, interleaved, report, write_section
+from measure import Line, interleaved, report, table, write_section
 from startup import fresh_processes
 from straight_step import StraightLoop, compiler
 from transients import friction_lines, prepared, relay_lines
@@ -24,7 +24,7 @@ FORCE, OMEGA = PROBLEM.args
 T_END = PROBLEM.t_span[1]
 
 STEP_TOLERANCE = 1e-9
-STEP_LIMIT = 2.5
+STEP_LIMIT = 2.0
 SLIP = {"t_span": (0.0, 1.0), "max_step": 1e-4}  # before the first event; the step is at its limit
 FLAGS = (("-O3",), ("-O3", "-march=native"))
 
@@ -66,6 +66,37 @@ def step_lines(repeats: int) -> list[Line]:
         for mine in ours
         for theirs in straight
     ]
+
+
+def overhead_rows(repeats: int) -> list[list[str]]:
+    """Return what events cost beside the steps: detection, dense output, a switch, the call."""
+
+    def plain(t: float, x: Any) -> tuple[Any, Any]:
+        y, v = x
+        return v, -y + np.sin(OMEGA * t) - FORCE
+
+    system, smooth = prepared(PROBLEM), fl.System(plain, n=2)
+    options = {"rtol": STEP_TOLERANCE, "atol": STEP_TOLERANCE, "method": "DOPRI5"}
+    slip = SLIP | {"y0": PROBLEM.y0} | options
+    calls: dict[str, Callable[[], fl.Solution]] = {
+        "plain": lambda: smooth.solve(dense_output=False, **slip),
+        "slip": lambda: system.solve(dense_output=False, **slip),
+        "dense": lambda: system.solve(dense_output=True, **slip),
+        "ten periods": lambda: system.solve(PROBLEM.t_span, PROBLEM.y0, dense_output=False, **options),
+        "call": lambda: system.solve((0.0, 1e-9), PROBLEM.y0, dense_output=False, **options),
+    }
+    n_steps, ten = _steps(calls["slip"]()), calls["ten periods"]()
+    times = interleaved(calls, repeats)
+    step = times["slip"] / n_steps
+    switch = (times["ten periods"] - times["call"] - _steps(ten) * step) / len(ten.switches)
+    figures = {
+        "a step without a switching function": times["plain"] / n_steps,
+        "detection, per step": step - times["plain"] / n_steps,
+        "dense output, per step": (times["dense"] - times["slip"]) / n_steps,
+        "a switch: location, decision, restart, sliding": switch,
+        "the call from Python": times["call"],
+    }
+    return [[what, f"{np.median(seconds) * 1e9:.0f} ns"] for what, seconds in figures.items()]
 
 
 def _steps(sol: fl.Solution) -> int:
@@ -110,6 +141,9 @@ def main() -> None:
         print("gcc or cc is missing, the comparison with the C loop is left out")
     else:
         text += report("Time per step of the dry-friction oscillator", step_lines(2 * arguments.repeats))
+    overhead = table(["of DOPRI5 on the oscillator", "time"], overhead_rows(2 * arguments.repeats))
+    print("", *overhead, sep="\n")
+    text += ["**What events cost beside the steps**", "", *overhead, ""]
     runs = {
         "Ten-period transient, 42 switches, at equal error of the event times": friction_lines,
         "Relay of order three, 55 switches, at equal error of the event times": relay_lines,

@@ -8,6 +8,7 @@ not find the switches of the reference has none. SciPy, numba and heyoka are lef
 from __future__ import annotations
 
 import argparse
+import json
 from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
@@ -17,7 +18,7 @@ import filippov as fl
 import numpy as np
 import numpy.typing as npt
 from friction_chain import chain, start_of_chain
-from measure import at_equal_error, interleaved, table, write_section
+from measure import Line, at_equal_error, interleaved, report, table, write_section
 from modes import MODELS, Model, Outcome, friction_chain
 from reference import load, max_event_error
 
@@ -26,8 +27,12 @@ Surface = Callable[[Any, Any], Any]
 Solve = Callable[[float], Outcome]
 
 PICTURE = Path(__file__).with_name("work_precision.png")
+RECORDED = Path(__file__).with_name("disode_python.json")
+SLOWER = 2000.0  # how many times as long the authors' code is to take
 TOLERANCES = [10.0**-k for k in range(3, 14)]
 METHODS = ("Taylor", "DOP853", "DOPRI5", "Rodas5P")
+BLACK_BOX = "DOPRI5, black box"
+MOST_DECLARED = 6  # surfaces on which a black box may slide at once
 PEERS = ("scipy", "numba", "heyoka")
 TARGETS = (1e-6, 1e-9)
 COUNTS = ("evaluations", "steps", "searches")
@@ -40,8 +45,8 @@ class Case(NamedTuple):
 
     Attributes
     ----------
-    title : str
-        The heading.
+    name, title : str
+        The problem, and the heading.
     system : System
         Traced and compiled.
     opaque : callable
@@ -50,12 +55,13 @@ class Case(NamedTuple):
         Its switching functions, for the black box.
     t_span, y0 : sequence of float
         The interval and the initial state.
-    times : ndarray, shape (k,)
-        The times of the switches.
+    times, declared : ndarray, shape (k,)
+        The times of the switches, and those of all sign changes of declared switching functions.
     model : Model
         The modes by hand.
     """
 
+    name: str
     title: str
     system: fl.System
     opaque: Callable[[float, Any], Any]
@@ -63,6 +69,7 @@ class Case(NamedTuple):
     t_span: tuple[float, float]
     y0: Any
     times: Array
+    declared: Array
     model: Model
 
 
@@ -79,8 +86,8 @@ def of_problem(title: str, name: str, file: str, surfaces: tuple[Surface, ...], 
         return problem.fun(float(t), np.array(x, dtype=float), *problem.args)
 
     system = fl.System(problem.fun, n=len(problem.y0), args=problem.args)
-    times = load(file, run_id).t
-    return Case(title, system, opaque, surfaces, problem.t_span, problem.y0, times, MODELS[name])
+    times = [load(file, run_id, all_signs).t for all_signs in (False, True)]
+    return Case(name, title, system, opaque, surfaces, problem.t_span, problem.y0, *times, MODELS[name])
 
 
 def of_chain() -> Case:
@@ -94,12 +101,14 @@ def of_chain() -> Case:
         return field(float(t), np.array(x, dtype=float))
 
     return Case(
+        "chain",
         f"chain of {BLOCKS} masses with friction",
         system,
         opaque,
         surfaces,
         (0.0, CHAIN_END),
         y0,
+        times,
         times,
         friction_chain(BLOCKS, CHAIN_END),
     )
@@ -136,7 +145,9 @@ def ours(case: Case, method: str) -> Solve:
     """Return our call with a method."""
 
     def solve(tolerance: float) -> Outcome:
-        return outcome_of(case.system.solve(case.t_span, case.y0, method=method, rtol=tolerance, atol=tolerance))
+        return outcome_of(
+            case.system.solve(case.t_span, case.y0, method=method, rtol=tolerance, atol=tolerance)
+        )
 
     return solve
 
@@ -186,7 +197,8 @@ class Curve(NamedTuple):
 def measured(case: Case, repeats: int) -> dict[str, Curve]:
     """Return the curves of all codes."""
     solvers: dict[str, Solve] = {method: ours(case, method) for method in METHODS}
-    solvers["DOPRI5, black box"] = black_box(case)
+    if len(case.surfaces) <= MOST_DECLARED:
+        solvers[BLACK_BOX] = black_box(case)
     solvers |= dict(peers(case, lambda name: find_spec(name) is not None))
     runs = {name: [solve(tolerance) for tolerance in TOLERANCES] for name, solve in solvers.items()}
     calls = {
@@ -197,12 +209,17 @@ def measured(case: Case, repeats: int) -> dict[str, Curve]:
     times = interleaved(calls, repeats)
     return {
         name: Curve(
-            [max_event_error(case.times, run.times) for run in found],
+            [max_event_error(expected_by(case, name), run.times) for run in found],
             np.array([run[1:] for run in found], dtype=float),
             np.array([np.median(times[name, tolerance]) for tolerance in TOLERANCES]),
         )
         for name, found in runs.items()
     }
+
+
+def expected_by(case: Case, name: str) -> Array:
+    """Return the times that a code should find."""
+    return case.declared if name == BLACK_BOX else case.times
 
 
 def table_of(curves: dict[str, Curve]) -> list[str]:
@@ -214,7 +231,10 @@ def table_of(curves: dict[str, Curve]) -> list[str]:
     for name, curve in curves.items():
         cells = [name, f"{np.isfinite(curve.errors).sum()}/{len(TOLERANCES)}"]
         for target in TARGETS:
-            cells += [_at(curve, 1e6 * curve.seconds, target), *(_at(curve, n, target) for n in curve.counts.T)]
+            cells += [
+                _at(curve, 1e6 * curve.seconds, target),
+                *(_at(curve, n, target) for n in curve.counts.T),
+            ]
         rows.append(cells)
     return table(head, rows)
 
@@ -225,6 +245,27 @@ def _at(curve: Curve, values: Array, target: float) -> str:
     except ValueError:
         return "-"
     return f"{value:.0f}" if np.isfinite(value) else "-"
+
+
+def recorded_lines(name: str, curves: dict[str, Curve]) -> Iterator[Line]:
+    """Yield the recorded times of the authors' Python code over ours, by the best method, at its errors."""
+    for tolerance, error, seconds in json.loads(RECORDED.read_text(encoding="utf-8"))["problems"].get(
+        name, ()
+    ):
+        times = {}
+        for method in METHODS:
+            try:
+                times[method] = float(at_equal_error(curves[method].errors, curves[method].seconds, error))
+            except ValueError:
+                continue
+        best = min(times, key=lambda method: times[method])
+        yield Line(
+            f"`{name}`, its tolerance {tolerance:.0e}, error {error:.1e}",
+            seconds / times[best],
+            SLOWER,
+            at_least=True,
+            detail=f"{seconds * 1e3:.0f} ms / {times[best] * 1e6:.0f} us by {best}",
+        )
 
 
 def draw(results: dict[str, dict[str, Curve]], path: Path) -> None:
@@ -251,7 +292,7 @@ def draw(results: dict[str, dict[str, Curve]], path: Path) -> None:
     figure.savefig(path, dpi=110)
 
 
-ORDER = (*METHODS, "DOPRI5, black box", "SciPy RK45", "SciPy DOP853", "numba DOPRI5", "heyoka")
+ORDER = (*METHODS, BLACK_BOX, "SciPy RK45", "SciPy DOP853", "numba DOPRI5", "heyoka")
 
 
 def main() -> None:
@@ -263,12 +304,14 @@ def main() -> None:
     for name in PEERS:
         if find_spec(name) is None:
             print(f"{name} is missing, its loops are left out: pip install filippov[bench]")
-    results, text = {}, []
+    results, text, lines = {}, [], []
     for case in cases():
         results[case.title] = measured(case, arguments.repeats)
         rows = [f"**{case.title}**, {len(case.times)} switches", "", *table_of(results[case.title]), ""]
         print(*rows, sep="\n", flush=True)
         text += rows
+        lines += recorded_lines(case.name, results[case.title])
+    text += report("The Python code of the authors of DISODE45, recorded times, over ours", lines)
     if not arguments.no_write:
         draw(results, PICTURE)
         write_section("work", [*text, "![work against precision](work_precision.png)"])

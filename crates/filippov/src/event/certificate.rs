@@ -167,3 +167,56 @@ fn prove_between(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use filippov_expr::Interval;
+
+    use super::{prove, Bound, Proof};
+
+    /// f = height + bend (theta - vertex)^2 over [0, 1], with its slope and nothing else known.
+    fn parabola(height: f64, bend: f64, vertex: f64) -> (impl Fn(f64) -> f64, Bound) {
+        let slopes = [2.0 * bend * -vertex, 2.0 * bend * (1.0 - vertex)];
+        let bound = Bound {
+            value: Interval::hull(-1e3, 1e3),
+            slope: Interval::hull(slopes[0].min(slopes[1]), slopes[0].max(slopes[1])),
+        };
+        (move |theta| height + bend * (theta - vertex).powi(2), bound)
+    }
+
+    #[test]
+    fn a_function_lies_above_the_lines_from_its_ends() {
+        for k in 0..200_u32 {
+            let vertex = f64::from(k % 20) / 10.0 - 0.5;
+            let bend = if k % 2 == 0 { 1.0 } else { -1.0 } * (0.1 + f64::from(k) / 50.0);
+            let (f, bound) = parabola(0.3, bend, vertex);
+            let least = (0..=100)
+                .map(|i| f(f64::from(i) / 100.0))
+                .fold(f64::INFINITY, f64::min);
+            let (left, right) = (Some(f(0.0)), Some(f(1.0)));
+            for ends in [(left, right), (left, None), (None, right), (None, None)] {
+                assert!(bound.lowest(1.0, ends.0, ends.1) <= least + 1e-12);
+            }
+            let by_one = bound.lowest(1.0, left, None);
+            let by_one = by_one.max(bound.lowest(1.0, None, right));
+            assert!(bound.lowest(1.0, left, right) >= by_one - 1e-12);
+        }
+    }
+
+    #[test]
+    fn slopes_that_cannot_reach_zero_between_the_ends_prove_that_there_is_none() {
+        // From 0.3 over 0.05 back to 0.3: at most 1 down and 1 up.
+        let (f, bound) = parabola(0.05, 1.0, 0.5);
+        let ends = (f(0.0), Some(f(1.0)));
+        assert_eq!(
+            prove(&mut |_, _| Some(bound), 1.0, ends, 1e-12, 0),
+            Proof::Open
+        );
+        let (f, bound) = parabola(0.3, 1.0, 0.5);
+        let ends = (f(0.0), Some(f(1.0)));
+        assert_eq!(
+            prove(&mut |_, _| Some(bound), 1.0, ends, 1e-12, 0),
+            Proof::Clear
+        );
+    }
+}

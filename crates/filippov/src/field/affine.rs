@@ -172,6 +172,11 @@ impl<'a> AffineLaw<'a> {
         [unit.determinant(), -unit[(0, 0)].min(unit[(1, 1)])]
     }
 
+    /// N = grad h B, where it is known and the same all along the motion.
+    pub fn steady_normal(&self) -> Option<&SparseRows> {
+        self.parts.is_settled().then(|| self.parts.normal())
+    }
+
     /// Does one sweep of [`project`](Self::project) do, with gradients that are known for good?
     pub fn projects_at_once(&self) -> bool {
         self.is_orthogonal && self.parts.is_settled()

@@ -5,6 +5,7 @@ use super::{AffineLaw, Canopy, Projector, RuleLaw, SmoothField};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::options::SlidingRule;
+use crate::sparse::SparseRows;
 use crate::system::PiecewiseSystem;
 use crate::tolerances::{MOST_MEETING, MOST_TRACKED};
 
@@ -173,6 +174,11 @@ impl<'a> IntersectionField<'a> {
     /// Do redundant contacts share their load at the last evaluation? The equations then do not determine the multipliers.
     pub fn shares_load(&self) -> bool {
         self.affine.as_ref().is_some_and(AffineLaw::is_shared)
+    }
+
+    /// N = grad h B at the last evaluation, where it is the same all along the motion.
+    pub fn steady_normal(&self) -> Option<&SparseRows> {
+        self.affine.as_ref()?.steady_normal()
     }
 
     /// Does the regularised motion oscillate around the root, for three and more surfaces?

@@ -182,9 +182,10 @@ impl NormalFields {
         let ranges = self.groups.iter().map(|group| {
             let row = group.values.iter().skip(j).step_by(self.m).enumerate();
             let row = row.filter(|&(pattern, _)| counts(group, pattern));
-            row.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], (_, &v)| {
-                [low.min(v), high.max(v)]
-            })
+            row.fold(
+                [f64::INFINITY, f64::NEG_INFINITY],
+                |[low, high], (_, &v)| [low.min(v), high.max(v)],
+            )
         });
         ranges.fold([0.0; 2], |[low, high], [l, h]| [low + l, high + h])
     }
@@ -376,6 +377,41 @@ impl SignGroup {
                     self.values[pattern * m + j] = 0.5 * (v + o);
                 }
             }
+        }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::{NormalFields, SignGroup};
+
+    #[test]
+    fn ranges_of_one_side_are_those_of_its_patterns() {
+        let group = |members: &[usize], seed: usize| SignGroup {
+            members: members.to_vec(),
+            values: (0..3 << members.len())
+                .map(|k| ((7 * k + seed) as f64).sin())
+                .collect(),
+        };
+        let fields = NormalFields::of_groups(3, vec![group(&[0, 2], 1), group(&[1], 2)]).unwrap();
+        for j in 0..3 {
+            let on = |side: Option<usize>| {
+                let counts = |k: &usize| side.is_none_or(|side| k >> j & 1 == side);
+                let patterns = (0..8).filter(counts);
+                let values: Vec<f64> = patterns.map(|k| fields.at(k)[j]).collect();
+                let least = values.iter().copied().fold(f64::INFINITY, f64::min);
+                [
+                    least,
+                    values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+                ]
+            };
+            let close = |a: [f64; 2], b: [f64; 2]| {
+                (a[0] - b[0]).abs() < 1e-15 && (a[1] - b[1]).abs() < 1e-15
+            };
+            assert!(close(fields.row_range(j), on(None)));
+            assert!(close(fields.side_range(j, -1), on(Some(0))));
+            assert!(close(fields.side_range(j, 1), on(Some(1))));
         }
     }
 }

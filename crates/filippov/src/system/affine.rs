@@ -80,7 +80,7 @@ pub trait AffineSigns: PiecewiseSystem {
         Ok(evaluations)
     }
 
-    /// Are the gradient of h_j and the jump of the field with s_j the same all along every motion?
+    /// Are the gradient of h_j, and what s_j changes in the rates of switching functions, the same all along every motion?
     fn is_steady(&self, j: usize) -> bool {
         let _ = j;
         false
@@ -143,9 +143,9 @@ pub struct AffineParts {
     rates: Vec<f64>,
     multipliers: Vec<f64>,
     solver: SparseSolver,
-    /// Gradients and jumps are the same at every evaluation.
+    /// Gradients and N are the same at every evaluation.
     is_steady: bool,
-    /// N is that of gradients and jumps, and does not change any more.
+    /// N is known, and does not change any more.
     is_formed: bool,
     /// `solver` has factored it.
     is_factored: bool,
@@ -173,14 +173,14 @@ impl AffineParts {
         }
     }
 
-    /// The same where gradients and jumps are the same at every evaluation: N is formed and factored once.
+    /// The same where gradients and N are the same at every evaluation: N is formed and factored once.
     #[must_use]
     pub fn steady(mut self, is_steady: bool) -> Self {
         self.is_steady = is_steady;
         self
     }
 
-    /// Are gradients and jumps the same at every evaluation?
+    /// Are gradients and N the same at every evaluation?
     pub fn is_steady(&self) -> bool {
         self.is_steady
     }

@@ -33,7 +33,7 @@ pub(super) struct AffineModel {
     jumps: Vec<Row>,
     /// Surfaces whose sign the field is multilinear in.
     is_blended: Vec<bool>,
-    /// Gradients and jumps that are the same all along every motion.
+    /// The gradient, and what the sign changes in the rates of switching functions, are the same all along every motion.
     is_steady: Vec<bool>,
     graph: Graph,
     /// dh_j/dt along the blended field, and bounds of it once they were asked for.
@@ -60,7 +60,7 @@ impl AffineModel {
             conflicts[j as usize].push(k);
             conflicts[k as usize].push(j);
         }
-        let (mut time_rates, mut gradients) = (Vec::new(), Vec::new());
+        let (mut time_rates, mut gradients) = (Vec::new(), Vec::<Row>::new());
         let (mut rates, mut is_steady) = (Vec::new(), Vec::new());
         let mut in_gradient = Vec::new();
         for (j, conflicts) in conflicts.iter_mut().enumerate() {
@@ -82,8 +82,13 @@ impl AffineModel {
             let row = entries.map(|&(i, node)| (i as usize, source(&graph, node, &mut outputs)));
             gradients.push(row.collect());
         }
-        for derivatives in &dependence.derivatives {
-            for &(j, node) in derivatives {
+        // What a sign changes in other states does not come back to the rates of switching functions.
+        let mut is_felt = vec![false; field.len()];
+        for &(state, _) in gradients.iter().flat_map(|row: &Row| row) {
+            is_felt[state] = true;
+        }
+        for (state, derivatives) in dependence.derivatives.iter().enumerate() {
+            for &(j, node) in derivatives.iter().filter(|_| is_felt[state]) {
                 is_steady[j as usize] &= !graph.depends_on_motion(node);
             }
         }
@@ -168,7 +173,8 @@ impl AffineModel {
         groups
     }
 
-    /// Are gradient and jump of surface `j` the same all along every motion?
+    /// Are the gradient of h_j, and what its sign changes in the rates of switching functions, the same all along every
+    /// motion?
     pub fn is_steady(&self, j: usize) -> bool {
         self.is_steady[j]
     }

@@ -13,6 +13,7 @@ use crate::event::{EventFunction, Monitored};
 use crate::field::{AffineBounds, IntersectionExit};
 use crate::integrate::detection::detect::Detector;
 use crate::integrate::integrator::Integrator;
+use crate::integrate::motion::ModeField;
 use crate::mode::Signs;
 use crate::options::SlidingRule;
 use crate::stepper::Interpolant;
@@ -241,25 +242,17 @@ impl Integrator<'_> {
     }
 
     /// Prepares the bounds of many multipliers, once per motion.
-    pub(in crate::integrate) fn prepare_bounds(&mut self) -> Result<(), FieldError> {
-        let (motion, system) = (&mut self.motion, self.system);
-        if motion.sliding.len() < 2
-            || !motion.has_bounds()
+    pub(in crate::integrate) fn prepare_bounds(&mut self) {
+        let motion = &mut self.motion;
+        if !motion.has_bounds()
             || motion.affine_bounds.is_some()
             || self.options.sliding != SlidingRule::Canopy
         {
-            return Ok(());
+            return;
         }
-        let mut bounds = None;
-        if let Some(affine) = system.affine_signs() {
-            let point = (self.t, &self.x[..]);
-            let (found, evaluations) =
-                AffineBounds::new(affine, &motion.sliding, point, &motion.signs)?;
-            self.stats.n_field_evaluations += evaluations;
-            bounds = found;
+        if let ModeField::Intersection(field) = &motion.field {
+            motion.affine_bounds = Some(field.steady_normal().and_then(AffineBounds::new));
         }
-        motion.affine_bounds = Some(bounds);
-        Ok(())
     }
 
     /// How far the motion lies beside the continuous extension, from the probes of the step.

@@ -277,7 +277,7 @@ impl Integrator<'_> {
         }
         self.measure_margin(dt)?;
         if self.motion.sliding.len() > 1 {
-            self.prepare_bounds()?;
+            self.prepare_bounds();
         }
         let mut probed = false;
         for index in 0..self.motion.monitored.len() {
@@ -338,7 +338,7 @@ impl Integrator<'_> {
     fn detect_along_series(&mut self, dt: f64) -> Result<Option<Found>, FieldError> {
         self.measure_margin(dt)?;
         if self.motion.sliding.len() > 1 {
-            self.prepare_bounds()?;
+            self.prepare_bounds();
         }
         let mut found: Option<Found> = None;
         // What was searched for the first zero is all that the others are searched for.
