@@ -41,32 +41,13 @@ impl Graph {
         };
         let mut image: FxHashMap<NodeId, NodeId> = FxHashMap::default();
         for id in nodes {
-            if vanishes(self, id) {
-                let zero = self.constant(0.0);
-                image.insert(id, zero);
-            }
-            if image.is_empty() || image.contains_key(&id) {
+            let moved = |operand: NodeId| image.get(&operand).copied().unwrap_or(operand);
+            let new = if vanishes(self, id) {
+                self.constant(0.0)
+            } else if self.node(id).operands().any(|a| moved(a) != a) {
+                self.with_operands(id, moved)
+            } else {
                 continue;
-            }
-            let at = |operand: NodeId| image.get(&operand).copied().unwrap_or(operand);
-            let new = match *self.node(id) {
-                Node::Unary(op, a) if at(a) != a => {
-                    let a = at(a);
-                    self.unary(op, a)
-                }
-                Node::Binary(op, a, b) if (at(a), at(b)) != (a, b) => {
-                    let (a, b) = (at(a), at(b));
-                    self.binary(op, a, b)
-                }
-                Node::Select {
-                    surface,
-                    plus,
-                    minus,
-                } if (at(plus), at(minus)) != (plus, minus) => {
-                    let (plus, minus) = (at(plus), at(minus));
-                    self.select(surface, 1.0, plus, minus)
-                }
-                _ => continue,
             };
             image.insert(id, new);
         }

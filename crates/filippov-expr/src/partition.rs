@@ -74,22 +74,11 @@ impl Graph {
                     surface,
                     plus,
                     minus,
-                } => match fixed(surface) {
-                    Some(sign) => at(if sign > 0.0 { plus } else { minus }),
-                    None => {
-                        let (plus, minus) = (at(plus), at(minus));
-                        self.select(surface, 1.0, plus, minus)
-                    }
-                },
-                Node::Unary(op, a) => {
-                    let a = at(a);
-                    self.unary(op, a)
+                } if fixed(surface).is_some() => {
+                    let above = fixed(surface).is_some_and(|sign| sign > 0.0);
+                    at(if above { plus } else { minus })
                 }
-                Node::Binary(op, a, b) => {
-                    let (a, b) = (at(a), at(b));
-                    self.binary(op, a, b)
-                }
-                _ => id,
+                _ => self.with_operands(id, at),
             };
             image.insert(id, new);
         }
@@ -97,6 +86,29 @@ impl Graph {
             .iter()
             .map(|root| image.get(root).copied().unwrap_or(*root))
             .collect()
+    }
+
+    /// The operation of a node on other operands.
+    pub(crate) fn with_operands(&mut self, id: NodeId, at: impl Fn(NodeId) -> NodeId) -> NodeId {
+        match *self.node(id) {
+            Node::Unary(op, a) => {
+                let a = at(a);
+                self.unary(op, a)
+            }
+            Node::Binary(op, a, b) => {
+                let (a, b) = (at(a), at(b));
+                self.binary(op, a, b)
+            }
+            Node::Select {
+                surface,
+                plus,
+                minus,
+            } => {
+                let (plus, minus) = (at(plus), at(minus));
+                self.select(surface, 1.0, plus, minus)
+            }
+            _ => id,
+        }
     }
 
     /// Which signs can change these values when the others are as given: one entry per surface.

@@ -43,7 +43,7 @@ impl Integrator<'_> {
                 open.push(j);
             }
         }
-        let decided: Vec<usize> = open.clone();
+        let doubtful = open.clone();
         while !open.is_empty() {
             let free = [&open[..], &slid[..]].concat();
             let mut settled = None;
@@ -64,7 +64,7 @@ impl Integrator<'_> {
         }
         let mut left = Lefts::new();
         let slides_alone = slid.len() == 1;
-        for &j in if slides_alone { meeting } else { &decided[..] } {
+        for &j in if slides_alone { meeting } else { &doubtful[..] } {
             // Once more, as the signs of others are known by now.
             let Some(decision) = self.decide_alone(j, mode, &after, &slid)? else {
                 return Ok(None);
