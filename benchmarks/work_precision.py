@@ -24,7 +24,7 @@ from reference import load, max_event_error
 
 Array = npt.NDArray[np.float64]
 Surface = Callable[[Any, Any], Any]
-Solve = Callable[[float], Outcome]
+Solve = Callable[[float], fl.Solution | Outcome]
 
 PICTURE = Path(__file__).with_name("work_precision.png")
 RECORDED = Path(__file__).with_name("disode_python.json")
@@ -144,10 +144,8 @@ def cases() -> Iterator[Case]:
 def ours(case: Case, method: str) -> Solve:
     """Return our call with a method."""
 
-    def solve(tolerance: float) -> Outcome:
-        return outcome_of(
-            case.system.solve(case.t_span, case.y0, method=method, rtol=tolerance, atol=tolerance)
-        )
+    def solve(tolerance: float) -> fl.Solution:
+        return case.system.solve(case.t_span, case.y0, method=method, rtol=tolerance, atol=tolerance)
 
     return solve
 
@@ -155,15 +153,17 @@ def ours(case: Case, method: str) -> Solve:
 def black_box(case: Case) -> Solve:
     """Return our call with the function as it is, its switching functions declared."""
 
-    def solve(tolerance: float) -> Outcome:
+    def solve(tolerance: float) -> fl.Solution:
         options = {"surfaces": case.surfaces, "rtol": tolerance, "atol": tolerance}
-        return outcome_of(fl.solve_ivp(case.opaque, case.t_span, case.y0, "DOPRI5", **options))
+        return fl.solve_ivp(case.opaque, case.t_span, case.y0, "DOPRI5", **options)
 
     return solve
 
 
-def outcome_of(sol: fl.Solution) -> Outcome:
-    """Return the times and counts of a run of ours."""
+def outcome_of(sol: fl.Solution | Outcome) -> Outcome:
+    """Return the times and counts of a run."""
+    if isinstance(sol, Outcome):
+        return sol
     return Outcome(sol.switches.t, sol.nfev, sol.stats["n_steps"], sol.stats["n_surface_evaluations"])
 
 
@@ -200,7 +200,9 @@ def measured(case: Case, repeats: int) -> dict[str, Curve]:
     if len(case.surfaces) <= MOST_DECLARED:
         solvers[BLACK_BOX] = black_box(case)
     solvers |= dict(peers(case, lambda name: find_spec(name) is not None))
-    runs = {name: [solve(tolerance) for tolerance in TOLERANCES] for name, solve in solvers.items()}
+    runs = {
+        name: [outcome_of(solve(tolerance)) for tolerance in TOLERANCES] for name, solve in solvers.items()
+    }
     calls = {
         (name, tolerance): (lambda solve=solve, tolerance=tolerance: solve(tolerance))
         for name, solve in solvers.items()
@@ -299,7 +301,7 @@ def main() -> None:
     """Measure, print, draw, and write the tables to ``README.md``."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--no-write", action="store_true", help="leave README.md and the picture as they are")
-    parser.add_argument("--repeats", type=int, default=5, help="rounds of interleaved samples (default 5)")
+    parser.add_argument("--repeats", type=int, default=3, help="rounds of interleaved samples (default 3)")
     arguments = parser.parse_args()
     for name in PEERS:
         if find_spec(name) is None:
