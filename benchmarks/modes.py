@@ -117,9 +117,23 @@ def _of_problem(
     )
 
 
+def _one_surface(operations: Operations) -> Any:
+    """Return what follows at one surface: a crossing, or sliding that ends to side `first` or the other."""
+
+    @operations.compiled
+    def follow(mode: Any, k: int, first: int, slides: bool) -> None:
+        if mode[0] == 0:
+            mode[0] = first if k == 0 else -first
+        else:
+            mode[0] = 0 if slides else -mode[0]
+
+    return follow
+
+
 def disode_planar(operations: Operations) -> Functions:
     """Problem 1 of DISODE45; mode: the side of g = 0, or 0 for sliding, where u = y1."""
     sin, cos, _, positive, beside, compiled = operations
+    follow = _one_surface(operations)
 
     @compiled
     def field(mode: Any, t: Any, x: Any, dx: Any) -> None:
@@ -143,12 +157,7 @@ def disode_planar(operations: Operations) -> Functions:
 
     @compiled
     def after(mode: Any, k: int, t: float, x: Any) -> None:
-        if mode[0] == 0:
-            mode[0] = -1 if k == 0 else 1
-        elif abs(x[0]) < 1.0:
-            mode[0] = 0
-        else:
-            mode[0] = -mode[0]
+        follow(mode, k, -1, abs(x[0]) < 1.0)
         x[1] = 0.2 + math.sin(2.0 * x[0]) + mode[0] * beside
 
     return Functions(field, events, after)
@@ -202,6 +211,7 @@ def structural_pounding(operations: Operations, c: float) -> Functions:
 def relay_feedback(operations: Operations, zeta: float, omega: float, sigma: float) -> Functions:
     """Problem 3 of DISODE45; mode: the side of x1 = 0, or 0 for sliding, where the relay is x2."""
     beside, compiled = operations.beside, operations.compiled
+    follow = _one_surface(operations)
 
     @compiled
     def field(mode: Any, t: Any, x: Any, dx: Any) -> None:
@@ -225,12 +235,7 @@ def relay_feedback(operations: Operations, zeta: float, omega: float, sigma: flo
 
     @compiled
     def after(mode: Any, k: int, t: float, x: Any) -> None:
-        if mode[0] == 0:
-            mode[0] = 1 if k == 0 else -1
-        elif abs(x[1]) < 1.0:
-            mode[0] = 0
-        else:
-            mode[0] = -mode[0]
+        follow(mode, k, 1, abs(x[1]) < 1.0)
         x[0] = mode[0] * beside
 
     return Functions(field, events, after)
@@ -392,6 +397,7 @@ def drill_string(operations: Operations, voltage: float) -> Functions:
 def belt(operations: Operations) -> Functions:
     """The block on a belt; mode: the sign of its speed against the belt, 0 at rest on it."""
     beside, compiled = operations.beside, operations.compiled
+    follow = _one_surface(operations)
 
     @compiled
     def field(mode: Any, t: Any, x: Any, dx: Any) -> None:
@@ -413,12 +419,7 @@ def belt(operations: Operations) -> Functions:
 
     @compiled
     def after(mode: Any, k: int, t: float, x: Any) -> None:
-        if mode[0] == 0:
-            mode[0] = -1 if k == 0 else 1
-        elif abs(x[0]) < 1.0:
-            mode[0] = 0
-        else:
-            mode[0] = -mode[0]
+        follow(mode, k, -1, abs(x[0]) < 1.0)
         x[1] = 0.2 + mode[0] * beside
 
     return Functions(field, events, after)

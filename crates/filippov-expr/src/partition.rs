@@ -74,10 +74,10 @@ impl Graph {
                     surface,
                     plus,
                     minus,
-                } if fixed(surface).is_some() => {
-                    let above = fixed(surface).is_some_and(|sign| sign > 0.0);
-                    at(if above { plus } else { minus })
-                }
+                } => match fixed(surface) {
+                    Some(sign) => at(if sign > 0.0 { plus } else { minus }),
+                    None => self.with_operands(id, at),
+                },
                 _ => self.with_operands(id, at),
             };
             image.insert(id, new);

@@ -188,7 +188,13 @@ impl<'a> AffineLaw<'a> {
     /// # Errors
     /// If a function of the user raises.
     pub fn project(&mut self, t: f64, x: &mut [f64], signs: &[f64]) -> Result<(), FieldError> {
-        for _ in 0..MOST_SWEEPS {
+        // The second sweep takes away what rounding left.
+        let most = if self.projects_at_once() {
+            2
+        } else {
+            MOST_SWEEPS
+        };
+        for _ in 0..most {
             self.system.surfaces(t, x, signs, &mut self.h)?;
             let mut is_near = true;
             let gradients = &self.parts.gradients;
