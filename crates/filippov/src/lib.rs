@@ -32,6 +32,7 @@
 //! ```
 
 pub mod action;
+mod decisions;
 mod error;
 pub mod event;
 pub mod field;
@@ -43,6 +44,7 @@ mod recorder;
 pub mod section;
 mod solution;
 pub mod sparse;
+mod status;
 pub mod stepper;
 pub mod switching;
 mod system;
@@ -55,12 +57,12 @@ pub use inspect::{
     HiddenDynamics, HiddenRoot, IntersectionValue, NotFinitePlace, PointKind,
 };
 pub use integrate::{
-    solve, solve_interruptible, solve_to_section, solve_with_actions, Integrator, Stats, Stop,
-    Warning, WarningCode,
+    solve, solve_interruptible, solve_to_section, solve_with_actions, Integrator, Stats,
 };
 pub use mode::{Mode, Signs};
 pub use options::{Keep, Method, NonUnique, Options, SlidingRule, Stabilization};
 pub use solution::{as_multiplier, Segment, Side, Solution, Switch, UserZero};
+pub use status::{Stop, Warning, WarningCode};
 pub use switching::Kind;
 pub use system::{
     AffineParts, AffineSigns, BothSides, ClosureSystem, Law, LawAction, LawMap, Laws, LieValue,

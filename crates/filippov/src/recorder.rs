@@ -2,11 +2,12 @@
 
 use smallvec::SmallVec;
 
-use crate::integrate::{Stats, Stop, Warning};
+use crate::integrate::Stats;
 use crate::mode::Mode;
 use crate::options::{Keep, Options, Stabilization};
 use crate::section::Observer;
 use crate::solution::{Segment, Solution, Step, Switch, UserZero};
+use crate::status::{Stop, Warning};
 use crate::stepper::Interpolant;
 use crate::tolerances::LATEST_SWITCHES;
 

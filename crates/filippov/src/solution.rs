@@ -4,10 +4,11 @@ use smallvec::SmallVec;
 
 use crate::error::FieldError;
 use crate::field::{IntersectionField, Projector, SlidingField, SmoothField};
-use crate::integrate::{Stats, Stop, Warning};
+use crate::integrate::Stats;
 use crate::mode::Mode;
 use crate::options::SlidingRule;
 use crate::section::Returns;
+use crate::status::{Stop, Warning};
 use crate::stepper::Basis;
 use crate::switching::Kind;
 use crate::system::{dot_magnitude, PiecewiseSystem};
@@ -34,6 +35,8 @@ pub struct Switch {
     pub mode_after: Mode,
     /// The name of the action, if it was one.
     pub note: String,
+    /// The rule of the decision that chose the mode after; empty for an action.
+    pub rule: &'static str,
 }
 
 /// A piece of constant mode.

@@ -2,6 +2,8 @@
 
 use filippov_expr::{Enclosure, Motion};
 
+use smallvec::SmallVec;
+
 use crate::error::FieldError;
 use crate::tolerances::TURNS_BACK;
 
@@ -29,6 +31,17 @@ impl EventFunction {
             EventFunction::Exit(index) => Some(index),
         }
     }
+}
+
+/// The earliest zero of a step.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// Where, in steps.
+    pub theta: f64,
+    /// What vanishes there.
+    pub functions: SmallVec<[EventFunction; 4]>,
+    /// The functions come within rounding of zero without a change of sign.
+    pub touch: bool,
 }
 
 /// A zero at the start of the motion that is divided out: near `t` the function is

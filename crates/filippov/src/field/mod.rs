@@ -2,6 +2,7 @@
 
 mod affine;
 mod affine_bounds;
+mod by_mode;
 mod by_rule;
 mod canopy;
 mod contact;
@@ -14,6 +15,7 @@ pub mod weights;
 
 pub use affine::AffineLaw;
 pub use affine_bounds::AffineBounds;
+pub(crate) use by_mode::{Exits, Law, ModeField, SlidingSet};
 pub use by_rule::RuleLaw;
 pub use canopy::Canopy;
 pub use contact::ContactField;

@@ -18,16 +18,17 @@ use std::time::Instant;
 
 use rustc_hash::FxHashMap;
 
-use super::{Stats, Stop, Warning};
+use super::Stats;
 use crate::action::Actions;
+use crate::decisions::{root_ends, Cause};
 use crate::error::{Error, FieldError};
-use crate::event::UserEvent;
+use crate::event::{Found, UserEvent};
+use crate::field::ModeField;
 use crate::field::SmoothField;
 use crate::integrate::actions::timetable::Timetable;
-use crate::integrate::decisions::meeting::DecidedRoot;
 use crate::integrate::detection::detect::Detector;
 use crate::integrate::detection::user_events::UserEvents;
-use crate::integrate::motion::{ModeField, Motion};
+use crate::integrate::motion::Motion;
 use crate::integrate::steps::chatter::Chatter;
 use crate::integrate::steps::pace::Pace;
 use crate::integrate::steps::stiff::Derivatives;
@@ -36,6 +37,7 @@ use crate::mode::Mode;
 use crate::options::{Method, Options};
 use crate::recorder::Recorder;
 use crate::solution::Solution;
+use crate::status::{Stop, Warning};
 use crate::stepper::{
     Attempt, Controller, Dop853, ErrorScale, Midpoint, Rodas5p, StepMethod, Stepper, Taylor,
 };
@@ -92,8 +94,6 @@ pub struct Integrator<'a> {
     pub(super) chatter: Option<Chatter>,
     /// The first of the last switches without progress of time, and how many came since.
     pub(super) last_switch: (f64, u32),
-    /// What its decision found of the root that the next motion begins at.
-    pub(super) decided: DecidedRoot,
     /// How long a step the series allows that was taken at the start of the motion, until the step.
     pub(super) series_reach: Option<f64>,
     /// Exit functions of this mode whose multipliers were held at their ends, with what they may go beyond.
@@ -168,7 +168,6 @@ impl<'a> Integrator<'a> {
             recent_dt: 0.0,
             chatter: None,
             last_switch: (f64::NAN, 0),
-            decided: DecidedRoot::default(),
             series_reach: None,
             slacks: Vec::new(),
         })
@@ -243,14 +242,15 @@ impl<'a> Integrator<'a> {
         }
         let shortest = (SHORTEST_STEP * self.t.abs()).max(SHORTEST_STEP_AT_ZERO);
         if dt < shortest && dt < remaining {
-            let mut lost = self.lost_jump()?.or_else(|| self.lost_root());
-            if lost.is_none() {
-                lost = self.lost_share()?;
-            }
-            if let Some(event) = lost {
+            let lost = self.ask(Cause::Start, root_ends::lost_functions)?;
+            if let Some(functions) = lost {
                 self.dt = f64::NAN;
                 self.one_sided = false;
-                return self.switch(&event);
+                return self.switch(&Found {
+                    theta: 0.0,
+                    functions,
+                    touch: false,
+                });
             }
             if !self.one_sided {
                 return Ok(Some(Stop::StepTooSmall));

@@ -1,18 +1,18 @@
 //! The integrator: steps, events and switches in the right order.
 
 mod actions;
-mod decisions;
 mod detection;
 mod integrator;
+mod limits;
 mod motion;
+mod resting;
 mod solve;
 mod start;
 mod stats;
-mod status;
 mod steps;
+mod transition;
 
 pub use detection::user_events::UserZero;
 pub use integrator::Integrator;
 pub use solve::{solve, solve_interruptible, solve_to_section, solve_with_actions};
 pub use stats::Stats;
-pub use status::{Stop, Warning, WarningCode};

@@ -1,12 +1,12 @@
 //! Where a run starts: arguments checked, the mode of the initial state found.
 
-use super::Stop;
 use crate::action::{Actions, Trigger};
+use crate::decisions::{Cause, Next, Rule};
 use crate::error::{Error, FieldError};
-use crate::integrate::decisions::transition::Left;
 use crate::integrate::integrator::Integrator;
 use crate::mode::Mode;
 use crate::options::Options;
+use crate::status::Stop;
 use crate::system::PiecewiseSystem;
 
 /// Checks the arguments of a run.
@@ -105,27 +105,26 @@ impl Integrator<'_> {
     /// Decides the mode anew at the current point and goes on.
     pub(super) fn go_on_from_here(&mut self) -> Result<Option<Stop>, FieldError> {
         let before = self.motion.mode.clone();
-        let (after, left) = match self.place(Some(&before))? {
-            Ok(placed) => placed,
-            Err(stop) => return Ok(Some(stop)),
-        };
-        self.go_on_in(before, after, &left)
+        match self.decide(Cause::Anew(&before))? {
+            (rule, Ok(next)) => self.go_on_in(before, next, rule),
+            (_, Err(stop)) => Ok(Some(stop)),
+        }
     }
 
     /// Records what changes between two modes, if anything does, and starts the motion in the second.
     pub(super) fn go_on_in(
         &mut self,
         before: Mode,
-        after: Mode,
-        left: &[Left],
+        next: Next,
+        rule: Rule,
     ) -> Result<Option<Stop>, FieldError> {
-        let entries = before.entries().iter().zip(after.entries()).enumerate();
+        let entries = before.entries().iter().zip(next.mode.entries()).enumerate();
         let changed = entries.filter(|(_, (before, after))| before != after);
         let changed: Vec<usize> = changed.map(|(j, _)| j).collect();
         if !changed.is_empty() {
-            self.record(before, after.clone(), &changed);
+            self.record(before, next.mode.clone(), &changed, rule.name());
         }
-        self.begin(after, left)
+        self.begin(next)
     }
 
     /// Finds the mode of the initial state and starts the motion.
@@ -134,10 +133,9 @@ impl Integrator<'_> {
         if !self.actions.list.is_empty() {
             return self.start_with_actions();
         }
-        let (mode, left) = match self.place(None)? {
-            Ok(placed) => placed,
-            Err(stop) => return Ok(Some(stop)),
-        };
-        self.begin(mode, &left)
+        match self.decide(Cause::Start)?.1 {
+            Ok(next) => self.begin(next),
+            Err(stop) => Ok(Some(stop)),
+        }
     }
 }

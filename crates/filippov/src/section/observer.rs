@@ -5,9 +5,9 @@ use std::collections::VecDeque;
 use super::cycle::Cycle;
 use super::{Place, Section};
 use crate::action::Clock;
-use crate::integrate::Stop;
 use crate::mode::Mode;
 use crate::solution::Switch;
+use crate::status::Stop;
 use crate::switching::Kind;
 use crate::tolerances::SAME_TICK;
 

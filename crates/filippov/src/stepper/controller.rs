@@ -40,6 +40,12 @@ impl ErrorScale {
         self.atol[i] + self.rtol * if b < a { a } else { b }
     }
 
+    /// The size of component `i` at `y`: its magnitude, or where that is small the one below which the absolute
+    /// tolerance governs its error. Infinite where nothing tells it.
+    pub fn size(&self, i: usize, y: f64) -> f64 {
+        self.of(i, y, y) / self.rtol
+    }
+
     /// The tolerance for a function with this gradient at `y`: the sum of what those of the components amount to.
     pub fn along(&self, gradient: &[f64], y: &[f64]) -> f64 {
         let components = gradient.iter().zip(y).enumerate();

@@ -27,6 +27,16 @@ pub enum Arrival {
     Start,
 }
 
+impl Arrival {
+    /// The arrival of a motion whose mode had this entry.
+    pub fn from_side(entry: i8) -> Self {
+        match entry {
+            0 => Arrival::Start,
+            side => Arrival::Region(side),
+        }
+    }
+}
+
 /// The decision at one surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Decision {

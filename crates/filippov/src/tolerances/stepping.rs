@@ -19,9 +19,15 @@ pub const SEVERAL: f64 = 3.0;
 /// How far ahead the first step looks then, as a multiple of the last motion in the mode.
 pub const REACH: f64 = 1.25;
 
-/// Share of the last step over which rates at an event are taken by differences: short against the time in
-/// which anything changes, long against rounding.
-pub const DRIFT_SHARE: f64 = 1e-4;
+/// A moment moves each component of the state by this part of its size: short against the time in which anything changes,
+/// and long enough for differences to be clear of rounding.
+pub const MOMENT: f64 = 1e-4;
+
+/// A moment in which the field changes by more than this part of its size is shortened, to a change of about [`MOMENT`].
+pub const TOO_LARGE_A_CHANGE: f64 = 1e-2;
+
+/// How often a moment is shortened: each time by up to the factor [`MOMENT`].
+pub const MOST_SHORTENINGS: usize = 4;
 
 /// Orders of Taylor steps per decimal digit of the relative tolerance, and beside that: where the coefficients are
 /// cheap, and where they are dear. The least work on coefficients per unit of time takes 1.15 per digit (Jorba and

@@ -284,21 +284,18 @@ pub const MOST_DOUBLINGS: usize = 20;
 /// steps add up.
 pub const LEFT_RESTING: f64 = 1e3;
 
-/// Normal components have vanished that are below this part of what they were a moment before, which is the square root of
-/// rounding: at a zero that is known to rounding they are some 1e-8 of it.
+/// Normal components have vanished that are below this part of what they were a moment before: a zero is known to much
+/// less than a moment.
 pub const VANISHED: f64 = 1e-3;
 
 /// A gradient depends on others where the square of its part orthogonal to them is below this fraction of its own: the
 /// rounding of inner products.
 pub const DEPENDENT: f64 = 64.0 * EPS;
 
-/// Equations that say nothing are looked at again after this part of the time that is left: what changes at the rate of the
-/// motion is then clear of `TANGENT_TO_ALL`.
-pub const TANGENT_FOR: f64 = 1e-4;
-
-/// Where the modes are tried for a moment, how long that is, as a part of the time that is left: a triple zero is then clear
-/// of rounding, and nothing else has changed much.
-pub const LOOK_AHEAD: f64 = 1e-4;
+/// A trial of the modes is lengthened by this factor, up to so many times, until every function is clear of rounding.
+pub const LONGER_TRIAL: f64 = 10.0;
+/// See [`LONGER_TRIAL`]: from a moment to about the time in which the state changes by its own size.
+pub const MOST_LENGTHENINGS: i32 = 3;
 
 /// Most surfaces that meet of which all modes are tried.
 pub const MOST_TRIED: usize = 3;

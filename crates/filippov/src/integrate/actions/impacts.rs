@@ -2,13 +2,14 @@
 
 use smallvec::{smallvec, SmallVec};
 
+use crate::decisions::{limits::reach, Cause};
 use crate::error::FieldError;
 use crate::field::{ContactField, Projector};
 use crate::integrate::actions::instant::is_reset;
 use crate::integrate::integrator::Integrator;
-use crate::integrate::Stop;
 use crate::mode::Mode;
 use crate::solution::Switch;
+use crate::status::Stop;
 use crate::switching::Kind;
 use crate::system::dot;
 use crate::tolerances::{IMPACTS_AGREE, SURFACE_NOISE, UNRESOLVED_FLIGHT};
@@ -36,8 +37,12 @@ impl Integrator<'_> {
         let &[j] = &last.surfaces[..] else {
             return Ok(None);
         };
-        let departs = after.entries()[j] == self.trigger_side(j, None);
-        if !is_reset(last) || !departs || !self.is_only_trigger(j) || self.motion.mode != *after {
+        let departs = after.entries()[j] == self.triggers().side(j, None);
+        if !is_reset(last)
+            || !departs
+            || !self.triggers().is_only_trigger(j)
+            || self.motion.mode != *after
+        {
             return Ok(None);
         }
         let signs = after.signs();
@@ -55,7 +60,7 @@ impl Integrator<'_> {
         let size = self.system.surface_size(j, t, x, &signs)?;
         let is_unresolved = height <= UNRESOLVED_FLIGHT * SURFACE_NOISE * size;
         let distance = rate.rate.abs() / dot(&row, &row).sqrt();
-        if !is_unresolved && distance >= self.reach() {
+        if !is_unresolved && distance >= reach(&self.scale, &self.x) {
             return Ok(None);
         }
         let here = Rest {
@@ -121,18 +126,26 @@ impl Integrator<'_> {
         self.stats.n_switches += 1;
         let due = self.reached_beside(&before, surface)?;
         if !due.is_empty() {
-            self.record_rest(y_before, surface, before.clone(), before.clone());
+            self.record_rest(y_before, surface, before.clone(), before.clone(), "");
             return self.act(due);
         }
-        let (after, left) = match self.place(Some(&before))? {
-            Ok(decided) => decided,
+        let (rule, decided) = self.decide(Cause::Anew(&before))?;
+        let next = match decided {
+            Ok(next) => next,
             Err(stop) => return Ok(Some(stop)),
         };
-        self.record_rest(y_before, surface, before, after.clone());
-        self.begin(after, &left)
+        self.record_rest(y_before, surface, before, next.mode.clone(), rule.name());
+        self.begin(next)
     }
 
-    fn record_rest(&mut self, y_before: Vec<f64>, surface: usize, before: Mode, after: Mode) {
+    fn record_rest(
+        &mut self,
+        y_before: Vec<f64>,
+        surface: usize,
+        before: Mode,
+        after: Mode,
+        rule: &'static str,
+    ) {
         self.recorder.switch(Switch {
             t: self.t,
             y_before: y_before.into(),
@@ -142,6 +155,7 @@ impl Integrator<'_> {
             mode_before: before,
             mode_after: after,
             note: String::new(),
+            rule,
         });
     }
 
@@ -151,10 +165,10 @@ impl Integrator<'_> {
         let h = self.surface_values(&signs)?;
         let passed = (0..h.len()).filter(|&k| {
             let side = before.entries()[k];
-            k != surface && self.is_only_trigger(k) && h[k] * f64::from(side) < 0.0
+            k != surface && self.triggers().is_only_trigger(k) && h[k] * f64::from(side) < 0.0
         });
         let passed: Vec<usize> = passed
-            .filter(|&k| self.trigger_side(k, None) == before.entries()[k])
+            .filter(|&k| self.triggers().side(k, None) == before.entries()[k])
             .collect();
         if passed.is_empty() {
             return Ok(Vec::new());

@@ -8,20 +8,22 @@
 //!    a motion that approaches it. This is repeated until there are none.
 //! 3. An action whose state still moves through its surface is not done again in that instant: the motion
 //!    crosses. (A count, or a phase that is set back, at a section.)
-//! 4. The mode is decided for the last state ([`crate::integrate::decisions::placement`]).
+//! 4. The mode is decided for the last state ([`crate::decisions`]).
 
 use smallvec::SmallVec;
 
 use crate::action::Trigger;
+use crate::decisions::{
+    add_vanishing_surfaces, goes_through, located_surfaces, pushed_back, rates_here, sides, Cause,
+    Left, Sides, Triggers, Values,
+};
 use crate::error::FieldError;
 use crate::event::EventFunction;
-use crate::integrate::decisions::placement::Sides;
-use crate::integrate::decisions::transition::{located_surfaces, Left, Values};
-use crate::integrate::detection::detect::Found;
+use crate::event::Found;
 use crate::integrate::integrator::Integrator;
-use crate::integrate::Stop;
 use crate::mode::Mode;
 use crate::solution::Switch;
+use crate::status::Stop;
 use crate::switching::{Kind, Leading};
 use crate::tolerances::{MOST_ACTIONS_AT_ONE_TIME, PENETRATION, SURFACE_NOISE};
 
@@ -41,28 +43,27 @@ impl Integrator<'_> {
         let Some(Sides {
             mut mode,
             on_surface,
-        }) = self.sides(None)?
+        }) = self.ask(Cause::Start, |at, notes| sides(at, notes, None))?
         else {
             return Ok(Some(Stop::NotFinite));
         };
         let mut due = self.timetable.take(self.actions, self.t);
         self.update_horizon();
         for j in 0..on_surface.len() {
-            if !on_surface[j] || !self.is_only_trigger(j) {
+            if !on_surface[j] || !self.triggers().is_only_trigger(j) {
                 continue;
             }
-            let side = self.trigger_side(j, None);
+            let side = self.triggers().side(j, None);
             mode.set(j, side);
             if self.goes_through(j, side, &mode, &on_surface)? {
                 due.extend(self.triggered_at(j, side));
             }
         }
         if due.is_empty() {
-            let (mode, left) = match self.place(None)? {
-                Ok(placed) => placed,
-                Err(stop) => return Ok(Some(stop)),
+            return match self.decide(Cause::Start)?.1 {
+                Ok(next) => self.begin(next),
+                Err(stop) => Ok(Some(stop)),
             };
-            return self.begin(mode, &left);
         }
         self.motion.restart(self.system, self.t, mode, &[]);
         due.sort_unstable();
@@ -108,10 +109,13 @@ impl Integrator<'_> {
         if event.touch {
             return Ok(None);
         }
-        let mut surfaces = located_surfaces(event);
-        self.add_vanishing_surfaces(&mut surfaces, h)?;
+        let mode = self.motion.mode.clone();
+        let (surfaces, rates) = self.ask(Cause::Anew(&mode), |at, _| {
+            let mut surfaces = located_surfaces(&event.functions);
+            add_vanishing_surfaces(at, &mut surfaces, h)?;
+            Ok((surfaces, rates_here(at)?))
+        })?;
         let located = |j: usize| event.functions.contains(&EventFunction::Surface(j));
-        let rates = self.rates_here()?;
         let entries = self.motion.mode.entries();
         let reached = surfaces.iter().copied().filter(|&j| {
             let approaches = rates[j] * f64::from(entries[j]) < 0.0;
@@ -133,8 +137,9 @@ impl Integrator<'_> {
             self.note_residuals(h, &surfaces);
             return self.act(due).map(Some);
         }
-        let departs =
-            |j: &&usize| rates[**j] * f64::from(entries[**j]) > 0.0 && self.is_only_trigger(**j);
+        let departs = |j: &&usize| {
+            rates[**j] * f64::from(entries[**j]) > 0.0 && self.triggers().is_only_trigger(**j)
+        };
         let departing: Vec<(usize, f64)> = surfaces
             .iter()
             .filter(departs)
@@ -144,20 +149,15 @@ impl Integrator<'_> {
             self.note_residuals(h, &surfaces);
             return self.go_on_unless_stuck(&departing).map(Some);
         }
-        if self.motion.is_in_contact() {
-            return self.decide_in_contact(event, &surfaces).map(Some);
-        }
-        let is_smooth = |&j: &usize| !self.system.switches_at(j);
-        if surfaces.len() > 1 && surfaces.iter().any(is_smooth) {
+        if !self.motion.is_in_contact() && surfaces.len() > 1 {
             self.note_residuals(h, &surfaces);
-            return self.cross_beside_triggers(&surfaces).map(Some);
         }
         Ok(None)
     }
 
     /// The triggers that the motion reaches here up to rounding.
     fn triggers_reached(&mut self, h: &Values) -> Result<Vec<usize>, FieldError> {
-        let rates = self.rates_here()?;
+        let rates = self.ask(Cause::Start, |at, _| rates_here(at))?;
         let mut reached = Vec::new();
         for j in (0..h.len()).filter(|&j| self.actions.at_surface(j).is_some()) {
             let signs = &self.motion.signs;
@@ -243,18 +243,19 @@ impl Integrator<'_> {
         self.passing = passing.filter(|(_, p)| **p).map(|(j, _)| j).collect();
         self.recorder.jump(self.t, &self.x);
         self.recorder.set_jump(first, &arrived, &self.x);
-        let (after, left) = match self.place(Some(&before))? {
-            Ok(placed) => placed,
+        let (_, decided) = self.decide(Cause::Anew(&before))?;
+        let next = match decided {
+            Ok(next) => next,
             Err(stop) => return Ok(Some(stop)),
         };
         self.residuals.clear();
         self.passing.clear();
-        self.recorder.set_last_mode(first, &after);
-        if let Some(rest) = self.impacts_end(first, &after)? {
-            return self.come_to_rest(rest, after);
+        self.recorder.set_last_mode(first, &next.mode);
+        if let Some(rest) = self.impacts_end(first, &next.mode)? {
+            return self.come_to_rest(rest, next.mode);
         }
         let t = self.t;
-        let stop = self.begin(after, &left)?;
+        let stop = self.begin(next)?;
         if self.t == t {
             // Contact that begins with a speed below the tolerance takes that away.
             self.recorder.jump(t, &self.x);
@@ -277,7 +278,10 @@ impl Integrator<'_> {
         if side == 0 {
             return Ok(None);
         }
-        let Some(Sides { mode, on_surface }) = self.sides(Some(before))? else {
+        let Some(Sides { mode, on_surface }) = self.ask(Cause::Anew(before), |at, notes| {
+            sides(at, notes, Some(before))
+        })?
+        else {
             return Ok(None);
         };
         let goes_on = on_surface[j] && self.goes_through(j, side, &mode, &on_surface)?;
@@ -294,9 +298,10 @@ impl Integrator<'_> {
     ) -> Result<Option<usize>, FieldError> {
         let signs = before.signs();
         let h = self.surface_values(&signs)?;
-        let is_solid = |j: &usize| self.is_only_trigger(*j) && !self.is_internal(*j);
+        let is_solid =
+            |j: &usize| self.triggers().is_only_trigger(*j) && !self.triggers().is_internal(*j);
         for j in (0..h.len()).filter(|j| is_solid(j) && !approach.passes[*j]) {
-            let side = self.trigger_side(j, Some(before));
+            let side = self.triggers().side(j, Some(before));
             let came_from = before.entries()[j] == side || before.entries()[j] == 0;
             let is_beyond = h[j] * f64::from(side) < 0.0 && came_from;
             let has_jumped = (h[j] - start[j]).abs() > PENETRATION * h[j].abs();
@@ -319,15 +324,52 @@ impl Integrator<'_> {
         departing: &[(usize, f64)],
     ) -> Result<Option<Stop>, FieldError> {
         let before = self.motion.mode.clone();
-        let (after, mut left) = match self.place(Some(&before))? {
-            Ok(placed) => placed,
+        let (rule, decided) = self.decide(Cause::Anew(&before))?;
+        self.residuals.clear();
+        let mut next = match decided {
+            Ok(next) => next,
             Err(stop) => return Ok(Some(stop)),
         };
-        self.residuals.clear();
-        for &(j, value) in departing.iter().filter(|(j, _)| self.is_internal(*j)) {
-            left.push(Left::Surface(j, Leading { order: 1, value }));
+        for &(j, value) in departing
+            .iter()
+            .filter(|(j, _)| self.triggers().is_internal(*j))
+        {
+            next.left
+                .push(Left::Surface(j, Leading { order: 1, value }));
         }
-        self.go_on_in(before, after, &left)
+        self.go_on_in(before, next, rule)
+    }
+
+    /// Moves the state back onto the triggers that it slipped through.
+    fn push_back(&mut self, memory: &Mode) -> Result<(), FieldError> {
+        let moved = self.ask(Cause::Anew(memory), |at, notes| {
+            pushed_back(at, notes, memory)
+        })?;
+        if let Some(x) = moved {
+            self.x = x;
+        }
+        Ok(())
+    }
+
+    /// Does the motion lead from this side through a surface that the point lies on?
+    fn goes_through(
+        &mut self,
+        j: usize,
+        side: i8,
+        mode: &Mode,
+        on_surface: &[bool],
+    ) -> Result<bool, FieldError> {
+        self.ask(Cause::Anew(mode), |at, notes| {
+            goes_through(at, notes, j, side, mode, on_surface)
+        })
+    }
+
+    /// What the surfaces do that trigger actions.
+    pub(in crate::integrate) fn triggers(&self) -> Triggers<'_> {
+        Triggers {
+            system: self.system,
+            actions: self.actions,
+        }
     }
 
     /// Does one action and records it.
@@ -355,6 +397,7 @@ impl Integrator<'_> {
                 mode_before: before.clone(),
                 mode_after: before.clone(),
                 note: action.name.clone(),
+                rule: "",
             });
         }
         // The run may end in the middle of an instant.
@@ -371,7 +414,11 @@ impl Integrator<'_> {
         done: &[usize],
         approach: &mut Approach,
     ) -> Result<Vec<usize>, FieldError> {
-        let Some(Sides { mode, on_surface }) = self.sides(Some(&self.motion.mode.clone()))? else {
+        let before = self.motion.mode.clone();
+        let cause = Cause::Anew(&before);
+        let Some(Sides { mode, on_surface }) =
+            self.ask(cause, |at, notes| sides(at, notes, Some(&before)))?
+        else {
             return Ok(Vec::new());
         };
         let mut due = Vec::new();
@@ -383,14 +430,14 @@ impl Integrator<'_> {
             let was_done = self
                 .triggered_at(j, side)
                 .any(|index| done.contains(&index));
-            if self.follows_law(j) && !on_surface[j] {
+            if self.triggers().follows_law(j) && !on_surface[j] {
                 // Whatever led there in this instant, also after its own change: in the end the law holds.
                 if mode.entries()[j] < 0 {
                     due.extend(self.triggered_at(j, 1));
                 }
                 continue;
             }
-            if was_done && self.is_internal(j) {
+            if was_done && self.triggers().is_internal(j) {
                 continue;
             }
             if !on_surface[j] {

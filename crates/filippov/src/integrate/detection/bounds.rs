@@ -10,10 +10,10 @@ use crate::event::certificate::{prove, Bound, Proof};
 use crate::event::isolate::PROBES;
 use crate::event::tube::Tube;
 use crate::event::{EventFunction, Monitored};
+use crate::field::ModeField;
 use crate::field::{AffineBounds, IntersectionExit};
 use crate::integrate::detection::detect::Detector;
 use crate::integrate::integrator::Integrator;
-use crate::integrate::motion::ModeField;
 use crate::mode::Signs;
 use crate::options::SlidingRule;
 use crate::stepper::Interpolant;
@@ -222,7 +222,7 @@ impl Integrator<'_> {
             margin: &self.detector.margin,
             stages: &self.detector.stages,
             affine: self.motion.affine_bounds(),
-            by_multipliers: !self.slides_by_rule() && self.motion.has_bounds(),
+            by_multipliers: !self.motion.slides_by_rule() && self.motion.has_bounds(),
             known_exits: &self.detector.enclosed_exits,
             known_roots: &self.detector.enclosed_roots,
         };

@@ -2,7 +2,7 @@
 
 use crate::error::FieldError;
 use crate::event::{EventFunction, Monitored};
-use crate::integrate::motion::{Exits, ModeField};
+use crate::field::{Exits, ModeField};
 use crate::stepper::Interpolant;
 use crate::system::PiecewiseSystem;
 

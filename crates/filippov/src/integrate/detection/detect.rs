@@ -2,16 +2,17 @@
 
 use std::cell::RefCell;
 
-use smallvec::{smallvec, SmallVec};
+use smallvec::smallvec;
 
 use crate::error::FieldError;
 use crate::event::certificate::Proof;
 use crate::event::filter::{may_vanish, may_vanish_bent, may_vanish_between, may_vanish_deflated};
 use crate::event::isolate::PROBES;
-use crate::event::{Deflation, EventFunction, Monitored};
+use crate::event::{Deflation, EventFunction, Found, Monitored};
+use crate::field::Exits;
 use crate::integrate::detection::bounds::{Piece, RootPiece};
 use crate::integrate::integrator::Integrator;
-use crate::integrate::motion::{Exits, Motion};
+use crate::integrate::motion::Motion;
 use crate::system::PiecewiseSystem;
 use crate::tolerances::{EPS, EXTRAPOLATION, ONE_SIDED_AIM, SURFACE_NOISE};
 
@@ -57,17 +58,6 @@ pub(in crate::integrate) struct Detector {
     exit_noise: Option<f64>,
     /// Which monitored functions could not be cleared, and whether bounds say anything about them.
     suspects: Vec<(usize, bool)>,
-}
-
-/// The earliest zero of a step.
-#[derive(Clone, Debug)]
-pub(in crate::integrate) struct Found {
-    /// Where, in steps.
-    pub theta: f64,
-    /// What vanishes there.
-    pub functions: SmallVec<[EventFunction; 4]>,
-    /// The functions come within rounding of zero without a change of sign.
-    pub touch: bool,
 }
 
 impl Detector {

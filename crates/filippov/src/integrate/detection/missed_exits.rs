@@ -2,7 +2,7 @@
 
 use crate::error::FieldError;
 use crate::event::EventFunction;
-use crate::integrate::detection::detect::Found;
+use crate::event::Found;
 use crate::integrate::integrator::Integrator;
 
 impl Integrator<'_> {

@@ -8,8 +8,8 @@
 use smallvec::SmallVec;
 
 use crate::error::FieldError;
+use crate::event::Found;
 use crate::event::{EventFunction, Monitored};
-use crate::integrate::detection::detect::Found;
 use crate::integrate::integrator::Integrator;
 use crate::stepper::StepMethod;
 use crate::tolerances::{EPS, EXPLAINED, MAX_LIE_ORDER, MOST_HALVINGS, TOUCH_DEPTH};

@@ -167,7 +167,7 @@ impl Integrator<'_> {
         let m = self.motion.monitored[index];
         let noise = self.noise_beside(&m)?;
         self.motion.monitored[index].noise = noise;
-        let by_multipliers = !self.slides_by_rule() && self.motion.has_bounds();
+        let by_multipliers = !self.motion.slides_by_rule() && self.motion.has_bounds();
         let interpolant = self.stepper.interpolant();
         let bounds = BoundedCurve {
             system: self.system,

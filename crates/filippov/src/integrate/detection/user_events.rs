@@ -4,7 +4,7 @@ use crate::error::FieldError;
 use crate::event::{UserEvent, UserFunction};
 use crate::integrate::integrator::Integrator;
 use crate::integrate::motion::Motion;
-use crate::integrate::Stop;
+use crate::status::Stop;
 use crate::stepper::Interpolant;
 use crate::tolerances::{EPS, SAME_TICK};
 

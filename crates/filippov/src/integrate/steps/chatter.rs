@@ -1,7 +1,7 @@
 //! Motion that chatters along a jump of the field for which no surface is declared.
 
 use crate::integrate::integrator::Integrator;
-use crate::integrate::Stop;
+use crate::status::Stop;
 use crate::tolerances::{CHATTER_STEPS, JUMP_SHRINK};
 
 /// Short steps since a jump of the field that no surface declares.

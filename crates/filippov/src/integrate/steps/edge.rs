@@ -1,11 +1,11 @@
 //! Steps at the edge of the field: where it ends at a surface, and where it jumps without one.
 
 use crate::error::FieldError;
+use crate::event::Found;
 use crate::event::{EventFunction, Monitored};
-use crate::integrate::detection::detect::Found;
+use crate::field::ModeField;
 use crate::integrate::integrator::Integrator;
-use crate::integrate::motion::ModeField;
-use crate::integrate::{Warning, WarningCode};
+use crate::status::{Warning, WarningCode};
 use crate::tolerances::{ARRIVED, JUMP_SHRINK, ONE_SIDED_AIM};
 
 impl Integrator<'_> {
@@ -90,11 +90,13 @@ impl Integrator<'_> {
             self.warnings.push(Warning {
                 t,
                 code: WarningCode::UndeclaredJump,
+                surfaces: Vec::new(),
                 text: format!(
                     "the right-hand side jumps near t = {t:.10} and no surface is declared there; \
                      give its switching function in surfaces="
                 ),
                 candidates: Vec::new(),
+                rule: "",
             });
             self.suspect_chatter(self.recent_dt);
             self.recent_dt = 0.0;

@@ -4,9 +4,9 @@ use crate::error::FieldError;
 use crate::event::isolate::Bracket;
 use crate::event::locate::refine;
 use crate::event::EventFunction;
+use crate::field::ModeField;
 use crate::field::SmoothField;
 use crate::integrate::integrator::Integrator;
-use crate::integrate::motion::ModeField;
 use crate::stepper::Attempt;
 use crate::tolerances::EPS;
 

@@ -1,7 +1,7 @@
 //! The pace of a motion: its first step, from how the last motion in its mode went.
 
+use crate::decisions::Left;
 use crate::error::FieldError;
-use crate::integrate::decisions::transition::Left;
 use crate::integrate::integrator::Integrator;
 use crate::stepper::{initial_step, restart_step, tiny_step, ErrorScale};
 use crate::switching::Leading;

@@ -2,8 +2,8 @@
 
 use crate::error::FieldError;
 use crate::integrate::integrator::Integrator;
-use crate::integrate::Stop;
 use crate::section::{Observer, Place, Section};
+use crate::status::Stop;
 
 impl Integrator<'_> {
     /// Observes the run at a section; its function, if it has one, is the only one of the user's events.

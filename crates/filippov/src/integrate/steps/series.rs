@@ -2,12 +2,13 @@
 
 use crate::error::FieldError;
 use crate::event::Monitored;
+use crate::field::ModeField;
 use crate::integrate::integrator::Integrator;
-use crate::integrate::motion::{ModeField, Motion};
+use crate::integrate::motion::Motion;
 use crate::integrate::steps::stiff::Derivatives;
-use crate::integrate::{Warning, WarningCode};
 use crate::mode::Signs;
 use crate::options::Method;
+use crate::status::{Warning, WarningCode};
 use crate::stepper::{reach as series_reach, Attempt, StepMethod};
 use crate::tolerances::{EPS, MOST_AUTO_SERIES, TAYLOR_SHORTEST};
 
@@ -25,7 +26,7 @@ impl Integrator<'_> {
         let may = !self.motion.is_in_contact()
             && self.motion.resting.is_empty()
             && !self.motion.is_drawn_back()
-            && !self.slides_by_rule()
+            && !self.motion.slides_by_rule()
             && self.motion.has_bounds()
             && (self.system.is_analytic() || starts_clear());
         if let (Some(taylor), true) = (&self.stepper.taylor, may) {
@@ -93,8 +94,10 @@ impl Integrator<'_> {
         self.warnings.push(Warning {
             t,
             code: WarningCode::NoSeries,
+            surfaces: Vec::new(),
             text,
             candidates: Vec::new(),
+            rule: "",
         });
     }
 

@@ -1,9 +1,9 @@
 //! Steps by the method for stiff motions.
 
 use crate::error::FieldError;
+use crate::field::ModeField;
 use crate::field::SmoothField;
 use crate::integrate::integrator::Integrator;
-use crate::integrate::motion::ModeField;
 use crate::stepper::{Attempt, Linearisation, StepMethod};
 use crate::tolerances::{AIM_MARGINS, EPS};
 
@@ -184,7 +184,7 @@ impl Integrator<'_> {
             return self.attempt_explicit(dt);
         }
         let stages = &mut self.detector.stages;
-        let observe = |stage: usize, field: &crate::integrate::motion::ModeField| {
+        let observe = |stage: usize, field: &crate::field::ModeField| {
             for (exit, value) in stages.iter_mut().zip(field.last_exits()) {
                 exit[stage] = value;
             }

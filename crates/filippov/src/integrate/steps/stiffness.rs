@@ -6,8 +6,8 @@ use crate::error::FieldError;
 use crate::field::SmoothField;
 use crate::integrate::integrator::Integrator;
 use crate::integrate::steps::stiff::Derivatives;
-use crate::integrate::{Warning, WarningCode};
 use crate::options::Method;
+use crate::status::{Warning, WarningCode};
 use crate::stepper::{Rodas5p, StepMethod};
 use crate::tolerances::{NOT_STIFF_SIGNS, STIFF_DOP853, STIFF_DOPRI5, STIFF_SERIES, STIFF_SIGNS};
 
@@ -88,8 +88,10 @@ impl Integrator<'_> {
         self.warnings.push(Warning {
             t,
             code: WarningCode::Stiff,
+            surfaces: Vec::new(),
             text,
             candidates: Vec::new(),
+            rule: "",
         });
         Ok(false)
     }

@@ -1,14 +1,13 @@
 //! Surfaces whose functions are zero all along the motion: those that neither field leaves, and those in the place of the
 //! one slid on.
 
+use crate::decisions::{surfaces_in_the_place_of_those_slid_on, Left};
 use crate::error::FieldError;
 use crate::event::EventFunction;
-use crate::field::Projector;
-use crate::integrate::decisions::choice::NOT_UNIQUE_AT;
-use crate::integrate::decisions::transition::{Left, Lefts};
+use crate::field::{ModeField, Projector};
 use crate::integrate::integrator::Integrator;
-use crate::integrate::{Stop, Warning, WarningCode};
 use crate::mode::Mode;
+use crate::status::{Stop, Warning, WarningCode};
 use crate::switching::first_nonzero;
 use crate::tolerances::{LEFT_RESTING, NEARLY_ZERO};
 
@@ -37,43 +36,29 @@ impl Integrator<'_> {
         Ok(())
     }
 
-    /// The motion in a region whose field is at rest where the surfaces of `meeting` vanish.
-    pub(in crate::integrate) fn rest_in(
-        &self,
-        region: Mode,
-        meeting: &[usize],
-    ) -> Result<(Mode, Lefts), FieldError> {
-        let (mut left, signs) = (Lefts::new(), region.signs());
-        for &j in meeting {
-            let side = region.entries()[j];
-            let leading = first_nonzero(self.system, j, side, 0, self.t, &self.x, &signs)?;
-            left.push(Left::Surface(j, leading));
-        }
-        Ok((region, left))
-    }
-
-    /// Was something said about a surface whose function is zero all along the motion?
+    /// Was a warning given about this surface alone: its function is zero along a motion, or the solution is not unique there?
     fn is_named(&self, j: usize) -> bool {
-        let name = self.system.surface_name(j);
-        self.warnings.iter().any(|warning| {
-            let not_unique = warning.text.strip_prefix(NOT_UNIQUE_AT);
-            let surfaces = not_unique.and_then(|text| text.split_once(" is not unique"));
-            warning.text.starts_with(&zero_from_here(&name))
-                || surfaces.is_some_and(|(names, _)| names == format!("{name} = 0"))
-        })
+        let is_about = |code| matches!(code, WarningCode::ZeroSurface | WarningCode::NonUnique);
+        let mut warnings = self.warnings.iter();
+        warnings.any(|warning| is_about(warning.code) && warning.surfaces == [j])
     }
 
-    /// Names a surface whose function is zero all along the motion, unless something was said about it.
+    /// Warns of a surface whose function is zero all along the motion, unless a warning was given about it.
     fn warn_zero_surface(&mut self, j: usize) {
-        if !self.is_named(j) {
-            let zero = zero_from_here(&self.system.surface_name(j));
-            self.warnings.push(Warning {
-                t: self.t,
-                code: WarningCode::ZeroSurface,
-                text: format!("{zero}: its sign means nothing, and that of the mode is taken"),
-                candidates: Vec::new(),
-            });
+        if self.is_named(j) {
+            return;
         }
+        let name = self.system.surface_name(j);
+        self.warnings.push(Warning {
+            t: self.t,
+            code: WarningCode::ZeroSurface,
+            surfaces: vec![j],
+            text: format!(
+                "{name} is zero all along the motion from here: its sign means nothing, and that of the mode is taken"
+            ),
+            candidates: Vec::new(),
+            rule: "",
+        });
     }
 
     /// A surface whose function was zero all along the step just made, up to rounding, and about which nothing was said: a
@@ -120,6 +105,56 @@ impl Integrator<'_> {
         Ok(stop)
     }
 
+    /// Notes the surfaces that are in the place of those slid on: they vanish all along the motion, and are no events.
+    pub(in crate::integrate) fn rest_on_coinciding(&mut self) -> Result<(), FieldError> {
+        if !(self.system.has_nested_signs() || self.motion.meets_kinks) {
+            return Ok(());
+        }
+        let (place, motion) = ((self.t, &self.x[..]), &mut self.motion);
+        let found = surfaces_in_the_place_of_those_slid_on(
+            self.system,
+            place,
+            &motion.mode,
+            &motion.active,
+        )?;
+        for k in found {
+            if !motion.resting.contains(&k) {
+                motion.resting.push(k);
+                motion
+                    .monitored
+                    .retain(|m| m.function != EventFunction::Surface(k));
+            }
+        }
+        Ok(())
+    }
+
+    /// Warns where a motion begins at a root around which the regularised motion oscillates.
+    pub(in crate::integrate) fn note_oscillation(&mut self) {
+        let ModeField::Intersection(field) = &self.motion.field else {
+            return;
+        };
+        if !field.oscillates() {
+            return;
+        }
+        let names = field
+            .set()
+            .iter()
+            .map(|&j| self.system.surface_name(j) + " = 0");
+        let names: Vec<String> = names.collect();
+        self.warnings.push(Warning {
+            t: self.t,
+            code: WarningCode::Oscillation,
+            surfaces: field.set().to_vec(),
+            text: format!(
+                "sliding at the intersection of {} is not stable for this scaling of the surfaces: the regularised \
+                 motion goes around it, with another mean, or away from it; another kappa= may be stable",
+                names.join(", ")
+            ),
+            candidates: Vec::new(),
+            rule: "",
+        });
+    }
+
     /// Has the motion left a surface that it was to stay on, by more than the tolerance?
     pub(in crate::integrate) fn has_left_resting(&mut self) -> Result<bool, FieldError> {
         let signs = self.motion.signs.clone();
@@ -130,7 +165,7 @@ impl Integrator<'_> {
                 .gradient(j, self.t, &self.x, &signs, &mut gradient)?;
             let tolerance = self.scale.along(&gradient, &self.x);
             // Bodies that touch have to be held apart at once.
-            let factor = if self.is_only_trigger(j) {
+            let factor = if self.triggers().is_only_trigger(j) {
                 1.0
             } else {
                 LEFT_RESTING
@@ -141,8 +176,4 @@ impl Integrator<'_> {
         }
         Ok(false)
     }
-}
-
-fn zero_from_here(name: &str) -> String {
-    format!("{name} is zero all along the motion from here")
 }

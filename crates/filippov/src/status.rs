@@ -296,8 +296,12 @@ pub struct Warning {
     pub t: f64,
     /// Its kind.
     pub code: WarningCode,
+    /// The surfaces that it is about, if any.
+    pub surfaces: Vec<usize>,
     /// What happened.
     pub text: String,
     /// At a non-unique point: all continuations, the chosen one first.
     pub candidates: Vec<Mode>,
+    /// The rule of the decision that it comes from; empty for others.
+    pub rule: &'static str,
 }

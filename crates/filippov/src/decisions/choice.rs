@@ -1,0 +1,90 @@
+//! Points where several continuations are Filippov solutions: which is taken, and who is told.
+
+use super::point::{Decided, Left, Next, Notes, Point};
+use crate::mode::Mode;
+use crate::options::NonUnique;
+use crate::status::{Stop, Warning, WarningCode};
+use crate::switching::Decision;
+
+/// The motion after the decision at one surface.
+pub(super) fn follow_at_surface(
+    at: &Point,
+    notes: &mut Notes,
+    mode: &Mode,
+    j: usize,
+    mut decision: Decision,
+) -> Decided {
+    if decision.turns_back() {
+        return Err(Stop::InvisibleTwoFold {
+            surface: j,
+            sliding: decision.two_fold,
+        });
+    }
+    let mut after = mode.with(j, decision.entry);
+    if decision.candidates.len() > 1 {
+        let candidates = decision.candidates.iter();
+        let candidates = candidates.map(|&entry| mode.with(j, entry)).collect();
+        after = choose(at, notes, &[j], after, candidates)?;
+        decision.entry = after.entries()[j];
+    }
+    let mut next = Next::new(after, Left::after(j, &decision));
+    next.root.at_two_fold = decision
+        .starts_at_two_fold()
+        .map(|motion| motion.multiplier());
+    Ok(next)
+}
+
+/// The mode that [`crate::Options::choices`] asks for at the next non-unique point.
+pub(super) fn asked<'a>(at: &Point<'_, '_, 'a>, notes: &Notes) -> Option<&'a Mode> {
+    at.policy.choices.get(notes.n_choices)
+}
+
+/// The continuation that is taken among several: the one asked for; else `preferred`, or none at all if the
+/// policy is to stop.
+pub(super) fn choose(
+    at: &Point,
+    notes: &mut Notes,
+    surfaces: &[usize],
+    preferred: Mode,
+    candidates: Vec<Mode>,
+) -> Result<Mode, Stop> {
+    let asked = asked(at, notes);
+    notes.n_choices += 1;
+    let chosen = match asked {
+        Some(asked) if candidates.contains(asked) => Some(asked.clone()),
+        Some(_) => None,
+        None if at.policy.nonunique == NonUnique::Error => None,
+        None => Some(preferred),
+    };
+    let Some(chosen) = chosen else {
+        return Err(Stop::NonUnique {
+            surfaces: surfaces.to_vec(),
+            candidates,
+        });
+    };
+    notes
+        .warnings
+        .push(non_unique(at, surfaces, &chosen, candidates));
+    Ok(chosen)
+}
+
+fn non_unique(at: &Point, surfaces: &[usize], chosen: &Mode, mut candidates: Vec<Mode>) -> Warning {
+    let modes: Vec<String> = candidates.iter().map(|m| format!("({m})")).collect();
+    let names = surfaces.iter().map(|&j| at.system.surface_name(j) + " = 0");
+    let names: Vec<String> = names.collect();
+    let text = format!(
+        "the continuation at {} is not unique: {}; ({chosen}) was chosen",
+        names.join(", "),
+        modes.join(", ")
+    );
+    // The chosen one first, the others in their order.
+    candidates.sort_by_key(|mode| mode != chosen);
+    Warning {
+        t: at.t,
+        code: WarningCode::NonUnique,
+        surfaces: surfaces.to_vec(),
+        text,
+        candidates,
+        rule: "",
+    }
+}

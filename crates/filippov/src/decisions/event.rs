@@ -1,0 +1,179 @@
+//! Events: which surfaces vanish there, and how the motion comes to them.
+
+use super::choice::choose;
+use super::decide::{How, Meeting};
+use super::point::{Arrival, Cause, Decided, Left, Lefts, Next, Notes, Point};
+use smallvec::SmallVec;
+
+use crate::error::FieldError;
+use crate::event::EventFunction;
+use crate::field::eval_on_side;
+use crate::mode::Mode;
+use crate::switching::{first_nonzero, normal_component, Arrival as SurfaceArrival, Leading};
+use crate::system::dot;
+use crate::tolerances::{DEPARTS_TANGENTIALLY, SURFACE_NOISE};
+
+/// The surfaces among the functions of an event, in order.
+pub(crate) fn located_surfaces(functions: &[EventFunction]) -> SmallVec<[usize; 4]> {
+    let mut surfaces = SmallVec::new();
+    for function in functions {
+        if let EventFunction::Surface(j) = *function {
+            surfaces.push(j);
+        }
+    }
+    surfaces.sort_unstable();
+    surfaces
+}
+
+/// The surfaces of an event, those slid on left out: those that were located, and all others that vanish there. With them the
+/// mode before, in which surfaces that do not matter have the signs of the place.
+pub(crate) fn vanishing_surfaces(
+    at: &Point,
+    notes: &mut Notes,
+) -> Result<(SmallVec<[usize; 4]>, Mode), FieldError> {
+    let mut mode = at.arrival.mode.clone();
+    let mut surfaces = located_surfaces(at.arrival.functions());
+    if only_located_matter(at.arrival, &surfaces) {
+        return Ok((surfaces, mode));
+    }
+    let h = at.surface_values(notes, at.arrival.signs)?;
+    for (j, h) in h.iter().enumerate() {
+        if !at.arrival.active[j] && *h != 0.0 {
+            mode.set(j, if *h < 0.0 { -1 } else { 1 });
+        }
+    }
+    add_vanishing_surfaces(at, &mut surfaces, &h)?;
+    Ok((surfaces, mode))
+}
+
+/// Are all surfaces slid on or located, so that the values of none are needed?
+fn only_located_matter(arrival: &Arrival, located: &[usize]) -> bool {
+    let entries = arrival.mode.entries().iter().enumerate();
+    let mut settled = entries.map(|(j, &e)| e == 0 || located.contains(&j));
+    settled.all(|settled| settled) && arrival.active.iter().all(|active| *active)
+}
+
+/// Adds to the surfaces that were located all others that vanish at the event: they matter, are not being left tangentially
+/// and lie within rounding of zero.
+pub(crate) fn add_vanishing_surfaces(
+    at: &Point,
+    surfaces: &mut SmallVec<[usize; 4]>,
+    h: &[f64],
+) -> Result<(), FieldError> {
+    let arrival = at.arrival;
+    for (j, h) in h.iter().enumerate() {
+        // A surface that the motion rests on while it slides is in the place of one that it slides on.
+        let slides = arrival.mode.entries()[j] == 0
+            || !arrival.sliding.is_empty() && arrival.resting.contains(&j);
+        if !arrival.active[j] || slides || surfaces.contains(&j) {
+            continue;
+        }
+        let size = at.system.surface_size(j, at.t, at.x, arrival.signs)?;
+        // A surface that is being left tangentially stays near for long; one that was crossed at this very instant belongs
+        // to the event.
+        if h.abs() <= SURFACE_NOISE * size && !arrival.departing.contains(&j) {
+            surfaces.push(j);
+        }
+    }
+    surfaces.sort_unstable();
+    Ok(())
+}
+
+/// How the motion comes to one surface, if that surface alone decides.
+pub(super) fn arrival_at_surface(arrival: &Arrival) -> Option<SurfaceArrival> {
+    let Cause::Event {
+        functions,
+        surfaces,
+        vanishing,
+        at_two_fold,
+        ..
+    } = arrival.cause
+    else {
+        return None;
+    };
+    if at_two_fold {
+        return Some(SurfaceArrival::TwoFold);
+    }
+    match (arrival.sliding, surfaces, functions) {
+        ([], &[j], _) => {
+            let side = arrival.mode.entries()[j];
+            Some(match vanishing {
+                [0, 0] => SurfaceArrival::Region(side),
+                _ => SurfaceArrival::Flat(side, vanishing),
+            })
+        }
+        ([_], [], [EventFunction::ExitMinus, ..]) => Some(SurfaceArrival::ExitMinus),
+        ([_], [], [EventFunction::ExitPlus, ..]) => Some(SurfaceArrival::ExitPlus),
+        _ => None,
+    }
+}
+
+/// Rule: the motion touches surfaces and stays in its mode, unless the field beyond leaves the surface too and is chosen.
+pub(super) fn touch(
+    at: &Point,
+    notes: &mut Notes,
+    meeting: &Meeting,
+) -> Result<Option<Decided>, FieldError> {
+    let (
+        How::Event(_),
+        Cause::Event {
+            touch: true,
+            at_two_fold: false,
+            vanishing,
+            ..
+        },
+    ) = (meeting.how, at.arrival.cause)
+    else {
+        return Ok(None);
+    };
+    let mode = meeting.mode;
+    if let (&[j], []) = (meeting.fresh, at.arrival.sliding) {
+        if let Some(leading) = goes_on_beyond(at, mode, j, vanishing)? {
+            let beyond = mode.with(j, -mode.entries()[j]);
+            let candidates = vec![mode.clone(), beyond.clone()];
+            match choose(at, notes, &[j], mode.clone(), candidates) {
+                Ok(after) if after == beyond => {
+                    let left = Lefts::from_elem(Left::Surface(j, leading), 1);
+                    return Ok(Some(Ok(Next::new(after, left))));
+                }
+                Ok(_) => {}
+                Err(stop) => return Ok(Some(Err(stop))),
+            }
+        }
+    }
+    let (mut left, signs) = (Lefts::new(), mode.signs());
+    for &j in meeting.fresh {
+        let side = mode.entries()[j];
+        let known = vanishing[usize::from(side > 0)].max(1);
+        let leading = first_nonzero(at.system, j, side, known, at.t, at.x, &signs)?;
+        if leading.sign() == side {
+            left.push(Left::Surface(j, leading));
+        }
+    }
+    Ok(Some(Ok(Next::new(mode.clone(), left))))
+}
+
+/// Where the motion in `mode` touches surface j: the first derivative of h along the field beyond, if that
+/// leaves the surface too, or stays on it. Then the solution is not unique.
+fn goes_on_beyond(
+    at: &Point,
+    mode: &Mode,
+    j: usize,
+    vanishing: [usize; 2],
+) -> Result<Option<Leading>, FieldError> {
+    let (beyond, signs) = (-mode.entries()[j], mode.signs());
+    let along = normal_component(at.system, j, j, beyond, at.t, at.x, &signs)?;
+    let mut field = vec![0.0; at.x.len()];
+    let mut gradient = field.clone();
+    let other = mode.with(j, beyond).signs();
+    eval_on_side(at.system, at.t, at.x, &other, &mut field)?;
+    at.system.gradient(j, at.t, at.x, &signs, &mut gradient)?;
+    let size = (dot(&field, &field) * dot(&gradient, &gradient)).sqrt();
+    // A touch is located to the square root of rounding: a component of that size vanishes.
+    let vanishing = vanishing[usize::from(beyond > 0)].max(usize::from(
+        along.value.abs() <= DEPARTS_TANGENTIALLY * size,
+    ));
+    let leading = first_nonzero(at.system, j, beyond, vanishing, at.t, at.x, &signs)?;
+    let goes_on = leading.sign() == beyond || leading.order == 0;
+    Ok(goes_on.then_some(leading))
+}

@@ -1,0 +1,173 @@
+//! Where derivatives at the point do not tell what follows: the modes are tried for a moment.
+//!
+//! So it is where two surfaces touch one another: seen from the point they are one, and a moment later they are two, in an
+//! order that decides.
+
+use super::coinciding::touch_one_another;
+use super::decide::Meeting;
+use super::departures::velocity_in;
+use super::point::{Decided, Left, Lefts, Next, Notes, Point};
+use crate::error::FieldError;
+use crate::field::ModeField;
+use crate::field::SmoothField;
+use crate::mode::Mode;
+use crate::switching::Leading;
+use crate::tolerances::{
+    LONGER_TRIAL, MAX_LIE_ORDER, MOST_LENGTHENINGS, MOST_TRIED, SURFACE_NOISE,
+};
+
+/// What follows where two surfaces touch one another, without being in one place.
+pub(super) fn decide_where_two_touch(
+    at: &Point,
+    notes: &mut Notes,
+    meeting: &Meeting,
+) -> Result<Option<Decided>, FieldError> {
+    match *meeting.surfaces {
+        [j, k] if touch_one_another(at, j, k, meeting.mode)? => {
+            decide_by_trial(at, notes, meeting.mode, meeting.surfaces)
+        }
+        _ => Ok(None),
+    }
+}
+
+/// The only mode, but for sliding on all of `meeting`, in which a motion goes on for a moment: it keeps to what it slides
+/// on, and to its sides of the others. `None` if there is none, or several.
+pub(super) fn decide_by_trial(
+    at: &Point,
+    notes: &mut Notes,
+    mode: &Mode,
+    meeting: &[usize],
+) -> Result<Option<Decided>, FieldError> {
+    if meeting.len() > MOST_TRIED {
+        return Ok(None);
+    }
+    let mut found: Option<(Mode, Lefts)> = None;
+    let mut entries = vec![-1_i8; meeting.len()];
+    loop {
+        if entries.iter().any(|&entry| entry != 0) {
+            let mut candidate = mode.clone();
+            let pairs = meeting.iter().zip(&entries);
+            pairs.for_each(|(&j, &entry)| candidate.set(j, entry));
+            if let Some(left) = lasts_in(at, notes, &candidate, meeting)? {
+                if found.replace((candidate, left)).is_some() {
+                    return Ok(None);
+                }
+            }
+        }
+        let Some(place) = entries.iter().position(|&entry| entry < 1) else {
+            return Ok(found.map(|(mode, left)| Ok(Next::new(mode, left))));
+        };
+        entries[place] += 1;
+        entries[..place].fill(-1);
+    }
+}
+
+/// What a motion leaves that lasts for a moment in this mode, if it does.
+fn lasts_in(
+    at: &Point,
+    notes: &mut Notes,
+    candidate: &Mode,
+    meeting: &[usize],
+) -> Result<Option<Lefts>, FieldError> {
+    let entries = candidate.entries();
+    let leaving: Vec<usize> = meeting
+        .iter()
+        .copied()
+        .filter(|&j| entries[j] != 0)
+        .collect();
+    let mut velocity = vec![0.0; at.x.len()];
+    velocity_in(at, notes, candidate, &[], at.t, at.x, &mut velocity)?;
+    if velocity.iter().any(|v| !v.is_finite()) {
+        return Ok(None);
+    }
+    let mut moment = at.moment(notes, &candidate.signs(), &velocity)?;
+    for _ in 0..=MOST_LENGTHENINGS {
+        match leaves_within(at, notes, candidate, &leaving, moment)? {
+            Trial::Leaves(left) => return Ok(Some(left)),
+            Trial::Ends => return Ok(None),
+            Trial::WithinRounding => moment *= LONGER_TRIAL,
+        }
+    }
+    Ok(None)
+}
+
+/// What becomes of a motion within a short time.
+enum Trial {
+    /// It leaves surfaces to the sides of its mode.
+    Leaves(Lefts),
+    /// It leaves one to the other side, or its multipliers go beyond their ends.
+    Ends,
+    /// Some function is not clear of rounding.
+    WithinRounding,
+}
+
+fn leaves_within(
+    at: &Point,
+    notes: &mut Notes,
+    candidate: &Mode,
+    leaving: &[usize],
+    moment: f64,
+) -> Result<Trial, FieldError> {
+    let mut values = [1.0, 0.5].map(|_| vec![0.0; leaving.len()]);
+    for (share, values) in [1.0, 0.5].into_iter().zip(&mut values) {
+        let Some(h) = surfaces_after(at, notes, candidate, share * moment)? else {
+            return Ok(Trial::Ends);
+        };
+        for (&j, value) in leaving.iter().zip(values) {
+            let (h, size) = h[j];
+            if h.abs() <= SURFACE_NOISE * size {
+                return Ok(Trial::WithinRounding);
+            }
+            if h * f64::from(candidate.entries()[j]) < 0.0 {
+                return Ok(Trial::Ends);
+            }
+            *value = h;
+        }
+    }
+    let [full, half] = values;
+    let pairs = leaving.iter().zip(full.iter().zip(half));
+    let left = pairs.map(|(&j, (full, half))| {
+        let order = (full / half).log2().round();
+        let order = order.clamp(1.0, MAX_LIE_ORDER as f64) as usize;
+        let factorial: f64 = (1..=order).map(|k| k as f64).product();
+        let value = factorial * full / moment.powi(order as i32);
+        Left::Surface(j, Leading { order, value })
+    });
+    Ok(Trial::Leaves(left.collect()))
+}
+
+/// The switching functions, and their sizes, after some time of motion in a mode; `None` if its multipliers are beyond
+/// their ends.
+fn surfaces_after(
+    at: &Point,
+    notes: &mut Notes,
+    candidate: &Mode,
+    time: f64,
+) -> Result<Option<Vec<(f64, f64)>>, FieldError> {
+    let (signs, law) = (candidate.signs(), at.policy.law);
+    let mut field = ModeField::of(at.system, law, candidate);
+    let mut x = at.x.to_vec();
+    let mut velocity = vec![0.0; x.len()];
+    // The midpoint rule.
+    for share in [0.5, 1.0] {
+        let mut from = x.clone();
+        let t = at.t + (share - 0.5) * time;
+        field.eval(t, &mut from, &mut velocity)?;
+        let pairs = x.iter_mut().zip(at.x.iter().zip(&velocity));
+        pairs.for_each(|(x, (start, v))| *x = start + share * time * v);
+        field.project(at.t + share * time, &mut x)?;
+    }
+    let exits = field.exits(at.t + time, &mut x)?;
+    notes.n_field_evaluations += field.n_evaluations();
+    if exits.iter().any(|exit| exit.is_nan() || *exit <= 0.0) {
+        return Ok(None);
+    }
+    let mut h = vec![0.0; signs.len()];
+    let t = at.t + time;
+    at.system.surfaces(t, &x, &signs, &mut h)?;
+    let sized = h.into_iter().enumerate().map(|(j, h)| {
+        let size = at.system.surface_size(j, t, &x, &signs)?;
+        Ok((h, size))
+    });
+    sized.collect::<Result<Vec<_>, FieldError>>().map(Some)
+}

@@ -1,0 +1,308 @@
+//! Where surfaces meet: what follows at an intersection, from the switching stage.
+
+use super::choice::{asked, choose, follow_at_surface};
+use super::decide::{How, Meeting};
+use super::departures::departures;
+use super::higher_order::decide_by_higher_order;
+use super::placement::place_on;
+use super::point::{Decided, Lefts, Next, Notes, Point, Root};
+use super::spiral::outward_leap;
+use crate::error::FieldError;
+use crate::event::EventFunction;
+use crate::field::ModeField;
+use crate::field::{IntersectionExit, MeetingFields};
+use crate::mode::Mode;
+use crate::status::Stop;
+use crate::switching::{
+    admissible, decide as decide_at_surface, has_one_mode_only, merged_root, region_at_rest,
+    resolve, Arrival as SurfaceArrival, Continuation, ExitKind, Incoming, NormalFields, Resolution,
+    Undecided,
+};
+use crate::tolerances::{MOST_LISTED, MOST_MEETING};
+
+/// Where a body has broken away, or has not been held, its friction is the kinetic one: what the other surfaces do
+/// is decided once more.
+pub(super) fn decide_with_kinetic_friction(
+    at: &Point,
+    notes: &mut Notes,
+    decided: Decided,
+    meeting: &Meeting,
+) -> Result<Decided, FieldError> {
+    let Ok(next) = &decided else {
+        return Ok(decided);
+    };
+    let slips = |j: &usize| at.system.sticks_at(*j) && next.mode.entries()[*j] != 0;
+    let (slipping, others): (Vec<usize>, Vec<usize>) =
+        meeting.surfaces.iter().partition(|j| slips(j));
+    if slipping.is_empty() || others.is_empty() {
+        return Ok(decided);
+    }
+    match place_on(at, notes, &next.mode, &others, Some(&next.mode))? {
+        (_, Ok(again)) if again.mode != next.mode => {
+            let left = departures(at, notes, &again.mode, meeting.surfaces, &[])?;
+            Ok(Ok(Next::new(again.mode, left)))
+        }
+        _ => Ok(decided),
+    }
+}
+
+/// Rule: the first-order data of the fields around the point, for the way in which the motion arrives.
+pub(super) fn resolve_first_order(
+    at: &Point,
+    notes: &mut Notes,
+    meeting: &Meeting,
+) -> Result<Decided, FieldError> {
+    let corners = at.corners(notes, meeting.surfaces, meeting.mode)?;
+    let kappa = at.policy.law.scaling(meeting.surfaces);
+    let mut others = Vec::new();
+    let resolution = match (corners.normal_fields(), meeting.how) {
+        (Err(undecided), _) => Err(undecided),
+        (Ok(fields), How::Start(_) | How::Limit) => resolve(&fields, &Incoming::Start, &kappa),
+        (Ok(fields), How::Event(_)) => {
+            let incoming = incoming(at, notes, meeting, (&corners, &fields))?;
+            others = other_solutions(&fields, &incoming);
+            match resolve(&fields, &incoming, &kappa) {
+                // The last of many turns is within rounding of all surfaces: its region leads past one of
+                // them, and has no meaning any more.
+                Err(Undecided::NotArriving { .. })
+                    if matches!(incoming, Incoming::Corner { .. }) =>
+                {
+                    resolve(&fields, &Incoming::Start, &kappa)
+                }
+                decided => decided,
+            }
+        }
+    };
+    follow(at, notes, meeting, &corners, resolution, &others)
+}
+
+/// Rule: more surfaces whose signs multiply one another than all of whose fields can be looked at.
+pub(super) fn too_many(
+    at: &Point,
+    _: &mut Notes,
+    meeting: &Meeting,
+) -> Result<Option<Decided>, FieldError> {
+    let groups = at.system.sign_groups(meeting.surfaces).into_iter();
+    let largest = groups
+        .filter(|group| group.len() > MOST_MEETING)
+        .max_by_key(Vec::len);
+    Ok(largest.map(|surfaces| {
+        Err(Stop::Intersection {
+            reason: Undecided::TooMany { n: surfaces.len() },
+            surfaces,
+            candidates: Vec::new(),
+        })
+    }))
+}
+
+/// How the motion came to the intersection.
+fn incoming(
+    at: &Point,
+    notes: &mut Notes,
+    meeting: &Meeting,
+    (corners, fields): (&MeetingFields, &NormalFields),
+) -> Result<Incoming, FieldError> {
+    let entries = meeting.surfaces.iter().map(|&j| meeting.mode.entries()[j]);
+    let entries: Vec<i8> = entries.collect();
+    if at.arrival.sliding.is_empty() {
+        return Ok(Incoming::Corner { region: entries });
+    }
+    let mut x = at.x.to_vec();
+    at.arrival.field.borrow_mut().exits(at.t, &mut x)?;
+    let field = at.arrival.field.borrow();
+    let multipliers = match &**field {
+        ModeField::Intersection(field) => field.tracked(at.t).to_vec(),
+        other => other.multipliers().into_vec(),
+    };
+    let exit = at
+        .arrival
+        .functions()
+        .iter()
+        .find_map(|function| match function {
+            EventFunction::Exit(index) => Some(*index),
+            _ => None,
+        });
+    let (Some(index), ModeField::Intersection(field), true) = (exit, &**field, meeting.is_exit())
+    else {
+        return Ok(Incoming::Face {
+            mode: entries,
+            multipliers,
+        });
+    };
+    let kind = match field.exit(index) {
+        IntersectionExit::Side { .. } => ExitKind::Side,
+        IntersectionExit::Fold => ExitKind::Fold,
+        IntersectionExit::Stability => ExitKind::Stability,
+    };
+    let mut lambda = multipliers;
+    if let IntersectionExit::Side { position, end } = field.exit(index) {
+        lambda[position] = f64::from(end);
+    }
+    if kind == ExitKind::Fold && meeting.surfaces.len() > 2 {
+        let merged = merged_root(fields, &lambda);
+        lambda = merged.map_or(lambda, |merged| merged.lambda);
+    }
+    let drift = drift(at, notes, meeting, (corners, fields), &lambda)?;
+    Ok(Incoming::Exit {
+        kind,
+        lambda,
+        drift: Some(drift),
+    })
+}
+
+/// The rate at which the normal components change along the motion at fixed multipliers.
+fn drift(
+    at: &Point,
+    notes: &mut Notes,
+    meeting: &Meeting,
+    (corners, fields): (&MeetingFields, &NormalFields),
+    lambda: &[f64],
+) -> Result<Vec<f64>, FieldError> {
+    let (mut velocity, mut weights) = (vec![0.0; at.x.len()], Vec::new());
+    corners.fill_product_weights(lambda, &mut weights);
+    corners.combine(&weights, &mut velocity);
+    let dt = at.moment(notes, &meeting.mode.signs(), &velocity)?;
+    let ahead: Vec<f64> =
+        at.x.iter()
+            .zip(&velocity)
+            .map(|(x, v)| x + dt * v)
+            .collect();
+    let later = at.moved(at.t + dt, &ahead);
+    let corners = later.corners(notes, meeting.surfaces, meeting.mode)?;
+    let (now, then) = (fields.interpolate(lambda), corners.normal_fields());
+    Ok(match then {
+        Ok(then) => {
+            let pairs = then.interpolate(lambda).into_iter().zip(now);
+            pairs.map(|(then, now)| (then - now) / dt).collect()
+        }
+        Err(_) => vec![f64::NAN; meeting.surfaces.len()],
+    })
+}
+
+/// Turns a resolution into the motion that follows. Where first-order data do not decide, the first
+/// derivatives that do not vanish may still leave only one way. `others` are further Filippov solutions.
+fn follow(
+    at: &Point,
+    notes: &mut Notes,
+    place: &Meeting,
+    fields: &MeetingFields,
+    resolution: Result<Resolution, Undecided>,
+    others: &[Continuation],
+) -> Result<Decided, FieldError> {
+    let (mode, meeting) = (place.mode, place.surfaces);
+    let rest = region_at_rest(at.system, fields, mode, at.t, at.x)?;
+    let resolution = match resolution {
+        Ok(resolution) if !resolution.degenerate => resolution,
+        // Both say the same, and vanish somewhere in between: higher derivatives do not make them two.
+        Err(Undecided::Proportional)
+            if fields.telling().len() == meeting.len()
+                && rest.is_none()
+                && !fields.lead_to_one_side() =>
+        {
+            return Ok(Err(Stop::Intersection {
+                surfaces: meeting.to_vec(),
+                candidates: Vec::new(),
+                reason: Undecided::Proportional,
+            }));
+        }
+        other => return decide_by_higher_order(at, notes, mode, meeting, other, rest),
+    };
+    let on_all = |k: &Mode| place.on_all(k);
+    let mut candidates: Vec<Mode> = Vec::new();
+    for mode in resolution.candidates.iter().chain(others) {
+        let mode = mode.as_mode().map(on_all);
+        candidates.extend(mode.filter(|mode| !candidates.contains(mode)));
+    }
+    candidates.extend(rest.clone().filter(|mode| !candidates.contains(mode)));
+    let is_spiral = matches!(resolution.chosen, Some(Continuation::OutwardSpiral));
+    let asked = asked(at, notes).filter(|asked| candidates.contains(asked));
+    let (mut after, leap) = match &resolution.chosen {
+        Some(Continuation::Mode(chosen)) => (on_all(chosen), None),
+        Some(Continuation::OutwardSpiral) => match asked {
+            Some(asked) => (asked.clone(), None),
+            None => match outward_leap(at, meeting, mode, fields) {
+                Some(leap) => (leap.region.clone(), Some(leap)),
+                None => {
+                    return decide_by_higher_order(at, notes, mode, meeting, Ok(resolution), rest)
+                }
+            },
+        },
+        None => return decide_by_higher_order(at, notes, mode, meeting, Ok(resolution), rest),
+    };
+    let preferred = after.clone();
+    if !resolution.unique || is_spiral || candidates.len() > 1 {
+        if !candidates.contains(&after) {
+            candidates.push(after.clone());
+        }
+        after = match choose(at, notes, meeting, after, candidates) {
+            Ok(after) => after,
+            Err(stop) => return Ok(Err(stop)),
+        };
+    }
+    let multipliers: &[f64] = if after == preferred && !is_spiral {
+        &resolution.multipliers
+    } else {
+        &[]
+    };
+    if let Some(decided) = decide_at_tangency(at, notes, &after, meeting)? {
+        return Ok(decided);
+    }
+    let left = match &leap {
+        // What it leaves is known at the end of the leap.
+        Some(_) => Lefts::new(),
+        None => departures(at, notes, &after, meeting, multipliers)?,
+    };
+    let mut next = Next::new(after, left);
+    next.root = Root {
+        multipliers: multipliers.to_vec(),
+        oscillates: next.mode == preferred && resolution.oscillates,
+        at_two_fold: None,
+        leap,
+    };
+    Ok(Ok(next))
+}
+
+/// Where the motion is to slide on one of the surfaces and both of its fields are tangent there: what higher
+/// derivatives say of that surface.
+fn decide_at_tangency(
+    at: &Point,
+    notes: &mut Notes,
+    after: &Mode,
+    meeting: &[usize],
+) -> Result<Option<Decided>, FieldError> {
+    let mut slid_on = after.sliding_set();
+    let (Some(j), None) = (slid_on.next(), slid_on.next()) else {
+        return Ok(None);
+    };
+    let decision = decide_at_surface(
+        at.system,
+        j,
+        SurfaceArrival::Start,
+        at.t,
+        at.x,
+        &after.signs(),
+    )?;
+    let is_tangent = decision.minus.order != 1 && decision.plus.order != 1;
+    if !is_tangent || decision.entry == 0 || at.system.sticks_at(j) {
+        return Ok(None);
+    }
+    let mut next = match follow_at_surface(at, notes, after, j, decision) {
+        Ok(next) => next,
+        Err(stop) => return Ok(Some(Err(stop))),
+    };
+    let others: Vec<usize> = meeting.iter().copied().filter(|&k| k != j).collect();
+    let left = departures(at, notes, &next.mode, &others, &[])?;
+    next.left.extend(left);
+    Ok(Some(Ok(next)))
+}
+
+/// All attracting continuations at an intersection that is reached, whatever the regularisation selects: Filippov
+/// solutions, and several if the solution is not unique. Not looked for where many surfaces meet.
+fn other_solutions(fields: &NormalFields, incoming: &Incoming) -> Vec<Continuation> {
+    let is_exit = matches!(incoming, Incoming::Exit { .. });
+    if is_exit || fields.m() > MOST_LISTED || has_one_mode_only(fields) {
+        return Vec::new();
+    }
+    let found = admissible(fields).into_iter();
+    found.map(|found| found.continuation).collect()
+}

@@ -1,0 +1,43 @@
+//! Decisions: which motion follows at a point. The one way in is [`decide`].
+//!
+//! A decision is a pure function of the problem, the place, the arrival and the policy, bundled as a [`Point`]. It returns
+//! its whole result, a [`Decision`]: the motion that follows, or why the run ends; the rule that decided; warnings; what it
+//! cost. No integrator is in sight: neither the end of the run nor the length of a step is known here. Where a rule has to
+//! look at the motion a moment later, the moment is [`Point::moment`].
+
+mod apart;
+mod between_sides;
+mod choice;
+mod coinciding;
+mod contact;
+mod decide;
+mod departures;
+mod event;
+mod higher_order;
+mod leave_by_rule;
+pub(crate) mod limits;
+mod look_ahead;
+mod meeting;
+mod nested;
+mod passage;
+mod placement;
+mod point;
+mod relay;
+mod resting;
+pub(crate) mod root_ends;
+mod spiral;
+mod triggers;
+mod two_fold;
+mod vanishing_jump;
+
+pub(crate) use between_sides::differs_between_sides;
+pub(crate) use coinciding::surfaces_in_the_place_of_those_slid_on;
+pub(crate) use decide::{decide, Decision, Rule};
+pub(crate) use event::{add_vanishing_surfaces, located_surfaces, vanishing_surfaces};
+pub(crate) use leave_by_rule::refusal;
+pub(crate) use passage::{goes_through, rates_here};
+pub(crate) use placement::{pushed_back, sides, Sides};
+pub(crate) use point::{Arrival, Cause, Decided, Left, Lefts, Next, Notes, Point, Values};
+pub(crate) use spiral::Leap;
+pub(crate) use triggers::Triggers;
+pub(crate) use two_fold::{beyond_double_zero, two_fold_here};

@@ -1,0 +1,372 @@
+//! Where a motion starts: the mode at a given point, at the start of a run and after actions.
+
+use super::choice::follow_at_surface;
+use super::contact::place_in_contact;
+use super::decide::settle;
+use super::decide::{How, Meeting, Rule};
+use super::departures::velocity_in;
+use super::nested::follow_jumps;
+use super::point::{Decided, Left, Next, Notes, Point};
+use crate::error::FieldError;
+use crate::field::{ContactField, Projector, SmoothField};
+use crate::mode::Mode;
+use crate::status::Stop;
+use crate::switching::{
+    decide as decide_at_surface, first_nonzero, Arrival as SurfaceArrival, Leading,
+};
+use crate::system::{dot, dot_magnitude, surfaces_that_matter};
+use crate::tolerances::{DEPARTS_TANGENTIALLY, SLIPPED, SLOW, SURFACE_NOISE};
+
+/// The sides that a point is on.
+pub(crate) struct Sides {
+    /// No entry is 0.
+    pub mode: Mode,
+    /// Which surfaces the point lies on, to rounding.
+    pub on_surface: Vec<bool>,
+}
+
+/// A surface that triggers actions and switches nothing, on which the point lies.
+struct Touched {
+    surface: usize,
+    /// The side from which the action is triggered.
+    side: i8,
+    /// The first derivative of h that does not vanish.
+    leading: Leading,
+}
+
+/// The motion from a place: at the start of a run, after actions, and where an event was none. `memory` is the mode before.
+pub(crate) fn place(
+    at: &Point,
+    notes: &mut Notes,
+    memory: Option<&Mode>,
+) -> Result<(Rule, Decided), FieldError> {
+    let Some(Sides { mode, on_surface }) = sides(at, notes, memory)? else {
+        return Ok((Rule::Region, Err(Stop::NotFinite)));
+    };
+    // What only a law of the system sees has the side that is known: its action has been done, or will be.
+    let zeros = (0..on_surface.len()).filter(|&j| on_surface[j] && !at.triggers().is_internal(j));
+    let (smooth, zeros): (Vec<usize>, Vec<usize>) =
+        zeros.partition(|&j| at.triggers().is_only_trigger(j));
+    let meeting = surfaces_that_matter(at.system, &mode, zeros.clone());
+    if !smooth.is_empty() {
+        return place_on_triggers(at, notes, mode, &smooth, meeting, memory);
+    }
+    let (rule, decided) = place_on(at, notes, &mode, &meeting, memory)?;
+    let (rule, decided) = follow_jumps(at, notes, &mode, &meeting, (rule, decided))?;
+    let is_new = |j: &usize| memory.is_none_or(|memory| memory.entries()[*j] == 0);
+    let inactive = zeros.into_iter().filter(|j| !meeting.contains(j));
+    Ok((rule, take_sides(at, decided, inactive.filter(is_new))?))
+}
+
+/// Gives surfaces that do not matter the sides that a motion in a region moves to.
+fn take_sides(
+    at: &Point,
+    decided: Decided,
+    inactive: impl Iterator<Item = usize>,
+) -> Result<Decided, FieldError> {
+    let mut next = match decided {
+        Ok(next) => next,
+        Err(stop) => return Ok(Err(stop)),
+    };
+    if next.mode.codimension() == 0 {
+        let signs = next.mode.signs();
+        for j in inactive {
+            let side = next.mode.entries()[j];
+            let leading = first_nonzero(at.system, j, side, 0, at.t, at.x, &signs)?;
+            if leading.order > 0 {
+                next.mode.set(j, leading.sign());
+            }
+        }
+    }
+    Ok(Ok(next))
+}
+
+/// The motion from a place where these surfaces matter and vanish. The others have the signs of `mode`.
+pub(super) fn place_on(
+    at: &Point,
+    notes: &mut Notes,
+    mode: &Mode,
+    surfaces: &[usize],
+    memory: Option<&Mode>,
+) -> Result<(Rule, Decided), FieldError> {
+    // Of several continuations that which stays on its side.
+    let entry = match (surfaces, memory) {
+        (&[j], Some(memory)) => memory.entries()[j],
+        _ => 0,
+    };
+    let meeting = Meeting {
+        mode,
+        surfaces,
+        fresh: surfaces,
+        how: How::Start(SurfaceArrival::from_side(entry)),
+    };
+    settle(at, notes, &meeting)
+}
+
+/// Rule: one surface, by the first derivatives of h that do not vanish along the fields of both sides.
+pub(super) fn one_surface(
+    at: &Point,
+    notes: &mut Notes,
+    meeting: &Meeting,
+) -> Result<Option<Decided>, FieldError> {
+    let (How::Start(arrival) | How::Event(Some(arrival)), &[j]) = (meeting.how, meeting.surfaces)
+    else {
+        return Ok(None);
+    };
+    let (mode, signs) = (meeting.mode, meeting.mode.signs());
+    let decision = decide_at_surface(at.system, j, arrival, at.t, at.x, &signs)?;
+    let is_event = matches!(meeting.how, How::Event(_));
+    if !is_event || !decision.leaves_with_rounding() {
+        return Ok(Some(follow_at_surface(at, notes, mode, j, decision)));
+    }
+    // A field that comes to rest on the surface: beside it, by rounding, it still points somewhere.
+    let mut x = at.x.to_vec();
+    let mut projector = Projector::new(x.len(), signs.len());
+    projector.project(at.system, j, at.t, &mut x, &signs)?;
+    let decision = decide_at_surface(at.system, j, arrival, at.t, &x, &signs)?;
+    let decided = follow_at_surface(at, notes, mode, j, decision);
+    Ok(Some(decided.map(|next| Next {
+        moved: Some(x),
+        ..next
+    })))
+}
+
+/// The side of every surface at the current point; a surface that the point lies on has the side of the mode
+/// before, or that which rounding says. `None` if a switching function is not a number.
+pub(crate) fn sides(
+    at: &Point,
+    notes: &mut Notes,
+    memory: Option<&Mode>,
+) -> Result<Option<Sides>, FieldError> {
+    let d = at.system.n_surfaces();
+    let mut mode = Mode::new(vec![1; d]);
+    // Switching functions may contain signs of others: repeat until nothing changes.
+    let mut on_surface = vec![false; d];
+    for _ in 0..=d {
+        let before = mode.clone();
+        let signs = mode.signs();
+        let h = at.surface_values(notes, &signs)?;
+        if h.iter().any(|h| h.is_nan()) {
+            return Ok(None);
+        }
+        for j in 0..d {
+            let size = at.system.surface_size(j, at.t, at.x, &signs)?;
+            let residual = at.arrival.residuals.get(j).copied().unwrap_or(0.0);
+            let noise = (SURFACE_NOISE * size).max(2.0 * residual);
+            on_surface[j] = h[j].abs() <= noise;
+            let known = memory.map_or(0, |memory| memory.entries()[j]);
+            if let Some(side) = slipped_through(at, j, h[j], &signs, memory)? {
+                on_surface[j] = true;
+                mode.set(j, side);
+                continue;
+            }
+            let entry = match known {
+                side if on_surface[j] && side != 0 => side,
+                _ if h[j] < 0.0 => -1,
+                _ => 1,
+            };
+            mode.set(j, entry);
+        }
+        if mode == before {
+            break;
+        }
+    }
+    Ok(Some(Sides { mode, on_surface }))
+}
+
+/// The free side of a trigger that the motion came from and that the point lies beyond by less than the
+/// tolerance: errors of jumps to a limit, and of impacts at nearly the same time. It counts as there.
+fn slipped_through(
+    at: &Point,
+    j: usize,
+    h: f64,
+    signs: &[f64],
+    memory: Option<&Mode>,
+) -> Result<Option<i8>, FieldError> {
+    let is_solid = at.triggers().is_only_trigger(j) && !at.triggers().is_internal(j);
+    let Some(memory) = memory.filter(|_| is_solid) else {
+        return Ok(None);
+    };
+    let side = at.triggers().side(j, Some(memory));
+    let came_from = memory.entries()[j] == side || memory.entries()[j] == 0;
+    if !came_from || h * f64::from(side) >= 0.0 {
+        return Ok(None);
+    }
+    let mut gradient = vec![0.0; at.x.len()];
+    at.system.gradient(j, at.t, at.x, signs, &mut gradient)?;
+    let tolerance = at.scale.along(&gradient, at.x);
+    let is_near = h.abs() <= SLIPPED * tolerance;
+    Ok((is_near && leaves_point_alone(at, j, signs)?).then_some(side))
+}
+
+/// Does the action at surface `j` leave h_j as it is, as an impact does? It does not move bodies, but their velocities.
+fn leaves_point_alone(at: &Point, j: usize, signs: &[f64]) -> Result<bool, FieldError> {
+    let Some((action, _)) = at.actions.at_surface(j) else {
+        return Ok(false);
+    };
+    let (mut moved, mut q) = (at.x.to_vec(), at.q.to_vec());
+    action.map.apply(at.t, &mut moved, signs, &mut q)?;
+    let mut h = [(); 2].map(|()| vec![0.0; signs.len()]);
+    at.system.surfaces(at.t, at.x, signs, &mut h[0])?;
+    at.system.surfaces(at.t, &moved, signs, &mut h[1])?;
+    let size = at.system.surface_size(j, at.t, at.x, signs)?;
+    Ok((h[0][j] - h[1][j]).abs() <= SURFACE_NOISE * size)
+}
+
+/// The point moved back onto the triggers that it slipped through, if there are any.
+pub(crate) fn pushed_back(
+    at: &Point,
+    notes: &mut Notes,
+    memory: &Mode,
+) -> Result<Option<Vec<f64>>, FieldError> {
+    let signs = memory.signs();
+    let h = at.surface_values(notes, &signs)?;
+    let mut beyond = Vec::new();
+    for (j, h) in h.iter().enumerate() {
+        if slipped_through(at, j, *h, &signs, Some(memory))?.is_some() {
+            beyond.push(j);
+        }
+    }
+    if beyond.is_empty() {
+        return Ok(None);
+    }
+    let mut x = at.x.to_vec();
+    let mut projector = Projector::new(x.len(), at.system.n_surfaces());
+    projector.project_onto(at.system, &beyond, at.t, &mut x, &signs)?;
+    Ok(Some(x))
+}
+
+/// The mode on surfaces of which some trigger actions and switch nothing: contact, where the impact has no
+/// velocity left and the motion would go through; else the side that the motion leads to.
+fn place_on_triggers(
+    at: &Point,
+    notes: &mut Notes,
+    mut mode: Mode,
+    smooth: &[usize],
+    meeting: Vec<usize>,
+    memory: Option<&Mode>,
+) -> Result<(Rule, Decided), FieldError> {
+    let mut touched = Vec::with_capacity(smooth.len());
+    let mut contacts = Vec::new();
+    for &j in smooth {
+        let side = at.triggers().side(j, memory);
+        mode.set(j, side);
+        let leading = leading_along(at, notes, j, &mode, &meeting, memory)?;
+        let is_slow = leading.order == 1 && is_slow(at, j, leading.value, &mode)?;
+        let is_still = leading.order != 1 || is_slow;
+        let stays = leading.sign() != side || is_slow;
+        if is_still && stays && can_stay(at, j, &mode)? {
+            contacts.push(j);
+            continue;
+        }
+        let came_from = memory.map_or(side, |memory| memory.entries()[j]);
+        let crosses = at.arrival.passing.contains(&j) || came_from == -side;
+        if leading.sign() == -side && !crosses {
+            // Its action comes first: the next event is here.
+            continue;
+        }
+        if leading.order > 0 {
+            mode.set(j, leading.sign());
+        }
+        touched.push(Touched {
+            surface: j,
+            side,
+            leading,
+        });
+    }
+    let (rule, decided) = if contacts.is_empty() {
+        place_on(at, notes, &mode, &meeting, memory)?
+    } else {
+        let decided = place_in_contact(at, notes, mode, &contacts, &meeting, &[])?;
+        (Rule::Contact, decided)
+    };
+    let decided = decided.map(|mut next| {
+        let departing = touched.iter().filter(|touched| {
+            let entry = next.mode.entries()[touched.surface];
+            touched.leading.sign() == entry || touched.side == entry
+        });
+        let departing = departing.map(|t| Left::Surface(t.surface, t.leading));
+        next.left.extend(departing);
+        next
+    });
+    Ok((rule, decided))
+}
+
+/// The first derivative of h_j that does not vanish along the motion that follows on the surfaces of `meeting`.
+pub(super) fn leading_along(
+    at: &Point,
+    notes: &mut Notes,
+    j: usize,
+    mode: &Mode,
+    meeting: &[usize],
+    memory: Option<&Mode>,
+) -> Result<Leading, FieldError> {
+    let (side, mut after) = (mode.entries()[j], mode.clone());
+    if !meeting.is_empty() {
+        // A trial: what is not unique is warned of when it is decided.
+        let mut trial = notes.of_trial();
+        let (_, decided) = place_on(at, &mut trial, mode, meeting, memory)?;
+        notes.add_costs(&trial);
+        let multipliers = decided.map_or_else(
+            |_| Vec::new(),
+            |next| {
+                after = next.mode;
+                next.root.multipliers
+            },
+        );
+        if after.codimension() > 0 {
+            if let Some(value) = rate_in(at, notes, j, &after, &multipliers)? {
+                return Ok(Leading { order: 1, value });
+            }
+        }
+    }
+    first_nonzero(at.system, j, side, 0, at.t, at.x, &after.signs())
+}
+
+/// The rate of h_j along sliding in a mode, where that is not tangent to it.
+fn rate_in(
+    at: &Point,
+    notes: &mut Notes,
+    j: usize,
+    after: &Mode,
+    multipliers: &[f64],
+) -> Result<Option<f64>, FieldError> {
+    let mut velocity = vec![0.0; at.x.len()];
+    velocity_in(at, notes, after, multipliers, at.t, at.x, &mut velocity)?;
+    let mut gradient = vec![0.0; at.x.len()];
+    let signs = after.signs();
+    let ht = at.system.gradient(j, at.t, at.x, &signs, &mut gradient)?;
+    let rate = ht + dot(&gradient, &velocity);
+    let size = ht.abs() + dot_magnitude(&gradient, &velocity);
+    Ok((rate.abs() > DEPARTS_TANGENTIALLY * size).then_some(rate))
+}
+
+/// Is this speed at surface j below the tolerance?
+pub(super) fn is_slow(at: &Point, j: usize, speed: f64, mode: &Mode) -> Result<bool, FieldError> {
+    let mut row = vec![0.0; at.x.len()];
+    at.system
+        .rate_gradient(j, at.t, at.x, &mode.signs(), &mut row)?;
+    let tolerance = at.scale.along(&row, at.x);
+    Ok(speed.abs() <= SLOW * tolerance)
+}
+
+/// Can a body stay in contact at h_j = 0? The action there leaves the point alone and acts on the velocity.
+pub(super) fn can_stay(at: &Point, j: usize, mode: &Mode) -> Result<bool, FieldError> {
+    let Some((action, _)) = at.actions.at_surface(j) else {
+        return Ok(false);
+    };
+    let (mut moved, mut q) = (at.x.to_vec(), at.q.to_vec());
+    action.map.apply(at.t, &mut moved, &mode.signs(), &mut q)?;
+    let size = dot(at.x, at.x).sqrt();
+    let shift: Vec<f64> = moved.iter().zip(at.x).map(|(m, x)| m - x).collect();
+    if q != at.q || dot(&shift, &shift).sqrt() > 1e-9 * (1.0 + size) {
+        return Ok(false);
+    }
+    let resting = mode.with(j, 0);
+    let Some(mut field) = ContactField::new(at.system, at.actions, &resting, at.q) else {
+        return Ok(false);
+    };
+    let (mut x, mut dx) = (at.x.to_vec(), vec![0.0; at.x.len()]);
+    field.eval(at.t, &mut x, &mut dx)?;
+    Ok(dx.iter().all(|v| v.is_finite()))
+}

@@ -1,0 +1,358 @@
+//! What a decision is asked about, and what its rules hand to one another.
+
+use super::spiral::Leap;
+use super::triggers::Triggers;
+use std::cell::RefCell;
+
+use smallvec::{smallvec, SmallVec};
+
+use crate::action::Actions;
+use crate::error::FieldError;
+use crate::event::{Deflation, EventFunction};
+use crate::field::{eval_on_side, Law, MeetingFields, ModeField};
+use crate::mode::{Mode, Signs};
+use crate::options::{NonUnique, Options};
+use crate::solution::Switch;
+use crate::status::{Stop, Warning};
+use crate::stepper::ErrorScale;
+use crate::switching::{Decision, Leading};
+use crate::system::PiecewiseSystem;
+use crate::tolerances::{MOMENT, MOST_SHORTENINGS, TOO_LARGE_A_CHANGE};
+
+/// One value per surface; few are kept without allocation.
+pub(crate) type Values = SmallVec<[f64; 8]>;
+
+/// A point at which a motion ends or starts: the problem, the place, the arrival and the policy.
+#[derive(Clone, Copy)]
+pub(crate) struct Point<'p, 'm, 'a> {
+    pub system: &'a dyn PiecewiseSystem,
+    pub actions: &'a Actions<'a>,
+    /// The tolerances.
+    pub scale: &'p ErrorScale,
+    pub t: f64,
+    pub x: &'p [f64],
+    /// The discrete states.
+    pub q: &'p [f64],
+    pub arrival: &'p Arrival<'m, 'a>,
+    pub policy: Policy<'a>,
+}
+
+/// What is chosen where the system leaves a choice.
+#[derive(Clone, Copy)]
+pub(crate) struct Policy<'a> {
+    /// How a motion slides on several surfaces.
+    pub law: Law<'a>,
+    pub nonunique: NonUnique,
+    /// The modes asked for at the first non-unique points of the run.
+    pub choices: &'a [Mode],
+}
+
+impl<'a> From<&'a Options> for Policy<'a> {
+    fn from(options: &'a Options) -> Self {
+        Policy {
+            law: options.into(),
+            nonunique: options.nonunique,
+            choices: &options.choices,
+        }
+    }
+}
+
+/// Why a decision is asked for.
+#[derive(Clone, Copy)]
+pub(crate) enum Cause<'p> {
+    /// The run starts here.
+    Start,
+    /// The state has jumped, or an event was none: the sides of this mode hold where the point lies on a surface.
+    Anew(&'p Mode),
+    /// These functions of the motion vanish here.
+    Event {
+        functions: &'p [EventFunction],
+        /// The surfaces that vanish here, those slid on left out.
+        surfaces: &'p [usize],
+        /// The mode before, in which surfaces that do not matter have the signs of the place.
+        mode: &'p Mode,
+        /// They come within rounding of zero without a change of sign.
+        touch: bool,
+        /// How many derivatives along f- and f+ vanish at a multiple zero.
+        vanishing: [usize; 2],
+        /// The point is a two-fold that sliding on one surface has reached.
+        at_two_fold: bool,
+    },
+    /// Infinitely many switches on these surfaces end here.
+    Limit(&'p [usize]),
+}
+
+/// How the motion arrived: the motion that ends here, and why.
+pub(crate) struct Arrival<'p, 'a> {
+    pub cause: Cause<'p>,
+    pub mode: &'p Mode,
+    pub signs: &'p Signs,
+    /// The surfaces slid on, in increasing order.
+    pub sliding: &'p [usize],
+    /// The surfaces whose sign matters in the mode.
+    pub active: &'p [bool],
+    /// The surfaces whose functions were zero all along the motion.
+    pub resting: &'p [usize],
+    /// The surfaces that the motion is still leaving tangentially.
+    pub departing: SmallVec<[usize; 2]>,
+    /// The run has met kinks in the place of other surfaces.
+    pub meets_kinks: bool,
+    /// The last switches of the run.
+    pub switches: &'p [Switch],
+    /// How far the point lies off each surface by rounding; empty: not at all.
+    pub residuals: &'p [f64],
+    /// Triggers whose action leaves the motion as it is: it crosses them.
+    pub passing: &'p [usize],
+    /// The velocity of the motion a little before.
+    pub velocity: &'p [f64],
+    /// The field of the motion. To evaluate it changes nothing but its caches.
+    pub field: RefCell<&'p mut ModeField<'a>>,
+}
+
+impl Arrival<'_, '_> {
+    /// The multipliers of the motion at the last evaluation of its field.
+    pub fn multipliers(&self) -> SmallVec<[f64; 2]> {
+        self.field.borrow().multipliers()
+    }
+
+    /// Does the motion slide on several surfaces?
+    pub fn slides_on_several(&self) -> bool {
+        matches!(&**self.field.borrow(), ModeField::Intersection(_))
+    }
+
+    /// The functions that vanish, if the motion ends with an event.
+    pub fn functions(&self) -> &[EventFunction] {
+        match self.cause {
+            Cause::Event { functions, .. } => functions,
+            _ => &[],
+        }
+    }
+}
+
+impl<'p, 'm, 'a> Point<'p, 'm, 'a> {
+    /// What the surfaces do that trigger actions.
+    pub fn triggers(&self) -> Triggers<'_> {
+        Triggers {
+            system: self.system,
+            actions: self.actions,
+        }
+    }
+
+    /// The same question at another place.
+    pub fn moved<'q>(&self, t: f64, x: &'q [f64]) -> Point<'q, 'm, 'a>
+    where
+        'p: 'q,
+    {
+        Point { t, x, ..*self }
+    }
+
+    /// A short time for a motion with this velocity: within it neither the state nor the field with these signs changes by
+    /// more than a small part ([`MOMENT`]) of its size.
+    ///
+    /// A component of the state that is zero has the size below which its absolute tolerance governs its error. A motion at
+    /// rest tells no time: for it the moment starts from a part of the unit of time.
+    pub fn moment(
+        &self,
+        notes: &mut Notes,
+        signs: &[f64],
+        velocity: &[f64],
+    ) -> Result<f64, FieldError> {
+        let speed = |v: &[f64]| {
+            let speeds = v.iter().zip(self.x).enumerate();
+            speeds
+                .map(|(i, (v, x))| v.abs() / self.scale.size(i, *x))
+                .filter(|speed| speed.is_finite())
+                .fold(0.0, f64::max)
+        };
+        let mut moment = MOMENT / speed(velocity).max(1.0);
+        let mut now = vec![0.0; self.x.len()];
+        eval_on_side(self.system, self.t, self.x, signs, &mut now)?;
+        let (mut then, mut ahead) = (now.clone(), now.clone());
+        let size = speed(&now);
+        for _ in 0..MOST_SHORTENINGS {
+            let pairs = ahead.iter_mut().zip(self.x.iter().zip(velocity));
+            pairs.for_each(|(ahead, (x, v))| *ahead = x + moment * v);
+            eval_on_side(self.system, self.t + moment, &ahead, signs, &mut then)?;
+            notes.n_field_evaluations += 1;
+            then.iter_mut()
+                .zip(&now)
+                .for_each(|(then, now)| *then -= now);
+            let is_finite = then.iter().all(|change| change.is_finite());
+            let change = if is_finite {
+                speed(&then)
+            } else {
+                f64::INFINITY
+            };
+            if change <= TOO_LARGE_A_CHANGE * size {
+                break;
+            }
+            moment *= MOMENT.max(MOMENT * size / change);
+        }
+        Ok(moment)
+    }
+
+    /// Values of all switching functions.
+    pub fn surface_values(&self, notes: &mut Notes, signs: &[f64]) -> Result<Values, FieldError> {
+        let mut h: Values = smallvec![0.0; self.system.n_surfaces()];
+        self.system.surfaces(self.t, self.x, signs, &mut h)?;
+        notes.n_surface_evaluations += 1;
+        Ok(h)
+    }
+
+    /// The fields around the point where the surfaces of `meeting` vanish, the others with the signs of `mode`.
+    pub fn corners(
+        &self,
+        notes: &mut Notes,
+        meeting: &[usize],
+        mode: &Mode,
+    ) -> Result<MeetingFields, FieldError> {
+        let mut corners = MeetingFields::new(self.system, meeting);
+        notes.n_field_evaluations +=
+            corners.evaluate(self.system, self.t, self.x, &mode.signs())?;
+        Ok(corners)
+    }
+}
+
+/// What rules find out beside the motion that follows. A trial has notes of its own, which are dropped.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Notes {
+    pub warnings: Vec<Warning>,
+    /// How many non-unique points the run has met, those of this decision included.
+    pub n_choices: usize,
+    /// Kinks were found in the place of other surfaces.
+    pub meets_kinks: bool,
+    pub n_field_evaluations: u64,
+    pub n_surface_evaluations: u64,
+}
+
+impl Notes {
+    /// Notes of a trial: what it costs counts, what it warns of does not.
+    pub fn of_trial(&self) -> Notes {
+        Notes {
+            n_choices: self.n_choices,
+            ..Notes::default()
+        }
+    }
+
+    /// Adds what a trial cost.
+    pub fn add_costs(&mut self, trial: &Notes) {
+        self.n_field_evaluations += trial.n_field_evaluations;
+        self.n_surface_evaluations += trial.n_surface_evaluations;
+        self.meets_kinks |= trial.meets_kinks;
+    }
+}
+
+/// The motion that follows.
+#[derive(Clone, Debug)]
+pub(crate) struct Next {
+    pub mode: Mode,
+    /// What vanishes at its start.
+    pub left: Lefts,
+    pub root: Root,
+    /// The state that it starts from, where that is not the place of the decision.
+    pub moved: Option<Vec<f64>>,
+}
+
+impl Next {
+    pub fn new(mode: Mode, left: Lefts) -> Self {
+        Next {
+            mode,
+            left,
+            root: Root::default(),
+            moved: None,
+        }
+    }
+}
+
+/// The root at which sliding begins.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Root {
+    /// The multipliers; none if they are not known.
+    pub multipliers: Vec<f64>,
+    /// The regularised motion oscillates around it.
+    pub oscillates: bool,
+    /// The multiplier of sliding on one surface that begins at a two-fold.
+    pub at_two_fold: Option<f64>,
+    /// The motion begins with the laps of an outward spiral.
+    pub leap: Option<Leap>,
+}
+
+/// The motion that follows, or why the run ends.
+pub(crate) type Decided = Result<Next, Stop>;
+
+/// What vanishes at the start of a motion, seldom more than two functions.
+pub(crate) type Lefts = SmallVec<[Left; 2]>;
+
+/// A function that vanishes at the start of a motion, with its first non-vanishing derivative.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Left {
+    /// The surface is left with this derivative of h.
+    Surface(usize, Leading),
+    /// Sliding starts with a vanishing exit function; the derivative of the normal component.
+    Exit(EventFunction, Leading),
+}
+
+impl Left {
+    /// What vanishes after the decision at surface `j`.
+    pub fn after(j: usize, decision: &Decision) -> Lefts {
+        if let Some(motion) = decision.starts_at_two_fold() {
+            let first = |value: f64| Leading { order: 1, value };
+            return smallvec![
+                Left::Exit(EventFunction::ExitMinus, first(motion.minus)),
+                Left::Exit(EventFunction::ExitPlus, first(motion.plus)),
+            ];
+        }
+        match decision.entry {
+            -1 => smallvec![Left::Surface(j, decision.minus)],
+            1 => smallvec![Left::Surface(j, decision.plus)],
+            _ => [
+                (EventFunction::ExitMinus, decision.minus),
+                (EventFunction::ExitPlus, decision.plus),
+            ]
+            .into_iter()
+            .filter(|(_, leading)| leading.order > 1)
+            .map(|(function, leading)| {
+                // The normal component is the derivative of h: one order less.
+                Left::Exit(
+                    function,
+                    Leading {
+                        order: leading.order - 1,
+                        value: leading.value,
+                    },
+                )
+            })
+            .collect(),
+        }
+    }
+
+    /// The surface that is left; for an exit function there is none.
+    pub fn surface(&self) -> Option<usize> {
+        match self {
+            Left::Surface(j, _) => Some(*j),
+            Left::Exit(..) => None,
+        }
+    }
+
+    /// The zero to divide out of the function along the motion from `t`.
+    pub fn deflation(self, t: f64) -> Option<(EventFunction, Deflation)> {
+        let (function, leading) = match self {
+            Left::Surface(j, leading) => (EventFunction::Surface(j), leading),
+            Left::Exit(function, leading) => (function, leading),
+        };
+        (leading.order > 0).then(|| {
+            let order = i32::try_from(leading.order).unwrap_or(1);
+            // In the sense of the mode every monitored function starts out positive.
+            (
+                function,
+                Deflation {
+                    t,
+                    order,
+                    leading: leading.coefficient().abs(),
+                    residual: 0.0,
+                    is_clean: false,
+                    blur: 0.0,
+                },
+            )
+        })
+    }
+}

@@ -1,0 +1,82 @@
+//! Sliding whose multipliers are lost, or go on beyond their ends by rounding.
+
+use super::point::{Notes, Point};
+use super::two_fold::{beyond_double_zero, two_fold_here};
+use super::vanishing_jump::has_lost_jump;
+use smallvec::{smallvec, SmallVec};
+
+use crate::error::FieldError;
+use crate::event::EventFunction;
+use crate::field::{IntersectionExit, ModeField};
+use crate::tolerances::{AT_FOLD, AT_SIDE, FIRST_SLACK};
+
+/// The functions that count as vanishing where steps of sliding shrink to nothing: the jump of the field across a surface has
+/// vanished, the multipliers have met a fold beyond which there are none, or both fields are tangent to the surface.
+pub(crate) fn lost_functions(
+    at: &Point,
+    notes: &mut Notes,
+) -> Result<Option<SmallVec<[EventFunction; 4]>>, FieldError> {
+    if at.arrival.slides_on_several() {
+        let m = at.arrival.sliding.len();
+        if has_lost_jump(at, notes)? {
+            return Ok(Some(smallvec![EventFunction::Exit(2 * m + 1)]));
+        }
+        return Ok(has_lost_root(at)?.then(|| smallvec![EventFunction::Exit(2 * m)]));
+    }
+    let &[j] = at.arrival.sliding else {
+        return Ok(None);
+    };
+    let arrived = beyond_double_zero(at, j)?.is_some() || two_fold_here(at)?.is_some();
+    Ok(arrived.then(|| smallvec![EventFunction::ExitMinus, EventFunction::ExitPlus]))
+}
+
+/// Has sliding on several surfaces come to a fold of its multipliers?
+fn has_lost_root(at: &Point) -> Result<bool, FieldError> {
+    let mut field = at.arrival.field.borrow_mut();
+    let fold = match &**field {
+        ModeField::Intersection(field) if field.set().len() > 2 && field.is_rootless() => {
+            return Ok(true)
+        }
+        ModeField::Intersection(field) => 2 * field.set().len(),
+        _ => return Ok(false),
+    };
+    let exits = field.exits(at.t, &mut at.x.to_vec())?;
+    Ok(exits.get(fold).is_some_and(|exit| exit.abs() < AT_FOLD))
+}
+
+/// Is it the root of three and more surfaces that is no longer stable?
+pub(crate) fn loses_stability(field: &ModeField, functions: &[EventFunction]) -> bool {
+    let ModeField::Intersection(field) = field else {
+        return false;
+    };
+    let is_stability = |f: &EventFunction| match f {
+        EventFunction::Exit(index) => field.exit(*index) == IntersectionExit::Stability,
+        _ => false,
+    };
+    field.set().len() > 2 && functions.iter().any(is_stability)
+}
+
+/// How far multipliers may go beyond their ends, by exit function, after an event whose decision is that the motion slides on:
+/// there forces balance to rounding. Ten times as far each time, so that the motion gets on.
+pub(crate) fn loosen(
+    field: &ModeField,
+    functions: &[EventFunction],
+    slacks: &mut Vec<(usize, f64)>,
+) {
+    let ModeField::Intersection(field) = field else {
+        slacks.clear();
+        return;
+    };
+    for function in functions {
+        let EventFunction::Exit(index) = *function else {
+            continue;
+        };
+        if !matches!(field.exit(index), IntersectionExit::Side { .. }) {
+            continue;
+        }
+        match slacks.iter_mut().find(|held| held.0 == index) {
+            Some(held) => held.1 = (10.0 * held.1).min(AT_SIDE),
+            None => slacks.push((index, FIRST_SLACK)),
+        }
+    }
+}

@@ -1,0 +1,452 @@
+//! From a located event, a limit or a start to the next motion: the decision is asked for, recorded and carried out.
+
+use std::cell::RefCell;
+
+use smallvec::{smallvec, SmallVec};
+
+use crate::decisions::{
+    beyond_double_zero, decide, differs_between_sides, limits::limit_here, refusal, root_ends,
+    two_fold_here, vanishing_surfaces, Arrival, Cause, Decided, Decision, Leap, Lefts, Next, Notes,
+    Point, Rule, Values,
+};
+use crate::error::FieldError;
+use crate::event::{Deflation, EventFunction, Found};
+use crate::field::{eval_on_side, ModeField, SmoothField};
+use crate::integrate::integrator::Integrator;
+use crate::mode::Mode;
+use crate::solution::Switch;
+use crate::status::Stop;
+use crate::switching::Kind;
+use crate::tolerances::{MOST_SWITCHES_AT_ONE_TIME, NO_PROGRESS, SMALL_JUMP};
+
+/// How many normal components of sliding on one surface vanish.
+fn n_exits(event: &Found) -> usize {
+    let exits = [EventFunction::ExitMinus, EventFunction::ExitPlus];
+    event.functions.iter().filter(|f| exits.contains(f)).count()
+}
+
+impl<'a> Integrator<'a> {
+    /// Asks a question about the current place, and counts what the answer cost.
+    pub(in crate::integrate) fn ask<R>(
+        &mut self,
+        cause: Cause,
+        question: impl FnOnce(&Point<'_, '_, 'a>, &mut Notes) -> Result<R, FieldError>,
+    ) -> Result<R, FieldError> {
+        let departing = self
+            .motion
+            .monitored
+            .iter()
+            .filter_map(|m| match m.function {
+                EventFunction::Surface(j) if m.deflation.is_some_and(|d| d.order > 1) => Some(j),
+                _ => None,
+            });
+        let arrival = Arrival {
+            cause,
+            mode: &self.motion.mode,
+            signs: &self.motion.signs,
+            sliding: &self.motion.sliding,
+            active: &self.motion.active,
+            resting: &self.motion.resting,
+            departing: departing.collect(),
+            meets_kinks: self.motion.meets_kinks,
+            switches: self.recorder.switches(),
+            residuals: &self.residuals,
+            passing: &self.passing,
+            velocity: self.stepper.start_derivative(),
+            field: RefCell::new(&mut self.motion.field),
+        };
+        let at = Point {
+            system: self.system,
+            actions: self.actions,
+            scale: &self.scale,
+            t: self.t,
+            x: &self.x,
+            q: &self.motion.discrete,
+            arrival: &arrival,
+            policy: self.options.into(),
+        };
+        let mut notes = Notes {
+            n_choices: self.n_choices,
+            ..Notes::default()
+        };
+        let answer = question(&at, &mut notes);
+        self.stats.n_field_evaluations += notes.n_field_evaluations;
+        self.stats.n_surface_evaluations += notes.n_surface_evaluations;
+        answer
+    }
+
+    /// Decides which motion follows at the current place; keeps the warnings.
+    pub(in crate::integrate) fn decide(
+        &mut self,
+        cause: Cause,
+    ) -> Result<(Rule, Decided), FieldError> {
+        let n_choices = self.n_choices;
+        let decision = self.ask(cause, |at, notes| {
+            let decision = decide(at, n_choices)?;
+            notes.add_costs(&decision.notes);
+            Ok(decision)
+        })?;
+        let Decision {
+            decided,
+            rule,
+            notes,
+        } = decision;
+        self.n_choices = notes.n_choices;
+        self.motion.meets_kinks |= notes.meets_kinks;
+        self.warnings.extend(notes.warnings);
+        Ok((rule, decided))
+    }
+
+    /// Values of all switching functions at the current place.
+    pub(in crate::integrate) fn surface_values(
+        &mut self,
+        signs: &[f64],
+    ) -> Result<Values, FieldError> {
+        let mut h: Values = smallvec![0.0; self.system.n_surfaces()];
+        self.system.surfaces(self.t, &self.x, signs, &mut h)?;
+        self.stats.n_surface_evaluations += 1;
+        Ok(h)
+    }
+
+    /// Decides what follows the event and starts it.
+    pub(in crate::integrate) fn switch(
+        &mut self,
+        event: &Found,
+    ) -> Result<Option<Stop>, FieldError> {
+        self.stats.n_switches += 1;
+        if self.count_switches_here() > MOST_SWITCHES_AT_ONE_TIME {
+            return self.leave_without_progress(event);
+        }
+        if !self.actions.list.is_empty() {
+            let signs = self.motion.signs.clone();
+            let h = self.surface_values(&signs)?;
+            if let Some(done) = self.act_at_event(event, &h)? {
+                return Ok(done);
+            }
+        }
+        let before = self.motion.mode.clone();
+        let cause = Cause::Event {
+            functions: &event.functions,
+            surfaces: &[],
+            mode: &before,
+            touch: event.touch,
+            vanishing: [0; 2],
+            at_two_fold: false,
+        };
+        let (surfaces, before) = self.ask(cause, vanishing_surfaces)?;
+        if let Some(done) = self.pass_double_zero(event, &before, &surfaces)? {
+            return Ok(done);
+        }
+        let cause = Cause::Event {
+            functions: &event.functions,
+            surfaces: &surfaces,
+            mode: &before,
+            touch: event.touch,
+            vanishing: std::mem::take(&mut self.detector.vanishing),
+            at_two_fold: self.arrives_at_two_fold(event, &surfaces)?,
+        };
+        let (rule, decided) = self.decide(cause)?;
+        self.residuals.clear();
+        let mut next = match decided {
+            Ok(next) => next,
+            Err(stop) => return Ok(Some(stop)),
+        };
+        let is_changed = |j: &usize| before.entries()[*j] != next.mode.entries()[*j];
+        let mut concerned = surfaces;
+        match rule {
+            Rule::Touch => {}
+            Rule::Contact | Rule::Triggers => {
+                let all = 0..before.entries().len();
+                let changed: SmallVec<[usize; 4]> = all.filter(is_changed).collect();
+                if !changed.is_empty() || rule == Rule::Triggers {
+                    concerned = changed;
+                }
+            }
+            _ => {
+                let slid = self.motion.sliding().iter().copied();
+                let slid: SmallVec<[usize; 4]> = slid.filter(|j| !concerned.contains(j)).collect();
+                concerned.extend(slid);
+                concerned.sort_unstable();
+                if concerned.len() > 1 && concerned.iter().any(is_changed) {
+                    concerned.retain(|j| is_changed(j));
+                }
+                // Stability is lost, and the motion stays all the same: it oscillates around the root from now on.
+                let sliding = self.motion.sliding().iter().copied();
+                let slides_on = next.mode.sliding_set().eq(sliding);
+                let field = &self.motion.field;
+                next.root.oscillates |=
+                    slides_on && root_ends::loses_stability(field, &event.functions);
+                if before == next.mode {
+                    root_ends::loosen(field, &event.functions, &mut self.slacks);
+                } else {
+                    self.slacks.clear();
+                }
+            }
+        }
+        self.record(before, next.mode.clone(), &concerned, rule.name());
+        if !matches!(rule, Rule::Touch | Rule::Contact | Rule::Triggers) {
+            if let Some(limit) = self.accumulation()? {
+                return self.jump_to(limit, next.mode);
+            }
+        }
+        self.begin(next)
+    }
+
+    /// How many switches came before this one without any progress of time.
+    fn count_switches_here(&mut self) -> u32 {
+        let (since, before) = self.last_switch;
+        let is_progress = self.t != since && self.t - since > NO_PROGRESS * self.t.abs();
+        self.last_switch = if is_progress || since.is_nan() {
+            (self.t, 0)
+        } else {
+            (since, before + 1)
+        };
+        self.last_switch.1
+    }
+
+    /// After too many switches without any progress of time: goes on from their limit, or ends the run.
+    fn leave_without_progress(&mut self, event: &Found) -> Result<Option<Stop>, FieldError> {
+        let mut surfaces = self.recorder.surfaces_switched_at(self.t);
+        if let Some(limit) = self.ask(Cause::Start, |at, _| limit_here(at, &surfaces))? {
+            let mode = self.motion.mode.clone();
+            return self.jump_to(limit, mode);
+        }
+        if surfaces.is_empty() {
+            let named = event.functions.iter().filter_map(|f| match f {
+                EventFunction::Surface(j) => Some(*j),
+                _ => None,
+            });
+            surfaces.extend(named);
+        }
+        Ok(Some(Stop::NoProgress { surfaces }))
+    }
+
+    /// Goes on beyond a double zero of the difference of the normal components, if sliding has come to one: what came of
+    /// that.
+    fn pass_double_zero(
+        &mut self,
+        event: &Found,
+        mode: &Mode,
+        surfaces: &[usize],
+    ) -> Result<Option<Option<Stop>>, FieldError> {
+        let &[j] = self.motion.sliding() else {
+            return Ok(None);
+        };
+        if n_exits(event) == 0 || !surfaces.is_empty() || !self.may_lose_multiplier() {
+            return Ok(None);
+        }
+        let beyond = self.ask(Cause::Anew(mode), |at, _| beyond_double_zero(at, j))?;
+        let Some((t, end)) = beyond.filter(|(t, _)| *t <= self.horizon) else {
+            return Ok(None);
+        };
+        self.record(mode.clone(), mode.clone(), &[], Rule::OneSurface.name());
+        self.move_straight(t, end)?;
+        let next = Next::new(mode.clone(), Lefts::new());
+        Ok(Some(self.begin(next)?))
+    }
+
+    /// Has sliding on one surface come to a two-fold? Then the point is moved there.
+    fn arrives_at_two_fold(
+        &mut self,
+        event: &Found,
+        surfaces: &[usize],
+    ) -> Result<bool, FieldError> {
+        let n_exits = n_exits(event);
+        let is_exit = n_exits == 2 || n_exits == 1 && self.approaches_two_fold();
+        if !is_exit || !surfaces.is_empty() {
+            return Ok(false);
+        }
+        let mode = self.motion.mode.clone();
+        let Some((t, x)) = self.ask(Cause::Anew(&mode), |at, _| two_fold_here(at))? else {
+            return Ok(false);
+        };
+        if t > self.t && t <= self.horizon {
+            self.move_straight(t, x)?;
+        }
+        Ok(true)
+    }
+
+    /// Is the difference of the normal components at the end of the step so small, compared with the speed, that the
+    /// multiplier may be lost? Far from it nothing else has to be looked at.
+    fn may_lose_multiplier(&self) -> bool {
+        let [minus, plus, ..] = self.detector.stages.as_slice() else {
+            return false;
+        };
+        let speed = self.stepper.end_derivative().iter();
+        let speed = speed.fold(0.0_f64, |most, v| most.max(v.abs()));
+        let least = (minus[0] + plus[0]).min(minus[6] + plus[6]);
+        least <= (SMALL_JUMP * self.options.rtol).min(1.0) * speed
+    }
+
+    /// Does the share of f+ change fast in the step just made, towards a two-fold?
+    pub(in crate::integrate) fn approaches_two_fold(&self) -> bool {
+        let [minus, plus, ..] = self.detector.stages.as_slice() else {
+            return false;
+        };
+        let (before, after) = (minus[0] + plus[0], minus[6] + plus[6]);
+        self.motion.sliding.len() == 1 && after < 0.99 * before
+    }
+
+    /// Records a switch between two modes that leaves the state as it is.
+    pub(in crate::integrate) fn record(
+        &mut self,
+        before: Mode,
+        after: Mode,
+        surfaces: &[usize],
+        rule: &'static str,
+    ) {
+        let kind = Kind::between(&before, &after);
+        self.recorder.switch(Switch {
+            t: self.t,
+            y_before: SmallVec::from_slice(&self.x),
+            y_after: SmallVec::from_slice(&self.x),
+            kind,
+            surfaces: SmallVec::from_slice(surfaces),
+            mode_before: before,
+            mode_after: after,
+            note: String::new(),
+            rule,
+        });
+    }
+
+    /// Starts a motion at the current point.
+    pub(in crate::integrate) fn begin(&mut self, next: Next) -> Result<Option<Stop>, FieldError> {
+        let Next {
+            mode,
+            mut left,
+            root,
+            moved,
+        } = next;
+        self.stats.n_field_evaluations += self.motion.field.n_evaluations();
+        self.remember_pace();
+        let slid = !self.motion.sliding().is_empty();
+        if let Some(x) = moved {
+            self.x = x;
+        }
+        let leaps = root.leap.is_some();
+        if let Some(leap) = root.leap {
+            left = self.make_leap(&leap)?;
+        }
+        let t = self.t;
+        let deflations: SmallVec<[(EventFunction, Deflation); 2]> =
+            left.iter().filter_map(|l| l.deflation(t)).collect();
+        self.note_resting(&mode, &left)?;
+        self.motion.restart(self.system, self.t, mode, &deflations);
+        let zeros = self.motion.monitored.iter_mut();
+        for zero in zeros.filter_map(|m| m.deflation.as_mut()) {
+            zero.is_clean = !slid;
+        }
+        self.choose_stepper();
+        match (&mut self.motion.field, root.at_two_fold) {
+            (ModeField::Intersection(field), _) => {
+                field.begin(&root.multipliers, root.oscillates);
+                for &(index, slack) in &self.slacks {
+                    field.set_slack(index, slack);
+                }
+            }
+            (ModeField::Sliding(field), Some(multiplier)) => {
+                field.begin_at_two_fold(self.t, multiplier);
+            }
+            _ => {}
+        }
+        self.motion.project(self.t, &mut self.x)?;
+        self.rest_on_coinciding()?;
+        self.evaluate_start()?;
+        self.note_oscillation();
+        if !leaps {
+            let multipliers = self.motion.multipliers();
+            self.recorder.begin_segment(
+                self.t,
+                &self.motion.mode,
+                multipliers,
+                &self.motion.discrete,
+            );
+        }
+        if let Some(stop) = refusal(&self.motion.field, &self.motion.sliding) {
+            return Ok(Some(stop));
+        }
+        if self.system.has_nested_signs() {
+            if let Some(stop) = self.differs_between_sides(self.t, &self.x)? {
+                return Ok(Some(stop));
+            }
+        }
+        let derivative = self.stepper.start_derivative();
+        if derivative.iter().any(|v| !v.is_finite()) {
+            return Ok(Some(Stop::NotFinite));
+        }
+        let start = (self.t, &self.x[..], derivative);
+        self.detector.measure(self.system, &self.motion, start, 0)?;
+        self.detector.accept_start(&mut self.motion.monitored);
+        self.user_events.restart(self.t, &self.x)?;
+        self.controller.restart();
+        self.dt = self.first_step(&left)?;
+        Ok(None)
+    }
+
+    /// Does the motion slide between fields that differ in more signs than those of the surfaces slid on?
+    pub(in crate::integrate) fn differs_between_sides(
+        &self,
+        t: f64,
+        x: &[f64],
+    ) -> Result<Option<Stop>, FieldError> {
+        let motion = &self.motion;
+        let is_checked = |k: usize| motion.active[k] && !motion.resting.contains(&k);
+        differs_between_sides(
+            self.system,
+            (t, x),
+            &motion.mode,
+            &motion.sliding,
+            is_checked,
+        )
+    }
+
+    /// Begins the segment of a motion that starts with a leap, and makes that; what the motion leaves at its end.
+    fn make_leap(&mut self, leap: &Leap) -> Result<Lefts, FieldError> {
+        let room = self.horizon - self.t;
+        let landing = self.ask(Cause::Start, |at, notes| leap.landing(at, notes, room))?;
+        let region = leap.region.clone();
+        self.motion.restart(self.system, self.t, region, &[]);
+        let discrete = &self.motion.discrete;
+        self.recorder
+            .begin_segment(self.t, &leap.region, SmallVec::new(), discrete);
+        let Some(landing) = landing else {
+            return Ok(Lefts::new());
+        };
+        self.move_straight(landing.t, landing.x)?;
+        Ok(landing.left)
+    }
+
+    /// Records a straight line to a later point: the motion in between has more switches than can be listed.
+    pub(in crate::integrate) fn move_straight(
+        &mut self,
+        t: f64,
+        end: Vec<f64>,
+    ) -> Result<(), FieldError> {
+        self.stepper.set_straight(self.t, t - self.t, &self.x, &end);
+        self.sample(t)?;
+        self.recorder.step(self.stepper.interpolant(), t, &end);
+        (self.t, self.x) = (t, end);
+        Ok(())
+    }
+
+    /// The derivative at the start of the motion, and its exit functions there.
+    fn evaluate_start(&mut self) -> Result<(), FieldError> {
+        self.series_reach = None;
+        if self.start_with_series() {
+            // Known.
+        } else if let ModeField::Region(_) = &self.motion.field {
+            let (signs, derivative) = (&self.motion.signs, self.stepper.start_derivative_mut());
+            self.stats.n_field_evaluations +=
+                eval_on_side(self.system, self.t, &self.x, signs, derivative)?;
+        } else {
+            let derivative = self.stepper.start_derivative_mut();
+            self.motion.field.eval(self.t, &mut self.x, derivative)?;
+            self.go_without_equations();
+        }
+        let exits = self.motion.field.last_exits();
+        self.detector.stages.clear();
+        let stages = exits.iter().map(|&exit| [exit; 7]);
+        self.detector.stages.extend(stages);
+        Ok(())
+    }
+}
