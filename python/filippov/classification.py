@@ -1,4 +1,4 @@
-"""What happens at a point: which surfaces vanish there, and in which modes a motion can go on."""
+"""What happens at a point: which surfaces vanish there, and which motion follows."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from filippov._core import classify as classify_in_core
-from filippov.errors import ModelError
+from filippov.errors import InputError, ModelError
 from filippov.modes import Mode
 from filippov.prepare import Prepared
 
@@ -30,7 +30,7 @@ _IN_WORDS = {
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Classification:
-    """What happens at a point, seen as the start of a run. Made by `System.classify`.
+    """What happens at a point where a run starts, or where a motion arrives. Made by `System.classify`.
 
     Attributes
     ----------
@@ -41,18 +41,20 @@ class Classification:
         The surfaces that vanish here, to rounding, and that the field depends on: indices into
         ``system.surfaces``.
     mode : Mode or None
-        The mode in which a run from here goes on; ``None`` if that is not decided, or if it spirals outwards.
+        The mode that follows; ``None`` if that is not decided, or if the motion spirals outwards.
     multipliers : tuple of float
         lambda of the surfaces that `mode` slides on, in their order.
     candidates : tuple of Mode
-        All modes in which a motion can go on from here.
+        All modes in which a motion can follow.
     unique : bool
-        Whether there is one way only.
+        Whether one motion only can follow.
     spirals : bool
         Whether the motion may wind around the intersection, further out with each turn.
+    rule : str
+        The rule that decided, as in the column ``rule`` of ``sol.switches``.
     leaf : str
-        At an intersection the rule that decided: ``start/only``, ``start/several``, ``higher-order``, or
-        ``rest`` of a region at rest.
+        Which part of the rule ``first_order`` decided at an intersection: ``start/only``, ``start/several``,
+        ``higher-order``, or ``rest`` of a region at rest; otherwise empty.
     reason : str
         Why there is no decision; empty if there is one.
     normal_components : ndarray, shape (2, ..., 2, m)
@@ -72,6 +74,7 @@ class Classification:
     candidates: tuple[Mode, ...]
     unique: bool
     spirals: bool
+    rule: str
     leaf: str
     reason: str
     normal_components: Array
@@ -84,8 +87,7 @@ class Classification:
         if self.mode is not None:
             shown = ", ".join(f"{lam:.6g}" for lam in self.multipliers)
             with_multipliers = f", multipliers {shown}" if shown else ""
-            rule = f" ({self.leaf})" if self.leaf else ""
-            lines.append(f"goes on in mode {self.mode}{with_multipliers}{rule}")
+            lines.append(f"goes on in mode {self.mode}{with_multipliers} ({self.leaf or self.rule})")
         elif self.reason:
             lines.append(f"not decided: {self.reason}")
         else:
@@ -99,7 +101,13 @@ class Classification:
 
 
 def classify(
-    prepared: Prepared, t: float, x: Array, p: Array, reach: float, kappa: tuple[float, ...]
+    prepared: Prepared,
+    t: float,
+    x: Array,
+    p: Array,
+    reach: float,
+    kappa: tuple[float, ...],
+    before: Mode | None = None,
 ) -> Classification:
     """Return what happens at a point.
 
@@ -115,6 +123,8 @@ def classify(
         Distance below which a surface counts as met.
     kappa : tuple of float
         Scaling of every surface; empty for 1.
+    before : Mode, optional
+        The mode of a motion that arrives here; without it a run starts here.
 
     Returns
     -------
@@ -122,10 +132,17 @@ def classify(
 
     Raises
     ------
+    InputError
+        If no motion in the mode `before` is at the point.
     ModelError
         If a field or a switching function is not finite at the point.
     """
-    found: dict[str, Any] | None = classify_in_core(prepared.core, t, x, p, reach, list(kappa))
+    try:
+        found: dict[str, Any] | None = classify_in_core(
+            prepared.core, t, x, p, reach, list(kappa), None if before is None else list(before)
+        )
+    except ValueError as error:
+        raise InputError(str(error)) from None
     if found is None:
         raise ModelError("a field or a switching function is not finite at this point", t=t, state=x)
     m = len(found["surfaces"])

@@ -73,20 +73,22 @@ class Points(ABC):
         t, state = check_time(t), check_y0(x, "x")
         values = self.parameter_values(params)
         prepared = self.prepare(len(state), float(t), state, values)
-        try:
-            entries = Mode([int(mode)] if isinstance(mode, (int, np.integer)) else mode)
-        except (TypeError, ValueError) as error:
-            raise InputError(f"mode: {error}") from None
-        if len(entries) != len(prepared.surfaces):
-            raise InputError(
-                f"mode: one entry per surface is needed: {len(prepared.surfaces)}, it has {len(entries)}"
-            )
+        entries = _check_mode("mode", mode, prepared)
         return sliding_field(prepared, float(t), state, entries, parameter_vector(values))
 
     def classify(
-        self, t: float, x: npt.ArrayLike, atol: float = 0.0, kappa: Any = None, **params: float
+        self,
+        t: float,
+        x: npt.ArrayLike,
+        before: Any = None,
+        *,
+        atol: float = 0.0,
+        kappa: Any = None,
+        **params: float,
     ) -> Classification:
-        """Return what happens at a point: which surfaces vanish there, and how a motion goes on.
+        """Return what happens at a point: which surfaces vanish there, and which motion follows.
+
+        The decision is that of a run that starts at the point or, with `before`, arrives there in that mode.
 
         Parameters
         ----------
@@ -94,6 +96,8 @@ class Points(ABC):
             Time.
         x : array_like, shape (n,)
             State.
+        before : Mode, tuple of int, or str, optional
+            The mode of the motion that arrives at the point, one entry per surface; without it a run starts there.
         atol : float, optional
             A surface nearer than this counts as met; by default only one that vanishes to rounding.
         kappa : float or array_like, shape (n_surfaces,), optional
@@ -108,7 +112,7 @@ class Points(ABC):
         Raises
         ------
         InputError
-            If an argument or a parameter name does not fit.
+            If an argument or a parameter name does not fit, or if no motion in the mode `before` is at the point.
         ModelError
             If a field or a switching function is not finite at the point.
 
@@ -119,10 +123,26 @@ class Points(ABC):
         >>> relays.classify(0.0, [0.0, 0.0])
         intersection at x[0] = 0, x[1] = 0: several surfaces meet
         goes on in mode 00, multipliers 0.5, -0.2 (start/only)
+        >>> relays.classify(0.0, [0.0, 0.0], before="0+").mode
+        Mode('00')
         """
         t, state = check_time(t), check_y0(x, "x")
         values = self.parameter_values(params)
         prepared = self.prepare(len(state), float(t), state, values)
         scaling, reach = check_kappa(kappa), check_distance(atol)
         fit_kappa(scaling, prepared.surfaces)
-        return classify(prepared, float(t), state, parameter_vector(values), reach, scaling)
+        entries = None if before is None else _check_mode("before", before, prepared)
+        return classify(prepared, float(t), state, parameter_vector(values), reach, scaling, entries)
+
+
+def _check_mode(name: str, mode: Any, prepared: Prepared) -> Mode:
+    """Return an argument as a mode with one entry per surface."""
+    try:
+        entries = Mode([int(mode)] if isinstance(mode, (int, np.integer)) else mode)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name}: {error}") from None
+    if len(entries) != len(prepared.surfaces):
+        raise InputError(
+            f"{name}: one entry per surface is needed: {len(prepared.surfaces)}, it has {len(entries)}"
+        )
+    return entries

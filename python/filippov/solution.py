@@ -311,8 +311,8 @@ class Solution:
     def warnings(self) -> list[RunWarning]:
         """What deserves a look."""
         return [
-            RunWarning(t, code, text, tuple(Mode(mode) for mode in candidates))
-            for t, code, text, candidates in self._run.warnings
+            RunWarning(t, code, text, tuple(Mode(mode) for mode in candidates), tuple(surfaces), rule)
+            for t, code, text, candidates, surfaces, rule in self._run.warnings
         ]
 
     @cached_property

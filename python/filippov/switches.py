@@ -37,6 +37,9 @@ class Switch(NamedTuple):
         Modes on both sides.
     note : str
         Further information, usually empty.
+    rule : str
+        The rule of the decision that chose `mode_after`, as ``one_surface``, ``relay`` or ``first_order``
+        (`docs/theory/order_of_outcomes.md` lists them); empty for a reset.
     """
 
     t: float
@@ -47,6 +50,7 @@ class Switch(NamedTuple):
     mode_before: Mode
     mode_after: Mode
     note: str
+    rule: str = ""
 
 
 class Segment(NamedTuple):
@@ -95,15 +99,22 @@ class RunWarning(NamedTuple):
         What was found, in words.
     candidates : tuple of Mode
         For ``"non_unique"`` all modes in which a solution goes on, the chosen one first; else empty.
+    surfaces : tuple of int
+        The surfaces that it is about, as indices into ``system.surfaces``.
+    rule : str
+        The rule of the decision that it comes from, as in `Switch`; empty if it comes from none.
     """
 
     t: float
     code: str
     message: str
     candidates: tuple[Mode, ...] = ()
+    surfaces: tuple[int, ...] = ()
+    rule: str = ""
 
     def __str__(self) -> str:
-        return f"t = {self.t:.10g}: {self.message} [{self.code}]"
+        rule = f", rule {self.rule}" if self.rule else ""
+        return f"t = {self.t:.10g}: {self.message} [{self.code}{rule}]"
 
 
 class SwitchTable(Sequence[Switch]):
@@ -184,6 +195,11 @@ class SwitchTable(Sequence[Switch]):
         """Further information, usually empty."""
         return [row[7] for row in self._rows]
 
+    @property
+    def rule(self) -> list[str]:
+        """The rules of the decisions that chose the modes just after; empty for resets."""
+        return [row[8] for row in self._rows]
+
     def surface_text(self, switch: Switch) -> str:
         """Return the printed switching functions that a switch concerns, separated by commas."""
         return ", ".join(
@@ -210,6 +226,7 @@ class SwitchTable(Sequence[Switch]):
         for label, values in (("before", self.y_before), ("after", self.y_after)):
             columns.update({f"{name}_{label}": values[:, i] for i, name in enumerate(self._states)})
         columns["note"] = self.note
+        columns["rule"] = self.rule
         return pandas.DataFrame(columns)
 
     def __repr__(self) -> str:
@@ -296,8 +313,8 @@ def import_pandas() -> Any:
 
 
 def _switch(row: tuple[Any, ...]) -> Switch:
-    t, y_before, y_after, kind, surfaces, mode_before, mode_after, note = row
-    return Switch(t, y_before, y_after, kind, tuple(surfaces), Mode(mode_before), Mode(mode_after), note)
+    t, y_before, y_after, kind, surfaces, before, after, note, rule = row
+    return Switch(t, y_before, y_after, kind, tuple(surfaces), Mode(before), Mode(after), note, rule)
 
 
 def _segment(row: tuple[Any, ...]) -> Segment:

@@ -1,7 +1,7 @@
 //! Inspection of points: the field of a mode, what happens at a point, its hidden dynamics.
 
 use filippov::switching::{HiddenOutcome, NormalFields};
-use filippov::{Classification, Mode};
+use filippov::{Classification, Inspection, Mode};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -38,7 +38,7 @@ pub fn intersection_field<'py>(
 
 /// What happens at a point; None if something is not finite.
 #[pyfunction]
-#[pyo3(signature = (system, t, x, p, reach, kappa))]
+#[pyo3(signature = (system, t, x, p, reach, kappa, before))]
 pub fn classify<'py>(
     py: Python<'py>,
     system: &Bound<'py, PyAny>,
@@ -47,6 +47,7 @@ pub fn classify<'py>(
     p: Array<'py>,
     reach: f64,
     kappa: Vec<f64>,
+    before: Option<Vec<i8>>,
 ) -> PyResult<Option<Bound<'py, PyDict>>> {
     let x = x.as_slice()?;
     let core = core_of(system, p.as_slice()?, t, x)?;
@@ -54,7 +55,33 @@ pub fn classify<'py>(
     if x.len() != core.n_states() {
         return Err(PyValueError::new_err("x has a wrong length"));
     }
-    let point = filippov::classify(&*core, t, x, reach, &kappa).map_err(raised)?;
+    if before
+        .as_ref()
+        .is_some_and(|before| before.len() != n_visible)
+    {
+        return Err(PyValueError::new_err("before has a wrong length"));
+    }
+    let before = before.map(|mut entries| {
+        entries.resize(core.n_surfaces(), 1);
+        Mode::new(entries)
+    });
+    if let Some(mode) = &before {
+        if let Some(j) = filippov::contradicts(&*core, t, x, mode, reach).map_err(raised)? {
+            let (name, entry) = (
+                core.surface_name(j),
+                ["-", "0", "+"][(mode.entries()[j] + 1) as usize],
+            );
+            return Err(PyValueError::new_err(format!(
+                "before: no motion whose entry is {entry} for {name} is at this point"
+            )));
+        }
+    }
+    let how = Inspection {
+        reach,
+        kappa: &kappa,
+        before: before.as_ref(),
+    };
+    let point = filippov::classify(&*core, t, x, how).map_err(raised)?;
     point.map(|point| as_dict(py, point, n_visible)).transpose()
 }
 
@@ -70,8 +97,8 @@ fn as_dict(py: Python<'_>, point: Classification, n_visible: usize) -> PyResult<
     dict.set_item("unique", point.unique)?;
     dict.set_item("spirals", point.spirals)?;
     dict.set_item("leaf", point.leaf)?;
-    let reason = point.undecided.map(|reason| reason.to_string());
-    dict.set_item("reason", reason.unwrap_or_default())?;
+    dict.set_item("rule", point.rule)?;
+    dict.set_item("reason", point.reason)?;
     dict.set_item("components", PyArray1::from_vec(py, point.components))?;
     let leading = point
         .leading

@@ -24,6 +24,7 @@ type SwitchRow<'py> = (
     Bound<'py, PyTuple>,
     Bound<'py, PyTuple>,
     String,
+    &'static str,
 );
 type SegmentRow<'py> = (
     f64,
@@ -35,7 +36,14 @@ type SegmentRow<'py> = (
     Vector<'py>,
 );
 
-type WarningRow<'py> = (f64, &'static str, String, Vec<Bound<'py, PyTuple>>);
+type WarningRow<'py> = (
+    f64,
+    &'static str,
+    String,
+    Vec<Bound<'py, PyTuple>>,
+    Vec<usize>,
+    &'static str,
+);
 
 /// What a run computed.
 #[pyclass(frozen, module = "filippov._core")]
@@ -217,6 +225,7 @@ impl Run {
                     self.mode(py, &s.mode_before)?,
                     self.mode(py, &s.mode_after)?,
                     s.note.clone(),
+                    s.rule,
                 ))
             })
             .collect()
@@ -336,7 +345,15 @@ impl Run {
             .iter()
             .map(|w| {
                 let candidates = self.modes(py, &w.candidates)?;
-                Ok((w.t, w.code.name(), w.text.clone(), candidates))
+                let surfaces = w.surfaces.clone();
+                Ok((
+                    w.t,
+                    w.code.name(),
+                    w.text.clone(),
+                    candidates,
+                    surfaces,
+                    w.rule,
+                ))
             })
             .collect()
     }

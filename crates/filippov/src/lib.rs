@@ -53,8 +53,9 @@ mod tolerances;
 pub use error::{Error, FieldError};
 pub use event::{UserEvent, UserFunction};
 pub use inspect::{
-    classify, hidden_dynamics, intersection_field, not_finite, state_text, Classification,
-    HiddenDynamics, HiddenRoot, IntersectionValue, NotFinitePlace, PointKind,
+    classify, contradicts, hidden_dynamics, intersection_field, not_finite, state_text,
+    Classification, HiddenDynamics, HiddenRoot, Inspection, IntersectionValue, NotFinitePlace,
+    PointKind,
 };
 pub use integrate::{
     solve, solve_interruptible, solve_to_section, solve_with_actions, Integrator, Stats,

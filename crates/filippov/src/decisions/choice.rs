@@ -50,6 +50,7 @@ pub(super) fn choose(
 ) -> Result<Mode, Stop> {
     let asked = asked(at, notes);
     notes.n_choices += 1;
+    notes.candidates.clone_from(&candidates);
     let chosen = match asked {
         Some(asked) if candidates.contains(asked) => Some(asked.clone()),
         Some(_) => None,

@@ -22,6 +22,7 @@ pub(super) fn decide_by_higher_order(
     let ends = meeting.iter().all(|j| at.arrival.sliding.contains(j));
     let decision = decide_intersection(at.system, meeting, mode, ends, (at.t, at.x))?;
     let only = decision.unique();
+    notes.leaf = "higher-order";
     let next = match (only, rest) {
         (Some((after, left)), rest) => {
             let mut candidates = vec![after.clone()];
@@ -41,6 +42,7 @@ pub(super) fn decide_by_higher_order(
         }
         // What stays on as many surfaces as there are states stays at the point.
         (None, Some(rest)) if decision.candidates.is_empty() && meeting.len() == at.x.len() => {
+            notes.leaf = "rest";
             rest_in(at, rest, meeting)?
         }
         _ => {

@@ -207,6 +207,8 @@ fn follow(
         }
         other => return decide_by_higher_order(at, notes, mode, meeting, other, rest),
     };
+    notes.leaf = resolution.leaf;
+    notes.spirals = resolution.candidates.contains(&Continuation::OutwardSpiral);
     let on_all = |k: &Mode| place.on_all(k);
     let mut candidates: Vec<Mode> = Vec::new();
     for mode in resolution.candidates.iter().chain(others) {

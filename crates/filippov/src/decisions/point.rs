@@ -221,6 +221,12 @@ pub(crate) struct Notes {
     pub n_choices: usize,
     /// Kinks were found in the place of other surfaces.
     pub meets_kinks: bool,
+    /// At a non-unique point, all modes among which one was chosen.
+    pub candidates: Vec<Mode>,
+    /// The motion may spiral outwards.
+    pub spirals: bool,
+    /// Which part of its rule decided at an intersection; empty if the rule has one only.
+    pub leaf: &'static str,
     pub n_field_evaluations: u64,
     pub n_surface_evaluations: u64,
 }

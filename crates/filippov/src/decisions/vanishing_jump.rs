@@ -15,7 +15,7 @@ use crate::field::{IntersectionExit, SmoothField};
 use crate::mode::Mode;
 use crate::switching::{admissible, Leading};
 use crate::system::dot;
-use crate::tolerances::{MOST_LISTED, VANISHED};
+use crate::tolerances::{EQUAL_SHARES, MOST_LISTED, VANISHED};
 
 /// The sliding motion as it was a moment before the jump vanished.
 struct Before {
@@ -65,7 +65,11 @@ pub(super) fn decide_where_jump_vanishes(
     };
     let ways = ways_on(at, notes, mode, meeting, &before)?;
     // It stays on as many surfaces as it can; where it has to leave, to the side whose field had the larger share.
-    let side = if before.multiplier < 0.0 { -1 } else { 1 };
+    let side = if before.multiplier < -EQUAL_SHARES {
+        -1
+    } else {
+        1
+    };
     let preferred = ways.iter().max_by_key(|way| {
         let is_that_side = way.mode.entries()[before.surface] == side;
         (

@@ -1,14 +1,23 @@
-//! What happens at a point.
+//! What happens at a point: the decision of a run that starts or arrives there.
 
-use crate::error::FieldError;
-use crate::field::{eval_on_side, MeetingFields};
-use crate::mode::Mode;
-use crate::switching::{
-    decide, decide_intersection, region_at_rest, relay_at, resolve, Arrival, Continuation,
-    Incoming, Leading, Resolution, Undecided, Uniqueness,
+use std::cell::RefCell;
+
+use smallvec::SmallVec;
+
+use crate::action::Actions;
+use crate::decisions::{
+    decide, sides, vanishing_surfaces, Arrival, Cause, Decision, Notes, Point, Policy, Sides,
 };
-use crate::system::{dot, dot_magnitude, surfaces_that_matter, PiecewiseSystem};
-use crate::tolerances::{MOST_MEETING, SURFACE_NOISE};
+use crate::error::FieldError;
+use crate::event::EventFunction;
+use crate::field::{eval_on_side, Law, MeetingFields, ModeField, SmoothField};
+use crate::mode::Mode;
+use crate::options::{NonUnique, Options};
+use crate::status::Stop;
+use crate::stepper::ErrorScale;
+use crate::switching::{decide as decide_at_surface, Arrival as SurfaceArrival, Leading};
+use crate::system::{dot, surfaces_that_matter, PiecewiseSystem};
+use crate::tolerances::{AT_SIDE, MOST_MEETING, SURFACE_NOISE};
 
 /// The kinds of point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,27 +65,29 @@ impl PointKind {
     }
 }
 
-/// What happens at a point, seen as the start of a run.
+/// What happens at a point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Classification {
     /// Which kind of point it is.
     pub kind: PointKind,
     /// The surfaces that vanish here, to rounding, and matter.
     pub surfaces: Vec<usize>,
-    /// The mode in which a run goes on; `None` if that is not decided, or an outward spiral.
+    /// The mode that follows; `None` if that is not decided, or an outward spiral.
     pub mode: Option<Mode>,
     /// lambda of the surfaces that `mode` slides on, in their order.
     pub multipliers: Vec<f64>,
-    /// All modes in which a motion can go on.
+    /// All modes in which a motion can follow.
     pub candidates: Vec<Mode>,
-    /// Is there one way only?
+    /// Can one motion only follow?
     pub unique: bool,
     /// May the motion spiral outwards around the intersection?
     pub spirals: bool,
-    /// At an intersection, the rule that decided; otherwise empty.
+    /// The rule that decided.
+    pub rule: &'static str,
+    /// At an intersection, the leaf of that rule, if it has several; otherwise empty.
     pub leaf: &'static str,
-    /// Why there is no decision.
-    pub undecided: Option<Undecided>,
+    /// Why there is no decision; empty if there is one.
+    pub reason: String,
     /// Normal components of all fields around the point, `[pattern * m + i]` as in
     /// [`crate::switching::NormalFields`].
     pub components: Vec<f64>,
@@ -84,18 +95,29 @@ pub struct Classification {
     pub leading: Option<[Leading; 2]>,
 }
 
-/// Says what happens at a point: which surfaces vanish there, and in which modes a motion can go on.
+/// How a point is looked at.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Inspection<'a> {
+    /// A surface that is nearer than this counts as met, and one that vanishes to rounding in any case.
+    pub reach: f64,
+    /// The scaling of all surfaces of the system; empty means 1.
+    pub kappa: &'a [f64],
+    /// The mode of the motion that arrives at the point; `None` for a start.
+    pub before: Option<&'a Mode>,
+}
+
+/// Says what happens at a point: which surfaces vanish there, and in which modes a motion can follow. The decision is that of
+/// a run ([`crate::solve`]) that starts there or, with [`Inspection::before`], arrives there in a mode.
 ///
-/// A surface vanishes if |h| is below the rounding of the terms that it is made of, or nearer than `reach`
-/// by its gradient; it matters if the field depends on its sign. `kappa` scales all surfaces of the system; empty means 1. `None` if the field or
-/// a switching function is not finite.
+/// A surface vanishes if |h| is below the rounding of the terms that it is made of; it matters if the field depends on its
+/// sign. `None` if the field or a switching function is not finite.
 ///
 /// # Example
 /// ```
-/// use filippov::{classify, ClosureSystem, PointKind};
+/// use filippov::{classify, ClosureSystem, Inspection, PointKind};
 ///
 /// let relay = ClosureSystem::new(1, 1, |_, _, s, dx| dx[0] = 0.3 - s[0], |_, x, h| h[0] = x[0]);
-/// let point = classify(&relay, 0.0, &[0.0], 0.0, &[])?.expect("finite");
+/// let point = classify(&relay, 0.0, &[0.0], Inspection::default())?.expect("finite");
 /// assert_eq!(point.kind, PointKind::Sliding);
 /// assert!((point.multipliers[0] - 0.3).abs() < 1e-15);
 /// # Ok::<(), filippov::FieldError>(())
@@ -107,247 +129,282 @@ pub fn classify(
     system: &dyn PiecewiseSystem,
     t: f64,
     x: &[f64],
+    how: Inspection,
+) -> Result<Option<Classification>, FieldError> {
+    let options = Options::default();
+    let law = Law {
+        kappa: how.kappa,
+        ..Law::from(&options)
+    };
+    let scale = ErrorScale::new(options.rtol, &options.atol, x.len());
+    let start = Mode::new(vec![1; system.n_surfaces()]);
+    let mode = how.before.unwrap_or(&start);
+    let (signs, sliding): (_, Vec<usize>) = (mode.signs(), mode.sliding_set().collect());
+    let mut active = vec![false; signs.len()];
+    system.active(&signs, &sliding, &mut active);
+    let residuals = residuals_within(system, t, x, how.reach, &signs)?;
+    let mut field = ModeField::of(system, law, mode);
+    let mut velocity = vec![0.0; x.len()];
+    let functions = match how.before {
+        Some(_) => vanishing_functions(system, (t, x), mode, &mut field, &residuals)?,
+        None => SmallVec::new(),
+    };
+    field.eval(t, &mut x.to_vec(), &mut velocity)?;
+    let actions = Actions::none();
+    let arrival = |cause, field| Arrival {
+        cause,
+        mode,
+        signs: &signs,
+        sliding: &sliding,
+        active: &active,
+        resting: &[],
+        departing: SmallVec::new(),
+        meets_kinks: false,
+        switches: &[],
+        residuals: &residuals,
+        passing: &[],
+        velocity: &velocity,
+        field: RefCell::new(field),
+    };
+    let policy = Policy {
+        law,
+        nonunique: NonUnique::Regularize,
+        choices: &[],
+    };
+    let point = |arrival| Point {
+        system,
+        actions: &actions,
+        scale: &scale,
+        t,
+        x,
+        q: &[],
+        arrival,
+        policy,
+    };
+    let event = |surfaces, before| Cause::Event {
+        functions: &functions,
+        surfaces,
+        mode: before,
+        touch: false,
+        vanishing: [0; 2],
+        at_two_fold: false,
+    };
+    let (surfaces, around, decision) = match how.before {
+        None => {
+            let arrival = arrival(Cause::Start, &mut field);
+            let at = point(&arrival);
+            let Some(Sides { mode, on_surface }) = sides(&at, &mut Notes::default(), None)? else {
+                return Ok(None);
+            };
+            let zeros = (0..on_surface.len()).filter(|&j| on_surface[j]).collect();
+            let surfaces = surfaces_that_matter(system, &mode, zeros);
+            (surfaces, mode, decide(&at, 0)?)
+        }
+        Some(_) => {
+            let mut same = ModeField::of(system, law, mode);
+            let located = arrival(event(&[], mode), &mut same);
+            let (fresh, before) = vanishing_surfaces(&point(&located), &mut Notes::default())?;
+            let mut surfaces = [&fresh[..], &sliding[..]].concat();
+            surfaces.sort_unstable();
+            let arrival = arrival(event(&fresh, &before), &mut field);
+            let decision = decide(&point(&arrival), 0)?;
+            (surfaces, before, decision)
+        }
+    };
+    let Some(components) = components_around(system, (t, x), &around, &surfaces)? else {
+        return Ok(None);
+    };
+    let mut found = describe(system, (t, x), law, decision)?;
+    found.kind = match *surfaces {
+        [] => PointKind::Region,
+        [j] => {
+            let start = SurfaceArrival::Start;
+            let sides = decide_at_surface(system, j, start, t, x, &around.signs())?;
+            found.leading = Some([sides.minus, sides.plus]);
+            PointKind::of(sides.minus, sides.plus)
+        }
+        _ => PointKind::Intersection,
+    };
+    (found.components, found.surfaces) = (components, surfaces);
+    Ok(Some(found))
+}
+
+/// The first surface whose entry in a mode contradicts the place: the mode slides on it and the place is not on it, or the
+/// place is on its other side. `reach` is that of an [`Inspection`].
+///
+/// # Errors
+/// If a function of the user raises.
+pub fn contradicts(
+    system: &dyn PiecewiseSystem,
+    t: f64,
+    x: &[f64],
+    mode: &Mode,
     reach: f64,
-    kappa: &[f64],
-) -> Result<Option<Classification>, FieldError> {
-    let Some((mode, zeros)) = place(system, t, x, reach)? else {
-        return Ok(None);
-    };
-    // What only triggers an action changes nothing here.
-    let zeros = zeros
-        .into_iter()
-        .filter(|&j| system.switches_at(j))
-        .collect();
-    let surfaces = surfaces_that_matter(system, &mode, zeros);
-    match surfaces.as_slice() {
-        [] => in_region(system, t, x, mode),
-        &[j] => on_surface(system, t, x, &mode, j),
-        _ => at_intersection(system, t, x, &mode, surfaces, kappa),
+) -> Result<Option<usize>, FieldError> {
+    let (signs, sliding): (_, Vec<usize>) = (mode.signs(), mode.sliding_set().collect());
+    let mut active = vec![false; signs.len()];
+    system.active(&signs, &sliding, &mut active);
+    let mut h = vec![0.0; signs.len()];
+    system.surfaces(t, x, &signs, &mut h)?;
+    let residuals = residuals_within(system, t, x, reach, &signs)?;
+    for (j, &entry) in mode.entries().iter().enumerate() {
+        let noise = SURFACE_NOISE * system.surface_size(j, t, x, &signs)?;
+        let reach = residuals.get(j).map_or(0.0, |residual| 2.0 * residual);
+        let is_beyond = match entry {
+            0 => h[j].abs() > noise.max(reach),
+            side => active[j] && h[j] * f64::from(side) < -noise.max(reach),
+        };
+        if is_beyond {
+            return Ok(Some(j));
+        }
     }
+    Ok(None)
 }
 
-/// The sides of all surfaces, and which of them vanish. Switching functions may contain signs of others: they
-/// are evaluated again until nothing changes.
-fn place(
+/// The normal components of all fields around a place, if they are few; `None` if one is not finite.
+fn components_around(
     system: &dyn PiecewiseSystem,
-    t: f64,
-    x: &[f64],
-    reach: f64,
-) -> Result<Option<(Mode, Vec<usize>)>, FieldError> {
-    let d = system.n_surfaces();
-    let mut mode = Mode::new(vec![1; d]);
-    let mut zeros = Vec::new();
-    let (mut h, mut gradient) = (vec![0.0; d], vec![0.0; x.len()]);
-    for _ in 0..=d {
-        let (before, signs) = (mode.clone(), mode.signs());
-        system.surfaces(t, x, &signs, &mut h)?;
-        if h.iter().any(|h| h.is_nan()) {
-            return Ok(None);
-        }
-        zeros.clear();
-        for (j, h) in h.iter().enumerate() {
-            let ht = system.gradient(j, t, x, &signs, &mut gradient)?;
-            let noise = SURFACE_NOISE * (dot_magnitude(&gradient, x) + (ht * t).abs());
-            if h.abs() <= noise.max(reach * dot(&gradient, &gradient).sqrt()) {
-                zeros.push(j);
-            }
-            mode.set(j, if *h < 0.0 { -1 } else { 1 });
-        }
-        if mode == before {
-            break;
-        }
-    }
-    Ok(Some((mode, zeros)))
-}
-
-impl Classification {
-    /// A point of this kind at which nothing is decided.
-    fn open(kind: PointKind, surfaces: Vec<usize>) -> Self {
-        Classification {
-            kind,
-            surfaces,
-            mode: None,
-            multipliers: Vec::new(),
-            candidates: Vec::new(),
-            unique: false,
-            spirals: false,
-            leaf: "",
-            undecided: None,
-            components: Vec::new(),
-            leading: None,
-        }
-    }
-}
-
-fn in_region(
-    system: &dyn PiecewiseSystem,
-    t: f64,
-    x: &[f64],
-    mode: Mode,
-) -> Result<Option<Classification>, FieldError> {
-    let mut dx = vec![0.0; x.len()];
-    eval_on_side(system, t, x, &mode.signs(), &mut dx)?;
-    let is_finite = dx.iter().all(|v| v.is_finite());
-    Ok(is_finite.then(|| Classification {
-        candidates: vec![mode.clone()],
-        mode: Some(mode),
-        unique: true,
-        ..Classification::open(PointKind::Region, Vec::new())
-    }))
-}
-
-fn on_surface(
-    system: &dyn PiecewiseSystem,
-    t: f64,
-    x: &[f64],
-    mode: &Mode,
-    j: usize,
-) -> Result<Option<Classification>, FieldError> {
-    let corners = corners_around(system, t, x, mode, &[j])?;
-    let Ok(fields) = corners.normal_fields() else {
-        return Ok(None);
-    };
-    let decision = decide(system, j, Arrival::Start, t, x, &mode.signs())?;
-    let candidates = decision.candidates.iter().map(|&e| mode.with(j, e));
-    let mut candidates: Vec<Mode> = candidates.collect();
-    if decision.turns_back() {
-        candidates.clear();
-    }
-    let (minus, plus) = (fields.at(0)[0], fields.at(1)[0]);
-    let slides = decision.entry == 0;
-    Ok(Some(Classification {
-        mode: (!candidates.is_empty()).then(|| mode.with(j, decision.entry)),
-        multipliers: slides
-            .then(|| ((minus + plus) / (minus - plus)).clamp(-1.0, 1.0))
-            .into_iter()
-            .collect(),
-        unique: candidates.len() == 1,
-        candidates,
-        components: fields.values().into_owned(),
-        leading: Some([decision.minus, decision.plus]),
-        ..Classification::open(PointKind::of(decision.minus, decision.plus), vec![j])
-    }))
-}
-
-fn at_intersection(
-    system: &dyn PiecewiseSystem,
-    t: f64,
-    x: &[f64],
-    mode: &Mode,
-    surfaces: Vec<usize>,
-    kappa: &[f64],
-) -> Result<Option<Classification>, FieldError> {
-    let mut point = Classification::open(PointKind::Intersection, surfaces);
-    let meeting = point.surfaces.clone();
-    if meeting.len() > MOST_MEETING && decided_by_relay(system, (t, x), mode, &mut point)? {
-        return Ok(Some(point));
-    }
-    let groups = system.sign_groups(&meeting).into_iter();
-    let largest = groups.map(|group| group.len()).max().unwrap_or(0);
-    if largest > MOST_MEETING {
-        point.undecided = Some(Undecided::TooMany { n: largest });
-        return Ok(Some(point));
-    }
-    let corners = corners_around(system, t, x, mode, &meeting)?;
-    let Ok(fields) = corners.normal_fields() else {
-        return Ok(None);
-    };
-    let scaling = meeting
-        .iter()
-        .map(|&j| kappa.get(j).copied().unwrap_or(1.0));
-    let scaling: Vec<f64> = scaling.collect();
-    if meeting.len() <= MOST_MEETING {
-        point.components = fields.values().into_owned();
-    }
-    let on_all = |k: &Mode| {
-        let mut full = mode.clone();
-        for (&j, &entry) in meeting.iter().zip(k.entries()) {
-            full.set(j, entry);
-        }
-        full
-    };
-    match resolve(&fields, &Incoming::Start, &scaling) {
-        Ok(resolution) if !resolution.degenerate => point.take(resolution, on_all),
-        other => {
-            let decision = decide_intersection(system, &meeting, mode, false, (t, x))?;
-            if let Some((only, _)) = decision.unique() {
-                point.mode = Some(only.clone());
-                point.unique = true;
-                point.leaf = "higher-order";
-            } else {
-                point.undecided = Some(other.err().unwrap_or(Undecided::NoOutcome));
-            }
-            point.candidates = decision.candidates;
-        }
-    }
-    if let Some(rest) = region_at_rest(system, &corners, mode, t, x)? {
-        point.add_rest(rest, x.len());
-    }
-    Ok(Some(point))
-}
-
-/// Many surfaces: the relay problem, if the field is affine in the signs and it has a solution that is clear.
-fn decided_by_relay(
-    system: &dyn PiecewiseSystem,
-    at: (f64, &[f64]),
-    mode: &Mode,
-    point: &mut Classification,
-) -> Result<bool, FieldError> {
-    let (found, _) = relay_at(system, at, mode, &point.surfaces)?;
-    let Some(found) = found.filter(|found| found.degenerate.is_empty()) else {
-        return Ok(false);
-    };
-    let mut after = mode.clone();
-    for ((&j, &entry), &sign) in point.surfaces.iter().zip(&found.modes).zip(&found.signs) {
-        after.set(j, entry);
-        if entry == 0 {
-            point.multipliers.push(sign);
-        }
-    }
-    point.unique = matches!(found.uniqueness, Uniqueness::Certain | Uniqueness::OfMotion);
-    point.candidates = vec![after.clone()];
-    point.mode = Some(after);
-    point.leaf = "relay";
-    Ok(true)
-}
-
-impl Classification {
-    /// Adds a region whose field is at rest.
-    fn add_rest(&mut self, rest: Mode, n: usize) {
-        // What stays on as many surfaces as there are states stays at the point.
-        let is_only = self.candidates.is_empty() && self.surfaces.len() == n;
-        if is_only {
-            self.mode = Some(rest.clone());
-            self.leaf = "rest";
-            self.undecided = None;
-        }
-        self.unique = is_only || self.unique && self.candidates.contains(&rest);
-        if !self.candidates.contains(&rest) {
-            self.candidates.push(rest);
-        }
-    }
-
-    fn take(&mut self, resolution: Resolution, on_all: impl Fn(&Mode) -> Mode) {
-        let candidates = &resolution.candidates;
-        self.spirals = candidates.contains(&Continuation::OutwardSpiral);
-        self.mode = resolution.mode().map(&on_all);
-        let modes = candidates.iter().filter_map(Continuation::as_mode);
-        self.candidates = modes.map(on_all).collect();
-        self.unique = resolution.unique && !self.spirals;
-        self.leaf = resolution.leaf;
-        self.multipliers = resolution.multipliers;
-    }
-}
-
-/// All fields around the point.
-fn corners_around(
-    system: &dyn PiecewiseSystem,
-    t: f64,
-    x: &[f64],
+    (t, x): (f64, &[f64]),
     mode: &Mode,
     surfaces: &[usize],
-) -> Result<MeetingFields, FieldError> {
+) -> Result<Option<Vec<f64>>, FieldError> {
+    if surfaces.is_empty() {
+        let mut field = vec![0.0; x.len()];
+        eval_on_side(system, t, x, &mode.signs(), &mut field)?;
+        let is_finite = field.iter().all(|v| v.is_finite());
+        return Ok(is_finite.then(Vec::new));
+    }
+    if surfaces.len() > MOST_MEETING {
+        return Ok(Some(Vec::new()));
+    }
     let mut corners = MeetingFields::new(system, surfaces);
     corners.evaluate(system, t, x, &mode.signs())?;
-    Ok(corners)
+    let fields = corners.normal_fields();
+    Ok(fields.ok().map(|fields| fields.values().into_owned()))
+}
+
+/// Half of what each switching function amounts to at this distance from its surface; a point counts as on the surface up to
+/// twice as much.
+fn residuals_within(
+    system: &dyn PiecewiseSystem,
+    t: f64,
+    x: &[f64],
+    reach: f64,
+    signs: &[f64],
+) -> Result<Vec<f64>, FieldError> {
+    if reach == 0.0 {
+        return Ok(Vec::new());
+    }
+    let mut gradient = vec![0.0; x.len()];
+    let residuals = (0..signs.len()).map(|j| {
+        system.gradient(j, t, x, signs, &mut gradient)?;
+        Ok(0.5 * reach * dot(&gradient, &gradient).sqrt())
+    });
+    residuals.collect()
+}
+
+/// The functions of a motion in this mode that vanish at a place: switching functions, and exit functions.
+fn vanishing_functions(
+    system: &dyn PiecewiseSystem,
+    (t, x): (f64, &[f64]),
+    mode: &Mode,
+    field: &mut ModeField,
+    residuals: &[f64],
+) -> Result<SmallVec<[EventFunction; 4]>, FieldError> {
+    let signs = mode.signs();
+    let mut h = vec![0.0; signs.len()];
+    system.surfaces(t, x, &signs, &mut h)?;
+    let mut found = SmallVec::new();
+    for (j, residual) in residuals.iter().enumerate() {
+        if mode.entries()[j] != 0 && h[j].abs() <= 2.0 * residual {
+            found.push(EventFunction::Surface(j));
+        }
+    }
+    let exits = field.exits(t, &mut x.to_vec())?;
+    let size = exits
+        .iter()
+        .fold(0.0_f64, |size, exit| size.max(exit.abs()));
+    let is_one = mode.codimension() == 1;
+    for (index, exit) in exits.iter().enumerate() {
+        if exit.abs() <= AT_SIDE * size {
+            found.push(match (is_one, index) {
+                (true, 0) => EventFunction::ExitMinus,
+                (true, _) => EventFunction::ExitPlus,
+                _ => EventFunction::Exit(index),
+            });
+        }
+    }
+    Ok(found)
+}
+
+/// A decision in the words of a classification.
+fn describe(
+    system: &dyn PiecewiseSystem,
+    (t, x): (f64, &[f64]),
+    law: Law,
+    decision: Decision,
+) -> Result<Classification, FieldError> {
+    let Decision {
+        decided,
+        rule,
+        notes,
+    } = decision;
+    let mut found = Classification {
+        kind: PointKind::Region,
+        surfaces: Vec::new(),
+        mode: None,
+        multipliers: Vec::new(),
+        candidates: notes.candidates,
+        unique: false,
+        spirals: notes.spirals,
+        rule: rule.name(),
+        leaf: notes.leaf,
+        reason: String::new(),
+        components: Vec::new(),
+        leading: None,
+    };
+    let next = match decided {
+        Ok(next) => next,
+        Err(stop) => {
+            found.reason = reason_of(&stop);
+            if let Stop::Intersection { candidates, .. } = stop {
+                found.candidates = candidates;
+            }
+            return Ok(found);
+        }
+    };
+    found.unique = notes.n_choices == 0 && !notes.spirals;
+    if found.candidates.is_empty() && next.root.leap.is_none() {
+        found.candidates = vec![next.mode.clone()];
+    }
+    if next.root.leap.is_some() {
+        return Ok(found);
+    }
+    found.multipliers = match (next.mode.codimension(), next.root.at_two_fold) {
+        (0, _) => Vec::new(),
+        (1, Some(multiplier)) => vec![multiplier],
+        (m, _) if m == next.root.multipliers.len() => next.root.multipliers,
+        _ => {
+            let mut field = ModeField::of(system, law, &next.mode);
+            field.exits_at(t, &mut x.to_vec())?;
+            field.multipliers().into_vec()
+        }
+    };
+    found.mode = Some(next.mode);
+    Ok(found)
+}
+
+/// Why there is no decision.
+fn reason_of(stop: &Stop) -> String {
+    match stop {
+        Stop::Intersection { reason, .. } => reason.to_string(),
+        Stop::SlidesAcrossJump { .. } => {
+            "the motion would slide between fields that differ in the sign of another function too, which jumps here".into()
+        }
+        Stop::InvisibleTwoFold { .. } => {
+            "the fields on both sides turn back to the surface (an invisible two-fold)".into()
+        }
+        Stop::SlidingRule { reason, .. } => reason.to_string(),
+        other => other.name().replace('_', " "),
+    }
 }

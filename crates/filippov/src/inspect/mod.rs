@@ -1,13 +1,13 @@
 //! Inspection: the field of a mode at a point, what happens at a point, and its hidden dynamics.
 //!
-//! Nothing here is part of a run; the decisions are those of the switching stage.
+//! Nothing here is part of a run; the decisions are those of a run.
 
 mod classify;
 mod hidden_dynamics;
 mod mode_field;
 mod not_finite;
 
-pub use classify::{classify, Classification, PointKind};
+pub use classify::{classify, contradicts, Classification, Inspection, PointKind};
 pub use hidden_dynamics::{hidden_dynamics, HiddenDynamics, HiddenRoot};
 pub use mode_field::{intersection_field, IntersectionValue};
 pub use not_finite::{not_finite, state_text, NotFinitePlace};

@@ -1,6 +1,6 @@
 //! Points whose answer is known.
 
-use super::{classify, hidden_dynamics, intersection_field, PointKind};
+use super::{classify, hidden_dynamics, intersection_field, Inspection, PointKind};
 use crate::switching::{HiddenOutcome, NormalFields};
 use crate::{ClosureSystem, Mode};
 
@@ -23,9 +23,17 @@ fn kind(bias: [f64; 2], x: [f64; 3]) -> Option<(PointKind, String)> {
 }
 
 fn kind_within(reach: f64, bias: [f64; 2], x: [f64; 3]) -> Option<(PointKind, String)> {
-    let point = classify(&relays(bias), 0.0, &x, reach, &[])
-        .ok()
-        .flatten()?;
+    let point = classify(
+        &relays(bias),
+        0.0,
+        &x,
+        Inspection {
+            reach,
+            ..Inspection::default()
+        },
+    )
+    .ok()
+    .flatten()?;
     let mode = point
         .mode
         .map_or_else(|| "none".into(), |mode| mode.to_string());

@@ -21,7 +21,7 @@ pub const REACH: f64 = 1.25;
 
 /// A moment moves each component of the state by this part of its size: short against the time in which anything changes,
 /// and long enough for differences to be clear of rounding.
-pub const MOMENT: f64 = 1e-4;
+pub const MOMENT: f64 = 1e-5;
 
 /// A moment in which the field changes by more than this part of its size is shortened, to a change of about [`MOMENT`].
 pub const TOO_LARGE_A_CHANGE: f64 = 1e-2;

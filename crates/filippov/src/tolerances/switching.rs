@@ -288,6 +288,10 @@ pub const LEFT_RESTING: f64 = 1e3;
 /// less than a moment.
 pub const VANISHED: f64 = 1e-3;
 
+/// The fields of both sides have equal shares where the multiplier is nearer to zero than this: a moment before a jump vanishes
+/// the multiplier is a quotient of two small numbers.
+pub const EQUAL_SHARES: f64 = 1e-6;
+
 /// A gradient depends on others where the square of its part orthogonal to them is below this fraction of its own: the
 /// rounding of inner products.
 pub const DEPENDENT: f64 = 64.0 * EPS;

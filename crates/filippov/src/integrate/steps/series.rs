@@ -183,9 +183,31 @@ impl Integrator<'_> {
             if terms.iter().any(|(c, _)| c.is_nan()) {
                 return f64::NAN;
             }
-            longest = longest.min(series_reach(terms.map(|(c, k)| (c / size, k))));
+            longest = longest.min(match terms {
+                [(0.0, _), (0.0, _)] => self.longest_for_polynomial(place),
+                _ => series_reach(terms.map(|(c, k)| (c / size, k))),
+            });
         }
         longest
+    }
+
+    /// How long a step may be for a function that is a polynomial along it: until the rounding of its largest term reaches
+    /// the tolerance. On a longer step its zeros near the start are lost.
+    fn longest_for_polynomial(&self, place: usize) -> f64 {
+        let Some(taylor) = &self.stepper.taylor else {
+            return f64::INFINITY;
+        };
+        let atol = self.options.atol.iter().copied();
+        let value = taylor.coefficient(place, 0).abs();
+        let tolerance = atol.fold(f64::INFINITY, f64::min) + self.options.rtol * value;
+        let reach = |k: usize| {
+            let rounding = EPS * taylor.coefficient(place, k).abs();
+            (tolerance / rounding).powf(1.0 / k as f64)
+        };
+        (2..taylor.order() - 1)
+            .filter(|&k| taylor.coefficient(place, k) != 0.0)
+            .map(reach)
+            .fold(f64::INFINITY, f64::min)
     }
 
     /// The tolerance for a function: relative to what it moves through in a step, exit functions to the larger one.
