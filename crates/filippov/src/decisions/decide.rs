@@ -15,6 +15,8 @@ use super::placement::{one_surface, place};
 use super::point::{Cause, Decided, Lefts, Next, Notes, Point};
 use super::relay::decide_by_relay;
 use super::vanishing_jump::decide_where_jump_vanishes;
+use smallvec::SmallVec;
+
 use crate::error::FieldError;
 use crate::field::ModeField;
 use crate::mode::Mode;
@@ -200,7 +202,8 @@ fn after_event(
     if fresh.len() > 1 && fresh.iter().any(|&j| at.triggers().is_only_trigger(j)) {
         return Ok((Rule::Triggers, cross_beside_triggers(at, notes, fresh)?));
     }
-    let mut surfaces: Vec<usize> = fresh.iter().chain(at.arrival.sliding).copied().collect();
+    let surfaces = fresh.iter().chain(at.arrival.sliding).copied();
+    let mut surfaces: SmallVec<[usize; 4]> = surfaces.collect();
     surfaces.sort_unstable();
     surfaces.dedup();
     let how = How::Event(arrival_at_surface(at.arrival));

@@ -233,6 +233,7 @@ fn follow(
     };
     let preferred = after.clone();
     if !resolution.unique || is_spiral || candidates.len() > 1 {
+        let modes = candidates.clone();
         if !candidates.contains(&after) {
             candidates.push(after.clone());
         }
@@ -240,6 +241,10 @@ fn follow(
             Ok(after) => after,
             Err(stop) => return Ok(Err(stop)),
         };
+        if is_spiral {
+            // The region that the spiral enters first is no mode in which a motion starts.
+            notes.candidates = modes;
+        }
     }
     let multipliers: &[f64] = if after == preferred && !is_spiral {
         &resolution.multipliers

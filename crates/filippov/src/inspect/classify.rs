@@ -196,8 +196,9 @@ pub fn classify(
             let Some(Sides { mode, on_surface }) = sides(&at, &mut Notes::default(), None)? else {
                 return Ok(None);
             };
-            let zeros = (0..on_surface.len()).filter(|&j| on_surface[j]).collect();
-            let surfaces = surfaces_that_matter(system, &mode, zeros);
+            // What only triggers an action changes nothing here.
+            let zeros = (0..on_surface.len()).filter(|&j| on_surface[j] && system.switches_at(j));
+            let surfaces = surfaces_that_matter(system, &mode, zeros.collect());
             (surfaces, mode, decide(&at, 0)?)
         }
         Some(_) => {
