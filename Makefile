@@ -17,6 +17,11 @@ BUILD_STAMP := $(STAMPS)/build
 RUST_SOURCES := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
 # maturin installs into the environment named here; a Conda environment around must not interfere.
 MATURIN := env -u CONDA_PREFIX VIRTUAL_ENV="$(abspath $(VENV))" $(BIN)/maturin
+# What `make test-fast` runs in Python: files of a second or two that together reach every stage, namely tracing,
+# arguments, itineraries against references, order, what wins at equal times, events, resets, sliding on
+# intersections, discrete states, the record, and runs that fail.
+FAST := $(patsubst %,tests/test_%.py,trace_branching trace_numpy wrong_input itinerary itinerary_exact order \
+	order_of_outcomes events resets sliding_rules classify laws structure adversarial failures)
 # The binding has no Rust tests of its own: tests/ exercises it from Python.
 RUST_TESTED := --workspace --exclude filippov-py
 
@@ -26,7 +31,7 @@ export MPLBACKEND ?= Agg
 N ?= 6000
 SEED ?= 0
 
-.PHONY: help tools setup build build-release fmt lint types test test-rs test-py test-slow fuzz bench demo \
+.PHONY: help tools setup build build-release fmt lint types test test-rs test-py test-fast test-slow fuzz bench demo \
 	pictures docs check all clean
 
 help: ## list the targets
@@ -68,6 +73,10 @@ test-rs: tools ## Rust tests
 test-py: $(BUILD_STAMP) ## Python tests and the examples in the docstrings
 	$(BIN)/pytest -m "not slow"
 	$(BIN)/pytest --doctest-modules python/filippov
+
+test-fast: $(BUILD_STAMP) ## Rust unit tests, and Python tests of every stage: half a minute once all is built
+	$(CARGO) test --release $(RUST_TESTED) --lib
+	$(BIN)/pytest -m "not slow" $(FAST)
 
 test-slow: $(BUILD_STAMP) ## the slow tests
 	$(CARGO) test --release $(RUST_TESTED) -- --ignored

@@ -13,6 +13,7 @@ from typing import Any
 import filippov as fl
 import numpy as np
 import pytest
+from clocks import ManualClock, solve_by
 
 
 def oscillator(t: float, x: Any) -> Any:
@@ -159,64 +160,74 @@ def test_system_exit_is_not_swallowed() -> None:
     assert sol.error.code == 3
 
 
-def interrupted(run: Callable[[], Any], after: float) -> tuple[fl.Interrupted, float]:
-    """Send Ctrl-C to this process after some time; return the exception and the delay."""
-    sent: list[float] = []
+def advancing(clock: ManualClock, seconds: float) -> Callable[[float, Any], Any]:
+    """The oscillator as a black box, each evaluation of which takes some seconds of the clock."""
 
-    def send() -> None:
-        sent.append(time.perf_counter())
-        os.kill(os.getpid(), signal.SIGINT)
+    def slow(t: float, x: Any) -> Any:
+        clock.advance(seconds)
+        return slow_oscillator(t, x)
 
-    timer = threading.Timer(after, send)
-    timer.start()
-    try:
-        with pytest.raises(KeyboardInterrupt) as info:
-            run()
-        delay = time.perf_counter() - sent[0]
-    finally:
-        timer.cancel()
-        timer.join()
-    assert isinstance(info.value, fl.Interrupted)
-    return info.value, delay
+    return slow
 
 
-ENDLESS: dict[str, Callable[[], Any]] = {
-    "traced": lambda: fl.solve_ivp(oscillator, (0, 1e9), [1.0, 2.0]),
-    "black box": lambda: fl.solve_ivp(slow_oscillator, (0, 1e9), [1.0, 2.0], surfaces=lambda t, x: x[1]),
-    "chatter": lambda: fl.solve_ivp(lambda t, x: [np.sign(np.sin(1e7 * t))], (0, 1e9), [0.0]),
-    "only the end": lambda: fl.solve_ivp(oscillator, (0, 1e9), [1.0, 2.0], dense_output=False, t_eval=[1e9]),
-}
+def endless(name: str, clock: ManualClock, **options: Any) -> fl.Solution:
+    """A run of every kind that ends by an interruption only."""
+    if name == "black box":
+        fun = advancing(clock, 0.001)
+        return solve_by(clock, fun, (0, 1e9), [1.0, 2.0], surfaces=lambda t, x: x[1], **options)
+    if name == "chatter":
+        return solve_by(clock, lambda t, x: [np.sign(np.sin(1e7 * t)), 0.0], (0, 1e9), [1.0, 2.0], **options)
+    if name == "only the end":
+        options |= {"dense_output": False, "t_eval": [1e9]}
+    return solve_by(clock, oscillator, (0, 1e9), [1.0, 2.0], **options)
+
+
+KINDS = ["traced", "black box", "chatter", "only the end"]
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals are sent in another way on Windows")
-@pytest.mark.parametrize("name", ENDLESS)
+@pytest.mark.parametrize("name", KINDS)
 def test_ctrl_c(name: str) -> None:
-    error, delay = interrupted(ENDLESS[name], after=0.1)
-    # 0.1 s is promised; as much again for a loaded machine.
-    assert delay < 0.2
-    partial = error.partial
+    """Within 0.1 s of the clock, which every look of the run advances by half a millisecond."""
+    clock = ManualClock(0.0005)
+    sent: list[float] = []
+
+    def send() -> None:
+        while clock.seconds < 0.05:
+            time.sleep(0.001)
+        signal.raise_signal(signal.SIGINT)
+        sent.append(clock.seconds)
+
+    thread = threading.Thread(target=send)
+    thread.start()
+    with pytest.raises(KeyboardInterrupt) as info:
+        endless(name, clock)
+    end = clock.seconds
+    thread.join()
+    assert isinstance(info.value, fl.Interrupted)
+    assert end - sent[0] < 0.1
+    partial = info.value.partial
     assert not partial.success
-    assert "t = " in str(error)
+    assert "t = " in str(info.value)
     if name != "only the end":
         assert len(partial.switches) > 0
         assert partial.t[-1] > 0.0
         assert np.isfinite(partial.sol(partial.t[-1])).all()
 
 
-@pytest.mark.parametrize("name", ENDLESS)
-def test_max_wall_time(name: str) -> None:
-    calls = {
-        "traced": (oscillator, {}),
-        "black box": (slow_oscillator, {"surfaces": lambda t, x: x[1]}),
-        "chatter": (lambda t, x: [np.sign(np.sin(1e7 * t)), 0.0], {}),
-        "only the end": (oscillator, {"dense_output": False, "t_eval": [1e9]}),
-    }
-    fun, options = calls[name]
-    start = time.perf_counter()
-    sol = fl.solve_ivp(fun, (0, 1e9), [1.0, 2.0], max_wall_time=0.1, **options)
-    assert time.perf_counter() - start < 0.4  # collecting the solution takes time too
+@pytest.mark.parametrize("per_look", [0.0005, 0.005])
+@pytest.mark.parametrize("name", KINDS)
+def test_max_wall_time(name: str, per_look: float) -> None:
+    """A run looks at the clock every 64 steps at most, and at every step if 2 ms pass between two looks."""
+    clock = ManualClock(per_look)
+    sol = endless(name, clock, max_wall_time=0.1)
     assert not sol.success
     assert "max_wall_time" in sol.message
+    looks = 0.1 / per_look
+    attempts = sol.stats["n_steps"] + sol.stats["n_rejected"]
+    assert attempts <= (64 if per_look < 0.002 else 1) * (looks + 1)
+    # One step of the black box has up to 20 evaluations of 1 ms.
+    assert 0.1 < clock.seconds < 0.1 + 2 * per_look + 0.05
 
 
 def test_max_steps() -> None:

@@ -45,7 +45,7 @@ def test_random_products_are_decided() -> None:
     """All of 120 systems with two to four surfaces; six ended undecided while folds were not followed."""
     for seed in range(120):
         case = random_products(seed)
-        sol = case.system().solve((0.0, T_END), case.y0, rtol=1e-8, atol=1e-9, max_wall_time=10.0)
+        sol = case.system().solve((0.0, T_END), case.y0, rtol=1e-8, atol=1e-9, max_steps=20_000)
         assert sol.success, (seed, sol.message)
 
 

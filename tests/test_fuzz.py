@@ -18,7 +18,10 @@ N = 240
 pytestmark = pytest.mark.filterwarnings("ignore::RuntimeWarning")
 
 
-@pytest.mark.parametrize("first", range(0, N, 40))
+@pytest.mark.parametrize(
+    "first",
+    [pytest.param(first, marks=pytest.mark.slow if first >= N // 2 else ()) for first in range(0, N, 40)],
+)
 def test_random_systems_keep_all_properties(first: int) -> None:
     for seed in range(first, first + 40):
         case = random_case(seed)

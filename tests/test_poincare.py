@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pickle
-import time
 from typing import Any
 
 import filippov as fl
@@ -32,11 +31,9 @@ def drill() -> fl.System:
 def test_a_longest_period_beyond_all_returns(friction: fl.System) -> None:
     few = fl.poincare(friction, fl.Phase(1.0), (0, 5), [1.0, 2.0], until_periodic=True)
     for longest in (10**9, 2**62):
-        start = time.perf_counter()
         same = fl.poincare(
             friction, fl.Phase(1.0), (0, 5), [1.0, 2.0], until_periodic=True, longest_period=longest
         )
-        assert time.perf_counter() - start < 1.0
         assert same.y.values.tolist() == few.y.values.tolist()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -57,7 +58,15 @@ def loses_its_root(run: Any) -> bool:
     )
 
 
-def test_many_regularised_motions() -> None:
+# From the 24 systems above on, with the three whose distances do not fall like the width from 1e-3 on.
+@pytest.mark.parametrize(
+    ("seeds", "least"),
+    [
+        pytest.param([*range(24, 56), 136], 2, id="some"),
+        pytest.param(range(200), 10, id="many", marks=pytest.mark.slow),
+    ],
+)
+def test_regularised_motions_of_many_systems(seeds: Sequence[int], least: int) -> None:
     """All of 200 systems approach the solution: 197 at the rate of the width from 1e-3 on, 199 from 1e-4 on.
 
     The exceptions, with distances divided by the width from 1e-3 to 1e-7:
@@ -69,7 +78,7 @@ def test_many_regularised_motions() -> None:
       the square: the exponent falls from 0.9 to 0.78 here.
     """
     exceptions, roots_lost, coarse, sliding = [], [], [], {0: 0, 1: 0, 2: 0, 3: 0}
-    for seed in range(200):
+    for seed in seeds:
         run, found = distances(seed)
         sliding[max(segment.mode.codimension for segment in run.segments)] += 1
         if approaches(found):
@@ -82,8 +91,8 @@ def test_many_regularised_motions() -> None:
     assert exceptions == []
     assert coarse == [37, 52]
     assert roots_lost == [136]
-    assert min(sliding.values()) >= 10
-    assert sliding[2] >= 60
+    assert min(sliding.values()) >= least
+    assert sliding[2] >= 6 * least
 
 
 @pytest.mark.parametrize(("seed", "limit"), [(37, 30.3), (52, 26.6)])

@@ -25,11 +25,11 @@ pytest.importorskip("zarr")
 WORKER = Path(sweep_worker.__file__)
 
 
-def start(store: Path, n_points: int, how: str) -> subprocess.Popen[str]:
-    """Start the sweep in a process group of its own."""
+def start(store: Path, n_points: int, how: str, *last: str) -> subprocess.Popen[str]:
+    """Start the sweep in a process group of its own; it waits after the last chunk, if one is named."""
     path = os.pathsep.join(entry for entry in sys.path if entry)
     return subprocess.Popen(
-        [sys.executable, str(WORKER), str(store), str(n_points), how],
+        [sys.executable, str(WORKER), str(store), str(n_points), how, *last],
         env={**os.environ, "PYTHONPATH": path},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -50,12 +50,13 @@ def marks(store: Path) -> dict[str, tuple[int, int]]:
 def kill_and_resume(store: Path, n_points: int, how: str, n_kills: int, seed: int) -> None:
     """Run the sweep, kill -9 it at random moments, and let the last process finish it."""
     rng = random.Random(seed)
-    total = n_points // 50
+    total = n_points // sweep_worker.CHUNK
     before: dict[str, tuple[int, int]] = {}
     for k in range(n_kills):
-        process = start(store, n_points, how)
         # Somewhere within the next part of the chunks, at any point of the work on one of them.
         goal = len(before) + rng.randint(1, max(1, total // (n_kills + 1) - 2))
+        # On a busy computer it could go on to its end before it is killed.
+        process = start(store, n_points, how, str(goal + 2))
         while len(marks(store)) < goal:
             assert process.poll() is None, process.communicate()[0]
             time.sleep(0.002)
@@ -69,7 +70,7 @@ def kill_and_resume(store: Path, n_points: int, how: str, n_kills: int, seed: in
         assert all(now[name] == mark for name, mark in before.items())
         before = now
     process = start(store, n_points, how)
-    told, _ = process.communicate(timeout=600)
+    told, _ = process.communicate(timeout=1800)
     assert process.returncode == 0, told
     assert "finished" in told
 
@@ -105,7 +106,7 @@ def test_ten_thousand_points_killed_five_times(tmp_path: Path) -> None:
 @pytest.mark.skipif(importlib.util.find_spec("distributed") is None, reason="distributed is not installed")
 def test_a_dask_cluster_of_two_workers(tmp_path: Path) -> None:
     process = start(tmp_path / "dask", 400, "dask")
-    told, _ = process.communicate(timeout=300)
+    told, _ = process.communicate(timeout=1800)
     assert process.returncode == 0, told
     alone = sweep_worker.run(str(tmp_path / "alone"), 400, "1").load()
     assert alone.identical(fl.open_sweep(tmp_path / "dask").load())

@@ -284,7 +284,7 @@ def test_threads_trace_at_once() -> None:
     results: dict[int, Any] = {}
 
     def work(idx: int) -> None:
-        barrier.wait(timeout=10.0)
+        barrier.wait(timeout=600.0)
         for _ in range(5):
             traced = trace_two(with_logic if idx % 2 else nested)
             results.setdefault(idx, set()).add((traced.n_paths, text_of(traced)))

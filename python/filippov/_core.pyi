@@ -9,6 +9,7 @@ from typing_extensions import Self
 
 __all__ = [
     "Builder",
+    "ManualClock",
     "OpaqueSystem",
     "Run",
     "RunOptions",
@@ -171,6 +172,13 @@ class Run:
     def not_finite(self) -> tuple[float, _Array] | None: ...
     def evaluate(self, t: _Array, left: bool = False) -> _Array: ...
     def multipliers(self, t: _Array) -> _Array: ...
+
+@final
+class ManualClock:
+    def __new__(cls, per_look: float = 0.0) -> Self: ...
+    def advance(self, seconds: float) -> None: ...
+    @property
+    def seconds(self) -> float: ...
 
 @final
 class RunOptions:

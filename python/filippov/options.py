@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from filippov._core import RunOptions
+from filippov._core import ManualClock, RunOptions
 from filippov.arrays import real_array, refuse_masked
 from filippov.errors import InputError, ToleranceError
 from filippov.progress import Report, print_progress
@@ -44,6 +44,7 @@ class Options(NamedTuple):
     max_steps: int
     max_events: int
     max_wall_time: float | None
+    clock: ManualClock | None
     sliding: str
     nonunique: str
     stabilization: float | None
@@ -72,6 +73,7 @@ _DEFAULT_OPTIONS = Options(
     max_steps=10**8,
     max_events=10**7,
     max_wall_time=None,
+    clock=None,
     sliding="canopy",
     nonunique="regularize",
     stabilization=None,
@@ -455,6 +457,7 @@ _CHECKS: dict[str, Callable[[Any, tuple[float, float], int], Any]] = {
     "max_steps": lambda value, t_span, n: _count("max_steps", value),
     "max_events": lambda value, t_span, n: _count("max_events", value),
     "max_wall_time": lambda value, t_span, n: _check_max_wall_time(value),
+    "clock": lambda value, t_span, n: value,  # for tests of `max_wall_time`; no argument of `solve_ivp`
     "max_branches": lambda value, t_span, n: _count("max_branches", value),
     "t_eval": lambda value, t_span, n: _check_t_eval(value, t_span),
     "dense_output": lambda value, t_span, n: bool(value),

@@ -51,7 +51,11 @@ def test_pulse_breaks_the_contacts(d: int, width: float, centre: float) -> None:
             assert (slip * np.array(segment.mode)[:, None] >= -1e-13).all()
 
 
-@pytest.mark.parametrize(("d", "width"), [(5, 0.1), (6, 1.0), (8, 0.1)])
+def slow(*values: Any) -> Any:
+    return pytest.param(*values, marks=pytest.mark.slow)
+
+
+@pytest.mark.parametrize(("d", "width"), [(5, 0.1), slow(6, 1.0), slow(8, 0.1)])
 def test_balanced_loads_are_those_of_the_regularised_train(d: int, width: float) -> None:
     """In these a contact at its limit is loaded further at a rate of 1e-10: it is neither held nor let go."""
     start = np.r_[np.zeros(d), np.full(d, 0.05)]

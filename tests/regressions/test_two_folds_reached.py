@@ -127,7 +127,6 @@ def test_sliding_that_becomes_infinitely_stiff_at_a_double_zero_of_the_jump_goes
         method=method,
         rtol=tolerance,
         atol=tolerance,
-        max_wall_time=10.0,
         max_steps=30_000,
     )
     assert sol.success, sol.message

@@ -3,6 +3,7 @@
 mod black_boxes;
 mod builder;
 mod callbacks;
+mod clock;
 mod conversion;
 mod inspect;
 mod laws;
@@ -22,6 +23,8 @@ mod _core {
     use super::black_boxes::{OpaqueSystem, SignedSystem};
     #[pymodule_export]
     use super::builder::Builder;
+    #[pymodule_export]
+    use super::clock::ManualClock;
     #[pymodule_export]
     use super::inspect::{classify, hidden_dynamics, intersection_field};
     #[pymodule_export]

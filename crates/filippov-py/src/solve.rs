@@ -1,13 +1,12 @@
 //! The call of the integrator.
 
-use std::time::Instant;
-
-use filippov::{Keep, Method, Mode, NonUnique, Options, SlidingRule, Stabilization};
+use filippov::{Clock, Keep, Method, Mode, NonUnique, Options, SlidingRule, Stabilization};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::clock::ManualClock;
 use crate::prepared_run::{ActionRow, EventRow, PreparedRun};
 use crate::run::{is_interruption, Run};
 use crate::threads::{on_threads, CHUNK_PER_THREAD, POLL_EVERY};
@@ -48,12 +47,13 @@ pub fn solve(
     let RunOptions { options, progress } = options;
     let solution = py
         .detach(|| {
-            let mut asked = Instant::now();
+            let mut asked = options.clock.now();
             let mut interrupt = |t: f64| {
-                if asked.elapsed() < POLL_EVERY {
+                let now = options.clock.now();
+                if now - asked < POLL_EVERY {
                     return false;
                 }
-                asked = Instant::now();
+                asked = now;
                 Python::attach(|py| {
                     let reported = progress.as_ref().map(|report| report.call1(py, (t,)));
                     py.check_signals().is_err() || matches!(reported, Some(Err(_)))
@@ -131,6 +131,10 @@ fn read_options(given: &Bound<'_, PyDict>) -> PyResult<(Options, Option<Py<PyAny
             "max_steps" => options.max_steps = value.extract()?,
             "max_events" => options.max_events = value.extract()?,
             "max_wall_time" => options.max_wall_time = value.extract()?,
+            "clock" => {
+                let clock: Option<PyRef<'_, ManualClock>> = value.extract()?;
+                options.clock = clock.map_or(Clock::Computer, |clock| clock.as_clock());
+            }
             "nonunique" => {
                 options.nonunique = match value.extract::<String>()?.as_str() {
                     // The tree of all solutions is made of runs with the choices of each.

@@ -32,6 +32,7 @@
 //! ```
 
 pub mod action;
+mod clock;
 mod decisions;
 mod error;
 pub mod event;
@@ -50,6 +51,7 @@ pub mod switching;
 mod system;
 mod tolerances;
 
+pub use clock::{Clock, ManualClock};
 pub use error::{Error, FieldError};
 pub use event::{UserEvent, UserFunction};
 pub use inspect::{

@@ -1,5 +1,6 @@
 //! The options of a run, with their defaults.
 
+use crate::clock::Clock;
 use crate::mode::Mode;
 
 /// What happens at a point where several continuations are Filippov solutions.
@@ -110,6 +111,8 @@ pub struct Options {
     pub max_events: u64,
     /// Stop after that many seconds.
     pub max_wall_time: Option<f64>,
+    /// The clock by which that time is measured.
+    pub clock: Clock,
     /// Policy at non-unique points.
     pub nonunique: NonUnique,
     /// The modes to take at the first non-unique points, in order; later points follow the policy. A mode that is
@@ -141,6 +144,7 @@ impl Default for Options {
             max_steps: 100_000_000,
             max_events: 10_000_000,
             max_wall_time: None,
+            clock: Clock::Computer,
             nonunique: NonUnique::Regularize,
             choices: Vec::new(),
             sliding: SlidingRule::default(),

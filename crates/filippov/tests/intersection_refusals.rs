@@ -17,6 +17,37 @@ fn face(mode: &[i8]) -> Incoming {
     }
 }
 
+/// Sliding on the second of three surfaces reaches the other two, in the plane, and no motion of the hidden dynamics
+/// ends early. The 20 starts are compared for one scaling, the 9 scalings for one start: all pairs of a start and a
+/// scaling would be 180 motions, and take 20 seconds.
+#[test]
+fn a_decision_on_three_surfaces_follows_few_motions() {
+    let normals = [(1.18, 0.57), (0.88, 0.82), (-0.92, 0.17)];
+    // By the signs of the surfaces, those of the last one alternate.
+    let values = [
+        (4.0, 4.0),
+        (8.0, 4.0),
+        (2.0, -4.0),
+        (2.0, 4.0),
+        (2.0, 6.0),
+        (-2.0, -2.0),
+        (-4.0, -2.0),
+        (-4.0, -2.0),
+    ];
+    let mut components = vec![0.0; 24];
+    for (k, (vx, vy)) in values.into_iter().enumerate() {
+        // The first surface is the lowest bit of a pattern.
+        let pattern = (k >> 2) | (k & 2) | ((k & 1) << 2);
+        for (i, (nx, ny)) in normals.into_iter().enumerate() {
+            components[3 * pattern + i] = nx * vx + ny * vy;
+        }
+    }
+    let fields = NormalFields::new(3, components).unwrap();
+    let found = resolve(&fields, &face(&[1, 0, -1]), &[1.0; 3]).unwrap();
+    assert_eq!(found.mode().unwrap().entries(), [0, 1, 1]);
+    assert!(found.n_motions <= 28, "{} motions", found.n_motions);
+}
+
 #[test]
 fn shapes_and_values_are_checked() {
     assert_eq!(

@@ -14,8 +14,6 @@
 //!
 //! `docs/theory/order_of_outcomes.md` has all of it, with the tests.
 
-use std::time::Instant;
-
 use rustc_hash::FxHashMap;
 
 use super::Stats;
@@ -178,7 +176,7 @@ impl<'a> Integrator<'a> {
     /// # Errors
     /// If a function of the user raises.
     pub fn run(&mut self, interrupt: &mut dyn FnMut(f64) -> bool) -> Result<Stop, FieldError> {
-        let started = Instant::now();
+        let started = self.options.clock.now();
         let (mut polled, mut interval, mut next_poll) = (started, 1, 0);
         if let Some(stop) = self.start()? {
             return Ok(stop);
@@ -192,7 +190,7 @@ impl<'a> Integrator<'a> {
                 return Ok(Stop::MaxEvents);
             }
             if attempts >= next_poll {
-                let now = Instant::now();
+                let now = self.options.clock.now();
                 let is_slow = (now - polled).as_secs_f64() > SLOW_POLL;
                 interval = if is_slow {
                     1

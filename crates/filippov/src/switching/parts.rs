@@ -235,6 +235,7 @@ fn joined(m: usize, parts: &[Vec<usize>], decided: &[Resolution]) -> Option<Reso
     whole.add_candidates(&picked.iter().filter_map(|p| combine(p)).collect::<Vec<_>>());
     whole.oscillates = decided.iter().any(|d| d.oscillates);
     whole.degenerate = decided.iter().any(|d| d.degenerate);
+    whole.n_motions = decided.iter().map(|d| d.n_motions).sum();
     whole.margin = decided
         .iter()
         .fold(f64::INFINITY, |least, d| d.margin.min(least));

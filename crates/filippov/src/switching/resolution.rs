@@ -51,6 +51,9 @@ pub struct Resolution {
     pub margin: f64,
     /// Do the fields, perturbed by a little, lead to another mode?
     pub degenerate: bool,
+    /// How many motions of the hidden dynamics the decision followed: nearly all of its work. Motions for perturbed
+    /// fields that led to an error are not among them.
+    pub n_motions: usize,
 }
 
 impl Resolution {
@@ -75,6 +78,7 @@ impl Resolution {
             oscillates: false,
             margin: f64::INFINITY,
             degenerate: false,
+            n_motions: 0,
         }
     }
 

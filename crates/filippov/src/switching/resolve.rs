@@ -72,10 +72,13 @@ fn in_doubt(
     let agreed: Vec<&Resolution> = others.iter().flatten().collect();
     let agree = agreed.len() == others.len() && agreed.iter().all(|o| o.chosen == agreed[0].chosen);
     let margin = resolution.margin;
+    let n_motions =
+        agreed.iter().map(|other| other.n_motions).sum::<usize>() + resolution.n_motions;
     if agree {
         resolution = agreed[0].clone();
         resolution.margin = margin;
     }
+    resolution.n_motions = n_motions;
     for other in agreed {
         resolution.add_candidates(&other.candidates);
     }
@@ -160,6 +163,7 @@ fn by_tree(
     if !resolution.unique {
         let starts = incoming.starts(fields, kappa)?;
         let outcome = limit(&starts.fields, &starts.states[0], kappa);
+        resolution.n_motions = 1;
         match continuation(&outcome) {
             Ok(found) if resolution.candidates.contains(&found) => {
                 resolution.oscillates = oscillates(&outcome);
@@ -187,6 +191,7 @@ fn by_hidden_dynamics(
     let mut resolution = Resolution::sure(leaf_of(&outcome), chosen.clone());
     resolution.oscillates = oscillates(&outcome);
     resolution.margin = smallest_component(fields);
+    resolution.n_motions = 1;
     if let Outcome::Sliding { multipliers, .. } = outcome {
         resolution.multipliers = multipliers;
     }
@@ -199,6 +204,7 @@ fn by_hidden_dynamics(
     let others = offsets.chain(scaled.skip(1));
     let others = others.map(|(state, kappa)| limit(&starts.fields, state, kappa));
     for other in others.skip(1) {
+        resolution.n_motions += 1;
         match continuation(&other) {
             Ok(other) => resolution.add_candidates(&[other]),
             Err(_) => resolution.unique = false,
@@ -231,6 +237,7 @@ fn start(fields: &NormalFields, kappa: &[f64]) -> Result<Resolution, Undecided> 
         };
         let mut resolution = Resolution::sure("start/several", chosen);
         resolution.oscillates = oscillates(&outcome);
+        resolution.n_motions = 1;
         let candidates: Vec<Continuation> = found.into_iter().map(|a| a.continuation).collect();
         resolution.add_candidates(&candidates);
         resolution.unique = resolution.candidates.len() == 1;
