@@ -3,7 +3,7 @@
 use super::apart::decide_apart;
 use super::coinciding::{decide_without_kinks, leave_coinciding};
 use super::contact::{cross_beside_triggers, decide_in_contact};
-use super::event::{arrival_at_surface, touch};
+use super::event::{arrival_at_surface, touch, vanishing_surfaces};
 use super::leave_by_rule::leave_by_rule;
 use super::limits::stay_at_limit;
 use super::look_ahead::decide_where_two_touch;
@@ -156,6 +156,10 @@ pub(crate) struct Decision {
     pub decided: Decided,
     pub rule: Rule,
     pub notes: Notes,
+    /// After an event, the surfaces that vanish there, those slid on left out.
+    pub surfaces: SmallVec<[usize; 4]>,
+    /// The mode before; after an event surfaces that do not matter have the signs of the place.
+    pub before: Mode,
 }
 
 /// Decides which motion follows at a point. `n_choices` is the number of non-unique points that the run has met before.
@@ -164,20 +168,25 @@ pub(crate) fn decide(at: &Point, n_choices: usize) -> Result<Decision, FieldErro
         n_choices,
         ..Notes::default()
     };
+    let (mut surfaces, mut before) = (SmallVec::new(), None);
     let (rule, decided) = match at.arrival.cause {
         Cause::Start => place(at, &mut notes, None)?,
         Cause::Anew(memory) => place(at, &mut notes, Some(memory))?,
-        Cause::Limit(surfaces) => {
-            let (mode, how) = (at.arrival.mode, How::Limit);
+        Cause::Limit(meeting) => {
             let meeting = Meeting {
-                mode,
-                surfaces,
-                fresh: surfaces,
-                how,
+                mode: at.arrival.mode,
+                surfaces: meeting,
+                fresh: meeting,
+                how: How::Limit,
             };
             settle(at, &mut notes, &meeting)?
         }
-        Cause::Event { surfaces, mode, .. } => after_event(at, &mut notes, surfaces, mode)?,
+        Cause::Event { .. } => {
+            let (found, mode) = vanishing_surfaces(at, &mut notes)?;
+            let decided = after_event(at, &mut notes, &found, &mode)?;
+            (surfaces, before) = (found, Some(mode));
+            decided
+        }
     };
     for warning in &mut notes.warnings {
         warning.rule = rule.name();
@@ -186,6 +195,8 @@ pub(crate) fn decide(at: &Point, n_choices: usize) -> Result<Decision, FieldErro
         decided,
         rule,
         notes,
+        surfaces,
+        before: before.unwrap_or_else(|| at.arrival.mode.clone()),
     })
 }
 
@@ -206,7 +217,7 @@ fn after_event(
     let mut surfaces: SmallVec<[usize; 4]> = surfaces.collect();
     surfaces.sort_unstable();
     surfaces.dedup();
-    let how = How::Event(arrival_at_surface(at.arrival));
+    let how = How::Event(arrival_at_surface(at.arrival, fresh));
     let meeting = Meeting {
         mode,
         surfaces: &surfaces,

@@ -80,10 +80,9 @@ pub(crate) fn add_vanishing_surfaces(
 }
 
 /// How the motion comes to one surface, if that surface alone decides.
-pub(super) fn arrival_at_surface(arrival: &Arrival) -> Option<SurfaceArrival> {
+pub(super) fn arrival_at_surface(arrival: &Arrival, fresh: &[usize]) -> Option<SurfaceArrival> {
     let Cause::Event {
         functions,
-        surfaces,
         vanishing,
         at_two_fold,
         ..
@@ -94,7 +93,7 @@ pub(super) fn arrival_at_surface(arrival: &Arrival) -> Option<SurfaceArrival> {
     if at_two_fold {
         return Some(SurfaceArrival::TwoFold);
     }
-    match (arrival.sliding, surfaces, functions) {
+    match (arrival.sliding, fresh, functions) {
         ([], &[j], _) => {
             let side = arrival.mode.entries()[j];
             Some(match vanishing {

@@ -30,10 +30,6 @@ fn repeats(a: &Switch, b: &Switch) -> bool {
 /// an intersection than the one before by the same ratio (`docs/theory/intersections.md`).
 pub(crate) fn limit_of(at: &Point) -> Result<Option<Limit>, FieldError> {
     let switches = at.arrival.switches;
-    if at.system.n_surfaces() < 2 {
-        // Nothing can meet.
-        return Ok(None);
-    }
     let Some(turn) = turn_of(switches) else {
         return Ok(None);
     };

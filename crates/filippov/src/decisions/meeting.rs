@@ -15,8 +15,8 @@ use crate::mode::Mode;
 use crate::status::Stop;
 use crate::switching::{
     admissible, decide as decide_at_surface, has_one_mode_only, merged_root, region_at_rest,
-    resolve, Arrival as SurfaceArrival, Continuation, ExitKind, Incoming, NormalFields, Resolution,
-    Undecided,
+    resolve_within, Arrival as SurfaceArrival, Continuation, ExitKind, Incoming, NormalFields,
+    Resolution, Undecided,
 };
 use crate::tolerances::{MOST_LISTED, MOST_MEETING};
 
@@ -57,17 +57,19 @@ pub(super) fn resolve_first_order(
     let mut others = Vec::new();
     let resolution = match (corners.normal_fields(), meeting.how) {
         (Err(undecided), _) => Err(undecided),
-        (Ok(fields), How::Start(_) | How::Limit) => resolve(&fields, &Incoming::Start, &kappa),
+        (Ok(fields), How::Start(_) | How::Limit) => {
+            resolve_within(&fields, &Incoming::Start, &kappa, at.patience)
+        }
         (Ok(fields), How::Event(_)) => {
             let incoming = incoming(at, notes, meeting, (&corners, &fields))?;
             others = other_solutions(&fields, &incoming);
-            match resolve(&fields, &incoming, &kappa) {
+            match resolve_within(&fields, &incoming, &kappa, at.patience) {
                 // The last of many turns is within rounding of all surfaces: its region leads past one of
                 // them, and has no meaning any more.
                 Err(Undecided::NotArriving { .. })
                     if matches!(incoming, Incoming::Corner { .. }) =>
                 {
-                    resolve(&fields, &Incoming::Start, &kappa)
+                    resolve_within(&fields, &Incoming::Start, &kappa, at.patience)
                 }
                 decided => decided,
             }
@@ -223,7 +225,7 @@ fn follow(
         Some(Continuation::OutwardSpiral) => match asked {
             Some(asked) => (asked.clone(), None),
             None => match outward_leap(at, meeting, mode, fields) {
-                Some(leap) => (leap.region.clone(), Some(leap)),
+                Some(leap) => (leap.region.clone(), Some(Box::new(leap))),
                 None => {
                     return decide_by_higher_order(at, notes, mode, meeting, Ok(resolution), rest)
                 }

@@ -37,7 +37,7 @@ pub(crate) use event::{add_vanishing_surfaces, located_surfaces, vanishing_surfa
 pub(crate) use leave_by_rule::refusal;
 pub(crate) use passage::{goes_through, rates_here};
 pub(crate) use placement::{pushed_back, sides, Sides};
-pub(crate) use point::{Arrival, Cause, Decided, Left, Lefts, Next, Notes, Point, Policy, Values};
+pub(crate) use point::{Arrival, Cause, Left, Lefts, Next, Notes, Point, Policy, Values};
 pub(crate) use spiral::Leap;
 pub(crate) use triggers::Triggers;
 pub(crate) use two_fold::{beyond_double_zero, two_fold_here};

@@ -15,7 +15,7 @@ use crate::options::{NonUnique, Options};
 use crate::solution::Switch;
 use crate::status::{Stop, Warning};
 use crate::stepper::ErrorScale;
-use crate::switching::{Decision, Leading};
+use crate::switching::{Decision, Leading, Patience};
 use crate::system::PiecewiseSystem;
 use crate::tolerances::{MOMENT, MOST_SHORTENINGS, TOO_LARGE_A_CHANGE};
 
@@ -35,6 +35,8 @@ pub(crate) struct Point<'p, 'm, 'a> {
     pub q: &'p [f64],
     pub arrival: &'p Arrival<'m, 'a>,
     pub policy: Policy<'a>,
+    /// How long the caller waits.
+    pub patience: Patience<'p>,
 }
 
 /// What is chosen where the system leaves a choice.
@@ -67,10 +69,6 @@ pub(crate) enum Cause<'p> {
     /// These functions of the motion vanish here.
     Event {
         functions: &'p [EventFunction],
-        /// The surfaces that vanish here, those slid on left out.
-        surfaces: &'p [usize],
-        /// The mode before, in which surfaces that do not matter have the signs of the place.
-        mode: &'p Mode,
         /// They come within rounding of zero without a change of sign.
         touch: bool,
         /// How many derivatives along f- and f+ vanish at a multiple zero.
@@ -280,7 +278,7 @@ pub(crate) struct Root {
     /// The multiplier of sliding on one surface that begins at a two-fold.
     pub at_two_fold: Option<f64>,
     /// The motion begins with the laps of an outward spiral.
-    pub leap: Option<Leap>,
+    pub leap: Option<Box<Leap>>,
 }
 
 /// The motion that follows, or why the run ends.

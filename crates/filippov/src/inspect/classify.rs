@@ -5,9 +5,7 @@ use std::cell::RefCell;
 use smallvec::SmallVec;
 
 use crate::action::Actions;
-use crate::decisions::{
-    decide, sides, vanishing_surfaces, Arrival, Cause, Decision, Notes, Point, Policy, Sides,
-};
+use crate::decisions::{decide, sides, Arrival, Cause, Decision, Notes, Point, Policy, Sides};
 use crate::error::FieldError;
 use crate::event::EventFunction;
 use crate::field::{eval_on_side, Law, MeetingFields, ModeField, SmoothField};
@@ -15,7 +13,7 @@ use crate::mode::Mode;
 use crate::options::{NonUnique, Options};
 use crate::status::Stop;
 use crate::stepper::ErrorScale;
-use crate::switching::{decide as decide_at_surface, Arrival as SurfaceArrival, Leading};
+use crate::switching::{decide as decide_at_surface, Arrival as SurfaceArrival, Leading, Patience};
 use crate::system::{dot, surfaces_that_matter, PiecewiseSystem};
 use crate::tolerances::{AT_SIDE, MOST_MEETING, SURFACE_NOISE};
 
@@ -180,11 +178,10 @@ pub fn classify(
         q: &[],
         arrival,
         policy,
+        patience: Patience::endless(),
     };
-    let event = |surfaces, before| Cause::Event {
+    let event = Cause::Event {
         functions: &functions,
-        surfaces,
-        mode: before,
         touch: false,
         vanishing: [0; 2],
         at_two_fold: false,
@@ -202,14 +199,11 @@ pub fn classify(
             (surfaces, mode, decide(&at, 0)?)
         }
         Some(_) => {
-            let mut same = ModeField::of(system, law, mode);
-            let located = arrival(event(&[], mode), &mut same);
-            let (fresh, before) = vanishing_surfaces(&point(&located), &mut Notes::default())?;
-            let mut surfaces = [&fresh[..], &sliding[..]].concat();
-            surfaces.sort_unstable();
-            let arrival = arrival(event(&fresh, &before), &mut field);
+            let arrival = arrival(event, &mut field);
             let decision = decide(&point(&arrival), 0)?;
-            (surfaces, before, decision)
+            let mut surfaces = [&decision.surfaces[..], &sliding[..]].concat();
+            surfaces.sort_unstable();
+            (surfaces, decision.before.clone(), decision)
         }
     };
     let Some(components) = components_around(system, (t, x), &around, &surfaces)? else {
@@ -349,6 +343,7 @@ fn describe(
         decided,
         rule,
         notes,
+        ..
     } = decision;
     let mut found = Classification {
         kind: PointKind::Region,

@@ -31,6 +31,7 @@ use crate::integrate::steps::chatter::Chatter;
 use crate::integrate::steps::pace::Pace;
 use crate::integrate::steps::stiff::Derivatives;
 use crate::integrate::steps::stiffness::Stiffness;
+use crate::integrate::watch::Watch;
 use crate::mode::Mode;
 use crate::options::{Method, Options};
 use crate::recorder::Recorder;
@@ -96,6 +97,7 @@ pub struct Integrator<'a> {
     pub(super) series_reach: Option<f64>,
     /// Exit functions of this mode whose multipliers were held at their ends, with what they may go beyond.
     pub(super) slacks: Vec<(usize, f64)>,
+    pub(super) watch: Watch<'a>,
 }
 
 impl<'a> Integrator<'a> {
@@ -168,16 +170,24 @@ impl<'a> Integrator<'a> {
             last_switch: (f64::NAN, 0),
             series_reach: None,
             slacks: Vec::new(),
+            watch: Watch::new(options),
         })
+    }
+
+    /// Asks `interrupt` every few steps, and during long decisions, with the time reached; the run stops where it returns
+    /// `true`.
+    #[must_use]
+    pub fn interruptible(mut self, interrupt: &'a mut (dyn FnMut(f64) -> bool + 'a)) -> Self {
+        self.watch.ask(interrupt);
+        self
     }
 
     /// Runs to the end.
     ///
     /// # Errors
     /// If a function of the user raises.
-    pub fn run(&mut self, interrupt: &mut dyn FnMut(f64) -> bool) -> Result<Stop, FieldError> {
-        let started = self.options.clock.now();
-        let (mut polled, mut interval, mut next_poll) = (started, 1, 0);
+    pub fn run(&mut self) -> Result<Stop, FieldError> {
+        let (mut polled, mut interval, mut next_poll) = (self.watch.start(), 1, 0);
         if let Some(stop) = self.start()? {
             return Ok(stop);
         }
@@ -190,7 +200,7 @@ impl<'a> Integrator<'a> {
                 return Ok(Stop::MaxEvents);
             }
             if attempts >= next_poll {
-                let now = self.options.clock.now();
+                let now = self.watch.now();
                 let is_slow = (now - polled).as_secs_f64() > SLOW_POLL;
                 interval = if is_slow {
                     1
@@ -198,17 +208,10 @@ impl<'a> Integrator<'a> {
                     (2 * interval).min(LONGEST_POLL)
                 };
                 (polled, next_poll) = (now, attempts + interval);
-                let elapsed = (now - started).as_secs_f64();
-                if self
-                    .options
-                    .max_wall_time
-                    .is_some_and(|most| elapsed > most)
-                {
-                    return Ok(Stop::MaxWallTime);
-                }
-                if interrupt(self.t) {
-                    return Ok(Stop::Interrupted);
-                }
+                self.watch.is_over(now, self.t);
+            }
+            if let Some(stop) = self.watch.stop() {
+                return Ok(stop);
             }
             if let Some(stop) = self.step()?.or_else(|| self.stop_at_section()) {
                 return Ok(stop);

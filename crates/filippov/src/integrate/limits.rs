@@ -3,7 +3,7 @@
 use smallvec::SmallVec;
 
 use crate::decisions::limits::{limit_of, Limit};
-use crate::decisions::Cause;
+use crate::decisions::{Cause, Decision};
 use crate::error::FieldError;
 use crate::integrate::integrator::Integrator;
 use crate::mode::Mode;
@@ -14,6 +14,10 @@ use crate::switching::Kind;
 impl Integrator<'_> {
     /// The limit that the last switches tend to, if they do and it is within the known times.
     pub(in crate::integrate) fn accumulation(&mut self) -> Result<Option<Limit>, FieldError> {
+        if self.system.n_surfaces() < 2 {
+            // Nothing can meet.
+            return Ok(None);
+        }
         let limit = self.ask(Cause::Start, |at, _| limit_of(at))?;
         Ok(limit.filter(|limit| limit.t <= self.horizon))
     }
@@ -29,7 +33,7 @@ impl Integrator<'_> {
         self.motion.mode = before.clone();
         self.move_straight(limit.t, limit.x)?;
         self.stats.n_switches += 1;
-        let (rule, decided) = self.decide(Cause::Limit(&limit.meeting))?;
+        let Decision { rule, decided, .. } = self.decide(Cause::Limit(&limit.meeting))?;
         // Where nothing is decided the run ends at the limit, having come there all the same.
         let after = decided.as_ref().map_or(&before, |next| &next.mode).clone();
         self.recorder.switch(Switch {

@@ -11,6 +11,7 @@ mod start;
 mod stats;
 mod steps;
 mod transition;
+mod watch;
 
 pub use detection::user_events::UserZero;
 pub use integrator::Integrator;

@@ -96,7 +96,7 @@ pub fn solve_with_actions(
     interrupt: &mut dyn FnMut(f64) -> bool,
 ) -> Result<Solution, Error> {
     let integrator = Integrator::new(system, t_span, y0, options, events, actions)?;
-    let mut solution = run_to_end(integrator, interrupt);
+    let mut solution = run_to_end(integrator.interruptible(interrupt));
     let resampled = options
         .t_eval
         .as_ref()
@@ -165,11 +165,11 @@ pub fn solve_to_section(
     let events = function.as_slice();
     let mut integrator = Integrator::new(system, t_span, y0, options, events, actions)?;
     integrator.observe(section);
-    Ok(run_to_end(integrator, interrupt))
+    Ok(run_to_end(integrator.interruptible(interrupt)))
 }
 
-fn run_to_end(mut integrator: Integrator, interrupt: &mut dyn FnMut(f64) -> bool) -> Solution {
-    let stop = match integrator.run(interrupt) {
+fn run_to_end(mut integrator: Integrator) -> Solution {
+    let stop = match integrator.run() {
         Ok(stop) => stop,
         Err(raised) => Stop::FieldRaised(raised),
     };

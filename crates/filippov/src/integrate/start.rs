@@ -1,7 +1,7 @@
 //! Where a run starts: arguments checked, the mode of the initial state found.
 
 use crate::action::{Actions, Trigger};
-use crate::decisions::{Cause, Next, Rule};
+use crate::decisions::{Cause, Decision, Next, Rule};
 use crate::error::{Error, FieldError};
 use crate::integrate::integrator::Integrator;
 use crate::mode::Mode;
@@ -105,9 +105,10 @@ impl Integrator<'_> {
     /// Decides the mode anew at the current point and goes on.
     pub(super) fn go_on_from_here(&mut self) -> Result<Option<Stop>, FieldError> {
         let before = self.motion.mode.clone();
-        match self.decide(Cause::Anew(&before))? {
-            (rule, Ok(next)) => self.go_on_in(before, next, rule),
-            (_, Err(stop)) => Ok(Some(stop)),
+        let Decision { rule, decided, .. } = self.decide(Cause::Anew(&before))?;
+        match decided {
+            Ok(next) => self.go_on_in(before, next, rule),
+            Err(stop) => Ok(Some(stop)),
         }
     }
 
@@ -133,7 +134,7 @@ impl Integrator<'_> {
         if !self.actions.list.is_empty() {
             return self.start_with_actions();
         }
-        match self.decide(Cause::Start)?.1 {
+        match self.decide(Cause::Start)?.decided {
             Ok(next) => self.begin(next),
             Err(stop) => Ok(Some(stop)),
         }

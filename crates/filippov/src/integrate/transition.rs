@@ -6,8 +6,8 @@ use smallvec::{smallvec, SmallVec};
 
 use crate::decisions::{
     beyond_double_zero, decide, differs_between_sides, limits::limit_here, refusal, root_ends,
-    two_fold_here, vanishing_surfaces, Arrival, Cause, Decided, Decision, Leap, Lefts, Next, Notes,
-    Point, Rule, Values,
+    two_fold_here, vanishing_surfaces, Arrival, Cause, Decision, Leap, Lefts, Next, Notes, Point,
+    Rule, Values,
 };
 use crate::error::FieldError;
 use crate::event::{Deflation, EventFunction, Found};
@@ -16,7 +16,7 @@ use crate::integrate::integrator::Integrator;
 use crate::mode::Mode;
 use crate::solution::Switch;
 use crate::status::Stop;
-use crate::switching::Kind;
+use crate::switching::{Kind, Patience};
 use crate::tolerances::{MOST_SWITCHES_AT_ONE_TIME, NO_PROGRESS, SMALL_JUMP};
 
 /// How many normal components of sliding on one surface vanish.
@@ -55,6 +55,8 @@ impl<'a> Integrator<'a> {
             velocity: self.stepper.start_derivative(),
             field: RefCell::new(&mut self.motion.field),
         };
+        let (watch, t) = (&self.watch, self.t);
+        let is_over = || watch.is_over(watch.now(), t);
         let at = Point {
             system: self.system,
             actions: self.actions,
@@ -64,6 +66,7 @@ impl<'a> Integrator<'a> {
             q: &self.motion.discrete,
             arrival: &arrival,
             policy: self.options.into(),
+            patience: Patience::until(&is_over),
         };
         let mut notes = Notes {
             n_choices: self.n_choices,
@@ -76,25 +79,19 @@ impl<'a> Integrator<'a> {
     }
 
     /// Decides which motion follows at the current place; keeps the warnings.
-    pub(in crate::integrate) fn decide(
-        &mut self,
-        cause: Cause,
-    ) -> Result<(Rule, Decided), FieldError> {
+    pub(in crate::integrate) fn decide(&mut self, cause: Cause) -> Result<Decision, FieldError> {
         let n_choices = self.n_choices;
-        let decision = self.ask(cause, |at, notes| {
-            let decision = decide(at, n_choices)?;
-            notes.add_costs(&decision.notes);
-            Ok(decision)
-        })?;
-        let Decision {
-            decided,
-            rule,
-            notes,
-        } = decision;
+        let mut decision = self.ask(cause, |at, _| decide(at, n_choices))?;
+        let notes = &mut decision.notes;
+        self.stats.n_field_evaluations += notes.n_field_evaluations;
+        self.stats.n_surface_evaluations += notes.n_surface_evaluations;
         self.n_choices = notes.n_choices;
         self.motion.meets_kinks |= notes.meets_kinks;
-        self.warnings.extend(notes.warnings);
-        Ok((rule, decided))
+        self.warnings.append(&mut notes.warnings);
+        if let Some(stop) = self.watch.stop() {
+            decision.decided = Err(stop);
+        }
+        Ok(decision)
     }
 
     /// Values of all switching functions at the current place.
@@ -124,28 +121,27 @@ impl<'a> Integrator<'a> {
                 return Ok(done);
             }
         }
-        let before = self.motion.mode.clone();
-        let cause = Cause::Event {
-            functions: &event.functions,
-            surfaces: &[],
-            mode: &before,
-            touch: event.touch,
-            vanishing: [0; 2],
-            at_two_fold: false,
-        };
-        let (surfaces, before) = self.ask(cause, vanishing_surfaces)?;
-        if let Some(done) = self.pass_double_zero(event, &before, &surfaces)? {
-            return Ok(done);
+        let n_exits = n_exits(event);
+        let mut at_two_fold = false;
+        if n_exits > 0 {
+            if let Some(done) = self.pass_double_zero(event)? {
+                return Ok(done);
+            }
+            at_two_fold = self.arrives_at_two_fold(event, n_exits)?;
         }
-        let cause = Cause::Event {
+        let vanishing = std::mem::take(&mut self.detector.vanishing);
+        let Decision {
+            decided,
+            rule,
+            surfaces,
+            before,
+            ..
+        } = self.decide(Cause::Event {
             functions: &event.functions,
-            surfaces: &surfaces,
-            mode: &before,
             touch: event.touch,
-            vanishing: std::mem::take(&mut self.detector.vanishing),
-            at_two_fold: self.arrives_at_two_fold(event, &surfaces)?,
-        };
-        let (rule, decided) = self.decide(cause)?;
+            vanishing,
+            at_two_fold,
+        })?;
         self.residuals.clear();
         let mut next = match decided {
             Ok(next) => next,
@@ -223,40 +219,36 @@ impl<'a> Integrator<'a> {
 
     /// Goes on beyond a double zero of the difference of the normal components, if sliding has come to one: what came of
     /// that.
-    fn pass_double_zero(
-        &mut self,
-        event: &Found,
-        mode: &Mode,
-        surfaces: &[usize],
-    ) -> Result<Option<Option<Stop>>, FieldError> {
+    fn pass_double_zero(&mut self, event: &Found) -> Result<Option<Option<Stop>>, FieldError> {
         let &[j] = self.motion.sliding() else {
             return Ok(None);
         };
-        if n_exits(event) == 0 || !surfaces.is_empty() || !self.may_lose_multiplier() {
+        if !self.may_lose_multiplier() {
             return Ok(None);
         }
-        let beyond = self.ask(Cause::Anew(mode), |at, _| beyond_double_zero(at, j))?;
+        let (surfaces, mode) = self.vanishing_surfaces(event)?;
+        if !surfaces.is_empty() {
+            return Ok(None);
+        }
+        let beyond = self.ask(Cause::Anew(&mode), |at, _| beyond_double_zero(at, j))?;
         let Some((t, end)) = beyond.filter(|(t, _)| *t <= self.horizon) else {
             return Ok(None);
         };
         self.record(mode.clone(), mode.clone(), &[], Rule::OneSurface.name());
         self.move_straight(t, end)?;
-        let next = Next::new(mode.clone(), Lefts::new());
+        let next = Next::new(mode, Lefts::new());
         Ok(Some(self.begin(next)?))
     }
 
     /// Has sliding on one surface come to a two-fold? Then the point is moved there.
-    fn arrives_at_two_fold(
-        &mut self,
-        event: &Found,
-        surfaces: &[usize],
-    ) -> Result<bool, FieldError> {
-        let n_exits = n_exits(event);
-        let is_exit = n_exits == 2 || n_exits == 1 && self.approaches_two_fold();
-        if !is_exit || !surfaces.is_empty() {
+    fn arrives_at_two_fold(&mut self, event: &Found, n_exits: usize) -> Result<bool, FieldError> {
+        if n_exits == 1 && !self.approaches_two_fold() {
             return Ok(false);
         }
-        let mode = self.motion.mode.clone();
+        let (surfaces, mode) = self.vanishing_surfaces(event)?;
+        if !surfaces.is_empty() {
+            return Ok(false);
+        }
         let Some((t, x)) = self.ask(Cause::Anew(&mode), |at, _| two_fold_here(at))? else {
             return Ok(false);
         };
@@ -264,6 +256,20 @@ impl<'a> Integrator<'a> {
             self.move_straight(t, x)?;
         }
         Ok(true)
+    }
+
+    /// The surfaces that vanish at an event, those slid on left out, and the mode before.
+    fn vanishing_surfaces(
+        &mut self,
+        event: &Found,
+    ) -> Result<(SmallVec<[usize; 4]>, Mode), FieldError> {
+        let cause = Cause::Event {
+            functions: &event.functions,
+            touch: event.touch,
+            vanishing: [0; 2],
+            at_two_fold: false,
+        };
+        self.ask(cause, vanishing_surfaces)
     }
 
     /// Is the difference of the normal components at the end of the step so small, compared with the speed, that the

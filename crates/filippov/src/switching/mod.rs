@@ -16,6 +16,7 @@ mod lie;
 mod normal_fields;
 mod p_matrix;
 mod parts;
+mod patience;
 mod redundant;
 mod relay;
 mod relay_at;
@@ -41,13 +42,14 @@ pub use lie::{first_nonzero, normal_component, Leading};
 pub use normal_fields::{NormalFields, SignGroup};
 pub use p_matrix::is_p_matrix;
 pub use parts::{independent_parts, of_part};
+pub use patience::Patience;
 pub use redundant::least_multipliers;
 pub use relay::{
     all_relay_modes, solve_relay, RelayError, RelayProblem, RelaySolution, Uniqueness,
 };
 pub use relay_at::relay_at;
 pub use resolution::{Continuation, Resolution, Undecided};
-pub use resolve::{has_one_mode_only, resolve};
+pub use resolve::{has_one_mode_only, resolve, resolve_within};
 pub use roots::{multiplier_rates, newton, roots_in_cube, stable_roots, Roots};
 pub use shared_load::{SharedLoad, SharedLoads};
 pub(crate) use small_matrix::invert;

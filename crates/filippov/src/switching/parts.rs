@@ -6,8 +6,9 @@
 
 use super::incoming::{ExitKind, Incoming};
 use super::normal_fields::{NormalFields, SignGroup};
+use super::patience::Patience;
 use super::resolution::{Continuation, Resolution, Undecided};
-use super::resolve::resolve;
+use super::resolve::resolve_within;
 use super::roots::newton;
 use super::stability::stability_margins;
 use crate::mode::Mode;
@@ -76,15 +77,15 @@ pub(super) fn resolve_parts(
     parts: &[Vec<usize>],
     incoming: &Incoming,
     kappa: &[f64],
+    patience: Patience,
 ) -> Result<Resolution, Undecided> {
     let mut decided = Vec::with_capacity(parts.len());
     for (index, part) in parts.iter().enumerate() {
         let own = of_part(fields, part);
         let scaling: Vec<f64> = part.iter().map(|&i| kappa[i]).collect();
         let resolution = match incoming_of(fields, parts, index, incoming) {
-            Some(incoming) => {
-                resolve(&own, &incoming, &scaling).map_err(|error| error.in_whole(part))?
-            }
+            Some(incoming) => resolve_within(&own, &incoming, &scaling, patience)
+                .map_err(|error| error.in_whole(part))?,
             None => unchanged(&own, incoming, part)?,
         };
         decided.push(resolution);

@@ -100,6 +100,9 @@ impl Resolution {
 /// Why there is no decision: one variant per cause.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Undecided {
+    /// The caller has waited long enough.
+    #[error("the decision was interrupted")]
+    Interrupted,
     /// The number of values does not fit the number of surfaces.
     #[error("{found} normal components do not fit {m} surfaces: each group needs m * 2^(its surfaces), of which it may have 6")]
     Shape {

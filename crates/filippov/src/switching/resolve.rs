@@ -1,10 +1,11 @@
 //! The decision at an intersection, whatever came before and however many surfaces meet.
 
 use super::codim2::{self, Bilinear, Corners};
-use super::hidden::{admissible, limit, Outcome};
+use super::hidden::{admissible, limit_within, Outcome};
 use super::incoming::{ExitKind, Incoming};
 use super::normal_fields::NormalFields;
 use super::parts::{independent_parts, resolve_parts};
+use super::patience::Patience;
 use super::resolution::{Continuation, Resolution, Undecided};
 use super::roots::{newton, stable_roots};
 use super::single;
@@ -42,19 +43,36 @@ pub fn resolve(
     incoming: &Incoming,
     kappa: &[f64],
 ) -> Result<Resolution, Undecided> {
+    resolve_within(fields, incoming, kappa, Patience::endless())
+}
+
+/// As [`resolve`], as long as the caller waits.
+///
+/// # Errors
+/// As [`resolve`]; [`Undecided::Interrupted`] when the caller has waited long enough.
+pub fn resolve_within(
+    fields: &NormalFields,
+    incoming: &Incoming,
+    kappa: &[f64],
+    patience: Patience,
+) -> Result<Resolution, Undecided> {
     if kappa.len() != fields.m() || kappa.iter().any(|k| !(k.is_finite() && *k > 0.0)) {
         return Err(Undecided::Scaling { m: fields.m() });
     }
     check_lengths(fields.m(), incoming)?;
     let parts = independent_parts(fields);
     if parts.len() > 1 && fields.m() > 2 {
-        return resolve_parts(fields, &parts, incoming, kappa);
+        return resolve_parts(fields, &parts, incoming, kappa, patience);
     }
-    let resolution = decide(fields, incoming, kappa)?;
-    if resolution.margin <= DOUBTFUL {
-        Ok(in_doubt(resolution, fields, incoming, kappa))
-    } else {
-        Ok(resolution)
+    let resolution = match decide(fields, incoming, kappa, patience) {
+        Ok(doubtful) if doubtful.margin <= DOUBTFUL => {
+            Ok(in_doubt(doubtful, fields, incoming, kappa, patience))
+        }
+        resolution => resolution,
+    };
+    match patience.is_over() {
+        true => Err(Undecided::Interrupted),
+        false => resolution,
     }
 }
 
@@ -66,8 +84,9 @@ fn in_doubt(
     fields: &NormalFields,
     incoming: &Incoming,
     kappa: &[f64],
+    patience: Patience,
 ) -> Resolution {
-    let perturbed = perturbations(fields).map(|other| decide(&other, incoming, kappa));
+    let perturbed = perturbations(fields).map(|other| decide(&other, incoming, kappa, patience));
     let others: Vec<Result<Resolution, Undecided>> = perturbed.collect();
     let agreed: Vec<&Resolution> = others.iter().flatten().collect();
     let agree = agreed.len() == others.len() && agreed.iter().all(|o| o.chosen == agreed[0].chosen);
@@ -104,6 +123,7 @@ fn decide(
     fields: &NormalFields,
     incoming: &Incoming,
     kappa: &[f64],
+    patience: Patience,
 ) -> Result<Resolution, Undecided> {
     if fields.m() == 2 && Bilinear::of_fields(fields).is_undetermined() {
         let tangent = (0..2).find(|&surface| fields.row_size(surface) == 0.0);
@@ -113,14 +133,17 @@ fn decide(
         });
     }
     let mut resolution = match (fields.m(), incoming) {
-        (_, Incoming::Start) => start(fields, kappa),
+        (_, Incoming::Start) => start(fields, kappa, patience),
         (1, _) => at_one_surface(fields, incoming),
-        (2, Incoming::Face { .. } | Incoming::Exit { .. }) => by_tree(fields, incoming, kappa),
-        (2, _) => by_hidden_dynamics(fields, incoming, &[kappa.to_vec()]),
+        (2, Incoming::Face { .. } | Incoming::Exit { .. }) => {
+            by_tree(fields, incoming, kappa, patience)
+        }
+        (2, _) => by_hidden_dynamics(fields, incoming, &[kappa.to_vec()], patience),
         _ => by_hidden_dynamics(
             fields,
             incoming,
             &comparable_scalings(fields, incoming, kappa),
+            patience,
         ),
     }?;
     complete(&mut resolution, fields, kappa);
@@ -146,6 +169,7 @@ fn by_tree(
     fields: &NormalFields,
     incoming: &Incoming,
     kappa: &[f64],
+    patience: Patience,
 ) -> Result<Resolution, Undecided> {
     let corners = Corners::new(fields)?;
     let mut resolution = match incoming {
@@ -162,7 +186,7 @@ fn by_tree(
     };
     if !resolution.unique {
         let starts = incoming.starts(fields, kappa)?;
-        let outcome = limit(&starts.fields, &starts.states[0], kappa);
+        let outcome = limit_within(&starts.fields, &starts.states[0], kappa, patience);
         resolution.n_motions = 1;
         match continuation(&outcome) {
             Ok(found) if resolution.candidates.contains(&found) => {
@@ -184,9 +208,10 @@ fn by_hidden_dynamics(
     fields: &NormalFields,
     incoming: &Incoming,
     scalings: &[Vec<f64>],
+    patience: Patience,
 ) -> Result<Resolution, Undecided> {
     let starts = incoming.starts(fields, &scalings[0])?;
-    let outcome = limit(&starts.fields, &starts.states[0], &scalings[0]);
+    let outcome = limit_within(&starts.fields, &starts.states[0], &scalings[0], patience);
     let chosen = continuation(&outcome)?;
     let mut resolution = Resolution::sure(leaf_of(&outcome), chosen.clone());
     resolution.oscillates = oscillates(&outcome);
@@ -202,7 +227,7 @@ fn by_hidden_dynamics(
     let offsets = starts.states.iter().map(|state| (state, &scalings[0]));
     let scaled = scalings.iter().map(|kappa| (&starts.states[0], kappa));
     let others = offsets.chain(scaled.skip(1));
-    let others = others.map(|(state, kappa)| limit(&starts.fields, state, kappa));
+    let others = others.map(|(state, kappa)| limit_within(&starts.fields, state, kappa, patience));
     for other in others.skip(1) {
         resolution.n_motions += 1;
         match continuation(&other) {
@@ -215,10 +240,15 @@ fn by_hidden_dynamics(
 }
 
 /// Without a past: the only admissible mode, or the one that the hidden dynamics tends to from u = 0.
-fn start(fields: &NormalFields, kappa: &[f64]) -> Result<Resolution, Undecided> {
+fn start(
+    fields: &NormalFields,
+    kappa: &[f64],
+    patience: Patience,
+) -> Result<Resolution, Undecided> {
     if fields.m() > MOST_MEETING {
         // Not all 3^m modes can be looked at.
-        let mut resolution = by_hidden_dynamics(fields, &Incoming::Start, &scalings(kappa))?;
+        let mut resolution =
+            by_hidden_dynamics(fields, &Incoming::Start, &scalings(kappa), patience)?;
         resolution.unique = has_one_mode_only(fields);
         return Ok(resolution);
     }
@@ -229,7 +259,7 @@ fn start(fields: &NormalFields, kappa: &[f64]) -> Result<Resolution, Undecided> 
         resolution.multipliers = only.multipliers.clone();
         resolution
     } else {
-        let outcome = limit(fields, &vec![0.0; fields.m()], kappa);
+        let outcome = limit_within(fields, &vec![0.0; fields.m()], kappa, patience);
         let chosen = match (continuation(&outcome), found.last()) {
             // Fields in balance: as good as any other is the last one, that of the most entries +1.
             (Err(Undecided::AtRest), Some(last)) => last.continuation.clone(),

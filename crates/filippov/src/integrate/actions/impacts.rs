@@ -2,7 +2,7 @@
 
 use smallvec::{smallvec, SmallVec};
 
-use crate::decisions::{limits::reach, Cause};
+use crate::decisions::{limits::reach, Cause, Decision};
 use crate::error::FieldError;
 use crate::field::{ContactField, Projector};
 use crate::integrate::actions::instant::is_reset;
@@ -129,7 +129,7 @@ impl Integrator<'_> {
             self.record_rest(y_before, surface, before.clone(), before.clone(), "");
             return self.act(due);
         }
-        let (rule, decided) = self.decide(Cause::Anew(&before))?;
+        let Decision { rule, decided, .. } = self.decide(Cause::Anew(&before))?;
         let next = match decided {
             Ok(next) => next,
             Err(stop) => return Ok(Some(stop)),

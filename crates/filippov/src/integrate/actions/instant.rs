@@ -15,7 +15,7 @@ use smallvec::SmallVec;
 use crate::action::Trigger;
 use crate::decisions::{
     add_vanishing_surfaces, goes_through, located_surfaces, pushed_back, rates_here, sides, Cause,
-    Left, Sides, Triggers, Values,
+    Decision, Left, Sides, Triggers, Values,
 };
 use crate::error::FieldError;
 use crate::event::EventFunction;
@@ -60,7 +60,7 @@ impl Integrator<'_> {
             }
         }
         if due.is_empty() {
-            return match self.decide(Cause::Start)?.1 {
+            return match self.decide(Cause::Start)?.decided {
                 Ok(next) => self.begin(next),
                 Err(stop) => Ok(Some(stop)),
             };
@@ -243,7 +243,7 @@ impl Integrator<'_> {
         self.passing = passing.filter(|(_, p)| **p).map(|(j, _)| j).collect();
         self.recorder.jump(self.t, &self.x);
         self.recorder.set_jump(first, &arrived, &self.x);
-        let (_, decided) = self.decide(Cause::Anew(&before))?;
+        let decided = self.decide(Cause::Anew(&before))?.decided;
         let next = match decided {
             Ok(next) => next,
             Err(stop) => return Ok(Some(stop)),
@@ -324,7 +324,7 @@ impl Integrator<'_> {
         departing: &[(usize, f64)],
     ) -> Result<Option<Stop>, FieldError> {
         let before = self.motion.mode.clone();
-        let (rule, decided) = self.decide(Cause::Anew(&before))?;
+        let Decision { rule, decided, .. } = self.decide(Cause::Anew(&before))?;
         self.residuals.clear();
         let mut next = match decided {
             Ok(next) => next,

@@ -25,6 +25,7 @@ pub use admissible::{admissible, Admissible};
 
 use super::normal_fields::NormalFields;
 use crate::mode::Mode;
+use crate::switching::patience::Patience;
 
 /// What the hidden dynamics tends to.
 #[derive(Clone, Debug, PartialEq)]
@@ -73,6 +74,16 @@ pub enum Outcome {
 ///
 /// Reference: N. Guglielmi, E. Hairer (2015), SIAM J. Appl. Dyn. Syst. 14, 1454-1477.
 pub fn limit(fields: &NormalFields, u: &[f64], kappa: &[f64]) -> Outcome {
+    limit_within(fields, u, kappa, Patience::endless())
+}
+
+/// As [`limit`]; [`Outcome::Unknown`] when the caller has waited long enough.
+pub(super) fn limit_within(
+    fields: &NormalFields,
+    u: &[f64],
+    kappa: &[f64],
+    patience: Patience,
+) -> Outcome {
     let scaled = fields.scaled(kappa);
     let size = scaled.size();
     if !(size > 0.0 && size.is_finite()) {
@@ -81,8 +92,8 @@ pub fn limit(fields: &NormalFields, u: &[f64], kappa: &[f64]) -> Outcome {
     let unit = scaled.scaled(&vec![1.0 / size; fields.m()]);
     match fields.m() {
         1 => line::limit(&unit, u[0]),
-        2 => plane::limit(&unit, [u[0], u[1]]),
-        _ => space::limit(&unit, u),
+        2 => plane::limit(&unit, [u[0], u[1]], patience),
+        _ => space::limit(&unit, u, patience),
     }
 }
 

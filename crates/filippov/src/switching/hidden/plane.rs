@@ -8,6 +8,7 @@ use super::{clipped, side, Outcome};
 use crate::mode::Mode;
 use crate::switching::codim2::{Bilinear, Lap};
 use crate::switching::normal_fields::NormalFields;
+use crate::switching::patience::Patience;
 use crate::tolerances::{MOST_PIECES, MOST_TESTS};
 
 /// Follows the motion from u, piece by piece: corner, strip, or a step within the square.
@@ -19,13 +20,13 @@ use crate::tolerances::{MOST_PIECES, MOST_TESTS};
 /// | the basin of a stable root | sliding on both |
 /// | a return to the half line {y = P.y, x > P.x} that is not further out than the last | sliding on both |
 /// | rotating fields with gamma > 1, and returns that have come far out | outward spiral |
-pub(super) fn limit(fields: &NormalFields, u: [f64; 2]) -> Outcome {
+pub(super) fn limit(fields: &NormalFields, u: [f64; 2], patience: Patience) -> Outcome {
     let mut plane = Plane::new(fields, u);
     for _ in 0..MOST_PIECES {
         if let Some(outcome) = plane.piece() {
             return outcome;
         }
-        if plane.square.tests > MOST_TESTS {
+        if plane.square.tests > MOST_TESTS || patience.is_over() {
             break;
         }
     }

@@ -5,13 +5,14 @@ use super::certificate::rest_on_face;
 use super::{clipped, side, Outcome};
 use crate::mode::Mode;
 use crate::switching::normal_fields::NormalFields;
+use crate::switching::patience::Patience;
 use crate::switching::roots::stable_roots;
 use crate::tolerances::{
     AT_THE_ROOT, FIRST_WATCH, LAST_WATCH, MOST_PIECES, MOST_TESTS, STEADY_CYCLE,
 };
 
 /// Follows the motion from u until it has a certain outcome, or for a long time.
-pub(super) fn limit(fields: &NormalFields, u: &[f64]) -> Outcome {
+pub(super) fn limit(fields: &NormalFields, u: &[f64], patience: Patience) -> Outcome {
     let mut u = u.to_vec();
     let mut cell: Option<Cell> = None;
     let mut watch = Watch::new(&u);
@@ -32,7 +33,7 @@ pub(super) fn limit(fields: &NormalFields, u: &[f64]) -> Outcome {
         let before = here.tests;
         let (time, _) = here.advance(&mut u, None);
         tests += here.tests - before;
-        if tests > MOST_TESTS {
+        if tests > MOST_TESTS || patience.is_over() {
             break;
         }
         cell = Some(here);

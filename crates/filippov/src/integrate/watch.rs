@@ -1,0 +1,82 @@
+//! When a run has to end before its time: the limit of wall time, and the caller's wish.
+
+use std::cell::{Cell, RefCell};
+use std::time::Instant;
+
+use crate::options::Options;
+use crate::status::Stop;
+
+/// What the caller is asked every now and then, with the time reached: should the run end?
+pub(super) type Interrupt<'a> = &'a mut (dyn FnMut(f64) -> bool + 'a);
+
+/// Which limit was reached.
+#[derive(Clone, Copy)]
+enum Over {
+    WallTime,
+    Interrupted,
+}
+
+/// Looks at the clock and at the caller's wish.
+pub(super) struct Watch<'a> {
+    options: &'a Options,
+    started: Cell<Option<Instant>>,
+    interrupt: RefCell<Option<Interrupt<'a>>>,
+    over: Cell<Option<Over>>,
+}
+
+impl<'a> Watch<'a> {
+    pub fn new(options: &'a Options) -> Self {
+        Watch {
+            options,
+            started: Cell::new(None),
+            interrupt: RefCell::new(None),
+            over: Cell::new(None),
+        }
+    }
+
+    /// Asks this of the caller from now on.
+    pub fn ask(&mut self, interrupt: Interrupt<'a>) {
+        self.interrupt = RefCell::new(Some(interrupt));
+    }
+
+    /// The time by the clock of the run.
+    pub fn now(&self) -> Instant {
+        self.options.clock.now()
+    }
+
+    /// The run starts now.
+    pub fn start(&self) -> Instant {
+        let now = self.now();
+        self.started.set(Some(now));
+        now
+    }
+
+    /// Has a limit been reached, now or before? `t` is the time that the run has reached.
+    pub fn is_over(&self, now: Instant, t: f64) -> bool {
+        if self.over.get().is_none() {
+            let elapsed = self.started.get().map(|started| now - started);
+            let most = self.options.max_wall_time;
+            let is_late = elapsed
+                .zip(most)
+                .is_some_and(|(elapsed, most)| elapsed.as_secs_f64() > most);
+            let wants_to_stop = || {
+                let mut interrupt = self.interrupt.borrow_mut();
+                interrupt.as_mut().is_some_and(|interrupt| interrupt(t))
+            };
+            if is_late {
+                self.over.set(Some(Over::WallTime));
+            } else if wants_to_stop() {
+                self.over.set(Some(Over::Interrupted));
+            }
+        }
+        self.over.get().is_some()
+    }
+
+    /// Why the run ends, if a limit has been reached.
+    pub fn stop(&self) -> Option<Stop> {
+        self.over.get().map(|over| match over {
+            Over::WallTime => Stop::MaxWallTime,
+            Over::Interrupted => Stop::Interrupted,
+        })
+    }
+}
