@@ -1,6 +1,6 @@
 """Something long in a process of its own, to be interrupted: ``python interrupted_worker.py WHAT STORE``.
 
-Prints ``computing`` once it has used a second of processor time, and after Ctrl-C what the exception
+Prints ``computing`` once it has used half a second of processor time, and after Ctrl-C what the exception
 carries.
 """
 
@@ -77,8 +77,8 @@ def told(partial: Any) -> dict[str, Any]:
 
 
 def announce(begun: float) -> None:
-    """Print that the run has taken a second of processor time, however long that lasts."""
-    while time.process_time() - begun < 1.0:
+    """Print that the run has taken half a second of processor time, however long that lasts."""
+    while time.process_time() - begun < 0.5:
         time.sleep(0.01)
     print("computing", flush=True)
 

@@ -27,7 +27,7 @@ ANNOUNCE = """
 import threading, time, xarray
 
 def announce(begun):
-    while time.process_time() - begun < 1.0:
+    while time.process_time() - begun < 0.5:
         time.sleep(0.01)
     open({began!r}, "w").close()
 
