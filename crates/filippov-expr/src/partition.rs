@@ -88,6 +88,27 @@ impl Graph {
             .collect()
     }
 
+    /// The value with some parameters as numbers.
+    pub(crate) fn at_parameters(
+        &mut self,
+        root: NodeId,
+        number: impl Fn(usize) -> Option<f64>,
+    ) -> NodeId {
+        let mut image: FxHashMap<NodeId, NodeId> = FxHashMap::default();
+        for id in self.all_below(&[root]) {
+            let moved = |operand: NodeId| image.get(&operand).copied().unwrap_or(operand);
+            let new = match *self.node(id) {
+                Node::Parameter(k) => number(k as usize).map_or(id, |value| self.constant(value)),
+                _ if self.node(id).operands().any(|a| moved(a) != a) => {
+                    self.with_operands(id, moved)
+                }
+                _ => id,
+            };
+            image.insert(id, new);
+        }
+        image[&root]
+    }
+
     /// The operation of a node on other operands.
     pub(crate) fn with_operands(&mut self, id: NodeId, at: impl Fn(NodeId) -> NodeId) -> NodeId {
         match *self.node(id) {
