@@ -7,6 +7,7 @@ mod conversion;
 mod inspect;
 mod laws;
 mod prepared_run;
+mod regions;
 mod run;
 mod solve;
 mod sweep;
@@ -24,6 +25,8 @@ mod _core {
     use super::builder::Builder;
     #[pymodule_export]
     use super::inspect::{classify, hidden_dynamics, intersection_field};
+    #[pymodule_export]
+    use super::regions::Regions;
     #[pymodule_export]
     use super::run::Run;
     #[pymodule_export]

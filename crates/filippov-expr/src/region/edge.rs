@@ -6,7 +6,7 @@ use crate::graph::Graph;
 use crate::linear::LinearForm;
 use crate::node::{Node, NodeId};
 use crate::op::{BinaryOp, UnaryOp};
-use crate::region::Regions;
+use crate::region::{Possible, Regions};
 
 /// That many combinations of signs are looked at.
 const MOST_COMBINATIONS: usize = 64;
@@ -69,7 +69,7 @@ impl Regions {
             for sign in [1.0, -1.0] {
                 let mut signs = signs.clone();
                 signs[k] = Some(sign);
-                if self.is_possible(&signs, None) {
+                if self.possible(&signs, None) == Possible::Yes {
                     pending.push((self.graph.at_signs(&[value], &signs)[0], signs));
                 }
             }
@@ -117,7 +117,7 @@ impl Regions {
             for sign in [1.0, -1.0] {
                 let mut signs = signs.clone();
                 signs[k] = Some(sign);
-                if self.is_possible(&signs, None) {
+                if self.possible(&signs, None) == Possible::Yes {
                     pending.push((self.graph.at_signs(&[value], &signs)[0], signs));
                 }
             }

@@ -55,6 +55,15 @@ pub struct Split {
     pub is_complete: bool,
 }
 
+/// Whether a region has points.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Possible {
+    Never,
+    /// Not for the values of the parameters.
+    NotForParameters,
+    Yes,
+}
+
 /// In questions about the field that many combinations of other signs are looked at.
 const MOST_COMBINATIONS: usize = 256;
 
@@ -93,18 +102,46 @@ impl Regions {
         (rest, self.graph.switch(rest))
     }
 
+    /// The switching function of a surface with these signs inside of it.
+    ///
+    /// # Panics
+    /// If there are not so many surfaces.
+    pub fn function(&mut self, surface: u32, signs: &[Option<f64>]) -> NodeId {
+        let function = self.graph.surface(surface);
+        self.graph.at_signs(&[function], signs)[0]
+    }
+
+    /// The inequalities `side * value > 0` of a region, without those that follow from the others.
+    pub fn conditions(&mut self, signs: &[Option<f64>]) -> Vec<(NodeId, f64)> {
+        let mut kept = Vec::new();
+        for (k, sign) in (0..).zip(signs) {
+            if let Some(sign) = *sign {
+                kept.push((self.function(k, signs), sign));
+            }
+        }
+        for at in (0..kept.len()).rev() {
+            let mut flipped = kept.clone();
+            flipped[at].1 = -flipped[at].1;
+            if !self.is_solvable(&flipped, true) {
+                kept.remove(at);
+            }
+        }
+        kept
+    }
+
     /// The regions of an expression; the search is given up after looking at `most` combinations of signs.
     ///
     /// Combinations that no point has are left out, as far as linear inequalities between the terms of the switching
-    /// functions show that.
-    pub fn split(&mut self, node: NodeId, most: usize) -> Split {
+    /// functions show that. Unless `in_full`, those under which terms without signs are left that nothing cancels are not
+    /// looked at one by one: the expression is nowhere identically zero there, and counts as one that varies.
+    pub fn split(&mut self, node: NodeId, most: usize, in_full: bool) -> Split {
         let mut found = Split {
             regions: Vec::new(),
             is_complete: true,
         };
-        let mut pending = vec![(node, vec![None; self.graph.n_surfaces()])];
+        let mut pending = vec![(node, vec![None; self.graph.n_surfaces()], true)];
         let mut n_visited = 0;
-        while let Some((value, signs)) = pending.pop() {
+        while let Some((value, signs, is_here)) = pending.pop() {
             n_visited += 1;
             if n_visited > most {
                 found.is_complete = false;
@@ -113,34 +150,42 @@ impl Regions {
             let form = LinearForm::of(&self.graph, value);
             if !self.graph.facts(value).has_sign || is_zero(&form) {
                 let (region, is_known) = self.region(value, &form, signs);
-                found.is_complete &= is_known;
-                found.regions.push(region);
+                if is_here {
+                    found.is_complete &= is_known;
+                    found.regions.push(region);
+                } else {
+                    self.used_parameters |= region.kind == Kind::Zero || !is_known;
+                }
                 continue;
             }
             let next = (0..signs.len()).zip(self.graph.sign_dependencies(&[value], &[]));
             let next = next.filter(|&(_, depends)| depends).map(|(k, _)| k).next();
-            let (Some(k), true) = (next, self.may_cancel(&form)) else {
-                found.regions.push(Region {
-                    signs,
-                    kind: Kind::Varies,
-                    value: None,
-                    step: None,
-                });
+            let (Some(k), true) = (next, in_full || self.may_cancel(&form)) else {
+                if is_here {
+                    found.regions.push(Region {
+                        signs,
+                        kind: Kind::Varies,
+                        value: None,
+                        step: None,
+                    });
+                }
                 continue;
             };
             let mut sides = Vec::new();
             for sign in [1.0, -1.0] {
                 let mut signs = signs.clone();
                 signs[k] = Some(sign);
-                if self.is_possible(&signs, None) {
+                let possible = self.possible(&signs, None);
+                if possible != Possible::Never {
                     let value = self.graph.at_signs(&[value], &signs)[0];
                     let n_terms = LinearForm::of(&self.graph, value).terms.len();
-                    sides.push((n_terms, value, signs));
+                    sides.push((n_terms, value, signs, is_here && possible == Possible::Yes));
                 }
             }
             // The side with fewer terms is nearer to a zero: it is looked at first.
             sides.sort_by_key(|side| std::cmp::Reverse(side.0));
-            pending.extend(sides.into_iter().map(|(_, value, signs)| (value, signs)));
+            let sides = sides.into_iter();
+            pending.extend(sides.map(|(_, value, signs, is_here)| (value, signs, is_here)));
         }
         found
     }
@@ -148,6 +193,32 @@ impl Regions {
     /// Whether the sign of a surface makes a difference to some of the values where some signs are fixed: directly, or
     /// through surfaces on which the values depend there.
     pub fn matters(&mut self, roots: &[NodeId], signs: &[Option<f64>], surface: u32) -> bool {
+        let mut budget = MOST_COMBINATIONS;
+        self.values_read(roots, signs, Some(surface))
+            .into_iter()
+            .any(|value| self.differs(value, signs, surface, &mut budget))
+    }
+
+    /// Whether some of the values depend, where some signs are fixed, on which of -1, 0 and 1 a state variable is that stands for
+    /// a sign: directly, or through surfaces on which the values depend there.
+    pub fn reads(&mut self, roots: &[NodeId], signs: &[Option<f64>], state: u32) -> bool {
+        let values = self.values_read(roots, signs, None);
+        values.into_iter().any(|value| {
+            let at = [-1.0, 0.0, 1.0].map(|number| self.graph.at_state(value, state, number));
+            at[1..].iter().any(|&other| {
+                let difference = self.graph.sub(at[0], other);
+                !is_zero(&LinearForm::of(&self.graph, difference))
+            })
+        })
+    }
+
+    /// The values where some signs are fixed, and the functions of the surfaces on which they depend there, but for one.
+    fn values_read(
+        &mut self,
+        roots: &[NodeId],
+        signs: &[Option<f64>],
+        without: Option<u32>,
+    ) -> Vec<NodeId> {
         let mut values = self.graph.at_signs(roots, signs);
         let mut seen = vec![false; self.graph.n_surfaces()];
         let mut first = 0;
@@ -155,17 +226,13 @@ impl Regions {
             let depends = self.graph.sign_dependencies(&values[first..], &[]);
             first = values.len();
             for k in 0..seen.len() {
-                if depends[k] && !seen[k] && k != surface as usize {
+                if depends[k] && !seen[k] && without != Some(k as u32) {
                     seen[k] = true;
-                    let function = self.graph.surface(k as u32);
-                    values.extend(self.graph.at_signs(&[function], signs));
+                    values.push(self.function(k as u32, signs));
                 }
             }
         }
-        let mut budget = MOST_COMBINATIONS;
         values
-            .into_iter()
-            .any(|value| self.differs(value, signs, surface, &mut budget))
     }
 
     /// Whether a value differs on the two sides of a surface, under some combination of the other signs.
@@ -209,17 +276,23 @@ impl Regions {
         self.graph.sub(above, below)
     }
 
-    /// Whether there may be a point with these signs, at which moreover side * value > 0 (side 0: value = 0).
+    /// Whether there may be a point with these signs for the values of the parameters; an answer that depends on them is
+    /// remembered.
     fn is_possible(&mut self, signs: &[Option<f64>], also: Option<(NodeId, f64)>) -> bool {
+        let possible = self.possible(signs, also);
+        self.used_parameters |= possible == Possible::NotForParameters;
+        possible == Possible::Yes
+    }
+
+    /// Whether there may be a point with these signs, at which moreover side * value > 0 (side 0: value = 0).
+    fn possible(&mut self, signs: &[Option<f64>], also: Option<(NodeId, f64)>) -> Possible {
         if !self.is_possible_with(signs, also, false) {
-            return false;
+            Possible::Never
+        } else if self.parameters.is_empty() || self.is_possible_with(signs, also, true) {
+            Possible::Yes
+        } else {
+            Possible::NotForParameters
         }
-        if self.parameters.is_empty() {
-            return true;
-        }
-        let possible = self.is_possible_with(signs, also, true);
-        self.used_parameters |= !possible;
-        possible
     }
 
     fn is_possible_with(
@@ -228,16 +301,22 @@ impl Regions {
         also: Option<(NodeId, f64)>,
         with_parameters: bool,
     ) -> bool {
-        let mut sides: Vec<(NodeId, f64)> = Vec::new();
-        for (k, sign) in signs.iter().enumerate() {
+        let mut sides = Vec::new();
+        for (k, sign) in (0..).zip(signs) {
             if let Some(sign) = *sign {
-                sides.push((self.graph.surface(k as u32), sign));
+                sides.push((self.function(k, signs), sign));
             }
         }
-        sides.extend(also);
+        if let Some((value, side)) = also {
+            sides.push((self.graph.at_signs(&[value], signs)[0], side));
+        }
+        self.is_solvable(&sides, with_parameters)
+    }
+
+    /// Whether there may be a point at which all `side * value > 0` (side 0: value = 0).
+    fn is_solvable(&mut self, sides: &[(NodeId, f64)], with_parameters: bool) -> bool {
         let mut rows = Vec::new();
-        for (function, side) in sides {
-            let mut function = self.graph.at_signs(&[function], signs)[0];
+        for &(mut function, side) in sides {
             if with_parameters {
                 function = self.with_parameters(function);
             }
@@ -304,9 +383,9 @@ impl Regions {
             return (region, true);
         }
         let signs = region.signs.clone();
-        if !self.is_possible(&signs, Some((value, -1.0))) {
+        if self.possible(&signs, Some((value, -1.0))) != Possible::Yes {
             region.kind = Kind::Positive;
-        } else if !self.is_possible(&signs, Some((value, 1.0))) {
+        } else if self.possible(&signs, Some((value, 1.0))) != Possible::Yes {
             region.kind = Kind::Negative;
         }
         (region, true)

@@ -17,7 +17,7 @@ fn a_ramp_is_zero_on_one_side() {
     let mut g = Graph::new();
     let (_, ramp) = ramp(&mut g);
     let mut regions = Regions::new(g, vec![], vec![]);
-    let split = regions.split(ramp, 100);
+    let split = regions.split(ramp, 100, false);
     assert!(split.is_complete);
     assert_eq!(kinds(&split), [Kind::Zero, Kind::Positive]);
     assert_eq!(split.regions[0].signs, [Some(-1.0)]);
@@ -34,10 +34,10 @@ fn combinations_that_no_point_has_are_left_out() {
     // Zero only where x < 1 and x > 2.
     let never = g.add(difference, two);
     let mut regions = Regions::new(g, vec![], vec![]);
-    assert!(kinds(&regions.split(never, 100))
+    assert!(kinds(&regions.split(never, 100, false))
         .iter()
         .all(|&kind| kind == Kind::Positive));
-    assert_eq!(kinds(&regions.split(difference, 100)).len(), 3);
+    assert_eq!(kinds(&regions.split(difference, 100, false)).len(), 3);
 }
 
 #[test]
@@ -46,7 +46,8 @@ fn what_cannot_cancel_is_not_split() {
     let (y, (_, ramp)) = (g.state(1), ramp(&mut g));
     let sum = g.add(y, ramp);
     let mut regions = Regions::new(g, vec![], vec![]);
-    assert_eq!(kinds(&regions.split(sum, 100)), [Kind::Varies]);
+    assert_eq!(kinds(&regions.split(sum, 100, false)), [Kind::Varies]);
+    assert_eq!(kinds(&regions.split(sum, 100, true)).len(), 2);
 }
 
 #[test]
@@ -61,8 +62,8 @@ fn a_search_that_is_given_up_says_so() {
         sum = g.add(sum, term);
     }
     let mut regions = Regions::new(g, vec![], vec![]);
-    assert!(!regions.split(sum, 100).is_complete);
-    assert!(regions.split(sum, 10_000).is_complete);
+    assert!(!regions.split(sum, 100, false).is_complete);
+    assert!(regions.split(sum, 10_000, false).is_complete);
 }
 
 #[test]
@@ -97,9 +98,12 @@ fn values_of_discrete_states() {
     let floor = g.add(moved, step);
     let (whole, between) = (g.sub(floor, one), g.sub(floor, half));
     let mut regions = Regions::new(g, vec![], vec![Discrete::Whole]);
-    assert_eq!(kinds(&regions.split(whole, 100)), [Kind::Zero, Kind::Zero]);
     assert_eq!(
-        kinds(&regions.split(between, 100)),
+        kinds(&regions.split(whole, 100, false)),
+        [Kind::Zero, Kind::Zero]
+    );
+    assert_eq!(
+        kinds(&regions.split(between, 100, false)),
         [Kind::Varies, Kind::Varies]
     );
     assert!(!regions.used_parameters());
@@ -112,7 +116,7 @@ fn a_threshold_given_by_a_parameter_is_its_value() {
     let above = g.sub(ramp, threshold);
     for (value, kind) in [(0.0, Kind::Zero), (0.5, Kind::Negative)] {
         let mut regions = Regions::new(g.clone(), vec![value], vec![]);
-        assert!(kinds(&regions.split(above, 100)).contains(&kind));
+        assert!(kinds(&regions.split(above, 100, false)).contains(&kind));
         assert!(regions.used_parameters());
     }
 }
