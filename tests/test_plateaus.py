@@ -170,6 +170,12 @@ def test_what_is_proposed_for_a_sign() -> None:
     assert "write np.where(x[0] > 1, 1.0, 0.0) in its place" in text
 
 
+def test_a_sum_is_zero_however_it_is_put_together() -> None:
+    text = refusal(along_x(lambda x: abs(x - 0.1) + x - 0.1 > 0), [0.0, 0.0])
+    assert "identically 0 where x[0] < 0.1" in text
+    assert "write `x[0] > 0.1` in the place" in text
+
+
 def test_anti_windup() -> None:
     """The limits of a controller compared with its output, as they are written first."""
 
