@@ -412,11 +412,29 @@ def test_many_thresholds_are_decided_by_what_can_be() -> None:
     assert final(lambda x: count(x) > 0.5, 0.0, 2.5) == pytest.approx(2.4, abs=1e-9)
 
 
+def count_of_many(threshold: float) -> Callable[[float, Any], Any]:
+    """Return the motion of 300 states at speed 1, of which one is faster where many others are above 1."""
+    last = np.arange(300) == 299
+    return lambda t, x: 1.0 + last * np.where(np.sum(x[:299] > 1) > threshold, 1.0, 0.0)
+
+
+def test_a_count_of_many_is_decided_by_its_steps() -> None:
+    start = np.append(np.linspace(0, 0.99, 299), 0.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        sol = fl.solve_ivp(count_of_many(99.5), (0, 0.5), start)
+    assert sol.success, sol.message
+    begins = 1.0 - np.sort(start[:299])[::-1][99]
+    assert sol.y[299, -1] == pytest.approx(0.5 + (0.5 - begins), abs=1e-9)
+    with pytest.raises(fl.TraceError, match="identically 0"):
+        fl.solve_ivp(count_of_many(99), (0, 0.5), start)
+
+
 def test_a_search_that_is_given_up_is_warned_of() -> None:
-    weights = 1.0 + 0.37 * np.arange(14) ** 1.5
-    fun = lambda t, x: np.where(weights @ np.sign(x) > 0.123, -1.0, 1.0) + np.zeros(14)  # noqa: E731
+    weights = 1.0 + 0.37 * np.arange(30) ** 1.5
+    fun = lambda t, x: np.where(weights @ np.sign(x) > 0.123, -1.0, 1.0) + np.zeros(30)  # noqa: E731
     with pytest.warns(fl.FilippovWarning, match="was not found out") as caught:
-        fl.solve_ivp(fun, (0, 0.01), np.linspace(1, 2, 14))
+        fl.solve_ivp(fun, (0, 0.01), np.linspace(1, 2, 30))
     assert caught[0].filename == __file__
     assert "more than 1024 combinations" in str(caught[0].message)
 

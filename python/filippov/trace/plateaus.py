@@ -22,8 +22,10 @@ if TYPE_CHECKING:
 
 __all__ = ["Again", "check_questions", "kink_of_event"]
 
-# Combinations of inner signs that are looked at for each comparison.
+# Combinations of inner signs looked at for each comparison; for each one after several that have more.
 MOST_COMBINATIONS = 1024
+MOST_AFTER_MANY = 32
+MANY = 3
 
 # Characters of an expression that are printed in a message.
 MOST_PRINTED = 160
@@ -104,6 +106,7 @@ def check_questions(tracer: Tracer, roots: Roots, role: str, again: Again | None
     check = _Check(tracer, roots, role, again)
     for question in tracer.questions:
         check.question(question)
+    check.doubt_unresolved()
     for surface in range(tracer.builder.n_surfaces() - tracer.laws.n_guards):
         check.surface(surface)
     if check.regions.used_parameters:
@@ -163,6 +166,7 @@ class _Check:
         self.role = role
         self.again = again
         self.doubts: list[str] = []
+        self.unresolved: list[Question] = []
         self.regions = _regions_of(tracer)
         self.roots = _nodes_of(tracer, roots, self.regions)
 
@@ -178,18 +182,28 @@ class _Check:
             return
         if not has_signs:
             return
-        rows, is_complete = self.regions.split(node, MOST_COMBINATIONS, False)
+        most = MOST_COMBINATIONS if len(self.unresolved) < MANY else MOST_AFTER_MANY
+        rows, is_complete = self.regions.split(node, most, False)
         for region in [_Region(*row) for row in rows]:
             if region.kind == "zero" and self._is_read(question, region, surface, sign):
                 raise self._plateau(question, node, region)
         if not is_complete and self._is_used(surface):
-            line, _ = self.line_of(question)
-            self.doubts.append(
-                f"{self.role}: whether {self._short(node)} is identically 0 in some region was not found "
-                f"out, as its terms have more than {MOST_COMBINATIONS} combinations of signs. If it is, "
-                "the comparison is not decided as Python does there; compare with a number that it never "
-                f"takes{_at(line)}"
-            )
+            self.unresolved.append(question)
+
+    def doubt_unresolved(self) -> None:
+        """Doubt the questions whose regions were not all looked at, by one text."""
+        if not self.unresolved:
+            return
+        first, more = self.unresolved[0], len(self.unresolved) - 1
+        line, _ = self.line_of(first)
+        others = f" (and {more} other comparison{'s' * (more > 1)})" if more else ""
+        self.doubts.append(
+            f"{self.role}: whether {self._short(first.node)}{others} is identically 0 in some region "
+            f"was not found out, as its terms have more than {MOST_COMBINATIONS} combinations of signs. If "
+            "it is, the comparison is not decided as Python does there; compare with a number that it "
+            "never takes"
+            f"{_at(line)}"
+        )
 
     def surface(self, surface: int) -> None:
         """Refuse a surface that is singular on another one; doubt one that ends there."""

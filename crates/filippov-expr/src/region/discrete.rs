@@ -100,7 +100,7 @@ fn linear(states: &[(Discrete, f64)], constant: f64) -> Option<Found> {
 }
 
 /// The largest number of which both are multiples, by Euclid's algorithm; none if they have none in common.
-fn common_divisor(a: f64, b: f64) -> Option<f64> {
+pub(super) fn common_divisor(a: f64, b: f64) -> Option<f64> {
     let (mut large, mut small) = (a.max(b), a.min(b));
     let least = SAME_MULTIPLE * large;
     while small > least {

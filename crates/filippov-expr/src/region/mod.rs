@@ -5,6 +5,7 @@
 //! regions, and the jumps and the edges of domains at the borders between regions. It reads graphs only;
 //! time stepping does not enter it.
 
+mod choices;
 mod discrete;
 mod edge;
 mod inequalities;
@@ -133,7 +134,8 @@ impl Regions {
     ///
     /// Combinations that no point has are left out, as far as linear inequalities between the terms of the switching
     /// functions show that. Unless `in_full`, those under which terms without signs are left that nothing cancels are not
-    /// looked at one by one: the expression is nowhere identically zero there, and counts as one that varies.
+    /// looked at one by one, nor are those of a sum of numbers that is zero for no choice of them: the expression is nowhere
+    /// identically zero there, and counts as one that varies.
     pub fn split(&mut self, node: NodeId, most: usize, in_full: bool) -> Split {
         let mut found = Split {
             regions: Vec::new(),
@@ -158,6 +160,15 @@ impl Regions {
                 }
                 continue;
             }
+            if n_visited == 1 && !in_full && choices::are_never_zero(&self.graph, &form) {
+                found.regions.push(Region {
+                    signs,
+                    kind: Kind::Varies,
+                    value: None,
+                    step: None,
+                });
+                continue;
+            }
             let next = (0..signs.len()).zip(self.graph.sign_dependencies(&[value], &[]));
             let next = next.filter(|&(_, depends)| depends).map(|(k, _)| k).next();
             let (Some(k), true) = (next, in_full || self.may_cancel(&form)) else {
@@ -178,12 +189,13 @@ impl Regions {
                 let possible = self.possible(&signs, None);
                 if possible != Possible::Never {
                     let value = self.graph.at_signs(&[value], &signs)[0];
-                    let n_terms = LinearForm::of(&self.graph, value).terms.len();
-                    sides.push((n_terms, value, signs, is_here && possible == Possible::Yes));
+                    let form = LinearForm::of(&self.graph, value);
+                    let distance = (form.terms.len(), form.constant.abs());
+                    sides.push((distance, value, signs, is_here && possible == Possible::Yes));
                 }
             }
-            // The side with fewer terms is nearer to a zero: it is looked at first.
-            sides.sort_by_key(|side| std::cmp::Reverse(side.0));
+            // The side with fewer terms, then with the smaller constant, is nearer to a zero: it is looked at first.
+            sides.sort_by(|a, b| b.0.partial_cmp(&a.0).unwrap_or(std::cmp::Ordering::Equal));
             let sides = sides.into_iter();
             pending.extend(sides.map(|(_, value, signs, is_here)| (value, signs, is_here)));
         }

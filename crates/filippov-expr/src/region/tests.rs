@@ -50,20 +50,58 @@ fn what_cannot_cancel_is_not_split() {
     assert_eq!(kinds(&regions.split(sum, 100, true)).len(), 2);
 }
 
-#[test]
-fn a_search_that_is_given_up_says_so() {
+/// `sum_k weight(k) sign(x_k) + constant`.
+fn votes(n: u32, constant: f64, weight: impl Fn(u32) -> f64) -> (Graph, NodeId) {
     let mut g = Graph::new();
-    let mut sum = g.constant(0.5);
-    for k in 0..12 {
+    let mut sum = g.constant(constant);
+    for k in 0..n {
         let x = g.state(k);
-        let sign = g.sign(x);
-        let weight = g.constant(1.0 + 0.37 * f64::from(k * k));
+        let (sign, weight) = (g.sign(x), g.constant(weight(k)));
         let term = g.mul(weight, sign);
         sum = g.add(sum, term);
     }
+    (g, sum)
+}
+
+#[test]
+fn a_search_that_is_given_up_says_so() {
+    let (g, sum) = votes(30, 0.5, |k| (1.0 + f64::from(k)).sqrt());
     let mut regions = Regions::new(g, vec![], vec![]);
     assert!(!regions.split(sum, 100, false).is_complete);
-    assert!(regions.split(sum, 10_000, false).is_complete);
+}
+
+#[test]
+fn votes_are_decided_without_looking_at_each_combination() {
+    let weights: [fn(u32) -> f64; 3] =
+        [|_| 1.0, |k| f64::from(k % 3) + 1.0, |k| 0.25 * f64::from(k)];
+    for weight in weights {
+        let (g, sum) = votes(200, 0.1, weight);
+        let split = Regions::new(g, vec![], vec![]).split(sum, 1, false);
+        assert!(split.is_complete);
+        assert_eq!(kinds(&split), [Kind::Varies]);
+    }
+    // No common step: the sums are enumerated.
+    let root = |k: u32| (1.0 + f64::from(k)).sqrt();
+    let (g, sum) = votes(20, 0.1, root);
+    assert!(
+        Regions::new(g, vec![], vec![])
+            .split(sum, 1, false)
+            .is_complete
+    );
+    let (g, sum) = votes(8, root(2) - root(5), root);
+    let split = Regions::new(g, vec![], vec![]).split(sum, 10_000, false);
+    assert!(!kinds(&split).contains(&Kind::Zero));
+    let (g, sum) = votes(8, root(2) + root(5), |k| {
+        if k == 2 || k == 5 {
+            root(k)
+        } else {
+            0.0
+        }
+    });
+    let split = Regions::new(g, vec![], vec![]).split(sum, 10_000, false);
+    assert!(kinds(&split).contains(&Kind::Zero));
+    let (g, sum) = votes(5, 1.0, |_| 1.0);
+    assert!(kinds(&Regions::new(g, vec![], vec![]).split(sum, 1000, false)).contains(&Kind::Zero));
 }
 
 #[test]
