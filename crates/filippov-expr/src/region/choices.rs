@@ -42,8 +42,11 @@ pub(super) fn are_never_zero(graph: &Graph, form: &LinearForm) -> bool {
         .iter()
         .try_fold(0.0, |g, &step| common_divisor(g, step));
     if let Some(divisor) = divisor.filter(|&g| g > 0.0) {
-        let multiple = low / divisor;
-        return (multiple - multiple.round()).abs() > ROUNDING * (1.0 + size / divisor);
+        let off = |value: f64| (value / divisor - (value / divisor).round()).abs();
+        let rounding = ROUNDING * (1.0 + size / divisor);
+        if steps.iter().all(|&step| off(step) <= rounding) {
+            return off(low) > rounding;
+        }
     }
     steps.len() <= MOST_ENUMERATED && !have_sum(&steps, -low, rounding)
 }
