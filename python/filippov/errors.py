@@ -1,4 +1,4 @@
-"""Exceptions of the package.
+"""Exceptions and the warning of the package.
 
 Every error says what happened, where (time, state, surface, mode, as far as known) and what to try.
 
@@ -13,6 +13,7 @@ from typing import Any
 
 __all__ = [
     "FilippovError",
+    "FilippovWarning",
     "InputError",
     "Interrupted",
     "IntersectionError",
@@ -64,6 +65,10 @@ class FilippovError(Exception):
     def __reduce__(self) -> tuple[Any, ...]:
         # The default protocol loses keyword-only attributes; worker processes send errors back by pickle.
         return type(self), (self.message,), self.__dict__.copy()
+
+
+class FilippovWarning(UserWarning):
+    """What a user should know about a result that was computed all the same."""
 
 
 class TraceError(FilippovError):

@@ -207,15 +207,15 @@ def _follow(hidden: HiddenDynamics, before: list[int] | None) -> Array:
         g1, g2 = hidden.rates(u[0], u[1])
         return [hidden.kappa[0] * g1 / largest, hidden.kappa[1] * g2 / largest]
 
-    def outside(t: float, u: Any) -> Any:
-        return np.maximum(abs(u[0]), abs(u[1])) - _FARTHEST
+    def outside(k: int) -> Event:
+        return Event(lambda t, u: u[k] ** 2 - _FARTHEST**2, direction="up", terminal=True)
 
     start = np.array(hidden.incoming)
     solution = solve_ivp(
         System(motion, n=2),
         (0.0, _LONGEST),
         start,
-        events=Event(outside, direction="up", terminal=True),
+        events=[outside(0), outside(1)],
         rtol=1e-6,
         atol=1e-8,
     )

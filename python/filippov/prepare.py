@@ -46,6 +46,8 @@ class Prepared(NamedTuple):
         The resets, as the core takes them.
     remembers : tuple of str
         Names outside of itself that a traced function with an ``if`` assigns.
+    doubts : tuple of str
+        What may be wrong with the comparisons of a traced function, for warnings.
     """
 
     core: CoreSystem
@@ -55,6 +57,7 @@ class Prepared(NamedTuple):
     why_opaque: str
     actions: tuple[CoreAction, ...] = ()
     remembers: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
 
     @property
     def backend(self) -> str:
@@ -123,7 +126,14 @@ def prepare(
     pinned = dict(values) if traced.guards or is_pinned else None
     remembers = tuple(remembered(source.fun)) if traced.n_paths > 1 else ()
     prepared = Prepared(
-        traced.system, traced, tuple(traced.system.surfaces()), pinned, "", actions, remembers
+        traced.system,
+        traced,
+        tuple(traced.system.surfaces()),
+        pinned,
+        "",
+        actions,
+        remembers,
+        traced.doubts,
     )
     # A function that has changed what it reads, a counter for instance, is traced again at the next call.
     if key is not None and key == _key(source, n, values, states):

@@ -274,6 +274,8 @@ def _keep_call(system: System, key: Hashable, given: Mapping[str, Any], n: int) 
     options = check_options(_changed(given), (0.0, 1.0), n)
     if options.nonunique != "branch":
         prepared = system.prepare(n, 0.0, None, values)
+        if prepared.doubts:  # warned of at every call
+            return
         system._calls[key] = _Call(
             prepared,
             options,

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from filippov._core import Run, TracedSystem
 from filippov.backward import reversed_source
+from filippov.caution import warn_user
 from filippov.errors import InputError, ModelError
 from filippov.events import accepted_names, function_name
 from filippov.forms import Source, base_source, check_surfaces, fields_source, relay_source
@@ -429,6 +430,7 @@ class System(Points):
             raise InputError(f"y0: the system has {self._n} states, y0 has {n}")
         known = self._prepared  # read once: another thread may trace for other values meanwhile
         if known is not None and known.is_valid_for(n, values):
+            warn_user(known.doubts)
             return known
         if self._source is None:
             raise ModelError(
@@ -436,6 +438,7 @@ class System(Points):
                 f"this copy is valid for {known.pinned if known else {}} only"
             )
         prepared = prepare(self._source, n, values, self._states, t0, y0)
+        warn_user(prepared.doubts)
         self._prepared = prepared
         if self._n is None:
             self._n = n

@@ -32,7 +32,8 @@
 //! ```
 //!
 //! The crate knows nothing of time stepping. Modules: [`graph`] (construction, with `simplify`),
-//! [`switching`] (surfaces found and merged), `partition` (what depends on which sign), [`derivative`],
+//! [`switching`] (surfaces found and merged), `partition` (what depends on which sign), [`region`] (what an
+//! expression is under each combination of its signs), [`derivative`],
 //! `print`, `serial`, [`program`] (native code by Cranelift, or a portable interpreter), [`enclosure`]
 //! (rigorous bounds along pieces of motions) and [`jet`] (Taylor coefficients of motions).
 
@@ -52,6 +53,7 @@ mod op;
 mod partition;
 mod print;
 pub mod program;
+pub mod region;
 mod schedule;
 mod serial;
 mod sign_gradient;
@@ -71,5 +73,6 @@ pub use node::{Node, NodeId};
 pub use op::{BinaryOp, UnaryOp};
 pub use print::Names;
 pub use program::{Backend, Program};
+pub use region::{Discrete, Edge, Kind, Region, Regions, Split};
 pub use schedule::Lengths;
 pub use switching::Switching;

@@ -17,6 +17,11 @@ impl Graph {
         self.facts(id).has_state
     }
 
+    /// Whether the value contains the sign of a surface.
+    pub fn has_signs(&self, id: NodeId) -> bool {
+        self.facts(id).has_sign
+    }
+
     /// Whether the value contains a parameter with this index or a higher one.
     pub fn depends_on_parameters_from(&self, id: NodeId, first: u32) -> bool {
         self.all_below(&[id])
@@ -86,6 +91,39 @@ impl Graph {
             .iter()
             .map(|root| image.get(root).copied().unwrap_or(*root))
             .collect()
+    }
+
+    /// The value with some parameters as numbers.
+    pub(crate) fn at_parameters(
+        &mut self,
+        root: NodeId,
+        number: impl Fn(usize) -> Option<f64>,
+    ) -> NodeId {
+        self.at_numbers(root, |node| match node {
+            Node::Parameter(k) => number(k as usize),
+            _ => None,
+        })
+    }
+
+    /// The value with a state variable as a number.
+    pub(crate) fn at_state(&mut self, root: NodeId, index: u32, number: f64) -> NodeId {
+        self.at_numbers(root, |node| (node == Node::State(index)).then_some(number))
+    }
+
+    fn at_numbers(&mut self, root: NodeId, number: impl Fn(Node) -> Option<f64>) -> NodeId {
+        let mut image: FxHashMap<NodeId, NodeId> = FxHashMap::default();
+        for id in self.all_below(&[root]) {
+            let moved = |operand: NodeId| image.get(&operand).copied().unwrap_or(operand);
+            let new = match number(*self.node(id)) {
+                Some(value) => self.constant(value),
+                None if self.node(id).operands().any(|a| moved(a) != a) => {
+                    self.with_operands(id, moved)
+                }
+                None => id,
+            };
+            image.insert(id, new);
+        }
+        image[&root]
     }
 
     /// The operation of a node on other operands.

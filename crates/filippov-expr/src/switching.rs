@@ -411,6 +411,16 @@ impl Graph {
         }
     }
 
+    /// What is left to take the sign of, where [`Graph::sign`] takes signs in front of a product for themselves.
+    pub(crate) fn without_signs(&self, id: NodeId) -> NodeId {
+        let (signs, rest) = self.split_signs(id);
+        if signs.is_empty() || matches!(self.reduce(id), Reduced::Known(_)) {
+            id
+        } else {
+            rest
+        }
+    }
+
     /// The signs in front of a product, and the rest of it.
     fn split_signs(&self, id: NodeId) -> (Vec<NodeId>, NodeId) {
         let mut signs = Vec::new();

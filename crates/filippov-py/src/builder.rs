@@ -137,6 +137,11 @@ impl Builder {
         Ok(graph.depends_on_parameters_from(Self::node(&graph, a)?, first))
     }
 
+    fn has_signs(&self, a: u32) -> PyResult<bool> {
+        let graph = self.graph();
+        Ok(graph.has_signs(Self::node(&graph, a)?))
+    }
+
     fn is_affine(&self, a: u32) -> PyResult<bool> {
         let graph = self.graph();
         Ok(graph.is_affine(Self::node(&graph, a)?))

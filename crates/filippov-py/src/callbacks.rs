@@ -162,8 +162,8 @@ impl EventExpression {
     }
 }
 
-/// A user's event as a compiled expression. Expressions with switches of their own are not compiled as
-/// events, so no signs are needed.
+/// A user's event as a compiled expression. Expressions with signs, of the field or of their own, are not compiled
+/// as events, so no signs are needed.
 pub struct CompiledEvent {
     pub expression: Arc<EventExpression>,
     /// Knows the parameters, and the discrete states of the run.

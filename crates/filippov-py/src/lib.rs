@@ -8,6 +8,7 @@ mod conversion;
 mod inspect;
 mod laws;
 mod prepared_run;
+mod regions;
 mod run;
 mod solve;
 mod sweep;
@@ -27,6 +28,8 @@ mod _core {
     use super::clock::ManualClock;
     #[pymodule_export]
     use super::inspect::{classify, hidden_dynamics, intersection_field};
+    #[pymodule_export]
+    use super::regions::Regions;
     #[pymodule_export]
     use super::run::Run;
     #[pymodule_export]

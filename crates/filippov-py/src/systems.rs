@@ -356,7 +356,13 @@ impl TracedSystem {
         if let Some(known) = events.iter().position(|(compiled, _)| *compiled == node) {
             return Ok(known);
         }
-        let event = EventExpression::compile(&graph, Builder::node(&graph, node)?)
+        let root = Builder::node(&graph, node)?;
+        if graph.has_signs(root) {
+            return Err(PyValueError::new_err(
+                "an event that reads signs of the field cannot be compiled: call its function",
+            ));
+        }
+        let event = EventExpression::compile(&graph, root)
             .map_err(|e| PyValueError::new_err(e.to_string()))?;
         events.push((node, Arc::new(event)));
         Ok(events.len() - 1)

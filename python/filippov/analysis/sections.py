@@ -9,6 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from filippov._core import TracedSystem
+from filippov.caution import warn_user
+from filippov.core_events import sampled
 from filippov.errors import InputError, ModelError, TraceError
 from filippov.events import (
     Event,
@@ -388,6 +390,9 @@ def _function_place(
         if text in prepared.surfaces:
             return Place("surface", sign * direction, surface=prepared.surfaces.index(text))
     # A function with jumps or kinks of its own has no bounds: it is called, and sampled.
+    if traced.system.n_surfaces:
+        kink = f"a kink or a jump of its own at `{traced.system.surfaces()[0]}` = 0"
+        warn_user([sampled(f"section ({function_name(g, 'function')})", kink)])
     if traced.guards or traced.system.n_surfaces:
         return called
     return Place("function", direction, function=traced.system)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ from filippov.trace.scalar import Scalar
 if TYPE_CHECKING:
     from filippov._core import Builder
 
-__all__ = ["MAX_DECISIONS", "Guard", "Tracer"]
+__all__ = ["MAX_DECISIONS", "Guard", "Question", "Tracer"]
 
 # A path this long comes from a loop whose length depends on the state.
 MAX_DECISIONS = 2_000
@@ -48,6 +48,24 @@ class Guard:
 
     text: str
     sign: float
+
+
+class Question(NamedTuple):
+    """What the user's function asked about an expression.
+
+    Attributes
+    ----------
+    node : int
+        The expression.
+    kind : {"comparison", "sign", "floor", "quantiser", "hysteresis"}
+        Whether it is positive, its sign, its sign inside of a floor; or the argument of a floor or relay.
+    is_strict : bool
+        Of a comparison: whether the answer at 0 is no.
+    """
+
+    node: int
+    kind: str
+    is_strict: bool = True
 
 
 class Tracer:
@@ -99,6 +117,11 @@ class Tracer:
         self.laws = Laws(len(parameters)) if laws is None else laws
         self.n_paths = 0
         self.guards: dict[int, Guard] = {}
+        self.questions: dict[Question, None] = {}
+        self.sides: tuple[int, int] | None = None
+        self.sought: Question | None = None
+        self.replaced: Question | None = None
+        self.found: tuple[UserLine | None, tuple[int, int] | None] | None = None
         self._path: list[tuple[int, float]] = []
         self._flipped: list[bool] = []
         self._answers: dict[int, float] = {}
@@ -170,6 +193,13 @@ class Tracer:
             raise TypeError(f"{value!r} is not a number")
         return node
 
+    def ask(self, node: int, kind: str, *, is_strict: bool = True) -> None:
+        """Remember a question; if it is the one that is sought, the user's line too."""
+        question = Question(node, kind, is_strict)
+        self.questions[question] = None
+        if question == self.sought and self.found is None:
+            self.found = (calling_line(), self.sides)
+
     def sign(self, node: int) -> int:
         """Return the node of the sign of an expression."""
         known = self.known_sign(node) if self.parameters else None
@@ -180,6 +210,9 @@ class Tracer:
             sides = [self.builder.sign(self.laws.beside(self, node, side)) for side in (-1.0, 1.0)]
             both = self.builder.binary("add", *sides)
             return self.builder.binary("multiply", self.builder.constant(0.5), both)
+        self.ask(node, "sign")
+        if self.replaced is not None and self.replaced == Question(node, "sign"):
+            return self.builder.state(self.n_states)
         return self.builder.sign(node)
 
     def absolute(self, node: int) -> int:
@@ -203,6 +236,7 @@ class Tracer:
         if known is None:
             if self.laws.is_held(self, node):
                 node = self.laws.beside(self, node, -1.0 if strict else 1.0)
+            self.ask(node, "comparison", is_strict=strict)
             surface, orientation = self.builder.switch(node)
             if surface >= 0:
                 return Comparison(self, surface, orientation)

@@ -26,6 +26,7 @@ __all__ = [
     "deepest_user_line",
     "explain_failure",
     "explain_raise",
+    "is_foreign",
 ]
 
 BLACK_BOX = (
@@ -166,7 +167,7 @@ def calling_line() -> UserLine | None:
     import sys
 
     frame: FrameType | None = sys._getframe(1)
-    while frame is not None and _is_foreign(frame.f_code.co_filename):
+    while frame is not None and is_foreign(frame.f_code.co_filename):
         frame = frame.f_back
     return None if frame is None else _line(frame, frame.f_lineno)
 
@@ -182,7 +183,7 @@ def _frames(traceback: TracebackType | None) -> Iterable[tuple[FrameType, int]]:
 
 def deepest_user_line(traceback: TracebackType | None) -> UserLine | None:
     """Return the user's line that raised: the innermost one outside of NumPy, SciPy and this package."""
-    own = [place for place in _frames(traceback) if not _is_foreign(place[0].f_code.co_filename)]
+    own = [place for place in _frames(traceback) if not is_foreign(place[0].f_code.co_filename)]
     return _line(*own[-1]) if own else None
 
 
@@ -194,7 +195,7 @@ def _line(frame: FrameType, number: int) -> UserLine:
     return UserLine(code.co_filename, number, code.co_name, text, frame)
 
 
-def _is_foreign(path: str) -> bool:
+def is_foreign(path: str) -> bool:
     """Whether a file belongs to the tracer, NumPy, SciPy or the standard library rather than to the user."""
     package = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
     library = os.path.dirname(os.__file__)
@@ -214,7 +215,7 @@ def _entered(traceback: TracebackType | None, fun: Callable[..., Any]) -> bool:
     """Whether the error came from inside of the function, not from calling it with wrong arguments."""
     code = getattr(getattr(fun, "__func__", fun), "__code__", None)
     if code is None:
-        return any(not _is_foreign(frame.f_code.co_filename) for frame, _ in _frames(traceback))
+        return any(not is_foreign(frame.f_code.co_filename) for frame, _ in _frames(traceback))
     return any(frame.f_code is code for frame, _ in _frames(traceback))
 
 

@@ -60,15 +60,20 @@ class Laws:
             return self._state(tracer, _Law("clock", (node,), ()), "floor")
         level = self._state(tracer, _Law("level", (node,), ()), "nearest")
         half = builder.constant(0.5)
-        step = builder.binary("multiply", half, builder.sign(builder.binary("subtract", node, level)))
+        distance = builder.binary("subtract", node, level)
+        tracer.ask(node, "quantiser")
+        tracer.ask(distance, "floor")
+        step = builder.binary("multiply", half, builder.sign(distance))
         return builder.binary("add", builder.binary("subtract", level, half), step)
 
     def hysteresis(self, tracer: Tracer, node: int, low: int, high: int, initial: float) -> int:
         """Return the node of the state, +1 or -1, of a relay with two thresholds."""
+        tracer.ask(node, "hysteresis")
         return self._state(tracer, _Law("hysteresis", (node, low, high), (initial,)), "hysteresis")
 
     def stick(self, tracer: Tracer, node: int, ratio: int) -> int:
         """Return the node of the sign of an expression at whose zero static friction is above kinetic."""
+        tracer.ask(node, "sign")
         surface, _ = tracer.builder.switch(node)
         if surface >= 0 and self.sticking.get(surface, ratio) != ratio:
             raise NotTraceable(
@@ -78,6 +83,10 @@ class Laws:
         if surface >= 0:
             self.sticking[surface] = ratio
         return tracer.builder.sign(node)
+
+    def discrete(self) -> list[str]:
+        """Return what each discrete state is: a "whole" number, or a "side", -1 or +1."""
+        return ["side" if law.kind == "hysteresis" else "whole" for law in self._known]
 
     def is_held(self, tracer: Tracer, node: int) -> bool:
         """Whether an expression contains discrete states and is constant between their changes."""

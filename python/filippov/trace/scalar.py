@@ -148,7 +148,7 @@ class Scalar:
         node = other.node if type(other) is Scalar and other.tracer is tracer else tracer.operand(other)
         if node is None:
             return NotImplemented
-        first, second = (self.node, node) if greater else (node, self.node)
+        first, second = tracer.sides = (self.node, node) if greater else (node, self.node)
         return tracer.compare(tracer.builder.binary("subtract", first, second), strict=strict)
 
     def __gt__(self, other: Any) -> Any:

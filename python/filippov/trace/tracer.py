@@ -12,20 +12,23 @@ from numpy.typing import NDArray
 
 from filippov.errors import ModelError, TraceError
 from filippov.events import accepted_names
-from filippov.trace.branching import Guard, Tracer
+from filippov.trace.branching import Guard, Question, Tracer
 from filippov.trace.condition import Condition
 from filippov.trace.explain import explain_failure, explain_raise
 from filippov.trace.laws import Laws
+from filippov.trace.plateaus import Roots, check_questions, kink_of_event
 from filippov.trace.reuse import Recent
 from filippov.trace.scalar import Scalar
 from filippov.trace.verify import verify
 
 if TYPE_CHECKING:
     from filippov._core import Builder, TracedSystem
+    from filippov.trace.explain import UserLine
 
-__all__ = ["Trace", "trace", "trace_event"]
+__all__ = ["Trace", "examine_event", "trace", "trace_event"]
 
 Vector = NDArray[np.float64]
+_Record = tuple[tuple[int, ...], list[int], tuple[tuple[int, float], ...]]
 
 
 @dataclass(frozen=True)
@@ -55,8 +58,11 @@ class Trace:
         For each trigger the index of its surface, and the sign by which it differs from that.
     tracer : Tracer
         What `trace_event` needs of the trace.
+    doubts : tuple of str
+        What may be wrong with the comparisons, for warnings.
     events : Recent
-        Handles of events in `system` that were traced, None for those that could not be.
+        Handles of events in `system` that were traced, None for those that could not be; and what kept these
+        from it.
     """
 
     builder: Builder
@@ -69,7 +75,8 @@ class Trace:
     declared: tuple[int, ...]
     triggers: tuple[tuple[int, float], ...]
     tracer: Tracer
-    events: Recent[tuple[int | None]] = member(default_factory=lambda: Recent(32))
+    doubts: tuple[str, ...] = ()
+    events: Recent[tuple[int | None, str]] = member(default_factory=lambda: Recent(32))
 
 
 def trace(
@@ -136,15 +143,24 @@ def trace(
     from filippov._core import Builder
 
     start = np.zeros(n) if y0 is None else np.array(y0, dtype=float)
-    tracer = Tracer(
-        Builder(), float(t0), start, parameters=dict(parameters or {}), states=states, max_paths=max_paths
-    )
-    declared = tuple(
-        _declare(tracer, surface, args, f"surfaces[{idx}]") for idx, surface in enumerate(surfaces or ())
-    )
-    field = _explore(tracer, fun, args, "fun", n)
-    watched = tuple(_watch(tracer, h, args, f"resets[{idx}].h") for idx, h in enumerate(triggers))
-    tracer.laws.complete(tracer)
+
+    def record(tracer: Tracer) -> _Record:
+        declared = tuple(
+            _declare(tracer, surface, args, f"surfaces[{idx}]") for idx, surface in enumerate(surfaces or ())
+        )
+        field = _explore(tracer, fun, args, "fun", n)
+        watched = tuple(_watch(tracer, h, args, f"resets[{idx}].h") for idx, h in enumerate(triggers))
+        tracer.laws.complete(tracer)
+        return declared, field, watched
+
+    def new_tracer() -> Tracer:
+        named = dict(parameters or {})
+        return Tracer(Builder(), float(t0), start, parameters=named, states=states, max_paths=max_paths)
+
+    tracer = new_tracer()
+    declared, field, watched = record(tracer)
+    roots = Roots(field, [index for index, _ in watched])
+    doubts = check_questions(tracer, roots, "fun", _Again(new_tracer, record))
     system = _system(tracer, field, [index for index, _ in watched])
     keywords = dict(parameters or {})
     verify(system, lambda t, x: fun(t, x, *args, **keywords), tracer.t0, start, tracer.values)
@@ -159,6 +175,7 @@ def trace(
         declared=declared,
         triggers=watched,
         tracer=tracer,
+        doubts=doubts,
     )
 
 
@@ -191,6 +208,26 @@ def trace_event(
         Node of ``g`` in ``traced.builder``. None if `g` cannot be traced, or uses a switching function that
         the field has not: it must then be called as a Python function.
     """
+    return examine_event(traced, g, args, t0=t0, y0=y0, parameters=parameters)[0]
+
+
+def examine_event(
+    traced: Trace,
+    g: Callable[..., Any],
+    args: tuple[Any, ...] = (),
+    *,
+    t0: float | None = None,
+    y0: NDArray[Any] | None = None,
+    parameters: Mapping[str, float] | None = None,
+) -> tuple[int | None, str]:
+    """Turn an event function into an expression as `trace_event` does, or tell why it is not used.
+
+    Returns
+    -------
+    tuple of (int or None, str)
+        The node, as of `trace_event`; and what a function that can be traced has of its own, so that it must
+        be called all the same: a kink, a jump, or a function that ends at one. Empty otherwise.
+    """
     from filippov._core import Builder
 
     own = traced.tracer
@@ -211,16 +248,47 @@ def trace_event(
         scratch.laws.complete(scratch)
         system = _system(scratch, [node] * n)
         # Traced apart first: a switching function of its own must not enter the builder of the field.
-        if not set(system.surfaces()) <= set(traced.system.surfaces()):
-            return None
+        reason = kink_of_event(scratch, node, system.surfaces(), traced.system.surfaces())
+        if reason:
+            return None, reason
         keywords = _named(g, dict(values), "event")
         repeated = lambda t, x: [g(t, x, *args, **keywords)] * n  # noqa: E731
         verify(system, repeated, t_start, start, scratch.values, role="event")
         tracer = tracer_into(traced.builder, own.laws)
         tracer.guards.update(own.guards)
-        return _explore(tracer, g, args, "event", None)[0]
+        return _explore(tracer, g, args, "event", None)[0], ""
     except (TraceError, ModelError):
-        return None
+        return None, ""
+
+
+class _Again:
+    """Traces once more, to learn what a trace that succeeds need not know.
+
+    Parameters
+    ----------
+    new_tracer : callable
+        Returns a tracer like the first one.
+    record : callable
+        Traces with it, and returns declared surfaces, nodes of the field, and triggers.
+    """
+
+    def __init__(self, new_tracer: Callable[[], Tracer], record: Callable[[Tracer], _Record]) -> None:
+        self.new_tracer = new_tracer
+        self.record = record
+
+    def line_of(self, question: Question) -> tuple[UserLine | None, tuple[int, int] | None]:
+        """Return the user's line in which a question was asked, and the sides of the comparison."""
+        tracer = self.new_tracer()
+        tracer.sought = question
+        self.record(tracer)
+        return tracer.found or (None, None)
+
+    def with_symbol(self, question: Question) -> tuple[Tracer, Roots]:
+        """Return a trace in which one more state stands for the sign of an expression, and its roots."""
+        tracer = self.new_tracer()
+        tracer.replaced = question
+        _, field, watched = self.record(tracer)
+        return tracer, Roots(field, [index for index, _ in watched])
 
 
 def _system(tracer: Tracer, field: list[int], watched: Sequence[int] = ()) -> TracedSystem:

@@ -1,0 +1,77 @@
+"""Events and sections with a kink or a jump of their own are said to be sampled; smooth ones are not."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import filippov as fl
+import numpy as np
+import pytest
+
+
+def oscillator(t: float, x: Any) -> Any:
+    return [x[1], -x[0]]
+
+
+@pytest.mark.parametrize(
+    "event",
+    [
+        lambda t, x: abs(x[0] - 0.3) - 0.1,
+        lambda t, x: np.maximum(x[0] - 0.3, 0.2 - x[0]) - 0.1,
+        lambda t, x: np.where(x[0] > 0.3, 1.0, -1.0),
+        lambda t, x: 1.0 if x[0] > 0.3 else -1.0,
+        lambda t, x: np.sign(x[0] - 0.3),
+        lambda t, x: np.floor(10 * x[0]) - 2.5,
+        lambda t, x: np.sqrt(abs(x[0] - 0.3)) - 0.1,
+        lambda t, x: 1.0 * (abs(x[0] - np.clip(x[0], -0.5, 0.5)) > 0) - 0.5,
+    ],
+)
+def test_an_event_with_a_kink_or_a_jump_is_said_to_be_sampled(event: Callable[..., Any]) -> None:
+    for _ in range(2):
+        with pytest.warns(fl.FilippovWarning, match=r"events: entry 0 \(event\) is sampled") as caught:
+            fl.solve_ivp(oscillator, (0, 3), [1.0, 0.0], events=event)
+        assert len(caught) == 1
+        assert caught[0].filename == __file__
+        assert "(x - c)**2 - w**2" in str(caught[0].message)
+
+
+def test_what_is_proposed_for_such_events_finds_all_zeros() -> None:
+    events = [
+        lambda t, x: (x[0] - 0.3) ** 2 - 1e-6,
+        lambda t, x: x[0] - 0.3 - 1e-3,
+        lambda t, x: x[0] - 0.3 + 1e-3,
+    ]
+    sol = fl.solve_ivp(oscillator, (0, 100), [1.0, 0.0], rtol=1e-9, atol=1e-12, events=events)
+    assert [len(t) for t in sol.t_events] == [64, 32, 32]
+
+
+@pytest.mark.parametrize(
+    "event",
+    [
+        lambda t, x: x[0] - 0.3,
+        lambda t, x: np.sqrt(x[0] + 3) - 1.8,
+        lambda t, x: np.sqrt((x[0] - 0.3) ** 2) - 0.1,
+        lambda t, x: np.log(x[0] + 3) - 1,
+        lambda t, x: float(x[0]) - 0.3,  # cannot be traced: what it contains is not known
+    ],
+)
+def test_a_smooth_event_is_not_warned_of(event: Callable[..., Any]) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fl.solve_ivp(oscillator, (0, 3), [1.0, 0.0], events=event)
+
+
+def test_a_kink_at_a_switch_of_the_field_is_not_warned_of() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fun = lambda t, x: [1.0, np.sign(x[0])]  # noqa: E731
+        sol = fl.solve_ivp(fun, (0, 3), [-1.0, 0.0], events=lambda t, x: abs(x[0]) - 0.5)
+    np.testing.assert_allclose(sol.t_events[0], [0.5, 1.5], rtol=0, atol=1e-12)
+
+
+def test_a_section_with_a_kink_is_said_to_be_sampled() -> None:
+    system = fl.System(oscillator, n=2)
+    with pytest.warns(fl.FilippovWarning, match="is sampled"):
+        fl.poincare(system, lambda t, x: abs(x[0] - 0.3) - 0.1, (0, 10), [1.0, 0.0])
