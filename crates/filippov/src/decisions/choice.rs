@@ -28,9 +28,9 @@ pub(super) fn follow_at_surface(
         decision.entry = after.entries()[j];
     }
     let mut next = Next::new(after, Left::after(j, &decision));
-    next.root.at_two_fold = decision
-        .starts_at_two_fold()
-        .map(|motion| motion.multiplier());
+    if let Some(motion) = decision.starts_at_two_fold() {
+        next.start_mut().at_two_fold = Some(motion.multiplier());
+    }
     Ok(next)
 }
 

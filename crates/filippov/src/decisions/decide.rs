@@ -155,23 +155,18 @@ const RULES: [(Rule, Apply); 14] = [
 pub(crate) struct Decision {
     pub decided: Decided,
     pub rule: Rule,
-    pub notes: Notes,
     /// After an event, the surfaces that vanish there, those slid on left out.
     pub surfaces: SmallVec<[usize; 4]>,
     /// The mode before; after an event surfaces that do not matter have the signs of the place.
     pub before: Mode,
 }
 
-/// Decides which motion follows at a point. `n_choices` is the number of non-unique points that the run has met before.
-pub(crate) fn decide(at: &Point, n_choices: usize) -> Result<Decision, FieldError> {
-    let mut notes = Notes {
-        n_choices,
-        ..Notes::default()
-    };
+/// Decides which motion follows at a point.
+pub(crate) fn decide(at: &Point, notes: &mut Notes) -> Result<Decision, FieldError> {
     let (mut surfaces, mut before) = (SmallVec::new(), None);
     let (rule, decided) = match at.arrival.cause {
-        Cause::Start => place(at, &mut notes, None)?,
-        Cause::Anew(memory) => place(at, &mut notes, Some(memory))?,
+        Cause::Start => place(at, notes, None)?,
+        Cause::Anew(memory) => place(at, notes, Some(memory))?,
         Cause::Limit(meeting) => {
             let meeting = Meeting {
                 mode: at.arrival.mode,
@@ -179,11 +174,11 @@ pub(crate) fn decide(at: &Point, n_choices: usize) -> Result<Decision, FieldErro
                 fresh: meeting,
                 how: How::Limit,
             };
-            settle(at, &mut notes, &meeting)?
+            settle(at, notes, &meeting)?
         }
         Cause::Event { .. } => {
-            let (found, mode) = vanishing_surfaces(at, &mut notes)?;
-            let decided = after_event(at, &mut notes, &found, &mode)?;
+            let (found, mode) = vanishing_surfaces(at, notes)?;
+            let decided = after_event(at, notes, &found, &mode)?;
             (surfaces, before) = (found, Some(mode));
             decided
         }
@@ -194,7 +189,6 @@ pub(crate) fn decide(at: &Point, n_choices: usize) -> Result<Decision, FieldErro
     Ok(Decision {
         decided,
         rule,
-        notes,
         surfaces,
         before: before.unwrap_or_else(|| at.arrival.mode.clone()),
     })
@@ -213,14 +207,22 @@ fn after_event(
     if fresh.len() > 1 && fresh.iter().any(|&j| at.triggers().is_only_trigger(j)) {
         return Ok((Rule::Triggers, cross_beside_triggers(at, notes, fresh)?));
     }
-    let surfaces = fresh.iter().chain(at.arrival.sliding).copied();
-    let mut surfaces: SmallVec<[usize; 4]> = surfaces.collect();
-    surfaces.sort_unstable();
-    surfaces.dedup();
+    let mut both = SmallVec::<[usize; 4]>::new();
+    let surfaces = match (fresh, at.arrival.sliding) {
+        (fresh, []) => fresh,
+        ([], sliding) => sliding,
+        (fresh, sliding) => {
+            both.extend_from_slice(fresh);
+            both.extend_from_slice(sliding);
+            both.sort_unstable();
+            both.dedup();
+            &both
+        }
+    };
     let how = How::Event(arrival_at_surface(at.arrival, fresh));
     let meeting = Meeting {
         mode,
-        surfaces: &surfaces,
+        surfaces,
         fresh,
         how,
     };
@@ -240,7 +242,10 @@ pub(super) fn settle(
 ) -> Result<(Rule, Decided), FieldError> {
     for (rule, apply) in RULES {
         if let Some(decided) = apply(at, notes, meeting)? {
-            return check(at, notes, meeting, rule, decided);
+            return match meeting.surfaces {
+                [] | [_] => Ok((rule, decided)),
+                _ => check(at, notes, meeting, rule, decided),
+            };
         }
     }
     let decided = resolve_first_order(at, notes, meeting)?;

@@ -5,7 +5,7 @@ use super::decide::{How, Meeting};
 use super::departures::departures;
 use super::higher_order::decide_by_higher_order;
 use super::placement::place_on;
-use super::point::{Decided, Lefts, Next, Notes, Point, Root};
+use super::point::{Decided, Lefts, Next, Notes, Point};
 use super::spiral::outward_leap;
 use crate::error::FieldError;
 use crate::event::EventFunction;
@@ -225,7 +225,7 @@ fn follow(
         Some(Continuation::OutwardSpiral) => match asked {
             Some(asked) => (asked.clone(), None),
             None => match outward_leap(at, meeting, mode, fields) {
-                Some(leap) => (leap.region.clone(), Some(Box::new(leap))),
+                Some(leap) => (leap.region.clone(), Some(leap)),
                 None => {
                     return decide_by_higher_order(at, notes, mode, meeting, Ok(resolution), rest)
                 }
@@ -262,12 +262,12 @@ fn follow(
         None => departures(at, notes, &after, meeting, multipliers)?,
     };
     let mut next = Next::new(after, left);
-    next.root = Root {
-        multipliers: multipliers.to_vec(),
-        oscillates: next.mode == preferred && resolution.oscillates,
-        at_two_fold: None,
-        leap,
-    };
+    let oscillates = next.mode == preferred && resolution.oscillates;
+    if leap.is_some() || oscillates || !multipliers.is_empty() {
+        let start = next.start_mut();
+        (start.oscillates, start.leap) = (oscillates, leap);
+        start.multipliers = multipliers.to_vec();
+    }
     Ok(Ok(next))
 }
 

@@ -6,7 +6,7 @@ use super::decide::settle;
 use super::decide::{How, Meeting, Rule};
 use super::departures::velocity_in;
 use super::nested::follow_jumps;
-use super::point::{Decided, Left, Next, Notes, Point};
+use super::point::{Decided, Left, Notes, Point};
 use crate::error::FieldError;
 use crate::field::{ContactField, Projector, SmoothField};
 use crate::mode::Mode;
@@ -45,10 +45,10 @@ pub(crate) fn place(
     };
     // What only a law of the system sees has the side that is known: its action has been done, or will be.
     let zeros = (0..on_surface.len()).filter(|&j| on_surface[j] && !at.triggers().is_internal(j));
-    let (smooth, mut zeros): (Vec<usize>, Vec<usize>) =
+    let (smooth, zeros): (Vec<usize>, Vec<usize>) =
         zeros.partition(|&j| at.triggers().is_only_trigger(j));
-    zeros.retain(|&j| at.system.switches_at(j));
-    let meeting = surfaces_that_matter(at.system, &mode, zeros.clone());
+    let switching = zeros.iter().copied().filter(|&j| at.system.switches_at(j));
+    let meeting = surfaces_that_matter(at.system, &mode, switching.collect());
     if !smooth.is_empty() {
         return place_on_triggers(at, notes, mode, &smooth, meeting, memory);
     }
@@ -126,9 +126,9 @@ pub(super) fn one_surface(
     projector.project(at.system, j, at.t, &mut x, &signs)?;
     let decision = decide_at_surface(at.system, j, arrival, at.t, &x, &signs)?;
     let decided = follow_at_surface(at, notes, mode, j, decision);
-    Ok(Some(decided.map(|next| Next {
-        moved: Some(x),
-        ..next
+    Ok(Some(decided.map(|mut next| {
+        next.start_mut().moved = Some(x);
+        next
     })))
 }
 
@@ -311,8 +311,9 @@ pub(super) fn leading_along(
         let multipliers = decided.map_or_else(
             |_| Vec::new(),
             |next| {
+                let multipliers = next.multipliers().to_vec();
                 after = next.mode;
-                next.root.multipliers
+                multipliers
             },
         );
         if after.codimension() > 0 {

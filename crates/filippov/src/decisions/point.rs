@@ -252,9 +252,8 @@ pub(crate) struct Next {
     pub mode: Mode,
     /// What vanishes at its start.
     pub left: Lefts,
-    pub root: Root,
-    /// The state that it starts from, where that is not the place of the decision.
-    pub moved: Option<Vec<f64>>,
+    /// What else is known of its start; seldom anything, and kept apart as decisions are handed from rule to rule.
+    pub start: Option<Box<Start>>,
 }
 
 impl Next {
@@ -262,23 +261,41 @@ impl Next {
         Next {
             mode,
             left,
-            root: Root::default(),
-            moved: None,
+            start: None,
         }
+    }
+
+    /// What is known of its start, to be added to.
+    pub fn start_mut(&mut self) -> &mut Start {
+        self.start.get_or_insert_default()
+    }
+
+    /// The multipliers at its start; none if they are not known.
+    pub fn multipliers(&self) -> &[f64] {
+        self.start.as_ref().map_or(&[], |start| &start.multipliers)
+    }
+
+    /// Does it start with the laps of an outward spiral?
+    pub fn leaps(&self) -> bool {
+        self.start
+            .as_ref()
+            .is_some_and(|start| start.leap.is_some())
     }
 }
 
-/// The root at which sliding begins.
+/// What is known of the start of a motion.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Root {
+pub(crate) struct Start {
     /// The multipliers; none if they are not known.
     pub multipliers: Vec<f64>,
-    /// The regularised motion oscillates around it.
+    /// The regularised motion oscillates around them.
     pub oscillates: bool,
     /// The multiplier of sliding on one surface that begins at a two-fold.
     pub at_two_fold: Option<f64>,
     /// The motion begins with the laps of an outward spiral.
-    pub leap: Option<Box<Leap>>,
+    pub leap: Option<Leap>,
+    /// The state, where that is not the place of the decision.
+    pub moved: Option<Vec<f64>>,
 }
 
 /// The motion that follows, or why the run ends.

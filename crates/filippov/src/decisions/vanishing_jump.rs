@@ -106,7 +106,7 @@ pub(super) fn decide_where_jump_vanishes(
         left.push(Left::Surface(before.surface, leading));
     }
     let mut next = Next::new(way.mode, left);
-    next.root.multipliers = way.multipliers;
+    next.start_mut().multipliers = way.multipliers;
     Ok(Some(Ok(next)))
 }
 

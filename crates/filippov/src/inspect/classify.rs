@@ -186,6 +186,7 @@ pub fn classify(
         vanishing: [0; 2],
         at_two_fold: false,
     };
+    let mut notes = Notes::default();
     let (surfaces, around, decision) = match how.before {
         None => {
             let arrival = arrival(Cause::Start, &mut field);
@@ -196,11 +197,11 @@ pub fn classify(
             // What only triggers an action changes nothing here.
             let zeros = (0..on_surface.len()).filter(|&j| on_surface[j] && system.switches_at(j));
             let surfaces = surfaces_that_matter(system, &mode, zeros.collect());
-            (surfaces, mode, decide(&at, 0)?)
+            (surfaces, mode, decide(&at, &mut notes)?)
         }
         Some(_) => {
             let arrival = arrival(event, &mut field);
-            let decision = decide(&point(&arrival), 0)?;
+            let decision = decide(&point(&arrival), &mut notes)?;
             let mut surfaces = [&decision.surfaces[..], &sliding[..]].concat();
             surfaces.sort_unstable();
             (surfaces, decision.before.clone(), decision)
@@ -209,7 +210,7 @@ pub fn classify(
     let Some(components) = components_around(system, (t, x), &around, &surfaces)? else {
         return Ok(None);
     };
-    let mut found = describe(system, (t, x), law, decision)?;
+    let mut found = describe(system, (t, x), law, decision, notes)?;
     found.kind = match *surfaces {
         [] => PointKind::Region,
         [j] => {
@@ -338,13 +339,9 @@ fn describe(
     (t, x): (f64, &[f64]),
     law: Law,
     decision: Decision,
+    notes: Notes,
 ) -> Result<Classification, FieldError> {
-    let Decision {
-        decided,
-        rule,
-        notes,
-        ..
-    } = decision;
+    let Decision { decided, rule, .. } = decision;
     let mut found = Classification {
         kind: PointKind::Region,
         surfaces: Vec::new(),
@@ -370,16 +367,17 @@ fn describe(
         }
     };
     found.unique = notes.n_choices == 0 && !notes.spirals;
-    if found.candidates.is_empty() && next.root.leap.is_none() {
+    if found.candidates.is_empty() && !next.leaps() {
         found.candidates = vec![next.mode.clone()];
     }
-    if next.root.leap.is_some() {
+    if next.leaps() {
         return Ok(found);
     }
-    found.multipliers = match (next.mode.codimension(), next.root.at_two_fold) {
+    let at_two_fold = next.start.as_ref().and_then(|start| start.at_two_fold);
+    found.multipliers = match (next.mode.codimension(), at_two_fold) {
         (0, _) => Vec::new(),
         (1, Some(multiplier)) => vec![multiplier],
-        (m, _) if m == next.root.multipliers.len() => next.root.multipliers,
+        (m, _) if m == next.multipliers().len() => next.multipliers().to_vec(),
         _ => {
             let mut field = ModeField::of(system, law, &next.mode);
             field.exits_at(t, &mut x.to_vec())?;

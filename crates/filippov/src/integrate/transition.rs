@@ -26,7 +26,8 @@ fn n_exits(event: &Found) -> usize {
 }
 
 impl<'a> Integrator<'a> {
-    /// Asks a question about the current place, and counts what the answer cost.
+    /// Asks a question about the current place; counts what the answer cost, and keeps its warnings.
+    #[inline]
     pub(in crate::integrate) fn ask<R>(
         &mut self,
         cause: Cause,
@@ -75,19 +76,17 @@ impl<'a> Integrator<'a> {
         let answer = question(&at, &mut notes);
         self.stats.n_field_evaluations += notes.n_field_evaluations;
         self.stats.n_surface_evaluations += notes.n_surface_evaluations;
+        self.n_choices = notes.n_choices;
+        self.motion.meets_kinks |= notes.meets_kinks;
+        if !notes.warnings.is_empty() {
+            self.warnings.append(&mut notes.warnings);
+        }
         answer
     }
 
-    /// Decides which motion follows at the current place; keeps the warnings.
+    /// Decides which motion follows at the current place.
     pub(in crate::integrate) fn decide(&mut self, cause: Cause) -> Result<Decision, FieldError> {
-        let n_choices = self.n_choices;
-        let mut decision = self.ask(cause, |at, _| decide(at, n_choices))?;
-        let notes = &mut decision.notes;
-        self.stats.n_field_evaluations += notes.n_field_evaluations;
-        self.stats.n_surface_evaluations += notes.n_surface_evaluations;
-        self.n_choices = notes.n_choices;
-        self.motion.meets_kinks |= notes.meets_kinks;
-        self.warnings.append(&mut notes.warnings);
+        let mut decision = self.ask(cause, decide)?;
         if let Some(stop) = self.watch.stop() {
             decision.decided = Err(stop);
         }
@@ -159,10 +158,11 @@ impl<'a> Integrator<'a> {
                 }
             }
             _ => {
-                let slid = self.motion.sliding().iter().copied();
-                let slid: SmallVec<[usize; 4]> = slid.filter(|j| !concerned.contains(j)).collect();
-                concerned.extend(slid);
-                concerned.sort_unstable();
+                concerned.extend_from_slice(self.motion.sliding());
+                if concerned.len() > 1 {
+                    concerned.sort_unstable();
+                    concerned.dedup();
+                }
                 if concerned.len() > 1 && concerned.iter().any(is_changed) {
                     concerned.retain(|j| is_changed(j));
                 }
@@ -170,8 +170,9 @@ impl<'a> Integrator<'a> {
                 let sliding = self.motion.sliding().iter().copied();
                 let slides_on = next.mode.sliding_set().eq(sliding);
                 let field = &self.motion.field;
-                next.root.oscillates |=
-                    slides_on && root_ends::loses_stability(field, &event.functions);
+                if slides_on && root_ends::loses_stability(field, &event.functions) {
+                    next.start_mut().oscillates = true;
+                }
                 if before == next.mode {
                     root_ends::loosen(field, &event.functions, &mut self.slacks);
                 } else {
@@ -320,18 +321,20 @@ impl<'a> Integrator<'a> {
         let Next {
             mode,
             mut left,
-            root,
-            moved,
+            mut start,
         } = next;
         self.stats.n_field_evaluations += self.motion.field.n_evaluations();
         self.remember_pace();
         let slid = !self.motion.sliding().is_empty();
-        if let Some(x) = moved {
-            self.x = x;
-        }
-        let leaps = root.leap.is_some();
-        if let Some(leap) = root.leap {
-            left = self.make_leap(&leap)?;
+        let mut leaps = false;
+        if let Some(start) = &mut start {
+            if let Some(x) = start.moved.take() {
+                self.x = x;
+            }
+            if let Some(leap) = &start.leap {
+                leaps = true;
+                left = self.make_leap(leap)?;
+            }
         }
         let t = self.t;
         let deflations: SmallVec<[(EventFunction, Deflation); 2]> =
@@ -343,15 +346,19 @@ impl<'a> Integrator<'a> {
             zero.is_clean = !slid;
         }
         self.choose_stepper();
-        match (&mut self.motion.field, root.at_two_fold) {
-            (ModeField::Intersection(field), _) => {
-                field.begin(&root.multipliers, root.oscillates);
+        match &mut self.motion.field {
+            ModeField::Intersection(field) => {
+                let start = start.as_deref();
+                let multipliers = start.map_or(&[][..], |start| &start.multipliers);
+                field.begin(multipliers, start.is_some_and(|start| start.oscillates));
                 for &(index, slack) in &self.slacks {
                     field.set_slack(index, slack);
                 }
             }
-            (ModeField::Sliding(field), Some(multiplier)) => {
-                field.begin_at_two_fold(self.t, multiplier);
+            ModeField::Sliding(field) => {
+                if let Some(multiplier) = start.and_then(|start| start.at_two_fold) {
+                    field.begin_at_two_fold(self.t, multiplier);
+                }
             }
             _ => {}
         }
