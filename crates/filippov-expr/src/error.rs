@@ -49,7 +49,10 @@ pub enum ExprError {
         expected: Tag,
     },
     /// A container that was cut short, or continued.
-    #[error("incomplete, or with something behind its end: {found} bytes{}", of_declared(declared))]
+    #[error(
+        "incomplete, or with something behind its end: {found} bytes{}",
+        of_declared(declared)
+    )]
     WrongLength {
         /// How many bytes there are.
         found: usize,

@@ -127,12 +127,24 @@ impl Graph {
                 | Node::Sign(_)
                 | Node::Input(_) => self.insert(*node),
             };
-            if absolute.contains(&k) && id.index() >= known {
+            // What was simplified further is another node.
+            if absolute.contains(&k)
+                && id.index() >= known
+                && is_product_with_sign(&self.nodes, self.node(id))
+            {
                 self.facts[id.index()].nonnegative = true;
             }
             made.push(id);
         }
         made
+    }
+}
+
+/// Whether a node is a product with a sign in front, as absolute values are.
+fn is_product_with_sign(nodes: &[Node], node: &Node) -> bool {
+    match *node {
+        Node::Binary(BinaryOp::Mul, left, _) => matches!(nodes[left.index()], Node::Sign(_)),
+        _ => false,
     }
 }
 
@@ -182,7 +194,10 @@ fn read_node(section: &mut Section, k: usize) -> Result<Node, ExprError> {
     const LATE: &str = "an operand that does not come before its use";
     let operand = |section: &mut Section| section.index(k, LATE).map(|id| NodeId(id as u32));
     let variable = |section: &mut Section| {
-        let index = section.index(LARGEST_INDEX as usize + 1, "the index of a variable is too large");
+        let index = section.index(
+            LARGEST_INDEX as usize + 1,
+            "the index of a variable is too large",
+        );
         index.map(|index| index as u32)
     };
     Ok(match section.byte()? {
@@ -236,7 +251,8 @@ fn read_surfaces(section: &mut Section, nodes: &[Node]) -> Result<Vec<usize>, Ex
     for j in 0..n_surfaces {
         let function = section.index(nodes.len(), "a surface whose function does not exist")?;
         if needed[function] > j {
-            return section.damaged("a surface that depends on its own sign, or on that of a later one");
+            return section
+                .damaged("a surface that depends on its own sign, or on that of a later one");
         }
         functions.push(function);
     }
@@ -279,11 +295,7 @@ fn read_absolute_values(
         if id < next {
             return section.damaged("absolute values that are not in order");
         }
-        let is_product_with_sign = match nodes[id] {
-            Node::Binary(BinaryOp::Mul, left, _) => matches!(nodes[left.index()], Node::Sign(_)),
-            _ => false,
-        };
-        if !is_product_with_sign {
+        if !is_product_with_sign(nodes, &nodes[id]) {
             return section.damaged("an absolute value that is no product with a sign");
         }
         next = id + 1;

@@ -8,6 +8,7 @@ mod inspect;
 mod laws;
 mod prepared_run;
 mod run;
+mod saved;
 mod solve;
 mod sweep;
 mod systems;
@@ -26,6 +27,8 @@ mod _core {
     use super::inspect::{classify, hidden_dynamics, intersection_field};
     #[pymodule_export]
     use super::run::Run;
+    #[pymodule_export]
+    use super::saved::{load_system, save_system};
     #[pymodule_export]
     use super::solve::{solve, solve_many, RunOptions};
     #[pymodule_export]

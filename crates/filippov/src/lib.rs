@@ -65,6 +65,7 @@ pub use saved::{RunnableSystem, SavedAction, SavedSystem};
 pub use solution::{as_multiplier, Segment, Side, Solution, Switch, UserZero};
 pub use switching::Kind;
 pub use system::{
-    AffineParts, AffineSigns, BothSides, ClosureSystem, Definition, Law, LawAction, LawMap, Laws, LieValue,
-    MotionJacobian, PiecewiseSystem, Rules, SingularSliding, TracedMap, TracedSystem, Word,
+    AffineParts, AffineSigns, BothSides, ClosureSystem, Definition, Law, LawAction, LawMap, Laws,
+    LieValue, MotionJacobian, PiecewiseSystem, Rules, SingularSliding, TracedMap, TracedSystem,
+    Word,
 };

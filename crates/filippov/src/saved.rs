@@ -291,12 +291,12 @@ impl RunnableSystem {
             });
         }
         let system = self.system.with_parameters(parameters.to_vec());
-        let discrete = self
-            .laws
-            .start(&system, t, x)
-            .map_err(|FieldError(_)| Error::Inconsistent {
-                detail: "an expression could not be evaluated",
-            })?;
+        let discrete =
+            self.laws
+                .start(&system, t, x)
+                .map_err(|FieldError(_)| Error::Inconsistent {
+                    detail: "an expression could not be evaluated",
+                })?;
         Ok((system, discrete))
     }
 

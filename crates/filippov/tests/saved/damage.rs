@@ -20,17 +20,17 @@ impl Damage {
         damage
     }
 
-    /// One of the sources, damaged, and whether its checksum is right all the same. Of three cases two have right
-    /// checksums, and of these most have sections whose lengths are right.
+    /// One of the sources, damaged, and whether its checksum is right all the same. Most have
+    /// a right checksum, and sections whose lengths are right.
     pub fn of_one(&mut self, sources: &[Vec<u8>]) -> (Vec<u8>, bool) {
         let mut bytes = sources[self.below(sources.len())].clone();
-        match self.below(6) {
-            0 | 1 => {
+        match self.below(8) {
+            0 => {
                 let all = 0..bytes.len();
                 self.change(&mut bytes, all, sources);
                 (bytes, false)
             }
-            2 => {
+            1 => {
                 let all = 0..bytes.len() - 4;
                 self.change(&mut bytes, all, sources);
                 match resealed(&bytes) {
@@ -65,12 +65,18 @@ impl Damage {
         if range.is_empty() {
             return;
         }
-        let place = range.start + self.below(range.len());
+        let mut place = range.start + self.below(range.len());
+        // Most bytes are the zeros of small numbers.
+        while bytes[place] == 0 && self.below(4) > 0 {
+            place = range.start + self.below(range.len());
+        }
         let room = range.end - place;
-        match self.below(10) {
-            0 => bytes[place] ^= 1 << self.below(8),
+        match self.below(16) {
+            0 | 10 | 11 => bytes[place] ^= 1 << self.below(8),
             1 => bytes[place] = self.next() as u8,
-            2 | 3 => bytes[place] = self.below(8) as u8,
+            2 | 3 | 12 => bytes[place] = self.below(8) as u8,
+            // The neighbour of an index, or another operation.
+            13..=15 => bytes[place] = bytes[place].wrapping_add([1, 255, 2, 254][self.below(4)]),
             4 | 5 if room >= 4 => {
                 let value = [0, 1, 2, 3, 5, 8, 1 << 16, u32::MAX][self.below(8)];
                 bytes[place..place + 4].copy_from_slice(&value.to_le_bytes());

@@ -154,11 +154,16 @@ pub fn laws() -> SavedSystem {
     let pull = g.mul(gain, q[3]);
     let drive = g.sub(q[1], halved);
     let dx = g.sub(drive, pull);
-    let stair = g.sub(q[2], y);
-    let push = g.sub(x, stair);
+
+    // The floor of 3 y, which is the same before and after a change of q.
+    let distance = g.sub(fine, q[2]);
+    let side = g.sign(distance);
+    let step = g.mul(half, side);
+    let below = g.sub(q[2], half);
+    let floor = g.add(below, step);
+    let push = g.sub(x, floor);
     let field = vec![dx, push];
 
-    let distance = g.sub(fine, q[2]);
     let Switching::Surface { index, orientation } = g.switch(distance) else {
         panic!("a switch")
     };

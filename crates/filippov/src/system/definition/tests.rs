@@ -87,11 +87,23 @@ fn what_is_wrong_is_named() {
 
 #[test]
 fn laws_are_what_they_say() {
-    let clock = text(|d| d.rules.laws[0] = Law::Clock { argument: NodeId(0) });
+    let clock = text(|d| {
+        d.rules.laws[0] = Law::Clock {
+            argument: NodeId(0),
+        }
+    });
     assert!(clock.contains("not affine in t alone"), "{clock}");
-    let held = text(|d| d.rules.laws[0] = Law::Held { argument: NodeId(0) });
+    let held = text(|d| {
+        d.rules.laws[0] = Law::Held {
+            argument: NodeId(0),
+        }
+    });
     assert!(held.contains("changes along a motion"), "{held}");
-    let own = text(|d| d.rules.laws[0] = Law::Held { argument: NodeId(3) });
+    let own = text(|d| {
+        d.rules.laws[0] = Law::Held {
+            argument: NodeId(3),
+        }
+    });
     assert!(own.contains("reads its own discrete state"), "{own}");
     let hysteresis = |initial: f64, guard: usize| {
         text(|d| {
