@@ -199,3 +199,29 @@ def test_nothing_python_is_in_the_bytes() -> None:
     assert fl.System.from_bytes(one.to_bytes()).to_bytes() == one.to_bytes()
     assert b"oscillator" not in one.to_bytes()
     assert len(one.to_bytes()) < 500
+
+
+def test_forged_bytes_are_refused_or_can_be_solved() -> None:
+    """With a right checksum. The Rust tests do this by the thousand; here messages and tables are made, too."""
+    rng = np.random.default_rng(7)
+    sources = [make().to_bytes() for make, _ in CASES.values()]
+    used = 0
+    for _ in range(500):
+        data = bytearray(sources[rng.integers(len(sources))])
+        for place in rng.integers(28, len(data) - 4, size=rng.integers(1, 3)):
+            data[place] = (
+                (data[place] + rng.integers(1, 3)) % 256 if rng.random() < 0.7 else rng.integers(256)
+            )
+        try:
+            system = fl.System.from_bytes(sealed(bytes(data)))
+        except fl.InputError:
+            continue
+        assert repr(system)
+        with np.errstate(all="ignore"):
+            sol = system.solve((0, 1), np.linspace(0.9, 0.3, system.n), max_steps=50, max_events=20)
+        assert sol.message
+        assert str(sol.switches)
+        assert len(sol.switches.kind) == len(sol.switches)
+        assert sol.surfaces == tuple(system.surfaces)
+        used += 1
+    assert used > 50

@@ -163,7 +163,7 @@ class Saving(ABC):
         ['x[1]']
         >>> fl.System.from_bytes(relay.to_bytes()[:-1])
         Traceback (most recent call last):
-        filippov.errors.InputError: data: incomplete, or with something behind its end: 408 bytes of 409
+        filippov.errors.InputError: data: incomplete, or with something behind its end: 247 bytes of 248
         """
         if not isinstance(data, (bytes, bytearray, memoryview)):
             raise InputError(f"data: bytes are needed, not {type(data).__name__}")

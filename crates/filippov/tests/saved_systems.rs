@@ -8,6 +8,7 @@ mod saved;
 
 use std::panic::{catch_unwind, AssertUnwindSafe};
 
+use filippov::action::{Clock, Trigger};
 use filippov::{Error, Method, Options, SavedSystem};
 use filippov_expr::{Backend, ExprError};
 use saved::damage::Damage;
@@ -55,8 +56,8 @@ fn a_map_that_is_a_function_of_the_caller_is_missed_by_name() {
 
 #[test]
 fn wrong_values_and_triggers_are_named() {
-    use filippov::action::{Clock, Trigger};
-    let refused = |change: fn(&mut SavedSystem)| {
+    type Change = fn(&mut SavedSystem);
+    let refused = |change: Change| {
         let mut system = saved::impacts();
         change(&mut system);
         let written = SavedSystem::from_bytes(&system.to_bytes())
@@ -69,7 +70,7 @@ fn wrong_values_and_triggers_are_named() {
         clock: Clock { period, phase },
         at_start: true,
     };
-    let cases: [(fn(&mut SavedSystem), &str); 6] = [
+    let cases: [(Change, &str); 6] = [
         (|s| s.defaults[0] = f64::NAN, "params = NaN: must be finite"),
         (
             |s| s.valid_for = Some(Vec::new()),
