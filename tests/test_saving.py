@@ -202,7 +202,7 @@ def test_nothing_python_is_in_the_bytes() -> None:
 
 
 def test_forged_bytes_are_refused_or_can_be_solved() -> None:
-    """With a right checksum. The Rust tests do this by the thousand; here messages and tables are made, too."""
+    """Right checksums. The Rust tests do this by the thousand; here messages and tables are made too."""
     rng = np.random.default_rng(7)
     sources = [make().to_bytes() for make, _ in CASES.values()]
     used = 0
