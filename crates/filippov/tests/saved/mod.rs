@@ -220,7 +220,9 @@ pub fn surfaces() -> SavedSystem {
     let r = g.sign(x);
     let both = g.mul(s, r);
     let sine = g.unary(UnaryOp::Sin, t);
-    let curved = g.binary(BinaryOp::Pow, z, t);
+    let minus_z = g.neg(z);
+    let base = g.unary(UnaryOp::Exp, minus_z);
+    let curved = g.binary(BinaryOp::Pow, base, t);
     let top = g.maximum(z, sine);
     let hypot = g.binary(BinaryOp::Hypot, x, y);
     let root = g.unary(UnaryOp::Sqrt, hypot);
