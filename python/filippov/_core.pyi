@@ -20,6 +20,8 @@ __all__ = [
     "classify",
     "hidden_dynamics",
     "intersection_field",
+    "load_system",
+    "save_system",
     "solve",
     "solve_many",
     "solve_points",
@@ -244,6 +246,22 @@ def intersection_field(
     p: _Array,
     near: list[float],
 ) -> tuple[_Array, list[float]] | None: ...
+def save_system(
+    system: TracedSystem,
+    defaults: list[float],
+    valid_for: list[float] | None,
+    actions: Sequence[tuple[str, list[float], TracedSystem | None, str]],
+) -> bytes: ...
+def load_system(
+    data: bytes,
+) -> tuple[
+    TracedSystem,
+    list[str],
+    list[str],
+    list[float],
+    list[float] | None,
+    list[tuple[str, list[float], TracedSystem | None, str]],
+]: ...
 def classify(
     system: TracedSystem | OpaqueSystem | SignedSystem,
     t: float,

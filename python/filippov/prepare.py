@@ -307,25 +307,3 @@ def check_n(n: Any) -> int | None:
     if isinstance(n, bool) or int(n) != n or n < 1:
         raise InputError(f"n: a positive whole number of states is needed, not {n!r}")
     return int(n)
-
-
-def packed(prepared: Prepared) -> tuple[Any, ...]:
-    """Return a traced system in a form that can be pickled."""
-    assert isinstance(prepared.core, TracedSystem)
-    maps = [
-        action._replace(map=action.map.to_bytes() if isinstance(action.map, TracedSystem) else action.map)
-        for action in prepared.actions
-    ]
-    return prepared.core.to_bytes(), prepared.surfaces, prepared.pinned, maps
-
-
-def unpacked(data: tuple[Any, ...]) -> Prepared:
-    """Return the system that was packed."""
-    core, surfaces, pinned, maps = data
-    actions = tuple(
-        action._replace(
-            map=TracedSystem.from_bytes(action.map) if isinstance(action.map, bytes) else action.map
-        )
-        for action in maps
-    )
-    return Prepared(TracedSystem.from_bytes(core), None, surfaces, pinned, "", actions)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from filippov._core import Run, TracedSystem
+from filippov._core import Run
 from filippov.backward import reversed_source
 from filippov.caution import warn_user
 from filippov.errors import InputError, ModelError
@@ -19,8 +19,9 @@ from filippov.options import (
     check_params,
 )
 from filippov.points import Points
-from filippov.prepare import Prepared, check_n, numbered_states, packed, prepare, unpacked
+from filippov.prepare import Prepared, check_n, numbered_states, prepare
 from filippov.resets import check_resets
+from filippov.saving import Saving
 from filippov.solution import Solution
 from filippov.trace.explain import deepest_user_line
 from filippov.unknown import did_you_mean
@@ -33,7 +34,7 @@ __all__ = ["System"]
 Array = npt.NDArray[np.float64]
 
 
-class System(Points):
+class System(Points, Saving):
     """A piecewise-smooth system ``x' = f_sigma(t, x, p)`` with ``sigma_j = sign h_j(t, x, p)``.
 
     The function is traced once, at the first use; solving again with other parameter values or
@@ -65,7 +66,8 @@ class System(Points):
 
     Notes
     -----
-    A system is picklable: the traced expression travels, not the Python function.
+    A system is picklable, and can be written to a file (`save`, `load`): the traced expression travels, not
+    the Python function.
 
     Examples
     --------
@@ -434,7 +436,7 @@ class System(Points):
             return known
         if self._source is None:
             raise ModelError(
-                "the function branches on parameter values, and it did not travel with the pickled system; "
+                "the function branches on parameter values, and it did not travel with the system; "
                 f"this copy is valid for {known.pinned if known else {}} only"
             )
         prepared = prepare(self._source, n, values, self._states, t0, y0)
@@ -459,23 +461,6 @@ class System(Points):
     def state_names(self, n: int) -> tuple[str, ...]:
         """Return the names of `n` states."""
         return self._states if self._states is not None else numbered_states(n)
-
-    def __getstate__(self) -> dict[str, Any]:
-        state = self.__dict__.copy()
-        if self._prepared is None and self._n is not None:
-            self._prepared_now()
-        prepared = self._prepared
-        state["_prepared"], state["_calls"] = None, {}
-        if prepared is not None and isinstance(prepared.core, TracedSystem):
-            state["_source"] = None
-            state["_traced"] = packed(prepared)
-        return state
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        traced = state.pop("_traced", None)
-        self.__dict__.update(state)
-        if traced is not None:
-            self._prepared = unpacked(traced)
 
     def __repr__(self) -> str:
         parts = [f"n={self._n}"] if self._n is not None else []

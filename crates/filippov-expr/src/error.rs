@@ -1,4 +1,6 @@
-//! What can go wrong: compiling a program and reading a serialised graph.
+//! What can go wrong: compiling a program and reading a container.
+
+use crate::container::{Tag, VERSION};
 
 /// Error of this crate, one variant per cause.
 ///
@@ -29,15 +31,49 @@ pub enum ExprError {
         /// The largest index that is possible.
         limit: u32,
     },
-    /// The bytes do not start like a serialised graph of a known version.
-    #[error("not a serialised expression graph, or one of another version")]
+    /// The bytes do not begin like a container.
+    #[error("not a file of filippov: it begins with other bytes")]
     UnknownFormat,
-    /// The bytes end too early, go on too long, or contain something impossible.
-    #[error("damaged expression graph at byte {offset}: {detail}")]
+    /// A container of another version of the format.
+    #[error("written in version {found} of the format, this is version {VERSION}: save it again with this release")]
+    OtherVersion {
+        /// The version found.
+        found: u32,
+    },
+    /// A container that holds something else.
+    #[error("holds {found}, {expected} is needed")]
+    OtherContent {
+        /// The content found.
+        found: Tag,
+        /// The content asked for.
+        expected: Tag,
+    },
+    /// A container that was cut short, or continued.
+    #[error(
+        "incomplete, or with something behind its end: {found} bytes{}",
+        of_declared(declared)
+    )]
+    WrongLength {
+        /// How many bytes there are.
+        found: usize,
+        /// How many there should be, if that could be read.
+        declared: Option<u64>,
+    },
+    /// The bytes are not those that were written.
+    #[error("damaged: the checksum is wrong")]
+    WrongChecksum,
+    /// A section ends too early, goes on too long, or contains something impossible.
+    #[error("damaged in section {section}, byte {offset}: {detail}")]
     Damaged {
-        /// Where reading stopped.
+        /// The section.
+        section: Tag,
+        /// The place in the container where reading stopped.
         offset: usize,
         /// What is wrong there.
         detail: &'static str,
     },
+}
+
+fn of_declared(declared: &Option<u64>) -> String {
+    declared.map_or_else(String::new, |declared| format!(" of {declared}"))
 }

@@ -146,14 +146,6 @@ impl Graph {
             return id;
         }
         let is_absolute = self.is_absolute_value(&node);
-        self.insert_known(node, is_absolute)
-    }
-
-    /// As [`Graph::insert`], where it is known whether a new node is an absolute value.
-    pub(crate) fn insert_known(&mut self, node: Node, is_absolute: bool) -> NodeId {
-        if let Some(&id) = self.ids.get(&node) {
-            return id;
-        }
         let id = NodeId(self.nodes.len() as u32);
         let mut facts = self.facts_of(&node);
         facts.nonnegative |= is_absolute;

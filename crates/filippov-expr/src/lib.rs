@@ -38,6 +38,7 @@
 //! (rigorous bounds along pieces of motions) and [`jet`] (Taylor coefficients of motions).
 
 pub mod blend;
+pub mod container;
 pub mod derivative;
 pub mod enclosure;
 mod error;

@@ -80,6 +80,20 @@ impl Schedule {
     }
 }
 
+impl Graph {
+    /// How long the arguments of any function of this graph have to be at least.
+    ///
+    /// # Errors
+    /// [`ExprError::IndexTooLarge`] for a variable beyond 2^28.
+    pub fn lengths(&self) -> Result<Lengths, ExprError> {
+        let mut lengths = Lengths::default();
+        for node in &self.nodes {
+            lengths.include(node)?;
+        }
+        Ok(lengths)
+    }
+}
+
 impl Lengths {
     fn include(&mut self, node: &Node) -> Result<(), ExprError> {
         let (length, index) = match *node {

@@ -1,17 +1,27 @@
-//! Graphs as bytes, and back with every byte checked.
+//! Graphs as bytes, and back: nothing is believed, everything is built again.
 //!
-//! Layout, little endian: 8 bytes of magic with the version; number of nodes (u32) and each node as a tag
-//! byte with its operands; number of surfaces (u32) and their nodes; number of known switches (u32), each
-//! node, surface and orientation (0: +1, 1: -1); number of known absolute values (u32) and their nodes.
+//! The section of a graph: number of nodes and each node as a tag byte with its operands; number of surfaces and their
+//! nodes; number of known switches, each node, surface and orientation (0: +1, 1: -1); number of known absolute
+//! values and their nodes.
+//!
+//! The nodes are made again by the construction that simplifies. For a graph that this crate has made that changes
+//! nothing. Other bytes cannot give a graph that no construction would give, such as a chain of a hundred thousand
+//! negations, on which simplification would recurse as deep.
 
 use rustc_hash::FxHashSet;
 
+use crate::container::{Container, Section, Tag, Writer};
 use crate::error::ExprError;
 use crate::graph::Graph;
 use crate::node::{Node, NodeId};
 use crate::op::{BinaryOp, UnaryOp};
+use crate::schedule::LARGEST_INDEX;
 
-const MAGIC: [u8; 8] = *b"FILEXPR\x02";
+/// The content of a container that holds a graph and nothing else.
+const CONTENT: Tag = Tag(*b"GRPH");
+
+/// The section of a graph.
+const NODES: Tag = Tag(*b"NODE");
 
 const TAG_CONSTANT: u8 = 0;
 const TAG_TIME: u8 = 1;
@@ -25,184 +35,273 @@ const TAG_BINARY: u8 = 128;
 
 impl Graph {
     /// The graph as bytes: nodes, surfaces and what is known about switching. Equal graphs give equal bytes.
+    ///
+    /// A graph with signs of surfaces that it does not have ([`Graph::sign_of`]) is not read again.
     pub fn to_bytes(&self) -> Vec<u8> {
-        let mut bytes = MAGIC.to_vec();
-        let number = |bytes: &mut Vec<u8>, value: u32| bytes.extend(value.to_le_bytes());
-        number(&mut bytes, self.nodes.len() as u32);
-        for node in &self.nodes {
-            let (tag, numbers): (u8, [Option<u32>; 3]) = match *node {
-                Node::Constant(value) => {
-                    bytes.push(TAG_CONSTANT);
-                    bytes.extend(value.to_bits().to_le_bytes());
-                    continue;
-                }
-                Node::Time => (TAG_TIME, [None; 3]),
-                Node::State(i) => (TAG_STATE, [Some(i), None, None]),
-                Node::Parameter(i) => (TAG_PARAMETER, [Some(i), None, None]),
-                Node::Sign(j) => (TAG_SIGN, [Some(j), None, None]),
-                Node::Input(i) => (TAG_INPUT, [Some(i), None, None]),
-                Node::Unary(op, a) => (TAG_UNARY + op as u8, [Some(a.0), None, None]),
-                Node::Binary(op, a, b) => (TAG_BINARY + op as u8, [Some(a.0), Some(b.0), None]),
-                Node::Select {
-                    surface,
-                    plus,
-                    minus,
-                } => (TAG_SELECT, [Some(surface), Some(plus.0), Some(minus.0)]),
-            };
-            bytes.push(tag);
-            for value in numbers.into_iter().flatten() {
-                number(&mut bytes, value);
-            }
-        }
-        number(&mut bytes, self.surfaces.functions.len() as u32);
-        for function in &self.surfaces.functions {
-            number(&mut bytes, function.0);
-        }
-        let mut switches: Vec<_> = self.surfaces.switches.iter().collect();
-        switches.sort_unstable_by_key(|entry| entry.0);
-        number(&mut bytes, switches.len() as u32);
-        for (id, &(surface, orientation)) in switches {
-            number(&mut bytes, id.0);
-            number(&mut bytes, surface);
-            bytes.push(u8::from(orientation < 0.0));
-        }
-        let absolute: Vec<_> = self.absolute_values().collect();
-        number(&mut bytes, absolute.len() as u32);
-        for id in absolute {
-            number(&mut bytes, id.0);
-        }
-        bytes
+        let mut writer = Writer::new(CONTENT);
+        self.write_section(&mut writer);
+        writer.finish()
     }
 
     /// The graph that [`Graph::to_bytes`] wrote.
     ///
     /// # Errors
-    /// [`ExprError::UnknownFormat`] or [`ExprError::Damaged`] for anything else: operands that do not come
-    /// before their node, unknown operations, equal nodes, surfaces that do not exist, missing or excess bytes.
+    /// Those of [`Container::open`] for anything else, and [`ExprError::Damaged`] for operands that do not come before
+    /// their node, unknown operations, equal nodes, surfaces that do not exist or depend on later ones, missing or
+    /// excess bytes.
     pub fn from_bytes(bytes: &[u8]) -> Result<Graph, ExprError> {
-        if bytes.len() < MAGIC.len() || bytes[..MAGIC.len()] != MAGIC {
-            return Err(ExprError::UnknownFormat);
+        let mut container = Container::open(bytes, CONTENT)?;
+        let graph = Graph::read_section(&mut container)?;
+        container.finish()?;
+        Ok(graph)
+    }
+
+    /// Writes the graph as a section of a container.
+    pub fn write_section(&self, writer: &mut Writer) {
+        writer.section(NODES);
+        writer.number(self.nodes.len());
+        for node in &self.nodes {
+            write_node(writer, node);
         }
-        let mut reader = Reader {
-            bytes,
-            offset: MAGIC.len(),
-        };
-        let n_nodes = reader.number()?;
-        let nodes = (0..n_nodes)
-            .map(|k| reader.node(k))
-            .collect::<Result<Vec<_>, _>>()?;
+        writer.number(self.surfaces.functions.len());
+        for function in &self.surfaces.functions {
+            writer.number(function.index());
+        }
+        let mut switches: Vec<_> = self.surfaces.switches.iter().collect();
+        switches.sort_unstable_by_key(|entry| entry.0);
+        writer.number(switches.len());
+        for (id, &(surface, orientation)) in switches {
+            writer.number(id.index());
+            writer.number(surface as usize);
+            writer.byte(u8::from(orientation < 0.0));
+        }
+        let absolute: Vec<_> = self.absolute_values().collect();
+        writer.number(absolute.len());
+        for id in absolute {
+            writer.number(id.index());
+        }
+    }
+
+    /// The graph that [`Graph::write_section`] wrote as the next section of a container.
+    ///
+    /// # Errors
+    /// [`ExprError::Damaged`], as [`Graph::from_bytes`].
+    pub fn read_section(container: &mut Container) -> Result<Graph, ExprError> {
+        let mut section = container.section(NODES)?;
+        let nodes = read_nodes(&mut section)?;
+        let functions = read_surfaces(&mut section, &nodes)?;
+        let switches = read_switches(&mut section, nodes.len(), functions.len())?;
+        let absolute = read_absolute_values(&mut section, &nodes)?;
+        section.finish()?;
 
         let mut graph = Graph::new();
-        for _ in 0..reader.number()? {
-            let function = reader.operand(n_nodes)?;
-            graph.surfaces.functions.push(function);
-        }
-        for _ in 0..reader.number()? {
-            let id = reader.operand(n_nodes)?;
-            let surface = reader.number()?;
-            if surface as usize >= graph.n_surfaces() {
-                return reader.damaged("a switch on a surface that does not exist");
-            }
-            let orientation = if reader.byte()? == 0 { 1.0 } else { -1.0 };
-            graph.surfaces.switches.insert(id, (surface, orientation));
-        }
-        let mut absolute = FxHashSet::default();
-        for _ in 0..reader.number()? {
-            absolute.insert(reader.operand(n_nodes)?.index());
-        }
-        if reader.offset != bytes.len() {
-            return reader.damaged("more bytes than expected");
-        }
-        for (k, node) in nodes.into_iter().enumerate() {
-            if graph.insert_known(node, absolute.contains(&k)).index() != k {
-                return reader.damaged("a node occurs twice");
-            }
+        let made = graph.build(&nodes, &absolute);
+        let surfaces = functions.into_iter().map(|function| made[function]);
+        graph.surfaces.functions = surfaces.collect();
+        for (id, side) in switches {
+            graph.surfaces.switches.insert(made[id], side);
         }
         for index in 0..graph.n_surfaces() as u32 {
             graph.register_surface(index);
         }
         Ok(graph)
     }
+
+    /// Makes nodes again, whose operands are numbers of nodes before them; their numbers here.
+    fn build(&mut self, nodes: &[Node], absolute: &FxHashSet<usize>) -> Vec<NodeId> {
+        let mut made: Vec<NodeId> = Vec::with_capacity(nodes.len());
+        for (k, node) in nodes.iter().enumerate() {
+            let known = self.len();
+            let id = match *node {
+                Node::Constant(value) => self.constant(value),
+                Node::Unary(op, a) => self.unary(op, made[a.index()]),
+                Node::Binary(op, a, b) => self.binary(op, made[a.index()], made[b.index()]),
+                Node::Select {
+                    surface,
+                    plus,
+                    minus,
+                } => self.select(surface, 1.0, made[plus.index()], made[minus.index()]),
+                Node::Time
+                | Node::State(_)
+                | Node::Parameter(_)
+                | Node::Sign(_)
+                | Node::Input(_) => self.insert(*node),
+            };
+            // What was simplified further is another node.
+            if absolute.contains(&k)
+                && id.index() >= known
+                && is_product_with_sign(&self.nodes, self.node(id))
+            {
+                self.facts[id.index()].nonnegative = true;
+            }
+            made.push(id);
+        }
+        made
+    }
 }
 
-/// Reads numbers and nodes, never beyond the end.
-struct Reader<'a> {
-    bytes: &'a [u8],
-    offset: usize,
+/// Whether a node is a product with a sign in front, as absolute values are.
+fn is_product_with_sign(nodes: &[Node], node: &Node) -> bool {
+    match *node {
+        Node::Binary(BinaryOp::Mul, left, _) => matches!(nodes[left.index()], Node::Sign(_)),
+        _ => false,
+    }
 }
 
-impl Reader<'_> {
-    fn damaged<T>(&self, detail: &'static str) -> Result<T, ExprError> {
-        Err(ExprError::Damaged {
-            offset: self.offset,
-            detail,
-        })
-    }
-
-    fn take<const N: usize>(&mut self) -> Result<[u8; N], ExprError> {
-        let end = self.offset + N;
-        match self
-            .bytes
-            .get(self.offset..end)
-            .and_then(|part| part.try_into().ok())
-        {
-            Some(part) => {
-                self.offset = end;
-                Ok(part)
-            }
-            None => self.damaged("ends too early"),
+fn write_node(writer: &mut Writer, node: &Node) {
+    let (tag, numbers): (u8, [Option<u32>; 3]) = match *node {
+        Node::Constant(value) => {
+            writer.byte(TAG_CONSTANT);
+            writer.float(value);
+            return;
         }
+        Node::Time => (TAG_TIME, [None; 3]),
+        Node::State(i) => (TAG_STATE, [Some(i), None, None]),
+        Node::Parameter(i) => (TAG_PARAMETER, [Some(i), None, None]),
+        Node::Sign(j) => (TAG_SIGN, [Some(j), None, None]),
+        Node::Input(i) => (TAG_INPUT, [Some(i), None, None]),
+        Node::Unary(op, a) => (TAG_UNARY + op as u8, [Some(a.0), None, None]),
+        Node::Binary(op, a, b) => (TAG_BINARY + op as u8, [Some(a.0), Some(b.0), None]),
+        Node::Select {
+            surface,
+            plus,
+            minus,
+        } => (TAG_SELECT, [Some(surface), Some(plus.0), Some(minus.0)]),
+    };
+    writer.byte(tag);
+    for value in numbers.into_iter().flatten() {
+        writer.number(value as usize);
     }
+}
 
-    fn byte(&mut self) -> Result<u8, ExprError> {
-        Ok(self.take::<1>()?[0])
-    }
-
-    fn number(&mut self) -> Result<u32, ExprError> {
-        self.take().map(u32::from_le_bytes)
-    }
-
-    fn operand(&mut self, limit: u32) -> Result<NodeId, ExprError> {
-        let id = self.number()?;
-        if id < limit {
-            Ok(NodeId(id))
-        } else {
-            self.damaged("an operand that does not come before its use")
+/// The nodes as they were written; no two are equal, and operands come first.
+fn read_nodes(section: &mut Section) -> Result<Vec<Node>, ExprError> {
+    let n_nodes = section.count(1)?;
+    let mut nodes = Vec::with_capacity(n_nodes);
+    let mut known = FxHashSet::default();
+    for k in 0..n_nodes {
+        let node = read_node(section, k)?;
+        if !known.insert(node) {
+            return section.damaged("a node occurs twice");
         }
+        nodes.push(node);
     }
+    Ok(nodes)
+}
 
-    /// Node number `k`, whose operands are below `k`.
-    fn node(&mut self, k: u32) -> Result<Node, ExprError> {
-        Ok(match self.byte()? {
-            TAG_CONSTANT => {
-                let value = f64::from_bits(u64::from_le_bytes(self.take()?));
-                Node::Constant(if value.is_nan() { f64::NAN } else { value })
+/// Node number `k`, whose operands are below `k`.
+fn read_node(section: &mut Section, k: usize) -> Result<Node, ExprError> {
+    const LATE: &str = "an operand that does not come before its use";
+    let operand = |section: &mut Section| section.index(k, LATE).map(|id| NodeId(id as u32));
+    let variable = |section: &mut Section| {
+        let index = section.index(
+            LARGEST_INDEX as usize + 1,
+            "the index of a variable is too large",
+        );
+        index.map(|index| index as u32)
+    };
+    Ok(match section.byte()? {
+        TAG_CONSTANT => {
+            let value = section.float()?;
+            Node::Constant(if value.is_nan() { f64::NAN } else { value })
+        }
+        TAG_TIME => Node::Time,
+        TAG_STATE => Node::State(variable(section)?),
+        TAG_PARAMETER => Node::Parameter(variable(section)?),
+        TAG_SIGN => Node::Sign(variable(section)?),
+        TAG_INPUT => Node::Input(variable(section)?),
+        TAG_SELECT => Node::Select {
+            surface: variable(section)?,
+            plus: operand(section)?,
+            minus: operand(section)?,
+        },
+        tag => {
+            let unary = tag
+                .checked_sub(TAG_UNARY)
+                .and_then(|n| UnaryOp::ALL.get(usize::from(n)));
+            let binary = tag
+                .checked_sub(TAG_BINARY)
+                .and_then(|n| BinaryOp::ALL.get(usize::from(n)));
+            match (unary, binary) {
+                (Some(&op), _) => Node::Unary(op, operand(section)?),
+                (_, Some(&op)) => Node::Binary(op, operand(section)?, operand(section)?),
+                _ => return section.damaged("an unknown operation"),
             }
-            TAG_TIME => Node::Time,
-            TAG_STATE => Node::State(self.number()?),
-            TAG_PARAMETER => Node::Parameter(self.number()?),
-            TAG_SIGN => Node::Sign(self.number()?),
-            TAG_INPUT => Node::Input(self.number()?),
-            TAG_SELECT => Node::Select {
-                surface: self.number()?,
-                plus: self.operand(k)?,
-                minus: self.operand(k)?,
-            },
-            tag => {
-                let unary = tag
-                    .checked_sub(TAG_UNARY)
-                    .and_then(|n| UnaryOp::ALL.get(usize::from(n)));
-                let binary = tag
-                    .checked_sub(TAG_BINARY)
-                    .and_then(|n| BinaryOp::ALL.get(usize::from(n)));
-                match (unary, binary) {
-                    (Some(&op), _) => Node::Unary(op, self.operand(k)?),
-                    (_, Some(&op)) => Node::Binary(op, self.operand(k)?, self.operand(k)?),
-                    _ => return self.damaged("an unknown operation"),
-                }
-            }
-        })
+        }
+    })
+}
+
+/// The nodes of the switching functions, each of which may contain the signs of those before it.
+fn read_surfaces(section: &mut Section, nodes: &[Node]) -> Result<Vec<usize>, ExprError> {
+    // How many surfaces there must be for the signs in each node.
+    let mut needed: Vec<usize> = Vec::with_capacity(nodes.len());
+    for node in nodes {
+        let own = match *node {
+            Node::Sign(surface) | Node::Select { surface, .. } => surface as usize + 1,
+            _ => 0,
+        };
+        let operands = node.operands().map(|operand| needed[operand.index()]);
+        needed.push(operands.fold(own, usize::max));
     }
+    let n_surfaces = section.count(4)?;
+    if needed.iter().any(|&count| count > n_surfaces) {
+        return section.damaged("the sign of a surface that does not exist");
+    }
+    let mut functions = Vec::with_capacity(n_surfaces);
+    for j in 0..n_surfaces {
+        let function = section.index(nodes.len(), "a surface whose function does not exist")?;
+        if needed[function] > j {
+            return section
+                .damaged("a surface that depends on its own sign, or on that of a later one");
+        }
+        functions.push(function);
+    }
+    Ok(functions)
+}
+
+/// A node whose sign is that of a surface, and the surface with its orientation.
+type KnownSwitch = (usize, (u32, f64));
+
+fn read_switches(
+    section: &mut Section,
+    n_nodes: usize,
+    n_surfaces: usize,
+) -> Result<Vec<KnownSwitch>, ExprError> {
+    let mut switches: Vec<KnownSwitch> = Vec::new();
+    for _ in 0..section.count(9)? {
+        let id = section.index(n_nodes, "a switch that is not a node")?;
+        if switches.last().is_some_and(|before| before.0 >= id) {
+            return section.damaged("switches that are not in order");
+        }
+        let surface = section.index(n_surfaces, "a switch on a surface that does not exist")?;
+        let orientation = match section.byte()? {
+            0 => 1.0,
+            1 => -1.0,
+            _ => return section.damaged("an orientation other than +1 and -1"),
+        };
+        switches.push((id, (surface as u32, orientation)));
+    }
+    Ok(switches)
+}
+
+fn read_absolute_values(
+    section: &mut Section,
+    nodes: &[Node],
+) -> Result<FxHashSet<usize>, ExprError> {
+    let mut absolute = FxHashSet::default();
+    let mut next = 0;
+    for _ in 0..section.count(4)? {
+        let id = section.index(nodes.len(), "an absolute value that is not a node")?;
+        if id < next {
+            return section.damaged("absolute values that are not in order");
+        }
+        if !is_product_with_sign(nodes, &nodes[id]) {
+            return section.damaged("an absolute value that is no product with a sign");
+        }
+        next = id + 1;
+        absolute.insert(id);
+    }
+    Ok(absolute)
 }
 
 #[cfg(test)]

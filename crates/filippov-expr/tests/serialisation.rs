@@ -3,6 +3,7 @@
 
 mod support;
 
+use filippov_expr::container::{resealed, sections_of};
 use filippov_expr::{
     Backend, BinaryOp, ExprError, Graph, Names, Node, NodeId, Program, Switching, UnaryOp, Wrt,
 };
@@ -67,9 +68,13 @@ proptest! {
     #[test]
     fn garbage_does_not_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
         prop_assert!(Graph::from_bytes(&bytes).is_err());
-        let mut with_magic = b"FILEXPR\x02".to_vec();
-        with_magic.extend(bytes);
-        if let Ok(graph) = Graph::from_bytes(&with_magic) {
+        let mut with_header = Graph::new().to_bytes();
+        let header = with_header.len() - 4 * 5;
+        with_header.splice(header..header + 16, bytes);
+        let place = sections_of(&with_header)[0].start + 4;
+        let length = (with_header.len() - place - 12) as u64;
+        with_header[place..place + 8].copy_from_slice(&length.to_le_bytes());
+        if let Ok(graph) = Graph::from_bytes(&resealed(&with_header).unwrap()) {
             exercise(graph);
         }
     }
@@ -87,7 +92,7 @@ proptest! {
             let place = usize::from(place) % bytes.len();
             bytes[place] = value % 8;
         }
-        if let Ok(graph) = Graph::from_bytes(&bytes) {
+        if let Ok(graph) = Graph::from_bytes(&resealed(&bytes).unwrap()) {
             exercise(graph);
         }
     }
@@ -115,9 +120,13 @@ fn surfaces_are_remembered() {
 #[test]
 fn other_versions_are_refused() {
     let mut bytes = Graph::new().to_bytes();
-    bytes[7] += 1;
+    bytes[8] += 1;
     assert_eq!(
         Graph::from_bytes(&bytes).unwrap_err(),
+        ExprError::OtherVersion { found: 2 }
+    );
+    assert_eq!(
+        Graph::from_bytes(b"FILEXPR\x02").unwrap_err(),
         ExprError::UnknownFormat
     );
     assert_eq!(
@@ -134,17 +143,16 @@ fn excess_bytes_and_repeated_nodes_are_refused() {
     bytes.push(0);
     assert!(matches!(
         Graph::from_bytes(&bytes),
-        Err(ExprError::Damaged { .. })
+        Err(ExprError::WrongLength { .. })
     ));
-    let twice = [
-        b"FILEXPR\x02".as_slice(),
-        &2_u32.to_le_bytes(),
-        &[1, 1],
-        &[0; 12],
-    ]
-    .concat();
+    // One node more, the time again.
+    let mut twice = g.to_bytes();
+    let place = sections_of(&twice)[0].clone();
+    twice[place.start + 4] += 1;
+    twice[place.start + 12] = 2;
+    twice.insert(place.start + 16, 1);
     assert!(matches!(
-        Graph::from_bytes(&twice),
+        Graph::from_bytes(&resealed(&twice).unwrap()),
         Err(ExprError::Damaged {
             detail: "a node occurs twice",
             ..

@@ -10,6 +10,7 @@ mod laws;
 mod prepared_run;
 mod regions;
 mod run;
+mod saved;
 mod solve;
 mod sweep;
 mod systems;
@@ -32,6 +33,8 @@ mod _core {
     use super::regions::Regions;
     #[pymodule_export]
     use super::run::Run;
+    #[pymodule_export]
+    use super::saved::{load_system, save_system};
     #[pymodule_export]
     use super::solve::{solve, solve_many, RunOptions};
     #[pymodule_export]

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use filippov::action::{Action, ActionMap, Actions, Clock, Trigger};
+use filippov::action::{Action, ActionMap, Actions, Trigger};
 use filippov::section::Section;
 use filippov::{
     solve_to_section, solve_with_actions, Error, Kind, LawAction, Mode, Options, Solution,
@@ -13,6 +13,7 @@ use pyo3::prelude::*;
 
 use crate::callbacks::{CalledEvent, CalledMap, CompiledEvent};
 use crate::run::Run;
+use crate::saved::read_trigger;
 use crate::systems::{core_of, n_visible_of, raised, CoreSystem, TracedSystem};
 
 /// The function of an event (a handle of the traced system, or a callable), its direction, how many zeros end the
@@ -205,18 +206,7 @@ fn read_actions(
     p: &[f64],
 ) -> PyResult<Vec<(SharedMap, Trigger, String)>> {
     let read = |(when, numbers, map, name): &ActionRow| {
-        let trigger = match (when.as_str(), &numbers[..]) {
-            ("surface", &[index, direction]) => Trigger::Surface {
-                index: index as usize,
-                direction: direction as i8,
-            },
-            ("times", times) => Trigger::Times(times.to_vec()),
-            ("clock", &[period, phase]) => Trigger::Clock {
-                clock: Clock { period, phase },
-                at_start: true,
-            },
-            _ => return Err(PyValueError::new_err(format!("unknown trigger {when:?}"))),
-        };
+        let trigger = read_trigger(when, numbers)?;
         let map: SharedMap = match map.bind(py).cast::<TracedSystem>() {
             Ok(traced) => Box::new(TracedMap::new(traced.get().with(p))),
             Err(_) => Box::new(CalledMap(map.clone_ref(py))),

@@ -3,8 +3,8 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use filippov::field::{SlidingField, SmoothField};
-use filippov::{FieldError, Laws, PiecewiseSystem};
-use filippov_expr::{Backend, ExprError, Graph, Names, NodeId};
+use filippov::{Definition, Error, FieldError, Laws, PiecewiseSystem, Rules};
+use filippov_expr::{Backend, Names};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -13,7 +13,7 @@ use pyo3::types::PyBytes;
 use crate::black_boxes::{OpaqueSystem, SignedSystem};
 use crate::builder::Builder;
 use crate::callbacks::EventExpression;
-use crate::laws::{read_law, read_ratios, Extra, LawRow};
+use crate::laws::{read_law, LawRow};
 
 pub type Array<'py> = PyReadonlyArray1<'py, f64>;
 pub type Output<'py> = Bound<'py, PyArray1<f64>>;
@@ -24,6 +24,11 @@ pub fn raised(error: FieldError) -> PyErr {
         Ok(error) => *error,
         Err(_) => PyRuntimeError::new_err("a function of the system failed"),
     }
+}
+
+/// What the core refuses.
+pub fn refused(error: Error) -> PyErr {
+    PyValueError::new_err(error.to_string())
 }
 
 /// A system of the core that can be run by threads.
@@ -130,7 +135,7 @@ fn checked<'a>(
 pub struct TracedSystem {
     pub system: filippov::TracedSystem,
     /// What it has beside the field.
-    extra: Extra,
+    rules: Rules,
     /// The laws of its discrete states, whose number is that of the last parameters' names.
     pub laws: Arc<Laws>,
     /// Kept for events, which are traced after the system into the same graph.
@@ -140,37 +145,21 @@ pub struct TracedSystem {
 }
 
 impl TracedSystem {
-    fn build(
-        graph: Graph,
-        field: Vec<NodeId>,
-        names: Names,
-        extra: Extra,
-        builder: Option<Py<Builder>>,
-    ) -> PyResult<Self> {
-        let n_laws = extra.laws.len();
-        let zeros = vec![0.0; names.parameters.len().saturating_sub(n_laws)];
-        let refused = |e: ExprError| PyValueError::new_err(e.to_string());
-        let laws = extra
-            .laws
-            .iter()
-            .map(|row| read_law(&graph, row))
-            .collect::<PyResult<Vec<_>>>()?;
-        let laws = Laws::new(&graph, laws).map_err(refused)?;
-        let system = filippov::TracedSystem::new(graph, field, zeros, names, Backend::Auto)
-            .map_err(refused)?;
-        let ratios = read_ratios(system.graph(), &extra.sticking)?;
-        let hidden = system.n_surfaces() - extra.n_hidden..system.n_surfaces();
-        let watched: Vec<usize> = extra.watched.iter().copied().chain(hidden).collect();
+    pub fn build(definition: Definition, builder: Option<Py<Builder>>) -> PyResult<Self> {
+        let rules = definition.rules.clone();
+        let (system, laws) = definition.build(Backend::Auto).map_err(refused)?;
         Ok(TracedSystem {
-            system: system
-                .watching(&watched)
-                .sticking(&ratios)
-                .with_discrete(n_laws),
+            system,
             laws: Arc::new(laws),
-            extra,
+            rules,
             builder,
             events: Mutex::default(),
         })
+    }
+
+    /// Everything that it was made of.
+    pub fn definition(&self) -> Definition {
+        Definition::of(&self.system, &self.rules)
     }
 
     /// The event with this handle.
@@ -199,18 +188,18 @@ impl TracedSystem {
     /// The names of the discrete states.
     pub fn law_names(&self) -> Vec<String> {
         let names = &self.system.names().parameters;
-        names[names.len() - self.extra.laws.len()..].to_vec()
+        names[names.len() - self.rules.laws.len()..].to_vec()
     }
 
     /// How many surfaces a user sees: those of the laws come after them.
     pub fn n_visible(&self) -> usize {
-        self.system.n_surfaces() - self.extra.n_hidden
+        self.system.n_surfaces() - self.rules.n_hidden
     }
 
     /// Signs for all surfaces from those that a user sees.
     fn all_signs<'py>(&self, py: Python<'py>, signs: &Array<'py>) -> PyResult<Array<'py>> {
         let mut all = signs.as_slice()?.to_vec();
-        all.extend(vec![1.0; self.extra.n_hidden]);
+        all.extend(vec![1.0; self.rules.n_hidden]);
         Ok(PyArray1::from_vec(py, all).readonly())
     }
 }
@@ -245,18 +234,23 @@ impl TracedSystem {
             states: states.unwrap_or_default(),
             parameters,
         };
-        if n_hidden > graph.n_surfaces() || laws.len() > names.parameters.len() {
-            return Err(PyValueError::new_err(
-                "laws: more than there are surfaces or names",
-            ));
-        }
-        let extra = Extra {
+        let laws = laws.iter().map(|row| read_law(&graph, row));
+        let sticking = sticking
+            .iter()
+            .map(|&(surface, ratio)| Ok((surface, Builder::node(&graph, ratio)?)));
+        let rules = Rules {
             watched,
-            laws,
+            laws: laws.collect::<PyResult<_>>()?,
             n_hidden,
-            sticking,
+            sticking: sticking.collect::<PyResult<_>>()?,
         };
-        Self::build(graph, field, names, extra, Some(builder))
+        let definition = Definition {
+            graph,
+            field,
+            names,
+            rules,
+        };
+        Self::build(definition, Some(builder))
     }
 
     #[getter]
@@ -369,70 +363,11 @@ impl TracedSystem {
     }
 
     fn to_bytes<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
-        let mut bytes = Vec::new();
-        let names = self.system.names();
-        write_number(&mut bytes, self.system.field_nodes().len());
-        for node in self.system.field_nodes() {
-            write_number(&mut bytes, node.index());
-        }
-        self.extra.write(&mut bytes);
-        for list in [&names.states, &names.parameters] {
-            write_number(&mut bytes, list.len());
-            for name in list {
-                write_block(&mut bytes, name.as_bytes());
-            }
-        }
-        write_block(&mut bytes, &self.system.graph().to_bytes());
-        PyBytes::new(py, &bytes)
+        PyBytes::new(py, &self.definition().to_bytes())
     }
 
     #[staticmethod]
     fn from_bytes(data: &[u8]) -> PyResult<Self> {
-        let damaged = || PyValueError::new_err("these bytes are not a traced system");
-        let mut rest = data;
-        let count = read_number(&mut rest).ok_or_else(damaged)? as usize;
-        let mut field = Vec::new();
-        for _ in 0..count {
-            field.push(read_number(&mut rest).ok_or_else(damaged)?);
-        }
-        let extra = Extra::read(&mut rest).ok_or_else(damaged)?;
-        let mut lists = [Vec::new(), Vec::new()];
-        for list in &mut lists {
-            for _ in 0..read_number(&mut rest).ok_or_else(damaged)? {
-                let block = read_block(&mut rest).ok_or_else(damaged)?;
-                list.push(String::from_utf8(block.to_vec()).map_err(|_| damaged())?);
-            }
-        }
-        let graph = Graph::from_bytes(read_block(&mut rest).ok_or_else(damaged)?)
-            .map_err(|e| PyValueError::new_err(e.to_string()))?;
-        let field = field
-            .into_iter()
-            .map(|id| Builder::node(&graph, id))
-            .collect::<PyResult<Vec<_>>>()?;
-        let [states, parameters] = lists;
-        let names = Names { states, parameters };
-        Self::build(graph, field, names, extra, None)
+        Self::build(Definition::from_bytes(data).map_err(refused)?, None)
     }
-}
-
-pub fn write_number(bytes: &mut Vec<u8>, number: usize) {
-    bytes.extend((number as u32).to_le_bytes());
-}
-
-pub fn write_block(bytes: &mut Vec<u8>, block: &[u8]) {
-    write_number(bytes, block.len());
-    bytes.extend(block);
-}
-
-pub fn read_number(rest: &mut &[u8]) -> Option<u32> {
-    let (head, tail) = rest.split_first_chunk::<4>()?;
-    *rest = tail;
-    Some(u32::from_le_bytes(*head))
-}
-
-pub fn read_block<'a>(rest: &mut &'a [u8]) -> Option<&'a [u8]> {
-    let length = read_number(rest)? as usize;
-    let (head, tail) = rest.split_at_checked(length)?;
-    *rest = tail;
-    Some(head)
 }

@@ -15,6 +15,16 @@ pub enum Error {
         /// The length needed.
         expected: usize,
     },
+    /// A list has the wrong number of entries.
+    #[error("{name}: {found} are given, {expected} are needed")]
+    WrongCount {
+        /// The argument.
+        name: &'static str,
+        /// How many there are.
+        found: usize,
+        /// How many are needed.
+        expected: usize,
+    },
     /// An argument is outside of its range.
     #[error("{name} = {value}: {requirement}")]
     OutOfRange {
@@ -25,7 +35,29 @@ pub enum Error {
         /// What it must fulfil.
         requirement: &'static str,
     },
-    /// The expression graph was refused.
+    /// A part of a system that does not exist is referred to.
+    #[error("{what} {index} does not exist: the system has {count}")]
+    NoSuchIndex {
+        /// What is referred to.
+        what: &'static str,
+        /// Its index.
+        index: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// Parts of a system contradict each other.
+    #[error("the system is inconsistent: {detail}")]
+    Inconsistent {
+        /// What is wrong.
+        detail: &'static str,
+    },
+    /// The map of an action is a function of the caller, which bytes cannot hold.
+    #[error("action {name:?}: its map is a function that could not be traced, and is not here")]
+    MissingMap {
+        /// The name of the action.
+        name: String,
+    },
+    /// An expression graph, or a container, was refused.
     #[error(transparent)]
     Expression(#[from] filippov_expr::ExprError),
 }

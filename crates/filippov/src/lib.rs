@@ -42,6 +42,7 @@ mod integrate;
 mod mode;
 mod options;
 mod recorder;
+mod saved;
 pub mod section;
 mod solution;
 pub mod sparse;
@@ -64,10 +65,12 @@ pub use integrate::{
 };
 pub use mode::{Mode, Signs};
 pub use options::{Keep, Method, NonUnique, Options, SlidingRule, Stabilization};
+pub use saved::{RunnableSystem, SavedAction, SavedSystem};
 pub use solution::{as_multiplier, Segment, Side, Solution, Switch, UserZero};
 pub use status::{Stop, Warning, WarningCode};
 pub use switching::Kind;
 pub use system::{
-    AffineParts, AffineSigns, BothSides, ClosureSystem, Law, LawAction, LawMap, Laws, LieValue,
-    MotionJacobian, PiecewiseSystem, SingularSliding, TracedMap, TracedSystem, Word,
+    AffineParts, AffineSigns, BothSides, ClosureSystem, Definition, Law, LawAction, LawMap, Laws,
+    LieValue, MotionJacobian, PiecewiseSystem, Rules, SingularSliding, TracedMap, TracedSystem,
+    Word,
 };

@@ -15,7 +15,8 @@ from filippov.analysis.sections import AnySection, Phase, Place
 from filippov.errors import FilippovError, InputError, Interrupted
 from filippov.events import bind_function, selective
 from filippov.options import Options
-from filippov.prepare import Prepared, packed, unpacked
+from filippov.prepare import Prepared
+from filippov.saving import packed, unpacked
 
 if TYPE_CHECKING:
     from filippov.system import System
@@ -100,7 +101,9 @@ class Task(NamedTuple):
         if place is not None and isinstance(place.function, TracedSystem):
             place = place._replace(function=place.function.to_bytes())
         if isinstance(self.system, Prepared) and isinstance(self.system.core, TracedSystem):
-            return self._replace(system=pickle.dumps(packed(self.system)), place=place)
+            # The values come with each point; without any here all tasks of a sweep carry the same bytes.
+            values = dict.fromkeys(self.names, 0.0)
+            return self._replace(system=pickle.dumps(packed(self.system, values)), place=place)
         raise InputError(
             "executor: a system that cannot be traced cannot be sent to other processes; leave executor= "
             "away, or write the right-hand side with NumPy functions"
@@ -109,7 +112,7 @@ class Task(NamedTuple):
 
 @lru_cache(maxsize=16)
 def _system(data: bytes) -> Prepared:
-    return unpacked(pickle.loads(data))
+    return unpacked(*pickle.loads(data)).prepared
 
 
 @lru_cache(maxsize=16)

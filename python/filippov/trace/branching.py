@@ -268,9 +268,7 @@ class Tracer:
             return constant
         from filippov._core import TracedSystem
 
-        system = TracedSystem(
-            self.builder, [node] * self.n_states, self.n_states, self.parameters, self.states
-        )
+        system = TracedSystem(self.builder, [node] * self.n_states, self.n_states, self.names(), self.states)
         signs = np.ones(self.builder.n_surfaces())
         return float(system.field(self.t0, self.y0, signs, self.values)[0])
 

@@ -13,6 +13,7 @@
 use std::sync::Arc;
 
 use filippov_expr::{Backend, ExprError, Graph, NodeId, Program, Wrt};
+use smallvec::{smallvec, SmallVec};
 
 use super::{PiecewiseSystem, TracedSystem};
 use crate::action::{ActionMap, Clock, Trigger};
@@ -58,6 +59,20 @@ pub enum Law {
 }
 
 impl Law {
+    /// The nodes that the law refers to.
+    pub(crate) fn nodes(&self) -> SmallVec<[NodeId; 3]> {
+        match *self {
+            Law::Clock { argument } | Law::Level { argument, .. } | Law::Held { argument } => {
+                smallvec![argument]
+            }
+            Law::Hysteresis {
+                argument,
+                thresholds: [low, high],
+                ..
+            } => smallvec![argument, low, high],
+        }
+    }
+
     /// The expressions that the law evaluates: the argument, and two more.
     fn expressions(&self, graph: &mut Graph) -> [NodeId; 3] {
         match *self {

@@ -1,0 +1,176 @@
+//! Definitions of traced systems as sections of a container.
+//!
+//! Four sections: the graph (that of `filippov-expr`); the nodes of the field; the names of states and parameters;
+//! the rules: surfaces that trigger actions, hidden ones, ratios of friction, laws.
+
+use filippov_expr::container::{Container, Section, Tag, Writer};
+use filippov_expr::{ExprError, Graph, Names, NodeId};
+
+use super::{Definition, Law, Rules};
+use crate::error::Error;
+
+const FIELD: Tag = Tag(*b"FELD");
+const NAMES: Tag = Tag(*b"NAME");
+const RULES: Tag = Tag(*b"RULE");
+
+const CLOCK: u8 = 0;
+const LEVEL: u8 = 1;
+const HELD: u8 = 2;
+const HYSTERESIS: u8 = 3;
+
+impl Definition {
+    /// Writes the definition as the next sections of a container.
+    pub(crate) fn write_sections(&self, writer: &mut Writer) {
+        self.graph.write_section(writer);
+        writer.section(FIELD);
+        write_nodes(writer, &self.field);
+        writer.section(NAMES);
+        for names in [&self.names.states, &self.names.parameters] {
+            writer.number(names.len());
+            names.iter().for_each(|name| writer.text(name));
+        }
+        writer.section(RULES);
+        self.rules.write(writer);
+    }
+
+    /// The definition that was written so, checked.
+    ///
+    /// # Errors
+    /// Those of the container and of [`Definition::check`].
+    pub(crate) fn read_sections(container: &mut Container) -> Result<Self, Error> {
+        let graph = Graph::read_section(container)?;
+        let mut section = container.section(FIELD)?;
+        let field = read_nodes(&mut section)?;
+        section.finish()?;
+        let mut section = container.section(NAMES)?;
+        let names = Names {
+            states: read_names(&mut section)?,
+            parameters: read_names(&mut section)?,
+        };
+        section.finish()?;
+        let mut section = container.section(RULES)?;
+        let rules = Rules::read(&mut section)?;
+        section.finish()?;
+        let definition = Definition {
+            graph,
+            field,
+            names,
+            rules,
+        };
+        definition.check()?;
+        Ok(definition)
+    }
+}
+
+impl Rules {
+    fn write(&self, writer: &mut Writer) {
+        writer.number(self.n_hidden);
+        writer.number(self.watched.len());
+        for &surface in &self.watched {
+            writer.number(surface);
+        }
+        writer.number(self.sticking.len());
+        for &(surface, ratio) in &self.sticking {
+            writer.number(surface);
+            writer.number(ratio.index());
+        }
+        writer.number(self.laws.len());
+        for law in &self.laws {
+            write_law(writer, law);
+        }
+    }
+
+    fn read(section: &mut Section) -> Result<Self, ExprError> {
+        let n_hidden = section.number()? as usize;
+        let mut watched = Vec::new();
+        for _ in 0..section.count(4)? {
+            watched.push(section.number()? as usize);
+        }
+        let mut sticking = Vec::new();
+        for _ in 0..section.count(8)? {
+            sticking.push((section.number()? as usize, node(section)?));
+        }
+        let mut laws = Vec::new();
+        for _ in 0..section.count(5)? {
+            laws.push(read_law(section)?);
+        }
+        Ok(Rules {
+            watched,
+            laws,
+            n_hidden,
+            sticking,
+        })
+    }
+}
+
+fn write_law(writer: &mut Writer, law: &Law) {
+    let kind = match law {
+        Law::Clock { .. } => CLOCK,
+        Law::Level { .. } => LEVEL,
+        Law::Held { .. } => HELD,
+        Law::Hysteresis { .. } => HYSTERESIS,
+    };
+    writer.byte(kind);
+    for node in law.nodes() {
+        writer.number(node.index());
+    }
+    match *law {
+        Law::Clock { .. } | Law::Held { .. } => {}
+        Law::Level {
+            surface,
+            orientation,
+            guard,
+            ..
+        } => {
+            writer.number(surface);
+            writer.float(orientation);
+            writer.number(guard);
+        }
+        Law::Hysteresis { initial, guard, .. } => {
+            writer.float(initial);
+            writer.number(guard);
+        }
+    }
+}
+
+fn read_law(section: &mut Section) -> Result<Law, ExprError> {
+    Ok(match section.byte()? {
+        CLOCK => Law::Clock {
+            argument: node(section)?,
+        },
+        LEVEL => Law::Level {
+            argument: node(section)?,
+            surface: section.number()? as usize,
+            orientation: section.float()?,
+            guard: section.number()? as usize,
+        },
+        HELD => Law::Held {
+            argument: node(section)?,
+        },
+        HYSTERESIS => Law::Hysteresis {
+            argument: node(section)?,
+            thresholds: [node(section)?, node(section)?],
+            initial: section.float()?,
+            guard: section.number()? as usize,
+        },
+        _ => return section.damaged("a law of an unknown kind"),
+    })
+}
+
+fn write_nodes(writer: &mut Writer, nodes: &[NodeId]) {
+    writer.number(nodes.len());
+    nodes.iter().for_each(|node| writer.number(node.index()));
+}
+
+fn read_nodes(section: &mut Section) -> Result<Vec<NodeId>, ExprError> {
+    (0..section.count(4)?).map(|_| node(section)).collect()
+}
+
+fn read_names(section: &mut Section) -> Result<Vec<String>, ExprError> {
+    (0..section.count(4)?).map(|_| section.text()).collect()
+}
+
+/// The number of a node, which [`Definition::check`] looks at.
+fn node(section: &mut Section) -> Result<NodeId, ExprError> {
+    section.number().map(NodeId)
+}

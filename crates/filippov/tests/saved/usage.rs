@@ -1,0 +1,109 @@
+//! Everything that can be done with a system, for any system that was accepted.
+
+use filippov::{classify, BothSides, Method, Options, PiecewiseSystem, SavedSystem, TracedSystem};
+use filippov_expr::Backend;
+
+/// Of so many systems one is compiled to native code: that takes much longer than all of the rest.
+const ONE_NATIVE_IN: u64 = 16;
+
+/// Larger systems are looked at in a few modes only.
+const MOST_SURFACES: usize = 6;
+
+/// Surfaces that near are taken for those of a point.
+const REACH: f64 = 1e-9;
+
+/// Builds a system and uses it; false if it is refused when it is built.
+pub fn use_everything(system: SavedSystem, case: u64) -> bool {
+    let backend = match case % ONE_NATIVE_IN {
+        0 => Backend::Auto,
+        _ => Backend::Interpreter,
+    };
+    let (n, parameters) = (system.definition.field.len(), system.defaults.clone());
+    let Ok(runnable) = system.build(backend) else {
+        return false;
+    };
+    for (t, scale) in [(0.0, 0.0), (0.3, 0.7)] {
+        let x: Vec<f64> = (0..n).map(|i| scale * (1.0 - 0.6 * i as f64)).collect();
+        let (system, _) = runnable.at(&parameters, t, &x).unwrap();
+        evaluate(&system, t, &x);
+    }
+    let methods = [
+        Method::Auto,
+        Method::Dopri5,
+        Method::Taylor,
+        Method::Rodas5p,
+        Method::Dop853,
+    ];
+    let options = Options {
+        method: methods[case as usize / 7 % methods.len()],
+        max_steps: 60,
+        max_events: 30,
+        max_wall_time: Some(0.2),
+        ..Options::default()
+    };
+    let start: Vec<f64> = (0..n).map(|i| 0.9 / (1.0 + i as f64)).collect();
+    if let Ok(solution) = runnable.solve((0.0, 2.0), &start, &parameters, &options, &[]) {
+        let _ = format!("{:?}", solution.stop);
+        let _ = solution.last_state();
+    }
+    true
+}
+
+fn evaluate(system: &TracedSystem, t: f64, x: &[f64]) {
+    let (n, d) = (system.n_states(), system.n_surfaces());
+    let mut out = vec![0.0; n];
+    let (mut h, mut rates) = (vec![0.0; d], vec![0.0; d]);
+    for side in [1.0, -1.0] {
+        let signs = vec![side; d];
+        system.field(t, x, &signs, &mut out).unwrap();
+        system.surfaces(t, x, &signs, &mut h).unwrap();
+        let velocity = out.clone();
+        system
+            .surface_rates(t, x, &signs, &velocity, &mut h, &mut rates)
+            .unwrap();
+        system.active(&signs, &[], &mut vec![false; d]);
+        series(system, &[], t, x, &signs);
+        for j in 0..d.min(MOST_SURFACES) {
+            at_surface(system, j, t, x, &signs);
+        }
+    }
+    for pair in [[0, 1], [1, 2]] {
+        if pair[1] < d {
+            series(system, &pair, t, x, &vec![1.0; d]);
+            system.sign_groups(&pair);
+        }
+    }
+    // The hidden dynamics of three and more surfaces takes a second.
+    if h.iter().filter(|&&h| h.abs() < REACH).count() <= 2 {
+        let _ = classify(system, t, x, REACH, &[]);
+    }
+}
+
+fn at_surface(system: &TracedSystem, j: usize, t: f64, x: &[f64], signs: &[f64]) {
+    let n = system.n_states();
+    let mut gradient = vec![0.0; n];
+    system.gradient(j, t, x, signs, &mut gradient).unwrap();
+    system.surface_size(j, t, x, signs).unwrap();
+    let mut sides = BothSides::new(n, system.n_surfaces());
+    system.both_sides(j, t, x, signs, &mut sides).unwrap();
+    for word in [&[][..], &[1], &[-1, 1]] {
+        system.lie_derivative(j, j, word, t, x, signs).unwrap();
+    }
+    system.rate_gradient(j, t, x, signs, &mut gradient).unwrap();
+    system.first_lie_derivatives(j, t, x, signs);
+    system.stick_ratio(j, t, x, signs);
+    system.switches_at(j);
+    assert!(system.surface_name(j).len() < 10_000);
+    series(system, &[j], t, x, signs);
+}
+
+fn series(system: &TracedSystem, sliding: &[usize], t: f64, x: &[f64], signs: &[f64]) {
+    if let Some(jets) = system.motion_jets(sliding, 5) {
+        let mut out = vec![0.0; jets.width() * (jets.order() + 1)];
+        system.eval_jets(&jets, t, x, signs, &mut out);
+    }
+    if let Some(jacobian) = system.motion_jacobian(sliding) {
+        let mut out = jacobian.linearisation();
+        system.eval_jacobian(&jacobian, t, x, signs, &mut out);
+    }
+}
