@@ -89,8 +89,10 @@ class RunWarning(NamedTuple):
     code : str
         Short name: ``"non_unique"``, ``"undeclared_jump"``, ``"zero_surface"``, ``"no_series"``,
         ``"stiff"`` (stability limits the steps of an explicit method), ``"oscillation"`` (sliding on three or
-        more surfaces at a root that is not stable for the given ``kappa``), ``"memory"`` (the function
-        assigns values that other calls may read) or ``"max_branches"``.
+        more surfaces at a root that is not stable for the given ``kappa``), ``"against_direction"`` (the
+        surface of a reset was crossed against its direction), ``"unknown_side"`` (a start on the surface of
+        a reset without a direction), ``"memory"`` (the function assigns values that other calls may read) or
+        ``"max_branches"``.
     message : str
         What was found, in words.
     candidates : tuple of Mode

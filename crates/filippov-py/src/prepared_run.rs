@@ -206,9 +206,10 @@ fn read_actions(
 ) -> PyResult<Vec<(SharedMap, Trigger, String)>> {
     let read = |(when, numbers, map, name): &ActionRow| {
         let trigger = match (when.as_str(), &numbers[..]) {
-            ("surface", &[index, direction]) => Trigger::Surface {
+            ("surface", &[index, direction, side]) => Trigger::Surface {
                 index: index as usize,
                 direction: direction as i8,
+                side: if side < 0.0 { -1 } else { 1 },
             },
             ("times", times) => Trigger::Times(times.to_vec()),
             ("clock", &[period, phase]) => Trigger::Clock {

@@ -273,6 +273,10 @@ pub enum WarningCode {
     Oscillation,
     /// A switching function is zero all along a motion.
     ZeroSurface,
+    /// A surface that triggers an action was crossed against its direction.
+    AgainstDirection,
+    /// A start on a surface whose action is triggered from both sides, with no velocity that leads off to the side that is taken.
+    UnknownSide,
 }
 
 impl WarningCode {
@@ -285,6 +289,8 @@ impl WarningCode {
             WarningCode::Stiff => "stiff",
             WarningCode::Oscillation => "oscillation",
             WarningCode::ZeroSurface => "zero_surface",
+            WarningCode::AgainstDirection => "against_direction",
+            WarningCode::UnknownSide => "unknown_side",
         }
     }
 }

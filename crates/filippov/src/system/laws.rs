@@ -264,6 +264,7 @@ fn falling(index: usize) -> Trigger {
     Trigger::Surface {
         index,
         direction: -1,
+        side: 1,
     }
 }
 

@@ -128,7 +128,8 @@ impl<'a> Integrator<'a> {
     }
 
     fn field_of(&self, mode: &Mode) -> ModeField<'a> {
-        match ContactField::new(self.system, self.actions, mode, &self.motion.discrete) {
+        let (sides, discrete) = (&self.motion.sides, &self.motion.discrete);
+        match ContactField::new(self.system, self.actions, mode, sides, discrete) {
             Some(field) => ModeField::Contact(Box::new(field)),
             None => ModeField::of(self.system, self.options.into(), mode),
         }

@@ -4,4 +4,5 @@ pub(super) mod contact;
 pub(super) mod impacts;
 pub(super) mod instant;
 pub(super) mod passage;
+pub(super) mod sides;
 pub(super) mod timetable;

@@ -335,11 +335,12 @@ impl Integrator<'_> {
     /// The side from which the action at surface `j` is triggered.
     pub(in crate::integrate) fn trigger_side(&self, j: usize, memory: Option<&Mode>) -> i8 {
         let known = memory.map_or(0, |memory| memory.entries()[j]);
-        match self.actions.at_surface(j) {
-            Some((_, direction)) if direction != 0 => -direction,
-            _ if known != 0 => known,
-            _ => 1,
-        }
+        let last = if known == 0 {
+            self.motion.sides[j]
+        } else {
+            known
+        };
+        self.actions.trigger_side(j, last)
     }
 
     /// Is this speed at surface j below the tolerance?
@@ -358,7 +359,8 @@ impl Integrator<'_> {
 
     /// Can a body stay in contact at h_j = 0? The action there leaves the point alone and acts on the velocity.
     pub(in crate::integrate) fn can_stay(&self, j: usize, mode: &Mode) -> Result<bool, FieldError> {
-        let Some((action, _)) = self.actions.at_surface(j) else {
+        let side = mode.entries()[j];
+        let Some(action) = self.actions.from_side(j, side) else {
             return Ok(false);
         };
         let (mut moved, mut q) = (self.x.clone(), self.motion.discrete.clone());
@@ -371,8 +373,11 @@ impl Integrator<'_> {
             return Ok(false);
         }
         let resting = mode.with(j, 0);
+        let mut sides = self.motion.sides.clone();
+        sides[j] = side;
+        let discrete = &self.motion.discrete;
         let Some(mut field) =
-            ContactField::new(self.system, self.actions, &resting, &self.motion.discrete)
+            ContactField::new(self.system, self.actions, &resting, &sides, discrete)
         else {
             return Ok(false);
         };

@@ -63,9 +63,10 @@ impl Integrator<'_> {
         })
     }
 
-    /// Names a surface whose function is zero all along the motion, unless something was said about it.
+    /// Names a surface whose function is zero all along the motion, unless something was said about it. Bodies that touch
+    /// without any force are no mistake: nothing depends on the sign.
     fn warn_zero_surface(&mut self, j: usize) {
-        if !self.is_named(j) {
+        if !self.is_named(j) && !self.is_only_trigger(j) {
             let zero = zero_from_here(&self.system.surface_name(j));
             self.warnings.push(Warning {
                 t: self.t,

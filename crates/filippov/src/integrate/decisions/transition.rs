@@ -377,6 +377,9 @@ impl Integrator<'_> {
 
     pub(in crate::integrate) fn record(&mut self, before: Mode, after: Mode, surfaces: &[usize]) {
         let kind = Kind::between(&before, &after);
+        if kind == Kind::Crossing && !self.actions.list.is_empty() {
+            self.warn_against_direction(&before, &after, surfaces);
+        }
         self.recorder.switch(Switch {
             t: self.t,
             y_before: SmallVec::from_slice(&self.x),

@@ -1,0 +1,84 @@
+//! Warnings about the side from which an action is triggered.
+
+use crate::error::FieldError;
+use crate::integrate::integrator::Integrator;
+use crate::integrate::{Warning, WarningCode};
+use crate::mode::Mode;
+use crate::switching::first_nonzero;
+
+impl Integrator<'_> {
+    /// Warns of triggers that the motion crosses without an action, since their direction is the other one.
+    #[cold]
+    pub(in crate::integrate) fn warn_against_direction(
+        &mut self,
+        before: &Mode,
+        after: &Mode,
+        surfaces: &[usize],
+    ) {
+        for &j in surfaces {
+            let side = before.entries()[j];
+            let is_crossed = side != 0 && after.entries()[j] == -side;
+            if !is_crossed || !self.is_only_trigger(j) || self.follows_law(j) {
+                continue;
+            }
+            if self.triggered_at(j, side).next().is_some() {
+                continue;
+            }
+            let text = format!(
+                "the motion crosses {} = 0 against the direction of the reset {}, which does not happen there; with \
+                 direction=\"both\" it does",
+                self.system.surface_name(j),
+                self.action_name(j)
+            );
+            self.warn_once(WarningCode::AgainstDirection, text);
+        }
+    }
+
+    /// Warns of a start on a trigger without a direction, unless the velocity leads off to the side taken. `mode` has the side
+    /// that was taken.
+    pub(in crate::integrate) fn warn_unknown_side(
+        &mut self,
+        j: usize,
+        mode: &Mode,
+    ) -> Result<(), FieldError> {
+        let has_direction = self.actions.at_surface(j).is_none_or(|(_, d)| d != 0);
+        if has_direction || self.follows_law(j) {
+            return Ok(());
+        }
+        let side = mode.entries()[j];
+        let leading = first_nonzero(self.system, j, side, 0, self.t, &self.x, &mode.signs())?;
+        let leads_off = leading.order == 1
+            && leading.sign() == side
+            && !self.is_slow(j, leading.value, mode)?;
+        if !leads_off {
+            let text = format!(
+                "the run starts on {} = 0, and the reset {} has no direction: the start counts as on the side where the \
+                 function of the reset is positive, as with direction=\"down\"; direction=\"up\" is the other side",
+                self.system.surface_name(j),
+                self.action_name(j)
+            );
+            self.warn_once(WarningCode::UnknownSide, text);
+        }
+        Ok(())
+    }
+
+    fn action_name(&self, j: usize) -> &str {
+        let found = self.actions.at_surface(j);
+        found.map_or("", |(action, _)| &action.name)
+    }
+
+    fn warn_once(&mut self, code: WarningCode, text: String) {
+        if !self
+            .warnings
+            .iter()
+            .any(|w| w.code == code && w.text == text)
+        {
+            self.warnings.push(Warning {
+                t: self.t,
+                code,
+                text,
+                candidates: Vec::new(),
+            });
+        }
+    }
+}
