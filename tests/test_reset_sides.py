@@ -171,6 +171,7 @@ def test_two_resets_of_one_surface_are_a_wall_with_two_faces():
         assert np.abs(sol.y[:, -1]).max() < 1e-12
 
 
+@pytest.mark.filterwarnings("ignore:unknown_side:filippov.FilippovWarning")
 @pytest.mark.parametrize("push", [-1.0, 0.0, 1.0])
 @pytest.mark.parametrize("function", [lambda t, x: x[0], lambda t, x: -x[0]])
 def test_a_start_on_the_surface_without_velocity_counts_as_on_the_positive_side(push, function):
@@ -191,6 +192,7 @@ def test_a_start_on_the_surface_without_velocity_counts_as_on_the_positive_side(
     assert other.warnings == []
 
 
+@pytest.mark.filterwarnings("ignore:unknown_side:filippov.FilippovWarning")
 def test_a_start_on_the_surface_with_a_velocity():
     def free(t, x):
         return [x[1], 0.0]
@@ -204,6 +206,7 @@ def test_a_start_on_the_surface_with_a_velocity():
     assert [warning.code for warning in hits.warnings] == ["unknown_side"]
 
 
+@pytest.mark.filterwarnings("ignore:against_direction:filippov.FilippovWarning")
 def test_a_reset_that_is_passed_against_its_direction_is_named():
     sol = fl.solve_ivp(rise, (0, 2), [0.0, 0.0], resets=wall(direction="down"))
     assert sol.switches.kind.tolist() == ["crossing"]
@@ -212,13 +215,43 @@ def test_a_reset_that_is_passed_against_its_direction_is_named():
     assert sol.warnings[0].t == pytest.approx(1.0)
 
 
-def test_a_reset_that_is_passed_often_against_its_direction_is_named_once():
-    lap = fl.Reset(lambda t, x: x[0], lambda t, x: [x[0], x[1], x[2] + 1.0], direction="up", name="lap")
-    sol = fl.solve_ivp(lambda t, x: [x[1], -x[0], 0.0], (0, 30), [1.0, 0.0, 0.0], resets=lap)
-    assert (sol.switches.kind == "crossing").sum() > 3
+@pytest.mark.filterwarnings("ignore:against_direction:filippov.FilippovWarning")
+def test_a_threshold_that_moves_the_state_back_is_named_too():
+    spike = fl.Reset(lambda t, x: x[0] - 1.0, lambda t, x: [0.0], direction="down", name="spike")
+    sol = fl.solve_ivp(lambda t, x: [1.0], (0, 2), [0.0], resets=spike)
     assert [warning.code for warning in sol.warnings] == ["against_direction"]
 
 
+@pytest.mark.filterwarnings("ignore:against_direction:filippov.FilippovWarning")
+def test_a_wall_that_is_passed_often_is_named_once():
+    turns = fl.Reset(lambda t, x: x[0], lambda t, x: [x[0], -x[1]], direction="down", name="wall")
+    back = fl.Reset(period=2.0, phase=0.5, map=lambda t, x: [-1.0, 1.0])
+    sol = fl.solve_ivp(lambda t, x: [x[1], 0.0], (0, 9), [-1.0, 1.0], resets=[turns, back])
+    assert (sol.switches.kind == "crossing").sum() == 2
+    assert [warning.code for warning in sol.warnings] == ["against_direction"]
+
+
+@pytest.mark.parametrize("direction", ["up", "down"])
+def test_counts_and_thresholds_that_let_the_motion_pass_are_not_named(direction):
+    lap = fl.Reset(lambda t, x: x[0], lambda t, x: [x[0], x[1], x[2] + 1.0], direction=direction, name="lap")
+    sol = fl.solve_ivp(lambda t, x: [x[1], -x[0], 0.0], (0, 30), [1.0, 0.0, 0.0], resets=lap)
+    assert (sol.switches.kind == "crossing").sum() > 3
+    assert sol.warnings == []
+
+
+def test_a_map_that_fails_where_it_is_not_asked_for_does_no_harm():
+    def fails(t, x):
+        if t > 0.5:
+            raise RuntimeError("not asked for")
+        return [float(x[0]), float(x[1])]
+
+    wall = fl.Reset(lambda t, x: x[0] - 0.5, fails, direction="down")
+    sol = fl.solve_ivp(rise, (0, 2), [0.0, 0.0], resets=wall)
+    assert sol.success
+    assert sol.switches.kind.tolist() == ["crossing"]
+
+
+@pytest.mark.filterwarnings("ignore:unknown_side:filippov.FilippovWarning")
 def test_the_side_travels_with_a_pickled_system():
     system = fl.System(rise, n=2, resets=wall(function=lambda t, x: 0.5 - x[0]))
     copy = pickle.loads(pickle.dumps(system))

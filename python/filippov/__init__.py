@@ -19,6 +19,7 @@ from filippov.classification import Classification
 from filippov.decorator import system
 from filippov.errors import (
     FilippovError,
+    FilippovWarning,
     InputError,
     Interrupted,
     IntersectionError,
@@ -98,6 +99,7 @@ __all__ = [
     "Ensemble",
     "Event",
     "FilippovError",
+    "FilippovWarning",
     "HiddenDynamics",
     "Hysteresis",
     "InputError",

@@ -61,8 +61,8 @@ class Reset:
 
     Without a direction, a run that starts on ``h = 0`` counts as on the side ``h >= 0``; unless its velocity
     leads off to ``h > 0``, the warning ``"unknown_side"`` asks for the direction. With a direction, a motion
-    that crosses the surface against it is not reset: the switch is a crossing, and the warning
-    ``"against_direction"`` names it.
+    that crosses the surface against it is not reset: the switch is a crossing, and where the reset would have
+    turned the motion back, the warning ``"against_direction"`` names it.
 
     Several resets at one instant are done in the order in which they are given, then those that the jump
     triggers; see ``docs/theory/order_of_outcomes.md``.

@@ -97,12 +97,26 @@ class RunWarning(NamedTuple):
         What was found, in words.
     candidates : tuple of Mode
         For ``"non_unique"`` all modes in which a solution goes on, the chosen one first; else empty.
+    surfaces : tuple of str
+        The printed switching functions that it is about; empty if it is about the motion.
     """
 
     t: float
     code: str
     message: str
     candidates: tuple[Mode, ...] = ()
+    surfaces: tuple[str, ...] = ()
+
+    @classmethod
+    def from_row(
+        cls,
+        row: tuple[float, str, str, list[tuple[int, ...]], list[int]],
+        names: tuple[str, ...],
+    ) -> RunWarning:
+        """Return a warning of the core; `names` are the printed switching functions."""
+        t, code, message, candidates, surfaces = row
+        own = tuple(names[j] for j in surfaces if j < len(names))  # laws have further ones, without a name
+        return cls(t, code, message, tuple(Mode(mode) for mode in candidates), own)
 
     def __str__(self) -> str:
         return f"t = {self.t:.10g}: {self.message} [{self.code}]"

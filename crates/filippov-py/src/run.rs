@@ -35,7 +35,13 @@ type SegmentRow<'py> = (
     Vector<'py>,
 );
 
-type WarningRow<'py> = (f64, &'static str, String, Vec<Bound<'py, PyTuple>>);
+type WarningRow<'py> = (
+    f64,
+    &'static str,
+    String,
+    Vec<Bound<'py, PyTuple>>,
+    Vec<usize>,
+);
 
 /// What a run computed.
 #[pyclass(frozen, module = "filippov._core")]
@@ -330,13 +336,19 @@ impl Run {
     }
 
     #[getter]
+    fn n_warnings(&self) -> usize {
+        self.solution().warnings.len()
+    }
+
+    #[getter]
     fn warnings<'py>(&self, py: Python<'py>) -> PyResult<Vec<WarningRow<'py>>> {
         self.solution()
             .warnings
             .iter()
             .map(|w| {
                 let candidates = self.modes(py, &w.candidates)?;
-                Ok((w.t, w.code.name(), w.text.clone(), candidates))
+                let surfaces = w.surfaces.clone();
+                Ok((w.t, w.code.name(), w.text.clone(), candidates, surfaces))
             })
             .collect()
     }

@@ -238,6 +238,8 @@ pub(super) struct Motion<'a> {
     /// The side of every surface on which the motion is; where its entry is 0, that on which it was last: the side
     /// of a contact.
     pub sides: SmallVec<[i8; 16]>,
+    /// Triggers that were crossed against their direction so far.
+    pub passed: Vec<usize>,
     /// The discrete states.
     pub discrete: Vec<f64>,
 }
@@ -271,6 +273,7 @@ impl<'a> Motion<'a> {
             meets_kinks: false,
             actions,
             sides: actions.sides_at_start(signs.len()).collect(),
+            passed: Vec::new(),
             discrete: actions.discrete.clone(),
             signs,
             mode,

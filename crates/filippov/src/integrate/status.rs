@@ -280,6 +280,23 @@ pub enum WarningCode {
 }
 
 impl WarningCode {
+    /// All kinds, in an order that is part of the format of sweeps: only added to at the end.
+    pub const ALL: [WarningCode; 8] = [
+        WarningCode::NonUnique,
+        WarningCode::UndeclaredJump,
+        WarningCode::NoSeries,
+        WarningCode::Stiff,
+        WarningCode::Oscillation,
+        WarningCode::ZeroSurface,
+        WarningCode::AgainstDirection,
+        WarningCode::UnknownSide,
+    ];
+
+    /// The bit that stands for this kind in a set of kinds: that of its place among [`ALL`](Self::ALL).
+    pub fn bit(self) -> i32 {
+        1 << self as i32
+    }
+
     /// A stable name.
     pub fn name(self) -> &'static str {
         match self {
@@ -306,4 +323,6 @@ pub struct Warning {
     pub text: String,
     /// At a non-unique point: all continuations, the chosen one first.
     pub candidates: Vec<Mode>,
+    /// The surfaces that it is about; none where it is about the motion.
+    pub surfaces: Vec<usize>,
 }

@@ -7,7 +7,9 @@ use crate::mode::Mode;
 use crate::switching::first_nonzero;
 
 impl Integrator<'_> {
-    /// Warns of triggers that the motion crosses without an action, since their direction is the other one.
+    /// Warns of triggers that the motion crosses without an action, since their direction is the other one, where the
+    /// action would have kept it on its side: a wall that is passed from behind. A count, or a relay with two
+    /// thresholds, is crossed either way. Each trigger is looked at once.
     #[cold]
     pub(in crate::integrate) fn warn_against_direction(
         &mut self,
@@ -21,17 +23,40 @@ impl Integrator<'_> {
             if !is_crossed || !self.is_only_trigger(j) || self.follows_law(j) {
                 continue;
             }
-            if self.triggered_at(j, side).next().is_some() {
+            let is_triggered = self.triggered_at(j, side).next().is_some();
+            if is_triggered || self.motion.passed.contains(&j) {
                 continue;
             }
-            let text = format!(
-                "the motion crosses {} = 0 against the direction of the reset {}, which does not happen there; with \
-                 direction=\"both\" it does",
-                self.system.surface_name(j),
-                self.action_name(j)
-            );
-            self.warn_once(WarningCode::AgainstDirection, text);
+            self.motion.passed.push(j);
+            // A map that fails here was not asked for.
+            if self.would_turn_back(j, before).unwrap_or(false) {
+                let text = format!(
+                    "the motion crosses {} = 0 against the direction of the reset {}, which does not happen there; \
+                     with direction=\"both\" it does",
+                    self.system.surface_name(j),
+                    self.action_name(j)
+                );
+                self.warn(WarningCode::AgainstDirection, j, text);
+            }
         }
+    }
+
+    /// Would the action at surface `j`, on which the point lies, leave the motion on the side of the mode?
+    fn would_turn_back(&self, j: usize, mode: &Mode) -> Result<bool, FieldError> {
+        let (side, signs) = (mode.entries()[j], mode.signs());
+        let Some(action) = self.actions.from_side(j, side) else {
+            return Ok(false);
+        };
+        let (mut x, mut q) = (self.x.clone(), self.motion.discrete.clone());
+        action.map.apply(self.t, &mut x, &signs, &mut q)?;
+        let mut h = vec![0.0; signs.len()];
+        self.system.surfaces(self.t, &x, &signs, &mut h)?;
+        if !self.leaves_point_alone(j, &signs)? {
+            return Ok(h[j] * f64::from(side) > 0.0);
+        }
+        let mut row = vec![0.0; x.len()];
+        let rate = self.system.rate_gradient(j, self.t, &x, &signs, &mut row)?;
+        Ok(rate.rate * f64::from(side) > 0.0)
     }
 
     /// Warns of a start on a trigger without a direction, unless the velocity leads off to the side taken. `mode` has the side
@@ -57,7 +82,7 @@ impl Integrator<'_> {
                 self.system.surface_name(j),
                 self.action_name(j)
             );
-            self.warn_once(WarningCode::UnknownSide, text);
+            self.warn(WarningCode::UnknownSide, j, text);
         }
         Ok(())
     }
@@ -67,18 +92,13 @@ impl Integrator<'_> {
         found.map_or("", |(action, _)| &action.name)
     }
 
-    fn warn_once(&mut self, code: WarningCode, text: String) {
-        if !self
-            .warnings
-            .iter()
-            .any(|w| w.code == code && w.text == text)
-        {
-            self.warnings.push(Warning {
-                t: self.t,
-                code,
-                text,
-                candidates: Vec::new(),
-            });
-        }
+    fn warn(&mut self, code: WarningCode, j: usize, text: String) {
+        self.warnings.push(Warning {
+            t: self.t,
+            code,
+            text,
+            candidates: Vec::new(),
+            surfaces: vec![j],
+        });
     }
 }

@@ -169,6 +169,7 @@ impl Integrator<'_> {
             code: WarningCode::NonUnique,
             text,
             candidates,
+            surfaces: surfaces.to_vec(),
         });
     }
 }

@@ -203,7 +203,11 @@ impl Integrator<'_> {
     }
 
     /// Does the action at surface `j` leave h_j as it is, as an impact does? It does not move bodies, but their velocities.
-    fn leaves_point_alone(&self, j: usize, signs: &[f64]) -> Result<bool, FieldError> {
+    pub(in crate::integrate) fn leaves_point_alone(
+        &self,
+        j: usize,
+        signs: &[f64],
+    ) -> Result<bool, FieldError> {
         let Some((action, _)) = self.actions.at_surface(j) else {
             return Ok(false);
         };

@@ -73,6 +73,7 @@ impl Integrator<'_> {
                 code: WarningCode::ZeroSurface,
                 text: format!("{zero}: its sign means nothing, and that of the mode is taken"),
                 candidates: Vec::new(),
+                surfaces: vec![j],
             });
         }
     }

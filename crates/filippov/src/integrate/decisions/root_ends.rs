@@ -72,8 +72,8 @@ impl Integrator<'_> {
         if !field.oscillates() {
             return;
         }
-        let names = field
-            .set()
+        let surfaces = field.set().to_vec();
+        let names = surfaces
             .iter()
             .map(|&j| self.system.surface_name(j) + " = 0");
         let names: Vec<String> = names.collect();
@@ -86,6 +86,7 @@ impl Integrator<'_> {
                 names.join(", ")
             ),
             candidates: Vec::new(),
+            surfaces,
         });
     }
 }

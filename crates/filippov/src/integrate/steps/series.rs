@@ -95,6 +95,7 @@ impl Integrator<'_> {
             code: WarningCode::NoSeries,
             text,
             candidates: Vec::new(),
+            surfaces: Vec::new(),
         });
     }
 

@@ -90,6 +90,7 @@ impl Integrator<'_> {
             code: WarningCode::Stiff,
             text,
             candidates: Vec::new(),
+            surfaces: Vec::new(),
         });
         Ok(false)
     }
