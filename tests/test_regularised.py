@@ -57,6 +57,7 @@ def loses_its_root(run: Any) -> bool:
     )
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 def test_many_regularised_motions() -> None:
     """All of 200 systems approach the solution: 197 at the rate of the width from 1e-3 on, 199 from 1e-4 on.
 
@@ -86,6 +87,7 @@ def test_many_regularised_motions() -> None:
     assert sliding[2] >= 60
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 @pytest.mark.parametrize(("seed", "limit"), [(37, 30.3), (52, 26.6)])
 def test_exceptions_at_the_coarsest_width_are_regular_at_finer_ones(seed: int, limit: float) -> None:
     case = random_case(seed)

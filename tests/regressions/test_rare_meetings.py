@@ -82,6 +82,7 @@ def test_two_fold_does_not_lead_to_the_wrong_side() -> None:
     assert sol.t[-1] == pytest.approx(2.0, abs=1e-6)
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 def test_decision_on_three_surfaces_is_quick() -> None:
     rows = [(1.18, 0.57), (0.88, 0.82), (-0.92, 0.17)]
     values = [(4, 4), (8, 4), (2, -4), (2, 4), (2, 6), (-2, -2), (-4, -2), (-4, -2)]

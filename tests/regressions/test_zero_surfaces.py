@@ -22,6 +22,8 @@ FUNCTIONS: dict[str, Callable[[Any], Any]] = {
 }
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
+@pytest.mark.filterwarnings("ignore:zero_surface:filippov.FilippovWarning")
 @pytest.mark.parametrize("speed", [1.0, -1.0])
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_a_function_that_vanishes_in_a_region_is_named(name: str, speed: float) -> None:
@@ -38,6 +40,8 @@ def test_a_function_that_vanishes_in_a_region_is_named(name: str, speed: float) 
     assert any(surface in warning.message for warning in named for surface in outer)
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
+@pytest.mark.filterwarnings("ignore:zero_surface:filippov.FilippovWarning")
 def test_a_dead_zone_around_the_start() -> None:
     sol = fl.solve_ivp(
         lambda t, x: [np.cos(t), np.sign(np.where(abs(x[0]) > 0.5, x[0], 0.0))], (0.0, 6.0), [0.0, 0.0]
@@ -47,6 +51,7 @@ def test_a_dead_zone_around_the_start() -> None:
     np.testing.assert_allclose(sol.switches.t, np.pi * np.array([1, 5, 6, 7, 11]) / 6, rtol=0, atol=1e-6)
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 def test_a_warning_about_one_surface_does_not_silence_another_whose_name_it_contains() -> None:
     def f(t: float, x: Any) -> Any:
         return [0.0, 1.0, np.sign(x[0] - 0.5), np.sign(x[0])]
