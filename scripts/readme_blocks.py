@@ -3,7 +3,8 @@
 Usage: ``python scripts/readme_blocks.py README.md docs/images``; files that the blocks write go to the folder
 that is the second argument. A block that stands below a comment ``<!-- not run -->`` is left out. A block of
 ``text`` right below a Python block is what that prints: another output is an error. With ``--fill`` it is
-written into the page instead.
+written into the page instead. A comment ``<!-- warns: CODE, ... -->`` above a block names the warnings of
+runs that it shows: others, or none, are an error.
 """
 
 from __future__ import annotations
@@ -12,22 +13,25 @@ import contextlib
 import io
 import re
 import sys
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
 _BLOCK = re.compile(
-    r"(?P<skip><!-- not run -->\n)?^```python\n(?P<code>.*?)^```$(\n\n^```text\n(?P<output>.*?)^```$)?",
+    r"(?P<skip><!-- not run -->\n)?(<!-- warns: (?P<warns>[a-z_, ]+) -->\n)?"
+    r"^```python\n(?P<code>.*?)^```$(\n\n^```text\n(?P<output>.*?)^```$)?",
     re.MULTILINE | re.DOTALL,
 )
 
 
 class Block(NamedTuple):
-    """A piece of code with the line of the page where it starts, and what it is said to print."""
+    """A piece of code: the line of the page where it starts, what it is said to print and to warn of."""
 
     line: int
     code: str
     output: str | None
+    warns: set[str]
 
 
 def blocks(page: Path) -> Iterator[Block]:
@@ -35,7 +39,9 @@ def blocks(page: Path) -> Iterator[Block]:
     text = page.read_text(encoding="utf-8")
     for match in _BLOCK.finditer(text):
         if not match["skip"]:
-            yield Block(text.count("\n", 0, match.start("code")) + 1, match["code"], match["output"])
+            line = text.count("\n", 0, match.start("code")) + 1
+            warns = set(match["warns"].split(", ")) if match["warns"] else set()
+            yield Block(line, match["code"], match["output"], warns)
 
 
 def run_blocks(page: Path, folder: Path) -> dict[str, Any]:
@@ -65,13 +71,38 @@ def fill_outputs(page: Path, folder: Path) -> None:
 
 def _outputs(page: Path, folder: Path, names: dict[str, Any]) -> Iterator[tuple[Block, str]]:
     """Run the blocks one after the other; yield each with what it printed."""
-    for block in list(blocks(page)):
-        printed = io.StringIO()
-        # Blank lines in front make a traceback point into the page.
-        code = compile("\n" * (block.line - 1) + block.code, str(page), "exec")
-        with _chdir(folder), contextlib.redirect_stdout(printed):
-            exec(code, names)
-        yield block, printed.getvalue()
+    with _warnings_of_runs() as warned:
+        for block in list(blocks(page)):
+            printed = io.StringIO()
+            warned.clear()
+            # Blank lines in front make a traceback point into the page.
+            code = compile("\n" * (block.line - 1) + block.code, str(page), "exec")
+            with _chdir(folder), contextlib.redirect_stdout(printed):
+                exec(code, names)
+            found = {code for warning in warned for code in warning.code.split(", ")}
+            if found != block.warns:
+                raise AssertionError(f"{page}, line {block.line}: the block warns of {sorted(found)}")
+            yield block, printed.getvalue()
+
+
+@contextlib.contextmanager
+def _warnings_of_runs() -> Iterator[list[Any]]:
+    """Collect the warnings of runs, as often as they are shown; filters of a page hold until its end."""
+    from filippov import FilippovWarning
+
+    found: list[Any] = []
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", FilippovWarning)
+        show = warnings.showwarning
+
+        def note(message: Any, category: type[Warning], *where: Any, **more: Any) -> None:
+            if issubclass(category, FilippovWarning):
+                found.append(message)
+            else:
+                show(message, category, *where, **more)
+
+        warnings.showwarning = note
+        yield found
 
 
 def _plain(text: str) -> str:

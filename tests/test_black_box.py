@@ -122,6 +122,7 @@ def test_moving_surface() -> None:
     assert sol.sol.multipliers(3.0)[0] == pytest.approx(-math.cos(3.0) / 2, abs=1e-7)
 
 
+@pytest.mark.filterwarnings("ignore:undeclared_jump:filippov.FilippovWarning")
 @pytest.mark.parametrize("height", [0.5, 1.0, 30.0])
 def test_undeclared_jump_in_time_is_noticed(height: float) -> None:
     def field(t: float, x: Any) -> Any:
@@ -135,6 +136,7 @@ def test_undeclared_jump_in_time_is_noticed(height: float) -> None:
     assert "surfaces" in warning.message
 
 
+@pytest.mark.filterwarnings("ignore:undeclared_jump:filippov.FilippovWarning")
 def test_undeclared_jump_in_the_state_is_noticed() -> None:
     def field(t: float, x: Any) -> Any:
         return [1.0 if float(x[0]) < 0.7 else 3.0]

@@ -42,6 +42,7 @@ def test_balanced_start_on_an_intersection(d: int) -> None:
     assert all(set(np.abs(end)) == {1.0} for end in ends)
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 def test_solution_returned_is_the_regularised_one() -> None:
     sol = fl.solve_ivp(two_fold, (0, 2), [0.0, -1.0], nonunique="branch")
     usual = fl.solve_ivp(two_fold, (0, 2), [0.0, -1.0])
@@ -111,6 +112,7 @@ def test_tree_of_two_points_in_a_row() -> None:
     assert {id(leaf) for leaf in leaves} == {id(path) for path in sol.branches.paths()}
 
 
+@pytest.mark.filterwarnings("ignore:max_branches:filippov.FilippovWarning")
 def test_bound_is_told() -> None:
     sol = fl.solve_ivp(away, (0, 1), np.zeros(3), nonunique="branch", max_branches=3)
     assert sol.branches is not None
@@ -189,6 +191,8 @@ def switching_cases() -> list[dict[str, Any]]:
     return [case for case in cases if case["situation"] == "codim1-enter" and case.get("expected")]
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
+@pytest.mark.filterwarnings("ignore:oscillation:filippov.FilippovWarning")
 @pytest.mark.parametrize("case", switching_cases(), ids=lambda case: case["id"])
 def test_candidates_of_entries_are_the_admissible_modes(case: dict[str, Any]) -> None:
     fields = {tuple(int(s) for s in k.split(",")): [*f, 0.0] for k, f in case["fields"].items()}

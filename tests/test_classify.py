@@ -78,6 +78,7 @@ def test_normal_components_have_one_axis_per_surface() -> None:
         point.normal_components[0] = 0.0
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 def test_start_on_an_intersection_goes_on_as_classified() -> None:
     """200 random sets of fields: mode, multipliers and uniqueness are those of a run that starts there."""
     rng = np.random.default_rng(3)

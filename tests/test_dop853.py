@@ -79,6 +79,7 @@ def test_powers_at_their_surface() -> None:
     np.testing.assert_allclose(sol.switches.t, other.switches.t, rtol=0, atol=1e-8)
 
 
+@pytest.mark.filterwarnings("ignore:undeclared_jump:filippov.FilippovWarning")
 def test_an_undeclared_jump_of_a_black_box_is_noticed() -> None:
     def called(t: float, x: Any) -> Any:
         return [-float(x[0]) + (1.0 if float(t) > 0.7 else 0.0)]
@@ -89,6 +90,7 @@ def test_an_undeclared_jump_of_a_black_box_is_noticed() -> None:
     assert warning.t == pytest.approx(0.7, abs=1e-2)
 
 
+@pytest.mark.filterwarnings("ignore:stiff:filippov.FilippovWarning")
 def test_stiffness_is_noticed() -> None:
     sol = fl.solve_ivp(
         lambda t, x: [-1e4 * (x[0] - np.sin(t)) + 0.1 * np.sign(x[0] - 5.0)], (0, 3), [0.0], method="DOP853"

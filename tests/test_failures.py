@@ -256,6 +256,7 @@ def test_t_eval_up_to_the_failure() -> None:
     assert sol.y.shape == (1, len(sol.t))
 
 
+@pytest.mark.filterwarnings("ignore:undeclared_jump:filippov.FilippovWarning")
 def test_chatter_along_an_undeclared_surface_ends_the_run() -> None:
     def force(t: float, x: Any) -> list[float]:
         return [math.cos(t) - (2.0 if float(x[0]) > 0.5 else -2.0)]
@@ -271,6 +272,7 @@ def test_chatter_along_an_undeclared_surface_ends_the_run() -> None:
     assert np.abs(sol.y[0, sol.t > 0.49] - 0.5).max() < 1e-3
 
 
+@pytest.mark.filterwarnings("ignore:undeclared_jump:filippov.FilippovWarning")
 def test_friction_in_two_directions_does_not_run_for_ever() -> None:
     """Its force jumps at a point of codimension two, which no switching function describes."""
 

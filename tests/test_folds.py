@@ -31,6 +31,7 @@ def test_after_a_fold_of_three_surfaces_the_motion_leaves_as_the_regularised_one
 
 
 # At a fold the regularised motion is late by eps^(2/3): a factor of 0.22 for a tenth of the width.
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 @pytest.mark.parametrize("seed", [26, 36, 73, 153, 182, 304, 377, 420, 509, 526, 672, 697, 887, 1110, 1361])
 def test_folds_are_left_as_by_the_regularised_motion(seed: int) -> None:
     case = random_products(seed)
@@ -41,6 +42,8 @@ def test_folds_are_left_as_by_the_regularised_motion(seed: int) -> None:
     assert fine < 5e-3
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
+@pytest.mark.filterwarnings("ignore:oscillation:filippov.FilippovWarning")
 def test_random_products_are_decided() -> None:
     """All of 120 systems with two to four surfaces; six ended undecided while folds were not followed."""
     for seed in range(120):
@@ -67,6 +70,8 @@ def hopf(t: float, x: Any) -> Any:
     return [-s[i] - b * s[(i + 1) % 3] - 0.5 * s[0] * s[1] * s[2] for i in range(3)]
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
+@pytest.mark.filterwarnings("ignore:oscillation:filippov.FilippovWarning")
 def test_where_stability_is_lost_to_a_small_oscillation_sliding_goes_on_with_a_warning() -> None:
     case = random_products(752)
     sol = case.system().solve((0.0, T_END), case.y0, rtol=1e-8, atol=1e-9)
@@ -79,6 +84,8 @@ def test_where_stability_is_lost_to_a_small_oscillation_sliding_goes_on_with_a_w
     np.testing.assert_allclose(sol.y[:, -1], [2.4009, -1.3312, 0.0], rtol=0, atol=2e-4)
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
+@pytest.mark.filterwarnings("ignore:oscillation:filippov.FilippovWarning")
 @pytest.mark.parametrize("method", ["Taylor", "DOPRI5"])
 @pytest.mark.parametrize("kappa", [None, (1.0, 1.0, 1.0), (1.0, 4.0, 0.25)])
 def test_stability_is_that_of_the_scaling_asked_for(kappa: tuple[float, ...] | None, method: str) -> None:

@@ -81,6 +81,9 @@ def test_errors_of_long_steps_are_told_from_wrong_motions() -> None:
     assert any("off the field's" in found for found in violations(wrong, sol))
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
+@pytest.mark.filterwarnings("ignore:stiff:filippov.FilippovWarning")
+@pytest.mark.filterwarnings("ignore:undeclared_jump:filippov.FilippovWarning")
 @pytest.mark.parametrize(
     ("seed", "what"),
     [
@@ -93,6 +96,7 @@ def test_what_is_said_or_no_larger_than_errors_is_no_violation(seed: int, what: 
     assert not check(random_case(seed))[1], what
 
 
+@pytest.mark.filterwarnings("ignore:undeclared_jump:filippov.FilippovWarning")
 def test_multipliers_are_known_away_from_two_folds() -> None:
     problem = build(random_case(632498).source)
     sol = problem.solve()

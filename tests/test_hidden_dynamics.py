@@ -30,6 +30,8 @@ def of_case(case: dict[str, Any]) -> fl.System:
     return constant({tuple(map(int, key.split(","))): field for key, field in case["fields"].items()})
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
+@pytest.mark.filterwarnings("ignore:oscillation:filippov.FilippovWarning")
 def test_scaling_decides_as_in_the_table() -> None:
     """Motions that slide onto the intersection, for all scalings of the table."""
     runs = changes = 0

@@ -50,6 +50,7 @@ def test_the_cases_slide_on_both_surfaces() -> None:
     assert sum("accumulation" in run.switches.kind for run in runs) >= 1
 
 
+@pytest.mark.filterwarnings("ignore:oscillation:filippov.FilippovWarning")
 @pytest.mark.parametrize(("order", "signs", "factors"), CHANGES)
 def test_same_motion_with_other_surfaces(
     order: tuple[int, int], signs: tuple[int, int], factors: tuple[float, float]

@@ -47,6 +47,7 @@ def changed(event: reference.Event) -> tuple[int, ...]:
     return tuple(j for j, (before, after) in enumerate(pairs) if before != after)
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 @pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-10, 1e-12])
 @pytest.mark.parametrize("name", CASES)
 def test_itinerary(name: str, rtol: float) -> None:
@@ -61,6 +62,7 @@ def test_itinerary(name: str, rtol: float) -> None:
     ]
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 @pytest.mark.parametrize("name", CASES)
 def test_times_states_and_multipliers(name: str) -> None:
     run, sol = solve(name)

@@ -197,6 +197,7 @@ def test_a_touch_is_no_reset_and_no_crossing():
     assert sol.y[0, -1] == pytest.approx(1.0, abs=1e-9)
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 def test_a_field_at_rest_on_the_surface_is_a_solution_of_its_own():
     rest = lambda above: fl.solve_ivp(lambda t, x: [np.where(x[0] > 0, above(t), x[0])], (0, 1), [0.0])  # noqa: E731
     pressed = rest(lambda t: -1.0)
@@ -278,6 +279,8 @@ def test_resets_without_end_are_jumped_to_their_limit_or_named():
     assert fl.solve_ivp(ball, (0, 20), [1.0, 0.0], resets=down).switches.kind[-1] == "accumulation"
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
+@pytest.mark.filterwarnings("ignore:zero_surface:filippov.FilippovWarning")
 @pytest.mark.parametrize(
     ("fun", "start", "name"),
     [
@@ -294,6 +297,7 @@ def test_a_function_that_is_zero_all_along_is_named_in_a_warning(fun, start, nam
     assert len(sol.switches) < 50
 
 
+@pytest.mark.filterwarnings("ignore:zero_surface:filippov.FilippovWarning")
 def test_a_motion_that_leaves_a_surface_slower_than_can_be_seen_at_its_start_is_followed():
     for side in (-1.0, 1.0):
         slow = lambda t, x, side=side: [side * 9 * t**8, abs(x[0])]  # noqa: E731

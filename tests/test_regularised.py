@@ -95,6 +95,7 @@ def test_regularised_motions_of_many_systems(seeds: Sequence[int], least: int) -
     assert sliding[2] >= 6 * least
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 @pytest.mark.parametrize(("seed", "limit"), [(37, 30.3), (52, 26.6)])
 def test_exceptions_at_the_coarsest_width_are_regular_at_finer_ones(seed: int, limit: float) -> None:
     case = random_case(seed)

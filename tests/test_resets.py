@@ -42,6 +42,7 @@ def test_the_time_of_rest_is_that_of_the_series_for_any_restitution(e):
     assert abs(sol.switches[-1].t - rest) < 1e-9 * rest
 
 
+@pytest.mark.filterwarnings("ignore:unknown_side:filippov.FilippovWarning")
 def test_a_ball_on_a_moving_table_lifts_off_and_lands_where_the_closed_form_says():
     a, w = 0.2, 10.0
 
@@ -234,6 +235,7 @@ def test_systems_with_resets_travel():
         assert abs(sol.switches[-1].t - math.sqrt(2 / G) * (1 + e) / (1 - e)) < 1e-8
 
 
+@pytest.mark.filterwarnings("ignore:unknown_side:filippov.FilippovWarning")
 def test_balls_at_rest_pass_an_impulse_on():
     def balls(t, x):
         return [x[3], x[4], x[5], 0.0, 0.0, 0.0]

@@ -57,6 +57,7 @@ def test_stiff_relay_against_radau(tolerance: float) -> None:
     np.testing.assert_allclose(sol.y[:, -1], end, rtol=0, atol=100 * tolerance)
 
 
+@pytest.mark.filterwarnings("ignore:stiff:filippov.FilippovWarning")
 @pytest.mark.slow
 def test_a_fiftieth_of_the_evaluations_of_dopri5_and_the_same_switches() -> None:
     implicit = fl.solve_ivp(relaxation, (0, T_END), START, method="Rodas5P", rtol=1e-6, atol=1e-9)
@@ -109,6 +110,7 @@ def two_stiff_bodies(t: float, x: Any) -> Any:
     ]
 
 
+@pytest.mark.filterwarnings("ignore:stiff:filippov.FilippovWarning")
 @pytest.mark.parametrize("entangled", [False, True])
 def test_stiff_sliding_on_an_intersection(entangled: bool) -> None:
     """Exact derivatives where the field is affine in the signs and where the signs multiply one another."""
@@ -194,6 +196,7 @@ def test_where_derivatives_are_infinite_dopri5_takes_the_step() -> None:
     np.testing.assert_allclose(sol.y[:, -1], other.y[:, -1], rtol=1e-6)
 
 
+@pytest.mark.filterwarnings("ignore:stiff:filippov.FilippovWarning")
 def test_impacts_and_rest_on_a_stiff_system() -> None:
     """A ball bounces to rest on the ground while a sensor follows it fast."""
     bounce = fl.Reset(lambda t, x: x[0], lambda t, x: [0.0, -0.5 * x[1], x[2]])

@@ -331,6 +331,7 @@ def test_unknown_rule_is_refused() -> None:
         fl.solve_ivp(lambda t, x: -np.sign(x), (0, 1), [1.0], sliding="utkin")
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 @pytest.mark.parametrize(
     ("sliding", "m", "reason"),
     [

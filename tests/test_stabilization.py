@@ -92,6 +92,7 @@ def test_series_know_nothing_of_the_term() -> None:
     assert [warning.code for warning in named.warnings] == ["no_series"]
 
 
+@pytest.mark.filterwarnings("ignore:stiff:filippov.FilippovWarning")
 def test_a_large_factor_is_stiff() -> None:
     sol = fl.solve_ivp(rotor, (0, 20), [1.0, 0.0], method="DOPRI5", stabilization=1e4)
     assert [warning.code for warning in sol.warnings] == ["stiff"]

@@ -25,6 +25,7 @@ def fast_while_sliding(t: float, x: Any) -> Any:
 START = [2.0, 0.66]
 
 
+@pytest.mark.filterwarnings("ignore:stiff:filippov.FilippovWarning")
 @pytest.mark.parametrize("method", ["DOPRI5", "Taylor"])
 def test_a_warning_names_the_method_for_stiff_motions(method: str) -> None:
     sol = fl.solve_ivp(relaxation, (0, 2), START, method=method)
@@ -97,6 +98,7 @@ def test_oscillations_at_loose_tolerances_are_not_stiff() -> None:
             assert "stiff_since" not in sol.stats
 
 
+@pytest.mark.filterwarnings("ignore:stiff:filippov.FilippovWarning")
 def test_messages_of_runs_that_end_early_name_the_method() -> None:
     sol = fl.solve_ivp(relaxation, (0, 2), START, method="DOPRI5", max_steps=500)
     assert not sol.success

@@ -313,6 +313,7 @@ def test_the_size_of_a_chain_does_not_multiply_paths() -> None:
 is_on = True
 
 
+@pytest.mark.filterwarnings("ignore:memory:filippov.FilippovWarning")
 def test_a_function_that_remembers_is_warned_of() -> None:
     """A thermostat by hand: in between the thresholds it returns what an earlier call decided."""
 
@@ -393,6 +394,7 @@ def _in_a_closure() -> Any:
     return fun
 
 
+@pytest.mark.filterwarnings("ignore:memory:filippov.FilippovWarning")
 @pytest.mark.parametrize(
     ("fun", "name"),
     [

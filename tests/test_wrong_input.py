@@ -309,6 +309,7 @@ def test_interrupt_carries_the_partial_solution() -> None:
     assert 0.0 < info.value.partial.t[-1] < 100
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 def test_non_unique_point_raises_if_asked() -> None:
     with pytest.raises(fl.NonUniqueError) as info:
         fl.solve_ivp(lambda t, x: [np.sign(x[0])], (0, 1), [0.0], nonunique="error")

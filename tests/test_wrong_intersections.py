@@ -86,6 +86,7 @@ def test_two_fold_at_an_intersection() -> None:
     stopped(folds.solve((0, 1), [0.0, 0.0, 0.0]), "not decided")
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 def test_two_fold_on_one_surface_is_reported() -> None:
     both_ways = fl.System.from_fields(
         {1: lambda t, x: [x[1], 1.0], -1: lambda t, x: [x[1], -1.0]}, lambda t, x: x[0], n=2
@@ -98,6 +99,7 @@ def test_two_fold_on_one_surface_is_reported() -> None:
         both_ways.solve((0, 1), [0.0, 0.0], nonunique="error")
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 def test_non_unique_intersection_is_reported() -> None:
     """Two modes lead away: the run says so, or raises if asked."""
     fields = {

@@ -25,6 +25,7 @@ __all__ = [
     "solve",
     "solve_many",
     "solve_points",
+    "warning_codes",
 ]
 
 _Array = npt.NDArray[np.float64]
@@ -188,6 +189,8 @@ class Run:
     @property
     def stats(self) -> dict[str, int | float | str]: ...
     @property
+    def n_warnings(self) -> int: ...
+    @property
     def warnings(self) -> list[tuple[float, str, str, list[tuple[int, ...]], list[int], str]]: ...
     @property
     def candidates(self) -> list[tuple[int, ...]]: ...
@@ -228,6 +231,7 @@ def solve_many(
     actions: list[tuple[str, list[float], Any, str]],
     threads: int,
 ) -> tuple[list[Run], BaseException | None]: ...
+def warning_codes() -> list[str]: ...
 def solve_points(
     system: TracedSystem | OpaqueSystem | SignedSystem,
     spans: _Array,

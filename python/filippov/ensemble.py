@@ -16,6 +16,7 @@ from filippov.arrays import finite_array
 from filippov.core_events import CoreEvent, core_events
 from filippov.errors import InputError, Interrupted
 from filippov.events import EventSpec, normalise_events
+from filippov.notices import show_summary
 from filippov.options import OPTIONS, check_options, check_t_span, fit_kappa
 from filippov.prepare import Prepared
 from filippov.solution import Solution
@@ -40,6 +41,8 @@ class Ensemble(Sequence[Solution]):
         As `Solution.status`: 0 at the end, 1 at a terminal event, -1 where a run failed.
     success : ndarray of bool, shape (n_members,)
         Whether ``status >= 0``.
+    n_warnings : ndarray of int, shape (n_members,)
+        How many warnings each run has; `Solution.warnings` of a member has them.
 
     An index gives the `Solution` of a member, with what `keep` left of it; its `message` says why it ended.
     """
@@ -84,6 +87,11 @@ class Ensemble(Sequence[Solution]):
         """Whether each run came to its end, shape (n_members,)."""
         result: npt.NDArray[np.bool_] = self.status >= 0
         return result
+
+    @cached_property
+    def n_warnings(self) -> npt.NDArray[np.int64]:
+        """How many warnings each run has, shape (n_members,)."""
+        return np.array([run.n_warnings for run in self._runs], dtype=np.int64)
 
     def __repr__(self) -> str:
         failed = int(np.count_nonzero(~self.success))
@@ -144,7 +152,16 @@ def run_ensemble(
         )
     if raised is not None:
         raise raised
+    if ensemble.n_warnings.any():
+        _show_warnings(ensemble)
     return ensemble
+
+
+def _show_warnings(ensemble: Ensemble) -> None:
+    rows = (run.warnings for run in ensemble._runs if run.n_warnings)
+    codes = (dict.fromkeys(row[1] for row in warned) for warned in rows)
+    where = "n_warnings counts those of each member, and .warnings of a member has them"
+    show_summary(codes, len(ensemble), "members", where, ensemble)
 
 
 class _Group(NamedTuple):

@@ -1,4 +1,4 @@
-"""Exceptions and the warning of the package.
+"""Exceptions and warnings of the package.
 
 Every error says what happened, where (time, state, surface, mode, as far as known) and what to try.
 
@@ -107,6 +107,46 @@ class NonUniqueError(FilippovError):
 
 class IntersectionError(FilippovError):
     """The motion at an intersection of surfaces could not be determined."""
+
+
+class FilippovWarning(UserWarning):
+    """A result may not be what was meant.
+
+    The text starts with the code of the warning, so that ``warnings.filterwarnings("ignore", code,
+    fl.FilippovWarning)`` silences one kind. `Solution.warnings` keeps all of them.
+
+    Parameters
+    ----------
+    message : str
+        Code, and what was found.
+    code : str
+        Short name of the kind, as in `RunWarning`; of a sweep or an ensemble all kinds, separated by ", ".
+    t : float, optional
+        Time at which it was first noticed.
+    surfaces : tuple of str, optional
+        The printed switching functions that it is about.
+    result : Solution, Ensemble or xarray.Dataset, optional
+        What the call returns. Where warnings are errors, it is found here and not lost.
+    """
+
+    def __init__(
+        self,
+        message: str = "",
+        *,
+        code: str = "",
+        t: float | None = None,
+        surfaces: tuple[str, ...] = (),
+        result: Any = None,
+    ) -> None:
+        super().__init__(message)
+        self.message = message
+        self.code = code
+        self.t = t
+        self.surfaces = surfaces
+        self.result = result
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.message,), self.__dict__.copy()
 
 
 class Interrupted(KeyboardInterrupt):

@@ -37,8 +37,9 @@ class Reset:
     map : callable
         ``map(t, y, *args) -> y_after``, `n` numbers. Parameters of the system that it names in its signature
         are handed over by name, as to `h`.
-    direction : {-1, 1, 0, "down", "up", "both"}, optional
-        -1, the default: where `h` falls to zero; 1: where it rises to zero; 0: both.
+    direction : {0, -1, 1, "both", "down", "up"}, optional
+        0, the default: where `h` reaches zero from either side; -1: where it falls to zero; 1: where it
+        rises to zero. A number counts by its sign.
     name : str, optional
         Name in tables and messages. Default: the name of `map`.
     times : array_like, optional
@@ -55,8 +56,13 @@ class Reset:
     -----
     A reset that leaves the position alone and acts on the velocity is an impact. Impacts that come faster and
     faster are followed to their limit; then the body stays *in contact*, ``h = 0`` and ``h' = 0``, with mode
-    entry 0, until the free acceleration pulls it away. The force of the contact has the direction of the
-    impact.
+    entry 0, until the free acceleration pulls it away to the side from which it came. The force of the
+    contact has the direction of the impact.
+
+    Without a direction, a run that starts on ``h = 0`` counts as on the side ``h >= 0``; unless its velocity
+    leads off to ``h > 0``, the warning ``"unknown_side"`` asks for the direction. With a direction, a motion
+    that crosses the surface against it is not reset: the switch is a crossing, and where the reset would have
+    turned the motion back, the warning ``"against_direction"`` names it.
 
     Several resets at one instant are done in the order in which they are given, then those that the jump
     triggers; see ``docs/theory/order_of_outcomes.md``.
@@ -76,7 +82,7 @@ class Reset:
         self,
         h: Callable[..., Any] | None = None,
         map: Callable[..., Any] | None = None,
-        direction: float | str = -1,
+        direction: float | str = "both",
         name: str | None = None,
         *,
         times: npt.ArrayLike | None = None,
@@ -122,7 +128,8 @@ class Reset:
         """
         if surface is not None:
             index, orientation = surface
-            return CoreAction("surface", [float(index), orientation * self.direction], core_map, self.name)
+            numbers = [float(index), orientation * self.direction, orientation]
+            return CoreAction("surface", numbers, core_map, self.name)
         if self.times is not None:
             return CoreAction("times", self.times.tolist(), core_map, self.name)
         assert self.period is not None

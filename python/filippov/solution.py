@@ -309,11 +309,8 @@ class Solution:
 
     @cached_property
     def warnings(self) -> list[RunWarning]:
-        """What deserves a look."""
-        return [
-            RunWarning(t, code, text, tuple(Mode(mode) for mode in candidates), tuple(surfaces), rule)
-            for t, code, text, candidates, surfaces, rule in self._run.warnings
-        ]
+        """What deserves a look; most of it is shown as a `FilippovWarning` too."""
+        return [RunWarning.from_row(row, self.surfaces) for row in self._run.warnings]
 
     @cached_property
     def branches(self) -> Branches | None:

@@ -18,6 +18,7 @@ from filippov.core_events import CoreEvent, core_events
 from filippov.errors import InputError, Interrupted, NonUniqueError
 from filippov.events import EventSpec, normalise_events, raised_by
 from filippov.modes import Mode
+from filippov.notices import show_warnings
 from filippov.options import (
     Options,
     check_args,
@@ -221,7 +222,8 @@ def solve_ivp(
         "max_wall_time": max_wall_time,
         "progress": progress,
     }
-    return _solve(fun, t_span, y0, _changed(given), events, args, params, surfaces, resets)
+    solution = _solve(fun, t_span, y0, _changed(given), events, args, params, surfaces, resets)
+    return _shown(solution)
 
 
 _DEFAULTS: dict[str, Any] = {
@@ -262,10 +264,18 @@ def solve_prepared(
         prepared = call.prepared
         if t0 < t1 and len(state) == prepared.core.n_states:
             run = run_core(prepared.core, t0, t1, state, call.parameters, call.core_options, [], call.actions)
-            return _present(run, system, prepared, call.options, t0, call.states, False, None)
+            solution = _present(run, system, prepared, call.options, t0, call.states, False, None)
+            return _shown(solution) if run.n_warnings or prepared.remembers else solution
     solution = _solve(system, t_span, y0, _changed(options), None, (), params, None, None)
     if key is not None and call is None and len(system._calls) < _MOST_CALLS:
         _keep_call(system, key, options, np.size(y0))
+    return _shown(solution)
+
+
+def _shown(solution: Solution) -> Solution:
+    """Show the warnings of a run; those of a choice not where all solutions were asked for."""
+    if solution.warnings:
+        show_warnings(solution, () if solution.branches is None else ("non_unique",))
     return solution
 
 

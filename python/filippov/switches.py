@@ -93,14 +93,16 @@ class RunWarning(NamedTuple):
     code : str
         Short name: ``"non_unique"``, ``"undeclared_jump"``, ``"zero_surface"``, ``"no_series"``,
         ``"stiff"`` (stability limits the steps of an explicit method), ``"oscillation"`` (sliding on three or
-        more surfaces at a root that is not stable for the given ``kappa``), ``"memory"`` (the function
-        assigns values that other calls may read) or ``"max_branches"``.
+        more surfaces at a root that is not stable for the given ``kappa``), ``"against_direction"`` (the
+        surface of a reset was crossed against its direction), ``"unknown_side"`` (a start on the surface of
+        a reset without a direction), ``"memory"`` (the function assigns values that other calls may read) or
+        ``"max_branches"``.
     message : str
         What was found, in words.
     candidates : tuple of Mode
         For ``"non_unique"`` all modes in which a solution goes on, the chosen one first; else empty.
-    surfaces : tuple of int
-        The surfaces that it is about, as indices into ``system.surfaces``.
+    surfaces : tuple of str
+        The printed switching functions that it is about; empty if it is about the motion.
     rule : str
         The rule of the decision that it comes from, as in `Switch`; empty if it comes from none.
     """
@@ -109,8 +111,19 @@ class RunWarning(NamedTuple):
     code: str
     message: str
     candidates: tuple[Mode, ...] = ()
-    surfaces: tuple[int, ...] = ()
+    surfaces: tuple[str, ...] = ()
     rule: str = ""
+
+    @classmethod
+    def from_row(
+        cls,
+        row: tuple[float, str, str, list[tuple[int, ...]], list[int], str],
+        names: tuple[str, ...],
+    ) -> RunWarning:
+        """Return a warning of the core; `names` are the printed switching functions."""
+        t, code, message, candidates, surfaces, rule = row
+        own = tuple(names[j] for j in surfaces if j < len(names))  # laws have further ones, without a name
+        return cls(t, code, message, tuple(Mode(mode) for mode in candidates), own, rule)
 
     def __str__(self) -> str:
         rule = f", rule {self.rule}" if self.rule else ""

@@ -92,6 +92,7 @@ MODELS: dict[str, tuple[Field, list[float], str, list[float]]] = {
 }
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", MODELS)
 def test_the_motion_leaves_where_the_jump_vanishes_and_says_that_it_may_go_either_way(
@@ -121,6 +122,7 @@ def test_both_solutions_can_be_had() -> None:
         fl.solve_ivp(fun, (0.0, T_END), y0, nonunique="error")
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 @pytest.mark.parametrize("method", METHODS)
 def test_jumps_that_depend_on_the_state_vanish_where_the_motion_says(method: str) -> None:
     def fun(t: float, x: Any) -> list[Any]:

@@ -97,6 +97,7 @@ def test_a_function_beside_the_sign_in_it(h: Any, method: str) -> None:
     assert not sol.warnings
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 def test_a_start_from_which_both_sides_lead_away_names_both() -> None:
     # At x = 0.1 the function is -0.7 on one side and 0.9 on the other: away on both.
     sol = fl.solve_ivp(lambda t, x: [-np.sign(x[0] - 0.8 * np.sign(x[0] - 0.1))], (0.0, 0.5), [0.1])

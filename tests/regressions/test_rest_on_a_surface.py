@@ -21,6 +21,7 @@ EQUILIBRIA: dict[str, tuple[Any, list[float], list[float]]] = {
 }
 
 
+@pytest.mark.filterwarnings("ignore:zero_surface:filippov.FilippovWarning")
 @pytest.mark.parametrize("name", EQUILIBRIA)
 def test_equilibrium_on_a_kink(name: str) -> None:
     fun, start, end = EQUILIBRIA[name]
@@ -42,6 +43,7 @@ def test_tank_runs_empty(law: Any) -> None:
     assert sol.warnings == []
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 def test_jump_on_a_surface_that_the_motion_cannot_leave_is_not_blamed_on_the_field() -> None:
     """x1 stays 0 whatever the sign: the multiplier is free in [-1, 1], the right-hand side is finite."""
     sol = fl.solve_ivp(lambda t, x: [0.0, 1 + np.sign(x[0])], (0, 1), [0.0, 0.0])

@@ -18,6 +18,7 @@ def _loses_stability(t: float, x: Any) -> Any:
 _OPTIONS: dict[str, Any] = {"rtol": 1e-4, "atol": 1e-4}
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 @pytest.mark.parametrize("method", ["auto", "DOPRI5"])
 def test_the_solution_as_a_function_is_continuous_at_the_switch(method: str) -> None:
     sol = fl.solve_ivp(_loses_stability, (0.0, 1.2), [0.3, 0.2], method=method, **_OPTIONS)
@@ -36,6 +37,7 @@ def test_the_solution_as_a_function_is_continuous_at_the_switch(method: str) -> 
     assert np.abs(end).max() > 0.0
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 @pytest.mark.parametrize("beyond", [0.0, 1e-13, 1e-9])
 def test_a_run_that_ends_where_the_spiral_begins_ends_in_time(beyond: float) -> None:
     sol = fl.solve_ivp(_loses_stability, (0.0, 1.2), [0.3, 0.2], **_OPTIONS)

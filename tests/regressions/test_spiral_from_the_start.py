@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 @pytest.mark.parametrize("method", ["auto", "DOPRI5"])
 def test_segments_begin_where_the_run_begins(method: str) -> None:
     def spiral(t: float, x: Any) -> Any:
@@ -28,6 +29,7 @@ def test_segments_begin_where_the_run_begins(method: str) -> None:
     assert ends[-1] == 1.0
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 @pytest.mark.parametrize("bias", [0.0, 0.1])
 def test_relays_that_push_away_spiral_outwards(bias: float) -> None:
     """The only sliding motion is one that no scaling makes stable."""

@@ -154,6 +154,7 @@ def test_the_middle_of_a_step_by_midpoints_beside_a_triple_zero_is_found() -> No
     assert sol.y[1, -1] == pytest.approx(0.78 - 0.15, abs=1e-12)
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 @pytest.mark.parametrize("offset", [1e-14, 1e-10, 1e-7, 1e-3])
 @pytest.mark.parametrize("method", METHODS)
 def test_a_start_beside_a_triple_zero_does_not_keep_its_side_for_good(method: str, offset: float) -> None:

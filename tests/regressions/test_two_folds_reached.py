@@ -32,6 +32,7 @@ def test_a_two_fold_that_all_sliding_motions_reach_ends_the_run_there(method: st
         assert not (np.abs(segment.multipliers_end) > 1.0).any()
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 def test_where_both_fields_lead_away_from_a_two_fold_both_are_named() -> None:
     # Attracting until cos(t) = 0, repelling afterwards.
     sol = fl.solve_ivp(lambda t, x: [np.where(x[0] > 0, -1.0, 1.375) * np.cos(t)], (0.0, 2.0), [0.0])
@@ -42,6 +43,7 @@ def test_where_both_fields_lead_away_from_a_two_fold_both_are_named() -> None:
     assert sol.y[0, -1] == pytest.approx(1.0 - np.sin(2.0), abs=1e-6)
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 def test_a_visible_two_fold_in_the_plane_of_a_surface() -> None:
     # On z = 0 with x, y < 0: f- = (1, 1, -x), f+ = (1, 1, y): sliding until both vanish, then away.
     def f(t: float, x: Any) -> Any:
@@ -109,6 +111,8 @@ def test_sliding_goes_through_a_point_where_the_jump_across_the_surface_has_a_do
         assert not (np.abs(values) > 1.0).any()
 
 
+@pytest.mark.filterwarnings("ignore:stiff:filippov.FilippovWarning")
+@pytest.mark.filterwarnings("ignore:undeclared_jump:filippov.FilippovWarning")
 @pytest.mark.parametrize("method", ["auto", "DOPRI5", "DOP853", "Rodas5P"])
 @pytest.mark.parametrize("tolerance", [1e-6, 1e-9])
 @pytest.mark.parametrize("beside", [0.0, 1e-9, -1e-9, 1e-5, -1e-5])

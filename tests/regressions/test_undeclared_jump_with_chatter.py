@@ -8,6 +8,7 @@ import filippov as fl
 import pytest
 
 
+@pytest.mark.filterwarnings("ignore:undeclared_jump:filippov.FilippovWarning")
 @pytest.mark.parametrize("upper", [-3.0, -1.0, -0.1])
 def test_undeclared_sliding_is_warned_about(upper: float) -> None:
     def field(t: float, x: Any) -> Any:
@@ -20,6 +21,7 @@ def test_undeclared_sliding_is_warned_about(upper: float) -> None:
     assert len(jumps) < 20  # one per jump is enough, not one per step
 
 
+@pytest.mark.filterwarnings("ignore:undeclared_jump:filippov.FilippovWarning")
 def test_small_undeclared_jump_is_noticed() -> None:
     """A tenth of the field, 50 000 times the tolerance: the steps shrink to find it."""
 

@@ -23,6 +23,8 @@ FUNCTIONS: dict[str, Callable[[Any], Any]] = {
 }
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
+@pytest.mark.filterwarnings("ignore:zero_surface:filippov.FilippovWarning")
 @pytest.mark.parametrize("speed", [1.0, -1.0])
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_a_function_that_vanishes_in_a_region_is_refused_and_decided_by_python_in_a_black_box(
@@ -44,6 +46,8 @@ def test_a_function_that_vanishes_in_a_region_is_refused_and_decided_by_python_i
     assert sol.y[1, -1] == pytest.approx(0.01 * np.sign(h(parts)).sum(), abs=1e-6)
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
+@pytest.mark.filterwarnings("ignore:zero_surface:filippov.FilippovWarning")
 def test_a_dead_zone_around_the_start() -> None:
     def fun(t: float, x: Any) -> Any:
         return [np.cos(t), np.sign(np.where(abs(x[0]) > 0.5, x[0], 0.0))]
@@ -55,6 +59,7 @@ def test_a_dead_zone_around_the_start() -> None:
     np.testing.assert_allclose(sol.switches.t, np.pi * np.array([1, 5, 7, 11]) / 6, rtol=0, atol=1e-6)
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 def test_a_warning_about_one_surface_does_not_silence_another_whose_name_it_contains() -> None:
     def f(t: float, x: Any) -> Any:
         return [0.0, 1.0, np.sign(x[0] - 0.5), np.sign(x[0])]

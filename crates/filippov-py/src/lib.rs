@@ -38,7 +38,7 @@ mod _core {
     #[pymodule_export]
     use super::solve::{solve, solve_many, RunOptions};
     #[pymodule_export]
-    use super::sweep::solve_points;
+    use super::sweep::{solve_points, warning_codes};
     #[pymodule_export]
     use super::systems::TracedSystem;
 

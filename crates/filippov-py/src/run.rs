@@ -339,6 +339,11 @@ impl Run {
     }
 
     #[getter]
+    fn n_warnings(&self) -> usize {
+        self.solution().warnings.len()
+    }
+
+    #[getter]
     fn warnings<'py>(&self, py: Python<'py>) -> PyResult<Vec<WarningRow<'py>>> {
         self.solution()
             .warnings

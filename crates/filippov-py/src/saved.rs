@@ -76,7 +76,7 @@ pub fn load_system(py: Python<'_>, data: &[u8]) -> PyResult<Loaded> {
     ))
 }
 
-/// When an action happens, from its name and numbers: the surface and the direction, the times, or the period and the
+/// When an action happens, from its name and numbers: the surface, the direction and the side of a start, the times, or the period and the
 /// phase of a clock, and 0 if a tick at the start of the run does not count.
 pub fn read_trigger(when: &str, numbers: &[f64]) -> PyResult<Trigger> {
     let ticks = |period, phase, at_start| Trigger::Clock {
@@ -84,9 +84,10 @@ pub fn read_trigger(when: &str, numbers: &[f64]) -> PyResult<Trigger> {
         at_start,
     };
     Ok(match (when, numbers) {
-        ("surface", &[index, direction]) => Trigger::Surface {
+        ("surface", &[index, direction, side]) => Trigger::Surface {
             index: index as usize,
             direction: direction as i8,
+            side: if side < 0.0 { -1 } else { 1 },
         },
         ("times", times) => Trigger::Times(times.to_vec()),
         ("clock", &[period, phase]) => ticks(period, phase, true),
@@ -98,9 +99,14 @@ pub fn read_trigger(when: &str, numbers: &[f64]) -> PyResult<Trigger> {
 /// The opposite of [`read_trigger`].
 fn trigger_row(trigger: Trigger) -> (&'static str, Vec<f64>) {
     match trigger {
-        Trigger::Surface { index, direction } => {
-            ("surface", vec![index as f64, f64::from(direction)])
-        }
+        Trigger::Surface {
+            index,
+            direction,
+            side,
+        } => (
+            "surface",
+            vec![index as f64, f64::from(direction), f64::from(side)],
+        ),
         Trigger::Times(times) => ("times", times),
         Trigger::Clock {
             clock: Clock { period, phase },

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use filippov::action::Clock;
 use filippov::section::{Cycle, Place, Returns, Section};
-use filippov::{Error, Kind, Solution, Stop, UserFunction};
+use filippov::{Error, Kind, Solution, Stop, UserFunction, Warning, WarningCode};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::{PyException, PyKeyError, PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
@@ -252,6 +252,12 @@ fn kind_named(name: &str) -> Option<Kind> {
     kinds.into_iter().find(|kind| kind.name() == name)
 }
 
+/// The kinds of warnings, in the order of their bits in the column `warnings` of a sweep.
+#[pyfunction]
+pub fn warning_codes() -> Vec<&'static str> {
+    WarningCode::ALL.map(WarningCode::name).to_vec()
+}
+
 /// What the runs leave, in columns.
 #[derive(Default)]
 struct Points {
@@ -264,6 +270,9 @@ struct Points {
     y_last: Vec<f64>,
     n_steps: Vec<i64>,
     n_switches: Vec<i64>,
+    n_warnings: Vec<i64>,
+    /// Their kinds, a bit of each.
+    warnings: Vec<i32>,
     n_returns: Vec<i64>,
     period: Vec<i64>,
     row_size: Vec<i64>,
@@ -312,6 +321,7 @@ impl Points {
         self.y_last.extend_from_slice(solution.last_state());
         let stats = &solution.stats;
         self.count(stats.n_steps as i64, stats.n_switches as i64);
+        self.note_warnings(&solution.warnings);
         self.returns(&solution.returns.take().unwrap_or_default());
     }
 
@@ -326,6 +336,7 @@ impl Points {
         self.y_last
             .resize(self.y_last.len() + self.n_states, f64::NAN);
         self.count(0, 0);
+        self.note_warnings(&[]);
         self.returns(&Returns::default());
     }
 
@@ -338,6 +349,12 @@ impl Points {
     fn count(&mut self, n_steps: i64, n_switches: i64) {
         self.n_steps.push(n_steps);
         self.n_switches.push(n_switches);
+    }
+
+    fn note_warnings(&mut self, warnings: &[Warning]) {
+        self.n_warnings.push(warnings.len() as i64);
+        let kinds = warnings.iter().map(|warning| warning.code.bit());
+        self.warnings.push(kinds.fold(0, |all, bit| all | bit));
     }
 
     fn returns(&mut self, returns: &Returns) {
@@ -378,6 +395,8 @@ impl Points {
         dict.set_item("t_last", PyArray1::from_vec(py, self.t_last))?;
         dict.set_item("n_steps", PyArray1::from_vec(py, self.n_steps))?;
         dict.set_item("n_switches", PyArray1::from_vec(py, self.n_switches))?;
+        dict.set_item("n_warnings", PyArray1::from_vec(py, self.n_warnings))?;
+        dict.set_item("warnings", PyArray1::from_vec(py, self.warnings))?;
         dict.set_item("n_returns", PyArray1::from_vec(py, self.n_returns))?;
         dict.set_item("period", PyArray1::from_vec(py, self.period))?;
         dict.set_item("row_size", PyArray1::from_vec(py, self.row_size))?;

@@ -54,7 +54,7 @@ const AT_TICKS: u8 = 2;
 ///     defaults: vec![0.5],
 ///     valid_for: None,
 ///     actions: vec![SavedAction {
-///         trigger: Trigger::Surface { index: surface, direction: -1 },
+///         trigger: Trigger::Surface { index: surface, direction: -1, side: 1 },
 ///         map: Some(bounce),
 ///         name: "impact".into(),
 ///     }],
@@ -214,8 +214,19 @@ impl SavedSystem {
 
     fn check_trigger(&self, trigger: &Trigger) -> Result<(), Error> {
         match trigger {
-            Trigger::Surface { index, direction } => {
+            Trigger::Surface {
+                index,
+                direction,
+                side,
+            } => {
                 check_index("surface", *index, self.definition.graph.n_surfaces())?;
+                if side.abs() != 1 {
+                    return Err(Error::OutOfRange {
+                        name: "side",
+                        value: f64::from(*side),
+                        requirement: "must be -1 or +1",
+                    });
+                }
                 if !(-1..=1).contains(direction) {
                     return Err(Error::OutOfRange {
                         name: "direction",
@@ -349,10 +360,15 @@ impl RunnableSystem {
 
 fn write_trigger(writer: &mut Writer, trigger: &Trigger) {
     match trigger {
-        Trigger::Surface { index, direction } => {
+        Trigger::Surface {
+            index,
+            direction,
+            side,
+        } => {
             writer.byte(AT_SURFACE);
             writer.number(*index);
             writer.byte(*direction as u8);
+            writer.byte(*side as u8);
         }
         Trigger::Times(times) => {
             writer.byte(AT_TIMES);
@@ -372,6 +388,7 @@ fn read_trigger(section: &mut Section) -> Result<Trigger, ExprError> {
         AT_SURFACE => Trigger::Surface {
             index: section.number()? as usize,
             direction: section.byte()? as i8,
+            side: section.byte()? as i8,
         },
         AT_TIMES => Trigger::Times(section.floats()?),
         AT_TICKS => Trigger::Clock {

@@ -273,9 +273,30 @@ pub enum WarningCode {
     Oscillation,
     /// A switching function is zero all along a motion.
     ZeroSurface,
+    /// A surface that triggers an action was crossed against its direction.
+    AgainstDirection,
+    /// A start on a surface whose action is triggered from both sides, with no velocity that leads off to the side that is taken.
+    UnknownSide,
 }
 
 impl WarningCode {
+    /// All kinds, in an order that is part of the format of sweeps: only added to at the end.
+    pub const ALL: [WarningCode; 8] = [
+        WarningCode::NonUnique,
+        WarningCode::UndeclaredJump,
+        WarningCode::NoSeries,
+        WarningCode::Stiff,
+        WarningCode::Oscillation,
+        WarningCode::ZeroSurface,
+        WarningCode::AgainstDirection,
+        WarningCode::UnknownSide,
+    ];
+
+    /// The bit that stands for this kind in a set of kinds: that of its place among [`ALL`](Self::ALL).
+    pub fn bit(self) -> i32 {
+        1 << self as i32
+    }
+
     /// A stable name.
     pub fn name(self) -> &'static str {
         match self {
@@ -285,6 +306,8 @@ impl WarningCode {
             WarningCode::Stiff => "stiff",
             WarningCode::Oscillation => "oscillation",
             WarningCode::ZeroSurface => "zero_surface",
+            WarningCode::AgainstDirection => "against_direction",
+            WarningCode::UnknownSide => "unknown_side",
         }
     }
 }

@@ -16,7 +16,11 @@ fn options() -> Options {
 
 fn at_surface(index: usize, direction: i8, map: &dyn ActionMap) -> Action<'_> {
     Action {
-        trigger: Trigger::Surface { index, direction },
+        trigger: Trigger::Surface {
+            index,
+            direction,
+            side: 1,
+        },
         map,
         name: format!("reset{index}"),
         kind: Some(Kind::Reset),

@@ -89,6 +89,7 @@ fn wrong_values_and_triggers_are_named() {
                 s.actions[0].trigger = Trigger::Surface {
                     index: 0,
                     direction: 2,
+                    side: 1,
                 }
             },
             "direction = 2: must be -1, 0 or +1",

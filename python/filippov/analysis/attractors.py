@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from filippov.analysis.observe import check_keywords
 from filippov.analysis.sweeps import sweep
-from filippov.errors import InputError, Interrupted
+from filippov.errors import FilippovWarning, InputError, Interrupted
 
 if TYPE_CHECKING:
     from filippov.system import System
@@ -101,13 +101,16 @@ def basins(
         if cut.partial is not None:
             cut.partial = numbered(cut.partial)
         raise
+    except FilippovWarning as warning:  # the caller has made errors of warnings
+        numbered(warning.result)
+        raise
     return None if found is None else numbered(found)
 
 
 def _with_attractors(
     found: Any, has_section: bool, nearness: float, weight: Any, modulo: Mapping[Any, float]
 ) -> Any:
-    """Return the Dataset of a sweep with the attractors of its points."""
+    """Add the attractors of its points to the Dataset of a sweep, and return it."""
     states = json.loads(found.attrs["states"])
     weight = np.broadcast_to(weight, len(states))
     moduli = np.array([float(modulo.get(name, modulo.get(i, 0.0))) for i, name in enumerate(states)])
@@ -124,7 +127,6 @@ def _with_attractors(
         orbits, sizes = orbits[keep], np.where(periodic, sizes, 0)
     labels = _label(orbits, sizes, nearness, weight, moduli)
     labels[failed] = -2
-    found = found.copy()
     dims = found.status.dims
     flags = {
         "long_name": "number of the attractor",

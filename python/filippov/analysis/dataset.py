@@ -15,11 +15,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from filippov._core import warning_codes
 from filippov.analysis.grid import Grid
 from filippov.analysis.optional import need
 from filippov.analysis.points import Table
 
-__all__ = ["REASONS", "Variable", "dataset_of", "variables_of"]
+__all__ = ["REASONS", "WARNINGS", "Variable", "dataset_of", "kinds_of", "variables_of"]
 
 # Why runs end, in an order that is part of the format of stores: only added to at the end.
 _TEXT = (
@@ -28,6 +29,8 @@ _TEXT = (
     "sliding_rule non_unique wrong_input not_prepared not_run chatter"
 )
 REASONS = tuple(_TEXT.split(" "))
+# The kinds of warnings, in the order of their bits.
+WARNINGS = tuple(warning_codes())
 _REASON_CODES = {reason: code for code, reason in enumerate(REASONS)}
 
 
@@ -70,8 +73,8 @@ class Variable(NamedTuple):
 
 _TYPES: dict[str, Any] = {
     **dict.fromkeys(("status", "reason", "modes"), np.int8),
-    **dict.fromkeys(("n_steps", "n_switches", "n_returns", "period", "row_size"), np.int64),
-    "n_pieces": np.int32,
+    **dict.fromkeys(("n_steps", "n_switches", "n_warnings", "n_returns", "period", "row_size"), np.int64),
+    **dict.fromkeys(("n_pieces", "warnings"), np.int32),
     "message": "string",
 }
 
@@ -95,6 +98,9 @@ def variables_of(
     yield Variable("t_last", "point", "t_last", None, attributes("last time reached", time))
     yield Variable("n_steps", "point", "n_steps", None, attributes("number of steps"))
     yield Variable("n_switches", "point", "n_switches", None, attributes("number of switches"))
+    yield Variable("n_warnings", "point", "n_warnings", None, attributes("number of warnings"))
+    flags = {"flag_masks": [1 << k for k in range(len(WARNINGS))], "flag_meanings": " ".join(WARNINGS)}
+    yield Variable("warnings", "point", "warnings", None, attributes("kinds of the warnings", more=flags))
     if not has_section:
         for i, name in enumerate(grid.states):
             yield Variable(name, "point", "y_last", i, attributes(f"{name} at the end", units.get(name)))
@@ -170,6 +176,12 @@ def dataset_of(
         found[variable.name] = (dims_of(variable, grid), values.reshape(shape), variable.attributes)
     coordinates = coordinates_of(grid, surfaces, has_section, units)
     return xarray.Dataset(found, coords=coordinates, attrs=dict(attributes))
+
+
+def kinds_of(masks: npt.NDArray[Any]) -> Iterator[list[str]]:
+    """Yield the kinds of warnings of every run that has any, from their bits."""
+    for mask in masks[masks != 0].ravel().tolist():
+        yield [code for bit, code in enumerate(WARNINGS) if mask >> bit & 1]
 
 
 def as_json(value: Any) -> str:

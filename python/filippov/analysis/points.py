@@ -29,7 +29,7 @@ Table = dict[str, Any]
 # The columns of a table, by what one row belongs to. Texts are lists.
 POINT_COLUMNS = (
     *("status", "reason", "message", "t_last", "y_last"),
-    *("n_steps", "n_switches", "n_returns", "period", "row_size"),
+    *("n_steps", "n_switches", "n_warnings", "warnings", "n_returns", "period", "row_size"),
 )
 RETURN_COLUMNS = ("t", "y", "duration", "sliding", "n_pieces")
 PIECE_COLUMNS = ("modes",)
@@ -197,7 +197,10 @@ def failed_table(message: str, reason: str, t0: Array, y0: Array, n_surfaces: in
         "message": [message] * count,
         "t_last": t0,
         "y_last": np.full((count, n), np.nan),
-        **{name: zeros for name in ("n_steps", "n_switches", "n_returns", "period", "row_size")},
+        **{
+            name: zeros for name in ("n_steps", "n_switches", "n_warnings", "n_returns", "period", "row_size")
+        },
+        "warnings": np.zeros(count, dtype=np.int32),
         **{name: np.empty(0) for name in ("t", "duration", "sliding")},
         "y": np.empty((0, n)),
         "n_pieces": np.empty(0, dtype=np.int32),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from filippov.analysis.dataset import as_json
+from filippov.analysis.dataset import as_json, kinds_of
 from filippov.analysis.grid import grid_of
 from filippov.analysis.observe import check_keywords, check_system, observation_of, options_of, span_of
 from filippov.analysis.optional import need
@@ -16,6 +16,7 @@ from filippov.analysis.points import Table, Task, end_times, prepare_for, run_ta
 from filippov.analysis.sections import clocks_of
 from filippov.errors import InputError, Interrupted
 from filippov.modes import Mode
+from filippov.notices import show_summary
 from filippov.options import fit_kappa
 
 if TYPE_CHECKING:
@@ -79,8 +80,9 @@ def poincare(
         Along the dimension ``obs``, one entry per return: its time ``t``, every state by its name, the
         ``return_time`` since the return before (or the start), the ``sliding_time`` in it, and the modes in
         between, as text in ``itinerary`` and as numbers in ``mode``, ``n_pieces`` rows of it per return. The
-        attributes have ``status, reason, message``, ``n_returns`` (all of them), and ``period``, the number
-        of returns after which the motion repeats, 0 if that was not found.
+        attributes have ``status, reason, message``, ``n_returns`` (all of them), ``period``, the number of
+        returns after which the motion repeats, 0 if that was not found, and ``n_warnings`` with their kinds
+        in ``warnings``.
 
     Raises
     ------
@@ -172,7 +174,10 @@ def poincare(
     except Interrupted as cut:
         partial = _dataset(cut.partial, grid.states, prepared.surfaces, units or {}, given)
         raise Interrupted(partial.attrs["message"], partial=partial) from None
-    return _dataset(table, grid.states, prepared.surfaces, units or {}, given)
+    found = _dataset(table, grid.states, prepared.surfaces, units or {}, given)
+    where = "the attributes n_warnings and warnings name them, and solve_ivp shows them in words"
+    show_summary(kinds_of(table["warnings"]), 1, "runs", where, found)
+    return found
 
 
 def _dataset(
@@ -208,6 +213,8 @@ def _dataset(
         "n_returns": int(table["n_returns"][0]),
         "period": int(table["period"][0]),
         "t_last": float(table["t_last"][0]),
+        "n_warnings": int(table["n_warnings"][0]),
+        "warnings": " ".join(code for kinds in kinds_of(table["warnings"]) for code in kinds),
     }
     return xarray.Dataset(variables, coords=coordinates, attrs={**end, **described})
 

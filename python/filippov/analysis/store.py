@@ -37,7 +37,7 @@ from filippov.errors import InputError, Interrupted
 
 __all__ = ["Store", "open_sweep", "run_with_store"]
 
-_VERSION = 1
+_VERSION = 2
 # The attribute of the result that has the plan.
 _RECORD = "filippov_sweep"
 # Rows of the ragged arrays that are written at once: what the memory of the last step is bounded by.

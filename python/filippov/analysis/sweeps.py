@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from filippov.analysis.dataset import REASONS, dataset_of
+from filippov.analysis.dataset import REASONS, dataset_of, kinds_of
 from filippov.analysis.grid import check_size, grid_of
 from filippov.analysis.observe import check_keywords, check_system, observation_of, options_of, span_of
 from filippov.analysis.optional import need
@@ -17,6 +17,7 @@ from filippov.analysis.points import Table, concatenate, prepare_for
 from filippov.analysis.schedule import Progress, as_executor, run_pieces
 from filippov.ensemble import check_threads
 from filippov.errors import InputError, Interrupted
+from filippov.notices import show_summary
 from filippov.options import fit_kappa
 
 if TYPE_CHECKING:
@@ -97,7 +98,8 @@ def sweep(
     xarray.Dataset or None
         The dimensions are those of the grid: first the parameters, then the initial states, that of `follow`
         last. Per point ``status`` (0: end of `t_span`, 1: stopped as asked, -1: failed), ``reason`` (a CF
-        flag), ``message``, ``t_last``, ``n_steps``, ``n_switches``. Without a section every state at the end.
+        flag), ``message``, ``t_last``, ``n_steps``, ``n_switches``, ``n_warnings``, and ``warnings``, the
+        kinds of these (CF flags, one bit each). Without a section every state at the end.
         With one ``n_returns``, ``period`` (0: none found), ``row_size``, and along ``obs`` the returns of all
         points one after the other (a contiguous ragged array as in the CF conventions): ``t``, every state,
         ``return_time``, ``sliding_time``, ``n_pieces``; along ``piece`` the modes in between. ``None`` with
@@ -164,7 +166,11 @@ def sweep(
     prepared = prepare_for(system, span[0], *grid.first())
     fit_kappa(checked.kappa, prepared.surfaces)
     plan = plan_of(system, grid, prepared, observed, checked, span, last is not None, units or {})
-    return run_plan(plan, store, executor, threads, chunk_size, part, progress)
+    found = run_plan(plan, store, executor, threads, chunk_size, part, progress)
+    if found is not None:
+        where = "the variables n_warnings and warnings have them per point"
+        show_summary(kinds_of(found["warnings"].values), plan.n_points, "points", where, found)
+    return found
 
 
 def bifurcation_diagram(

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 
 from filippov.cli.mistakes import Mistake
 from filippov.cli.parser import build_parser
-from filippov.errors import FilippovError, Interrupted
+from filippov.errors import FilippovError, FilippovWarning, Interrupted
 
 __all__ = ["main"]
 
@@ -44,7 +45,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.print_help()
         return 0
     try:
-        code: int = given.run(given)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FilippovWarning)  # the commands print them
+            code: int = given.run(given)
         sys.stdout.flush()
     except (Mistake, FilippovError) as error:
         if given.debug:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from filippov import analysis
+from filippov.analysis.dataset import kinds_of
 from filippov.analysis.grid import memory_of_machine
 from filippov.cli.commands import check_needs, check_picture, check_target, say
 from filippov.cli.mistakes import Mistake, assignments, hint, number
@@ -19,6 +20,7 @@ from filippov.cli.model import Model, load_model
 from filippov.cli.solving import initial_state, interval, options_of_run
 from filippov.cli.tables import write_rows
 from filippov.errors import Interrupted
+from filippov.notices import summary
 
 __all__ = ["add_sweep_options", "sweep"]
 
@@ -203,6 +205,9 @@ def _close(given: argparse.Namespace, result: Any, swept: str, state: str | None
         say(given, f"written:  {given.csv}, {rows} rows")
     if given.plot is not None:
         _draw(given, result, swept, state or str(_states(result)[0]))
+    warning = summary(kinds_of(result["warnings"].values), n_points, "points", "see n_warnings and warnings")
+    if warning is not None:
+        print(f"warning:  {warning}", file=sys.stderr)
     for reason, points in found.items():
         print(f"failed:   {len(points)} times {reason}; first at {points[0].point}", file=sys.stderr)
     return 1 if n_failed else 0

@@ -22,6 +22,8 @@ pub enum Trigger {
         index: usize,
         /// -1: from the side h > 0; +1: from h < 0; 0: from both.
         direction: i8,
+        /// +1 or -1: the side of a start on the surface, if the direction is 0.
+        side: i8,
     },
     /// At these times, in increasing order. They are ends of steps and never searched for.
     Times(Vec<f64>),
@@ -134,11 +136,49 @@ impl Actions<'_> {
         }
     }
 
-    /// The first action that surface `j` triggers.
+    /// The first action that surface `j` triggers, and the direction of all of them: 0 if they have several.
     pub fn at_surface(&self, j: usize) -> Option<(&Action<'_>, i8)> {
-        self.list.iter().find_map(|action| match action.trigger {
-            Trigger::Surface { index, direction } if index == j => Some((action, direction)),
-            _ => None,
-        })
+        let mut found = self.all_at_surface(j);
+        let (first, direction, _) = found.next()?;
+        let is_same = found.all(|(_, other, _)| other == direction);
+        Some((first, if is_same { direction } else { 0 }))
+    }
+
+    /// The side of surface `j` from which its actions are triggered; where both sides do, the side `last` on which
+    /// the motion is, or was last.
+    pub fn trigger_side(&self, j: usize, last: i8) -> i8 {
+        match self.at_surface(j) {
+            Some((_, direction)) if direction != 0 => -direction,
+            _ => last,
+        }
+    }
+
+    /// The first action that surface `j` triggers for a motion from `side`; if there is none, the first of all.
+    pub fn from_side(&self, j: usize, side: i8) -> Option<&Action<'_>> {
+        let meant = |(_, direction, _): &(_, i8, _)| *direction == 0 || *direction == -side;
+        let found = self.all_at_surface(j).find(meant);
+        found
+            .or_else(|| self.all_at_surface(j).next())
+            .map(|(action, ..)| action)
+    }
+
+    /// The side of each of `n` surfaces on which a start counts that lies on it: that of the first action there, else +1.
+    pub fn sides_at_start(&self, n: usize) -> impl Iterator<Item = i8> + '_ {
+        let side = move |j| self.all_at_surface(j).next().map_or(1, |(.., side)| side);
+        (0..n).map(side)
+    }
+
+    /// The actions that surface `j` triggers, with direction and side.
+    fn all_at_surface(&self, j: usize) -> impl Iterator<Item = (&Action<'_>, i8, i8)> {
+        self.list
+            .iter()
+            .filter_map(move |action| match action.trigger {
+                Trigger::Surface {
+                    index,
+                    direction,
+                    side,
+                } if index == j => Some((action, direction, side)),
+                _ => None,
+            })
     }
 }

@@ -118,7 +118,7 @@ fn try_mode(at: &Point, notes: &mut Notes, mode: &Mode) -> Result<Option<Tried>,
 }
 
 fn field_of<'a>(at: &Point<'_, '_, 'a>, mode: &Mode) -> ModeField<'a> {
-    match ContactField::new(at.system, at.actions, mode, at.q) {
+    match ContactField::new(at.system, at.actions, mode, at.arrival.sides, at.q) {
         Some(field) => ModeField::Contact(Box::new(field)),
         None => ModeField::of(at.system, at.policy.law, mode),
     }

@@ -36,7 +36,7 @@ pub(crate) use decide::{decide, Decision, Rule};
 pub(crate) use event::{add_vanishing_surfaces, located_surfaces, vanishing_surfaces};
 pub(crate) use leave_by_rule::refusal;
 pub(crate) use passage::{goes_through, rates_here};
-pub(crate) use placement::{pushed_back, sides, Sides};
+pub(crate) use placement::{is_slow, leaves_point_alone, pushed_back, sides, Sides};
 pub(crate) use point::{Arrival, Cause, Left, Lefts, Next, Notes, Point, Policy, Values};
 pub(crate) use spiral::Leap;
 pub(crate) use triggers::Triggers;

@@ -201,7 +201,7 @@ fn slipped_through(
 }
 
 /// Does the action at surface `j` leave h_j as it is, as an impact does? It does not move bodies, but their velocities.
-fn leaves_point_alone(at: &Point, j: usize, signs: &[f64]) -> Result<bool, FieldError> {
+pub(crate) fn leaves_point_alone(at: &Point, j: usize, signs: &[f64]) -> Result<bool, FieldError> {
     let Some((action, _)) = at.actions.at_surface(j) else {
         return Ok(false);
     };
@@ -344,7 +344,7 @@ fn rate_in(
 }
 
 /// Is this speed at surface j below the tolerance?
-pub(super) fn is_slow(at: &Point, j: usize, speed: f64, mode: &Mode) -> Result<bool, FieldError> {
+pub(crate) fn is_slow(at: &Point, j: usize, speed: f64, mode: &Mode) -> Result<bool, FieldError> {
     let mut row = vec![0.0; at.x.len()];
     at.system
         .rate_gradient(j, at.t, at.x, &mode.signs(), &mut row)?;
@@ -354,7 +354,8 @@ pub(super) fn is_slow(at: &Point, j: usize, speed: f64, mode: &Mode) -> Result<b
 
 /// Can a body stay in contact at h_j = 0? The action there leaves the point alone and acts on the velocity.
 pub(super) fn can_stay(at: &Point, j: usize, mode: &Mode) -> Result<bool, FieldError> {
-    let Some((action, _)) = at.actions.at_surface(j) else {
+    let side = mode.entries()[j];
+    let Some(action) = at.actions.from_side(j, side) else {
         return Ok(false);
     };
     let (mut moved, mut q) = (at.x.to_vec(), at.q.to_vec());
@@ -365,7 +366,9 @@ pub(super) fn can_stay(at: &Point, j: usize, mode: &Mode) -> Result<bool, FieldE
         return Ok(false);
     }
     let resting = mode.with(j, 0);
-    let Some(mut field) = ContactField::new(at.system, at.actions, &resting, at.q) else {
+    let mut sides = at.arrival.sides.to_vec();
+    sides[j] = side;
+    let Some(mut field) = ContactField::new(at.system, at.actions, &resting, &sides, at.q) else {
         return Ok(false);
     };
     let (mut x, mut dx) = (at.x.to_vec(), vec![0.0; at.x.len()]);

@@ -87,6 +87,8 @@ pub(crate) struct Arrival<'p, 'a> {
     pub signs: &'p Signs,
     /// The surfaces slid on, in increasing order.
     pub sliding: &'p [usize],
+    /// The side of every surface on which the motion is; where its entry is 0, that on which it was last.
+    pub sides: &'p [i8],
     /// The surfaces whose sign matters in the mode.
     pub active: &'p [bool],
     /// The surfaces whose functions were zero all along the motion.
@@ -133,6 +135,7 @@ impl<'p, 'm, 'a> Point<'p, 'm, 'a> {
         Triggers {
             system: self.system,
             actions: self.actions,
+            sides: self.arrival.sides,
         }
     }
 

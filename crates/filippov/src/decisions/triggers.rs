@@ -9,6 +9,8 @@ use crate::system::PiecewiseSystem;
 pub(crate) struct Triggers<'p> {
     pub system: &'p dyn PiecewiseSystem,
     pub actions: &'p Actions<'p>,
+    /// The side of every surface on which the motion is, or was last: the side of a contact.
+    pub sides: &'p [i8],
 }
 
 impl Triggers<'_> {
@@ -38,10 +40,7 @@ impl Triggers<'_> {
     /// The side from which the action at surface `j` is triggered, for a motion that was in this mode.
     pub fn side(&self, j: usize, memory: Option<&Mode>) -> i8 {
         let known = memory.map_or(0, |memory| memory.entries()[j]);
-        match self.actions.at_surface(j) {
-            Some((_, direction)) if direction != 0 => -direction,
-            _ if known != 0 => known,
-            _ => 1,
-        }
+        let last = if known == 0 { self.sides[j] } else { known };
+        self.actions.trigger_side(j, last)
     }
 }

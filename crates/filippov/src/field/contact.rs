@@ -37,19 +37,20 @@ pub struct ContactField<'a> {
 
 impl<'a> ContactField<'a> {
     /// Contact at those zero entries of the mode whose surface triggers an action and switches nothing, sliding
-    /// on the others; `discrete` are the discrete states. `None` without any contact.
+    /// on the others; `sides` are the sides on which the motion is, or was last; `discrete` are the discrete states.
+    /// `None` without any contact.
     pub fn new(
         system: &'a dyn PiecewiseSystem,
         actions: &'a Actions<'a>,
         mode: &Mode,
+        sides: &[i8],
         discrete: &[f64],
     ) -> Option<Self> {
         let (mut contacts, mut sliding) = (Vec::new(), Vec::new());
         for j in mode.sliding_set() {
             match actions.at_surface(j) {
-                Some((_, direction)) if !system.switches_at(j) => {
-                    let side = if direction > 0 { -1.0 } else { 1.0 };
-                    contacts.push((j, side));
+                Some(_) if !system.switches_at(j) => {
+                    contacts.push((j, f64::from(actions.trigger_side(j, sides[j]))));
                 }
                 _ => sliding.push(j),
             }
@@ -153,7 +154,7 @@ impl<'a> ContactField<'a> {
         let mut impulses = Vec::with_capacity(rows.len());
         for (&(j, side), row) in self.contacts.iter().zip(rows) {
             let mut w = vec![0.0; x.len()];
-            if let Some((action, _)) = self.actions.at_surface(j) {
+            if let Some(action) = self.actions.from_side(j, if side < 0.0 { -1 } else { 1 }) {
                 let map = action.map;
                 map.impulse(t, x, row, &self.signs, &self.discrete, &mut w)?;
             }

@@ -149,11 +149,14 @@ pub fn classify(
     };
     field.eval(t, &mut x.to_vec(), &mut velocity)?;
     let actions = Actions::none();
+    let sides_of = |entry: &i8| if *entry < 0 { -1 } else { 1 };
+    let sides_before: Vec<i8> = mode.entries().iter().map(sides_of).collect();
     let arrival = |cause, field| Arrival {
         cause,
         mode,
         signs: &signs,
         sliding: &sliding,
+        sides: &sides_before,
         active: &active,
         resting: &[],
         departing: SmallVec::new(),

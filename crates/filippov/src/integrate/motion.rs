@@ -60,6 +60,11 @@ pub(super) struct Motion<'a> {
     /// This run has met kinks in the place of other surfaces.
     pub meets_kinks: bool,
     actions: &'a Actions<'a>,
+    /// The side of every surface on which the motion is; where its entry is 0, that on which it was last: the side
+    /// of a contact.
+    pub sides: SmallVec<[i8; 16]>,
+    /// Triggers that were crossed against their direction so far.
+    pub passed: Vec<usize>,
     /// The discrete states.
     pub discrete: Vec<f64>,
 }
@@ -92,6 +97,8 @@ impl<'a> Motion<'a> {
             resting: SmallVec::new(),
             meets_kinks: false,
             actions,
+            sides: actions.sides_at_start(signs.len()).collect(),
+            passed: Vec::new(),
             discrete: actions.discrete.clone(),
             signs,
             mode,
@@ -109,10 +116,16 @@ impl<'a> Motion<'a> {
         deflations: &[(EventFunction, Deflation)],
     ) {
         let (signs, sliding): (_, SlidingSet) = (mode.signs(), mode.sliding_set().collect());
+        if !self.actions.list.is_empty() {
+            let known = self.sides.iter_mut().zip(mode.entries());
+            known
+                .filter(|(_, &entry)| entry != 0)
+                .for_each(|(side, &entry)| *side = entry);
+        }
         let contact = if self.actions.list.is_empty() || sliding.is_empty() {
             None
         } else {
-            ContactField::new(system, self.actions, &mode, &self.discrete)
+            ContactField::new(system, self.actions, &mode, &self.sides, &self.discrete)
         };
         if let Some(contact) = contact {
             self.replace_field(ModeField::Contact(Box::new(contact)));

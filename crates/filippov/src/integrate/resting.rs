@@ -45,7 +45,8 @@ impl Integrator<'_> {
 
     /// Warns of a surface whose function is zero all along the motion, unless a warning was given about it.
     fn warn_zero_surface(&mut self, j: usize) {
-        if self.is_named(j) {
+        // Bodies that touch without any force are no mistake: nothing depends on the sign.
+        if self.is_named(j) || self.triggers().is_only_trigger(j) {
             return;
         }
         let name = self.system.surface_name(j);

@@ -68,7 +68,7 @@ pub fn solve_interruptible(
 /// let ball = ball.with_smooth_surfaces(&[0]);
 /// let bounce = |_t: f64, x: &mut [f64], _q: &mut [f64]| x[1] *= -0.5;
 /// let impact = Action {
-///     trigger: Trigger::Surface { index: 0, direction: -1 },
+///     trigger: Trigger::Surface { index: 0, direction: -1, side: 1 },
 ///     map: &bounce,
 ///     name: "impact".into(),
 ///     kind: Some(Kind::Reset),

@@ -46,6 +46,7 @@ impl<'a> Integrator<'a> {
             mode: &self.motion.mode,
             signs: &self.motion.signs,
             sliding: &self.motion.sliding,
+            sides: &self.motion.sides,
             active: &self.motion.active,
             resting: &self.motion.resting,
             departing: departing.collect(),
@@ -303,6 +304,9 @@ impl<'a> Integrator<'a> {
         rule: &'static str,
     ) {
         let kind = Kind::between(&before, &after);
+        if kind == Kind::Crossing && !self.actions.list.is_empty() {
+            self.warn_against_direction(&before, &after, surfaces);
+        }
         self.recorder.switch(Switch {
             t: self.t,
             y_before: SmallVec::from_slice(&self.x),

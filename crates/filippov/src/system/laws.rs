@@ -279,6 +279,7 @@ fn falling(index: usize) -> Trigger {
     Trigger::Surface {
         index,
         direction: -1,
+        side: 1,
     }
 }
 

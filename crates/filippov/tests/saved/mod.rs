@@ -121,6 +121,7 @@ pub fn impacts() -> SavedSystem {
                 Trigger::Surface {
                     index: floor,
                     direction: -1,
+                    side: 1,
                 },
                 &bounce,
                 "bounce",

@@ -1,6 +1,8 @@
 //! Everything that can be done with a system, for any system that was accepted.
 
-use filippov::{classify, BothSides, Method, Options, PiecewiseSystem, SavedSystem, TracedSystem};
+use filippov::{
+    classify, BothSides, Inspection, Method, Options, PiecewiseSystem, SavedSystem, TracedSystem,
+};
 use filippov_expr::Backend;
 
 /// Of so many systems one is compiled to native code: that takes much longer than all of the rest.
@@ -75,7 +77,15 @@ fn evaluate(system: &TracedSystem, t: f64, x: &[f64]) {
     }
     // The hidden dynamics of three and more surfaces takes a second.
     if h.iter().filter(|&&h| h.abs() < REACH).count() <= 2 {
-        let _ = classify(system, t, x, REACH, &[]);
+        let _ = classify(
+            system,
+            t,
+            x,
+            Inspection {
+                reach: REACH,
+                ..Inspection::default()
+            },
+        );
     }
 }
 

@@ -106,8 +106,10 @@ impl Integrator<'_> {
     ) -> Result<Option<Stop>, FieldError> {
         let Rest { t, mut x, surface } = rest;
         let contact = before.with(surface, 0);
-        let discrete = &self.motion.discrete;
-        if let Some(mut field) = ContactField::new(self.system, self.actions, &contact, discrete) {
+        let (sides, discrete) = (&self.motion.sides, &self.motion.discrete);
+        if let Some(mut field) =
+            ContactField::new(self.system, self.actions, &contact, sides, discrete)
+        {
             field.project(t, &mut x)?;
         }
         if x.iter().any(|v| !v.is_finite()) {

@@ -55,6 +55,7 @@ impl Integrator<'_> {
             }
             let side = self.triggers().side(j, None);
             mode.set(j, side);
+            self.warn_unknown_side(j, &mode)?;
             if self.goes_through(j, side, &mode, &on_surface)? {
                 due.extend(self.triggered_at(j, side));
             }
@@ -186,9 +187,9 @@ impl Integrator<'_> {
         side: i8,
     ) -> impl Iterator<Item = usize> + '_ {
         let fires = move |trigger: &Trigger| match trigger {
-            Trigger::Surface { index, direction } => {
-                *index == j && (*direction == 0 || *direction == -side)
-            }
+            Trigger::Surface {
+                index, direction, ..
+            } => *index == j && (*direction == 0 || *direction == -side),
             _ => false,
         };
         let list = self.actions.list.iter().enumerate();
@@ -369,6 +370,7 @@ impl Integrator<'_> {
         Triggers {
             system: self.system,
             actions: self.actions,
+            sides: &self.motion.sides,
         }
     }
 
@@ -464,11 +466,8 @@ impl Integrator<'_> {
     fn free_sides(&self, mode: &Mode) -> Vec<i8> {
         let mut sides = mode.entries().to_vec();
         for (j, side) in sides.iter_mut().enumerate() {
-            match self.actions.at_surface(j) {
-                Some((_, direction)) if *side == 0 && !self.system.switches_at(j) => {
-                    *side = if direction > 0 { -1 } else { 1 };
-                }
-                _ => {}
+            if *side == 0 && self.triggers().is_only_trigger(j) {
+                *side = self.triggers().side(j, None);
             }
         }
         sides

@@ -2,4 +2,5 @@
 
 pub(super) mod impacts;
 pub(super) mod instant;
+pub(super) mod sides;
 pub(super) mod timetable;

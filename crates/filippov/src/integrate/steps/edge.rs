@@ -90,12 +90,11 @@ impl Integrator<'_> {
             self.warnings.push(Warning {
                 t,
                 code: WarningCode::UndeclaredJump,
-                surfaces: Vec::new(),
-                text: format!(
-                    "the right-hand side jumps near t = {t:.10} and no surface is declared there; \
-                     give its switching function in surfaces="
-                ),
+                text: "the right-hand side jumps here and no surface is declared; give its switching function in \
+                       surfaces="
+                    .into(),
                 candidates: Vec::new(),
+                surfaces: Vec::new(),
                 rule: "",
             });
             self.suspect_chatter(self.recent_dt);

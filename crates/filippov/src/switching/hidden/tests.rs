@@ -6,6 +6,7 @@ use super::first_zero::{first_loss, value};
 use super::strip::{Strip, StripEnd};
 use super::{line, plane, space, Outcome};
 use crate::switching::codim2::Bilinear;
+use crate::switching::patience::Patience;
 use crate::switching::NormalFields;
 
 /// A generator with a seed: SplitMix64, uniform in [-1, 1).
@@ -45,8 +46,8 @@ fn two_surfaces_by_both_drivers() {
     for _ in 0..4000 {
         let fields = random.fields(2);
         let u = [2.0 * random.next(), 2.0 * random.next()];
-        let exact = plane::limit(&fields, u);
-        let general = space::limit(&fields, &u);
+        let exact = plane::limit(&fields, u, Patience::endless());
+        let general = space::limit(&fields, &u, Patience::endless());
         if general == Outcome::Unknown {
             assert_eq!(mode_of(&exact), "spiral", "{fields:?} from {u:?}");
             unknown += 1;
@@ -70,7 +71,7 @@ fn one_surface_by_both_drivers() {
         }
         assert_eq!(
             mode_of(&exact),
-            mode_of(&space::limit(&fields, &[u])),
+            mode_of(&space::limit(&fields, &[u], Patience::endless())),
             "{fields:?} from {u}"
         );
     }
@@ -166,9 +167,18 @@ fn the_first_of_several_zeros_is_found() {
 fn rest_is_no_outcome() {
     // g = (x, y): repels from the middle.
     let fields = NormalFields::new(2, vec![-1.0, -1.0, 1.0, -1.0, -1.0, 1.0, 1.0, 1.0]).unwrap();
-    assert_eq!(plane::limit(&fields, [0.0, 0.0]), Outcome::AtRest);
-    assert_eq!(space::limit(&fields, &[0.0, 0.0]), Outcome::AtRest);
-    assert_eq!(mode_of(&plane::limit(&fields, [1e-9, 1e-9])), "++");
+    assert_eq!(
+        plane::limit(&fields, [0.0, 0.0], Patience::endless()),
+        Outcome::AtRest
+    );
+    assert_eq!(
+        space::limit(&fields, &[0.0, 0.0], Patience::endless()),
+        Outcome::AtRest
+    );
+    assert_eq!(
+        mode_of(&plane::limit(&fields, [1e-9, 1e-9], Patience::endless())),
+        "++"
+    );
 }
 
 /// The form that defines a basin decreases along the motion from every point of its border.
