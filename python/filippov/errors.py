@@ -67,10 +67,6 @@ class FilippovError(Exception):
         return type(self), (self.message,), self.__dict__.copy()
 
 
-class FilippovWarning(UserWarning):
-    """What a user should know about a result that was computed all the same."""
-
-
 class TraceError(FilippovError):
     """A user's function cannot be turned into an expression.
 

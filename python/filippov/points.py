@@ -88,7 +88,7 @@ class Points(ABC):
     ) -> Classification:
         """Return what happens at a point: which surfaces vanish there, and which motion follows.
 
-        The decision is that of a run that starts at the point or, with `before`, arrives there in that mode.
+        The decision is that of a run that starts at the point, or with `before` arrives there in that mode.
 
         Parameters
         ----------
@@ -97,7 +97,8 @@ class Points(ABC):
         x : array_like, shape (n,)
             State.
         before : Mode, tuple of int, or str, optional
-            The mode of the motion that arrives at the point, one entry per surface; without it a run starts there.
+            The mode of the motion that arrives at the point, one entry per surface; without it a run starts
+            there.
         atol : float, optional
             A surface nearer than this counts as met; by default only one that vanishes to rounding.
         kappa : float or array_like, shape (n_surfaces,), optional
@@ -112,7 +113,8 @@ class Points(ABC):
         Raises
         ------
         InputError
-            If an argument or a parameter name does not fit, or if no motion in the mode `before` is at the point.
+            If an argument or a parameter name does not fit, or if no motion in the mode `before` can be at the
+            point.
         ModelError
             If a field or a switching function is not finite at the point.
 
