@@ -52,13 +52,13 @@ fmt: $(ENV_STAMP) ## format the Rust and the Python sources
 	$(BIN)/ruff check --fix --quiet .
 	$(BIN)/ruff format .
 
-lint: $(ENV_STAMP) ## formatting, clippy, ruff, file lengths, map; changes nothing
+lint: $(ENV_STAMP) ## formatting, clippy, ruff, structure, map; changes nothing
 	@sh scripts/check_tools.sh lint
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --release --workspace --all-targets -- -D warnings
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(PY) scripts/check_lengths.py
+	$(PY) scripts/check_structure.py
 	$(PY) scripts/check_map.py
 
 types: $(BUILD_STAMP) ## type check (strict) and comparison of the stub with the extension

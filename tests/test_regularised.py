@@ -59,6 +59,7 @@ def loses_its_root(run: Any) -> bool:
 
 
 # From the 24 systems above on, with the three whose distances do not fall like the width from 1e-3 on.
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 @pytest.mark.parametrize(
     ("seeds", "least"),
     [

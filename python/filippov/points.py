@@ -113,7 +113,7 @@ class Points(ABC):
         Raises
         ------
         InputError
-            If an argument or a parameter name does not fit, or if no motion in the mode `before` can be at the
+            If an argument or a parameter name does not fit, or if no motion in mode `before` can be at the
             point.
         ModelError
             If a field or a switching function is not finite at the point.

@@ -43,7 +43,7 @@ class StandingRun:
         self.t_events: list[Array] = [np.empty(0) for _ in range(n_events)]
         self.y_events: list[Array] = [np.empty((0, len(y0))) for _ in range(n_events)]
         self.stats: dict[str, int | float | str] = {"nfev": 0, "n_steps": 0, "n_rejected": 0, "n_events": 0}
-        self.warnings: list[tuple[float, str, str, list[tuple[int, ...]], list[int]]] = []
+        self.warnings: list[tuple[float, str, str, list[tuple[int, ...]], list[int], str]] = []
         self.candidates: list[tuple[int, ...]] = []
 
     def evaluate(self, t: Array, left: bool) -> Array:

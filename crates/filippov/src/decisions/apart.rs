@@ -4,9 +4,9 @@
 //! rounding does. Higher derivatives of one surface may, and where the signs of the others do not change them, the others
 //! need not be known.
 
-use super::decide::Meeting;
 use super::leave_by_rule::slides_by_rule;
 use super::point::{Decided, Left, Lefts, Next, Notes, Point};
+use super::rule::Meeting;
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::switching::{decide, Arrival as SurfaceArrival, Decision, Leading, NormalFields};

@@ -1,6 +1,5 @@
 //! Contact: which bodies stay, which leave, and what slides beside them.
 
-use super::placement::place;
 use super::point::{Decided, Left, Lefts, Next, Notes, Point};
 use crate::error::FieldError;
 use crate::event::EventFunction;
@@ -200,22 +199,4 @@ fn derivative_along(
         rate.time
     };
     Ok(time + dot(&row, &later))
-}
-
-/// A motion in a region, or sliding, that passes surfaces of triggers in the other direction while further
-/// surfaces vanish.
-pub(super) fn cross_beside_triggers(
-    at: &Point,
-    notes: &mut Notes,
-    surfaces: &[usize],
-) -> Result<Decided, FieldError> {
-    let before = at.arrival.mode;
-    let mut mode = before.clone();
-    for &j in surfaces
-        .iter()
-        .filter(|&&j| at.triggers().is_only_trigger(j))
-    {
-        mode.set(j, -before.entries()[j]);
-    }
-    place(at, notes, Some(&mode)).map(|(_, decided)| decided)
 }

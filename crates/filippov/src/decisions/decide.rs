@@ -2,7 +2,7 @@
 
 use super::apart::decide_apart;
 use super::coinciding::{decide_without_kinks, leave_coinciding};
-use super::contact::{cross_beside_triggers, decide_in_contact};
+use super::contact::decide_in_contact;
 use super::event::{arrival_at_surface, touch, vanishing_surfaces};
 use super::leave_by_rule::leave_by_rule;
 use super::limits::stay_at_limit;
@@ -12,129 +12,20 @@ use super::nested::{
     decide_where_others_jump, leave_along_bends, leave_at_bends, reject_if_not_attracting,
 };
 use super::placement::{one_surface, place};
+use super::point::{Apply, Rules};
 use super::point::{Cause, Decided, Lefts, Next, Notes, Point};
 use super::relay::decide_by_relay;
+use super::rule::{How, Meeting, Rule};
+use super::settle::settle;
 use super::vanishing_jump::decide_where_jump_vanishes;
 use smallvec::SmallVec;
 
 use crate::error::FieldError;
 use crate::field::ModeField;
 use crate::mode::Mode;
-use crate::switching::Arrival as SurfaceArrival;
 
-/// The rule that made a decision.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Rule {
-    /// No surface that matters vanishes.
-    Region,
-    /// The motion touches a surface.
-    Touch,
-    /// Other switching functions jump where surfaces are reached.
-    OthersJump,
-    /// The first derivatives that do not vanish on both sides of one surface.
-    OneSurface,
-    /// Surfaces bend at one another; one motion leads away from all.
-    Bends,
-    /// Surfaces in one place: one decides.
-    Coinciding,
-    /// Switches accumulate, and the motion stays on all surfaces.
-    Limit,
-    /// Surfaces that are decided one by one.
-    Apart,
-    /// Two surfaces that touch one another: the modes are tried for a moment.
-    Trial,
-    /// The rule of sliding that the caller chose ends.
-    SlidingRule,
-    /// The jump of the field across one surface vanishes while the motion slides on several.
-    VanishingJump,
-    /// The relay problem of a field that is affine in the signs.
-    Relay,
-    /// The signs of too many surfaces multiply one another.
-    TooMany,
-    /// First-order data at an intersection: trees, hidden dynamics, spirals; higher derivatives where those vanish.
-    FirstOrder,
-    /// Bodies in contact: the forces that push.
-    Contact,
-    /// Triggers of actions are crossed together with other surfaces.
-    Triggers,
-}
-
-impl Rule {
-    /// A stable name.
-    pub fn name(self) -> &'static str {
-        match self {
-            Rule::Region => "region",
-            Rule::Touch => "touch",
-            Rule::OthersJump => "others_jump",
-            Rule::OneSurface => "one_surface",
-            Rule::Bends => "bends",
-            Rule::Coinciding => "coinciding",
-            Rule::Limit => "limit",
-            Rule::Apart => "apart",
-            Rule::Trial => "trial",
-            Rule::SlidingRule => "sliding_rule",
-            Rule::VanishingJump => "vanishing_jump",
-            Rule::Relay => "relay",
-            Rule::TooMany => "too_many",
-            Rule::FirstOrder => "first_order",
-            Rule::Contact => "contact",
-            Rule::Triggers => "triggers",
-        }
-    }
-}
-
-/// What a rule is asked about: surfaces that vanish together.
-#[derive(Clone, Copy)]
-pub(crate) struct Meeting<'m> {
-    /// The mode before, or at a start the sides of the point.
-    pub mode: &'m Mode,
-    /// All surfaces that vanish, in increasing order.
-    pub surfaces: &'m [usize],
-    /// Those among them that were reached now.
-    pub fresh: &'m [usize],
-    pub how: How,
-}
-
-/// How the motion comes to the surfaces of a meeting.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum How {
-    /// The motion starts there, or on one surface as it says.
-    Start(SurfaceArrival),
-    /// It arrives; in this way, if one surface alone decides.
-    Event(Option<SurfaceArrival>),
-    /// Infinitely many switches end there.
-    Limit,
-}
-
-impl How {
-    /// A start on surface `j` where a motion in this mode came from.
-    pub fn on_one_surface(mode: &Mode, j: usize) -> Self {
-        How::Start(SurfaceArrival::from_side(mode.entries()[j]))
-    }
-}
-
-impl Meeting<'_> {
-    /// The full mode with these entries on the surfaces.
-    pub fn on_all(&self, entries: &Mode) -> Mode {
-        let mut full = self.mode.clone();
-        for (&j, &entry) in self.surfaces.iter().zip(entries.entries()) {
-            full.set(j, entry);
-        }
-        full
-    }
-
-    /// Does sliding on all surfaces end here, and none is reached?
-    pub fn is_exit(&self) -> bool {
-        matches!(self.how, How::Event(_)) && self.fresh.is_empty()
-    }
-}
-
-/// A rule: the motion that follows, or why the run ends; `None` where the rule does not apply.
-type Apply = fn(&Point, &mut Notes, &Meeting) -> Result<Option<Decided>, FieldError>;
-
-/// The rules where surfaces vanish: the first that applies decides. Where none does, first-order data do
-/// ([`Rule::FirstOrder`]).
-const RULES: [(Rule, Apply); 14] = [
+/// The rules where surfaces vanish: the first that applies decides. First-order data always do.
+const LIST: [(Rule, Apply); 15] = [
     (Rule::Region, region),
     (Rule::Touch, touch),
     (Rule::OthersJump, decide_where_others_jump),
@@ -149,7 +40,11 @@ const RULES: [(Rule, Apply); 14] = [
     (Rule::VanishingJump, decide_where_jump_vanishes),
     (Rule::Relay, decide_by_relay),
     (Rule::TooMany, too_many),
+    (Rule::FirstOrder, resolve_first_order),
 ];
+
+/// The list with what holds for its answers.
+pub(crate) const RULES: Rules = Rules { list: &LIST, check };
 
 /// The whole result of a decision.
 pub(crate) struct Decision {
@@ -234,24 +129,6 @@ fn after_event(
     Ok((rule, decided))
 }
 
-/// The answer of the first rule that applies, with its name.
-pub(super) fn settle(
-    at: &Point,
-    notes: &mut Notes,
-    meeting: &Meeting,
-) -> Result<(Rule, Decided), FieldError> {
-    for (rule, apply) in RULES {
-        if let Some(decided) = apply(at, notes, meeting)? {
-            return match meeting.surfaces {
-                [] | [_] => Ok((rule, decided)),
-                _ => check(at, notes, meeting, rule, decided),
-            };
-        }
-    }
-    let decided = resolve_first_order(at, notes, meeting)?;
-    check(at, notes, meeting, Rule::FirstOrder, decided)
-}
-
 /// What holds for the answers of several rules: friction that has become kinetic is decided once more, and sliding on one
 /// surface needs fields that point to it.
 fn check(
@@ -260,7 +137,7 @@ fn check(
     meeting: &Meeting,
     rule: Rule,
     mut decided: Decided,
-) -> Result<(Rule, Decided), FieldError> {
+) -> Result<Decided, FieldError> {
     use Rule::{
         Apart, Coinciding, FirstOrder, Limit, Relay, SlidingRule, TooMany, Trial, VanishingJump,
     };
@@ -288,11 +165,29 @@ fn check(
     if is_intersection {
         decided = reject_if_not_attracting(at, decided, meeting.surfaces)?;
     }
-    Ok((rule, decided))
+    Ok(decided)
 }
 
 /// Rule: the region that the point is in.
 fn region(_: &Point, _: &mut Notes, meeting: &Meeting) -> Result<Option<Decided>, FieldError> {
     let is_region = meeting.surfaces.is_empty();
     Ok(is_region.then(|| Ok(Next::new(meeting.mode.clone(), Lefts::new()))))
+}
+
+/// A motion in a region, or sliding, that passes surfaces of triggers in the other direction while further
+/// surfaces vanish.
+fn cross_beside_triggers(
+    at: &Point,
+    notes: &mut Notes,
+    surfaces: &[usize],
+) -> Result<Decided, FieldError> {
+    let before = at.arrival.mode;
+    let mut mode = before.clone();
+    for &j in surfaces
+        .iter()
+        .filter(|&&j| at.triggers().is_only_trigger(j))
+    {
+        mode.set(j, -before.entries()[j]);
+    }
+    place(at, notes, Some(&mode)).map(|(_, decided)| decided)
 }

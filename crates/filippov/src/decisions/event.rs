@@ -1,8 +1,8 @@
 //! Events: which surfaces vanish there, and how the motion comes to them.
 
 use super::choice::choose;
-use super::decide::{How, Meeting};
 use super::point::{Arrival, Cause, Decided, Left, Lefts, Next, Notes, Point};
+use super::rule::{How, Meeting};
 use smallvec::SmallVec;
 
 use crate::error::FieldError;

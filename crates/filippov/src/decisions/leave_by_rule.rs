@@ -1,9 +1,9 @@
 //! Sliding on an intersection by another rule than the canopy: where it begins and ends.
 
 use super::choice::choose;
-use super::decide::Meeting;
 use super::departures::departures;
 use super::point::{Arrival, Decided, Next, Notes, Point};
+use super::rule::Meeting;
 use crate::error::FieldError;
 use crate::field::weights::RuleFailure;
 use crate::field::ModeField;

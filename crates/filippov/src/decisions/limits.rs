@@ -1,8 +1,8 @@
 //! Limits of infinitely many switches in finite time, and what follows there.
 
-use super::decide::{How, Meeting};
 use super::departures::velocity_in;
 use super::point::{Decided, Lefts, Next, Notes, Point};
+use super::rule::{How, Meeting};
 use crate::error::FieldError;
 use crate::field::Projector;
 use crate::mode::Mode;

@@ -4,9 +4,9 @@
 //! order that decides.
 
 use super::coinciding::touch_one_another;
-use super::decide::Meeting;
 use super::departures::velocity_in;
 use super::point::{Decided, Left, Lefts, Next, Notes, Point};
+use super::rule::Meeting;
 use crate::error::FieldError;
 use crate::field::ModeField;
 use crate::field::SmoothField;

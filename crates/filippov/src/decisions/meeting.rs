@@ -1,11 +1,11 @@
 //! Where surfaces meet: what follows at an intersection, from the switching stage.
 
 use super::choice::{asked, choose, follow_at_surface};
-use super::decide::{How, Meeting};
 use super::departures::departures;
 use super::higher_order::decide_by_higher_order;
-use super::placement::place_on;
 use super::point::{Decided, Lefts, Next, Notes, Point};
+use super::rule::{How, Meeting};
+use super::settle::place_on;
 use super::spiral::outward_leap;
 use crate::error::FieldError;
 use crate::event::EventFunction;
@@ -51,7 +51,7 @@ pub(super) fn resolve_first_order(
     at: &Point,
     notes: &mut Notes,
     meeting: &Meeting,
-) -> Result<Decided, FieldError> {
+) -> Result<Option<Decided>, FieldError> {
     let corners = at.corners(notes, meeting.surfaces, meeting.mode)?;
     let kappa = at.policy.law.scaling(meeting.surfaces);
     let mut others = Vec::new();
@@ -75,7 +75,7 @@ pub(super) fn resolve_first_order(
             }
         }
     };
-    follow(at, notes, meeting, &corners, resolution, &others)
+    follow(at, notes, meeting, &corners, resolution, &others).map(Some)
 }
 
 /// Rule: more surfaces whose signs multiply one another than all of whose fields can be looked at.

@@ -6,10 +6,10 @@
 //! as that of abs or maximum does, is slid on beyond if its field and its normal there allow it.
 
 use super::choice::choose;
-use super::decide::{How, Meeting, Rule};
 use super::departures::departures;
-use super::placement::place_on;
 use super::point::{Decided, Left, Lefts, Next, Notes, Point};
+use super::rule::{How, Meeting, Rule};
+use super::settle::place_on;
 use crate::error::FieldError;
 use crate::field::eval_on_side;
 use crate::mode::Mode;

@@ -2,18 +2,16 @@
 
 use super::choice::follow_at_surface;
 use super::contact::place_in_contact;
-use super::decide::settle;
-use super::decide::{How, Meeting, Rule};
 use super::departures::velocity_in;
 use super::nested::follow_jumps;
 use super::point::{Decided, Left, Notes, Point};
+use super::rule::{How, Meeting, Rule};
+use super::settle::place_on;
 use crate::error::FieldError;
 use crate::field::{ContactField, Projector, SmoothField};
 use crate::mode::Mode;
 use crate::status::Stop;
-use crate::switching::{
-    decide as decide_at_surface, first_nonzero, Arrival as SurfaceArrival, Leading,
-};
+use crate::switching::{decide as decide_at_surface, first_nonzero, Leading};
 use crate::system::{dot, dot_magnitude, surfaces_that_matter};
 use crate::tolerances::{DEPARTS_TANGENTIALLY, SLIPPED, SLOW, SURFACE_NOISE};
 
@@ -80,28 +78,6 @@ fn take_sides(
         }
     }
     Ok(Ok(next))
-}
-
-/// The motion from a place where these surfaces matter and vanish. The others have the signs of `mode`.
-pub(super) fn place_on(
-    at: &Point,
-    notes: &mut Notes,
-    mode: &Mode,
-    surfaces: &[usize],
-    memory: Option<&Mode>,
-) -> Result<(Rule, Decided), FieldError> {
-    // Of several continuations that which stays on its side.
-    let entry = match (surfaces, memory) {
-        (&[j], Some(memory)) => memory.entries()[j],
-        _ => 0,
-    };
-    let meeting = Meeting {
-        mode,
-        surfaces,
-        fresh: surfaces,
-        how: How::Start(SurfaceArrival::from_side(entry)),
-    };
-    settle(at, notes, &meeting)
 }
 
 /// Rule: one surface, by the first derivatives of h that do not vanish along the fields of both sides.
@@ -201,7 +177,7 @@ fn slipped_through(
 }
 
 /// Does the action at surface `j` leave h_j as it is, as an impact does? It does not move bodies, but their velocities.
-pub(crate) fn leaves_point_alone(at: &Point, j: usize, signs: &[f64]) -> Result<bool, FieldError> {
+pub(super) fn leaves_point_alone(at: &Point, j: usize, signs: &[f64]) -> Result<bool, FieldError> {
     let Some((action, _)) = at.actions.at_surface(j) else {
         return Ok(false);
     };
@@ -344,7 +320,7 @@ fn rate_in(
 }
 
 /// Is this speed at surface j below the tolerance?
-pub(crate) fn is_slow(at: &Point, j: usize, speed: f64, mode: &Mode) -> Result<bool, FieldError> {
+pub(super) fn is_slow(at: &Point, j: usize, speed: f64, mode: &Mode) -> Result<bool, FieldError> {
     let mut row = vec![0.0; at.x.len()];
     at.system
         .rate_gradient(j, at.t, at.x, &mode.signs(), &mut row)?;

@@ -1,6 +1,6 @@
 //! What a decision is asked about, and what its rules hand to one another.
 
-use super::spiral::Leap;
+use super::rule::{Meeting, Rule};
 use super::triggers::Triggers;
 use std::cell::RefCell;
 
@@ -15,6 +15,7 @@ use crate::options::{NonUnique, Options};
 use crate::solution::Switch;
 use crate::status::{Stop, Warning};
 use crate::stepper::ErrorScale;
+use crate::switching::codim2::Lap;
 use crate::switching::{Decision, Leading, Patience};
 use crate::system::PiecewiseSystem;
 use crate::tolerances::{MOMENT, MOST_SHORTENINGS, TOO_LARGE_A_CHANGE};
@@ -35,8 +36,24 @@ pub(crate) struct Point<'p, 'm, 'a> {
     pub q: &'p [f64],
     pub arrival: &'p Arrival<'m, 'a>,
     pub policy: Policy<'a>,
+    /// The rules where surfaces vanish.
+    pub rules: &'static Rules,
     /// How long the caller waits.
     pub patience: Patience<'p>,
+}
+
+/// A rule: the motion that follows, or why the run ends; `None` where the rule does not apply.
+pub(super) type Apply = fn(&Point, &mut Notes, &Meeting) -> Result<Option<Decided>, FieldError>;
+
+/// What holds for the answers of rules: an answer, checked and completed.
+pub(super) type Check =
+    fn(&Point, &mut Notes, &Meeting, Rule, Decided) -> Result<Decided, FieldError>;
+
+/// The rules in their order, the last of which always answers.
+pub(crate) struct Rules {
+    pub(super) list: &'static [(Rule, Apply)],
+    /// Asked where several surfaces vanish.
+    pub(super) check: Check,
 }
 
 /// What is chosen where the system leaves a choice.
@@ -299,6 +316,23 @@ pub(crate) struct Start {
     pub leap: Option<Leap>,
     /// The state, where that is not the place of the decision.
     pub moved: Option<Vec<f64>>,
+}
+
+/// The laps of an outward spiral up to a small distance: too many to be listed, and one straight line in the record. One
+/// member of a one-parameter family.
+///
+/// Reference: Guglielmi, Hairer (2022), formula (6.5).
+#[derive(Clone, Debug)]
+pub(crate) struct Leap {
+    /// The region that the motion enters at the end, and is said to be in from the start on.
+    pub region: Mode,
+    /// The surface on its border on which it enters.
+    pub(super) border: usize,
+    pub(super) lap: Lap,
+    /// The fields of the regions of the lap.
+    pub(super) fields: [Vec<f64>; 4],
+    /// The free parameter of the family: a distance in units of the switching functions.
+    pub(super) distance: f64,
 }
 
 /// The motion that follows, or why the run ends.

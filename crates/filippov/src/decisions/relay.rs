@@ -2,9 +2,9 @@
 
 use super::choice::choose;
 use super::coinciding::have_parallels;
-use super::decide::{How, Meeting};
 use super::departures::departures;
 use super::point::{Decided, Left, Lefts, Next, Notes, Point};
+use super::rule::{How, Meeting};
 use crate::error::FieldError;
 use crate::event::EventFunction;
 use crate::field::SmoothField;

@@ -4,9 +4,9 @@
 //! at once. First-order data say nothing there, and the multiplier is 0/0; both are taken a moment away.
 
 use super::choice::choose;
-use super::decide::Meeting;
 use super::departures::{departures, velocity_in};
 use super::point::{Decided, Left, Lefts, Next, Notes, Point};
+use super::rule::Meeting;
 
 use crate::error::FieldError;
 use crate::event::EventFunction;

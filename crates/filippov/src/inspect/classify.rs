@@ -5,7 +5,9 @@ use std::cell::RefCell;
 use smallvec::SmallVec;
 
 use crate::action::Actions;
-use crate::decisions::{decide, sides, Arrival, Cause, Decision, Notes, Point, Policy, Sides};
+use crate::decisions::{
+    decide, sides, Arrival, Cause, Decision, Notes, Point, Policy, Sides, RULES,
+};
 use crate::error::FieldError;
 use crate::event::EventFunction;
 use crate::field::{eval_on_side, Law, MeetingFields, ModeField, SmoothField};
@@ -181,6 +183,7 @@ pub fn classify(
         q: &[],
         arrival,
         policy,
+        rules: &RULES,
         patience: Patience::endless(),
     };
     let event = Cause::Event {

@@ -14,8 +14,6 @@
 //!
 //! `docs/theory/order_of_outcomes.md` has all of it, with the tests.
 
-use rustc_hash::FxHashMap;
-
 use super::Stats;
 use crate::action::Actions;
 use crate::decisions::{root_ends, Cause};
@@ -24,12 +22,12 @@ use crate::event::{Found, UserEvent};
 use crate::field::ModeField;
 use crate::field::SmoothField;
 use crate::integrate::actions::timetable::Timetable;
-use crate::integrate::detection::detect::Detector;
-use crate::integrate::detection::user_events::UserEvents;
+use crate::integrate::detection::detector::Detector;
+use crate::integrate::detection::user_functions::UserEvents;
 use crate::integrate::motion::Motion;
-use crate::integrate::steps::chatter::Chatter;
-use crate::integrate::steps::pace::Pace;
-use crate::integrate::steps::stiff::Derivatives;
+use crate::integrate::steps::chatter::ChatterWatch;
+use crate::integrate::steps::pace::Paces;
+use crate::integrate::steps::stiffness::Derivatives;
 use crate::integrate::steps::stiffness::Stiffness;
 use crate::integrate::watch::Watch;
 use crate::mode::Mode;
@@ -72,7 +70,7 @@ pub struct Integrator<'a> {
     /// Proposed step.
     pub(super) dt: f64,
     /// How the last motion went, by mode.
-    pub(super) paces: FxHashMap<Mode, Pace>,
+    pub(super) paces: Paces,
     pub(super) detector: Detector,
     pub(super) user_events: UserEvents<'a>,
     pub(super) recorder: Recorder,
@@ -90,7 +88,7 @@ pub struct Integrator<'a> {
     /// Largest recent step of this motion.
     pub(super) recent_dt: f64,
     /// Since a jump of the field that no surface declares, if the steps have been short since then.
-    pub(super) chatter: Option<Chatter>,
+    pub(super) chatter: ChatterWatch,
     /// The first of the last switches without progress of time, and how many came since.
     pub(super) last_switch: (f64, u32),
     /// How long a step the series allows that was taken at the start of the motion, until the step.
@@ -154,7 +152,7 @@ impl<'a> Integrator<'a> {
             stepper,
             controller: Controller::default(),
             dt: f64::NAN,
-            paces: FxHashMap::default(),
+            paces: Paces::default(),
             detector: Detector::new(n, system.n_surfaces()),
             user_events: UserEvents::new(events),
             recorder: Recorder::new(n, options),
@@ -166,7 +164,7 @@ impl<'a> Integrator<'a> {
             stiffness: Stiffness::default(),
             n_aims: 0,
             recent_dt: 0.0,
-            chatter: None,
+            chatter: ChatterWatch::default(),
             last_switch: (f64::NAN, 0),
             series_reach: None,
             slacks: Vec::new(),
@@ -425,7 +423,8 @@ impl<'a> Integrator<'a> {
             (dt * self.controller.accept(error)).max(self.wanted_dt)
         };
         self.note_jump(dt);
-        let chatter = self.chatters(dt);
+        let stepper = &self.stepper;
+        let chatter = self.chatter.note_step(dt, || stepper.field_jumps());
         if let Some(stop) = self.record_user_zeros(zeros, theta, t_stop)? {
             return Ok(Some(stop));
         }
@@ -473,7 +472,7 @@ impl<'a> Integrator<'a> {
         }
         self.t = t_stop;
         self.recent_dt = 0.0;
-        self.chatter = None;
+        self.chatter.forget();
         self.switch(&event)
     }
 

@@ -13,7 +13,7 @@ mod steps;
 mod transition;
 mod watch;
 
-pub use detection::user_events::UserZero;
+pub use detection::user_functions::UserZero;
 pub use integrator::Integrator;
 pub use solve::{solve, solve_interruptible, solve_to_section, solve_with_actions};
 pub use stats::Stats;

@@ -12,7 +12,7 @@ use crate::mode::{Mode, Signs};
 use crate::options::SlidingRule;
 use crate::system::{MotionJets, PiecewiseSystem};
 
-use crate::integrate::steps::stiff::Derivatives;
+use crate::integrate::steps::stiffness::Derivatives;
 
 /// Modes that are remembered: in a run that meets more of them, what follows from a mode is found anew now and then.
 const MOST_KNOWN: usize = 8;

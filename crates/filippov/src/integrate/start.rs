@@ -1,12 +1,8 @@
 //! Where a run starts: arguments checked, the mode of the initial state found.
 
 use crate::action::{Actions, Trigger};
-use crate::decisions::{Cause, Decision, Next, Rule};
-use crate::error::{Error, FieldError};
-use crate::integrate::integrator::Integrator;
-use crate::mode::Mode;
+use crate::error::Error;
 use crate::options::Options;
-use crate::status::Stop;
 use crate::system::PiecewiseSystem;
 
 /// Checks the arguments of a run.
@@ -99,44 +95,4 @@ pub(super) fn check(
         )?;
     }
     Ok(())
-}
-
-impl Integrator<'_> {
-    /// Decides the mode anew at the current point and goes on.
-    pub(super) fn go_on_from_here(&mut self) -> Result<Option<Stop>, FieldError> {
-        let before = self.motion.mode.clone();
-        let Decision { rule, decided, .. } = self.decide(Cause::Anew(&before))?;
-        match decided {
-            Ok(next) => self.go_on_in(before, next, rule),
-            Err(stop) => Ok(Some(stop)),
-        }
-    }
-
-    /// Records what changes between two modes, if anything does, and starts the motion in the second.
-    pub(super) fn go_on_in(
-        &mut self,
-        before: Mode,
-        next: Next,
-        rule: Rule,
-    ) -> Result<Option<Stop>, FieldError> {
-        let entries = before.entries().iter().zip(next.mode.entries()).enumerate();
-        let changed = entries.filter(|(_, (before, after))| before != after);
-        let changed: Vec<usize> = changed.map(|(j, _)| j).collect();
-        if !changed.is_empty() {
-            self.record(before, next.mode.clone(), &changed, rule.name());
-        }
-        self.begin(next)
-    }
-
-    /// Finds the mode of the initial state and starts the motion.
-    pub(super) fn start(&mut self) -> Result<Option<Stop>, FieldError> {
-        self.recorder.start(self.t, &self.x);
-        if !self.actions.list.is_empty() {
-            return self.start_with_actions();
-        }
-        match self.decide(Cause::Start)?.decided {
-            Ok(next) => self.begin(next),
-            Err(stop) => Ok(Some(stop)),
-        }
-    }
 }

@@ -5,19 +5,21 @@ use std::cell::RefCell;
 use smallvec::{smallvec, SmallVec};
 
 use crate::decisions::{
-    beyond_double_zero, decide, differs_between_sides, limits::limit_here, refusal, root_ends,
-    two_fold_here, vanishing_surfaces, Arrival, Cause, Decision, Leap, Lefts, Next, Notes, Point,
-    Rule, Values,
+    beyond_double_zero, decide, differs_between_sides, landing, limits::limit_here, refusal,
+    root_ends, two_fold_here, vanishing_surfaces, warn_against_direction, Arrival, Cause, Decision,
+    Leap, Left, Lefts, Next, Notes, Point, Rule, Values, RULES,
 };
 use crate::error::FieldError;
 use crate::event::{Deflation, EventFunction, Found};
 use crate::field::{eval_on_side, ModeField, SmoothField};
 use crate::integrate::integrator::Integrator;
+use crate::integrate::steps::pace::excursion;
 use crate::mode::Mode;
 use crate::solution::Switch;
 use crate::status::Stop;
+use crate::stepper::{initial_step, restart_step};
 use crate::switching::{Kind, Patience};
-use crate::tolerances::{MOST_SWITCHES_AT_ONE_TIME, NO_PROGRESS, SMALL_JUMP};
+use crate::tolerances::{MOST_SWITCHES_AT_ONE_TIME, NO_PROGRESS, SMALLEST_GUESS, SMALL_JUMP};
 
 /// How many normal components of sliding on one surface vanish.
 fn n_exits(event: &Found) -> usize {
@@ -68,6 +70,7 @@ impl<'a> Integrator<'a> {
             q: &self.motion.discrete,
             arrival: &arrival,
             policy: self.options.into(),
+            rules: &RULES,
             patience: Patience::until(&is_over),
         };
         let mut notes = Notes {
@@ -181,7 +184,7 @@ impl<'a> Integrator<'a> {
                 }
             }
         }
-        self.record(before, next.mode.clone(), &concerned, rule.name());
+        self.record(before, next.mode.clone(), &concerned, rule.name())?;
         if !matches!(rule, Rule::Touch | Rule::Contact | Rule::Triggers) {
             if let Some(limit) = self.accumulation()? {
                 return self.jump_to(limit, next.mode);
@@ -236,7 +239,7 @@ impl<'a> Integrator<'a> {
         let Some((t, end)) = beyond.filter(|(t, _)| *t <= self.horizon) else {
             return Ok(None);
         };
-        self.record(mode.clone(), mode.clone(), &[], Rule::OneSurface.name());
+        self.record(mode.clone(), mode.clone(), &[], Rule::OneSurface.name())?;
         self.move_straight(t, end)?;
         let next = Next::new(mode, Lefts::new());
         Ok(Some(self.begin(next)?))
@@ -302,10 +305,10 @@ impl<'a> Integrator<'a> {
         after: Mode,
         surfaces: &[usize],
         rule: &'static str,
-    ) {
+    ) -> Result<(), FieldError> {
         let kind = Kind::between(&before, &after);
         if kind == Kind::Crossing && !self.actions.list.is_empty() {
-            self.warn_against_direction(&before, &after, surfaces);
+            self.look_at_directions(&before, &after, surfaces)?;
         }
         self.recorder.switch(Switch {
             t: self.t,
@@ -318,6 +321,34 @@ impl<'a> Integrator<'a> {
             note: String::new(),
             rule,
         });
+        Ok(())
+    }
+
+    /// Warns of triggers that the motion crosses against their direction. Each is looked at once.
+    #[cold]
+    fn look_at_directions(
+        &mut self,
+        before: &Mode,
+        after: &Mode,
+        surfaces: &[usize],
+    ) -> Result<(), FieldError> {
+        for &j in surfaces {
+            let side = before.entries()[j];
+            let is_crossed = side != 0 && after.entries()[j] == -side;
+            let triggers = self.triggers();
+            if !is_crossed || !triggers.is_only_trigger(j) || triggers.follows_law(j) {
+                continue;
+            }
+            let is_triggered = self.triggered_at(j, side).next().is_some();
+            if is_triggered || self.motion.passed.contains(&j) {
+                continue;
+            }
+            self.motion.passed.push(j);
+            self.ask(Cause::Anew(before), |at, notes| {
+                warn_against_direction(at, notes, j, before)
+            })?;
+        }
+        Ok(())
     }
 
     /// Starts a motion at the current point.
@@ -328,7 +359,8 @@ impl<'a> Integrator<'a> {
             mut start,
         } = next;
         self.stats.n_field_evaluations += self.motion.field.n_evaluations();
-        self.remember_pace();
+        let duration = self.t - self.motion.t_start;
+        self.paces.remember(&self.motion.mode, self.dt, duration);
         let slid = !self.motion.sliding().is_empty();
         let mut leaps = false;
         if let Some(start) = &mut start {
@@ -420,7 +452,7 @@ impl<'a> Integrator<'a> {
     /// Begins the segment of a motion that starts with a leap, and makes that; what the motion leaves at its end.
     fn make_leap(&mut self, leap: &Leap) -> Result<Lefts, FieldError> {
         let room = self.horizon - self.t;
-        let landing = self.ask(Cause::Start, |at, notes| leap.landing(at, notes, room))?;
+        let landing = self.ask(Cause::Start, |at, notes| landing(leap, at, notes, room))?;
         let region = leap.region.clone();
         self.motion.restart(self.system, self.t, region, &[]);
         let discrete = &self.motion.discrete;
@@ -465,5 +497,79 @@ impl<'a> Integrator<'a> {
         let stages = exits.iter().map(|&exit| [exit; 7]);
         self.detector.stages.extend(stages);
         Ok(())
+    }
+
+    /// Decides the mode anew at the current point and goes on.
+    pub(in crate::integrate) fn go_on_from_here(&mut self) -> Result<Option<Stop>, FieldError> {
+        let before = self.motion.mode.clone();
+        let Decision { rule, decided, .. } = self.decide(Cause::Anew(&before))?;
+        match decided {
+            Ok(next) => self.go_on_in(before, next, rule),
+            Err(stop) => Ok(Some(stop)),
+        }
+    }
+
+    /// Records what changes between two modes, if anything does, and starts the motion in the second.
+    pub(in crate::integrate) fn go_on_in(
+        &mut self,
+        before: Mode,
+        next: Next,
+        rule: Rule,
+    ) -> Result<Option<Stop>, FieldError> {
+        let entries = before.entries().iter().zip(next.mode.entries()).enumerate();
+        let changed = entries.filter(|(_, (before, after))| before != after);
+        let changed: Vec<usize> = changed.map(|(j, _)| j).collect();
+        if !changed.is_empty() {
+            self.record(before, next.mode.clone(), &changed, rule.name())?;
+        }
+        self.begin(next)
+    }
+
+    /// Finds the mode of the initial state and starts the motion.
+    pub(in crate::integrate) fn start(&mut self) -> Result<Option<Stop>, FieldError> {
+        self.recorder.start(self.t, &self.x);
+        if !self.actions.list.is_empty() {
+            return self.start_with_actions();
+        }
+        match self.decide(Cause::Start)?.decided {
+            Ok(next) => self.begin(next),
+            Err(stop) => Ok(Some(stop)),
+        }
+    }
+
+    /// The first step of a motion: what the last motion in its mode suggests; else the proposal of the
+    /// motion before, as far as Hairer's guess for this one supports it. No longer than a short
+    /// excursion from the surface.
+    pub(in crate::integrate) fn first_step(&mut self, left: &[Left]) -> Result<f64, FieldError> {
+        let remaining = (self.t_end - self.t).max(f64::MIN_POSITIVE);
+        if let (Some(first), true) = (self.options.first_step, self.dt.is_nan()) {
+            return Ok(first.max(SMALLEST_GUESS).min(remaining));
+        }
+        let longest = remaining.min(self.options.max_step);
+        if self.motion.jets.is_some() {
+            // The series tells.
+            return Ok(longest);
+        }
+        let (t, x, scale, field) = (self.t, &self.x, &self.scale, &mut self.motion.field);
+        let derivative = self.stepper.start_derivative();
+        let mode = &self.motion.mode;
+        let mut dt = match self.paces.first_step(mode, x, derivative, scale) {
+            Some(dt) => dt.min(longest),
+            None if self.dt.is_nan() => initial_step(field, t, x, derivative, scale, longest)?,
+            None => restart_step(field, t, x, derivative, scale, self.dt.min(longest))?,
+        };
+        for l in left {
+            if let Left::Surface(j, leading) = l {
+                let place = (self.t, &self.x[..]);
+                dt = dt.min(excursion(
+                    self.system,
+                    place,
+                    &self.motion.mode,
+                    *j,
+                    *leading,
+                )?);
+            }
+        }
+        Ok(dt)
     }
 }

@@ -14,8 +14,8 @@ use smallvec::SmallVec;
 
 use crate::action::Trigger;
 use crate::decisions::{
-    add_vanishing_surfaces, goes_through, located_surfaces, pushed_back, rates_here, sides, Cause,
-    Decision, Left, Sides, Triggers, Values,
+    add_vanishing_surfaces, goes_through, located_surfaces, pushed_back, rates_here, sides,
+    warn_unknown_side, Cause, Decision, Left, Sides, Triggers, Values,
 };
 use crate::error::FieldError;
 use crate::event::EventFunction;
@@ -55,7 +55,9 @@ impl Integrator<'_> {
             }
             let side = self.triggers().side(j, None);
             mode.set(j, side);
-            self.warn_unknown_side(j, &mode)?;
+            self.ask(Cause::Start, |at, notes| {
+                warn_unknown_side(at, notes, j, &mode)
+            })?;
             if self.goes_through(j, side, &mode, &on_surface)? {
                 due.extend(self.triggered_at(j, side));
             }

@@ -5,21 +5,15 @@ use std::cell::RefCell;
 use filippov_expr::{Enclosure, Interval};
 use smallvec::SmallVec;
 
-use crate::error::FieldError;
-use crate::event::certificate::{prove, Bound, Proof};
-use crate::event::isolate::PROBES;
+use crate::event::certificate::Bound;
 use crate::event::tube::Tube;
 use crate::event::{EventFunction, Monitored};
-use crate::field::ModeField;
 use crate::field::{AffineBounds, IntersectionExit};
-use crate::integrate::detection::detect::Detector;
-use crate::integrate::integrator::Integrator;
 use crate::mode::Signs;
-use crate::options::SlidingRule;
 use crate::stepper::Interpolant;
 use crate::switching::{enclose_root, EnclosedRoot, IntervalVector, RootBounds, Vector};
 use crate::system::PiecewiseSystem;
-use crate::tolerances::{MARGIN, MOST_ENCLOSED, PROOF_DEPTH, ROOT_BOXES};
+use crate::tolerances::{MOST_ENCLOSED, ROOT_BOXES};
 
 /// The continuous extension of a step, as far as it bounds what is monitored.
 pub(in crate::integrate) struct BoundedCurve<'a> {
@@ -203,74 +197,4 @@ fn exit_bound(exit: IntersectionExit, root: &EnclosedRoot) -> Option<Enclosure> 
         },
     };
     Some(Enclosure { value, rate })
-}
-
-impl Integrator<'_> {
-    /// What bounds over the step up to `reach` prove about a function.
-    pub(in crate::integrate) fn prove_clear(
-        &self,
-        index: usize,
-        value_at_end: f64,
-        reach: f64,
-    ) -> Proof {
-        let m = self.motion.monitored[index];
-        let curve = BoundedCurve {
-            system: self.system,
-            interpolant: self.stepper.interpolant(),
-            signs: &self.motion.signs,
-            sliding: self.motion.sliding(),
-            margin: &self.detector.margin,
-            stages: &self.detector.stages,
-            affine: self.motion.affine_bounds(),
-            by_multipliers: !self.motion.slides_by_rule() && self.motion.has_bounds(),
-            known_exits: &self.detector.enclosed_exits,
-            known_roots: &self.detector.enclosed_roots,
-        };
-        // Next to a zero that is divided out the function itself may only rise.
-        let at_start = if m.deflation.is_some() {
-            f64::INFINITY
-        } else {
-            m.value
-        };
-        prove(
-            &mut |a, b| curve.over(&m, a, b),
-            reach,
-            (at_start, (reach == 1.0).then_some(value_at_end)),
-            m.noise,
-            PROOF_DEPTH,
-        )
-    }
-
-    /// Prepares the bounds of many multipliers, once per motion.
-    pub(in crate::integrate) fn prepare_bounds(&mut self) {
-        let motion = &mut self.motion;
-        if !motion.has_bounds()
-            || motion.affine_bounds.is_some()
-            || self.options.sliding != SlidingRule::Canopy
-        {
-            return;
-        }
-        if let ModeField::Intersection(field) = &motion.field {
-            motion.affine_bounds = Some(field.steady_normal().and_then(AffineBounds::new));
-        }
-    }
-
-    /// How far the motion lies beside the continuous extension, from the probes of the step.
-    pub(in crate::integrate) fn measure_margin(&mut self, dt: f64) -> Result<(), FieldError> {
-        let Detector { margin, x, .. } = &mut self.detector;
-        if self.motion.is_straight {
-            return Ok(());
-        }
-        margin.resize(x.len(), 0.0);
-        let mut moved = x.clone();
-        for theta in PROBES {
-            self.stepper.interpolant().at(theta, x);
-            moved.copy_from_slice(x);
-            self.motion.project(self.t + theta * dt, &mut moved)?;
-            for ((margin, x), moved) in margin.iter_mut().zip(&*x).zip(&moved) {
-                *margin = margin.max(MARGIN * (moved - x).abs());
-            }
-        }
-        Ok(())
-    }
 }

@@ -2,7 +2,6 @@
 
 pub(super) mod chatter;
 pub(super) mod edge;
-pub(super) mod one_sided_steps;
 pub(super) mod pace;
 pub(super) mod sampling;
 pub(super) mod series;

@@ -1,15 +1,17 @@
 //! The pace of a motion: its first step, from how the last motion in its mode went.
 
-use crate::decisions::Left;
+use rustc_hash::FxHashMap;
+
 use crate::error::FieldError;
-use crate::integrate::integrator::Integrator;
-use crate::stepper::{initial_step, restart_step, tiny_step, ErrorScale};
+use crate::mode::Mode;
+use crate::stepper::{tiny_step, ErrorScale};
 use crate::switching::Leading;
-use crate::tolerances::{FAMILIAR, MANY, MAX_LIE_ORDER, REACH, SEVERAL, SMALLEST_GUESS};
+use crate::system::PiecewiseSystem;
+use crate::tolerances::{FAMILIAR, MANY, MAX_LIE_ORDER, REACH, SEVERAL};
 
 /// How the last motion in a mode went.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::integrate) struct Pace {
+struct Pace {
     /// The step proposed at its end.
     dt: f64,
     /// How long it lasted.
@@ -33,78 +35,59 @@ impl Pace {
     }
 }
 
-impl Integrator<'_> {
-    /// Keeps the pace of the motion that ends, for the next one in its mode.
-    pub(in crate::integrate) fn remember_pace(&mut self) {
-        // A motion that ended where it began tells nothing.
-        if !self.dt.is_finite() || self.t == self.motion.t_start {
+/// How the last motions went, by mode.
+#[derive(Default)]
+pub(in crate::integrate) struct Paces(FxHashMap<Mode, Pace>);
+
+impl Paces {
+    /// Keeps the pace of a motion that ends: the step proposed at its end, and how long it lasted. A motion that ended where
+    /// it began tells nothing.
+    pub fn remember(&mut self, mode: &Mode, dt: f64, duration: f64) {
+        if !dt.is_finite() || duration == 0.0 {
             return;
         }
-        let pace = Pace {
-            dt: self.dt,
-            duration: self.t - self.motion.t_start,
-        };
-        match self.paces.get_mut(&self.motion.mode) {
+        let pace = Pace { dt, duration };
+        match self.0.get_mut(mode) {
             Some(last) => *last = pace,
             None => {
-                self.paces.insert(self.motion.mode.clone(), pace);
+                self.0.insert(mode.clone(), pace);
             }
         }
     }
 
-    /// The first step of a motion: what the last motion in its mode suggests; else the proposal of the
-    /// motion before, as far as Hairer's guess for this one supports it. No longer than a short
-    /// excursion from the surface.
-    pub(in crate::integrate) fn first_step(&mut self, left: &[Left]) -> Result<f64, FieldError> {
-        let remaining = (self.t_end - self.t).max(f64::MIN_POSITIVE);
-        if let (Some(first), true) = (self.options.first_step, self.dt.is_nan()) {
-            return Ok(first.max(SMALLEST_GUESS).min(remaining));
-        }
-        let longest = remaining.min(self.options.max_step);
-        if self.motion.jets.is_some() {
-            // The series tells.
-            return Ok(longest);
-        }
-        let (t, x, scale, field) = (self.t, &self.x, &self.scale, &mut self.motion.field);
-        let derivative = self.stepper.start_derivative();
-        let pace = self.paces.get(&self.motion.mode);
-        let mut dt = match pace.and_then(|pace| pace.first_step(x, derivative, scale)) {
-            Some(dt) => dt.min(longest),
-            None if self.dt.is_nan() => initial_step(field, t, x, derivative, scale, longest)?,
-            None => restart_step(field, t, x, derivative, scale, self.dt.min(longest))?,
-        };
-        for l in left {
-            if let Left::Surface(j, leading) = l {
-                dt = dt.min(self.excursion(*j, *leading)?);
-            }
-        }
-        Ok(dt)
+    /// The first step of a motion in the mode, as far as the last one suggests it.
+    pub fn first_step(
+        &self,
+        mode: &Mode,
+        x: &[f64],
+        derivative: &[f64],
+        scale: &ErrorScale,
+    ) -> Option<f64> {
+        self.0.get(mode)?.first_step(x, derivative, scale)
     }
+}
 
-    /// Predicted time of return to a surface that is left tangentially: the zero of
-    /// a τ^k/k! + b τ^(k+1)/(k+1)!, with a fifth to spare.
-    fn excursion(&self, j: usize, leading: Leading) -> Result<f64, FieldError> {
-        let order = leading.order + 1;
-        // While sliding h changes along another field than those of the derivatives.
-        let is_known = leading.order >= 2 && self.motion.sliding.is_empty();
-        if !is_known || order > self.system.max_lie_order().min(MAX_LIE_ORDER) {
-            return Ok(f64::INFINITY);
-        }
-        let side = self.motion.mode.entries()[j];
-        let signs = &self.motion.signs;
-        let next = self.system.lie_derivative(
-            j,
-            j,
-            &[side; MAX_LIE_ORDER][..order],
-            self.t,
-            &self.x,
-            signs,
-        )?;
-        let back = -(order as f64) * leading.value / next.value;
-        Ok(if back > 0.0 {
-            1.2 * back
-        } else {
-            f64::INFINITY
-        })
+/// Predicted time of return of a motion in a region to surface `j` that it leaves tangentially: the zero of
+/// a τ^k/k! + b τ^(k+1)/(k+1)!, with a fifth to spare.
+pub(in crate::integrate) fn excursion(
+    system: &dyn PiecewiseSystem,
+    (t, x): (f64, &[f64]),
+    mode: &Mode,
+    j: usize,
+    leading: Leading,
+) -> Result<f64, FieldError> {
+    let order = leading.order + 1;
+    // While sliding h changes along another field than those of the derivatives.
+    let is_known = leading.order >= 2 && mode.codimension() == 0;
+    if !is_known || order > system.max_lie_order().min(MAX_LIE_ORDER) {
+        return Ok(f64::INFINITY);
     }
+    let word = [mode.entries()[j]; MAX_LIE_ORDER];
+    let next = system.lie_derivative(j, j, &word[..order], t, x, &mode.signs())?;
+    let back = -(order as f64) * leading.value / next.value;
+    Ok(if back > 0.0 {
+        1.2 * back
+    } else {
+        f64::INFINITY
+    })
 }

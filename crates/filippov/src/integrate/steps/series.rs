@@ -5,7 +5,7 @@ use crate::event::Monitored;
 use crate::field::ModeField;
 use crate::integrate::integrator::Integrator;
 use crate::integrate::motion::Motion;
-use crate::integrate::steps::stiff::Derivatives;
+use crate::integrate::steps::stiffness::Derivatives;
 use crate::mode::Signs;
 use crate::options::Method;
 use crate::status::{Warning, WarningCode};

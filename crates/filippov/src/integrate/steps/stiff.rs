@@ -1,23 +1,15 @@
-//! Steps by the method for stiff motions.
+//! Stiff motions: noticed by the explicit methods, and integrated by the method for them.
+
+use smallvec::SmallVec;
 
 use crate::error::FieldError;
-use crate::field::ModeField;
-use crate::field::SmoothField;
+use crate::field::{ModeField, SmoothField};
 use crate::integrate::integrator::Integrator;
-use crate::stepper::{Attempt, Linearisation, StepMethod};
-use crate::tolerances::{AIM_MARGINS, EPS};
-
-/// How a motion is linearised.
-#[derive(Clone, Default)]
-pub(in crate::integrate) enum Derivatives {
-    /// It is not: an explicit method integrates it.
-    #[default]
-    None,
-    /// By the derivatives of the expression graph.
-    Exact(std::sync::Arc<crate::system::MotionJacobian>),
-    /// By differences of its field.
-    Differences,
-}
+use crate::integrate::steps::stiffness::Derivatives;
+use crate::options::Method;
+use crate::status::{Warning, WarningCode};
+use crate::stepper::{Attempt, Linearisation, Rodas5p, StepMethod};
+use crate::tolerances::{AIM_MARGINS, EPS, STIFF_DOP853, STIFF_DOPRI5, STIFF_SERIES};
 
 impl Integrator<'_> {
     /// Gives the motion that starts to the method for stiff motions.
@@ -197,5 +189,90 @@ impl Integrator<'_> {
             self.take_derivatives(Derivatives::Differences);
         }
         Ok(attempt)
+    }
+}
+
+impl Integrator<'_> {
+    /// Looks at the step just computed, of length `dt`, before it is accepted; returns whether the rest of the run is left
+    /// to the method for stiff motions.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    #[cold]
+    #[inline(never)]
+    pub(in crate::integrate) fn look_at_stiffness(&mut self, dt: f64) -> Result<bool, FieldError> {
+        let is_limited = match self.stepper.in_use() {
+            StepMethod::Dopri5 if matches!(self.motion.derivatives, Derivatives::None) => {
+                let product = self.stepper.dopri5.stiffness();
+                product.is_some_and(|product| product > STIFF_DOPRI5)
+            }
+            StepMethod::Dop853 => {
+                let product = self.stepper.dop853.as_ref().and_then(|d| d.stiffness());
+                product.is_some_and(|product| product > STIFF_DOP853)
+            }
+            StepMethod::Taylor => self.is_series_limited(dt)?,
+            _ => return Ok(false),
+        };
+        if !self.stiffness.count(is_limited) {
+            return Ok(false);
+        }
+        self.stiffness.since = Some(self.t);
+        if self.options.method == Method::Auto {
+            self.stepper.rodas5p = Some(Box::new(Rodas5p::new(self.x.len())));
+            return Ok(true);
+        }
+        let (t, mode) = (self.t, &self.motion.mode);
+        let text = format!(
+            "the motion in mode ({mode}) is stiff near t = {t:.10}: stability and not accuracy keeps its steps at \
+             {dt:.3e}; method=\"Rodas5P\" takes longer ones"
+        );
+        self.warnings.push(Warning {
+            t,
+            code: WarningCode::Stiff,
+            surfaces: Vec::new(),
+            text,
+            candidates: Vec::new(),
+            rule: "",
+        });
+        Ok(false)
+    }
+
+    /// Is a Taylor step far shorter than the motion takes to change? The fastest rate is that between the last two sums
+    /// of the series, whose difference is what grows fastest.
+    fn is_series_limited(&mut self, dt: f64) -> Result<bool, FieldError> {
+        let Some(taylor) = &self.stepper.taylor else {
+            return Ok(false);
+        };
+        let Some(mut beside) = taylor.slow_end_without_last(&self.x, &self.scale) else {
+            return Ok(false);
+        };
+        let (t, end, rates) = (
+            self.t + dt,
+            &taylor.step().end,
+            &taylor.step().end_derivative,
+        );
+        let apart: SmallVec<[f64; 16]> = beside.iter().zip(end).map(|(a, b)| a - b).collect();
+        let mut rates_beside: SmallVec<[f64; 16]> = SmallVec::from_elem(0.0, beside.len());
+        self.motion
+            .field
+            .eval_unprojected(t, &mut beside, &mut rates_beside)?;
+        rates_beside
+            .iter_mut()
+            .zip(rates)
+            .for_each(|(a, b)| *a -= b);
+        let rate = self.scale.norm(&rates_beside, end) / self.scale.norm(&apart, end);
+        Ok(rate * dt > STIFF_SERIES)
+    }
+
+    /// Leaves the rest of the motion to the method for stiff motions.
+    pub(in crate::integrate) fn go_on_implicitly(&mut self) {
+        let start = self.stepper.start_derivative().to_vec();
+        // A Taylor step has no proposal for the next one.
+        let last = self.stepper.interpolant().dt;
+        self.start_implicit();
+        self.stepper.start_derivative_mut().copy_from_slice(&start);
+        self.motion.jets = None;
+        self.controller.restart();
+        self.dt = last;
     }
 }

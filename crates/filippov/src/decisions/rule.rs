@@ -1,0 +1,111 @@
+//! Rules where surfaces vanish: how they are named, and what they are asked.
+
+use crate::mode::Mode;
+use crate::switching::Arrival as SurfaceArrival;
+
+/// The rule that made a decision.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Rule {
+    /// No surface that matters vanishes.
+    Region,
+    /// The motion touches a surface.
+    Touch,
+    /// Other switching functions jump where surfaces are reached.
+    OthersJump,
+    /// The first derivatives that do not vanish on both sides of one surface.
+    OneSurface,
+    /// Surfaces bend at one another; one motion leads away from all.
+    Bends,
+    /// Surfaces in one place: one decides.
+    Coinciding,
+    /// Switches accumulate, and the motion stays on all surfaces.
+    Limit,
+    /// Surfaces that are decided one by one.
+    Apart,
+    /// Two surfaces that touch one another: the modes are tried for a moment.
+    Trial,
+    /// The rule of sliding that the caller chose ends.
+    SlidingRule,
+    /// The jump of the field across one surface vanishes while the motion slides on several.
+    VanishingJump,
+    /// The relay problem of a field that is affine in the signs.
+    Relay,
+    /// The signs of too many surfaces multiply one another.
+    TooMany,
+    /// First-order data at an intersection: trees, hidden dynamics, spirals; higher derivatives where those vanish.
+    FirstOrder,
+    /// Bodies in contact: the forces that push.
+    Contact,
+    /// Triggers of actions are crossed together with other surfaces.
+    Triggers,
+}
+
+impl Rule {
+    /// A stable name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Rule::Region => "region",
+            Rule::Touch => "touch",
+            Rule::OthersJump => "others_jump",
+            Rule::OneSurface => "one_surface",
+            Rule::Bends => "bends",
+            Rule::Coinciding => "coinciding",
+            Rule::Limit => "limit",
+            Rule::Apart => "apart",
+            Rule::Trial => "trial",
+            Rule::SlidingRule => "sliding_rule",
+            Rule::VanishingJump => "vanishing_jump",
+            Rule::Relay => "relay",
+            Rule::TooMany => "too_many",
+            Rule::FirstOrder => "first_order",
+            Rule::Contact => "contact",
+            Rule::Triggers => "triggers",
+        }
+    }
+}
+
+/// What a rule is asked about: surfaces that vanish together.
+#[derive(Clone, Copy)]
+pub(crate) struct Meeting<'m> {
+    /// The mode before, or at a start the sides of the point.
+    pub mode: &'m Mode,
+    /// All surfaces that vanish, in increasing order.
+    pub surfaces: &'m [usize],
+    /// Those among them that were reached now.
+    pub fresh: &'m [usize],
+    pub how: How,
+}
+
+/// How the motion comes to the surfaces of a meeting.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum How {
+    /// The motion starts there, or on one surface as it says.
+    Start(SurfaceArrival),
+    /// It arrives; in this way, if one surface alone decides.
+    Event(Option<SurfaceArrival>),
+    /// Infinitely many switches end there.
+    Limit,
+}
+
+impl How {
+    /// A start on surface `j` where a motion in this mode came from.
+    pub fn on_one_surface(mode: &Mode, j: usize) -> Self {
+        How::Start(SurfaceArrival::from_side(mode.entries()[j]))
+    }
+}
+
+impl Meeting<'_> {
+    /// The full mode with these entries on the surfaces.
+    pub fn on_all(&self, entries: &Mode) -> Mode {
+        let mut full = self.mode.clone();
+        for (&j, &entry) in self.surfaces.iter().zip(entries.entries()) {
+            full.set(j, entry);
+        }
+        full
+    }
+
+    /// Does sliding on all surfaces end here, and none is reached?
+    pub fn is_exit(&self) -> bool {
+        matches!(self.how, How::Event(_)) && self.fresh.is_empty()
+    }
+}

@@ -1,0 +1,167 @@
+//! What the event stage keeps of a step: values of the monitored functions, and what was found out about them.
+
+use std::cell::RefCell;
+
+use crate::error::FieldError;
+use crate::event::{EventFunction, Monitored};
+use crate::field::Exits;
+use crate::integrate::detection::bounds::{Piece, RootPiece};
+use crate::integrate::motion::Motion;
+use crate::system::PiecewiseSystem;
+use crate::tolerances::SURFACE_NOISE;
+
+/// A function is clear of a zero that was divided out beyond this multiple of its rounding.
+pub(super) const CLEAR_OF_NOISE: f64 = 1e3;
+
+/// Scratch space of the event stage, and values at the end of the step.
+pub(in crate::integrate) struct Detector {
+    /// The exit functions of the motion at the seven stages.
+    pub stages: Vec<[f64; 7]>,
+    /// The step did not resolve a monitored function; it may not grow.
+    pub unresolved: bool,
+    /// A monitored function could not be searched; the step has to be shortened.
+    pub uncertain: bool,
+    /// An exit function was not searched though nothing was proved about it.
+    pub dismissed: bool,
+    /// Rounding blurs the zero that was found: it may be a multiple one.
+    pub blurred: bool,
+    /// How far below zero the touch that was found may be, else 0.
+    pub depth: f64,
+    /// Rounding of the function whose multiple zero was found, over the step, else 0.
+    pub blur: f64,
+    /// How many derivatives along f- and f+ vanish at the multiple zero that was found.
+    pub vanishing: [usize; 2],
+    /// Length of the next step, if the event stage knows better than the error control.
+    pub next_dt: Option<f64>,
+    /// Exit functions computed in the search of this step, by theta.
+    pub exits: Vec<(f64, Exits)>,
+    pub h: Vec<f64>,
+    /// Switching functions at the probes of the step.
+    pub(super) probed: [Vec<f64>; 2],
+    pub(super) rate: Vec<f64>,
+    pub x: Vec<f64>,
+    /// How far the projection onto a curved surface moves the extension in this step; else empty.
+    pub margin: Vec<f64>,
+    /// Bounds of the normal components over pieces of the extension of this step.
+    pub enclosed_exits: RefCell<Vec<Piece>>,
+    /// Bounds of the multipliers there, while sliding on an intersection.
+    pub enclosed_roots: RefCell<Vec<RootPiece>>,
+    /// Value and rate at the end of the step, per monitored function.
+    pub right: Vec<(f64, f64)>,
+    /// Rounding of the exit functions in this step, once it was needed.
+    pub(super) exit_noise: Option<f64>,
+    /// Which monitored functions could not be cleared, and whether bounds say anything about them.
+    pub(super) suspects: Vec<(usize, bool)>,
+}
+
+impl Detector {
+    pub fn new(n: usize, d: usize) -> Self {
+        Detector {
+            stages: Vec::new(),
+            unresolved: false,
+            uncertain: false,
+            dismissed: false,
+            blurred: false,
+            depth: 0.0,
+            blur: 0.0,
+            vanishing: [0; 2],
+            next_dt: None,
+            exits: Vec::new(),
+            h: vec![0.0; d],
+            probed: [vec![0.0; d], vec![0.0; d]],
+            rate: vec![0.0; d],
+            x: vec![0.0; n],
+            margin: Vec::new(),
+            enclosed_exits: RefCell::default(),
+            enclosed_roots: RefCell::default(),
+            right: Vec::new(),
+            exit_noise: None,
+            suspects: Vec::new(),
+        }
+    }
+
+    /// Values and rates of the monitored functions at (t, x) with velocity `v`, into `right`.
+    pub fn measure(
+        &mut self,
+        system: &dyn PiecewiseSystem,
+        motion: &Motion,
+        (t, x, v): (f64, &[f64], &[f64]),
+        stage: usize,
+    ) -> Result<(), FieldError> {
+        let with_surfaces = motion
+            .monitored
+            .iter()
+            .any(|m| matches!(m.function, EventFunction::Surface(_)));
+        if with_surfaces {
+            system.surface_rates(t, x, &motion.signs, v, &mut self.h, &mut self.rate)?;
+        }
+        self.right.clear();
+        for m in &motion.monitored {
+            self.right.push(match m.function {
+                EventFunction::Surface(j) => {
+                    (m.orientation * self.h[j], m.orientation * self.rate[j])
+                }
+                EventFunction::ExitMinus => (self.stages[0][stage], f64::NAN),
+                EventFunction::ExitPlus => (self.stages[1][stage], f64::NAN),
+                EventFunction::Exit(index) => (self.stages[index][stage], f64::NAN),
+            });
+        }
+        Ok(())
+    }
+
+    /// Makes the values at the end of the step those at the start of the next one. Returns whether a
+    /// surface that the motion departed from is now clear.
+    pub fn accept(&mut self, monitored: &mut [Monitored], dt: f64) -> bool {
+        let mut cleared = false;
+        for (m, &(value, rate)) in monitored.iter_mut().zip(&self.right) {
+            m.curvature = (rate - m.rate) / dt;
+            (m.value, m.rate) = (value, rate);
+            // A zero that rounding still blurs stays divided out.
+            if m.deflation.is_some() && value > CLEAR_OF_NOISE * m.noise {
+                m.deflation = None;
+                cleared = true;
+            }
+        }
+        for stages in &mut self.stages {
+            stages[0] = stages[6];
+        }
+        cleared
+    }
+
+    /// Makes the values just measured those at the start of a motion.
+    pub fn accept_start(&mut self, monitored: &mut [Monitored]) {
+        for (m, &(value, rate)) in monitored.iter_mut().zip(&self.right) {
+            (m.value, m.rate) = (value, rate);
+            if let Some(zero) = &mut m.deflation {
+                zero.blur = self.blur;
+                zero.residual = if value.abs() <= self.depth {
+                    value
+                } else {
+                    0.0
+                };
+            }
+        }
+    }
+
+    /// Rounding of a monitored function over the step.
+    pub(super) fn noise(
+        &mut self,
+        system: &dyn PiecewiseSystem,
+        motion: &Motion,
+        function: EventFunction,
+        (t, start, end): (f64, &[f64], &[f64]),
+    ) -> Result<f64, FieldError> {
+        let EventFunction::Surface(j) = function else {
+            let stages = &self.stages;
+            let noise = *self.exit_noise.get_or_insert_with(|| {
+                let values = stages.iter().flatten();
+                4.0 * SURFACE_NOISE * values.fold(0.0_f64, |m, v| m.max(v.abs()))
+            });
+            return Ok(noise);
+        };
+        let size = system
+            .surface_size(j, t, end, &motion.signs)?
+            .max(system.surface_size(j, t, start, &motion.signs)?);
+        Ok(SURFACE_NOISE * size)
+    }
+}
