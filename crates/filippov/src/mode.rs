@@ -9,7 +9,7 @@ pub type Signs = SmallVec<[f64; FEW]>;
 const FEW: usize = 8;
 
 /// A mode: one entry per surface, +1 where h > 0, -1 where h < 0, 0 while sliding on h = 0.
-#[derive(PartialEq, Eq, Hash)]
+#[derive(PartialEq, Eq, Hash, Default)]
 pub struct Mode {
     /// Few are kept without allocation: modes are copied at every switch.
     entries: SmallVec<[i8; 16]>,

@@ -3,7 +3,7 @@
 use super::apart::decide_apart;
 use super::coinciding::{decide_without_kinks, leave_coinciding};
 use super::contact::decide_in_contact;
-use super::event::{arrival_at_surface, touch, vanishing_surfaces};
+use super::event::{arrival_at_surface, touch, vanishing_surfaces, Reached};
 use super::leave_by_rule::leave_by_rule;
 use super::limits::stay_at_limit;
 use super::look_ahead::decide_where_two_touch;
@@ -46,19 +46,18 @@ const LIST: [(Rule, Apply); 15] = [
 /// The list with what holds for its answers.
 pub(crate) const RULES: Rules = Rules { list: &LIST, check };
 
-/// The whole result of a decision.
+/// The result of a decision; `Notes` have what was found out beside it.
 pub(crate) struct Decision {
     pub decided: Decided,
     pub rule: Rule,
-    /// After an event, the surfaces that vanish there, those slid on left out.
-    pub surfaces: SmallVec<[usize; 4]>,
-    /// The mode before; after an event surfaces that do not matter have the signs of the place.
-    pub before: Mode,
 }
 
-/// Decides which motion follows at a point.
-pub(crate) fn decide(at: &Point, notes: &mut Notes) -> Result<Decision, FieldError> {
-    let (mut surfaces, mut before) = (SmallVec::new(), None);
+/// Decides which motion follows at a point. After an event, `reached` is what vanishes there.
+pub(crate) fn decide(
+    at: &Point,
+    notes: &mut Notes,
+    reached: &mut Reached,
+) -> Result<Decision, FieldError> {
     let (rule, decided) = match at.arrival.cause {
         Cause::Start => place(at, notes, None)?,
         Cause::Anew(memory) => place(at, notes, Some(memory))?,
@@ -72,21 +71,14 @@ pub(crate) fn decide(at: &Point, notes: &mut Notes) -> Result<Decision, FieldErr
             settle(at, notes, &meeting)?
         }
         Cause::Event { .. } => {
-            let (found, mode) = vanishing_surfaces(at, notes)?;
-            let decided = after_event(at, notes, &found, &mode)?;
-            (surfaces, before) = (found, Some(mode));
-            decided
+            *reached = vanishing_surfaces(at, notes)?;
+            after_event(at, notes, &reached.surfaces, &reached.before)?
         }
     };
     for warning in &mut notes.warnings {
         warning.rule = rule.name();
     }
-    Ok(Decision {
-        decided,
-        rule,
-        surfaces,
-        before: before.unwrap_or_else(|| at.arrival.mode.clone()),
-    })
+    Ok(Decision { decided, rule })
 }
 
 /// The motion after an event at which `surfaces` vanish beside those slid on.

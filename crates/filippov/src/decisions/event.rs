@@ -25,25 +25,32 @@ pub(crate) fn located_surfaces(functions: &[EventFunction]) -> SmallVec<[usize; 
     surfaces
 }
 
-/// The surfaces of an event, those slid on left out: those that were located, and all others that vanish there. With them the
-/// mode before, in which surfaces that do not matter have the signs of the place.
-pub(crate) fn vanishing_surfaces(
-    at: &Point,
-    notes: &mut Notes,
-) -> Result<(SmallVec<[usize; 4]>, Mode), FieldError> {
-    let mut mode = at.arrival.mode.clone();
-    let mut surfaces = located_surfaces(at.arrival.functions());
-    if only_located_matter(at.arrival, &surfaces) {
-        return Ok((surfaces, mode));
+/// What vanishes at an event.
+#[derive(Default)]
+pub(crate) struct Reached {
+    /// The surfaces, those slid on left out: those that were located, and all others that vanish there.
+    pub surfaces: SmallVec<[usize; 4]>,
+    /// The mode before, in which surfaces that do not matter have the signs of the place.
+    pub before: Mode,
+}
+
+/// What vanishes at the event.
+pub(crate) fn vanishing_surfaces(at: &Point, notes: &mut Notes) -> Result<Reached, FieldError> {
+    let mut reached = Reached {
+        surfaces: located_surfaces(at.arrival.functions()),
+        before: at.arrival.mode.clone(),
+    };
+    if only_located_matter(at.arrival, &reached.surfaces) {
+        return Ok(reached);
     }
     let h = at.surface_values(notes, at.arrival.signs)?;
     for (j, h) in h.iter().enumerate() {
         if !at.arrival.active[j] && *h != 0.0 {
-            mode.set(j, if *h < 0.0 { -1 } else { 1 });
+            reached.before.set(j, if *h < 0.0 { -1 } else { 1 });
         }
     }
-    add_vanishing_surfaces(at, &mut surfaces, &h)?;
-    Ok((surfaces, mode))
+    add_vanishing_surfaces(at, &mut reached.surfaces, &h)?;
+    Ok(reached)
 }
 
 /// Are all surfaces slid on or located, so that the values of none are needed?

@@ -36,7 +36,7 @@ mod vanishing_jump;
 pub(crate) use between_sides::differs_between_sides;
 pub(crate) use coinciding::surfaces_in_the_place_of_those_slid_on;
 pub(crate) use decide::{decide, Decision, RULES};
-pub(crate) use event::{add_vanishing_surfaces, located_surfaces, vanishing_surfaces};
+pub(crate) use event::{add_vanishing_surfaces, located_surfaces, vanishing_surfaces, Reached};
 pub(crate) use leave_by_rule::refusal;
 pub(crate) use passage::{goes_through, rates_here};
 pub(crate) use placement::{pushed_back, sides, Sides};

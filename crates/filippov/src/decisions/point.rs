@@ -338,8 +338,8 @@ pub(crate) struct Leap {
 /// The motion that follows, or why the run ends.
 pub(crate) type Decided = Result<Next, Stop>;
 
-/// What vanishes at the start of a motion, seldom more than two functions.
-pub(crate) type Lefts = SmallVec<[Left; 2]>;
+/// What vanishes at the start of a motion, seldom more than one function.
+pub(crate) type Lefts = SmallVec<[Left; 1]>;
 
 /// A function that vanishes at the start of a motion, with its first non-vanishing derivative.
 #[derive(Clone, Copy, Debug)]

@@ -6,7 +6,7 @@ use smallvec::SmallVec;
 
 use crate::action::Actions;
 use crate::decisions::{
-    decide, sides, Arrival, Cause, Decision, Notes, Point, Policy, Sides, RULES,
+    decide, sides, Arrival, Cause, Decision, Notes, Point, Policy, Reached, Sides, RULES,
 };
 use crate::error::FieldError;
 use crate::event::EventFunction;
@@ -192,7 +192,7 @@ pub fn classify(
         vanishing: [0; 2],
         at_two_fold: false,
     };
-    let mut notes = Notes::default();
+    let (mut notes, mut reached) = (Notes::default(), Reached::default());
     let (surfaces, around, decision) = match how.before {
         None => {
             let arrival = arrival(Cause::Start, &mut field);
@@ -203,14 +203,14 @@ pub fn classify(
             // What only triggers an action changes nothing here.
             let zeros = (0..on_surface.len()).filter(|&j| on_surface[j] && system.switches_at(j));
             let surfaces = surfaces_that_matter(system, &mode, zeros.collect());
-            (surfaces, mode, decide(&at, &mut notes)?)
+            (surfaces, mode, decide(&at, &mut notes, &mut reached)?)
         }
         Some(_) => {
             let arrival = arrival(event, &mut field);
-            let decision = decide(&point(&arrival), &mut notes)?;
-            let mut surfaces = [&decision.surfaces[..], &sliding[..]].concat();
+            let decision = decide(&point(&arrival), &mut notes, &mut reached)?;
+            let mut surfaces = [&reached.surfaces[..], &sliding[..]].concat();
             surfaces.sort_unstable();
-            (surfaces, decision.before.clone(), decision)
+            (surfaces, reached.before.clone(), decision)
         }
     };
     let Some(components) = components_around(system, (t, x), &around, &surfaces)? else {
@@ -347,7 +347,7 @@ fn describe(
     decision: Decision,
     notes: Notes,
 ) -> Result<Classification, FieldError> {
-    let Decision { decided, rule, .. } = decision;
+    let Decision { decided, rule } = decision;
     let mut found = Classification {
         kind: PointKind::Region,
         surfaces: Vec::new(),

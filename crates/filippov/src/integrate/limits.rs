@@ -132,7 +132,7 @@ impl Integrator<'_> {
             self.record_rest(y_before, surface, before.clone(), before.clone(), "");
             return self.act(due);
         }
-        let Decision { rule, decided, .. } = self.decide(Cause::Anew(&before))?;
+        let Decision { rule, decided } = self.decide(Cause::Anew(&before))?;
         let next = match decided {
             Ok(next) => next,
             Err(stop) => return Ok(Some(stop)),
@@ -214,7 +214,7 @@ impl Integrator<'_> {
         self.motion.mode = before.clone();
         self.move_straight(limit.t, limit.x)?;
         self.stats.n_switches += 1;
-        let Decision { rule, decided, .. } = self.decide(Cause::Limit(&limit.meeting))?;
+        let Decision { rule, decided } = self.decide(Cause::Limit(&limit.meeting))?;
         // Where nothing is decided the run ends at the limit, having come there all the same.
         let after = decided.as_ref().map_or(&before, |next| &next.mode).clone();
         self.recorder.switch(Switch {

@@ -7,7 +7,7 @@ use smallvec::{smallvec, SmallVec};
 use crate::decisions::{
     beyond_double_zero, decide, differs_between_sides, landing, limits::limit_here, refusal,
     root_ends, two_fold_here, vanishing_surfaces, warn_against_direction, Arrival, Cause, Decision,
-    Leap, Left, Lefts, Next, Notes, Point, Rule, Values, RULES,
+    Leap, Left, Lefts, Next, Notes, Point, Reached, Rule, Values, RULES,
 };
 use crate::error::FieldError;
 use crate::event::{Deflation, EventFunction, Found};
@@ -90,7 +90,17 @@ impl<'a> Integrator<'a> {
 
     /// Decides which motion follows at the current place.
     pub(in crate::integrate) fn decide(&mut self, cause: Cause) -> Result<Decision, FieldError> {
-        let mut decision = self.ask(cause, decide)?;
+        self.decide_where_reached(cause, &mut Reached::default())
+    }
+
+    /// The same after an event; `reached` becomes what vanishes there.
+    #[inline]
+    fn decide_where_reached(
+        &mut self,
+        cause: Cause,
+        reached: &mut Reached,
+    ) -> Result<Decision, FieldError> {
+        let mut decision = self.ask(cause, |at, notes| decide(at, notes, reached))?;
         if let Some(stop) = self.watch.stop() {
             decision.decided = Err(stop);
         }
@@ -133,18 +143,15 @@ impl<'a> Integrator<'a> {
             at_two_fold = self.arrives_at_two_fold(event, n_exits)?;
         }
         let vanishing = std::mem::take(&mut self.detector.vanishing);
-        let Decision {
-            decided,
-            rule,
-            surfaces,
-            before,
-            ..
-        } = self.decide(Cause::Event {
+        let mut reached = Reached::default();
+        let cause = Cause::Event {
             functions: &event.functions,
             touch: event.touch,
             vanishing,
             at_two_fold,
-        })?;
+        };
+        let Decision { decided, rule } = self.decide_where_reached(cause, &mut reached)?;
+        let Reached { surfaces, before } = reached;
         self.residuals.clear();
         let mut next = match decided {
             Ok(next) => next,
@@ -231,7 +238,10 @@ impl<'a> Integrator<'a> {
         if !self.may_lose_multiplier() {
             return Ok(None);
         }
-        let (surfaces, mode) = self.vanishing_surfaces(event)?;
+        let Reached {
+            surfaces,
+            before: mode,
+        } = self.vanishing_surfaces(event)?;
         if !surfaces.is_empty() {
             return Ok(None);
         }
@@ -250,7 +260,10 @@ impl<'a> Integrator<'a> {
         if n_exits == 1 && !self.approaches_two_fold() {
             return Ok(false);
         }
-        let (surfaces, mode) = self.vanishing_surfaces(event)?;
+        let Reached {
+            surfaces,
+            before: mode,
+        } = self.vanishing_surfaces(event)?;
         if !surfaces.is_empty() {
             return Ok(false);
         }
@@ -264,10 +277,7 @@ impl<'a> Integrator<'a> {
     }
 
     /// The surfaces that vanish at an event, those slid on left out, and the mode before.
-    fn vanishing_surfaces(
-        &mut self,
-        event: &Found,
-    ) -> Result<(SmallVec<[usize; 4]>, Mode), FieldError> {
+    fn vanishing_surfaces(&mut self, event: &Found) -> Result<Reached, FieldError> {
         let cause = Cause::Event {
             functions: &event.functions,
             touch: event.touch,
@@ -502,7 +512,7 @@ impl<'a> Integrator<'a> {
     /// Decides the mode anew at the current point and goes on.
     pub(in crate::integrate) fn go_on_from_here(&mut self) -> Result<Option<Stop>, FieldError> {
         let before = self.motion.mode.clone();
-        let Decision { rule, decided, .. } = self.decide(Cause::Anew(&before))?;
+        let Decision { rule, decided } = self.decide(Cause::Anew(&before))?;
         match decided {
             Ok(next) => self.go_on_in(before, next, rule),
             Err(stop) => Ok(Some(stop)),

@@ -327,7 +327,7 @@ impl Integrator<'_> {
         departing: &[(usize, f64)],
     ) -> Result<Option<Stop>, FieldError> {
         let before = self.motion.mode.clone();
-        let Decision { rule, decided, .. } = self.decide(Cause::Anew(&before))?;
+        let Decision { rule, decided } = self.decide(Cause::Anew(&before))?;
         self.residuals.clear();
         let mut next = match decided {
             Ok(next) => next,
