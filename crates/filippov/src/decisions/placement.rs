@@ -45,10 +45,10 @@ pub(crate) fn place(
     };
     // What only a law of the system sees has the side that is known: its action has been done, or will be.
     let zeros = (0..on_surface.len()).filter(|&j| on_surface[j] && !at.triggers().is_internal(j));
-    let (smooth, mut zeros): (Vec<usize>, Vec<usize>) =
+    let (smooth, zeros): (Vec<usize>, Vec<usize>) =
         zeros.partition(|&j| at.triggers().is_only_trigger(j));
-    zeros.retain(|&j| at.system.switches_at(j));
-    let meeting = surfaces_that_matter(at.system, &mode, zeros.clone());
+    let switching = zeros.iter().copied().filter(|&j| at.system.switches_at(j));
+    let meeting = surfaces_that_matter(at.system, &mode, switching.collect());
     if !smooth.is_empty() {
         return place_on_triggers(at, notes, mode, &smooth, meeting, memory);
     }
