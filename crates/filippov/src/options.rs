@@ -131,6 +131,8 @@ pub struct Options {
     pub keep: Keep,
     /// Keep the interpolants of all steps, so that the solution can be evaluated anywhere.
     pub dense_output: bool,
+    /// Keep what every decision was asked and what it answered, in [`crate::Solution::decisions`].
+    pub keep_decisions: bool,
 }
 
 impl Default for Options {
@@ -153,6 +155,7 @@ impl Default for Options {
             t_eval: None,
             keep: Keep::default(),
             dense_output: true,
+            keep_decisions: false,
         }
     }
 }

@@ -22,6 +22,7 @@ mod nested;
 mod passage;
 mod placement;
 mod point;
+mod record;
 mod relay;
 mod resting;
 pub(crate) mod root_ends;
@@ -38,6 +39,10 @@ pub(crate) use leave_by_rule::refusal;
 pub(crate) use passage::{goes_through, rates_here};
 pub(crate) use placement::{pushed_back, sides, Sides};
 pub(crate) use point::{Arrival, Cause, Left, Lefts, Next, Notes, Point, Policy, Values};
+pub(crate) use record::decide_and_record;
+pub use record::{
+    replay_decision, DecisionCause, DecisionOutcome, DecisionPoint, DecisionRecord, StartingZero,
+};
 pub(crate) use spiral::Leap;
 pub(crate) use triggers::Triggers;
 pub(crate) use two_fold::{beyond_double_zero, two_fold_here};

@@ -5,9 +5,9 @@ use std::cell::RefCell;
 use smallvec::{smallvec, SmallVec};
 
 use crate::decisions::{
-    beyond_double_zero, decide, differs_between_sides, limits::limit_here, refusal, root_ends,
-    two_fold_here, vanishing_surfaces, Arrival, Cause, Decision, Leap, Lefts, Next, Notes, Point,
-    Rule, Values,
+    beyond_double_zero, decide, decide_and_record, differs_between_sides, limits::limit_here,
+    refusal, root_ends, two_fold_here, vanishing_surfaces, Arrival, Cause, Decision, Leap, Lefts,
+    Next, Notes, Point, Rule, Values,
 };
 use crate::error::FieldError;
 use crate::event::{Deflation, EventFunction, Found};
@@ -81,7 +81,12 @@ impl<'a> Integrator<'a> {
     /// Decides which motion follows at the current place; keeps the warnings.
     pub(in crate::integrate) fn decide(&mut self, cause: Cause) -> Result<Decision, FieldError> {
         let n_choices = self.n_choices;
-        let mut decision = self.ask(cause, |at, _| decide(at, n_choices))?;
+        let (mut decision, record) = if self.options.keep_decisions {
+            let (decision, record) = self.ask(cause, |at, _| decide_and_record(at, n_choices))?;
+            (decision, Some(record))
+        } else {
+            (self.ask(cause, |at, _| decide(at, n_choices))?, None)
+        };
         let notes = &mut decision.notes;
         self.stats.n_field_evaluations += notes.n_field_evaluations;
         self.stats.n_surface_evaluations += notes.n_surface_evaluations;
@@ -90,7 +95,9 @@ impl<'a> Integrator<'a> {
         self.warnings.append(&mut notes.warnings);
         if let Some(stop) = self.watch.stop() {
             decision.decided = Err(stop);
+            return Ok(decision);
         }
+        self.recorder.decisions.extend(record);
         Ok(decision)
     }
 
