@@ -20,6 +20,7 @@ __all__ = [
     "classify",
     "hidden_dynamics",
     "intersection_field",
+    "replay_decision",
     "solve",
     "solve_many",
     "solve_points",
@@ -168,7 +169,9 @@ class Run:
     @property
     def switches(
         self,
-    ) -> list[tuple[float, _Array, _Array, str, tuple[int, ...], tuple[int, ...], tuple[int, ...], str, str]]: ...
+    ) -> list[
+        tuple[float, _Array, _Array, str, tuple[int, ...], tuple[int, ...], tuple[int, ...], str, str]
+    ]: ...
     @property
     def segments(self) -> list[tuple[float, float, tuple[int, ...], int, int, _Array, _Array]]: ...
     @property

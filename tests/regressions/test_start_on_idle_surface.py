@@ -1,4 +1,4 @@
-"""A start on a surface that switches nothing there: its entry in the mode is the side that the motion moves to."""
+"""A start on a surface that switches nothing there: its entry is the side that the motion moves to."""
 
 from __future__ import annotations
 

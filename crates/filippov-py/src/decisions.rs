@@ -9,7 +9,7 @@ use pyo3::types::{PyDict, PyTuple};
 
 use crate::prepared_run::{ActionRow, PreparedRun};
 use crate::solve::RunOptions;
-use crate::systems::raised;
+use crate::systems::{raised, CoreSystem};
 
 /// The name of a function, and the number of the surface or of the exit function.
 type FunctionRow = (String, usize);
@@ -38,14 +38,37 @@ pub fn replay_decision<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let (p, point) = (p.as_slice()?.to_vec(), read_point(point)?);
     let prepared = PreparedRun::new(&system, point.t, point.x.clone(), p, &[], &actions)?;
-    let n = prepared.core().n_surfaces();
-    if point.mode.entries().len() != n || point.x.len() != prepared.core().n_states() {
-        return Err(PyValueError::new_err(
-            "point: mode or x does not fit the system",
-        ));
-    }
+    check_point(&point, prepared.core())?;
     let outcome = prepared.replay(&options.options, &point).map_err(raised)?;
     outcome_as_dict(py, &outcome)
+}
+
+/// Checks that a point is one of this system.
+fn check_point(point: &DecisionPoint, system: &CoreSystem) -> PyResult<()> {
+    let n = system.n_surfaces();
+    let wrong = |text: String| Err(PyValueError::new_err(format!("point: {text}")));
+    let mut surfaces = [&point.resting[..], &point.departing, &point.passing].concat();
+    let mut modes = vec![&point.mode];
+    match &point.cause {
+        DecisionCause::Start => {}
+        DecisionCause::Anew(memory) => modes.push(memory),
+        DecisionCause::Event { functions, .. } => {
+            surfaces.extend(functions.iter().filter_map(|function| match function {
+                EventFunction::Surface(j) => Some(*j),
+                _ => None,
+            }));
+        }
+        DecisionCause::Limit(meeting) => surfaces.extend(meeting),
+    }
+    let fits = modes.iter().all(|mode| mode.entries().len() == n);
+    let n_states = system.n_states();
+    if !fits || point.x.len() != n_states || point.velocity.len() != n_states {
+        return wrong("mode or x does not fit the system".into());
+    }
+    match surfaces.iter().find(|&&j| j >= n) {
+        Some(j) => wrong(format!("no surface {j}")),
+        None => Ok(()),
+    }
 }
 
 fn mode_as_tuple<'py>(py: Python<'py>, mode: &Mode) -> PyResult<Bound<'py, PyTuple>> {

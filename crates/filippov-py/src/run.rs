@@ -361,7 +361,7 @@ impl Run {
             .collect()
     }
 
-    /// What every decision was asked and what it answered, if the option `keep_decisions` was set.
+    /// What was asked and what was decided, of as many decisions as the option `keep_decisions` names.
     fn decisions<'py>(&self, py: Python<'py>) -> PyResult<Vec<DecisionRow<'py>>> {
         let solution = self.solution();
         let records = solution.decisions.iter();

@@ -131,8 +131,9 @@ pub struct Options {
     pub keep: Keep,
     /// Keep the interpolants of all steps, so that the solution can be evaluated anywhere.
     pub dense_output: bool,
-    /// Keep what every decision was asked and what it answered, in [`crate::Solution::decisions`].
-    pub keep_decisions: bool,
+    /// Keep of so many decisions, the first ones, what was asked and what was decided, in
+    /// [`crate::Solution::decisions`].
+    pub keep_decisions: usize,
 }
 
 impl Default for Options {
@@ -155,7 +156,7 @@ impl Default for Options {
             t_eval: None,
             keep: Keep::default(),
             dense_output: true,
-            keep_decisions: false,
+            keep_decisions: 0,
         }
     }
 }

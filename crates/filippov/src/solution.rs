@@ -108,7 +108,7 @@ pub struct Solution {
     pub warnings: Vec<Warning>,
     /// The returns to the section, if the run was observed at one.
     pub returns: Option<Returns>,
-    /// The decisions, if they were asked for ([`crate::Options::keep_decisions`]).
+    /// The first decisions, if they were asked for ([`crate::Options::keep_decisions`]).
     pub decisions: Vec<DecisionRecord>,
     pub(crate) steps: Vec<Step>,
     pub(crate) coefficients: Vec<f64>,

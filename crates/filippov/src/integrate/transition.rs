@@ -81,7 +81,8 @@ impl<'a> Integrator<'a> {
     /// Decides which motion follows at the current place; keeps the warnings.
     pub(in crate::integrate) fn decide(&mut self, cause: Cause) -> Result<Decision, FieldError> {
         let n_choices = self.n_choices;
-        let (mut decision, record) = if self.options.keep_decisions {
+        let (mut decision, record) = if self.recorder.decisions.len() < self.options.keep_decisions
+        {
             let (decision, record) = self.ask(cause, |at, _| decide_and_record(at, n_choices))?;
             (decision, Some(record))
         } else {
