@@ -31,7 +31,7 @@ export MPLBACKEND ?= Agg
 N ?= 6000
 SEED ?= 0
 
-.PHONY: help tools setup build build-release fmt lint types test test-rs test-py test-fast test-slow fuzz bench demo \
+.PHONY: help tools setup build build-release fmt lint types test test-rs test-py test-fast test-slow fuzz decisions bench demo \
 	pictures docs check all clean
 
 help: ## list the targets
@@ -86,6 +86,9 @@ fuzz: $(BUILD_STAMP) ## random graphs in native code and interpreter; damaged by
 	$(CARGO) test --release -p filippov-expr --test fuzz -- --ignored
 	$(CARGO) test --release -p filippov --test saved_systems -- --ignored
 	PYTHONPATH=tests OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PY) -m fuzz --n $(N) --seed $(SEED)
+
+decisions: $(BUILD_STAMP) ## record the corpus of decisions again, see CONTRIBUTING
+	$(PY) scripts/record_decisions.py
 
 bench: $(BENCH_STAMP) ## run the benchmarks
 	$(PY) benchmarks/disode_tables.py

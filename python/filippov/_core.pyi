@@ -22,6 +22,7 @@ __all__ = [
     "intersection_field",
     "load_system",
     "save_system",
+    "replay_decision",
     "solve",
     "solve_many",
     "solve_points",
@@ -198,6 +199,7 @@ class Run:
     def candidates(self) -> list[tuple[int, ...]]: ...
     @property
     def not_finite(self) -> tuple[float, _Array] | None: ...
+    def decisions(self) -> list[tuple[dict[str, Any], dict[str, Any]]]: ...
     def evaluate(self, t: _Array, left: bool = False) -> _Array: ...
     def multipliers(self, t: _Array) -> _Array: ...
 
@@ -243,6 +245,13 @@ def solve_points(
     actions: list[tuple[str, list[float], Any, str]],
     section: dict[str, Any] | None,
     threads: int,
+) -> dict[str, Any]: ...
+def replay_decision(
+    system: TracedSystem | OpaqueSystem | SignedSystem,
+    p: _Array,
+    options: RunOptions,
+    actions: list[tuple[str, list[float], Any, str]],
+    point: dict[str, Any],
 ) -> dict[str, Any]: ...
 def intersection_field(
     system: TracedSystem | OpaqueSystem | SignedSystem,

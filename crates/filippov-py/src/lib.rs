@@ -5,6 +5,7 @@ mod builder;
 mod callbacks;
 mod clock;
 mod conversion;
+mod decisions;
 mod inspect;
 mod laws;
 mod prepared_run;
@@ -27,6 +28,8 @@ mod _core {
     use super::builder::Builder;
     #[pymodule_export]
     use super::clock::ManualClock;
+    #[pymodule_export]
+    use super::decisions::replay_decision;
     #[pymodule_export]
     use super::inspect::{classify, hidden_dynamics, intersection_field};
     #[pymodule_export]

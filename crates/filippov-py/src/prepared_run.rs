@@ -5,8 +5,8 @@ use std::sync::Arc;
 use filippov::action::{Action, ActionMap, Actions, Trigger};
 use filippov::section::Section;
 use filippov::{
-    solve_to_section, solve_with_actions, Error, Kind, LawAction, Mode, Options, Solution,
-    TracedMap, UserEvent, UserFunction,
+    replay_decision, solve_to_section, solve_with_actions, DecisionOutcome, DecisionPoint, Error,
+    FieldError, Kind, LawAction, Mode, Options, Solution, TracedMap, UserEvent, UserFunction,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -135,6 +135,17 @@ impl PreparedRun {
             &self.actions(),
             interrupt,
         )
+    }
+
+    /// Decides once more what follows at a point of such a run.
+    pub fn replay(
+        &self,
+        options: &Options,
+        point: &DecisionPoint,
+    ) -> Result<DecisionOutcome, FieldError> {
+        let completed = self.complete(options);
+        let options = completed.as_ref().unwrap_or(options);
+        replay_decision(&*self.core, &self.actions(), options, point)
     }
 
     /// The system with its parameters, if it is traced.

@@ -12,6 +12,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
 use crate::conversion::columns;
+use crate::decisions::record_as_pair;
 use crate::systems::raised;
 
 type Vector<'py> = Bound<'py, PyArray1<f64>>;
@@ -35,6 +36,8 @@ type SegmentRow<'py> = (
     Vector<'py>,
     Vector<'py>,
 );
+
+type DecisionRow<'py> = (Bound<'py, PyDict>, Bound<'py, PyDict>);
 
 type WarningRow<'py> = (
     f64,
@@ -361,6 +364,13 @@ impl Run {
                 ))
             })
             .collect()
+    }
+
+    /// What was asked and what was decided, of as many decisions as the option `keep_decisions` names.
+    fn decisions<'py>(&self, py: Python<'py>) -> PyResult<Vec<DecisionRow<'py>>> {
+        let solution = self.solution();
+        let records = solution.decisions.iter();
+        records.map(|record| record_as_pair(py, record)).collect()
     }
 
     /// The continuations where the run ended at a non-unique point; else empty.

@@ -160,6 +160,7 @@ fn read_options(given: &Bound<'_, PyDict>) -> PyResult<(Options, Option<Py<PyAny
             }
             "sliding" => options.sliding = sliding_rule(&value.extract::<String>()?)?,
             "t_eval" => options.t_eval = value.extract()?,
+            "keep_decisions" => options.keep_decisions = value.extract()?,
             "dense_output" => options.dense_output = value.extract()?,
             "progress" if !value.is_none() => progress = Some(value.unbind()),
             "method" => options.method = method(&value.extract::<String>()?)?,

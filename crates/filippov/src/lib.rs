@@ -53,6 +53,9 @@ mod system;
 mod tolerances;
 
 pub use clock::{Clock, ManualClock};
+pub use decisions::{
+    replay_decision, DecisionCause, DecisionOutcome, DecisionPoint, DecisionRecord, StartingZero,
+};
 pub use error::{Error, FieldError};
 pub use event::{UserEvent, UserFunction};
 pub use inspect::{

@@ -131,6 +131,9 @@ pub struct Options {
     pub keep: Keep,
     /// Keep the interpolants of all steps, so that the solution can be evaluated anywhere.
     pub dense_output: bool,
+    /// Keep of so many decisions, the first ones, what was asked and what was decided, in
+    /// [`crate::Solution::decisions`].
+    pub keep_decisions: usize,
 }
 
 impl Default for Options {
@@ -153,6 +156,7 @@ impl Default for Options {
             t_eval: None,
             keep: Keep::default(),
             dense_output: true,
+            keep_decisions: 0,
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use smallvec::SmallVec;
 
+use crate::decisions::DecisionRecord;
 use crate::integrate::Stats;
 use crate::mode::Mode;
 use crate::options::{Keep, Options, Stabilization};
@@ -36,6 +37,8 @@ pub(crate) struct Recorder {
     is_sampled: bool,
     /// Watches the section, if there is one.
     pub observer: Option<Observer>,
+    /// The decisions, if they are wanted.
+    pub decisions: Vec<DecisionRecord>,
 }
 
 impl Recorder {
@@ -60,6 +63,7 @@ impl Recorder {
             wanted: wanted.unwrap_or_default(),
             next: 0,
             observer: None,
+            decisions: Vec::new(),
         }
     }
 
@@ -265,6 +269,7 @@ impl Recorder {
             steps: self.steps,
             coefficients: self.coefficients,
             returns: self.observer.map(Observer::into_returns),
+            decisions: self.decisions,
             y0: self.y0,
             y_last: x.to_vec(),
         }

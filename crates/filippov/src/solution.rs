@@ -2,6 +2,7 @@
 
 use smallvec::SmallVec;
 
+use crate::decisions::DecisionRecord;
 use crate::error::FieldError;
 use crate::field::{IntersectionField, Projector, SlidingField, SmoothField};
 use crate::integrate::Stats;
@@ -107,6 +108,8 @@ pub struct Solution {
     pub warnings: Vec<Warning>,
     /// The returns to the section, if the run was observed at one.
     pub returns: Option<Returns>,
+    /// The first decisions, if they were asked for ([`crate::Options::keep_decisions`]).
+    pub decisions: Vec<DecisionRecord>,
     pub(crate) steps: Vec<Step>,
     pub(crate) coefficients: Vec<f64>,
     pub(crate) y0: Vec<f64>,

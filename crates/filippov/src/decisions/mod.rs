@@ -22,6 +22,7 @@ mod nested;
 mod passage;
 mod placement;
 mod point;
+mod record;
 mod relay;
 mod resting;
 pub(crate) mod root_ends;
@@ -41,6 +42,10 @@ pub(crate) use leave_by_rule::refusal;
 pub(crate) use passage::{goes_through, rates_here};
 pub(crate) use placement::{pushed_back, sides, Sides};
 pub(crate) use point::{Arrival, Cause, Leap, Left, Lefts, Next, Notes, Point, Policy, Values};
+pub(crate) use record::decide_and_record;
+pub use record::{
+    replay_decision, DecisionCause, DecisionOutcome, DecisionPoint, DecisionRecord, StartingZero,
+};
 pub(crate) use rule::Rule;
 pub(crate) use sides::{warn_against_direction, warn_unknown_side};
 pub(crate) use spiral::landing;

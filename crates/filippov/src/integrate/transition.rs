@@ -5,9 +5,10 @@ use std::cell::RefCell;
 use smallvec::{smallvec, SmallVec};
 
 use crate::decisions::{
-    beyond_double_zero, decide, differs_between_sides, landing, limits::limit_here, refusal,
-    root_ends, two_fold_here, vanishing_surfaces, warn_against_direction, Arrival, Cause, Decision,
-    Leap, Left, Lefts, Next, Notes, Point, Reached, Rule, Values, RULES,
+    beyond_double_zero, decide, decide_and_record, differs_between_sides, landing,
+    limits::limit_here, refusal, root_ends, two_fold_here, vanishing_surfaces,
+    warn_against_direction, Arrival, Cause, Decision, Leap, Left, Lefts, Next, Notes, Point,
+    Reached, Rule, Values, RULES,
 };
 use crate::error::FieldError;
 use crate::event::{Deflation, EventFunction, Found};
@@ -100,7 +101,14 @@ impl<'a> Integrator<'a> {
         cause: Cause,
         reached: &mut Reached,
     ) -> Result<Decision, FieldError> {
-        let mut decision = self.ask(cause, |at, notes| decide(at, notes, reached))?;
+        let mut decision = if self.recorder.decisions.len() < self.options.keep_decisions {
+            let kept = self.ask(cause, |at, notes| decide_and_record(at, notes, reached));
+            let (decision, record) = kept?;
+            self.recorder.decisions.push(record);
+            decision
+        } else {
+            self.ask(cause, |at, notes| decide(at, notes, reached))?
+        };
         if let Some(stop) = self.watch.stop() {
             decision.decided = Err(stop);
         }
