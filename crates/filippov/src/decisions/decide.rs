@@ -36,7 +36,7 @@ const LIST: [(Rule, Apply); 15] = [
     (Rule::Limit, stay_at_limit),
     (Rule::Apart, decide_apart),
     (Rule::Trial, decide_where_two_touch),
-    (Rule::SlidingRule, leave_by_rule),
+    (Rule::Law, leave_by_rule),
     (Rule::VanishingJump, decide_where_jump_vanishes),
     (Rule::Relay, decide_by_relay),
     (Rule::TooMany, too_many),
@@ -130,29 +130,14 @@ fn check(
     rule: Rule,
     mut decided: Decided,
 ) -> Result<Decided, FieldError> {
-    use Rule::{
-        Apart, Coinciding, FirstOrder, Limit, Relay, SlidingRule, TooMany, Trial, VanishingJump,
-    };
+    use Rule::{Apart, Coinciding, FirstOrder, Law, Limit, Relay, TooMany, Trial, VanishingJump};
     let is_event = matches!(meeting.how, How::Event(_));
-    if is_event
-        && matches!(
-            rule,
-            SlidingRule | VanishingJump | Relay | TooMany | FirstOrder
-        )
-    {
+    if is_event && matches!(rule, Law | VanishingJump | Relay | TooMany | FirstOrder) {
         decided = decide_with_kinetic_friction(at, notes, decided, meeting)?;
     }
     let is_intersection = matches!(
         rule,
-        Apart
-            | Coinciding
-            | FirstOrder
-            | Limit
-            | Relay
-            | SlidingRule
-            | TooMany
-            | Trial
-            | VanishingJump
+        Apart | Coinciding | FirstOrder | Limit | Relay | Law | TooMany | Trial | VanishingJump
     );
     if is_intersection {
         decided = reject_if_not_attracting(at, decided, meeting.surfaces)?;

@@ -29,15 +29,7 @@ pub(crate) fn departures(
     }
     let (n, signs) = (at.x.len(), after.signs());
     let mut velocity = vec![0.0; n];
-    velocity_in(
-        at,
-        notes,
-        after,
-        multipliers,
-        at.t,
-        &at.x.to_vec(),
-        &mut velocity,
-    )?;
+    velocity_in(at, notes, after, multipliers, at.t, at.x, &mut velocity)?;
     let mut gradient = vec![0.0; n];
     for j in leaving {
         let ht = at.system.gradient(j, at.t, at.x, &signs, &mut gradient)?;

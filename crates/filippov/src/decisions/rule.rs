@@ -25,7 +25,7 @@ pub(crate) enum Rule {
     /// Two surfaces that touch one another: the modes are tried for a moment.
     Trial,
     /// The rule of sliding that the caller chose ends.
-    SlidingRule,
+    Law,
     /// The jump of the field across one surface vanishes while the motion slides on several.
     VanishingJump,
     /// The relay problem of a field that is affine in the signs.
@@ -53,7 +53,7 @@ impl Rule {
             Rule::Limit => "limit",
             Rule::Apart => "apart",
             Rule::Trial => "trial",
-            Rule::SlidingRule => "sliding_rule",
+            Rule::Law => "sliding_rule",
             Rule::VanishingJump => "vanishing_jump",
             Rule::Relay => "relay",
             Rule::TooMany => "too_many",
