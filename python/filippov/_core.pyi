@@ -282,8 +282,6 @@ def classify(
     t: float,
     x: _Array,
     p: _Array,
-    reach: float,
-    kappa: list[float],
-    before: list[int] | None,
+    how: tuple[float, list[float], list[int] | None],
 ) -> dict[str, Any] | None: ...
 def hidden_dynamics(components: _Array, before: list[int] | None, kappa: list[float]) -> dict[str, Any]: ...

@@ -139,9 +139,8 @@ def classify(
         If a field or a switching function is not finite at the point.
     """
     try:
-        found: dict[str, Any] | None = classify_in_core(
-            prepared.core, t, x, p, reach, list(kappa), None if before is None else list(before)
-        )
+        how = (reach, list(kappa), None if before is None else list(before))
+        found: dict[str, Any] | None = classify_in_core(prepared.core, t, x, p, how)
     except ValueError as error:
         raise InputError(str(error)) from None
     if found is None:

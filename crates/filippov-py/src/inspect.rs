@@ -36,19 +36,19 @@ pub fn intersection_field<'py>(
     Ok(value.map(|value| (PyArray1::from_vec(py, value.dx), value.multipliers)))
 }
 
-/// What happens at a point; None if something is not finite.
+/// What happens at a point; None if something is not finite. `how` are the distance that counts as met, the scaling of the
+/// surfaces, and the mode before.
 #[pyfunction]
-#[pyo3(signature = (system, t, x, p, reach, kappa, before))]
+#[pyo3(signature = (system, t, x, p, how))]
 pub fn classify<'py>(
     py: Python<'py>,
     system: &Bound<'py, PyAny>,
     t: f64,
     x: Array<'py>,
     p: Array<'py>,
-    reach: f64,
-    kappa: Vec<f64>,
-    before: Option<Vec<i8>>,
+    how: (f64, Vec<f64>, Option<Vec<i8>>),
 ) -> PyResult<Option<Bound<'py, PyDict>>> {
+    let (reach, kappa, before) = how;
     let x = x.as_slice()?;
     let core = core_of(system, p.as_slice()?, t, x)?;
     let n_visible = n_visible_of(system, &*core);
