@@ -225,3 +225,18 @@ def test_forged_bytes_are_refused_or_can_be_solved() -> None:
         assert sol.surfaces == tuple(system.surfaces)
         used += 1
     assert used > 50
+
+
+def test_nodes_that_simplify_further_when_they_are_read_keep_their_meaning():
+    """The product of a sign with itself is known to be 1 only once its surface is known."""
+
+    def fun(t, x):
+        h = 0.1 * x[1] - 0.8 * x[0] + 0.08
+        push = 0.2 * np.sign(h) * np.sign(h)
+        return [0.5 * x[1] - 1.8 * np.clip(h, -0.6, 0.3) + push, -0.6 * x[1] - 0.5 * x[0] + 1.0]
+
+    system = fl.System(fun, n=2)
+    system.prepare(2, 0.0, np.array([-0.4, 1.0]), {})
+    copy = pickle.loads(pickle.dumps(system))
+    ends = [run.solve((0, 3), [-0.4, 1.0]).y[:, -1] for run in (system, copy)]
+    np.testing.assert_allclose(ends[0], ends[1], rtol=1e-12)

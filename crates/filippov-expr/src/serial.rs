@@ -51,7 +51,7 @@ impl Graph {
     /// excess bytes.
     pub fn from_bytes(bytes: &[u8]) -> Result<Graph, ExprError> {
         let mut container = Container::open(bytes, CONTENT)?;
-        let graph = Graph::read_section(&mut container)?;
+        let (graph, _) = Graph::read_section(&mut container)?;
         container.finish()?;
         Ok(graph)
     }
@@ -82,11 +82,12 @@ impl Graph {
         }
     }
 
-    /// The graph that [`Graph::write_section`] wrote as the next section of a container.
+    /// The graph that [`Graph::write_section`] wrote as the next section of a container, and the node that each written one
+    /// has become: what has been learned about switching since a node was made may simplify it further.
     ///
     /// # Errors
     /// [`ExprError::Damaged`], as [`Graph::from_bytes`].
-    pub fn read_section(container: &mut Container) -> Result<Graph, ExprError> {
+    pub fn read_section(container: &mut Container) -> Result<(Graph, Vec<NodeId>), ExprError> {
         let mut section = container.section(NODES)?;
         let nodes = read_nodes(&mut section)?;
         let functions = read_surfaces(&mut section, &nodes)?;
@@ -104,7 +105,7 @@ impl Graph {
         for index in 0..graph.n_surfaces() as u32 {
             graph.register_surface(index);
         }
-        Ok(graph)
+        Ok((graph, made))
     }
 
     /// Makes nodes again, whose operands are numbers of nodes before them; their numbers here.

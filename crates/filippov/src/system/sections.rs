@@ -38,9 +38,9 @@ impl Definition {
     /// # Errors
     /// Those of the container and of [`Definition::check`].
     pub(crate) fn read_sections(container: &mut Container) -> Result<Self, Error> {
-        let graph = Graph::read_section(container)?;
+        let (graph, made) = Graph::read_section(container)?;
         let mut section = container.section(FIELD)?;
-        let field = read_nodes(&mut section)?;
+        let field = read_nodes(&mut section, &made)?;
         section.finish()?;
         let mut section = container.section(NAMES)?;
         let names = Names {
@@ -49,7 +49,7 @@ impl Definition {
         };
         section.finish()?;
         let mut section = container.section(RULES)?;
-        let rules = Rules::read(&mut section)?;
+        let rules = Rules::read(&mut section, &made)?;
         section.finish()?;
         let definition = Definition {
             graph,
@@ -80,7 +80,7 @@ impl Rules {
         }
     }
 
-    fn read(section: &mut Section) -> Result<Self, ExprError> {
+    fn read(section: &mut Section, made: &[NodeId]) -> Result<Self, ExprError> {
         let n_hidden = section.number()? as usize;
         let mut watched = Vec::new();
         for _ in 0..section.count(4)? {
@@ -88,11 +88,11 @@ impl Rules {
         }
         let mut sticking = Vec::new();
         for _ in 0..section.count(8)? {
-            sticking.push((section.number()? as usize, node(section)?));
+            sticking.push((section.number()? as usize, node(section, made)?));
         }
         let mut laws = Vec::new();
         for _ in 0..section.count(5)? {
-            laws.push(read_law(section)?);
+            laws.push(read_law(section, made)?);
         }
         Ok(Rules {
             watched,
@@ -133,23 +133,23 @@ fn write_law(writer: &mut Writer, law: &Law) {
     }
 }
 
-fn read_law(section: &mut Section) -> Result<Law, ExprError> {
+fn read_law(section: &mut Section, made: &[NodeId]) -> Result<Law, ExprError> {
     Ok(match section.byte()? {
         CLOCK => Law::Clock {
-            argument: node(section)?,
+            argument: node(section, made)?,
         },
         LEVEL => Law::Level {
-            argument: node(section)?,
+            argument: node(section, made)?,
             surface: section.number()? as usize,
             orientation: section.float()?,
             guard: section.number()? as usize,
         },
         HELD => Law::Held {
-            argument: node(section)?,
+            argument: node(section, made)?,
         },
         HYSTERESIS => Law::Hysteresis {
-            argument: node(section)?,
-            thresholds: [node(section)?, node(section)?],
+            argument: node(section, made)?,
+            thresholds: [node(section, made)?, node(section, made)?],
             initial: section.float()?,
             guard: section.number()? as usize,
         },
@@ -162,15 +162,18 @@ fn write_nodes(writer: &mut Writer, nodes: &[NodeId]) {
     nodes.iter().for_each(|node| writer.number(node.index()));
 }
 
-fn read_nodes(section: &mut Section) -> Result<Vec<NodeId>, ExprError> {
-    (0..section.count(4)?).map(|_| node(section)).collect()
+fn read_nodes(section: &mut Section, made: &[NodeId]) -> Result<Vec<NodeId>, ExprError> {
+    (0..section.count(4)?)
+        .map(|_| node(section, made))
+        .collect()
 }
 
 fn read_names(section: &mut Section) -> Result<Vec<String>, ExprError> {
     (0..section.count(4)?).map(|_| section.text()).collect()
 }
 
-/// The number of a node, which [`Definition::check`] looks at.
-fn node(section: &mut Section) -> Result<NodeId, ExprError> {
-    section.number().map(NodeId)
+/// A node: what the written one has become.
+fn node(section: &mut Section, made: &[NodeId]) -> Result<NodeId, ExprError> {
+    let index = section.index(made.len(), "a node that does not exist")?;
+    Ok(made[index])
 }
