@@ -231,12 +231,15 @@ def test_nodes_that_simplify_further_when_they_are_read_keep_their_meaning():
     """The product of a sign with itself is known to be 1 only once its surface is known."""
 
     def fun(t, x):
-        h = 0.1 * x[1] - 0.8 * x[0] + 0.08
-        push = 0.2 * np.sign(h) * np.sign(h)
-        return [0.5 * x[1] - 1.8 * np.clip(h, -0.6, 0.3) + push, -0.6 * x[1] - 0.5 * x[0] + 1.0]
+        h = -0.8 * x[0] + 0.115 * x[1] - -0.08
+        pull = -1.82 * np.clip(h, -0.66, 0.3) * np.sqrt(1 + x[0] ** 2)
+        return [
+            0.5 * x[1] - 0.12 * x[0] + pull + 0.157 * np.sign(h) * np.sign(h),
+            -0.634 * x[1] - 0.5 * x[0] + 1.0,
+        ]
 
     system = fl.System(fun, n=2)
-    system.prepare(2, 0.0, np.array([-0.4, 1.0]), {})
+    ends = [system.solve((0, 3), [-0.44, 1.013]).y[:, -1]]
     copy = pickle.loads(pickle.dumps(system))
-    ends = [run.solve((0, 3), [-0.4, 1.0]).y[:, -1] for run in (system, copy)]
-    np.testing.assert_allclose(ends[0], ends[1], rtol=1e-12)
+    ends.append(copy.solve((0, 3), [-0.44, 1.013]).y[:, -1])
+    np.testing.assert_allclose(*ends, rtol=1e-12)
