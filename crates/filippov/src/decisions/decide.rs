@@ -1,5 +1,7 @@
 //! The one way from a point to the motion that follows: [`decide`], and the rules where surfaces vanish, in their order.
 
+use smallvec::SmallVec;
+
 use super::apart::decide_apart;
 use super::coinciding::{decide_without_kinks, leave_coinciding};
 use super::contact::decide_in_contact;
@@ -12,13 +14,11 @@ use super::nested::{
     decide_where_others_jump, leave_along_bends, leave_at_bends, reject_if_not_attracting,
 };
 use super::placement::{one_surface, place};
-use super::point::{Apply, Rules};
-use super::point::{Cause, Decided, Lefts, Next, Notes, Point};
+use super::point::{Apply, Cause, Decided, Lefts, Next, Notes, Point, Rules};
 use super::relay::decide_by_relay;
 use super::rule::{How, Meeting, Rule};
 use super::settle::settle;
 use super::vanishing_jump::decide_where_jump_vanishes;
-use smallvec::SmallVec;
 
 use crate::error::FieldError;
 use crate::field::ModeField;
@@ -88,10 +88,12 @@ fn after_event(
     fresh: &[usize],
     mode: &Mode,
 ) -> Result<(Rule, Decided), FieldError> {
-    if matches!(&**at.arrival.field.borrow(), ModeField::Contact(_)) {
+    let is_touch = matches!(at.arrival.cause, Cause::Event { touch: true, .. });
+    if !is_touch && matches!(&**at.arrival.field.borrow(), ModeField::Contact(_)) {
         return Ok((Rule::Contact, decide_in_contact(at, notes, fresh)?));
     }
-    if fresh.len() > 1 && fresh.iter().any(|&j| at.triggers().is_only_trigger(j)) {
+    let is_trigger = |j: &usize| at.triggers().is_only_trigger(*j);
+    if !is_touch && fresh.len() > 1 && fresh.iter().any(is_trigger) {
         return Ok((Rule::Triggers, cross_beside_triggers(at, notes, fresh)?));
     }
     let mut both = SmallVec::<[usize; 4]>::new();

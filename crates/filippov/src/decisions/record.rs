@@ -2,11 +2,11 @@
 
 use std::cell::RefCell;
 
+use smallvec::SmallVec;
+
 use super::decide::{decide, Decision, RULES};
 use super::event::Reached;
 use super::point::{Arrival, Cause, Left, Next, Notes, Point, Policy};
-use smallvec::SmallVec;
-
 use crate::action::Actions;
 use crate::error::FieldError;
 use crate::event::EventFunction;
