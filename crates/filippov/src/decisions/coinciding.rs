@@ -1,4 +1,4 @@
-//! Surfaces in the place of one another: which of them decides, and what the others do.
+//! Coincident surfaces (same zero set): one of them decides, and the others follow it.
 //!
 //! A kink, as of `abs` or `maximum`, is a surface on whose sign the field does not depend while the point is on it. Where it is
 //! in the place of another surface, as `x` beside `x + x*abs(x)` or both arguments of a maximum that vanish together, it has no

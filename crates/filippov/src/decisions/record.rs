@@ -129,7 +129,7 @@ pub(crate) fn decide_and_record(
     Ok((decision, DecisionRecord { point, outcome }))
 }
 
-/// Decides once more what follows at a recorded point of a run with these actions and options.
+/// Repeats the decision at a recorded point of a run with these actions and options.
 ///
 /// The field of the motion before starts from the recorded multipliers. What it remembered beside them (earlier multipliers,
 /// how far they may go beyond their ends) is not recorded: where a decision depends on that, it may differ.
