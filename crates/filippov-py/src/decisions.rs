@@ -25,7 +25,7 @@ pub fn record_as_pair<'py>(
     ))
 }
 
-/// Decides once more what follows at a point of a recorded run.
+/// Repeats the decision at a point of a recorded run.
 #[pyfunction]
 #[pyo3(signature = (system, p, options, actions, point))]
 pub fn replay_decision<'py>(

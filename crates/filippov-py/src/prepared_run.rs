@@ -137,7 +137,7 @@ impl PreparedRun {
         )
     }
 
-    /// Decides once more what follows at a point of such a run.
+    /// Repeats the decision at a point of such a run.
     pub fn replay(
         &self,
         options: &Options,

@@ -1,8 +1,8 @@
-//! Surfaces that meet and are decided one by one, where first-order data say nothing.
+//! Decide intersecting surfaces one by one if first-order data are doubtful.
 //!
-//! Where a normal component vanishes, as where an integrator leaves its limit, the fields around the point tell no more than
-//! rounding does. Higher derivatives of one surface may, and where the signs of the others do not change them, the others
-//! need not be known.
+//! If a normal component vanishes, as it does when an integrator leaves its limit, rounding hides what the fields around the
+//! point decide. Higher derivatives of one surface may decide. If the signs of the other surfaces do not change those
+//! derivatives, the other surfaces need not be known.
 
 use super::leave_by_rule::slides_by_rule;
 use super::point::{Decided, Left, Lefts, Next, Notes, Point};

@@ -14,14 +14,14 @@ use crate::switching::{first_nonzero, Leading};
 use crate::system::{dot, PiecewiseSystem};
 use crate::tolerances::{BESIDE, COINCIDE, MOST_MEETING, TANGENT};
 
-/// A kink in the place of another surface.
+/// A kink that coincides with another surface.
 struct Kink {
     surface: usize,
     /// The surface that decides.
     beside: usize,
 }
 
-/// Those of `meeting` that are kinks in the place of others of it.
+/// The kinks of `meeting` that coincide with another surface of it.
 fn coinciding_kinks(
     at: &Point,
     notes: &mut Notes,
@@ -76,7 +76,7 @@ pub(super) fn touch_one_another(
     Ok(are_parallel && in_the_place_of(at.system, (at.t, at.x), j, &[k], mode)?.is_empty())
 }
 
-/// Rule: kinks in the place of other surfaces; the others are decided without them.
+/// Rule: kinks coincide with other surfaces. The other surfaces are decided, and the kinks follow them.
 pub(super) fn decide_without_kinks(
     at: &Point,
     notes: &mut Notes,
@@ -125,7 +125,7 @@ fn take_along(at: &Point, kinks: &[Kink], decided: Decided) -> Result<Decided, F
     Ok(Ok(next))
 }
 
-/// The active surfaces that are in the place of those slid on in a mode: their functions vanish all along the motion.
+/// The active surfaces that coincide with those slid on in a mode: their functions vanish all along the motion.
 pub(crate) fn surfaces_in_the_place_of_those_slid_on(
     system: &dyn PiecewiseSystem,
     place: (f64, &[f64]),

@@ -1,4 +1,4 @@
-//! Where derivatives at the point do not tell what follows: the modes are tried for a moment.
+//! Try the modes for a moment if derivatives at the point do not decide.
 //!
 //! So it is where two surfaces touch one another: seen from the point they are one, and a moment later they are two, in an
 //! order that decides.
