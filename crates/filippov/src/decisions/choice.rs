@@ -7,6 +7,7 @@ use crate::status::{Stop, Warning, WarningCode};
 use crate::switching::Decision;
 
 /// The motion after the decision at one surface.
+#[inline]
 pub(super) fn follow_at_surface(
     at: &Point,
     notes: &mut Notes,

@@ -115,6 +115,13 @@ fn after_event(
         fresh,
         how,
     };
+    let may_coincide = at.system.has_nested_signs() || at.arrival.meets_kinks;
+    if !(is_touch || may_coincide) {
+        // No rule before that of one surface applies: the list need not be asked.
+        if let Some(decided) = one_surface(at, notes, &meeting)? {
+            return Ok((Rule::OneSurface, decided));
+        }
+    }
     let (rule, decided) = settle(at, notes, &meeting)?;
     let decided = match decided {
         Ok(next) if rule != Rule::Touch => Ok(leave_coinciding(at, notes, next)?),

@@ -14,6 +14,7 @@ use crate::system::dot;
 use crate::tolerances::{DEPARTS_TANGENTIALLY, SURFACE_NOISE};
 
 /// The surfaces among the functions of an event, in order.
+#[inline]
 pub(crate) fn located_surfaces(functions: &[EventFunction]) -> SmallVec<[usize; 4]> {
     let mut surfaces = SmallVec::new();
     for function in functions {
@@ -21,7 +22,9 @@ pub(crate) fn located_surfaces(functions: &[EventFunction]) -> SmallVec<[usize; 
             surfaces.push(j);
         }
     }
-    surfaces.sort_unstable();
+    if surfaces.len() > 1 {
+        surfaces.sort_unstable();
+    }
     surfaces
 }
 
@@ -35,6 +38,7 @@ pub(crate) struct Reached {
 }
 
 /// What vanishes at the event.
+#[inline]
 pub(crate) fn vanishing_surfaces(at: &Point, notes: &mut Notes) -> Result<Reached, FieldError> {
     let mut reached = Reached {
         surfaces: located_surfaces(at.arrival.functions()),

@@ -18,6 +18,7 @@ pub(super) fn slides_by_rule(arrival: &Arrival) -> bool {
 }
 
 /// Why the rule gives no field where the motion has just begun.
+#[inline]
 pub(crate) fn refusal(field: &ModeField, sliding: &[usize]) -> Option<Stop> {
     match field {
         ModeField::Intersection(field) => field

@@ -81,6 +81,7 @@ fn take_sides(
 }
 
 /// Rule: one surface, by the first derivatives of h that do not vanish along the fields of both sides.
+#[inline(always)]
 pub(super) fn one_surface(
     at: &Point,
     notes: &mut Notes,

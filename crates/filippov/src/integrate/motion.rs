@@ -5,8 +5,9 @@ use std::sync::Arc;
 use smallvec::SmallVec;
 
 use crate::action::Actions;
+use crate::decisions::Left;
 use crate::error::FieldError;
-use crate::event::{Deflation, EventFunction, Monitored};
+use crate::event::{EventFunction, Monitored};
 use crate::field::{AffineBounds, ContactField, Law, ModeField, SlidingSet};
 use crate::mode::{Mode, Signs};
 use crate::options::SlidingRule;
@@ -113,7 +114,7 @@ impl<'a> Motion<'a> {
         system: &'a dyn PiecewiseSystem,
         t_start: f64,
         mode: Mode,
-        deflations: &[(EventFunction, Deflation)],
+        left: &[Left],
     ) {
         let (signs, sliding): (_, SlidingSet) = (mode.signs(), mode.sliding_set().collect());
         if !self.actions.list.is_empty() {
@@ -143,7 +144,7 @@ impl<'a> Motion<'a> {
         self.affine_bounds = None;
         self.is_straight = sliding.iter().all(|&j| system.is_affine(j));
         (self.mode, self.t_start, self.signs, self.sliding) = (mode, t_start, signs, sliding);
-        self.find_monitored(system, deflations);
+        self.find_monitored(system, left);
     }
 
     /// Takes another field and keeps the one before, if it can be used again.
@@ -180,11 +181,7 @@ impl<'a> Motion<'a> {
         self.jets = known.get_or_insert_with(|| find(&self.sliding)).clone();
     }
 
-    fn find_monitored(
-        &mut self,
-        system: &dyn PiecewiseSystem,
-        deflations: &[(EventFunction, Deflation)],
-    ) {
+    fn find_monitored(&mut self, system: &dyn PiecewiseSystem, left: &[Left]) {
         self.recall(system);
         self.sticks = self.sliding.len() > 1 && self.sliding.iter().any(|&j| system.sticks_at(j));
         let is_plain = self.resting.is_empty()
@@ -202,12 +199,10 @@ impl<'a> Motion<'a> {
             }
         }
         // Of several for one function the first counts.
-        for (function, deflation) in deflations.iter().rev() {
-            let own = self
-                .monitored
-                .iter_mut()
-                .filter(|m| m.function == *function);
-            own.for_each(|m| m.deflation = Some(*deflation));
+        let t = self.t_start;
+        for (function, deflation) in left.iter().rev().filter_map(|l| l.deflation(t)) {
+            let own = self.monitored.iter_mut().filter(|m| m.function == function);
+            own.for_each(|m| m.deflation = Some(deflation));
         }
         self.note_departure();
     }

@@ -23,7 +23,11 @@ impl Integrator<'_> {
             Left::Surface(j, leading) if leading.order == 0 => Some(*j),
             _ => None,
         });
-        self.motion.resting = resting.collect();
+        self.motion.resting.clear();
+        self.motion.resting.extend(resting);
+        if self.motion.resting.is_empty() {
+            return Ok(());
+        }
         let signs = mode.signs();
         for k in 0..self.motion.resting.len() {
             let j = self.motion.resting[k];

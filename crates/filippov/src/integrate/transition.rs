@@ -36,14 +36,14 @@ impl<'a> Integrator<'a> {
         cause: Cause,
         question: impl FnOnce(&Point<'_, '_, 'a>, &mut Notes) -> Result<R, FieldError>,
     ) -> Result<R, FieldError> {
-        let departing = self
-            .motion
-            .monitored
-            .iter()
-            .filter_map(|m| match m.function {
-                EventFunction::Surface(j) if m.deflation.is_some_and(|d| d.order > 1) => Some(j),
-                _ => None,
-            });
+        let mut departing = SmallVec::new();
+        for monitored in &self.motion.monitored {
+            if let (EventFunction::Surface(j), Some(Deflation { order: 2.., .. })) =
+                (monitored.function, monitored.deflation)
+            {
+                departing.push(j);
+            }
+        }
         let arrival = Arrival {
             cause,
             mode: &self.motion.mode,
@@ -52,7 +52,7 @@ impl<'a> Integrator<'a> {
             sides: &self.motion.sides,
             active: &self.motion.active,
             resting: &self.motion.resting,
-            departing: departing.collect(),
+            departing,
             meets_kinks: self.motion.meets_kinks,
             switches: self.recorder.switches(),
             residuals: &self.residuals,
@@ -177,8 +177,8 @@ impl<'a> Integrator<'a> {
                 }
             }
             _ => {
-                concerned.extend_from_slice(self.motion.sliding());
-                if concerned.len() > 1 {
+                if !self.motion.sliding.is_empty() {
+                    concerned.extend(self.motion.sliding.iter().copied());
                     concerned.sort_unstable();
                     concerned.dedup();
                 }
@@ -390,11 +390,8 @@ impl<'a> Integrator<'a> {
                 left = self.make_leap(leap)?;
             }
         }
-        let t = self.t;
-        let deflations: SmallVec<[(EventFunction, Deflation); 2]> =
-            left.iter().filter_map(|l| l.deflation(t)).collect();
         self.note_resting(&mode, &left)?;
-        self.motion.restart(self.system, self.t, mode, &deflations);
+        self.motion.restart(self.system, self.t, mode, &left);
         let zeros = self.motion.monitored.iter_mut();
         for zero in zeros.filter_map(|m| m.deflation.as_mut()) {
             zero.is_clean = !slid;
