@@ -21,9 +21,12 @@ from filippov.trace.memory import remembered
 from filippov.trace.reuse import Recent
 from filippov.trace.verify import verify
 
-__all__ = ["Prepared", "prepare"]
+__all__ = ["MEMORY", "Prepared", "prepare"]
 
 Array = npt.NDArray[np.float64]
+# The code of the warning for a function that assigns what other calls of it may read.
+MEMORY = "memory"
+
 CoreSystem = TracedSystem | OpaqueSystem | SignedSystem
 
 
@@ -65,6 +68,18 @@ class Prepared(NamedTuple):
         if not isinstance(self.core, TracedSystem):
             return "black box"
         return "native" if self.core.is_native() else "interpreter"
+
+    @property
+    def warnings(self) -> list[tuple[str, str]]:
+        """Code and text of the warnings that every run of this system has."""
+        if not self.remembers:
+            return []
+        text = (
+            f"fun assigns {', '.join(self.remembers)}, outside of itself: a trace does not remember what "
+            "an earlier call left there. For a relay with two thresholds use fl.Hysteresis; else keep such "
+            "values out of fun"
+        )
+        return [(MEMORY, text)]
 
     def is_valid_for(self, n: int, values: dict[str, float]) -> bool:
         """Whether this form holds for `n` states and these parameter values."""
