@@ -17,6 +17,11 @@ def repel(t, x):
     return [np.sign(x[0])]
 
 
+def rest_on_a_jump(t, x):
+    """The jump vanishes at the start, where x[1] is zero, and nothing leaves its surface."""
+    return [0.0, x[1] * np.sign(x[0])]
+
+
 def here():
     return inspect.currentframe().f_back.f_lineno
 
@@ -53,6 +58,83 @@ def test_a_warning_points_to_the_line_of_the_caller(call, repeat):
         assert shown.code == SHOWN
         assert str(shown).startswith("non_unique: ")
         assert shown.result is result
+
+
+# What a call leaves behind for the next one.
+STATE = {"side": 0}
+
+
+def repel_with_a_memory(t, x, a=1.0):
+    """At x = 0 the solution is not unique, and an earlier call leaves something behind."""
+    if x[0] > 0:
+        STATE["side"] = 1
+    else:
+        STATE["side"] = -1
+    return [a * np.sign(x[0])]
+
+
+WARNING_TWICE = fl.System(repel_with_a_memory, n=1, states=("z",), params={"a": 1.0})
+HALF = fl.Section(lambda t, x: x[0] - 0.5)
+RUNS = {
+    "solve_ivp": lambda: fl.solve_ivp(repel_with_a_memory, (0, 1), [0.0]),
+    "solve": lambda: WARNING_TWICE.solve((0, 1), [0.0]),
+    "branches": lambda: WARNING_TWICE.solve((0, 1), [0.0], nonunique="branch"),
+    "ensemble": lambda: WARNING_TWICE.ensemble((0, 1), [[0.0], [1.0]]),
+    "sweep": lambda: fl.sweep(WARNING_TWICE, (0, 1), {"z": [0.0, 1.0]}),
+    "basins": lambda: fl.basins(WARNING_TWICE, None, (0, 1), {"z": [0.0, 1.0]}),
+    "poincare": lambda: fl.poincare(WARNING_TWICE, HALF, (0, 1), [0.0]),
+    "bifurcation_diagram": lambda: fl.bifurcation_diagram(WARNING_TWICE, HALF, (0, 1), [0.0], {"a": [1, 2]}),
+}
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_no_function_that_runs_a_system_swallows_a_warning(name):
+    pytest.importorskip("xarray")
+    for _ in range(2):
+        result, found = caught(RUNS[name])
+        codes = {code for warning in found for code in warning.message.code.split(", ")}
+        assert codes == ({"memory"} if name == "branches" else {"non_unique", "memory"})
+    if name in ("sweep", "basins", "bifurcation_diagram"):
+        bit = result.warnings.attrs["flag_meanings"].split().index("memory")
+        assert result.n_warnings.values.tolist() == [2, 2 if name == "bifurcation_diagram" else 1]
+        assert (result.warnings.values >> bit & 1).tolist() == [1, 1]
+    elif name == "ensemble":
+        assert result.n_warnings.tolist() == [2, 1]
+        codes_of = [[warning.code for warning in member.warnings] for member in result]
+        assert codes_of == [["non_unique", "memory"], ["memory"]]
+    elif name == "poincare":
+        assert (result.attrs["n_warnings"], result.attrs["warnings"]) == (2, "non_unique memory")
+
+
+def test_every_public_function_that_runs_a_system_is_looked_at():
+    """A function that runs a system takes `t_span`; those that read a store or inspect points do not."""
+    public = {name: getattr(fl, name) for name in fl.__all__}
+    methods = {name: value for name, value in vars(fl.System).items() if not name.startswith("_")}
+    running = {
+        name
+        for name, value in {**public, **methods}.items()
+        if inspect.isfunction(value) and "t_span" in inspect.signature(value).parameters
+    }
+    assert running == set(RUNS) - {"branches"}
+
+
+def test_the_warnings_of_all_branches_are_shown():
+    def fun(t, x):
+        # Below zero the field is stiff.
+        return [np.sign(x[0]), np.where(x[0] < 0, -1e5 * (x[1] - np.cos(t)), 0.0)]
+
+    sol, found = caught(lambda: fl.solve_ivp(fun, (0, 3), [0.0, 1.0], nonunique="branch", method="DOPRI5"))
+    assert [{warning.code for warning in branch.warnings} - {"non_unique"} for branch in sol.branches] == [
+        set(),
+        {"stiff"},
+    ]
+    assert [warning.message.code for warning in found] == ["stiff"]
+
+
+def test_a_copy_of_a_system_remembers_that_it_has_a_memory():
+    copy = pickle.loads(pickle.dumps(WARNING_TWICE))
+    _, found = caught(lambda: copy.solve((0, 1), [1.0]))
+    assert [warning.message.code for warning in found] == ["memory"]
 
 
 def test_a_bifurcation_diagram_shows_one_warning_at_the_line_of_the_caller():
@@ -136,7 +218,7 @@ def test_how_a_run_was_made_is_not_shown():
                 method="DOPRI5",
             ),
         ),
-        ("zero_surface", lambda: fl.solve_ivp(lambda t, x: [np.abs(x[0]) + x[0]], (0, 1), [0.0])),
+        ("zero_surface", lambda: fl.solve_ivp(rest_on_a_jump, (0, 1), [0.0, 0.0])),
         (
             "stiff",
             lambda: fl.solve_ivp(lambda t, x: [-1e5 * (x[0] - np.cos(t))], (0, 3), [0.0], method="DOPRI5"),
@@ -168,7 +250,7 @@ def test_a_code_is_silenced_by_the_start_of_the_text():
         warnings.simplefilter("always")
         warnings.filterwarnings("ignore", "non_unique", fl.FilippovWarning)
         fl.solve_ivp(repel, (0, 1), [0.0])
-        fl.solve_ivp(lambda t, x: [np.abs(x[0]) + x[0]], (0, 1), [0.0])
+        fl.solve_ivp(rest_on_a_jump, (0, 1), [0.0, 0.0])
     assert [warning.message.code for warning in found] == ["zero_surface"]
 
 

@@ -157,8 +157,6 @@ SIGNS: dict[str, tuple[Condition, Condition, float, float]] = {
 }
 
 
-# Some of these quantities rest at a jump of their own for a while, and the run says so.
-@pytest.mark.filterwarnings("ignore:zero_surface:filippov.FilippovWarning")
 @pytest.mark.parametrize("name", SIGNS)
 def test_a_sign_with_a_plateau_is_refused(name: str) -> None:
     sign, instead, start, exact = SIGNS[name]
@@ -215,7 +213,6 @@ def test_a_plateau_at_the_value_of_a_parameter() -> None:
 # ------------------------------------------------------------ what is no plateau
 
 
-@pytest.mark.filterwarnings("ignore:zero_surface:filippov.FilippovWarning")
 @pytest.mark.parametrize(
     ("condition", "exact"),
     [
@@ -310,7 +307,6 @@ def test_a_relay_with_hysteresis_of_what_jumps_is_refused() -> None:
     assert "which jumps at `x[0] - 0.2` = 0" in text
 
 
-@pytest.mark.filterwarnings("ignore:zero_surface:filippov.FilippovWarning")
 def test_a_quantiser_of_a_plateau_is_refused() -> None:
     text = refusal(along_x(lambda x: np.floor(np.clip(x, 0, 3))), [-1.0, 0.0])
     assert "stays at a whole number" in text

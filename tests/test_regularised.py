@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
+import filippov as fl
 import numpy as np
 import pytest
 from regularised import T_END, random_case
@@ -48,6 +50,10 @@ def test_spiral_that_shrinks_a_thousandfold_with_each_turn() -> None:
     assert max(found) < 15.0
 
 
+# Of 200 systems those that meet a point where the solution is not unique, or not seen to be.
+NOT_UNIQUE = (37, 69, 87, 177, 197)
+
+
 def loses_its_root(run: Any) -> bool:
     """Whether sliding on an intersection ends while all multipliers are inside, at a fold for instance."""
     pairs = zip(run.segments[:-1], run.segments[1:], strict=True)
@@ -59,7 +65,6 @@ def loses_its_root(run: Any) -> bool:
 
 
 # From the 24 systems above on, with the three whose distances do not fall like the width from 1e-3 on.
-@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 @pytest.mark.parametrize(
     ("seeds", "least"),
     [
@@ -79,8 +84,13 @@ def test_regularised_motions_of_many_systems(seeds: Sequence[int], least: int) -
       the square: the exponent falls from 0.9 to 0.78 here.
     """
     exceptions, roots_lost, coarse, sliding = [], [], [], {0: 0, 1: 0, 2: 0, 3: 0}
-    for seed in seeds:
-        run, found = distances(seed)
+    with pytest.warns(fl.FilippovWarning, match="non_unique"):
+        runs = {seed: distances(seed) for seed in seeds}
+    warned = {seed: {warning.code for warning in run.warnings} for seed, (run, _) in runs.items()}
+    assert {seed: codes for seed, codes in warned.items() if codes} == {
+        seed: {"non_unique"} for seed in seeds if seed in NOT_UNIQUE
+    }
+    for seed, (run, found) in runs.items():
         sliding[max(segment.mode.codimension for segment in run.segments)] += 1
         if approaches(found):
             continue
@@ -96,11 +106,20 @@ def test_regularised_motions_of_many_systems(seeds: Sequence[int], least: int) -
     assert sliding[2] >= 6 * least
 
 
-@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
-@pytest.mark.parametrize(("seed", "limit"), [(37, 30.3), (52, 26.6)])
-def test_exceptions_at_the_coarsest_width_are_regular_at_finer_ones(seed: int, limit: float) -> None:
+@pytest.mark.parametrize(
+    ("seed", "limit", "noticed"),
+    [
+        (37, 30.3, pytest.warns(fl.FilippovWarning, match=r"may not be unique: \(000\) was chosen")),
+        (52, 26.6, nullcontext()),
+    ],
+    ids=["37", "52"],
+)
+def test_exceptions_at_the_coarsest_width_are_regular_at_finer_ones(
+    seed: int, limit: float, noticed: AbstractContextManager[Any]
+) -> None:
     case = random_case(seed)
-    exact = case.system().solve((0.0, T_END), case.y0, rtol=1e-9, atol=1e-9).sol(TIMES)
+    with noticed:
+        exact = case.system().solve((0.0, T_END), case.y0, rtol=1e-9, atol=1e-9).sol(TIMES)
     states = case.regularised(1e-6, TIMES)
     assert states is not None
     np.testing.assert_allclose(np.abs(states - exact).max() / 1e-6, limit, rtol=0.02)

@@ -347,3 +347,73 @@ def test_a_map_that_raises_or_is_not_finite_ends_the_run_with_its_name():
     sol = fl.solve_ivp(fall, (0, 1), [1.0, 0.0], resets=infinite)
     assert not sol.success
     assert "wall" in sol.message
+
+
+MAPS = {
+    "floor": lambda t, x: [0.0, np.floor(x[0])],
+    "rint": lambda t, x: [0.0, np.rint(x[0] + 0.2)],
+    "floor of a whole number": lambda t, x: [0.0, np.floor(x[1])],
+    "digitize": lambda t, x: [0.0, 1.0 * np.digitize(x[0], [1, 2, 3, 7])],
+    "remainder": lambda t, x: [x[0] % 2, x[0] // 2],
+    "floor of time": lambda t, x: [0.0, np.floor(t)],
+    "sawtooth": lambda t, x: [0.0, fl.sawtooth(t, 2.0)],
+    "sign": lambda t, x: [0.0, np.sign(x[1] - 3)],
+    ">": lambda t, x: [0.0, 1.0 * (x[1] > 3)],
+    ">=": lambda t, x: [0.0, 1.0 * (x[1] >= 3)],
+    "<": lambda t, x: [0.0, 1.0 * (x[1] < 3)],
+    "<=": lambda t, x: [0.0, 1.0 * (x[1] <= 3)],
+    "if": lambda t, x: [0.0, 1.0 if x[1] > 3 else 2.0],
+    "abs >": lambda t, x: [0.0, 1.0 * (abs(x[1] - 3) > 0)],
+    "product >": lambda t, x: [0.0, 1.0 * ((x[1] - 3) ** 2 > 0)],
+    "ramp >": lambda t, x: [0.0, np.where(np.maximum(x[1] - 3, 0) > 0, 1.0, 0.0)],
+    "two": lambda t, x: [0.0, 2.0 * (x[1] >= 3) + 1.0 * (x[1] > 3)],
+    "abs": lambda t, x: [0.0, abs(x[1] - 3) + np.maximum(x[0], x[1])],
+}
+
+
+@pytest.mark.parametrize("level", [2.0, 3.0, 4.0])
+@pytest.mark.parametrize("name", MAPS)
+def test_a_map_has_the_values_of_python(name, level):
+    """Also where a quantity is exactly 0, as a count that is kept in a state is."""
+    system = fl.System(
+        lambda t, x: [1.0, 0.0],
+        n=2,
+        resets=fl.Reset(lambda t, x: x[0] - 5.5, MAPS[name], direction="up"),
+    )
+    sol = system.solve((0, 4.5), [2.3, level], rtol=1e-10)
+    assert sol.success, sol.message
+    (jump,) = sol.switches
+    assert jump.t == pytest.approx(3.2, abs=1e-9)
+    assert sol.y[1, -1] == pytest.approx(MAPS[name](jump.t, jump.y_before)[1], abs=1e-12)
+    swept = system.ensemble((0, 4.5), [[2.3, level]] * 2, rtol=1e-10)
+    assert swept.y.tolist() == [sol.y[:, -1].tolist()] * 2
+
+
+@pytest.mark.parametrize("name", ["abs", ">=", "<"])
+def test_a_map_whose_expressions_have_the_values_of_python_is_traced(name):
+    system = fl.System(
+        lambda t, x: [1.0, 0.0],
+        n=2,
+        resets=fl.Reset(lambda t, x: x[0] - 5.5, MAPS[name], direction="up"),
+    )
+    copy = fl.System.from_bytes(system.to_bytes())
+    for start in ([2.3, 3.0], [2.3, 2.5]):
+        ends = [solved.solve((0, 4.5), start).y[:, -1].tolist() for solved in (system, copy)]
+        assert ends[0] == ends[1]
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        lambda x: fl.hysteresis(x, 1, 2),
+        lambda x: fl.stick(x, 2.0),
+        lambda x: np.where(x > 100, fl.hysteresis(x, 1, 2), 0.0),
+        lambda x: fl.hysteresis(x, 1, 2) if x > 100 else 0.0,
+    ],
+)
+def test_a_law_with_a_memory_is_refused_in_a_map(law):
+    reset = fl.Reset(lambda t, x: x[0] - 1, lambda t, x: [0.0, law(x[0])], name="sample")
+    for surfaces in (None, lambda t, x: x[1] - 50):
+        fun = (lambda t, x: [1.0, 0.0]) if surfaces is None else (lambda t, x: [math.exp(0.0 * x[0]), 0.0])
+        with pytest.raises(fl.ModelError, match=r"entry 0 \(sample\): a law with a memory"):
+            fl.solve_ivp(fun, (0, 2), [0.0, 0.0], resets=reset, surfaces=surfaces)

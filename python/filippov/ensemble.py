@@ -91,7 +91,8 @@ class Ensemble(Sequence[Solution]):
     @cached_property
     def n_warnings(self) -> npt.NDArray[np.int64]:
         """How many warnings each run has, shape (n_members,)."""
-        return np.array([run.n_warnings for run in self._runs], dtype=np.int64)
+        pairs = zip(self._runs, self._prepared, strict=False)  # an interrupted ensemble has fewer runs
+        return np.array([run.n_warnings + len(prepared.warnings) for run, prepared in pairs], dtype=np.int64)
 
     def __repr__(self) -> str:
         failed = int(np.count_nonzero(~self.success))
@@ -158,8 +159,8 @@ def run_ensemble(
 
 
 def _show_warnings(ensemble: Ensemble) -> None:
-    rows = (run.warnings for run in ensemble._runs if run.n_warnings)
-    codes = (dict.fromkeys(row[1] for row in warned) for warned in rows)
+    warned = (ensemble[k] for k in np.flatnonzero(ensemble.n_warnings).tolist())
+    codes = (dict.fromkeys(warning.code for warning in member.warnings) for member in warned)
     where = "n_warnings counts those of each member, and .warnings of a member has them"
     show_summary(codes, len(ensemble), "members", where, ensemble)
 

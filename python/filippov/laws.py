@@ -15,13 +15,13 @@ from filippov.trace.pure import PURE, PureFunction
 
 __all__ = ["Hysteresis", "Stick", "hysteresis", "sawtooth", "stick", "without_memory"]
 
-_refused: ContextVar[bool] = ContextVar("_refused", default=False)
+_refused: ContextVar[str] = ContextVar("_refused", default="")
 
 
 @contextmanager
-def without_memory() -> Iterator[None]:
-    """Refuse laws with a memory: a black box is called with plain numbers, which remember nothing."""
-    token = _refused.set(True)
+def without_memory(why: str) -> Iterator[None]:
+    """Refuse laws with a memory by a `ModelError` with this text: plain numbers remember nothing."""
+    token = _refused.set(why)
     try:
         yield
     finally:
@@ -89,8 +89,8 @@ def hysteresis(value: Any, low: Any, high: Any, initial: float = -1) -> Any:
         tracer = value.tracer
         bounds = (tracer.node(low), tracer.node(high))
         return tracer.scalar(tracer.laws.hysteresis(tracer, value.node, *bounds, float(initial)))
-    if _refused.get():
-        raise ModelError("a law with a memory cannot be part of a black box: the function must be traced")
+    if why := _refused.get():
+        raise ModelError(why)
     # At a point alone, without the past.
     return 1.0 if value >= high else -1.0 if value <= low else float(initial)
 
@@ -170,8 +170,8 @@ def stick(v: Any, static: Any) -> Any:
     if isinstance(v, Scalar):
         tracer = v.tracer
         return tracer.scalar(tracer.laws.stick(tracer, v.node, tracer.node(static)))
-    if _refused.get():
-        raise ModelError("static friction cannot be part of a black box: the function must be traced")
+    if why := _refused.get():
+        raise ModelError(why)
     return float(np.sign(v))
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 from filippov.errors import FilippovWarning
 from filippov.solution import Solution
+from filippov.switches import RunWarning
 
 __all__ = ["show_summary", "show_warnings", "summary"]
 
@@ -19,23 +20,25 @@ _NOT_SHOWN = frozenset({"no_series"})
 _PACKAGE = os.path.dirname(__file__) + os.sep
 
 
-def show_warnings(solution: Solution, expected: Collection[str] = ()) -> None:
-    """Show the warnings of a run, one per code and surfaces.
+def show_warnings(noticed: Iterable[RunWarning], result: Solution, expected: Collection[str] = ()) -> None:
+    """Show warnings of runs, one per code and surfaces.
 
     Parameters
     ----------
-    solution : Solution
-        The run.
+    noticed : iterable of RunWarning
+        The warnings.
+    result : Solution
+        What the call returns.
     expected : collection of str
         Codes that the caller has asked about, and that are not shown.
 
     Raises
     ------
     FilippovWarning
-        If the filters of Python make an error of it; `result` is the solution.
+        If the filters of Python make an error of it; `result` is attached.
     """
     seen = set()
-    for found in solution.warnings:
+    for found in noticed:
         key = found.code, found.surfaces
         if key in seen or found.code in expected or not _is_shown(found.code):
             continue
@@ -46,7 +49,7 @@ def show_warnings(solution: Solution, expected: Collection[str] = ()) -> None:
                 code=found.code,
                 t=found.t,
                 surfaces=found.surfaces,
-                result=solution,
+                result=result,
             )
         )
 

@@ -21,9 +21,12 @@ from filippov.trace.memory import remembered
 from filippov.trace.reuse import Recent
 from filippov.trace.verify import verify
 
-__all__ = ["Prepared", "prepare"]
+__all__ = ["MEMORY", "Prepared", "prepare"]
 
 Array = npt.NDArray[np.float64]
+# The code of the warning for a function that assigns what other calls of it may read.
+MEMORY = "memory"
+
 CoreSystem = TracedSystem | OpaqueSystem | SignedSystem
 
 
@@ -65,6 +68,18 @@ class Prepared(NamedTuple):
         if not isinstance(self.core, TracedSystem):
             return "black box"
         return "native" if self.core.is_native() else "interpreter"
+
+    @property
+    def warnings(self) -> list[tuple[str, str]]:
+        """Code and text of the warnings that every run of this system has."""
+        if not self.remembers:
+            return []
+        text = (
+            f"fun assigns {', '.join(self.remembers)}, outside of itself: a trace does not remember what "
+            "an earlier call left there. For a relay with two thresholds use fl.Hysteresis; else keep such "
+            "values out of fun"
+        )
+        return [(MEMORY, text)]
 
     def is_valid_for(self, n: int, values: dict[str, float]) -> bool:
         """Whether this form holds for `n` states and these parameter values."""
@@ -226,14 +241,17 @@ def _actions(
     actions, is_pinned = [], False
     for k, reset in enumerate(source.resets):
         bound = bind_function(reset.map, source.args, values)
-        check_map_value(bound(t0, y0.copy()), n, f"resets: entry {k} ({reset.name})")
+        _check_map(bound, n, t0, y0, f"resets: entry {k} ({reset.name})")
         own = selective(reset.map, values)
         try:
             traced = trace(own, n, args=source.args, parameters=values or None, t0=t0, y0=y0, states=states)
-            core_map: Any = traced.system
-            is_pinned |= bool(traced.guards)
         except (TraceError, ModelError):
-            core_map, is_pinned = bound, True
+            traced = None
+        if traced is not None and traced.tracer.laws.remembers:
+            raise ModelError(f"resets: entry {k} ({reset.name}): {NO_MEMORY_IN_A_MAP}")
+        is_exact, for_these_values = (False, True) if traced is None else traced.is_exact_at_an_instant()
+        is_pinned |= for_these_values or not is_exact
+        core_map: Any = traced.system if traced is not None and is_exact else bound
         actions.append(reset.action(None if reset.h is None else next(surfaces), core_map))
     return tuple(actions), is_pinned
 
@@ -258,16 +276,22 @@ def _prepare_opaque(
         fun = bind_function(source.fun, source.args, values)
         core = OpaqueSystem(fun, surfaces, n, names, n_switching)
         if y0 is not None:
-            with without_memory():
+            with without_memory(NO_MEMORY_IN_A_BLACK_BOX):
                 check_components(fun(t0, y0.copy()), n)
     if y0 is not None:
         for j, surface in enumerate(surfaces):
             what = f"surfaces: entry {j}" if j < n_switching else f"resets: h of {names[j]}"
             check_scalar_function(surface, t0, y0, what)
         for k, reset in enumerate(source.resets):
-            value = actions[k].map(t0, y0.copy())
-            check_map_value(value, n, f"resets: entry {k} ({reset.name})")
+            _check_map(actions[k].map, n, t0, y0, f"resets: entry {k} ({reset.name})")
     return Prepared(core, None, tuple(names), dict(values), str(reason), tuple(actions))
+
+
+def _check_map(bound: Callable[..., Any], n: int, t0: float, y0: Array, what: str) -> None:
+    """Refuse a map that does not return `n` real numbers, or that has a memory."""
+    with without_memory(f"{what}: {NO_MEMORY_IN_A_MAP}"):
+        value = bound(t0, y0.copy())
+    check_map_value(value, n, what)
 
 
 def check_components(value: Any, n: int) -> None:
@@ -289,6 +313,15 @@ def numbered_states(n: int) -> tuple[str, ...]:
     """Return the names of `n` states that have none of their own: ``x[0], x[1], ...``."""
     return tuple(f"x[{i}]" for i in range(n))
 
+
+NO_MEMORY_IN_A_BLACK_BOX = (
+    "a law with a memory (a relay with hysteresis, static friction) cannot be part of a black box: the "
+    "function must be traced"
+)
+NO_MEMORY_IN_A_MAP = (
+    "a law with a memory (a relay with hysteresis, static friction) cannot be part of a map, which is "
+    "evaluated at an instant: keep what it remembers in a state, and let the map read and write that"
+)
 
 _NO_PARAMETERS: Array = np.zeros(0)
 

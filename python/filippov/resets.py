@@ -64,6 +64,10 @@ class Reset:
     that crosses the surface against it is not reset: the switch is a crossing, and where the reset would have
     turned the motion back, the warning ``"against_direction"`` names it.
 
+    A map is evaluated at an instant, with Python's values. One that jumps (``np.sign``, ``np.floor``, a
+    comparison) is called as a Python function, unless its expressions have Python's value on the jump too.
+    One with a law with a memory (`hysteresis`, `stick`) is refused.
+
     Several resets at one instant are done in the order in which they are given, then those that the jump
     triggers; see ``docs/theory/order_of_outcomes.md``.
 

@@ -137,12 +137,12 @@ class Saving(ABC):
             As `save`.
         """
         prepared = self._prepared_now()
-        data, functions = packed(prepared, self._params)
+        data, functions, _ = packed(prepared, self._params)
         if functions:
             names = [action.name for action in prepared.actions if not isinstance(action.map, TracedSystem)]
             raise ModelError(
-                f"the map of the reset {names[0]} could not be traced, and Python functions are not saved: "
-                "write it with NumPy functions"
+                f"the map of the reset {names[0]} could not be traced, or jumps, and is called as a Python "
+                "function; Python functions are not saved: write it with continuous NumPy functions"
             )
         return data
 
@@ -178,8 +178,10 @@ class Saving(ABC):
             raise InputError(f"{what}: {error}") from None
         return new
 
-    def _restore(self, data: bytes, functions: Sequence[Callable[..., Any]]) -> None:
-        self._prepared, self._states, self._params = unpacked(data, functions)
+    def _restore(
+        self, data: bytes, functions: Sequence[Callable[..., Any]], remembers: Sequence[str] = ()
+    ) -> None:
+        self._prepared, self._states, self._params = unpacked(data, functions, remembers)
         self._n = self._prepared.core.n_states
         self._source, self._calls = None, {}
 
@@ -213,8 +215,10 @@ def _path(path: Any) -> Path:
         raise InputError(f"path: the name of a file is needed, not {kind}") from None
 
 
-def packed(prepared: Prepared, params: Mapping[str, float]) -> tuple[bytes, tuple[Callable[..., Any], ...]]:
-    """Return a system as bytes, and the maps of its resets that are functions of Python.
+def packed(
+    prepared: Prepared, params: Mapping[str, float]
+) -> tuple[bytes, tuple[Callable[..., Any], ...], tuple[str, ...]]:
+    """Return a system as bytes, the maps of its resets that are functions of Python, and what it `remembers`.
 
     Parameters
     ----------
@@ -241,10 +245,13 @@ def packed(prepared: Prepared, params: Mapping[str, float]) -> tuple[bytes, tupl
             functions.append(action.map)
     pinned = prepared.pinned
     values = None if pinned is None else [pinned[name] for name in params]
-    return save_system(prepared.core, list(params.values()), values, rows), tuple(functions)
+    data = save_system(prepared.core, list(params.values()), values, rows)
+    return data, tuple(functions), prepared.remembers
 
 
-def unpacked(data: bytes, functions: Sequence[Callable[..., Any]] = ()) -> Loaded:
+def unpacked(
+    data: bytes, functions: Sequence[Callable[..., Any]] = (), remembers: Sequence[str] = ()
+) -> Loaded:
     """Return what `packed` was given.
 
     Raises
@@ -263,5 +270,5 @@ def unpacked(data: bytes, functions: Sequence[Callable[..., Any]] = ()) -> Loade
             raise ModelError(f"the map of the reset {name} is a Python function, which did not travel")
         actions.append(CoreAction(when, numbers, found, name))
     pinned = None if values is None else dict(zip(names, values, strict=True))
-    prepared = Prepared(core, None, tuple(core.surfaces()), pinned, "", tuple(actions))
+    prepared = Prepared(core, None, tuple(core.surfaces()), pinned, "", tuple(actions), tuple(remembers))
     return Loaded(prepared, tuple(states) or None, dict(zip(names, defaults, strict=True)))

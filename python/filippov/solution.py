@@ -310,7 +310,9 @@ class Solution:
     @cached_property
     def warnings(self) -> list[RunWarning]:
         """What deserves a look; most of it is shown as a `FilippovWarning` too."""
-        return [RunWarning.from_row(row, self.surfaces) for row in self._run.warnings]
+        found = [RunWarning.from_row(row, self.surfaces) for row in self._run.warnings]
+        origin = self._origin
+        return found + [RunWarning(origin.t0, code, text, ()) for code, text in origin.prepared.warnings]
 
     @cached_property
     def branches(self) -> Branches | None:

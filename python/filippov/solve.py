@@ -32,7 +32,6 @@ from filippov.prepare import Prepared, parameter_vector
 from filippov.progress import Report
 from filippov.solution import AnyRun, Solution
 from filippov.start import StandingRun
-from filippov.switches import RunWarning
 from filippov.system import System
 from filippov.unknown import check_unknown
 
@@ -265,7 +264,7 @@ def solve_prepared(
         if t0 < t1 and len(state) == prepared.core.n_states:
             run = run_core(prepared.core, t0, t1, state, call.parameters, call.core_options, [], call.actions)
             solution = _present(run, system, prepared, call.options, t0, call.states, False, None)
-            return _shown(solution) if run.n_warnings or prepared.remembers else solution
+            return _shown(solution) if run.n_warnings or prepared.warnings else solution
     solution = _solve(system, t_span, y0, _changed(options), None, (), params, None, None)
     if key is not None and call is None and len(system._calls) < _MOST_CALLS:
         _keep_call(system, key, options, np.size(y0))
@@ -273,9 +272,12 @@ def solve_prepared(
 
 
 def _shown(solution: Solution) -> Solution:
-    """Show the warnings of a run; those of a choice not where all solutions were asked for."""
-    if solution.warnings:
-        show_warnings(solution, () if solution.branches is None else ("non_unique",))
+    """Show the warnings of a run; of all its branches, but for their choices, where these were asked for."""
+    if solution.branches is None:
+        show_warnings(solution.warnings, solution)
+    else:
+        found = (warning for branch in solution.branches for warning in branch.warnings)
+        show_warnings(found, solution, ("non_unique",))
     return solution
 
 
@@ -363,8 +365,6 @@ def _present(
         raising = raised_by(run.error, [*own, *events])
         if raising:
             solution.message = solution.message.replace("the right-hand side", raising, 1)
-    if prepared.remembers:
-        _warn_of_memory(solution, prepared)
     if options.progress is not None:
         _report_end(options.progress, run, solution)
     if run.status < 0:
@@ -383,16 +383,6 @@ def _report_end(report: Report, run: AnyRun, solution: Solution) -> None:
     if error is not None:
         error.partial = solution
         raise error
-
-
-def _warn_of_memory(solution: Solution, prepared: Prepared) -> None:
-    """Warn where a function with an ``if`` assigns what other calls of it may read."""
-    text = (
-        f"fun assigns {', '.join(prepared.remembers)}, outside of itself: a trace does not remember what "
-        "an earlier call left there. For a relay with two thresholds use fl.Hysteresis; else keep such "
-        "values out of fun"
-    )
-    solution.warnings.append(RunWarning(float(solution.t[0]), "memory", text, ()))
 
 
 def _add_branches(

@@ -21,7 +21,6 @@ EQUILIBRIA: dict[str, tuple[Any, list[float], list[float]]] = {
 }
 
 
-@pytest.mark.filterwarnings("ignore:zero_surface:filippov.FilippovWarning")
 @pytest.mark.parametrize("name", EQUILIBRIA)
 def test_equilibrium_on_a_kink(name: str) -> None:
     fun, start, end = EQUILIBRIA[name]
@@ -29,6 +28,7 @@ def test_equilibrium_on_a_kink(name: str) -> None:
     assert sol.success, sol.message
     np.testing.assert_allclose(sol.y[:, -1], end, rtol=0, atol=1e-12)
     assert len(sol.switches) == 0
+    assert sol.warnings == []
 
 
 @pytest.mark.parametrize(

@@ -15,12 +15,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from filippov._core import warning_codes
 from filippov.analysis.grid import Grid
 from filippov.analysis.optional import need
-from filippov.analysis.points import Table
+from filippov.analysis.points import WARNINGS, Table
 
-__all__ = ["REASONS", "WARNINGS", "Variable", "dataset_of", "kinds_of", "variables_of"]
+__all__ = ["REASONS", "Variable", "dataset_of", "kinds_of", "variables_of"]
 
 # Why runs end, in an order that is part of the format of stores: only added to at the end.
 _TEXT = (
@@ -29,8 +28,6 @@ _TEXT = (
     "sliding_rule non_unique wrong_input not_prepared not_run chatter"
 )
 REASONS = tuple(_TEXT.split(" "))
-# The kinds of warnings, in the order of their bits.
-WARNINGS = tuple(warning_codes())
 _REASON_CODES = {reason: code for code, reason in enumerate(REASONS)}
 
 

@@ -10,21 +10,24 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from filippov._core import TracedSystem, solve_points
+from filippov._core import TracedSystem, solve_points, warning_codes
 from filippov.analysis.sections import AnySection, Phase, Place
 from filippov.errors import FilippovError, InputError, Interrupted
 from filippov.events import bind_function, selective
 from filippov.options import Options
-from filippov.prepare import Prepared
+from filippov.prepare import MEMORY, Prepared
 from filippov.saving import packed, unpacked
 
 if TYPE_CHECKING:
     from filippov.system import System
 
-__all__ = ["Observation", "Table", "Task", "concatenate", "not_run", "prepare_for", "run_task"]
+__all__ = ["WARNINGS", "Observation", "Table", "Task", "concatenate", "not_run", "prepare_for", "run_task"]
 
 Array = npt.NDArray[np.float64]
 Table = dict[str, Any]
+
+# The kinds of warnings, in the order of their bits. Part of the format of stores: only added to at the end.
+WARNINGS = (*warning_codes(), MEMORY)
 
 # The columns of a table, by what one row belongs to. Texts are lists.
 POINT_COLUMNS = (
@@ -172,6 +175,10 @@ def _run(task: Task, prepared: Prepared, place: Place | None) -> Table:
         task.threads,
     )
     raised = table.pop("raised")
+    for code, _ in prepared.warnings:
+        begun = np.array([reason != "not_run" for reason in table["reason"]])
+        table["n_warnings"] = table["n_warnings"] + begun
+        table["warnings"] = table["warnings"] | np.where(begun, 1 << WARNINGS.index(code), 0).astype(np.int32)
     if isinstance(raised, KeyboardInterrupt):
         raise Interrupted(partial=table)
     if raised is not None:

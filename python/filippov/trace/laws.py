@@ -88,6 +88,11 @@ class Laws:
         """Return what each discrete state is: a "whole" number, or a "side", -1 or +1."""
         return ["side" if law.kind == "hysteresis" else "whole" for law in self._known]
 
+    @property
+    def remembers(self) -> bool:
+        """Whether what a law returns depends on the past, and not on the point alone."""
+        return bool(self.sticking) or any(law.kind == "hysteresis" for law in self._known)
+
     def is_held(self, tracer: Tracer, node: int) -> bool:
         """Whether an expression contains discrete states and is constant between their changes."""
         builder = tracer.builder

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from filippov._core import Regions
     from filippov.trace.branching import Tracer
 
-__all__ = ["Again", "check_questions", "kink_of_event"]
+__all__ = ["Again", "check_questions", "is_exact_at_an_instant", "kink_of_event"]
 
 # Combinations of inner signs looked at for each comparison; for each one after several that have more.
 MOST_COMBINATIONS = 1024
@@ -140,6 +140,26 @@ def kink_of_event(tracer: Tracer, node: int, surfaces: Sequence[str], of_field: 
         return ""
     text = regions.text(edge[1], tracer.states, tracer.names() or None)
     return f"{_shortened(text)}, which may end, or is singular, where a sign inside of it changes"
+
+
+def is_exact_at_an_instant(tracer: Tracer, nodes: Sequence[int]) -> tuple[bool, bool]:
+    """Return whether expressions have Python's values at every point, and if for these parameters only.
+
+    On a surface they take the side h > 0. Python does the same for ``h >= 0`` and ``h < 0``, but not for
+    ``h > 0``, ``h <= 0`` and the sign of h, and it makes no difference where the values do not jump. An
+    expression with discrete states has no value at a point.
+    """
+    if tracer.laws.names:
+        return False, False
+    regions = _regions_of(tracer)
+    differs = False
+    for question in tracer.questions:
+        node, surface, sign, _ = regions.question(question.node)
+        if surface < 0 and tracer.builder.as_constant(node) is None:
+            return False, False  # of one sign and zero at some points, like abs(x) > 0
+        differs |= question.kind != "comparison" or (sign > 0.0) == question.is_strict
+    is_exact = not differs or all(regions.jumps_at(node) is None for node in nodes)
+    return is_exact, regions.used_parameters
 
 
 def _shortened(text: str) -> str:

@@ -16,7 +16,7 @@ from filippov.trace.branching import Guard, Question, Tracer
 from filippov.trace.condition import Condition
 from filippov.trace.explain import explain_failure, explain_raise
 from filippov.trace.laws import Laws
-from filippov.trace.plateaus import Roots, check_questions, kink_of_event
+from filippov.trace.plateaus import Roots, check_questions, is_exact_at_an_instant, kink_of_event
 from filippov.trace.reuse import Recent
 from filippov.trace.scalar import Scalar
 from filippov.trace.verify import verify
@@ -77,6 +77,11 @@ class Trace:
     tracer: Tracer
     doubts: tuple[str, ...] = ()
     events: Recent[tuple[int | None, str]] = member(default_factory=lambda: Recent(32))
+
+    def is_exact_at_an_instant(self) -> tuple[bool, bool]:
+        """Return whether every value is that of the function, and if for these parameters only."""
+        is_exact, for_these_values = is_exact_at_an_instant(self.tracer, self.field)
+        return is_exact, for_these_values or bool(self.guards)
 
 
 def trace(

@@ -16,6 +16,22 @@ impl Regions {
     /// It is continuous at h_k = 0 if the difference of its values on the two sides vanishes there, as that of `maximum(a, b)`
     /// on a - b = 0 does, or if all its operands are continuous.
     pub fn jumps_at(&mut self, node: NodeId) -> Option<u32> {
+        self.all_jumps(node, &[]).first().copied()
+    }
+
+    /// Whether some of the values jump at a surface where some signs are fixed, or are not seen to be continuous there:
+    /// themselves, or the functions of other surfaces on which they depend there.
+    ///
+    /// If not, the sign of the surface makes no difference where its function is zero.
+    pub fn jump_across(&mut self, roots: &[NodeId], signs: &[Option<f64>], surface: u32) -> bool {
+        self.values_read(roots, signs, Some(surface))
+            .into_iter()
+            .any(|value| self.all_jumps(value, signs).contains(&surface))
+    }
+
+    /// The surfaces at which an expression jumps where some signs are fixed, or is not seen to be continuous, in increasing
+    /// order. The expression has these signs already.
+    fn all_jumps(&mut self, node: NodeId, signs: &[Option<f64>]) -> Vec<u32> {
         let mut known: FxHashMap<NodeId, Vec<u32>> = FxHashMap::default();
         for id in self.graph.all_below(&[node]) {
             if !self.graph.facts(id).has_sign {
@@ -30,16 +46,18 @@ impl Regions {
             }
             candidates.sort_unstable();
             candidates.dedup();
-            candidates.retain(|&k| self.jumps_on(id, k));
+            candidates.retain(|&k| self.jumps_on(id, signs, k));
             known.insert(id, candidates);
         }
-        known.get(&node)?.first().copied()
+        known.remove(&node).unwrap_or_default()
     }
 
     /// Whether the two sides of a surface differ on it, as far as it is seen.
-    fn jumps_on(&mut self, node: NodeId, surface: u32) -> bool {
+    fn jumps_on(&mut self, node: NodeId, signs: &[Option<f64>], surface: u32) -> bool {
         let difference = self.difference(node, surface);
-        let mut pending = vec![(difference, vec![None; self.graph.n_surfaces()])];
+        let mut signs = signs.to_vec();
+        signs.resize(self.graph.n_surfaces(), None);
+        let mut pending = vec![(difference, signs)];
         let mut n_visited = 0;
         while let Some((value, signs)) = pending.pop() {
             let function = self.graph.surface(surface);

@@ -179,6 +179,32 @@ fn jumps() {
 }
 
 #[test]
+fn jumps_where_some_signs_are_fixed() {
+    let mut g = Graph::new();
+    let (x, y) = (g.state(0), g.state(1));
+    let (size, side) = (g.abs(x), g.sign(x));
+    let [Switching::Surface { index: at_x, .. }, Switching::Surface { index: at_y, .. }] =
+        [x, y].map(|state| g.switch(state))
+    else {
+        panic!("states have surfaces")
+    };
+    let field = g.select(at_y, 1.0, side, size);
+    // A surface that jumps where x changes its sign, and that the field reads.
+    let shifted = g.add(y, side);
+    let nested = g.sign(shifted);
+    let mut regions = Regions::new(g, vec![], vec![]);
+    let mut jumps = |root, y: f64| {
+        let mut signs = vec![None; at_y as usize + 1];
+        signs[at_y as usize] = Some(y);
+        regions.jump_across(&[root], &signs, at_x)
+    };
+    assert!(jumps(field, 1.0));
+    assert!(!jumps(field, -1.0));
+    assert!(!jumps(size, 1.0));
+    assert!(jumps(nested, 1.0));
+}
+
+#[test]
 fn edges() {
     let mut g = Graph::new();
     let (x, (over, ramp)) = (g.state(0), ramp(&mut g));

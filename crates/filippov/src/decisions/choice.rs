@@ -74,11 +74,17 @@ fn non_unique(at: &Point, surfaces: &[usize], chosen: &Mode, mut candidates: Vec
     let modes: Vec<String> = candidates.iter().map(|m| format!("({m})")).collect();
     let names = surfaces.iter().map(|&j| at.system.surface_name(j) + " = 0");
     let names: Vec<String> = names.collect();
-    let text = format!(
-        "the continuation at {} is not unique: {}; ({chosen}) was chosen",
-        names.join(", "),
-        modes.join(", ")
-    );
+    let names = names.join(", ");
+    let text = match &modes[..] {
+        [_] => format!(
+            "the continuation at {names} may not be unique: ({chosen}) was chosen and no other was found, but not \
+             every scaling of the surfaces (kappa=) was seen to lead to it"
+        ),
+        modes => format!(
+            "the continuation at {names} is not unique: {}; ({chosen}) was chosen",
+            modes.join(", ")
+        ),
+    };
     // The chosen one first, the others in their order.
     candidates.sort_by_key(|mode| mode != chosen);
     Warning {

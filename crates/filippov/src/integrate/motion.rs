@@ -58,6 +58,9 @@ pub(super) struct Motion<'a> {
     law: Law<'a>,
     /// Surfaces that the motion stays on by either field, so that h is zero all along: not monitored.
     pub resting: SmallVec<[usize; 2]>,
+    /// Surfaces whose functions were found to be zero in this mode, and that neither rest nor are slid on: they stay
+    /// monitored, and are not settled on again.
+    pub settled: SmallVec<[usize; 2]>,
     /// This run has met kinks in the place of other surfaces.
     pub meets_kinks: bool,
     actions: &'a Actions<'a>,
@@ -96,6 +99,7 @@ impl<'a> Motion<'a> {
             sticks: false,
             law,
             resting: SmallVec::new(),
+            settled: SmallVec::new(),
             meets_kinks: false,
             actions,
             sides: actions.sides_at_start(signs.len()).collect(),
@@ -140,6 +144,9 @@ impl<'a> Motion<'a> {
                 None => ModeField::new(system, self.law, &sliding, &signs),
             };
             self.replace_field(field);
+        }
+        if self.mode != mode {
+            self.settled.clear();
         }
         self.affine_bounds = None;
         self.is_straight = sliding.iter().all(|&j| system.is_affine(j));

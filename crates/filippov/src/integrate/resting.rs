@@ -4,7 +4,7 @@
 use crate::decisions::{surfaces_in_the_place_of_those_slid_on, Left};
 use crate::error::FieldError;
 use crate::event::EventFunction;
-use crate::field::{ModeField, Projector};
+use crate::field::{ModeField, Projector, SlidingSet};
 use crate::integrate::integrator::Integrator;
 use crate::mode::Mode;
 use crate::status::{Stop, Warning, WarningCode};
@@ -34,7 +34,7 @@ impl Integrator<'_> {
             let beyond = -mode.entries()[j];
             let leading = first_nonzero(self.system, j, beyond, 0, self.t, &self.x, &signs)?;
             if leading.order == 0 {
-                self.warn_zero_surface(j);
+                self.warn_zero_surface(j, mode);
             }
         }
         Ok(())
@@ -47,10 +47,16 @@ impl Integrator<'_> {
         warnings.any(|warning| is_about(warning.code) && warning.surfaces == [j])
     }
 
-    /// Warns of a surface whose function is zero all along the motion, unless a warning was given about it.
-    fn warn_zero_surface(&mut self, j: usize) {
-        // Bodies that touch without any force are no mistake: nothing depends on the sign.
+    /// Warns of a surface whose function is zero all along the motion in `mode`, unless a warning was given about it.
+    ///
+    /// It is no mistake where nothing depends on the sign: where bodies touch without any force, and at a kink, where the
+    /// values of both signs agree, as those of `max(h, 0)` and `abs(h)` do where h = 0.
+    fn warn_zero_surface(&mut self, j: usize, mode: &Mode) {
         if self.is_named(j) || self.triggers().is_only_trigger(j) {
+            return;
+        }
+        let sliding: SlidingSet = mode.sliding_set().collect();
+        if !self.system.jumps_across(j, &mode.signs(), &sliding) {
             return;
         }
         let name = self.system.surface_name(j);
@@ -90,7 +96,7 @@ impl Integrator<'_> {
             self.stepper.interpolant().at(0.5, &mut self.detector.x);
             let (middle, h) = (0.5 * (self.t + t1), &mut self.detector.h);
             self.system.surfaces(middle, &self.detector.x, &signs, h)?;
-            if h[j].abs() <= noise && !self.is_named(j) {
+            if h[j].abs() <= noise && !self.is_named(j) && !self.motion.settled.contains(&j) {
                 return Ok(Some(j));
             }
         }
@@ -105,7 +111,10 @@ impl Integrator<'_> {
         projector.project(self.system, j, self.t, &mut self.x, &signs)?;
         let stop = self.go_on_from_here()?;
         if !self.motion.sliding().contains(&j) {
-            self.warn_zero_surface(j);
+            if !self.motion.resting.contains(&j) {
+                self.motion.settled.push(j);
+            }
+            self.warn_zero_surface(j, &self.motion.mode.clone());
         }
         Ok(stop)
     }

@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use filippov_expr::{
     Backend, BinaryOp, EnclosureProgram, ExprError, Gradient, Graph, Names, NodeId, Program,
+    Regions,
 };
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
@@ -60,7 +61,21 @@ pub(super) struct Model {
     jets: Mutex<JetsCache>,
     jacobians: Mutex<JacobianCache>,
     /// Active surfaces of the modes met so far; a zero entry is the surface slid on.
-    activity: Mutex<FxHashMap<SmallVec<[i8; 16]>, Vec<bool>>>,
+    activity: Mutex<FxHashMap<Entries, Vec<bool>>>,
+    /// Whether something jumps at a surface, by surface and mode; found only where a function is zero along a motion.
+    jumps: Mutex<FxHashMap<(usize, Entries), bool>>,
+}
+
+/// The entries of a mode: a sign per surface, 0 for one slid on.
+type Entries = SmallVec<[i8; 16]>;
+
+/// The entries of a mode, given by its signs and the surfaces slid on (increasing).
+fn entries(signs: &[f64], sliding: &[usize]) -> Entries {
+    let entry = |(j, &sign): (usize, &f64)| match sliding.binary_search(&j) {
+        Ok(_) => 0,
+        Err(_) => sign as i8,
+    };
+    signs.iter().enumerate().map(entry).collect()
 }
 
 /// The gradient of one switching function: outputs are the derivative in t, then the listed states.
@@ -138,6 +153,7 @@ impl Model {
             jets: Mutex::default(),
             jacobians: Mutex::default(),
             activity: Mutex::default(),
+            jumps: Mutex::default(),
             rates_program: OnceLock::new(),
             affine_signs: OnceLock::new(),
             field_program,
@@ -374,17 +390,7 @@ impl Model {
 
     /// Marks the surfaces whose sign matters in a mode.
     pub fn active(&self, signs: &[f64], sliding: &[usize], active: &mut [bool]) {
-        let key: SmallVec<[i8; 16]> = signs
-            .iter()
-            .enumerate()
-            .map(|(j, &s)| {
-                if sliding.binary_search(&j).is_ok() {
-                    0
-                } else {
-                    s as i8
-                }
-            })
-            .collect();
+        let key = entries(signs, sliding);
         let mut known = self.activity.lock().unwrap_or_else(PoisonError::into_inner);
         let found = known
             .entry(key)
@@ -438,6 +444,27 @@ impl Model {
                 return active;
             }
         }
+    }
+
+    /// May the field, or the function of an active or watched surface, jump at surface `j` in this mode? A watched surface
+    /// triggers actions by its own sign.
+    pub fn jumps_across(&self, j: usize, signs: &[f64], sliding: &[usize]) -> bool {
+        if self.watched.contains(&j) {
+            return true;
+        }
+        let mut mode = entries(signs, sliding);
+        mode[j] = 0;
+        let mut known = self.jumps.lock().unwrap_or_else(PoisonError::into_inner);
+        *known.entry((j, mode)).or_insert_with_key(|(_, mode)| {
+            let mut roots = self.field.clone();
+            let watched = self.watched.iter();
+            roots.extend(watched.map(|&k| self.graph.surface(k as u32)));
+            let signs = mode.iter().map(|&s| (s != 0).then(|| f64::from(s)));
+            let signs: Vec<Option<f64>> = signs.collect();
+            // The values of the parameters and of discrete states are left open: the answer holds for all of them.
+            Regions::new(self.graph.clone(), Vec::new(), Vec::new())
+                .jump_across(&roots, &signs, j as u32)
+        })
     }
 
     /// Calls a function with the program of a Lie derivative, which is made when it is first needed.

@@ -347,6 +347,13 @@ pub trait PiecewiseSystem: Sync {
         true
     }
 
+    /// May the field, or an active switching function, jump at h_j = 0 in the mode with these signs, sliding on these
+    /// surfaces (increasing)? If not, the sign of h_j makes no difference where h_j is zero.
+    fn jumps_across(&self, j: usize, signs: &[f64], sliding: &[usize]) -> bool {
+        let _ = (j, signs, sliding);
+        true
+    }
+
     /// Is static friction above kinetic at h_j = 0? Then the motion sticks there while the sign that it needs lies in
     /// [-r, r] with the ratio r of [`stick_ratio`](Self::stick_ratio), and [`both_sides`](Self::both_sides) has the
     /// fields at the signs -r and +r.

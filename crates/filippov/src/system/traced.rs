@@ -434,6 +434,10 @@ impl PiecewiseSystem for TracedSystem {
         self.model.switches_at(j)
     }
 
+    fn jumps_across(&self, j: usize, signs: &[f64], sliding: &[usize]) -> bool {
+        self.model.jumps_across(j, signs, sliding)
+    }
+
     fn sticks_at(&self, j: usize) -> bool {
         self.model.sticks_at(j)
     }
