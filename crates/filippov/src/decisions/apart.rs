@@ -11,7 +11,7 @@ use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::switching::{decide, Arrival as SurfaceArrival, Decision, Leading, NormalFields};
 use crate::system::dot_magnitude;
-use crate::tolerances::{DOUBTFUL, MOST_MEETING, TANGENT};
+use crate::tolerances::{DOUBTFUL, MOST_MEETING, PATTERNS_PER_LOOK, TANGENT};
 
 /// What follows where the surfaces of `meeting` vanish, if first-order data are doubtful and each surface is decided
 /// whatever the signs of those that are not; `None` if not. One that is left has its sign for those decided later.
@@ -90,6 +90,9 @@ fn decide_alone(
     let arrival = SurfaceArrival::from_side(mode.entries()[j]);
     let mut found: Option<Decision> = None;
     for pattern in 0..1_usize << others.len() {
+        if (pattern + 1).is_multiple_of(PATTERNS_PER_LOOK) && at.patience.is_over() {
+            return Ok(None);
+        }
         let signs = after.on_sides(&others, pattern).signs();
         let decision = decide(at.system, j, arrival, at.t, at.x, &signs)?;
         let is_clear = decision.candidates.len() == 1

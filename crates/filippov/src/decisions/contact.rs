@@ -90,6 +90,9 @@ pub(super) fn place_in_contact(
     }
     modes.sort_by_key(|mode| usize::MAX - mode.codimension());
     for tried in modes {
+        if at.patience.is_over() {
+            return Ok(Err(Stop::Interrupted));
+        }
         let Some(Tried { velocity }) = try_mode(at, notes, &tried)? else {
             continue;
         };

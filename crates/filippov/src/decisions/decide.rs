@@ -14,7 +14,7 @@ use super::nested::{
     decide_where_others_jump, leave_along_bends, leave_at_bends, reject_if_not_attracting,
 };
 use super::placement::{one_surface, place};
-use super::point::{Apply, Cause, Decided, Lefts, Next, Notes, Point, Rules};
+use super::point::{Answer, Apply, Cause, Decided, Lefts, Next, Notes, Point, Rules};
 use super::relay::decide_by_relay;
 use super::rule::{How, Meeting, Rule};
 use super::settle::settle;
@@ -24,8 +24,8 @@ use crate::error::FieldError;
 use crate::field::ModeField;
 use crate::mode::Mode;
 
-/// The rules where surfaces vanish: the first that applies decides. First-order data always do.
-const LIST: [(Rule, Apply); 15] = [
+/// The rules where surfaces vanish: the first that applies decides.
+const LIST: [(Rule, Apply); 14] = [
     (Rule::Region, region),
     (Rule::Touch, touch),
     (Rule::OthersJump, decide_where_others_jump),
@@ -40,11 +40,17 @@ const LIST: [(Rule, Apply); 15] = [
     (Rule::VanishingJump, decide_where_jump_vanishes),
     (Rule::Relay, decide_by_relay),
     (Rule::TooMany, too_many),
-    (Rule::FirstOrder, resolve_first_order),
 ];
 
+/// The rule where none of them applies.
+const LAST: (Rule, Answer) = (Rule::FirstOrder, resolve_first_order);
+
 /// The list with what holds for its answers.
-pub(crate) const RULES: Rules = Rules { list: &LIST, check };
+pub(crate) const RULES: Rules = Rules {
+    list: &LIST,
+    last: LAST,
+    check,
+};
 
 /// The result of a decision; `Notes` have what was found out beside it.
 pub(crate) struct Decision {

@@ -118,7 +118,9 @@ pub(super) fn velocity_in(
         }
         _ => {
             let field = IntersectionField::new(at.system, &set, &signs, multipliers);
-            let field = field.with_rule(at.policy.law.rule);
+            let field = field
+                .with_rule(at.policy.law.rule)
+                .with_patience(at.patience);
             let mut field = field.with_scaling(&at.policy.law.scaling(&set));
             field.eval(t, &mut x, velocity)?;
             field.n_evaluations()

@@ -20,7 +20,7 @@ pub(super) fn decide_by_higher_order(
     rest: Option<Mode>,
 ) -> Result<Decided, FieldError> {
     let ends = meeting.iter().all(|j| at.arrival.sliding.contains(j));
-    let decision = decide_intersection(at.system, meeting, mode, ends, (at.t, at.x))?;
+    let decision = decide_intersection(at.system, meeting, mode, ends, (at.t, at.x), at.patience)?;
     let only = decision.unique();
     notes.leaf = "higher-order";
     let next = match (only, rest) {

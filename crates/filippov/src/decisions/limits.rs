@@ -9,7 +9,7 @@ use crate::mode::Mode;
 use crate::solution::Switch;
 use crate::status::Stop;
 use crate::stepper::ErrorScale;
-use crate::switching::{accumulate, admissible, least_multipliers, Kind, Return, Undecided};
+use crate::switching::{accumulate, admissible_within, least_multipliers, Kind, Return, Undecided};
 use crate::system::dot;
 use crate::tolerances::{LONGEST_TURN, MOST_MEETING, NEAREST_ACCUMULATION, SURFACE_NOISE};
 
@@ -125,7 +125,7 @@ pub(super) fn stay_at_limit(
         if silent.is_some() {
             return least_multipliers(&fields, &telling).is_some();
         }
-        let found = admissible(&fields);
+        let found = admissible_within(&fields, at.patience);
         let mut modes = found
             .iter()
             .filter_map(|found| found.continuation.as_mode());

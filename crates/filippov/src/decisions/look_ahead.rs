@@ -44,6 +44,9 @@ pub(super) fn decide_by_trial(
     let mut found: Option<(Mode, Lefts)> = None;
     let mut entries = vec![-1_i8; meeting.len()];
     loop {
+        if at.patience.is_over() {
+            return Ok(None);
+        }
         if entries.iter().any(|&entry| entry != 0) {
             let mut candidate = mode.clone();
             let pairs = meeting.iter().zip(&entries);

@@ -14,7 +14,7 @@ use crate::field::{IntersectionExit, MeetingFields};
 use crate::mode::Mode;
 use crate::status::Stop;
 use crate::switching::{
-    admissible, decide as decide_at_surface, has_one_mode_only, merged_root, region_at_rest,
+    admissible_within, decide as decide_at_surface, has_one_mode_only, merged_root, region_at_rest,
     resolve_within, Arrival as SurfaceArrival, Continuation, ExitKind, Incoming, NormalFields,
     Resolution, Undecided,
 };
@@ -51,7 +51,7 @@ pub(super) fn resolve_first_order(
     at: &Point,
     notes: &mut Notes,
     meeting: &Meeting,
-) -> Result<Option<Decided>, FieldError> {
+) -> Result<Decided, FieldError> {
     let corners = at.corners(notes, meeting.surfaces, meeting.mode)?;
     let kappa = at.policy.law.scaling(meeting.surfaces);
     let mut others = Vec::new();
@@ -62,7 +62,7 @@ pub(super) fn resolve_first_order(
         }
         (Ok(fields), How::Event(_)) => {
             let incoming = incoming(at, notes, meeting, (&corners, &fields))?;
-            others = other_solutions(&fields, &incoming);
+            others = other_solutions(at, &fields, &incoming);
             match resolve_within(&fields, &incoming, &kappa, at.patience) {
                 // The last of many turns is within rounding of all surfaces: its region leads past one of
                 // them, and has no meaning any more.
@@ -75,7 +75,7 @@ pub(super) fn resolve_first_order(
             }
         }
     };
-    follow(at, notes, meeting, &corners, resolution, &others).map(Some)
+    follow(at, notes, meeting, &corners, resolution, &others)
 }
 
 /// Rule: more surfaces whose signs multiply one another than all of whose fields can be looked at.
@@ -192,6 +192,9 @@ fn follow(
     others: &[Continuation],
 ) -> Result<Decided, FieldError> {
     let (mode, meeting) = (place.mode, place.surfaces);
+    if resolution == Err(Undecided::Interrupted) {
+        return Ok(Err(Stop::Interrupted));
+    }
     let rest = region_at_rest(at.system, fields, mode, at.t, at.x)?;
     let resolution = match resolution {
         Ok(resolution) if !resolution.degenerate => resolution,
@@ -307,11 +310,11 @@ fn decide_at_tangency(
 
 /// All attracting continuations at an intersection that is reached, whatever the regularisation selects: Filippov
 /// solutions, and several if the solution is not unique. Not looked for where many surfaces meet.
-fn other_solutions(fields: &NormalFields, incoming: &Incoming) -> Vec<Continuation> {
+fn other_solutions(at: &Point, fields: &NormalFields, incoming: &Incoming) -> Vec<Continuation> {
     let is_exit = matches!(incoming, Incoming::Exit { .. });
     if is_exit || fields.m() > MOST_LISTED || has_one_mode_only(fields) {
         return Vec::new();
     }
-    let found = admissible(fields).into_iter();
+    let found = admissible_within(fields, at.patience).into_iter();
     found.map(|found| found.continuation).collect()
 }

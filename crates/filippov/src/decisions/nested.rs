@@ -240,6 +240,9 @@ fn leaves_at_bends(
     }
     let mut found = None;
     for pattern in 0..1_usize << m {
+        if at.patience.is_over() {
+            return Ok(None);
+        }
         let region = mode.on_sides(meeting, pattern);
         let mut settled = region.clone();
         let (jumped, _) = let_others_jump(at, notes, mode, &mut settled, (&[], meeting))?;
@@ -274,6 +277,9 @@ fn leaves_along_bends(
     let (mut field, mut normals) = (vec![0.0; n], Vec::with_capacity(m << m));
     let (mut rises, mut falls) = (vec![true; m], vec![true; m]);
     for pattern in 0..1_usize << m {
+        if at.patience.is_over() {
+            return Ok(None);
+        }
         let region = mode.on_sides(meeting, pattern);
         let (signs, t, x) = (region.signs(), at.t, at.x);
         notes.n_field_evaluations += eval_on_side(at.system, t, x, &signs, &mut field)?;
@@ -291,7 +297,7 @@ fn leaves_along_bends(
     if stays || !are_in_one_plane(normals) {
         return Ok(None);
     }
-    let decision = decide_intersection(at.system, meeting, mode, false, (at.t, at.x))?;
+    let decision = decide_intersection(at.system, meeting, mode, false, (at.t, at.x), at.patience)?;
     let ([only], [left]) = (&decision.candidates[..], &decision.left[..]) else {
         return Ok(None);
     };

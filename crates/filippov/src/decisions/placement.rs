@@ -227,6 +227,9 @@ fn place_on_triggers(
     let mut touched = Vec::with_capacity(smooth.len());
     let mut contacts = Vec::new();
     for &j in smooth {
+        if at.patience.is_over() {
+            return Ok((Rule::Triggers, Err(Stop::Interrupted)));
+        }
         let side = at.triggers().side(j, memory);
         mode.set(j, side);
         let leading = leading_along(at, notes, j, &mode, &meeting, memory)?;

@@ -45,13 +45,18 @@ pub(crate) struct Point<'p, 'm, 'a> {
 /// A rule: the motion that follows, or why the run ends; `None` where the rule does not apply.
 pub(super) type Apply = fn(&Point, &mut Notes, &Meeting) -> Result<Option<Decided>, FieldError>;
 
+/// The last rule, which always applies.
+pub(super) type Answer = fn(&Point, &mut Notes, &Meeting) -> Result<Decided, FieldError>;
+
 /// What holds for the answers of rules: an answer, checked and completed.
 pub(super) type Check =
     fn(&Point, &mut Notes, &Meeting, Rule, Decided) -> Result<Decided, FieldError>;
 
-/// The rules in their order, the last of which always answers.
+/// The rules in their order.
 pub(crate) struct Rules {
     pub(super) list: &'static [(Rule, Apply)],
+    /// Where none of the list applies.
+    pub(super) last: (Rule, Answer),
     /// Asked where several surfaces vanish.
     pub(super) check: Check,
 }

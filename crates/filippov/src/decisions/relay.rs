@@ -163,7 +163,7 @@ fn solve_relay_at(
         x.iter_mut().zip(&velocity).for_each(|(x, v)| *x += dt * v);
         t += dt;
     }
-    let (found, evaluations) = relay_at(at.system, (t, &x), mode, meeting)?;
+    let (found, evaluations) = relay_at(at.system, (t, &x), mode, meeting, at.patience)?;
     notes.n_field_evaluations += evaluations;
     Ok(found)
 }

@@ -13,16 +13,30 @@ pub(super) fn settle(
     notes: &mut Notes,
     meeting: &Meeting,
 ) -> Result<(Rule, Decided), FieldError> {
+    let (rule, decided) = first_answer(at, notes, meeting)?;
+    let decided = match meeting.surfaces {
+        [] | [_] => decided,
+        _ => (at.rules.check)(at, notes, meeting, rule, decided)?,
+    };
+    Ok((rule, decided))
+}
+
+fn first_answer(
+    at: &Point,
+    notes: &mut Notes,
+    meeting: &Meeting,
+) -> Result<(Rule, Decided), FieldError> {
     for &(rule, apply) in at.rules.list {
         if let Some(decided) = apply(at, notes, meeting)? {
-            let decided = match meeting.surfaces {
-                [] | [_] => decided,
-                _ => (at.rules.check)(at, notes, meeting, rule, decided)?,
-            };
             return Ok((rule, decided));
         }
     }
-    Ok((Rule::Region, Err(Stop::NotFinite)))
+    let (rule, answer) = at.rules.last;
+    // A rule of the list does not apply, or was interrupted. Of one or two surfaces none takes long.
+    if meeting.surfaces.len() > 2 && at.patience.is_over() {
+        return Ok((rule, Err(Stop::Interrupted)));
+    }
+    Ok((rule, answer(at, notes, meeting)?))
 }
 
 /// The motion from a place where these surfaces matter and vanish. The others have the signs of `mode`.

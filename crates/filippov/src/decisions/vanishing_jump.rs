@@ -13,7 +13,7 @@ use crate::event::EventFunction;
 use crate::field::ModeField;
 use crate::field::{IntersectionExit, SmoothField};
 use crate::mode::Mode;
-use crate::switching::{admissible, Leading};
+use crate::switching::{admissible_within, Leading};
 use crate::system::dot;
 use crate::tolerances::{EQUAL_SHARES, MOST_LISTED, VANISHED};
 
@@ -162,7 +162,7 @@ fn ways_on(
         return Ok(Vec::new());
     };
     let mut ways = Vec::new();
-    for found in admissible(&fields) {
+    for found in admissible_within(&fields, at.patience) {
         let Some(entries) = found.continuation.as_mode() else {
             continue;
         };

@@ -4,8 +4,8 @@ use super::MeetingFields;
 use crate::error::FieldError;
 use crate::switching::codim2::Bilinear;
 use crate::switching::{
-    least_multipliers, newton, scaling_margin, stability_margins, stable_roots, Matrix,
-    NormalFields,
+    least_multipliers, newton, scaling_margin, stability_margins, stable_roots_within, Matrix,
+    NormalFields, Patience,
 };
 use crate::system::PiecewiseSystem;
 use crate::tolerances::TRACKED_CHANGE;
@@ -74,6 +74,7 @@ impl Canopy {
         tracked: &[&[f64]],
         oscillates: &mut Option<bool>,
         dx: &mut [f64],
+        patience: Patience,
     ) -> Option<(Vec<f64>, [f64; 2])> {
         let fields = self.fields.normal_fields().ok()?;
         let telling = self.telling();
@@ -83,7 +84,7 @@ impl Canopy {
         } else if fields.m() == 2 {
             solve_two(&fields)?
         } else {
-            let lambda = solve_many(&fields, tracked)?;
+            let lambda = solve_many(&fields, tracked, patience)?;
             let jacobian = (fields.jacobian(&lambda), fields.groups().len() > 1);
             let ends = root_ends((&jacobian.0, jacobian.1), &self.kappa, oscillates);
             // Beyond a fold Newton's method may find the other root, which is never followed.
@@ -106,13 +107,13 @@ fn solve_two(fields: &NormalFields) -> Option<(Vec<f64>, [f64; 2])> {
 }
 
 /// More surfaces: Newton's method from the last multipliers; at the start from the only stable root.
-fn solve_many(fields: &NormalFields, tracked: &[&[f64]]) -> Option<Vec<f64>> {
+fn solve_many(fields: &NormalFields, tracked: &[&[f64]], patience: Patience) -> Option<Vec<f64>> {
     let mut known = tracked
         .iter()
         .filter(|last| last.len() == fields.m())
         .peekable();
     if known.peek().is_none() {
-        let root = stable_roots(fields).into_iter().next()?;
+        let root = stable_roots_within(fields, patience).into_iter().next()?;
         return newton(fields, &root);
     }
     known.find_map(|last| newton(fields, last).filter(|root| is_continued(fields, last, root)))

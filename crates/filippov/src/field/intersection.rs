@@ -6,6 +6,7 @@ use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::options::SlidingRule;
 use crate::sparse::SparseRows;
+use crate::switching::Patience;
 use crate::system::PiecewiseSystem;
 use crate::tolerances::{MOST_MEETING, MOST_TRACKED};
 
@@ -75,6 +76,8 @@ pub struct IntersectionField<'a> {
     projector: Projector,
     /// The factor of the term that draws the motion back, in place of the projection.
     restoring: Option<f64>,
+    /// How long a search for the first multipliers may take.
+    patience: Patience<'a>,
     n_evaluations: u64,
 }
 
@@ -113,6 +116,7 @@ impl<'a> IntersectionField<'a> {
             oscillates: None,
             projector: Projector::new(system.n_states(), system.n_surfaces()),
             restoring: None,
+            patience: Patience::endless(),
             n_evaluations: 0,
         }
     }
@@ -133,6 +137,13 @@ impl<'a> IntersectionField<'a> {
                 _ => RuleFailure::TooManySurfaces { m },
             });
         }
+        self
+    }
+
+    /// The same with a search for its first multipliers that ends without any when the caller has waited long enough.
+    #[must_use]
+    pub fn with_patience(mut self, patience: Patience<'a>) -> Self {
+        self.patience = patience;
         self
     }
 
@@ -303,7 +314,12 @@ impl<'a> IntersectionField<'a> {
         let found = match &mut self.canopy {
             Some(canopy) => {
                 self.n_evaluations += canopy.evaluate(self.system, t, x, &self.signs)?;
-                canopy.solve(&by_distance(&self.tracked, t), &mut self.oscillates, dx)
+                canopy.solve(
+                    &by_distance(&self.tracked, t),
+                    &mut self.oscillates,
+                    dx,
+                    self.patience,
+                )
             }
             None => None,
         };

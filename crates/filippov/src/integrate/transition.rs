@@ -61,7 +61,7 @@ impl<'a> Integrator<'a> {
             field: RefCell::new(&mut self.motion.field),
         };
         let (watch, t) = (&self.watch, self.t);
-        let is_over = || watch.is_over(watch.now(), t);
+        let is_over = || watch.stop().is_some() || watch.is_over(watch.now(), t);
         let at = Point {
             system: self.system,
             actions: self.actions,
@@ -83,7 +83,8 @@ impl<'a> Integrator<'a> {
         self.stats.n_surface_evaluations += notes.n_surface_evaluations;
         self.n_choices = notes.n_choices;
         self.motion.meets_kinks |= notes.meets_kinks;
-        if !notes.warnings.is_empty() {
+        // What an interrupted decision warns of need not hold.
+        if !notes.warnings.is_empty() && self.watch.stop().is_none() {
             self.warnings.append(&mut notes.warnings);
         }
         answer
@@ -104,7 +105,9 @@ impl<'a> Integrator<'a> {
         let mut decision = if self.recorder.decisions.len() < self.options.keep_decisions {
             let kept = self.ask(cause, |at, notes| decide_and_record(at, notes, reached));
             let (decision, record) = kept?;
-            self.recorder.decisions.push(record);
+            if self.watch.stop().is_none() {
+                self.recorder.decisions.push(record);
+            }
             decision
         } else {
             self.ask(cause, |at, notes| decide(at, notes, reached))?

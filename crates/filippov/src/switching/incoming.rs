@@ -2,8 +2,9 @@
 
 use super::fold::merged_root;
 use super::normal_fields::NormalFields;
+use super::patience::Patience;
 use super::resolution::Undecided;
-use super::roots::{multiplier_rates, newton, stable_roots};
+use super::roots::{multiplier_rates, newton, stable_roots_within};
 use crate::tolerances::{AFTER_THE_EXIT, BESIDE_THE_ROOT, CORNER_OFFSETS, UNSTABLE_START};
 
 /// What the motion did before.
@@ -64,7 +65,12 @@ impl Incoming {
     /// | face | (lambda, e): e the sides from which the other surfaces are reached |
     /// | exit | the root, in fields that have drifted a little |
     /// | start | u = 0 |
-    pub(super) fn starts(&self, fields: &NormalFields, kappa: &[f64]) -> Result<Starts, Undecided> {
+    pub(super) fn starts(
+        &self,
+        fields: &NormalFields,
+        kappa: &[f64],
+        patience: Patience,
+    ) -> Result<Starts, Undecided> {
         let same = |states| Starts {
             fields: fields.clone(),
             states,
@@ -72,7 +78,7 @@ impl Incoming {
         match self {
             Incoming::Corner { region } => corner_states(fields, region, kappa).map(same),
             Incoming::Face { mode, multipliers } => {
-                let multipliers = polished(fields, mode, multipliers)?;
+                let multipliers = polished(fields, mode, multipliers, patience)?;
                 face_states(fields, mode, &multipliers).map(same)
             }
             Incoming::Exit {
@@ -165,6 +171,7 @@ fn polished(
     fields: &NormalFields,
     mode: &[i8],
     multipliers: &[f64],
+    patience: Patience,
 ) -> Result<Vec<f64>, Undecided> {
     let face = fields.restrict(mode);
     let not_sliding = Undecided::NotArriving {
@@ -173,7 +180,7 @@ fn polished(
     let root = if multipliers.len() == face.m() {
         newton(&face, multipliers)
     } else {
-        stable_roots(&face).into_iter().next()
+        stable_roots_within(&face, patience).into_iter().next()
     };
     root.ok_or(not_sliding)
 }

@@ -3,6 +3,7 @@
 use super::codim2::Bilinear;
 use super::lie::{first_nonzero, normal_component, Leading};
 use super::normal_fields::NormalFields;
+use super::patience::Patience;
 use crate::error::FieldError;
 use crate::field::MeetingFields;
 use crate::mode::Mode;
@@ -38,7 +39,7 @@ impl IntersectionDecision {
 /// A region k attracts if f^k leaves every surface on the side k; sliding on j attracts if it
 /// is attractive there and its field leaves every other surface on the side of the mode
 /// (Guglielmi, Hairer 2022; `docs/theory/switching.md`). Where the motion has slid on all of them until now (`ends`), it does
-/// not stay with a multiplier at its end.
+/// not stay with a multiplier at its end. When the caller has waited long enough, not all are listed.
 ///
 /// # Errors
 /// If a function of the user raises.
@@ -48,6 +49,7 @@ pub fn decide_intersection(
     mode: &Mode,
     ends: bool,
     (t, x): (f64, &[f64]),
+    patience: Patience,
 ) -> Result<IntersectionDecision, FieldError> {
     let mut decision = IntersectionDecision {
         candidates: Vec::new(),
@@ -59,6 +61,9 @@ pub fn decide_intersection(
         return Ok(decision);
     }
     for pattern in 0..1_usize << m {
+        if patience.is_over() {
+            return Ok(decision);
+        }
         let candidate = mode.on_sides(meeting, pattern);
         if let Some(left) = region_attracts(system, meeting, &candidate, t, x)? {
             decision.candidates.push(candidate.clone());

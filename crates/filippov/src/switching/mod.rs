@@ -34,7 +34,8 @@ pub use codim1::{decide, weight_at_two_fold, Arrival, Decision, TwoFoldMotion};
 pub use enclosed_root::{enclose_root, EnclosedRoot, IntervalVector, RootBounds};
 pub use fold::{merged_root, MergedRoot};
 pub use hidden::{
-    admissible, limit as limit_of_hidden_dynamics, Admissible, Outcome as HiddenOutcome,
+    admissible, admissible_within, limit as limit_of_hidden_dynamics, Admissible,
+    Outcome as HiddenOutcome,
 };
 pub use incoming::{ExitKind, Incoming};
 pub use intersection::{decide_intersection, region_at_rest, IntersectionDecision};
@@ -45,12 +46,15 @@ pub use parts::{independent_parts, of_part};
 pub use patience::Patience;
 pub use redundant::least_multipliers;
 pub use relay::{
-    all_relay_modes, solve_relay, RelayError, RelayProblem, RelaySolution, Uniqueness,
+    all_relay_modes, solve_relay, solve_relay_within, RelayError, RelayProblem, RelaySolution,
+    Uniqueness,
 };
 pub use relay_at::relay_at;
 pub use resolution::{Continuation, Resolution, Undecided};
 pub use resolve::{has_one_mode_only, resolve, resolve_within};
-pub use roots::{multiplier_rates, newton, roots_in_cube, stable_roots, Roots};
+pub use roots::{
+    multiplier_rates, newton, roots_in_cube, stable_roots, stable_roots_within, Roots,
+};
 pub use shared_load::{SharedLoad, SharedLoads};
 pub(crate) use small_matrix::invert;
 pub use small_matrix::{Matrix, Vector};

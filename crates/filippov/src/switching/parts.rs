@@ -9,7 +9,7 @@ use super::normal_fields::{NormalFields, SignGroup};
 use super::patience::Patience;
 use super::resolution::{Continuation, Resolution, Undecided};
 use super::resolve::resolve_within;
-use super::roots::newton;
+use super::roots::{newton, stable_roots_within};
 use super::stability::stability_margins;
 use crate::mode::Mode;
 use crate::tolerances::{AT_SIDE, EPS, MOST_COMBINED};
@@ -86,7 +86,7 @@ pub(super) fn resolve_parts(
         let resolution = match incoming_of(fields, parts, index, incoming) {
             Some(incoming) => resolve_within(&own, &incoming, &scaling, patience)
                 .map_err(|error| error.in_whole(part))?,
-            None => unchanged(&own, incoming, part)?,
+            None => unchanged(&own, incoming, part, patience)?,
         };
         decided.push(resolution);
     }
@@ -185,11 +185,12 @@ fn unchanged(
     own: &NormalFields,
     incoming: &Incoming,
     part: &[usize],
+    patience: Patience,
 ) -> Result<Resolution, Undecided> {
     let multipliers = own_multipliers(incoming, part);
     let start = match multipliers.len() == own.m() {
         true => newton(own, &multipliers),
-        false => super::roots::stable_roots(own).into_iter().next(),
+        false => stable_roots_within(own, patience).into_iter().next(),
     };
     let chosen = Continuation::mode(&vec![0; own.m()]);
     let mut resolution = Resolution::sure("", chosen);

@@ -1,6 +1,9 @@
 //! How long a caller waits for a decision.
 
-/// Asked again and again during long computations: when the caller has waited long enough, they end without an outcome.
+/// Asked again and again during long computations: when the caller has waited long enough, they end without an outcome, or
+/// with a part of it. Whoever gave the patience drops what comes of them.
+///
+/// A question costs about as much as a look at a clock: loops with short rounds ask after some rounds only.
 #[derive(Clone, Copy)]
 pub struct Patience<'a>(Option<&'a dyn Fn() -> bool>);
 

@@ -23,15 +23,16 @@
 //! Guglielmi, Hairer (2022); `docs/theory/switching.md`.
 
 use super::p_matrix::is_p_matrix;
+use super::patience::Patience;
 use super::shared_load::{has_one_motion, let_stick};
 use crate::sparse::{Singular, SparseRows, SparseSolver};
-use crate::tolerances::{EPS, RELAY_DAMPING};
+use crate::tolerances::{EPS, PIVOTS_PER_LOOK, RELAY_DAMPING};
 
 /// Largest number of surfaces for which all modes are tried.
 pub const MOST_ENUMERATED: usize = 8;
 
 /// Steps without fewer wrong states before single changes.
-const PATIENCE: usize = 4;
+const MOST_IDLE: usize = 4;
 
 /// Proximal steps; each gains a factor of about 1 / d.
 const MOST_PROXIMAL: usize = 30;
@@ -120,12 +121,24 @@ pub enum RelayError {
 /// # Ok::<(), filippov::switching::RelayError>(())
 /// ```
 pub fn solve_relay(problem: &RelayProblem, before: &[i8]) -> Result<RelaySolution, RelayError> {
+    solve_relay_within(problem, before, Patience::endless())
+}
+
+/// As [`solve_relay`], as long as the caller waits.
+///
+/// # Errors
+/// As [`solve_relay`]; [`RelayError::Undecided`] also when the caller has waited long enough.
+pub fn solve_relay_within(
+    problem: &RelayProblem,
+    before: &[i8],
+    patience: Patience,
+) -> Result<RelaySolution, RelayError> {
     if !problem.n.is_finite() || !problem.nu.iter().all(|v| v.is_finite()) {
         return Err(RelayError::NotFinite);
     }
     let leaders = problem.leaders();
     let start: Vec<i8> = leaders.iter().map(|&i| before[i]).collect();
-    let solved = problem.restricted(&leaders).solve(&start)?;
+    let solved = problem.restricted(&leaders).solve(&start, patience)?;
     let mut solution = problem.completed(&leaders, &solved, before);
     let is_follower = |i: &usize| leaders.binary_search(i).is_err();
     if solution.degenerate.iter().any(is_follower) {
@@ -140,7 +153,7 @@ pub fn solve_relay(problem: &RelayProblem, before: &[i8]) -> Result<RelaySolutio
 /// All solutions of (R) for up to `MOST_ENUMERATED` surfaces, and whether there may be more of them in between:
 /// a mode with singular N may hold a continuum.
 pub fn all_relay_modes(problem: &RelayProblem) -> (Vec<Vec<i8>>, bool) {
-    let (found, has_singular) = problem.enumerate();
+    let (found, has_singular) = problem.enumerate(Patience::endless());
     let modes = found.into_iter().map(|state| state.modes);
     (modes.collect(), has_singular)
 }
@@ -162,10 +175,25 @@ struct Solved {
 }
 
 /// The linear systems of one problem, counted.
-#[derive(Default)]
-struct Pivots {
+struct Pivots<'a> {
     solver: SparseSolver,
     n_pivots: usize,
+    patience: Patience<'a>,
+}
+
+impl<'a> Pivots<'a> {
+    fn within(patience: Patience<'a>) -> Self {
+        Pivots {
+            solver: SparseSolver::default(),
+            n_pivots: 0,
+            patience,
+        }
+    }
+
+    /// Has the caller waited long enough? Asked after every system, and looked at after some.
+    fn are_over(&self) -> bool {
+        self.n_pivots.is_multiple_of(PIVOTS_PER_LOOK) && self.patience.is_over()
+    }
 }
 
 impl RelayProblem {
@@ -235,8 +263,8 @@ impl RelayProblem {
         }
     }
 
-    fn solve(&self, start: &[i8]) -> Result<Solved, RelayError> {
-        let mut pivots = Pivots::default();
+    fn solve(&self, start: &[i8], patience: Patience) -> Result<Solved, RelayError> {
+        let mut pivots = Pivots::within(patience);
         let is_p = is_p_matrix(&negative(&self.n)) == Some(true);
         let mut state = self.pivot(start, &mut pivots);
         // A surface that is left at rate 0 may share what it carries with others.
@@ -254,7 +282,7 @@ impl RelayProblem {
             false => Uniqueness::Unknown,
         };
         if uniqueness == Uniqueness::Unknown && self.nu.len() <= MOST_ENUMERATED {
-            let (all, has_singular) = self.enumerate();
+            let (all, has_singular) = self.enumerate(patience);
             uniqueness = match (all.len(), has_singular) {
                 (2.., _) => Uniqueness::Several,
                 (1, false) => Uniqueness::Certain,
@@ -285,7 +313,7 @@ impl RelayProblem {
     fn pivot(&self, start: &[i8], pivots: &mut Pivots) -> Option<State> {
         let mut modes = start.to_vec();
         let mut fewest = usize::MAX;
-        let mut patience = PATIENCE;
+        let mut idle = 0;
         for _ in 0..100 + 10 * modes.len() {
             let state = self.state(&modes, pivots).ok()?;
             let wrong: Vec<usize> = (0..modes.len())
@@ -294,18 +322,18 @@ impl RelayProblem {
             if wrong.is_empty() {
                 return Some(state);
             }
-            if wrong.len() < fewest {
-                (fewest, patience) = (wrong.len(), PATIENCE);
-            } else {
-                patience = patience.saturating_sub(1);
+            if pivots.are_over() {
+                return None;
             }
-            let changed = if patience > 0 {
-                &wrong[..]
+            if wrong.len() < fewest {
+                (fewest, idle) = (wrong.len(), 0);
             } else {
-                &wrong[..1]
-            };
+                idle += 1;
+            }
+            let many = idle < MOST_IDLE;
+            let changed = if many { &wrong[..] } else { &wrong[..1] };
             for &i in changed {
-                modes[i] = self.better(&state, i, patience > 0);
+                modes[i] = self.better(&state, i, many);
             }
         }
         None
@@ -431,10 +459,10 @@ impl RelayProblem {
         None
     }
 
-    /// All solutions by trying every mode; also whether a mode was singular.
-    fn enumerate(&self) -> (Vec<State>, bool) {
+    /// All solutions by trying every mode; also whether there may be others: a mode was singular, or was not tried.
+    fn enumerate(&self, patience: Patience) -> (Vec<State>, bool) {
         let m = self.nu.len();
-        let mut pivots = Pivots::default();
+        let mut pivots = Pivots::within(patience);
         let (mut found, mut has_singular) = (Vec::new(), false);
         if m > MOST_ENUMERATED {
             return (found, true);
@@ -446,6 +474,9 @@ impl RelayProblem {
                 Err(_) => has_singular = true,
                 Ok(state) if !(0..m).any(|i| self.is_wrong(&state, i)) => found.push(state),
                 Ok(_) => {}
+            }
+            if pivots.are_over() {
+                return (found, true);
             }
         }
         (found, has_singular)

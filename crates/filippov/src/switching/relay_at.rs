@@ -1,6 +1,7 @@
 //! The relay problem of a system at a point where surfaces meet.
 
-use super::relay::{solve_relay, RelayProblem, RelaySolution, Uniqueness};
+use super::patience::Patience;
+use super::relay::{solve_relay_within, RelayProblem, RelaySolution, Uniqueness};
 use super::shared_load::stay_together;
 use crate::error::FieldError;
 use crate::mode::Mode;
@@ -17,6 +18,7 @@ pub fn relay_at(
     (t, x): (f64, &[f64]),
     mode: &Mode,
     meeting: &[usize],
+    patience: Patience,
 ) -> Result<(Option<RelaySolution>, u64), FieldError> {
     let parts = system
         .affine_signs()
@@ -32,7 +34,7 @@ pub fn relay_at(
         n: parts.normal().clone(),
         noise: system.lie_tolerance(1),
     };
-    let mut found = solve_relay(&problem, &before).ok();
+    let mut found = solve_relay_within(&problem, &before, patience).ok();
     if let Some(solution) = found.as_mut().filter(|found| found.n_sharing > 0) {
         let sticking: Vec<usize> = (0..meeting.len())
             .filter(|&i| solution.modes[i] == 0)

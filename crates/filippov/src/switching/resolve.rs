@@ -1,13 +1,13 @@
 //! The decision at an intersection, whatever came before and however many surfaces meet.
 
 use super::codim2::{self, Bilinear, Corners};
-use super::hidden::{admissible, limit_within, Outcome};
+use super::hidden::{admissible_within, limit_within, Outcome};
 use super::incoming::{ExitKind, Incoming};
 use super::normal_fields::NormalFields;
 use super::parts::{independent_parts, resolve_parts};
 use super::patience::Patience;
 use super::resolution::{Continuation, Resolution, Undecided};
-use super::roots::{newton, stable_roots};
+use super::roots::{newton, stable_roots_within};
 use super::single;
 use super::stability::{is_negative_p_matrix, is_stable_for};
 use crate::tolerances::{AFTER_THE_EXIT, DOUBTFUL, MOST_MEETING, MOST_SCALED_SINGLY};
@@ -103,7 +103,7 @@ fn in_doubt(
     }
     resolution.degenerate |= !agree;
     resolution.unique &= resolution.candidates.len() == 1 && !resolution.degenerate;
-    complete(&mut resolution, fields, kappa);
+    complete(&mut resolution, fields, kappa, patience);
     resolution
 }
 
@@ -146,7 +146,7 @@ fn decide(
             patience,
         ),
     }?;
-    complete(&mut resolution, fields, kappa);
+    complete(&mut resolution, fields, kappa, patience);
     Ok(resolution)
 }
 
@@ -185,7 +185,7 @@ fn by_tree(
         Incoming::Corner { .. } | Incoming::Start => return Err(Undecided::NoOutcome),
     };
     if !resolution.unique {
-        let starts = incoming.starts(fields, kappa)?;
+        let starts = incoming.starts(fields, kappa, patience)?;
         let outcome = limit_within(&starts.fields, &starts.states[0], kappa, patience);
         resolution.n_motions = 1;
         match continuation(&outcome) {
@@ -210,7 +210,7 @@ fn by_hidden_dynamics(
     scalings: &[Vec<f64>],
     patience: Patience,
 ) -> Result<Resolution, Undecided> {
-    let starts = incoming.starts(fields, &scalings[0])?;
+    let starts = incoming.starts(fields, &scalings[0], patience)?;
     let outcome = limit_within(&starts.fields, &starts.states[0], &scalings[0], patience);
     let chosen = continuation(&outcome)?;
     let mut resolution = Resolution::sure(leaf_of(&outcome), chosen.clone());
@@ -252,7 +252,7 @@ fn start(
         resolution.unique = has_one_mode_only(fields);
         return Ok(resolution);
     }
-    let found = admissible(fields);
+    let found = admissible_within(fields, patience);
     let margin = smallest_component(fields);
     let mut resolution = if let [only] = found.as_slice() {
         let mut resolution = Resolution::sure("start/only", only.continuation.clone());
@@ -278,7 +278,7 @@ fn start(
 }
 
 /// Adds the multipliers of the chosen mode, and whether the regularised motion oscillates in it.
-fn complete(resolution: &mut Resolution, fields: &NormalFields, kappa: &[f64]) {
+fn complete(resolution: &mut Resolution, fields: &NormalFields, kappa: &[f64], patience: Patience) {
     let Some(mode) = resolution.mode() else {
         return;
     };
@@ -295,7 +295,7 @@ fn complete(resolution: &mut Resolution, fields: &NormalFields, kappa: &[f64]) {
             newton(&face, known).or_else(|| Some(known.clone()))
         }
         2 => both(),
-        _ => stable_roots(&face).into_iter().next(),
+        _ => stable_roots_within(&face, patience).into_iter().next(),
     };
     let Some(root) = root else {
         return;

@@ -2,11 +2,12 @@
 
 use super::codim2::Bilinear;
 use super::normal_fields::{NormalFields, SignGroup};
+use super::patience::Patience;
 use super::small_matrix::Matrix;
 use super::stability::is_scaling_stable;
 use crate::tolerances::{
-    FAR_FROM_THE_CUBE, INJECTIVE, MOST_BOXES, MOST_BOX_WORK, NARROWEST_BOX, NEWTON_DONE,
-    NEWTON_STEPS, SAME_ROOT,
+    BOXES_PER_LOOK, FAR_FROM_THE_CUBE, INJECTIVE, MOST_BOXES, MOST_BOX_WORK, NARROWEST_BOX,
+    NEWTON_DONE, NEWTON_STEPS, SAME_ROOT,
 };
 
 /// The roots found in the cube.
@@ -15,7 +16,7 @@ pub struct Roots {
     /// The roots, each once.
     pub points: Vec<Vec<f64>>,
     /// Are these certainly all? Not if a multiple root, or one at the border of many boxes, used up
-    /// the work.
+    /// the work, or if the caller did not wait.
     pub complete: bool,
 }
 
@@ -28,8 +29,13 @@ pub struct Roots {
 /// Multipliers on which g depends linearly, free of all others, are eliminated first: the search is
 /// exponential in the number of surfaces whose signs multiply, and in no others.
 pub fn roots_in_cube(fields: &NormalFields) -> Roots {
+    roots_within(fields, Patience::endless())
+}
+
+/// As [`roots_in_cube`]; those found until then when the caller has waited long enough.
+fn roots_within(fields: &NormalFields, patience: Patience) -> Roots {
     if let Some(eliminated) = Eliminated::of(fields) {
-        let inner = search(&eliminated.rest);
+        let inner = search(&eliminated.rest, patience);
         let complete = inner.complete;
         let points = inner.points.iter();
         let mut roots = Roots {
@@ -41,10 +47,10 @@ pub fn roots_in_cube(fields: &NormalFields) -> Roots {
         }
         return roots;
     }
-    search(fields)
+    search(fields, patience)
 }
 
-fn search(fields: &NormalFields) -> Roots {
+fn search(fields: &NormalFields, patience: Patience) -> Roots {
     let m = fields.m();
     let mut roots = Roots {
         points: Vec::new(),
@@ -55,7 +61,10 @@ fn search(fields: &NormalFields) -> Roots {
         high: vec![1.0; m],
         fields: fields.clone(),
     }];
-    for _ in 0..MOST_BOXES.min(MOST_BOX_WORK / (m * m * m)) {
+    for count in 0..MOST_BOXES.min(MOST_BOX_WORK / (m * m * m)) {
+        if count.is_multiple_of(BOXES_PER_LOOK) && patience.is_over() {
+            break;
+        }
         let Some(region) = pending.pop() else {
             return roots;
         };
@@ -73,6 +82,11 @@ fn search(fields: &NormalFields) -> Roots {
 /// The roots at which a motion can slide: in the cube, with sign det G = (-1)^m, and stable for
 /// some scaling. For one and two surfaces in closed form.
 pub fn stable_roots(fields: &NormalFields) -> Vec<Vec<f64>> {
+    stable_roots_within(fields, Patience::endless())
+}
+
+/// As [`stable_roots`]; those found until then when the caller has waited long enough.
+pub fn stable_roots_within(fields: &NormalFields, patience: Patience) -> Vec<Vec<f64>> {
     match fields.m() {
         0 => vec![Vec::new()],
         1 => {
@@ -87,7 +101,7 @@ pub fn stable_roots(fields: &NormalFields) -> Vec<Vec<f64>> {
         }
         _ => {
             let stable = |root: &Vec<f64>| is_scaling_stable(&fields.jacobian(root));
-            roots_in_cube(fields)
+            roots_within(fields, patience)
                 .points
                 .into_iter()
                 .filter(stable)

@@ -140,6 +140,14 @@ pub const MOST_BOXES: usize = 100_000;
 /// boxes alone is no bound. Up to six surfaces it is none.
 pub const MOST_BOX_WORK: usize = MOST_BOXES * 6 * 6 * 6;
 
+/// Boxes after which the search looks whether the caller still waits: each takes a microsecond for three surfaces and a
+/// tenth of a millisecond for six.
+pub const BOXES_PER_LOOK: usize = 64;
+
+/// Sides of other surfaces on which one surface is decided before the caller is asked whether to go on: traced functions take
+/// a microsecond on each side, black boxes some evaluations.
+pub const PATTERNS_PER_LOOK: usize = 8;
+
 /// Boxes narrower than this hold a root that is multiple up to rounding.
 pub const NARROWEST_BOX: f64 = 1e-6;
 
@@ -205,6 +213,10 @@ pub const NULL_VECTOR_ENTRY: f64 = 1e-6;
 /// Share of a row that is taken off the diagonal of a singular relay problem. Proximal steps then converge by
 /// about this factor each; the damped matrix has half of the digits left.
 pub const RELAY_DAMPING: f64 = 1e-6;
+
+/// Linear systems of a relay problem after which its solution looks whether the caller still waits: more than a decision
+/// from the mode before usually needs. Each takes a millisecond for some thousand surfaces.
+pub const PIVOTS_PER_LOOK: usize = 8;
 
 /// Most contacts that close loops with one another, as those of seven bodies in a row: up to 1716 facets are looked at in
 /// each evaluation.

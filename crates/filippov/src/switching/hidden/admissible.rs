@@ -3,8 +3,9 @@
 use crate::mode::Mode;
 use crate::switching::codim2::Lap;
 use crate::switching::normal_fields::NormalFields;
+use crate::switching::patience::Patience;
 use crate::switching::resolution::Continuation;
-use crate::switching::roots::stable_roots;
+use crate::switching::roots::stable_roots_within;
 
 /// A continuation that is possible without regard to the past.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,10 +27,15 @@ pub struct Admissible {
 /// that the Filippov solution from such a point is not unique. For three and more surfaces, spirals
 /// around two of them while a third one is left are not looked for.
 pub fn admissible(fields: &NormalFields) -> Vec<Admissible> {
+    admissible_within(fields, Patience::endless())
+}
+
+/// As [`admissible`]; some of them when the caller has waited long enough.
+pub fn admissible_within(fields: &NormalFields, patience: Patience) -> Vec<Admissible> {
     let mut found = Vec::new();
     let mut mode = vec![-1_i8; fields.m()];
     loop {
-        found.extend(in_mode(fields, &mode));
+        found.extend(in_mode(fields, &mode, patience));
         // The next mode in counting order.
         let Some(i) = mode.iter().position(|&k| k < 1) else {
             break;
@@ -46,7 +52,7 @@ pub fn admissible(fields: &NormalFields) -> Vec<Admissible> {
     found
 }
 
-fn in_mode(fields: &NormalFields, mode: &[i8]) -> Vec<Admissible> {
+fn in_mode(fields: &NormalFields, mode: &[i8], patience: Patience) -> Vec<Admissible> {
     let leaves = |multipliers: &Vec<f64>| {
         let mut next = multipliers.iter();
         let held = |&k: &i8| {
@@ -62,7 +68,7 @@ fn in_mode(fields: &NormalFields, mode: &[i8]) -> Vec<Admissible> {
             .zip(g)
             .all(|(&k, g)| k == 0 || f64::from(k) * g > 0.0)
     };
-    let roots = stable_roots(&fields.restrict(mode));
+    let roots = stable_roots_within(&fields.restrict(mode), patience);
     let admissible = |multipliers| Admissible {
         continuation: Continuation::Mode(Mode::new(mode.to_vec())),
         multipliers,

@@ -21,7 +21,7 @@ mod returns;
 mod space;
 mod strip;
 
-pub use admissible::{admissible, Admissible};
+pub use admissible::{admissible, admissible_within, Admissible};
 
 use super::normal_fields::NormalFields;
 use crate::mode::Mode;

@@ -6,7 +6,7 @@ use super::{clipped, side, Outcome};
 use crate::mode::Mode;
 use crate::switching::normal_fields::NormalFields;
 use crate::switching::patience::Patience;
-use crate::switching::roots::stable_roots;
+use crate::switching::roots::stable_roots_within;
 use crate::tolerances::{
     AT_THE_ROOT, FIRST_WATCH, LAST_WATCH, MOST_PIECES, MOST_TESTS, STEADY_CYCLE,
 };
@@ -38,7 +38,7 @@ pub(super) fn limit(fields: &NormalFields, u: &[f64], patience: Patience) -> Out
         }
         cell = Some(here);
         if let Some(mode) = watch.note(time, &u) {
-            return oscillation(fields, &mode);
+            return oscillation(fields, &mode, patience);
         }
         if watch.is_over() {
             break;
@@ -73,8 +73,8 @@ fn at_rest(sides: &[i8], root: Vec<f64>) -> Outcome {
     }
 }
 
-fn oscillation(fields: &NormalFields, mode: &[i8]) -> Outcome {
-    let roots = stable_roots(&fields.restrict(mode));
+fn oscillation(fields: &NormalFields, mode: &[i8], patience: Patience) -> Outcome {
+    let roots = stable_roots_within(&fields.restrict(mode), patience);
     Outcome::Sliding {
         mode: Mode::new(mode.to_vec()),
         multipliers: roots.into_iter().next().unwrap_or_default(),
