@@ -357,6 +357,7 @@ pub(crate) enum Left {
 
 impl Left {
     /// What vanishes after the decision at surface `j`.
+    #[inline]
     pub fn after(j: usize, decision: &Decision) -> Lefts {
         if let Some(motion) = decision.starts_at_two_fold() {
             let first = |value: f64| Leading { order: 1, value };

@@ -127,6 +127,7 @@ impl<'a> ModeField<'a> {
     }
 
     /// The multipliers at the last evaluation, in the order of the surfaces slid on.
+    #[inline]
     pub fn multipliers(&self) -> SmallVec<[f64; 2]> {
         match self {
             ModeField::Region(_) => SmallVec::new(),

@@ -145,7 +145,7 @@ impl<'a> Motion<'a> {
             };
             self.replace_field(field);
         }
-        if self.mode != mode {
+        if !self.settled.is_empty() && self.mode != mode {
             self.settled.clear();
         }
         self.affine_bounds = None;
