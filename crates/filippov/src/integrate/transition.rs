@@ -104,7 +104,10 @@ impl<'a> Integrator<'a> {
         let mut decision = if self.recorder.decisions.len() < self.options.keep_decisions {
             let kept = self.ask(cause, |at, notes| decide_and_record(at, notes, reached));
             let (decision, record) = kept?;
-            self.recorder.decisions.push(record);
+            // One that was interrupted depends on the time it had.
+            if self.watch.stop().is_none() {
+                self.recorder.decisions.push(record);
+            }
             decision
         } else {
             self.ask(cause, |at, notes| decide(at, notes, reached))?
