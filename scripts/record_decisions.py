@@ -2,9 +2,10 @@
 
 Usage: ``python scripts/record_decisions.py [--seeds 20000] [--no-suite] [--output PATH]``. Of the decisions
 that are alike in their cause, rule, modes and what vanishes at the start of the new motion, a few are kept,
-each of another run. A decision is kept only if a replay gives the same outcome. The script prints how many
-did not, and how many came from systems and resets that cannot be written to a file (Python functions that are
-called and not traced).
+each of another run. Each is asked for once more at once: if the outcome is another one, the record lacks
+something that the decision depends on, or rounding decides. Then nothing is written and the script ends with
+an error. It prints how many decisions came from systems and resets that cannot be written to a file (Python
+functions that are called and not traced).
 """
 
 from __future__ import annotations
@@ -103,7 +104,6 @@ class Recorder:
             outcome = json.loads(json.dumps(outcome))
             wrong = list(differences(outcome, found))
             if wrong:
-                self.counts["not reproduced"] += 1
                 self.not_reproduced.append(f"{self.source}: rule {outcome['rule']}; {'; '.join(wrong)}")
                 continue
             atol = known["atol"] if isinstance(known["atol"], float) else list(known["atol"])
@@ -201,10 +201,13 @@ def main() -> int:
         jobs = [] if given.no_suite else [pool.submit(record_suite, part) for part in (0, 1)]
         jobs.append(pool.submit(record_fuzz, range(given.seeds)))
         entries, counts, not_reproduced = merged([job.result() for job in jobs])
-    write(entries, given.output)
     print(", ".join(f"{name}: {count}" for name, count in counts.items()))
+    if not_reproduced:
+        print(f"{len(not_reproduced)} decisions are not reproduced; nothing is written")
+        print(*not_reproduced[:SHOWN], sep="\n")
+        return 1
+    write(entries, given.output)
     print(f"{len(entries)} decisions kept, {given.output.stat().st_size / 1e6:.2f} MB")
-    print(*not_reproduced[:SHOWN], sep="\n")
     return 0
 
 

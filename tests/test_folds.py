@@ -7,6 +7,7 @@ from typing import Any
 import filippov as fl
 import numpy as np
 import pytest
+from filippov._core import RunOptions, TracedSystem, solve
 from products import T_END, random_products
 
 
@@ -50,6 +51,22 @@ def test_random_products_are_decided() -> None:
         case = random_products(seed)
         sol = case.system().solve((0.0, T_END), case.y0, rtol=1e-8, atol=1e-9, max_steps=20_000)
         assert sol.success, (seed, sol.message)
+
+
+@pytest.mark.parametrize("seed", [10, 697])
+def test_a_multiplier_at_its_end_leaves_to_its_side(seed: int) -> None:
+    """The normal component is rounding there, and with the other sign no root continues the multipliers."""
+    case = random_products(seed)
+    core = case.system().prepare(len(case.y0), 0.0, None, {}).core
+    assert isinstance(core, TracedSystem)
+    options = RunOptions({"rtol": 1e-8, "atol": 1e-9, "keep_decisions": 100})
+    run = solve(core, 0.0, T_END, case.y0, np.zeros(0), options, [])
+    exits = []
+    for point, outcome in run.decisions():
+        if len(case.y0) == point["mode"].count(0) == outcome["mode"].count(0) + 1:
+            exits += [(order, sign * outcome["mode"][j]) for (_, j), order, sign in outcome["zeros"]]
+    assert exits
+    assert set(exits) == {(2, 1)}
 
 
 @pytest.mark.parametrize("seed", [491, 739])

@@ -8,6 +8,7 @@ import filippov as fl
 import numpy as np
 import pytest
 from clocks import ManualClock, solve_by
+from filippov._core import RunOptions, TracedSystem, replay_decision, solve
 
 ENDS = [2.0, 50.0, 1e3, 1e4, 1e5, 1e6]
 
@@ -111,8 +112,7 @@ def test_a_mode_before_that_cannot_be_there_is_refused() -> None:
         system.classify(0.0, [1.0], before="-")
 
 
-@pytest.mark.filterwarnings("ignore::filippov.FilippovWarning")
-def test_a_long_decision_ends_at_the_limit_of_wall_time() -> None:
+def long_decision() -> tuple[Any, list[float]]:
     """Three surfaces whose signs multiply one another: the hidden dynamics is followed for many steps."""
     rows = [(1.18, 0.57), (0.88, 0.82), (-0.92, 0.17)]
     values = [(4, 4), (8, 4), (2, -4), (2, 4), (2, 6), (-2, -2), (-4, -2), (-4, -2)]
@@ -127,7 +127,12 @@ def test_a_long_decision_ends_at_the_limit_of_wall_time() -> None:
             dx = [d + weight * v for d, v in zip(dx, value, strict=True)]
         return dx
 
-    start = [2.16726531, -3.12570564]
+    return fun, [2.16726531, -3.12570564]
+
+
+@pytest.mark.filterwarnings("ignore::filippov.FilippovWarning")
+def test_a_long_decision_ends_at_the_limit_of_wall_time() -> None:
+    fun, start = long_decision()
     free = fl.solve_ivp(fun, (0.0, 3.0), start)
     # Each look at the clock takes a millisecond; there are few between steps, and many in the decision.
     clock = ManualClock(per_look=1e-3)
@@ -137,3 +142,17 @@ def test_a_long_decision_ends_at_the_limit_of_wall_time() -> None:
     stopped = met[0] if met else free.t[-1]
     assert sol.t[-1] == pytest.approx(stopped, abs=1e-9)
     assert clock.seconds < 0.3
+
+
+def test_a_decision_that_is_interrupted_is_not_recorded() -> None:
+    """It depends on the time it had, which a replay does not know."""
+    fun, start = long_decision()
+    core = fl.System(fun, n=2).prepare(2, 0.0, None, {}).core
+    assert isinstance(core, TracedSystem)
+    clock = ManualClock(per_look=1e-3)
+    options = RunOptions({"max_wall_time": 0.2, "clock": clock, "keep_decisions": 100})
+    run = solve(core, 0.0, 3.0, np.array(start), np.zeros(0), options, [])
+    assert run.reason == "max_wall_time"
+    assert run.decisions()
+    for point, outcome in run.decisions():
+        assert replay_decision(core, np.zeros(0), RunOptions({}), [], point) == outcome

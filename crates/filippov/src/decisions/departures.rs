@@ -1,6 +1,6 @@
 //! How a motion leaves the surfaces that meet at its start.
 
-use super::point::{Left, Lefts, Notes, Point};
+use super::point::{Left, Lefts, Notes, Point, Values};
 use smallvec::smallvec;
 
 use crate::error::FieldError;
@@ -8,7 +8,7 @@ use crate::field::{IntersectionField, SlidingField, SmoothField};
 use crate::mode::Mode;
 use crate::switching::{first_nonzero, Leading};
 use crate::system::{dot, dot_magnitude};
-use crate::tolerances::DEPARTS_TANGENTIALLY;
+use crate::tolerances::{DEPARTS_TANGENTIALLY, MOST_MEETING};
 
 /// The surfaces of `meeting` that the motion in `after` leaves, with the leading derivatives of h.
 pub(crate) fn departures(
@@ -31,13 +31,16 @@ pub(crate) fn departures(
     let mut velocity = vec![0.0; n];
     velocity_in(at, notes, after, multipliers, at.t, at.x, &mut velocity)?;
     let mut gradient = vec![0.0; n];
+    // At the exit of a multiplier all forces may balance, and nothing of the motion itself tells how large they are.
+    let mut around: Vec<usize> = leaving.iter().copied().chain(after.sliding_set()).collect();
+    around.sort_unstable();
+    let sizes = component_sizes(at, notes, after, &around)?;
     for j in leaving {
         let ht = at.system.gradient(j, at.t, at.x, &signs, &mut gradient)?;
         let value = ht + dot(&gradient, &velocity);
         let size = ht.abs() + dot_magnitude(&gradient, &velocity);
-        let leading = if value.abs() > DEPARTS_TANGENTIALLY * size
-            && departs_clearly(at, notes, after, multipliers, j, value)?
-        {
+        let place = around.binary_search(&j).unwrap_or(0);
+        let leading = if value.abs() > DEPARTS_TANGENTIALLY * size.max(sizes[place]) {
             Leading { order: 1, value }
         } else if after.codimension() == 0 {
             let side = after.entries()[j];
@@ -52,25 +55,29 @@ pub(crate) fn departures(
     Ok(left)
 }
 
-/// Is a normal component clear of rounding, compared with that beyond the surface? At the exit of a multiplier
-/// all forces may balance, and nothing of the motion itself tells how large they are.
-fn departs_clearly(
+/// The largest component normal to each of these surfaces among the fields around them, or a bound of it where the field is
+/// affine in their signs; 0 where the fields are too many to be looked at, or not finite.
+fn component_sizes(
     at: &Point,
     notes: &mut Notes,
-    after: &Mode,
-    multipliers: &[f64],
-    j: usize,
-    value: f64,
-) -> Result<bool, FieldError> {
-    let beyond = after.with(j, -after.entries()[j]);
-    let (x, mut velocity) = (at.x.to_vec(), vec![0.0; at.x.len()]);
-    velocity_in(at, notes, &beyond, multipliers, at.t, &x, &mut velocity)?;
-    let mut gradient = vec![0.0; x.len()];
-    let signs = beyond.signs();
-    let ht = at.system.gradient(j, at.t, &x, &signs, &mut gradient)?;
-    let other = ht + dot(&gradient, &velocity);
-    let is_rounding = value.abs() <= DEPARTS_TANGENTIALLY * other.abs();
-    Ok(!is_rounding)
+    mode: &Mode,
+    surfaces: &[usize],
+) -> Result<Values, FieldError> {
+    let affine = at.system.affine_signs();
+    let parts = affine.and_then(|affine| Some((affine, affine.affine_parts(surfaces)?)));
+    if let Some((affine, mut parts)) = parts {
+        notes.n_field_evaluations += parts.evaluate(affine, at.t, at.x, &mode.signs())?;
+        let spread = |row| parts.normal().row(row).map(|(_, n)| n.abs()).sum::<f64>();
+        let rows = parts.nu().into_iter().enumerate();
+        return Ok(rows.map(|(row, nu)| nu.abs() + spread(row)).collect());
+    }
+    let groups = at.system.sign_groups(surfaces);
+    if groups.iter().any(|group| group.len() > MOST_MEETING) {
+        return Ok(smallvec![0.0; surfaces.len()]);
+    }
+    let fields = at.corners(notes, surfaces, mode)?.normal_fields();
+    let size = |i| fields.as_ref().map_or(0.0, |fields| fields.row_size(i));
+    Ok((0..surfaces.len()).map(size).collect())
 }
 
 /// The rate of dh_j/dt along the motion in `after`, which has this velocity.

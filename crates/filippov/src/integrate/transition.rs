@@ -105,6 +105,7 @@ impl<'a> Integrator<'a> {
         let mut decision = if self.recorder.decisions.len() < self.options.keep_decisions {
             let kept = self.ask(cause, |at, notes| decide_and_record(at, notes, reached));
             let (decision, record) = kept?;
+            // One that was interrupted depends on the time it had.
             if self.watch.stop().is_none() {
                 self.recorder.decisions.push(record);
             }
