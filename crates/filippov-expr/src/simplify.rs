@@ -135,6 +135,7 @@ impl Graph {
 
     fn negative(&mut self, a: NodeId) -> NodeId {
         match *self.node(a) {
+            Node::Constant(value) => self.constant(-value),
             Node::Unary(UnaryOp::Neg, inner) => inner,
             Node::Binary(BinaryOp::Sub, left, right) => self.sub(right, left),
             Node::Binary(op @ (BinaryOp::Mul | BinaryOp::Div), left, right) => {

@@ -164,3 +164,16 @@ fn products_of_many_absolute_values_stay_small() {
     assert!(g.len() < 10_000, "{}", g.len());
     assert!(matches!(g.node(product), Node::Binary(BinaryOp::Mul, ..)));
 }
+
+#[test]
+fn no_constant_is_negated() {
+    let mut g = Graph::new();
+    let x = g.state(0);
+    let (zero, square) = (g.constant(0.0), g.mul(x, x));
+    let opposite = g.neg(square);
+    let ratio = g.div(square, opposite);
+    assert_eq!(g.as_constant(ratio), Some(-1.0));
+    let one = g.constant(1.0);
+    let difference = g.sub(zero, one);
+    assert_eq!(g.as_constant(difference), Some(-1.0));
+}

@@ -3,19 +3,22 @@
 
 use filippov_expr::{Backend, BinaryOp, Graph, NodeId, Program, UnaryOp};
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 
-/// How many times more cases to try than usual: the environment variable `EXPR_TEST_FACTOR`.
-fn factor() -> u32 {
-    std::env::var("EXPR_TEST_FACTOR")
+/// A number from the environment, 1 if it has none.
+fn number(variable: &str) -> u32 {
+    std::env::var(variable)
         .ok()
         .and_then(|text| text.parse().ok())
         .unwrap_or(1)
 }
 
-/// That many cases; failures become tests of their own, not files.
+/// That many cases, times `EXPR_TEST_FACTOR` of the environment. They are the same in every run, unless `EXPR_TEST_SEED`
+/// is another. Failures become tests of their own, not files.
 pub fn config(cases: u32) -> ProptestConfig {
     ProptestConfig {
-        cases: cases * factor(),
+        cases: cases * number("EXPR_TEST_FACTOR"),
+        rng_seed: RngSeed::Fixed(number("EXPR_TEST_SEED").into()),
         failure_persistence: None,
         max_global_rejects: u32::MAX,
         ..ProptestConfig::default()

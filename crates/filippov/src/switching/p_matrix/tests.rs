@@ -3,6 +3,7 @@
 use super::is_p_matrix;
 use crate::sparse::SparseRows;
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 
 fn determinant(a: &[Vec<f64>]) -> f64 {
     match a.split_first() {
@@ -55,7 +56,7 @@ fn known_classes_are_recognised_at_any_size() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, rng_seed: RngSeed::Fixed(1), ..ProptestConfig::default() })]
 
     #[test]
     fn minors_decide(entries in prop::collection::vec(-1.0..1.0, 16), own in 0.0..1.5) {
