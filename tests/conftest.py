@@ -11,7 +11,7 @@ from command_line import MODEL
 
 
 def pytest_configure() -> None:
-    """Let Ctrl-C interrupt, which the tests send: a program that a shell starts in the background ignores it."""
+    """Let Ctrl-C, which the tests send, interrupt: programs started in the background ignore it."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
