@@ -420,7 +420,9 @@ impl<'a> Integrator<'a> {
         self.motion.project(self.t, &mut self.x)?;
         self.rest_on_coinciding()?;
         self.evaluate_start()?;
-        self.note_oscillation();
+        if self.motion.sliding.len() > 1 {
+            self.note_oscillation();
+        }
         if !leaps {
             let multipliers = self.motion.multipliers();
             self.recorder.begin_segment(
@@ -430,8 +432,10 @@ impl<'a> Integrator<'a> {
                 &self.motion.discrete,
             );
         }
-        if let Some(stop) = refusal(&self.motion.field, &self.motion.sliding) {
-            return Ok(Some(stop));
+        if self.motion.sliding.len() > 1 {
+            if let Some(stop) = refusal(&self.motion.field, &self.motion.sliding) {
+                return Ok(Some(stop));
+            }
         }
         if self.system.has_nested_signs() {
             if let Some(stop) = self.differs_between_sides(self.t, &self.x)? {
