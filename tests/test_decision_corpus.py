@@ -49,7 +49,7 @@ def test_corpus_has_all_kinds(entries: list[Entry]) -> None:
         "region",
         "touch",
         "one_surface",
-        "apart",
+        "germs",
         "trial",
         "relay",
         "first_order",

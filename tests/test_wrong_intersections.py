@@ -46,12 +46,16 @@ def test_parallel_gradients() -> None:
         np.testing.assert_allclose(sol.y[:, -1], [0.0, -1.0, 1.0], rtol=0, atol=1e-8)
 
 
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 def test_one_surface_declared_twice() -> None:
+    """Both functions vanish together, so that one equation determines two multipliers."""
     twice = system(INWARDS, x0, lambda t, x: x[0] + x[0] ** 3)
-    assert twice.classify(0.0, [0.0, 0.0, 0.0]).mode is None
+    point = twice.classify(0.0, [0.0, 0.0, 0.0])
+    assert (str(point.mode), point.unique) == ("00", False)
     sol = twice.solve((0, 3), [1.0, 1.0, 0.0])
-    stopped(sol, "proportional")
-    assert sol.t[-1] == pytest.approx(1.0, abs=1e-9)
+    assert sol.success, sol.message
+    assert [warning.code for warning in sol.warnings] == ["non_unique"]
+    np.testing.assert_allclose(sol.y[:, -1], [0.0, 0.0, 3.0], atol=1e-9)
 
 
 def test_proportional_normal_components() -> None:
@@ -77,13 +81,15 @@ def test_not_a_number_in_one_corner(corner: tuple[int, int]) -> None:
 
 
 def test_two_fold_at_an_intersection() -> None:
-    """Both fields at the first surface are tangent to it where it meets the second one."""
+    """Both fields at the first surface are tangent to it where it meets the second one, and attract later."""
     fields = {signs: (lambda t, x, s=signs: [-s[0] * x[2], -float(s[1]), 1.0]) for signs in SQUARE}
     folds = system(fields, x0, x1)
     point = folds.classify(0.0, [0.0, 0.0, 0.0])
-    assert point.mode is None
-    assert "tangent" in point.reason or "proportional" in point.reason
-    stopped(folds.solve((0, 1), [0.0, 0.0, 0.0]), "not decided")
+    assert (str(point.mode), point.unique) == ("00", True)
+    np.testing.assert_allclose(point.multipliers, [0.0, 0.0], atol=1e-12)
+    sol = folds.solve((0, 1), [0.0, 0.0, 0.0])
+    assert sol.success, sol.message
+    np.testing.assert_allclose(sol.y[:, -1], [0.0, 0.0, 1.0], atol=1e-12)
 
 
 @pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")

@@ -93,7 +93,7 @@ def test_switches_name_their_rules() -> None:
     sol = fl.solve_ivp(relays, (0.0, 2.0), [0.5, 1.0])
     assert sol.switches.rule == [switch.rule for switch in sol.switches]
     assert sol.switches.rule[0] == "one_surface"
-    assert set(sol.switches.rule[1:]) <= {"relay", "apart", "first_order"}
+    assert set(sol.switches.rule[1:]) <= {"relay", "germs", "first_order"}
     assert list(sol.switches.to_pandas()["rule"]) == sol.switches.rule
 
 

@@ -30,10 +30,14 @@ def test_two_equal_blocks_stop() -> None:
 
 
 def test_proportional_normal_components_are_not_decided_in_silence() -> None:
-    sol = fl.solve_ivp(lambda t, x: [0.3 - np.sign(x[0]) * np.sign(x[1])] * 2, (0, 4), [1.0, 1.0])
-    assert not sol.success
-    assert "proportional" in sol.message
-    assert sol.t[-1] == pytest.approx(1 / 0.7, abs=1e-9)
+    """All multipliers whose product is 0.3 hold the motion at 0, and the region -- leads away."""
+    with pytest.warns(fl.FilippovWarning, match="non_unique"):
+        sol = fl.solve_ivp(lambda t, x: [0.3 - np.sign(x[0]) * np.sign(x[1])] * 2, (0, 4), [1.0, 1.0])
+    assert sol.success, sol.message
+    (warning,) = sol.warnings
+    assert warning.t == pytest.approx(1 / 0.7, abs=1e-9)
+    assert {str(mode) for mode in warning.candidates} == {"--", "00"}
+    np.testing.assert_allclose(sol.y[:, -1], 2 * [1.0 - 0.7 * 4], atol=1e-9)
 
 
 def test_spiral_that_shrinks_to_rounding_in_two_turns() -> None:

@@ -144,6 +144,8 @@ fn evaluations_within(
     let system = system.with_smooth_surfaces(&bodies);
     let options = Options {
         max_wall_time: limit.map(|limit| 1e-3 * (limit as f64 - 0.5)),
+        // A motion that follows makes no step.
+        max_steps: 0,
         ..options(&clock)
     };
     let (y0, never) = (vec![0.0; n], &mut |_: f64| false);

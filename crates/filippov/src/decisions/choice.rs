@@ -30,7 +30,8 @@ pub(super) fn follow_at_surface(
     }
     let mut next = Next::new(after, Left::after(j, &decision));
     if let Some(motion) = decision.starts_at_two_fold() {
-        next.start_mut().at_two_fold = Some(motion.multiplier());
+        let start = next.start_mut();
+        (start.multipliers, start.is_given) = (vec![motion.multiplier()], true);
     }
     Ok(next)
 }

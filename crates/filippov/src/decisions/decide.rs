@@ -2,10 +2,10 @@
 
 use smallvec::SmallVec;
 
-use super::apart::decide_apart;
 use super::coinciding::{decide_without_kinks, leave_coinciding};
 use super::contact::decide_in_contact;
 use super::event::{arrival_at_surface, touch, vanishing_surfaces, Reached};
+use super::germs::decide_if_doubtful;
 use super::leave_by_rule::leave_by_rule;
 use super::limits::stay_at_limit;
 use super::look_ahead::decide_where_two_touch;
@@ -34,11 +34,11 @@ const LIST: [(Rule, Apply); 14] = [
     (Rule::Bends, leave_along_bends),
     (Rule::Coinciding, decide_without_kinks),
     (Rule::Limit, stay_at_limit),
-    (Rule::Apart, decide_apart),
     (Rule::Trial, decide_where_two_touch),
     (Rule::Law, leave_by_rule),
     (Rule::VanishingJump, decide_where_jump_vanishes),
     (Rule::Relay, decide_by_relay),
+    (Rule::Germs, decide_if_doubtful),
     (Rule::TooMany, too_many),
 ];
 
@@ -145,14 +145,14 @@ fn check(
     rule: Rule,
     mut decided: Decided,
 ) -> Result<Decided, FieldError> {
-    use Rule::{Apart, Coinciding, FirstOrder, Law, Limit, Relay, TooMany, Trial, VanishingJump};
+    use Rule::{Coinciding, FirstOrder, Germs, Law, Limit, Relay, TooMany, Trial, VanishingJump};
     let is_event = matches!(meeting.how, How::Event(_));
     if is_event && matches!(rule, Law | VanishingJump | Relay | TooMany | FirstOrder) {
         decided = decide_with_kinetic_friction(at, notes, decided, meeting)?;
     }
     let is_intersection = matches!(
         rule,
-        Apart | Coinciding | FirstOrder | Limit | Relay | Law | TooMany | Trial | VanishingJump
+        Germs | Coinciding | FirstOrder | Limit | Relay | Law | TooMany | Trial | VanishingJump
     );
     if is_intersection {
         decided = reject_if_not_attracting(at, decided, meeting.surfaces)?;

@@ -51,7 +51,7 @@ pub(super) fn decide_by_trial(
             let mut candidate = mode.clone();
             let pairs = meeting.iter().zip(&entries);
             pairs.for_each(|(&j, &entry)| candidate.set(j, entry));
-            if let Some(left) = lasts_in(at, notes, &candidate, meeting)? {
+            if let Trial::Leaves(left) = try_mode(at, notes, &candidate, meeting)? {
                 if found.replace((candidate, left)).is_some() {
                     return Ok(None);
                 }
@@ -65,13 +65,13 @@ pub(super) fn decide_by_trial(
     }
 }
 
-/// What a motion leaves that lasts for a moment in this mode, if it does.
-fn lasts_in(
+/// Follows a motion in this mode for a moment, and longer until it is clear of rounding.
+pub(super) fn try_mode(
     at: &Point,
     notes: &mut Notes,
     candidate: &Mode,
     meeting: &[usize],
-) -> Result<Option<Lefts>, FieldError> {
+) -> Result<Trial, FieldError> {
     let entries = candidate.entries();
     let leaving: Vec<usize> = meeting
         .iter()
@@ -81,26 +81,25 @@ fn lasts_in(
     let mut velocity = vec![0.0; at.x.len()];
     velocity_in(at, notes, candidate, &[], at.t, at.x, &mut velocity)?;
     if velocity.iter().any(|v| !v.is_finite()) {
-        return Ok(None);
+        return Ok(Trial::WithinRounding);
     }
     let mut moment = at.moment(notes, &candidate.signs(), &velocity)?;
     for _ in 0..=MOST_LENGTHENINGS {
         match leaves_within(at, notes, candidate, &leaving, moment)? {
-            Trial::Leaves(left) => return Ok(Some(left)),
-            Trial::Ends => return Ok(None),
             Trial::WithinRounding => moment *= LONGER_TRIAL,
+            trial => return Ok(trial),
         }
     }
-    Ok(None)
+    Ok(Trial::WithinRounding)
 }
 
 /// What becomes of a motion within a short time.
-enum Trial {
+pub(super) enum Trial {
     /// It leaves surfaces to the sides of its mode.
     Leaves(Lefts),
     /// It leaves one to the other side, or its multipliers go beyond their ends.
     Ends,
-    /// Some function is not clear of rounding.
+    /// Some function is not clear of rounding, or the mode has no field.
     WithinRounding,
 }
 

@@ -2,7 +2,7 @@
 
 use super::choice::{asked, choose, follow_at_surface};
 use super::departures::departures;
-use super::higher_order::decide_by_higher_order;
+use super::germs::decide_undecided;
 use super::point::{Decided, Lefts, Next, Notes, Point};
 use super::rule::{How, Meeting};
 use super::settle::place_on;
@@ -76,6 +76,28 @@ pub(super) fn resolve_first_order(
         }
     };
     follow(at, notes, meeting, &corners, resolution, &others)
+}
+
+/// The mode to which the hidden dynamics at the point tends, if first-order data determine it.
+pub(super) fn hidden_limit(
+    at: &Point,
+    notes: &mut Notes,
+    meeting: &Meeting,
+) -> Result<Option<Mode>, FieldError> {
+    let corners = at.corners(notes, meeting.surfaces, meeting.mode)?;
+    let Ok(fields) = corners.normal_fields() else {
+        return Ok(None);
+    };
+    let kappa = at.policy.law.scaling(meeting.surfaces);
+    let incoming = match meeting.how {
+        How::Event(_) => incoming(at, notes, meeting, (&corners, &fields))?,
+        How::Start(_) | How::Limit => Incoming::Start,
+    };
+    let resolution = resolve_within(&fields, &incoming, &kappa, at.patience);
+    Ok(match resolution {
+        Ok(resolution) => resolution.mode().map(|mode| meeting.on_all(mode)),
+        Err(_) => None,
+    })
 }
 
 /// Rule: more surfaces whose signs multiply one another than all of whose fields can be looked at.
@@ -198,19 +220,7 @@ fn follow(
     let rest = region_at_rest(at.system, fields, mode, at.t, at.x)?;
     let resolution = match resolution {
         Ok(resolution) if !resolution.degenerate => resolution,
-        // Both say the same, and vanish somewhere in between: higher derivatives do not make them two.
-        Err(Undecided::Proportional)
-            if fields.telling().len() == meeting.len()
-                && rest.is_none()
-                && !fields.lead_to_one_side() =>
-        {
-            return Ok(Err(Stop::Intersection {
-                surfaces: meeting.to_vec(),
-                candidates: Vec::new(),
-                reason: Undecided::Proportional,
-            }));
-        }
-        other => return decide_by_higher_order(at, notes, mode, meeting, other, rest),
+        other => return decide_undecided(at, notes, place, other),
     };
     notes.leaf = resolution.leaf;
     notes.spirals = resolution.candidates.contains(&Continuation::OutwardSpiral);
@@ -229,12 +239,10 @@ fn follow(
             Some(asked) => (asked.clone(), None),
             None => match outward_leap(at, meeting, mode, fields) {
                 Some(leap) => (leap.region.clone(), Some(leap)),
-                None => {
-                    return decide_by_higher_order(at, notes, mode, meeting, Ok(resolution), rest)
-                }
+                None => return decide_undecided(at, notes, place, Ok(resolution)),
             },
         },
-        None => return decide_by_higher_order(at, notes, mode, meeting, Ok(resolution), rest),
+        None => return decide_undecided(at, notes, place, Ok(resolution)),
     };
     let preferred = after.clone();
     if !resolution.unique || is_spiral || candidates.len() > 1 {

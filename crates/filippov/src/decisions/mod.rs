@@ -5,15 +5,16 @@
 //! cost. No integrator is in sight: neither the end of the run nor the length of a step is known here. Where a rule has to
 //! look at the motion a moment later, the moment is [`Point::moment`].
 
-mod apart;
 mod between_sides;
+mod blow_up;
 mod choice;
 mod coinciding;
 mod contact;
 mod decide;
 mod departures;
 mod event;
-mod higher_order;
+mod germ;
+mod germs;
 mod leave_by_rule;
 pub(crate) mod limits;
 mod look_ahead;
@@ -24,7 +25,6 @@ mod placement;
 mod point;
 mod record;
 mod relay;
-mod resting;
 pub(crate) mod root_ends;
 mod rule;
 mod settle;
@@ -33,6 +33,7 @@ mod spiral;
 mod triggers;
 mod two_fold;
 mod vanishing_jump;
+mod viable;
 
 pub(crate) use between_sides::differs_between_sides;
 pub(crate) use coinciding::surfaces_in_the_place_of_those_slid_on;

@@ -315,8 +315,8 @@ pub(crate) struct Start {
     pub multipliers: Vec<f64>,
     /// The regularised motion oscillates around them.
     pub oscillates: bool,
-    /// The multiplier of sliding on one surface that begins at a two-fold.
-    pub at_two_fold: Option<f64>,
+    /// Do the equations of the multipliers vanish at the start, so that these hold there?
+    pub is_given: bool,
     /// The motion begins with the laps of an outward spiral.
     pub leap: Option<Leap>,
     /// The state, where that is not the place of the decision.

@@ -269,11 +269,7 @@ impl DecisionOutcome {
             Ok(next) => (Some(next), ""),
             Err(stop) => (None, stop.name()),
         };
-        let start = next.and_then(|next| next.start.as_deref());
-        let multipliers = start.map_or_else(Vec::new, |start| match start.at_two_fold {
-            Some(multiplier) => vec![multiplier],
-            None => start.multipliers.clone(),
-        });
+        let multipliers = next.map_or_else(Vec::new, |next| next.multipliers().to_vec());
         DecisionOutcome {
             mode: next.map(|next| next.mode.clone()),
             stop,

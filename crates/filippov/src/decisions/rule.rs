@@ -20,8 +20,8 @@ pub(crate) enum Rule {
     Coinciding,
     /// Switches accumulate, and the motion stays on all surfaces.
     Limit,
-    /// Surfaces that are decided one by one.
-    Apart,
+    /// The first derivatives of all guards that do not vanish, where first-order data are doubtful.
+    Germs,
     /// Two surfaces that touch one another: the modes are tried for a moment.
     Trial,
     /// The rule of sliding that the caller chose ends.
@@ -51,7 +51,7 @@ impl Rule {
             Rule::Bends => "bends",
             Rule::Coinciding => "coinciding",
             Rule::Limit => "limit",
-            Rule::Apart => "apart",
+            Rule::Germs => "germs",
             Rule::Trial => "trial",
             Rule::Law => "sliding_rule",
             Rule::VanishingJump => "vanishing_jump",

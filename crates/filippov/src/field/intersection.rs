@@ -1,7 +1,7 @@
 //! The sliding field on an intersection of surfaces.
 
 use super::weights::RuleFailure;
-use super::{AffineLaw, Canopy, Projector, RuleLaw, SmoothField};
+use super::{AffineLaw, Canopy, MeetingFields, Projector, RuleLaw, SmoothField};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::options::SlidingRule;
@@ -68,6 +68,8 @@ pub struct IntersectionField<'a> {
     /// Those that were found lately, with their times: from the nearest ones the next are tracked.
     tracked: Vec<(f64, Vec<f64>)>,
     exits: Vec<f64>,
+    /// The time of a start at which the equations vanish, and the multipliers there.
+    start: Option<(f64, Vec<f64>)>,
     is_rootless: bool,
     /// How far multipliers may go beyond their ends, by exit function.
     slack: Vec<f64>,
@@ -111,6 +113,7 @@ impl<'a> IntersectionField<'a> {
             lambda: Vec::new(),
             tracked: vec![(f64::INFINITY, lambda.to_vec())],
             exits: vec![f64::NAN; 2 * set.len() + 2],
+            start: None,
             is_rootless: false,
             slack: vec![0.0; 2 * set.len()],
             oscillates: None,
@@ -171,10 +174,16 @@ impl<'a> IntersectionField<'a> {
     /// regularised motion goes around the root, so that it need not be stable.
     pub fn begin(&mut self, lambda: &[f64], oscillates: bool) {
         self.tracked = vec![(f64::INFINITY, lambda.to_vec())];
+        self.start = None;
         self.oscillates = oscillates.then_some(true);
         if let Some(law) = &mut self.affine {
             law.begin();
         }
+    }
+
+    /// The equations vanish at the start of the motion: its multipliers there are those that it begins with.
+    pub fn hold_at_start(&mut self, t: f64) {
+        self.start = self.tracked.first().map(|(_, lambda)| (t, lambda.clone()));
     }
 
     /// Lets the multiplier of an exit function go beyond its end by this much.
@@ -295,6 +304,17 @@ impl<'a> IntersectionField<'a> {
     /// Evaluates multipliers and exit functions at (t, x) and writes the field. Where there is no root they are NaN.
     fn solve(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), FieldError> {
         self.is_rootless = false;
+        if let Some((_, lambda)) = self.start.as_ref().filter(|(start, _)| *start == t) {
+            let mut around = MeetingFields::new(self.system, &self.set);
+            self.n_evaluations += around.evaluate(self.system, t, x, &self.signs)?;
+            let mut weights = Vec::new();
+            around.fill_product_weights(lambda, &mut weights);
+            around.combine(&weights, dx);
+            self.lambda.clone_from(lambda);
+            // The root was chosen among those that are stable.
+            self.fill_exits([1.0, 1.0]);
+            return Ok(());
+        }
         if let Some(law) = &mut self.by_rule {
             let evaluated = (self.system, &self.signs[..]);
             self.n_evaluations += law.eval(evaluated, t, x, &mut self.lambda, dx)?;

@@ -379,11 +379,9 @@ fn describe(
     if next.leaps() {
         return Ok(found);
     }
-    let at_two_fold = next.start.as_ref().and_then(|start| start.at_two_fold);
-    found.multipliers = match (next.mode.codimension(), at_two_fold) {
-        (0, _) => Vec::new(),
-        (1, Some(multiplier)) => vec![multiplier],
-        (m, _) if m == next.multipliers().len() => next.multipliers().to_vec(),
+    found.multipliers = match next.mode.codimension() {
+        0 => Vec::new(),
+        m if m == next.multipliers().len() => next.multipliers().to_vec(),
         _ => {
             let mut field = ModeField::of(system, law, &next.mode);
             field.exits_at(t, &mut x.to_vec())?;

@@ -406,13 +406,16 @@ impl<'a> Integrator<'a> {
                 let start = start.as_deref();
                 let multipliers = start.map_or(&[][..], |start| &start.multipliers);
                 field.begin(multipliers, start.is_some_and(|start| start.oscillates));
+                if start.is_some_and(|start| start.is_given) {
+                    field.hold_at_start(self.t);
+                }
                 for &(index, slack) in &self.slacks {
                     field.set_slack(index, slack);
                 }
             }
             ModeField::Sliding(field) => {
-                if let Some(multiplier) = start.and_then(|start| start.at_two_fold) {
-                    field.begin_at_two_fold(self.t, multiplier);
+                if let Some(start) = start.filter(|start| start.is_given) {
+                    field.begin_at_two_fold(self.t, start.multipliers[0]);
                 }
             }
             _ => {}

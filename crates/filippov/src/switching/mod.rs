@@ -53,7 +53,8 @@ pub use relay_at::relay_at;
 pub use resolution::{Continuation, Resolution, Undecided};
 pub use resolve::{has_one_mode_only, resolve, resolve_within};
 pub use roots::{
-    multiplier_rates, newton, roots_in_cube, stable_roots, stable_roots_within, Roots,
+    is_undetermined, multiplier_rates, newton, roots_in_cube, stable_roots,
+    stable_roots_with_border, stable_roots_within, Roots,
 };
 pub use shared_load::{SharedLoad, SharedLoads};
 pub(crate) use small_matrix::invert;

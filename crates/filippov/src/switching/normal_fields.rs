@@ -303,6 +303,31 @@ impl NormalFields {
         half
     }
 
+    /// The same canopy on a cube that is larger by this factor: its values at the vertices of that.
+    #[must_use]
+    pub fn enlarged(&self, factor: f64) -> NormalFields {
+        let mut enlarged = self.clone();
+        let mut vertex = vec![0.0; self.m];
+        for (group, to) in self.groups.iter().zip(&mut enlarged.groups) {
+            for pattern in 0..1_usize << group.members.len() {
+                for (bit, &i) in group.members.iter().enumerate() {
+                    vertex[i] = if pattern >> bit & 1 == 1 {
+                        factor
+                    } else {
+                        -factor
+                    };
+                }
+                let weights = group.weights(&vertex, None);
+                for j in 0..self.m {
+                    let values = group.values.iter().skip(j).step_by(self.m);
+                    to.values[pattern * self.m + j] =
+                        weights.iter().zip(values).map(|(w, v)| w * v).sum();
+                }
+            }
+        }
+        enlarged
+    }
+
     /// Changes every value: `change(group, surface, value)`.
     pub(super) fn map(&self, mut change: impl FnMut(usize, usize, f64) -> f64) -> NormalFields {
         let mut mapped = self.clone();

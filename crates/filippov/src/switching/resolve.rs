@@ -10,7 +10,9 @@ use super::resolution::{Continuation, Resolution, Undecided};
 use super::roots::{newton, stable_roots_within};
 use super::single;
 use super::stability::{is_negative_p_matrix, is_stable_for};
-use crate::tolerances::{AFTER_THE_EXIT, DOUBTFUL, MOST_MEETING, MOST_SCALED_SINGLY};
+use crate::tolerances::{
+    AFTER_THE_EXIT, DOUBTFUL, MOST_MEETING, MOST_SCALED_SINGLY, UNSTABLE_START,
+};
 
 /// Decides what follows at an intersection of m surfaces, scaled by `kappa`.
 ///
@@ -259,7 +261,15 @@ fn start(
         resolution.multipliers = only.multipliers.clone();
         resolution
     } else {
-        let outcome = limit_within(fields, &vec![0.0; fields.m()], kappa, patience);
+        let from = |u: f64| limit_within(fields, &vec![u; fields.m()], kappa, patience);
+        let mut outcome = from(0.0);
+        // u = 0 may be at rest in some directions, or on the border of two basins.
+        let is_found = |limit: &Continuation| found.iter().any(|one| one.continuation == *limit);
+        let is_lost =
+            !oscillates(&outcome) && continuation(&outcome).is_ok_and(|limit| !is_found(&limit));
+        if is_lost && !found.is_empty() {
+            outcome = from(UNSTABLE_START);
+        }
         let chosen = match (continuation(&outcome), found.last()) {
             // Fields in balance: as good as any other is the last one, that of the most entries +1.
             (Err(Undecided::AtRest), Some(last)) => last.continuation.clone(),

@@ -6,8 +6,8 @@ use super::patience::Patience;
 use super::small_matrix::Matrix;
 use super::stability::is_scaling_stable;
 use crate::tolerances::{
-    BOXES_PER_LOOK, FAR_FROM_THE_CUBE, INJECTIVE, MOST_BOXES, MOST_BOX_WORK, NARROWEST_BOX,
-    NEWTON_DONE, NEWTON_STEPS, SAME_ROOT,
+    AT_SIDE, BOXES_PER_LOOK, DOUBTFUL, FAR_FROM_THE_CUBE, INJECTIVE, MOST_BOXES, MOST_BOX_WORK,
+    NARROWEST_BOX, NEWTON_DONE, NEWTON_STEPS, SAME_ROOT,
 };
 
 /// The roots found in the cube.
@@ -108,6 +108,25 @@ pub fn stable_roots_within(fields: &NormalFields, patience: Patience) -> Vec<Vec
                 .collect()
         }
     }
+}
+
+/// The same in the cube with its border, and a little beyond it by rounding: multipliers at their ends are -1 or +1.
+pub fn stable_roots_with_border(fields: &NormalFields, patience: Patience) -> Vec<Vec<f64>> {
+    let factor = 1.0 + AT_SIDE;
+    let mut roots = stable_roots_within(&fields.enlarged(factor), patience);
+    for value in roots.iter_mut().flatten() {
+        *value = (factor * *value).clamp(-1.0, 1.0);
+    }
+    roots
+}
+
+/// Do the equations leave a line of multipliers within the cube, and not single roots? Looked at for two surfaces.
+pub fn is_undetermined(fields: &NormalFields) -> bool {
+    let crosses_zero = |j: usize| {
+        let ([low, high], noise) = (fields.row_range(j), DOUBTFUL * fields.row_size(j));
+        low < -noise && high > noise
+    };
+    fields.m() == 2 && Bilinear::of_fields(fields).is_undetermined() && (0..2).all(crosses_zero)
 }
 
 /// Newton's method from `start`, with full steps: for tracking a root from the last one.

@@ -25,6 +25,15 @@ pub const SURFACE_NOISE: f64 = 16.0 * EPS;
 /// indistinguishable from a tangency in the sense of every later comparison.
 pub const TANGENT: f64 = 1e-11;
 
+/// Highest order of the Taylor coefficients of a guard that are looked at before it counts as zero.
+pub const GERM_ORDER: usize = 6;
+
+/// A Taylor coefficient of a guard counts as zero below this fraction of what the sizes and rates of its terms allow.
+pub const VANISHING_GERM: f64 = 1e-10;
+
+/// Newton's method for the multipliers of divided equations starts at all points of this grid.
+pub const BLOW_UP_STARTS: [f64; 4] = [-0.9, -0.3, 0.3, 0.9];
+
 /// Highest order of Lie derivative looked at before a point counts as undecided.
 pub const MAX_LIE_ORDER: usize = 6;
 

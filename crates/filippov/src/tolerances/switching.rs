@@ -47,7 +47,8 @@ pub const DOUBTFUL: f64 = 1e-8;
 pub const BESIDE_THE_ROOT: f64 = 1e-6;
 
 /// Distance from a root of three and more surfaces that loses stability at which the hidden dynamics starts: the pair
-/// of eigenvalues that vanishes there says nothing, and what decides grows like the square of the distance.
+/// of eigenvalues that vanishes there says nothing, and what decides grows like the square of the distance. Also that from
+/// u = 0 of a second start, if the hidden dynamics from there rests in a repelling mode.
 pub const UNSTABLE_START: f64 = 0.1;
 
 /// Drift of the normal components after an exit, as a fraction of their size: small enough to leave
@@ -143,10 +144,6 @@ pub const MOST_BOX_WORK: usize = MOST_BOXES * 6 * 6 * 6;
 /// Boxes after which the search looks whether the caller still waits: each takes a microsecond for three surfaces and a
 /// tenth of a millisecond for six.
 pub const BOXES_PER_LOOK: usize = 64;
-
-/// Sides of other surfaces on which one surface is decided before the caller is asked whether to go on: traced functions take
-/// a microsecond on each side, black boxes some evaluations.
-pub const PATTERNS_PER_LOOK: usize = 8;
 
 /// Boxes narrower than this hold a root that is multiple up to rounding.
 pub const NARROWEST_BOX: f64 = 1e-6;

@@ -1,0 +1,245 @@
+//! Sliding where some equations of the multipliers vanish at the point: they are divided by the time since then.
+//!
+//! If the normal components a_i^k of all fields vanish at the point, the equation g_i(lambda) = 0 says nothing there. A
+//! moment tau later, along the motion with velocity v, they are tau (d_t a_i^k + grad a_i^k . v). So the multipliers
+//! with which sliding begins solve
+//!
+//! ```text
+//! g_i(lambda) = 0                                                    for the equations that do not vanish,
+//! sum over k of w_k(lambda) (d_t a_i^k + grad a_i^k . v(lambda)) = 0     for those that do,
+//! v(lambda) = sum over k of w_k(lambda) f^k
+//! ```
+//!
+//! On one surface this is the quadratic equation of a two-fold (Dieci, Lopez 2009, case IV).
+
+use super::point::{Notes, Point};
+use super::rule::Meeting;
+use crate::error::FieldError;
+use crate::field::eval_on_side;
+use crate::mode::Mode;
+use crate::switching::{stable_roots_with_border, Matrix, NormalFields};
+use crate::system::dot;
+use crate::tolerances::{
+    AT_SIDE, BLOW_UP_STARTS, FAR_FROM_THE_CUBE, NEWTON_STEPS, SAME_ROOT, TANGENT,
+};
+
+/// Sliding with multipliers that the divided equations determine.
+pub(super) struct Beginning {
+    pub multipliers: Vec<f64>,
+    /// Of every surface of the meeting: how fast h, or its rate if that vanishes in all fields, grows.
+    pub rates: Vec<f64>,
+    /// On one surface, how fast the normal components of f- and f+ grow.
+    pub components: [f64; 2],
+}
+
+/// The fields around the surfaces slid on, with the normal components to all surfaces of a meeting.
+struct Around {
+    /// The surfaces slid on, counted within the meeting.
+    slid: Vec<usize>,
+    /// Of every pattern: the velocity, and one row per surface of the meeting.
+    patterns: Vec<(Vec<f64>, Vec<Row>)>,
+    /// The surfaces of the meeting to which all fields are tangent.
+    is_silent: Vec<bool>,
+}
+
+/// A normal component, and how it changes.
+struct Row {
+    value: f64,
+    time: f64,
+    gradient: Vec<f64>,
+}
+
+/// All ways in which sliding in `mode`, on the surfaces of the meeting whose entry is 0, can begin.
+pub(super) fn beginnings(
+    at: &Point,
+    notes: &mut Notes,
+    meeting: &Meeting,
+    mode: &Mode,
+    is_silent: &[bool],
+) -> Result<Vec<Beginning>, FieldError> {
+    let Some(around) = Around::new(at, notes, meeting, mode, is_silent)? else {
+        return Ok(Vec::new());
+    };
+    let mut found: Vec<Beginning> = Vec::new();
+    for start in starts(around.slid.len()) {
+        let Some(multipliers) = around.root_from(start) else {
+            continue;
+        };
+        let is_same = |other: &Beginning| distance(&other.multipliers, &multipliers) <= SAME_ROOT;
+        if found.iter().any(is_same) {
+            continue;
+        }
+        let Ok(divided) = around.divided(&multipliers) else {
+            continue;
+        };
+        let roots = stable_roots_with_border(&divided, at.patience);
+        if roots
+            .iter()
+            .any(|root| distance(root, &multipliers) <= AT_SIDE)
+        {
+            let rates = around.rates(&multipliers);
+            let components = [divided.at(0)[0], divided.at(divided.n_patterns() - 1)[0]];
+            found.push(Beginning {
+                multipliers,
+                rates,
+                components,
+            });
+        }
+    }
+    Ok(found)
+}
+
+impl Around {
+    /// `None` if the caller does not wait.
+    fn new(
+        at: &Point,
+        notes: &mut Notes,
+        meeting: &Meeting,
+        mode: &Mode,
+        is_silent: &[bool],
+    ) -> Result<Option<Self>, FieldError> {
+        let slid: Vec<usize> = (0..meeting.surfaces.len())
+            .filter(|&i| mode.entries()[meeting.surfaces[i]] == 0)
+            .collect();
+        let surfaces: Vec<usize> = slid.iter().map(|&i| meeting.surfaces[i]).collect();
+        let mut patterns = Vec::with_capacity(1 << slid.len());
+        for pattern in 0..1_usize << slid.len() {
+            if at.patience.is_over() {
+                return Ok(None);
+            }
+            let signs = mode.on_sides(&surfaces, pattern).signs();
+            let mut velocity = vec![0.0; at.x.len()];
+            notes.n_field_evaluations +=
+                eval_on_side(at.system, at.t, at.x, &signs, &mut velocity)?;
+            let mut rows = Vec::with_capacity(meeting.surfaces.len());
+            for &j in meeting.surfaces {
+                let mut gradient = vec![0.0; at.x.len()];
+                let rate = at
+                    .system
+                    .rate_gradient(j, at.t, at.x, &signs, &mut gradient)?;
+                rows.push(Row {
+                    value: rate.rate,
+                    time: rate.time,
+                    gradient,
+                });
+            }
+            patterns.push((velocity, rows));
+        }
+        Ok(Some(Around {
+            slid,
+            patterns,
+            is_silent: is_silent.to_vec(),
+        }))
+    }
+
+    fn weights(&self, lambda: &[f64]) -> Vec<f64> {
+        let mut weights = vec![1.0];
+        for (bit, lambda) in lambda.iter().enumerate() {
+            for pattern in 0..1 << bit {
+                weights.push(0.5 * (1.0 + lambda) * weights[pattern]);
+                weights[pattern] *= 0.5 * (1.0 - lambda);
+            }
+        }
+        weights
+    }
+
+    fn velocity(&self, lambda: &[f64]) -> Vec<f64> {
+        let mut velocity = vec![0.0; self.patterns[0].0.len()];
+        for (weight, (field, _)) in self.weights(lambda).iter().zip(&self.patterns) {
+            velocity
+                .iter_mut()
+                .zip(field)
+                .for_each(|(v, f)| *v += weight * f);
+        }
+        velocity
+    }
+
+    /// The component normal to surface i of the meeting in one pattern, divided by time if it vanishes in all.
+    fn component(&self, pattern: usize, i: usize, velocity: &[f64]) -> f64 {
+        let row = &self.patterns[pattern].1[i];
+        match self.is_silent[i] {
+            true => row.time + dot(&row.gradient, velocity),
+            false => row.value,
+        }
+    }
+
+    /// How fast every h of the meeting, or its rate, grows with these multipliers.
+    fn rates(&self, lambda: &[f64]) -> Vec<f64> {
+        let (weights, velocity) = (self.weights(lambda), self.velocity(lambda));
+        let rate = |i: usize| -> f64 {
+            let terms = weights.iter().enumerate();
+            terms
+                .map(|(pattern, w)| w * self.component(pattern, i, &velocity))
+                .sum()
+        };
+        (0..self.is_silent.len()).map(rate).collect()
+    }
+
+    /// The equations of the surfaces slid on.
+    fn equations(&self, lambda: &[f64]) -> Vec<f64> {
+        let rates = self.rates(lambda);
+        self.slid.iter().map(|&i| rates[i]).collect()
+    }
+
+    /// The normal components of the surfaces slid on a moment later, divided by time where they vanish now, along the
+    /// motion with these multipliers.
+    fn divided(&self, lambda: &[f64]) -> Result<NormalFields, crate::switching::Undecided> {
+        let velocity = self.velocity(lambda);
+        let patterns = 0..self.patterns.len();
+        let values = patterns.flat_map(|pattern| {
+            let velocity = &velocity;
+            self.slid
+                .iter()
+                .map(move |&i| self.component(pattern, i, velocity))
+        });
+        NormalFields::new(self.slid.len(), values.collect())
+    }
+
+    /// A root in the cube, by Newton's method.
+    fn root_from(&self, mut lambda: Vec<f64>) -> Option<Vec<f64>> {
+        let m = lambda.len();
+        for _ in 0..NEWTON_STEPS {
+            let value = self.equations(&lambda);
+            let mut jacobian = Matrix::zeros(m);
+            for column in 0..m {
+                // The equations are quadratic: central differences are exact.
+                let [mut up, mut down] = [lambda.clone(), lambda.clone()];
+                (up[column], down[column]) = (lambda[column] + 0.5, lambda[column] - 0.5);
+                let (up, down) = (self.equations(&up), self.equations(&down));
+                for row in 0..m {
+                    jacobian[(row, column)] = up[row] - down[row];
+                }
+            }
+            let step = jacobian.solve(&value)?;
+            let length = step.iter().fold(0.0_f64, |m, d| m.max(d.abs()));
+            lambda.iter_mut().zip(&step).for_each(|(l, d)| *l -= d);
+            if lambda
+                .iter()
+                .any(|l| l.is_nan() || l.abs() > FAR_FROM_THE_CUBE)
+            {
+                return None;
+            }
+            if length <= TANGENT {
+                let is_inside = lambda.iter().all(|l| l.abs() <= 1.0 + AT_SIDE);
+                return is_inside.then_some(lambda);
+            }
+        }
+        None
+    }
+}
+
+/// Where Newton's method starts.
+fn starts(m: usize) -> impl Iterator<Item = Vec<f64>> {
+    let n = BLOW_UP_STARTS.len();
+    (0..n.pow(m as u32)).map(move |index| {
+        (0..m)
+            .map(|i| BLOW_UP_STARTS[index / n.pow(i as u32) % n])
+            .collect()
+    })
+}
+
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter()
+        .zip(b)
+        .fold(0.0, |most, (a, b)| most.max((a - b).abs()))
+}

@@ -1,0 +1,126 @@
+//! Germs: how the guards of a mode begin along its motion.
+
+use std::sync::Arc;
+
+use super::point::Point;
+use crate::error::FieldError;
+use crate::mode::{Mode, Signs};
+use crate::switching::Leading;
+use crate::system::{dot, MotionJets};
+use crate::tolerances::{GERM_ORDER, VANISHING_GERM};
+
+/// How a guard begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Germ {
+    /// With this derivative, the first that does not vanish; order 0 is the value.
+    Begins(Leading),
+    /// All derivatives up to the highest order vanish.
+    Zero,
+    /// A derivative does not exist at the point.
+    Unknown,
+}
+
+/// The Taylor coefficients of the motion in a mode.
+pub(super) struct MotionSeries {
+    jets: Arc<MotionJets>,
+    signs: Signs,
+    rows: Vec<f64>,
+    n: usize,
+    /// The rate at which the motion changes, per component of the state: coefficient k is at most about `size * rate^k`.
+    rates: Vec<f64>,
+    sizes: Vec<f64>,
+}
+
+impl MotionSeries {
+    /// The series from the point, with these multipliers of the surfaces slid on; `None` if the system has none.
+    pub fn of(at: &Point, mode: &Mode, multipliers: &[f64]) -> Option<Self> {
+        let sliding: Vec<usize> = mode.sliding_set().collect();
+        let jets = at.system.motion_jets(&sliding, GERM_ORDER)?;
+        let mut signs = mode.signs();
+        for (&j, &multiplier) in sliding.iter().zip(multipliers) {
+            signs[j] = multiplier;
+        }
+        let (n, width) = (at.x.len(), jets.width());
+        let mut rows = vec![0.0; (jets.order() + 1) * width];
+        at.system.eval_jets(&jets, at.t, at.x, &signs, &mut rows);
+        let sizes: Vec<f64> = (0..n).map(|i| at.scale.size(i, at.x[i])).collect();
+        let of = |i: usize, k: usize| (rows[k * width + i] / sizes[i]).abs();
+        let speed = (0..n).map(|i| of(i, 1)).fold(0.0, f64::max);
+        let rate = |i: usize| {
+            let orders = 1..=jets.order();
+            let rates = orders.map(|k| of(i, k).powf(1.0 / k as f64));
+            rates.filter(|rate| rate.is_finite()).fold(speed, f64::max)
+        };
+        let rates = (0..n).map(rate).collect();
+        Some(MotionSeries {
+            jets,
+            signs,
+            rows,
+            n,
+            rates,
+            sizes,
+        })
+    }
+
+    /// How h_j begins.
+    pub fn of_surface(&self, at: &Point, j: usize) -> Result<Germ, FieldError> {
+        let mut gradient = vec![0.0; self.n];
+        let rate = at
+            .system
+            .gradient(j, at.t, at.x, &self.signs, &mut gradient)?;
+        let width = self.jets.width();
+        let size = |k: usize| {
+            let parts = gradient.iter().zip(self.sizes.iter().zip(&self.rates));
+            let own = if k == 1 { rate.abs() } else { 0.0 };
+            own + parts
+                .map(|(g, (size, rate))| g.abs() * size * rate.powi(k as i32))
+                .sum::<f64>()
+        };
+        let coefficient = |k: usize| {
+            let row = &self.rows[k * width..(k + 1) * width];
+            match self.jets.surface(j) {
+                Some(place) => row[place],
+                None => dot(&gradient, &row[..self.n]) + if k == 1 { rate } else { 0.0 },
+            }
+        };
+        // The point is on the surface.
+        Ok(self.first(1, coefficient, size))
+    }
+
+    /// How the exit function with this index begins.
+    pub fn of_exit(&self, index: usize) -> Germ {
+        let Some(place) = self.jets.exit(index) else {
+            return Germ::Unknown;
+        };
+        let width = self.jets.width();
+        let coefficient = |k: usize| self.rows[k * width + place];
+        let fastest = self.rates.iter().copied().fold(0.0, f64::max);
+        let orders = 0..=self.jets.order();
+        let largest = orders.map(|k| coefficient(k).abs() / fastest.powi(k as i32));
+        let largest = largest.filter(|v| v.is_finite()).fold(0.0, f64::max);
+        self.first(0, coefficient, |k| largest * fastest.powi(k as i32))
+    }
+
+    fn first(
+        &self,
+        from: usize,
+        coefficient: impl Fn(usize) -> f64,
+        size: impl Fn(usize) -> f64,
+    ) -> Germ {
+        let mut factorial = 1.0;
+        for k in 0..=self.jets.order() {
+            factorial *= k.max(1) as f64;
+            let c = coefficient(k);
+            if !c.is_finite() {
+                return Germ::Unknown;
+            }
+            if k >= from && c.abs() > VANISHING_GERM * size(k) {
+                return Germ::Begins(Leading {
+                    order: k,
+                    value: c * factorial,
+                });
+            }
+        }
+        Germ::Zero
+    }
+}

@@ -1,0 +1,385 @@
+//! Which modes can follow at a point: those that are consistent with their own signs, and all of whose guards begin positive.
+
+use super::blow_up::beginnings;
+use super::germ::{Germ, MotionSeries};
+use super::look_ahead::{try_mode, Trial};
+use super::point::{Cause, Left, Lefts, Notes, Point};
+use super::rule::Meeting;
+use crate::error::FieldError;
+use crate::event::EventFunction;
+use crate::mode::Mode;
+use crate::switching::{
+    first_nonzero, is_undetermined, stable_roots_with_border, Leading, NormalFields,
+};
+use crate::system::dot_magnitude;
+use crate::tolerances::{AT_SIDE, DOUBTFUL, MOST_MEETING, TANGENT};
+
+/// A mode in which a motion can go on.
+#[derive(Clone, Debug)]
+pub(super) struct Viable {
+    pub mode: Mode,
+    /// What vanishes at its start.
+    pub left: Lefts,
+    /// Of the surfaces that it slides on.
+    pub multipliers: Vec<f64>,
+    /// Do the equations of the multipliers vanish at the point?
+    pub is_given: bool,
+    /// Does no guard stay zero?
+    pub is_strict: bool,
+    /// Does the field beyond a surface on which the motion stays press it there? Then it may as well slide.
+    pub is_pressed: bool,
+}
+
+impl Viable {
+    /// All guards grow.
+    fn strictly(mode: Mode, left: Lefts) -> Self {
+        Viable {
+            mode,
+            left,
+            multipliers: Vec::new(),
+            is_given: false,
+            is_strict: true,
+            is_pressed: false,
+        }
+    }
+}
+
+/// All modes at a point.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Survey {
+    pub viable: Vec<Viable>,
+    /// The others, each with a guard that begins negative.
+    pub failing: Vec<(Mode, EventFunction)>,
+    /// Modes about which derivatives at the point do not decide, nor a trial.
+    pub open: Vec<Mode>,
+}
+
+enum Verdict {
+    Viable(Viable),
+    Fails(EventFunction),
+    Open,
+}
+
+/// Looks at all modes on the surfaces of `meeting`.
+pub(super) fn survey(
+    at: &Point,
+    notes: &mut Notes,
+    meeting: &Meeting,
+) -> Result<Option<Survey>, FieldError> {
+    let m = meeting.surfaces.len();
+    if m > MOST_MEETING {
+        return Ok(None);
+    }
+    let corners = at.corners(notes, meeting.surfaces, meeting.mode)?;
+    let Ok(fields) = corners.normal_fields() else {
+        return Ok(None);
+    };
+    let noise = noise_of(at, meeting, &fields)?;
+    let mut found = Survey::default();
+    for index in 0..3_usize.pow(m as u32) {
+        let entries = (0..m).map(|i| 1 - (index / 3_usize.pow(i as u32) % 3) as i8);
+        if at.patience.is_over() {
+            return Ok(None);
+        }
+        let entries = Mode::new(entries.collect());
+        let mode = meeting.on_all(&entries);
+        let verdict = match entries.codimension() {
+            _ if has_ended(at, meeting, &mode) => Verdict::Fails(at.arrival.functions()[0]),
+            0 => of_region(at, meeting, (&fields, &noise), (&entries, &mode))?,
+            _ => of_sliding(at, notes, meeting, (&fields, &noise), (&entries, &mode))?,
+        };
+        match verdict {
+            Verdict::Viable(viable) => found.viable.push(viable),
+            Verdict::Fails(guard) => found.failing.push((mode, guard)),
+            Verdict::Open => match try_mode(at, notes, &mode, meeting.surfaces)? {
+                Trial::Leaves(left) => found.viable.push(Viable::strictly(mode, left)),
+                Trial::Ends => found.failing.push((mode, guard_of(meeting, &entries))),
+                Trial::WithinRounding => found.open.push(mode),
+            },
+        }
+    }
+    Ok(Some(found))
+}
+
+/// Is this the mode of a motion that one of its own exit functions has just ended?
+fn has_ended(at: &Point, meeting: &Meeting, mode: &Mode) -> bool {
+    let is_touch = matches!(at.arrival.cause, Cause::Event { touch: true, .. });
+    meeting.is_exit() && !is_touch && mode == meeting.mode && !at.arrival.functions().is_empty()
+}
+
+fn of_region(
+    at: &Point,
+    meeting: &Meeting,
+    (fields, noise): (&NormalFields, &[f64]),
+    (entries, mode): (&Mode, &Mode),
+) -> Result<Verdict, FieldError> {
+    let signs = mode.signs();
+    let g = fields.in_region(entries.entries());
+    let mut viable = Viable::strictly(mode.clone(), Lefts::new());
+    for (i, &j) in meeting.surfaces.iter().enumerate() {
+        let side = mode.entries()[j];
+        let known = usize::from(g[i].abs() <= noise[i]);
+        let leading = first_nonzero(at.system, j, side, known, at.t, at.x, &signs)?;
+        if leading.order == 0 {
+            let corner: Vec<f64> = entries.entries().iter().map(|&k| f64::from(k)).collect();
+            viable.is_pressed |= is_pressed(fields, noise, &corner, i);
+            viable.is_strict = false;
+        } else if leading.sign() != side {
+            return Ok(Verdict::Fails(EventFunction::Surface(j)));
+        }
+        viable.left.push(Left::Surface(j, leading));
+    }
+    Ok(Verdict::Viable(viable))
+}
+
+fn of_sliding(
+    at: &Point,
+    notes: &mut Notes,
+    meeting: &Meeting,
+    (fields, noise): (&NormalFields, &[f64]),
+    (entries, mode): (&Mode, &Mode),
+) -> Result<Verdict, FieldError> {
+    let face = fields.restrict(entries.entries());
+    let is_silent = silent_rows((fields, noise), entries.entries());
+    if entries.sliding_set().any(|i| is_silent[i]) {
+        return of_blown_up(at, notes, meeting, (entries, mode), &is_silent);
+    }
+    if is_undetermined(&face) {
+        return Ok(Verdict::Open);
+    }
+    let mut verdict = Verdict::Fails(guard_of(meeting, entries));
+    for lambda in stable_roots_with_border(&face, at.patience) {
+        match at_root(at, meeting, (fields, noise), (entries, mode), &lambda)? {
+            Verdict::Viable(viable) => return Ok(Verdict::Viable(viable)),
+            Verdict::Open => verdict = Verdict::Open,
+            Verdict::Fails(guard) => {
+                if !matches!(verdict, Verdict::Open) {
+                    verdict = Verdict::Fails(guard);
+                }
+            }
+        }
+    }
+    Ok(verdict)
+}
+
+/// The first surface slid on: a mode without a stable root does not last there.
+fn guard_of(meeting: &Meeting, entries: &Mode) -> EventFunction {
+    let place = entries.sliding_set().next().unwrap_or(0);
+    EventFunction::Surface(meeting.surfaces[place])
+}
+
+/// A motion with these multipliers and sides stays on surface i of the meeting. Does the field beyond the surface press it
+/// there? Then it slides.
+fn is_pressed(fields: &NormalFields, noise: &[f64], lambda: &[f64], i: usize) -> bool {
+    let mut beyond = lambda.to_vec();
+    beyond[i] = -lambda[i];
+    lambda[i] * fields.interpolate(&beyond)[i] > noise[i]
+}
+
+/// Are all fields around the surfaces slid on, and on both sides of surface i of the meeting, tangent to that? Only then
+/// does a motion on it keep the sign of its mode.
+fn is_neutral(fields: &NormalFields, noise: &[f64], entries: &[i8], i: usize) -> bool {
+    [-1, 1].into_iter().all(|side| {
+        let mut around = entries.to_vec();
+        around[i] = side;
+        silent_rows((fields, noise), &around)[i]
+    })
+}
+
+/// To which surfaces of the meeting are all fields around the surfaces slid on tangent?
+fn silent_rows((fields, noise): (&NormalFields, &[f64]), entries: &[i8]) -> Vec<bool> {
+    let slid: Vec<usize> = (0..entries.len()).filter(|&i| entries[i] == 0).collect();
+    let mut is_silent = vec![true; fields.m()];
+    let mut region = entries.to_vec();
+    for pattern in 0..1_usize << slid.len() {
+        for (bit, &i) in slid.iter().enumerate() {
+            region[i] = if pattern >> bit & 1 == 1 { 1 } else { -1 };
+        }
+        let rows = is_silent.iter_mut().zip(noise);
+        for ((is_silent, noise), value) in rows.zip(fields.in_region(&region).iter()) {
+            *is_silent &= value.abs() <= *noise;
+        }
+    }
+    is_silent
+}
+
+/// Sliding where equations of the multipliers vanish.
+fn of_blown_up(
+    at: &Point,
+    notes: &mut Notes,
+    meeting: &Meeting,
+    (entries, mode): (&Mode, &Mode),
+    is_silent: &[bool],
+) -> Result<Verdict, FieldError> {
+    let mut verdict = None;
+    for beginning in beginnings(at, notes, meeting, mode, is_silent)? {
+        let mut left = Lefts::new();
+        let mut failing = None;
+        let largest = beginning
+            .rates
+            .iter()
+            .fold(0.0_f64, |most, rate| most.max(rate.abs()));
+        let is_end = |lambda: &f64| 1.0 - lambda.abs() <= AT_SIDE;
+        let mut is_open = beginning.multipliers.iter().any(is_end);
+        for (i, &j) in meeting.surfaces.iter().enumerate() {
+            let side = f64::from(entries.entries()[i]);
+            let value = beginning.rates[i];
+            if side == 0.0 {
+                continue;
+            }
+            if value.abs() <= DOUBTFUL * largest {
+                is_open = true;
+            } else if side * value < 0.0 {
+                failing = Some(EventFunction::Surface(j));
+            }
+            let order = 1 + usize::from(is_silent[i]);
+            left.push(Left::Surface(j, Leading { order, value }));
+        }
+        match (failing, is_open) {
+            (Some(guard), _) => verdict = verdict.or(Some(Verdict::Fails(guard))),
+            (None, true) => verdict = Some(Verdict::Open),
+            (None, false) => {
+                if entries.codimension() == 1 {
+                    for (function, value) in [EventFunction::ExitMinus, EventFunction::ExitPlus]
+                        .into_iter()
+                        .zip(beginning.components)
+                    {
+                        left.push(Left::Exit(function, Leading { order: 1, value }));
+                    }
+                }
+                return Ok(Verdict::Viable(Viable {
+                    multipliers: beginning.multipliers,
+                    is_given: true,
+                    ..Viable::strictly(mode.clone(), left)
+                }));
+            }
+        }
+    }
+    // No way to begin is stable.
+    Ok(verdict.unwrap_or(Verdict::Fails(guard_of(meeting, entries))))
+}
+
+fn at_root(
+    at: &Point,
+    meeting: &Meeting,
+    (fields, noise): (&NormalFields, &[f64]),
+    (entries, mode): (&Mode, &Mode),
+    lambda: &[f64],
+) -> Result<Verdict, FieldError> {
+    let mut next = lambda.iter();
+    let held = entries.entries().iter();
+    let full: Vec<f64> = held
+        .map(|&k| {
+            if k == 0 {
+                next.next().copied().unwrap_or(0.0)
+            } else {
+                f64::from(k)
+            }
+        })
+        .collect();
+    let g = fields.interpolate(&full);
+    let (mut left, mut tangent) = (Lefts::new(), Vec::new());
+    for (i, &j) in meeting.surfaces.iter().enumerate() {
+        let side = f64::from(entries.entries()[i]);
+        if side == 0.0 {
+            continue;
+        }
+        if g[i].abs() <= noise[i] {
+            tangent.push(j);
+        } else if side * g[i] < 0.0 {
+            return Ok(Verdict::Fails(EventFunction::Surface(j)));
+        } else {
+            left.push(Left::Surface(
+                j,
+                Leading {
+                    order: 1,
+                    value: g[i],
+                },
+            ));
+        }
+    }
+    let ends: Vec<usize> = (0..2 * lambda.len())
+        .filter(|index| {
+            let end = if index % 2 == 0 { 1.0 } else { -1.0 };
+            1.0 + end * lambda[index / 2] <= AT_SIDE
+        })
+        .collect();
+    let mut viable = Viable {
+        multipliers: lambda.to_vec(),
+        ..Viable::strictly(mode.clone(), left)
+    };
+    if tangent.is_empty() && ends.is_empty() {
+        return Ok(Verdict::Viable(viable));
+    }
+    let Some(series) = MotionSeries::of(at, mode, lambda) else {
+        return Ok(Verdict::Open);
+    };
+    for j in tangent {
+        let side = mode.entries()[j];
+        let i = meeting.surfaces.iter().position(|&k| k == j).unwrap_or(0);
+        match series.of_surface(at, j)? {
+            Germ::Begins(leading) if leading.sign() == side => {
+                viable.left.push(Left::Surface(j, leading))
+            }
+            Germ::Begins(_) => return Ok(Verdict::Fails(EventFunction::Surface(j))),
+            Germ::Zero if is_neutral(fields, noise, entries.entries(), i) => {
+                viable.is_strict = false;
+                viable.left.push(Left::Surface(
+                    j,
+                    Leading {
+                        order: 0,
+                        value: 0.0,
+                    },
+                ));
+            }
+            // It slides, with a multiplier at its end.
+            Germ::Zero if is_pressed(fields, noise, &full, i) => {
+                return Ok(Verdict::Fails(EventFunction::Surface(j)));
+            }
+            Germ::Zero | Germ::Unknown => return Ok(Verdict::Open),
+        }
+    }
+    for index in ends {
+        let function = match (lambda.len(), index) {
+            (1, 0) => EventFunction::ExitMinus,
+            (1, _) => EventFunction::ExitPlus,
+            _ => EventFunction::Exit(index),
+        };
+        match series.of_exit(index) {
+            Germ::Begins(leading) if leading.value > 0.0 => {
+                if leading.order > 0 {
+                    viable.left.push(Left::Exit(function, leading));
+                }
+            }
+            Germ::Begins(_) => return Ok(Verdict::Fails(function)),
+            // The multiplier stays at its end.
+            Germ::Zero => viable.is_strict = false,
+            Germ::Unknown => return Ok(Verdict::Open),
+        }
+    }
+    Ok(Verdict::Viable(viable))
+}
+
+/// What a normal component may be without being clear of zero, for each surface: the error of the fields at a located event,
+/// and what the rounding of time and state makes of zero.
+pub(super) fn noise_of(
+    at: &Point,
+    meeting: &Meeting,
+    fields: &NormalFields,
+) -> Result<Vec<f64>, FieldError> {
+    let mut gradient = vec![0.0; at.x.len()];
+    let mut noise = Vec::with_capacity(meeting.surfaces.len());
+    for (i, &j) in meeting.surfaces.iter().enumerate() {
+        let mut largest = DOUBTFUL * fields.row_size(i);
+        for side in [-1, 1] {
+            let signs = meeting.mode.with(j, side).signs();
+            let partials = at
+                .system
+                .rate_gradient(j, at.t, at.x, &signs, &mut gradient)?;
+            let size = dot_magnitude(&gradient, at.x) + (partials.time * at.t).abs();
+            largest = largest.max(TANGENT * size);
+        }
+        noise.push(largest);
+    }
+    Ok(noise)
+}
