@@ -1,6 +1,6 @@
 //! Sliding where some equations of the multipliers vanish at the point: they are divided by the time since then.
 //!
-//! If the normal components a_i^k of all fields vanish at the point, the equation g_i(lambda) = 0 says nothing there. A
+//! If the normal components a_i^k of all fields vanish at the point, the equation g_i(lambda) = 0 holds for all lambda there. A
 //! moment tau later, along the motion with velocity v, they are tau (d_t a_i^k + grad a_i^k . v). So the multipliers
 //! with which sliding begins solve
 //!

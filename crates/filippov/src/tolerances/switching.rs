@@ -47,7 +47,7 @@ pub const DOUBTFUL: f64 = 1e-8;
 pub const BESIDE_THE_ROOT: f64 = 1e-6;
 
 /// Distance from a root of three and more surfaces that loses stability at which the hidden dynamics starts: the pair
-/// of eigenvalues that vanishes there says nothing, and what decides grows like the square of the distance. Also that from
+/// of eigenvalues vanishes there, and the motion off the root grows like the square of the distance. Also the distance from
 /// u = 0 of a second start, if the hidden dynamics from there rests in a repelling mode.
 pub const UNSTABLE_START: f64 = 0.1;
 
