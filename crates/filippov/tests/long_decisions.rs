@@ -160,12 +160,12 @@ fn evaluations_within(
     count.load(Ordering::Relaxed)
 }
 
-/// Eight sides of a surface with up to twenty evaluations each, for derivatives by differences, and the fields of all sixteen
-/// sides for each of some rules that follow.
+/// A bound of the evaluations between two looks: the test of one mode, with derivatives by differences, and the fields of all
+/// sixteen sides for each of some rules. Observed with an earlier version, and kept.
 const BETWEEN_LOOKS: usize = 8 * 20 + 7 * 16;
 
 #[test]
-fn surfaces_decided_one_by_one() {
+fn modes_of_three_surfaces_where_all_rates_vanish() {
     // All rates vanish at the start, and the signs of all surfaces multiply one another.
     let field = |t: f64, _: &[f64], s: &[f64], dx: &mut [f64]| {
         let product: f64 = s.iter().product();
@@ -178,7 +178,7 @@ fn surfaces_decided_one_by_one() {
 }
 
 #[test]
-fn modes_of_higher_order() {
+fn modes_of_four_surfaces_where_all_rates_vanish() {
     let field = |t: f64, _: &[f64], s: &[f64], dx: &mut [f64]| {
         let product: f64 = s.iter().product();
         for (i, v) in dx.iter_mut().enumerate() {

@@ -32,7 +32,7 @@ pub(crate) enum Rule {
     Relay,
     /// The signs of too many surfaces multiply one another.
     TooMany,
-    /// First-order data at an intersection: trees, hidden dynamics, spirals; higher derivatives where those vanish.
+    /// First-order data at an intersection: trees, hidden dynamics, spirals; germs where those do not decide.
     FirstOrder,
     /// Bodies in contact: the forces that push.
     Contact,
