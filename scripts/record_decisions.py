@@ -1,11 +1,13 @@
-"""Record the corpus of decisions, `tests/data/decisions.json.gz`: random systems, and the test suite.
+"""Record the decisions of random systems and of the test suite.
 
-Usage: ``python scripts/record_decisions.py [--seeds 20000] [--no-suite] [--output PATH]``. Of the decisions
+Usage: ``python scripts/record_decisions.py [--seeds 20000] [--no-suite] [--output FOLDER]``. Of the decisions
 that are alike in their cause, rule, modes and what vanishes at the start of the new motion, a few are kept,
-each of another run. Each is asked for once more at once: if the outcome is another one, the record lacks
-something that the decision depends on, or rounding decides. Then nothing is written and the script ends with
-an error. It prints how many decisions came from systems and resets that cannot be written to a file (Python
-functions that are called and not traced).
+each of another run. Those of systems that can be written to a file go to `decisions.json.gz`. Each is asked
+for once more at once: if the outcome is another one, the record lacks something that the decision depends on,
+or rounding decides. Then nothing is written and the script ends with an error. Those of functions that are
+called and not traced go to `black_box_decisions.json.gz`, under the name of their test, which makes them
+again: one decision of each kind of each test. Tests that fail, or decide otherwise when they are run once
+more, are left out: some share what a fixture of their file decides.
 """
 
 from __future__ import annotations
@@ -20,96 +22,71 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
-import filippov.ensemble
-import filippov.options
-import filippov.solve
-from filippov._core import Run, RunOptions, TracedSystem, replay_decision
+import filippov
+from filippov._core import Run, RunOptions, replay_decision
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tests"))
 os.environ["PYTHONPATH"] = str(ROOT / "tests")  # of the processes that are started
 
-from decision_corpus import CORPUS, OPTIONS, Entry, Problem, differences, write  # noqa: E402
+import black_box_decisions  # noqa: E402
+import decision_corpus  # noqa: E402
+from decision_corpus import OPTIONS, Entry, Problem, differences  # noqa: E402
+from decision_recorder import is_traced, recording  # noqa: E402
 
 KEPT_PER_KIND = 3
-# Of a run with more decisions the first ones are looked at.
-LOOKED_AT = 1000
+# In a test, decisions about black boxes that come after these depend on the rounding of those before.
+FIRST_OF_A_TEST = 60
 SHOWN = 20
 
 Dict = dict[str, Any]
 
 
 class Recorder:
-    """Makes every run keep its decisions, and collects those of a new kind."""
+    """Collects the decisions of a new kind."""
 
     def __init__(self) -> None:
         self.source = ""
         self.kept: dict[str, list[Entry]] = {}
+        self.black_boxes: dict[str, dict[str, black_box_decisions.Row]] = {}
         self.counts: Counter[str] = Counter()
         self.not_reproduced: list[str] = []
-        self._given: dict[int, tuple[RunOptions, Dict]] = {}
-        self._solve = filippov.solve.run_core
-        self._solve_many = filippov.ensemble.solve_many
+        self._of_black_boxes: Counter[str] = Counter()
 
-    def install(self) -> None:
-        """Stand between the package and its core."""
-        filippov.options.RunOptions = self._options
-        filippov.options._FOR_CORE.clear()
-        filippov.solve.run_core = self._run
-        filippov.ensemble.solve_many = self._run_many
-
-    def _options(self, given: Dict) -> RunOptions:
-        options = RunOptions({**given, "keep_decisions": LOOKED_AT})
-        self._given[id(options)] = (options, given)
-        return options
-
-    def _run(self, core: Any, t0: float, t1: float, y0: Any, p: Any, options: Any, *rest: Any) -> Run:
-        run = self._solve(core, t0, t1, y0, p, options, *rest)
-        self._take(run, core, p, options, rest[1] if len(rest) > 1 else [])
-        return run
-
-    def _run_many(
-        self,
-        core: Any,
-        t0: float,
-        t1: float,
-        y0: Any,
-        p: Any,
-        options: Any,
-        events: Any,
-        actions: Any,
-        n: int,
-    ) -> Any:
-        runs, raised = self._solve_many(core, t0, t1, y0, p, options, events, actions, n)
-        for run, values in zip(runs, p, strict=False):
-            self._take(run, core, values, options, actions)
-        return runs, raised
-
-    def _take(self, run: Run, core: Any, p: Any, options: RunOptions, actions: Any) -> None:
+    def take(self, run: Run, core: Any, p: Any, options: RunOptions, given: Dict, actions: Any) -> None:
+        """Look at the decisions of a run."""
         decisions = run.decisions()
         self.counts["decisions"] += len(decisions)
-        is_traced = isinstance(core, TracedSystem) and all(isinstance(a[2], TracedSystem) for a in actions)
-        if not is_traced:
-            self.counts["not traced"] += len(decisions)
-            return
-        given = self._given[id(options)][1]
         known = {key: given.get(key, ()) for key in OPTIONS}
+        look = self._take_traced if is_traced(core, actions) else self._take_black_box
         for point, outcome in decisions:
             kind = kind_of(point, outcome, known, bool(actions))
-            alike = self.kept.setdefault(kind, [])
-            if len(alike) >= KEPT_PER_KIND or any(entry.source == self.source for entry in alike):
-                continue
-            found = replay_decision(core, p, options, actions, point)
-            self.counts["replayed"] += 1
             outcome = json.loads(json.dumps(outcome))
-            wrong = list(differences(outcome, found))
-            if wrong:
-                self.not_reproduced.append(f"{self.source}: rule {outcome['rule']}; {'; '.join(wrong)}")
-                continue
-            atol = known["atol"] if isinstance(known["atol"], float) else list(known["atol"])
-            options_kept = json.loads(json.dumps({**known, "atol": atol}))
-            problem = Problem.of(core, list(actions))
-            alike.append(Entry(self.source, problem, list(p), options_kept, point, outcome))
+            look(kind, point, outcome, (core, p, options, known, actions))
+
+    def _take_traced(self, kind: str, point: Dict, outcome: Dict, run: tuple[Any, ...]) -> None:
+        core, p, options, known, actions = run
+        alike = self.kept.setdefault(kind, [])
+        if len(alike) >= KEPT_PER_KIND or any(entry.source == self.source for entry in alike):
+            return
+        self.counts["replayed"] += 1
+        wrong = list(differences(outcome, replay_decision(core, p, options, actions, point)))
+        if wrong:
+            self.not_reproduced.append(f"{self.source}: rule {outcome['rule']}; {'; '.join(wrong)}")
+            return
+        atol = known["atol"] if isinstance(known["atol"], float) else list(known["atol"])
+        options_kept = json.loads(json.dumps({**known, "atol": atol}))
+        alike.append(
+            Entry(self.source, Problem.of(core, list(actions)), list(p), options_kept, point, outcome)
+        )
+
+    def _take_black_box(self, kind: str, point: Dict, outcome: Dict, run: tuple[Any, ...]) -> None:
+        self.counts["of black boxes"] += 1
+        number = self._of_black_boxes[self.source]
+        self._of_black_boxes[self.source] += 1
+        if number < FIRST_OF_A_TEST:
+            of_test = self.black_boxes.setdefault(self.source, {})
+            of_test.setdefault(kind, (number, point["t"], point["cause"], outcome))
 
 
 def kind_of(point: Dict, outcome: Dict, options: Dict, has_actions: bool) -> str:
@@ -139,42 +116,52 @@ def record_fuzz(seeds: range) -> Recorder:
     from fuzz.systems import build, random_case
 
     recorder = Recorder()
-    recorder.install()
     warnings.simplefilter("ignore")
-    for seed in seeds:
-        recorder.source = f"fuzz {seed}"
-        try:
-            build(random_case(seed).source).solve()
-        except filippov.FilippovError:
-            recorder.counts["raised"] += 1
-    return without_processes(recorder)
+    with recording(recorder.take):
+        for seed in seeds:
+            recorder.source = f"fuzz {seed}"
+            try:
+                build(random_case(seed).source).solve()
+            except filippov.FilippovError:
+                recorder.counts["raised"] += 1
+    return recorder
 
 
 def record_suite(part: int) -> Recorder:
     """Return what the tests that are not slow decide, those of every second file."""
     import pytest
 
-    recorder = Recorder()
-
-    class Plugin:
-        def pytest_runtest_setup(self, item: pytest.Item) -> None:
-            recorder.source = item.nodeid
-
-    recorder.install()
     os.chdir(ROOT)
     files = [str(path) for path in sorted((ROOT / "tests").rglob("test_*.py"))][part::2]
     quiet = ["-q", "--no-header", "--tb=no", "-rfE", "-p", "no:cacheprovider"]
-    ended = pytest.main(["-m", "not slow", *quiet, *files], [Plugin()])
+    recorder = Recorder()
+
+    class Plugin:
+        def __init__(self) -> None:
+            self.failed: set[str] = set()
+
+        def pytest_runtest_setup(self, item: pytest.Item) -> None:
+            recorder.source = item.nodeid
+
+        def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+            if report.failed:
+                self.failed.add(report.nodeid)
+
+    def run(what: list[str]) -> tuple[object, set[str]]:
+        plugin = Plugin()
+        return pytest.main(["-m", "not slow", *quiet, *what], [plugin]), plugin.failed
+
+    black_box_decisions.read = dict  # nothing is compared while it is recorded
+    with recording(recorder.take):
+        ended, failed = run(files)
     print(
         f"the tests ended with {ended!r}; tests that count memory or calls may fail while decisions are kept"
     )
-    return without_processes(recorder)
-
-
-def without_processes(recorder: Recorder) -> Recorder:
-    """Return a recorder that can be sent to another process."""
-    recorder._given.clear()
-    del recorder._solve, recorder._solve_many
+    black_boxes = {name: of_test for name, of_test in recorder.black_boxes.items() if name not in failed}
+    rows = {name: [*of_test.values()] for name, of_test in black_boxes.items()}
+    black_box_decisions.read = lambda: rows
+    _, failed = run([*rows])
+    recorder.black_boxes = {name: of_test for name, of_test in black_boxes.items() if name not in failed}
     return recorder
 
 
@@ -195,19 +182,27 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=20_000, help="number of random systems")
     parser.add_argument("--no-suite", action="store_true", help="random systems only")
-    parser.add_argument("--output", type=Path, default=CORPUS)
+    parser.add_argument("--output", type=Path, default=decision_corpus.CORPUS.parent, help="folder")
     given = parser.parse_args()
     with ProcessPoolExecutor(3) as pool:
         jobs = [] if given.no_suite else [pool.submit(record_suite, part) for part in (0, 1)]
         jobs.append(pool.submit(record_fuzz, range(given.seeds)))
-        entries, counts, not_reproduced = merged([job.result() for job in jobs])
+        recorders = [job.result() for job in jobs]
+    entries, counts, not_reproduced = merged(recorders)
     print(", ".join(f"{name}: {count}" for name, count in counts.items()))
     if not_reproduced:
         print(f"{len(not_reproduced)} decisions are not reproduced; nothing is written")
         print(*not_reproduced[:SHOWN], sep="\n")
         return 1
-    write(entries, given.output)
-    print(f"{len(entries)} decisions kept, {given.output.stat().st_size / 1e6:.2f} MB")
+    path = given.output / decision_corpus.CORPUS.name
+    decision_corpus.write(entries, path)
+    print(f"{len(entries)} decisions kept, {path.stat().st_size / 1e6:.2f} MB")
+    if not given.no_suite:
+        rows = {name: [*of_test.values()] for r in recorders for name, of_test in r.black_boxes.items()}
+        path = given.output / black_box_decisions.BLACK_BOXES.name
+        black_box_decisions.write(rows, path)
+        number = sum(map(len, rows.values()))
+        print(f"{number} decisions of {len(rows)} tests kept, {path.stat().st_size / 1e6:.2f} MB")
     return 0
 
 

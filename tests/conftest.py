@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from black_box_decisions import compared
 from command_line import MODEL
 
 
@@ -14,6 +15,13 @@ def pytest_configure() -> None:
     """Let Ctrl-C, which the tests send, interrupt: programs started in the background ignore it."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture(autouse=True)
+def decisions_as_recorded(request: pytest.FixtureRequest) -> Iterator[None]:
+    """What is decided about functions that are not traced is what was recorded for the test."""
+    with compared(request.node.nodeid):
+        yield
 
 
 @pytest.fixture

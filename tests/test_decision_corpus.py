@@ -1,14 +1,22 @@
-"""Recorded decisions of random systems and of the tests: asked for once more, they are the same."""
+"""Recorded decisions of random systems and of the tests: asked for once more, they are the same.
+
+Those about functions that are called and not traced are compared in their own tests, by a fixture.
+"""
 
 from __future__ import annotations
 
+import json
 from collections import defaultdict
+from pathlib import Path
 from typing import Any
 
+import black_box_decisions
 import filippov as fl
 import numpy as np
 import pytest
+from black_box_decisions import differences_of_runs, untraced
 from decision_corpus import Entry, differences, read
+from decision_recorder import recording
 from filippov._core import Run, RunOptions, TracedSystem, replay_decision, solve
 
 SHOWN = 10
@@ -112,3 +120,50 @@ def test_point_that_does_not_fit_is_refused() -> None:
         replay(functions=[("surface", 3)])
     with pytest.raises(ValueError, match="point: memory is missing"):
         replay(cause="anew")
+
+
+def sliding_black_box() -> None:
+    """A relay that slides from t = 1/0.7 on, as a function that is called."""
+
+    def relay(t: float, x: Any) -> Any:
+        return [0.3 - (1.0 if float(x[0]) > 0.0 else -1.0)]
+
+    fl.solve_ivp(relay, (0, 2), [1.0], surfaces=lambda t, x: x[0])
+
+
+def test_decisions_about_black_boxes_are_collected_on_request_only() -> None:
+    found: list[Any] = []
+    with recording(untraced(found)):
+        sliding_black_box()
+        fl.solve_ivp(lambda t, x: [0.3 - np.sign(x[0])], (0, 2), [1.0])
+    (start, there), (event, sliding) = found
+    assert (start["cause"], there["mode"], event["cause"], sliding["mode"]) == ("start", (1,), "event", (0,))
+    sliding_black_box()
+    assert len(found) == 2
+
+
+def test_differences_about_black_boxes_are_found() -> None:
+    found: list[Any] = []
+    with recording(untraced(found)):
+        sliding_black_box()
+    point, outcome = json.loads(json.dumps(found[1]))
+    row = (1, point["t"], "event", outcome)
+    assert not [*differences_of_runs([row], found)]
+    for changed, expected in (
+        ((2, point["t"], "event", outcome), "only 2 found"),
+        ((1, point["t"] + 1e-3, "event", outcome), "event at t = "),
+        ((1, point["t"], "limit", outcome), "limit at t = "),
+        ((1, point["t"], "event", {**outcome, "mode": [1]}), "mode: "),
+    ):
+        (text,) = differences_of_runs([changed], found)
+        assert expected in text
+
+
+def test_tests_of_recorded_black_boxes_exist() -> None:
+    """A test that has another name now is not compared any more."""
+    folder = Path(__file__).parent.parent
+    kept = black_box_decisions.read()
+    assert sum(map(len, kept.values())) > 300
+    for name in kept:
+        path, test = name.split("[")[0].split("::", 1)
+        assert f"def {test.split('::')[-1]}(" in (folder / path).read_text(), name
