@@ -1,6 +1,5 @@
 //! Sliding between fields in which other functions have different signs.
 
-use super::nested::between;
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::status::Stop;
@@ -28,7 +27,10 @@ pub(crate) fn differs_between_sides(
             let beyond = -h[k] * f64::from(side.entries()[k]);
             let size = system.surface_size(k, t, x, &signs)?;
             if beyond > BETWEEN_SIDES * (1.0 + size) {
-                return Ok(Some(between(sliding, &[k])));
+                return Ok(Some(Stop::SlidesAcrossJump {
+                    surfaces: sliding.to_vec(),
+                    jumping: vec![k],
+                }));
             }
         }
     }

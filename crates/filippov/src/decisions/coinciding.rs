@@ -15,14 +15,14 @@ use crate::system::{dot, PiecewiseSystem};
 use crate::tolerances::{BESIDE, COINCIDE, MOST_MEETING, TANGENT};
 
 /// A kink that coincides with another surface.
-struct Kink {
-    surface: usize,
+pub(super) struct Kink {
+    pub surface: usize,
     /// The surface that decides.
-    beside: usize,
+    pub beside: usize,
 }
 
 /// The kinks of `meeting` that coincide with another surface of it.
-fn coinciding_kinks(
+pub(super) fn coinciding_kinks(
     at: &Point,
     notes: &mut Notes,
     mode: &Mode,
@@ -72,57 +72,10 @@ pub(super) fn touch_one_another(
     k: usize,
     mode: &Mode,
 ) -> Result<bool, FieldError> {
-    let are_parallel = have_parallels(at, &[j, k], mode)?;
+    let [one, other] = [normal(at, j, mode)?, normal(at, k, mode)?];
+    let has_none = |normal: &[f64]| normal.iter().all(|v| *v == 0.0);
+    let are_parallel = !has_none(&one) && !has_none(&other) && parallel(&one, &other);
     Ok(are_parallel && in_the_place_of(at.system, (at.t, at.x), j, &[k], mode)?.is_empty())
-}
-
-/// Rule: kinks coincide with other surfaces. The other surfaces are decided, and the kinks follow them.
-pub(super) fn decide_without_kinks(
-    at: &Point,
-    notes: &mut Notes,
-    meeting: &Meeting,
-) -> Result<Option<Decided>, FieldError> {
-    let kinks = coinciding_kinks(at, notes, meeting.mode, meeting.surfaces)?;
-    if kinks.is_empty() {
-        return Ok(None);
-    }
-    let is_kink = |j: &usize| kinks.iter().any(|kink| kink.surface == *j);
-    let without = |surfaces: &[usize]| -> Vec<usize> {
-        let others = surfaces.iter().copied().filter(|j| !is_kink(j));
-        others.collect()
-    };
-    let (others, fresh) = (without(meeting.surfaces), without(meeting.fresh));
-    let how = match *others {
-        [j] => How::on_one_surface(meeting.mode, j),
-        _ => meeting.how,
-    };
-    let (_, decided) = settle(
-        at,
-        notes,
-        &Meeting {
-            surfaces: &others,
-            fresh: &fresh,
-            how,
-            ..*meeting
-        },
-    )?;
-    take_along(at, &kinks, decided).map(Some)
-}
-
-/// The decision of the others, with the kinks in their places.
-fn take_along(at: &Point, kinks: &[Kink], decided: Decided) -> Result<Decided, FieldError> {
-    let mut next = match decided {
-        Ok(next) => next,
-        Err(stop) => return Ok(Err(stop)),
-    };
-    for &Kink { surface, beside } in kinks {
-        if next.mode.entries()[beside] != 0 {
-            leave_together(at, beside, surface, &mut next.mode, &mut next.left)?;
-        } else if next.mode.entries()[surface] == 0 {
-            next.mode.set(surface, 1);
-        }
-    }
-    Ok(Ok(next))
 }
 
 /// The active surfaces that coincide with those slid on in a mode: their functions vanish all along the motion.

@@ -2,41 +2,31 @@
 
 use smallvec::SmallVec;
 
-use super::coinciding::{decide_without_kinks, leave_coinciding};
+use super::coinciding::leave_coinciding;
 use super::contact::decide_in_contact;
 use super::event::{arrival_at_surface, touch, vanishing_surfaces, Reached};
-use super::germs::decide_if_doubtful;
+use super::germs::{decide_if_doubtful, decide_if_entangled};
 use super::leave_by_rule::leave_by_rule;
 use super::limits::stay_at_limit;
-use super::look_ahead::decide_where_two_touch;
 use super::meeting::{decide_with_kinetic_friction, resolve_first_order, too_many};
-use super::nested::{
-    decide_where_others_jump, leave_along_bends, leave_at_bends, reject_if_not_attracting,
-};
 use super::placement::{one_surface, place};
 use super::point::{Answer, Apply, Cause, Decided, Lefts, Next, Notes, Point, Rules};
 use super::relay::decide_by_relay;
 use super::rule::{How, Meeting, Rule};
 use super::settle::settle;
-use super::vanishing_jump::decide_where_jump_vanishes;
 
 use crate::error::FieldError;
 use crate::field::ModeField;
 use crate::mode::Mode;
 
 /// The rules where surfaces vanish: the first that applies decides.
-const LIST: [(Rule, Apply); 14] = [
+const LIST: [(Rule, Apply); 9] = [
     (Rule::Region, region),
     (Rule::Touch, touch),
-    (Rule::OthersJump, decide_where_others_jump),
+    (Rule::Entangled, decide_if_entangled),
     (Rule::OneSurface, one_surface),
-    (Rule::Bends, leave_at_bends),
-    (Rule::Bends, leave_along_bends),
-    (Rule::Coinciding, decide_without_kinks),
     (Rule::Limit, stay_at_limit),
-    (Rule::Trial, decide_where_two_touch),
     (Rule::Law, leave_by_rule),
-    (Rule::VanishingJump, decide_where_jump_vanishes),
     (Rule::Relay, decide_by_relay),
     (Rule::Germs, decide_if_doubtful),
     (Rule::TooMany, too_many),
@@ -145,17 +135,10 @@ fn check(
     rule: Rule,
     mut decided: Decided,
 ) -> Result<Decided, FieldError> {
-    use Rule::{Coinciding, FirstOrder, Germs, Law, Limit, Relay, TooMany, Trial, VanishingJump};
+    use Rule::{FirstOrder, Law, Relay, TooMany};
     let is_event = matches!(meeting.how, How::Event(_));
-    if is_event && matches!(rule, Law | VanishingJump | Relay | TooMany | FirstOrder) {
+    if is_event && matches!(rule, Law | Relay | TooMany | FirstOrder) {
         decided = decide_with_kinetic_friction(at, notes, decided, meeting)?;
-    }
-    let is_intersection = matches!(
-        rule,
-        Germs | Coinciding | FirstOrder | Limit | Relay | Law | TooMany | Trial | VanishingJump
-    );
-    if is_intersection {
-        decided = reject_if_not_attracting(at, decided, meeting.surfaces)?;
     }
     Ok(decided)
 }

@@ -7,7 +7,7 @@ use crate::error::FieldError;
 use crate::mode::{Mode, Signs};
 use crate::switching::Leading;
 use crate::system::{dot, MotionJets};
-use crate::tolerances::{GERM_ORDER, VANISHING_GERM};
+use crate::tolerances::{EPS, GERM_ORDER, VANISHING_GERM};
 
 /// How a guard begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,11 +29,13 @@ pub(super) struct MotionSeries {
     /// The rate at which the motion changes, per component of the state: coefficient k is at most about `size * rate^k`.
     rates: Vec<f64>,
     sizes: Vec<f64>,
+    pace: f64,
 }
 
 impl MotionSeries {
-    /// The series from the point, with these multipliers of the surfaces slid on; `None` if the system has none.
-    pub fn of(at: &Point, mode: &Mode, multipliers: &[f64]) -> Option<Self> {
+    /// The series from the point, with these multipliers of the surfaces slid on; `None` if the system has none. `pace` is
+    /// the rate at which the fields around the point change the state.
+    pub fn of(at: &Point, mode: &Mode, multipliers: &[f64], pace: f64) -> Option<Self> {
         let sliding: Vec<usize> = mode.sliding_set().collect();
         let jets = at.system.motion_jets(&sliding, GERM_ORDER)?;
         let mut signs = mode.signs();
@@ -53,6 +55,7 @@ impl MotionSeries {
         };
         let rates = (0..n).map(rate).collect();
         Some(MotionSeries {
+            pace,
             jets,
             signs,
             rows,
@@ -69,11 +72,15 @@ impl MotionSeries {
             .system
             .gradient(j, at.t, at.x, &self.signs, &mut gradient)?;
         let width = self.jets.width();
+        // A state at rest is known to rounding only, which moves at the pace of the fields around it.
         let size = |k: usize| {
             let parts = gradient.iter().zip(self.sizes.iter().zip(&self.rates));
             let own = if k == 1 { rate.abs() } else { 0.0 };
             own + parts
-                .map(|(g, (size, rate))| g.abs() * size * rate.powi(k as i32))
+                .map(|(g, (size, rate))| {
+                    let of_rounding = EPS / VANISHING_GERM * self.pace.powi(k as i32);
+                    g.abs() * size * rate.powi(k as i32).max(of_rounding)
+                })
                 .sum::<f64>()
         };
         let coefficient = |k: usize| {

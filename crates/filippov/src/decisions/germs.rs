@@ -1,6 +1,8 @@
 //! Decide by the germs of the guards if first-order data are doubtful.
 
 use super::choice::choose;
+use super::coinciding::{coinciding_kinks, have_parallels, touch_one_another};
+use super::consistency::with_those_that_jump;
 use super::departures::velocity_in;
 use super::leave_by_rule::slides_by_rule;
 use super::meeting::hidden_limit;
@@ -8,10 +10,66 @@ use super::point::{Decided, Left, Next, Notes, Point};
 use super::rule::{How, Meeting};
 use super::viable::{noise_of, survey, Viable};
 use crate::error::FieldError;
+use crate::field::SmoothField;
 use crate::mode::Mode;
 use crate::status::Stop;
 use crate::switching::{NormalFields, Resolution, Undecided};
-use crate::tolerances::{MOST_MEETING, TANGENT};
+use crate::tolerances::{EQUAL_SHARES, MOST_MEETING, TANGENT};
+
+/// Rule: switching functions jump between the regions around the point, surfaces are in one place or touch one another.
+pub(super) fn decide_if_entangled(
+    at: &Point,
+    notes: &mut Notes,
+    meeting: &Meeting,
+) -> Result<Option<Decided>, FieldError> {
+    if !(1..=MOST_MEETING).contains(&meeting.surfaces.len()) {
+        return Ok(None);
+    }
+    let wider = with_those_that_jump(at, notes, meeting)?;
+    let is_entangled =
+        wider.is_some() || is_parallel(at, notes, meeting)? || is_silent(at, notes, meeting)?;
+    if !is_entangled || slides_by_rule(at.arrival) {
+        return Ok(None);
+    }
+    let Some(surfaces) = wider else {
+        return Ok(decide_by_germs(at, notes, meeting)?.ok());
+    };
+    let meeting = &Meeting {
+        surfaces: &surfaces,
+        ..*meeting
+    };
+    decide_undecided(at, notes, meeting, Err(Undecided::NoOutcome)).map(Some)
+}
+
+/// Are all fields around the point tangent to one of several surfaces?
+fn is_silent(at: &Point, notes: &mut Notes, meeting: &Meeting) -> Result<bool, FieldError> {
+    if meeting.surfaces.len() < 2 {
+        return Ok(false);
+    }
+    let corners = at.corners(notes, meeting.surfaces, meeting.mode)?;
+    let Ok(fields) = corners.normal_fields() else {
+        return Ok(false);
+    };
+    let noise = noise_of(at, meeting, &fields)?;
+    let is_silent = |(i, noise): (usize, &f64)| {
+        let sticks = at.system.sticks_at(meeting.surfaces[i]);
+        !sticks && fields.row_range(i).iter().all(|v| v.abs() <= *noise)
+    };
+    Ok(noise.iter().enumerate().any(is_silent))
+}
+
+/// Are surfaces in one place, or do two touch one another?
+fn is_parallel(at: &Point, notes: &mut Notes, meeting: &Meeting) -> Result<bool, FieldError> {
+    let Meeting { surfaces, mode, .. } = *meeting;
+    if surfaces.len() < 2 || !have_parallels(at, surfaces, mode)? {
+        return Ok(false);
+    }
+    let touches = match *surfaces {
+        [j, k] => touch_one_another(at, j, k, mode)?,
+        _ => false,
+    };
+    Ok(touches || !coinciding_kinks(at, notes, mode, surfaces)?.is_empty())
+}
 
 /// Rule: first-order data are doubtful, and the viable modes are known.
 pub(super) fn decide_if_doubtful(
@@ -26,7 +84,9 @@ pub(super) fn decide_if_doubtful(
     }
     let corners = at.corners(notes, meeting.surfaces, meeting.mode)?;
     match corners.normal_fields() {
-        Ok(fields) if is_doubtful(at, &fields, meeting)? => decide_by_germs(at, notes, meeting),
+        Ok(fields) if is_doubtful(at, &fields, meeting)? => {
+            Ok(decide_by_germs(at, notes, meeting)?.ok())
+        }
         _ => Ok(None),
     }
 }
@@ -40,8 +100,12 @@ pub(super) fn decide_undecided(
 ) -> Result<Decided, FieldError> {
     notes.leaf = "germs";
     Ok(match decide_by_germs(at, notes, meeting)? {
-        Some(decided) => decided,
-        None => Err(Stop::Intersection {
+        Ok(decided) => decided,
+        Err(between) if !between.is_empty() => Err(Stop::SlidesAcrossJump {
+            surfaces: meeting.surfaces.to_vec(),
+            jumping: between,
+        }),
+        Err(_) => Err(Stop::Intersection {
             surfaces: meeting.surfaces.to_vec(),
             candidates: Vec::new(),
             reason: resolution.err().unwrap_or(Undecided::NoOutcome),
@@ -49,18 +113,21 @@ pub(super) fn decide_undecided(
     })
 }
 
-/// The viable mode that follows; `None` if there is none.
+/// The viable mode that follows. If there is none, the functions that jump on what could be slid on.
 fn decide_by_germs(
     at: &Point,
     notes: &mut Notes,
     meeting: &Meeting,
-) -> Result<Option<Decided>, FieldError> {
+) -> Result<Result<Decided, Vec<usize>>, FieldError> {
     let Some(mut found) = survey(at, notes, meeting)? else {
-        return Ok(None);
+        return Ok(Err(Vec::new()));
     };
     drop_other_names(at, notes, meeting, &mut found.viable)?;
     if found.viable.is_empty() {
-        return Ok(None);
+        let mut jumping: Vec<usize> = found.between.into_iter().flat_map(|(_, j)| j).collect();
+        jumping.sort_unstable();
+        jumping.dedup();
+        return Ok(Err(jumping));
     }
     let mut chosen = preferred(at, notes, meeting, &found.viable)?;
     let viable = found.viable.iter().map(|viable| viable.mode.clone());
@@ -69,14 +136,14 @@ fn decide_by_germs(
     if modes.len() > 1 {
         chosen = match choose(at, notes, meeting.surfaces, chosen, modes) {
             Ok(chosen) => chosen,
-            Err(stop) => return Ok(Some(Err(stop))),
+            Err(stop) => return Ok(Ok(Err(stop))),
         };
     }
     let viable = found
         .viable
         .into_iter()
         .find(|viable| viable.mode == chosen);
-    Ok(viable.map(|viable| Ok(begin(viable))))
+    Ok(viable.map(|viable| Ok(begin(viable))).ok_or_else(Vec::new))
 }
 
 /// The mode that is taken among several, if none is asked for: the limit of the hidden dynamics; the mode before; a mode all
@@ -91,15 +158,59 @@ fn preferred(
     if let [only] = viable {
         return Ok(only.mode.clone());
     }
-    let limit = hidden_limit(at, notes, meeting)?;
-    if let Some(limit) = limit.filter(is_viable) {
-        return Ok(limit);
+    if !is_silent(at, notes, meeting)? {
+        let limit = hidden_limit(at, notes, meeting)?;
+        if let Some(limit) = limit.filter(is_viable) {
+            return Ok(limit);
+        }
     }
     if matches!(meeting.how, How::Event(_)) && is_viable(meeting.mode) {
         return Ok(meeting.mode.clone());
     }
-    let strict = viable.iter().find(|viable| viable.is_strict);
-    Ok(strict.unwrap_or(&viable[0]).mode.clone())
+    let is_any_strict = viable.iter().any(|viable| viable.is_strict);
+    let strict = viable
+        .iter()
+        .filter(|viable| viable.is_strict == is_any_strict);
+    let before = multipliers_before(at, notes, meeting)?;
+    let far = |viable: &&Viable| {
+        let mut own = viable.multipliers.iter();
+        let entries = meeting.surfaces.iter().map(|&j| viable.mode.entries()[j]);
+        let place = entries.map(|entry| match entry {
+            0 => own.next().copied().unwrap_or(0.0),
+            side => f64::from(side),
+        });
+        let parts = place.zip(&before).map(|(own, before)| (own - before).abs());
+        (parts.sum::<f64>() / EQUAL_SHARES).round() as u64
+    };
+    Ok(strict.min_by_key(far).unwrap_or(&viable[0]).mode.clone())
+}
+
+/// The signs of the motion that arrives, with the multipliers of what it slides on a moment before: at the point itself they
+/// may be lost in rounding. Empty at a start.
+fn multipliers_before(
+    at: &Point,
+    notes: &mut Notes,
+    meeting: &Meeting,
+) -> Result<Vec<f64>, FieldError> {
+    if !matches!(meeting.how, How::Event(_)) {
+        return Ok(Vec::new());
+    }
+    let mut velocity = at.arrival.velocity.to_vec();
+    let moment = at.moment(notes, at.arrival.signs, &velocity)?;
+    let pairs = at.x.iter().zip(&velocity);
+    let mut past: Vec<f64> = pairs.map(|(x, v)| x - moment * v).collect();
+    let mut field = at.arrival.field.borrow_mut();
+    field.eval(at.t - moment, &mut past, &mut velocity)?;
+    let known = field.multipliers();
+    let mut signs = at.arrival.mode.signs();
+    for (&j, &multiplier) in at.arrival.sliding.iter().zip(&known) {
+        signs[j] = if multiplier.is_finite() {
+            multiplier
+        } else {
+            0.0
+        };
+    }
+    Ok(meeting.surfaces.iter().map(|&j| signs[j]).collect())
 }
 
 /// Keeps one of several modes that have the same motion, and differ in the entries of surfaces on which that stays: the one
@@ -162,7 +273,7 @@ fn drop_other_names(
 
 fn begin(viable: Viable) -> Next {
     let mut next = Next::new(viable.mode, viable.left);
-    if viable.is_given || next.mode.codimension() > 1 && !viable.multipliers.is_empty() {
+    if !viable.multipliers.is_empty() {
         let start = next.start_mut();
         (start.multipliers, start.is_given) = (viable.multipliers, viable.is_given);
     }
@@ -172,8 +283,5 @@ fn begin(viable: Viable) -> Next {
 /// Is a normal component at some surface not clear of zero?
 fn is_doubtful(at: &Point, fields: &NormalFields, meeting: &Meeting) -> Result<bool, FieldError> {
     let noise = noise_of(at, meeting, fields)?;
-    Ok(noise.iter().enumerate().any(|(i, noise)| {
-        let [least, most] = fields.row_range(i);
-        least.abs() <= *noise || most.abs() <= *noise
-    }))
+    Ok(fields.any_component(|i, component| component.abs() <= noise[i]))
 }

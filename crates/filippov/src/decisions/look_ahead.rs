@@ -16,55 +16,6 @@ use crate::tolerances::{
     LONGER_TRIAL, MAX_LIE_ORDER, MOST_LENGTHENINGS, MOST_TRIED, SURFACE_NOISE,
 };
 
-/// What follows where two surfaces touch one another, without being in one place.
-pub(super) fn decide_where_two_touch(
-    at: &Point,
-    notes: &mut Notes,
-    meeting: &Meeting,
-) -> Result<Option<Decided>, FieldError> {
-    match *meeting.surfaces {
-        [j, k] if touch_one_another(at, j, k, meeting.mode)? => {
-            decide_by_trial(at, notes, meeting.mode, meeting.surfaces)
-        }
-        _ => Ok(None),
-    }
-}
-
-/// The only mode, but for sliding on all of `meeting`, in which a motion goes on for a moment: it keeps to what it slides
-/// on, and to its sides of the others. `None` if there is none, or several.
-pub(super) fn decide_by_trial(
-    at: &Point,
-    notes: &mut Notes,
-    mode: &Mode,
-    meeting: &[usize],
-) -> Result<Option<Decided>, FieldError> {
-    if meeting.len() > MOST_TRIED {
-        return Ok(None);
-    }
-    let mut found: Option<(Mode, Lefts)> = None;
-    let mut entries = vec![-1_i8; meeting.len()];
-    loop {
-        if at.patience.is_over() {
-            return Ok(None);
-        }
-        if entries.iter().any(|&entry| entry != 0) {
-            let mut candidate = mode.clone();
-            let pairs = meeting.iter().zip(&entries);
-            pairs.for_each(|(&j, &entry)| candidate.set(j, entry));
-            if let Trial::Leaves(left) = try_mode(at, notes, &candidate, meeting)? {
-                if found.replace((candidate, left)).is_some() {
-                    return Ok(None);
-                }
-            }
-        }
-        let Some(place) = entries.iter().position(|&entry| entry < 1) else {
-            return Ok(found.map(|(mode, left)| Ok(Next::new(mode, left))));
-        };
-        entries[place] += 1;
-        entries[..place].fill(-1);
-    }
-}
-
 /// Follows a motion in this mode for a moment, and longer until it is clear of rounding.
 pub(super) fn try_mode(
     at: &Point,

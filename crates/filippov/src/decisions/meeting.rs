@@ -1,6 +1,6 @@
 //! Where surfaces meet: what follows at an intersection, from the switching stage.
 
-use super::choice::{asked, choose, follow_at_surface};
+use super::choice::{asked, choose};
 use super::departures::departures;
 use super::germs::decide_undecided;
 use super::point::{Decided, Lefts, Next, Notes, Point};
@@ -14,9 +14,8 @@ use crate::field::{IntersectionExit, MeetingFields};
 use crate::mode::Mode;
 use crate::status::Stop;
 use crate::switching::{
-    admissible_within, decide as decide_at_surface, has_one_mode_only, merged_root, region_at_rest,
-    resolve_within, Arrival as SurfaceArrival, Continuation, ExitKind, Incoming, NormalFields,
-    Resolution, Undecided,
+    admissible_within, has_one_mode_only, merged_root, resolve_within, Continuation, ExitKind,
+    Incoming, NormalFields, Resolution, Undecided,
 };
 use crate::tolerances::{MOST_LISTED, MOST_MEETING};
 
@@ -217,7 +216,6 @@ fn follow(
     if resolution == Err(Undecided::Interrupted) {
         return Ok(Err(Stop::Interrupted));
     }
-    let rest = region_at_rest(at.system, fields, mode, at.t, at.x)?;
     let resolution = match resolution {
         Ok(resolution) if !resolution.degenerate => resolution,
         other => return decide_undecided(at, notes, place, other),
@@ -230,7 +228,6 @@ fn follow(
         let mode = mode.as_mode().map(on_all);
         candidates.extend(mode.filter(|mode| !candidates.contains(mode)));
     }
-    candidates.extend(rest.clone().filter(|mode| !candidates.contains(mode)));
     let is_spiral = matches!(resolution.chosen, Some(Continuation::OutwardSpiral));
     let asked = asked(at, notes).filter(|asked| candidates.contains(asked));
     let (mut after, leap) = match &resolution.chosen {
@@ -264,9 +261,6 @@ fn follow(
     } else {
         &[]
     };
-    if let Some(decided) = decide_at_tangency(at, notes, &after, meeting)? {
-        return Ok(decided);
-    }
     let left = match &leap {
         // What it leaves is known at the end of the leap.
         Some(_) => Lefts::new(),
@@ -280,40 +274,6 @@ fn follow(
         start.multipliers = multipliers.to_vec();
     }
     Ok(Ok(next))
-}
-
-/// Where the motion is to slide on one of the surfaces and both of its fields are tangent there: what higher
-/// derivatives say of that surface.
-fn decide_at_tangency(
-    at: &Point,
-    notes: &mut Notes,
-    after: &Mode,
-    meeting: &[usize],
-) -> Result<Option<Decided>, FieldError> {
-    let mut slid_on = after.sliding_set();
-    let (Some(j), None) = (slid_on.next(), slid_on.next()) else {
-        return Ok(None);
-    };
-    let decision = decide_at_surface(
-        at.system,
-        j,
-        SurfaceArrival::Start,
-        at.t,
-        at.x,
-        &after.signs(),
-    )?;
-    let is_tangent = decision.minus.order != 1 && decision.plus.order != 1;
-    if !is_tangent || decision.entry == 0 || at.system.sticks_at(j) {
-        return Ok(None);
-    }
-    let mut next = match follow_at_surface(at, notes, after, j, decision) {
-        Ok(next) => next,
-        Err(stop) => return Ok(Some(Err(stop))),
-    };
-    let others: Vec<usize> = meeting.iter().copied().filter(|&k| k != j).collect();
-    let left = departures(at, notes, &next.mode, &others, &[])?;
-    next.left.extend(left);
-    Ok(Some(Ok(next)))
 }
 
 /// All attracting continuations at an intersection that is reached, whatever the regularisation selects: Filippov

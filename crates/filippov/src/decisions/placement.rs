@@ -3,7 +3,6 @@
 use super::choice::follow_at_surface;
 use super::contact::place_in_contact;
 use super::departures::velocity_in;
-use super::nested::follow_jumps;
 use super::point::{Decided, Left, Notes, Point};
 use super::rule::{How, Meeting, Rule};
 use super::settle::place_on;
@@ -51,7 +50,6 @@ pub(crate) fn place(
         return place_on_triggers(at, notes, mode, &smooth, meeting, memory);
     }
     let (rule, decided) = place_on(at, notes, &mode, &meeting, memory)?;
-    let (rule, decided) = follow_jumps(at, notes, &mode, &meeting, (rule, decided))?;
     let is_new = |j: &usize| memory.is_none_or(|memory| memory.entries()[*j] == 0);
     let inactive = zeros.into_iter().filter(|j| !meeting.contains(j));
     Ok((rule, take_sides(at, decided, inactive.filter(is_new))?))

@@ -2,13 +2,12 @@
 
 use super::point::{Notes, Point};
 use super::two_fold::{beyond_double_zero, two_fold_here};
-use super::vanishing_jump::has_lost_jump;
 use smallvec::{smallvec, SmallVec};
 
 use crate::error::FieldError;
 use crate::event::EventFunction;
 use crate::field::{IntersectionExit, ModeField};
-use crate::tolerances::{AT_FOLD, AT_SIDE, FIRST_SLACK};
+use crate::tolerances::{AT_FOLD, AT_SIDE, FIRST_SLACK, VANISHED};
 
 /// The functions that count as vanishing where steps of sliding shrink to nothing: the jump of the field across a surface has
 /// vanished, the multipliers have met a fold beyond which there are none, or both fields are tangent to the surface.
@@ -28,6 +27,25 @@ pub(crate) fn lost_functions(
     };
     let arrived = beyond_double_zero(at, j)?.is_some() || two_fold_here(at)?.is_some();
     Ok(arrived.then(|| smallvec![EventFunction::ExitMinus, EventFunction::ExitPlus]))
+}
+
+/// Have the components normal to one of the surfaces slid on vanished in all fields, compared with a moment before?
+fn has_lost_jump(at: &Point, notes: &mut Notes) -> Result<bool, FieldError> {
+    let (mode, surfaces, velocity) = (at.arrival.mode, at.arrival.sliding, at.arrival.velocity);
+    let moment = at.moment(notes, &mode.signs(), velocity)?;
+    let pairs = at.x.iter().zip(velocity);
+    let past: Vec<f64> = pairs.map(|(x, v)| x - moment * v).collect();
+    let earlier = at.moved(at.t - moment, &past);
+    let here = at.corners(notes, surfaces, mode)?;
+    let earlier = earlier.corners(notes, surfaces, mode)?;
+    let (Ok(here), Ok(earlier)) = (here.normal_fields(), earlier.normal_fields()) else {
+        return Ok(false);
+    };
+    let is_lost = |row: usize| {
+        let sticks = at.system.sticks_at(surfaces[row]);
+        !sticks && here.row_size(row) <= VANISHED * earlier.row_size(row)
+    };
+    Ok((0..surfaces.len()).any(is_lost))
 }
 
 /// Has sliding on several surfaces come to a fold of its multipliers?

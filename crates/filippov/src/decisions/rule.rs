@@ -10,24 +10,16 @@ pub(crate) enum Rule {
     Region,
     /// The motion touches a surface.
     Touch,
-    /// Other switching functions jump where surfaces are reached.
-    OthersJump,
+    /// The viable modes, where switching functions jump, or surfaces touch or are in one place.
+    Entangled,
     /// The first derivatives that do not vanish on both sides of one surface.
     OneSurface,
-    /// Surfaces bend at one another; one motion leads away from all.
-    Bends,
-    /// Surfaces in one place: one decides.
-    Coinciding,
     /// Switches accumulate, and the motion stays on all surfaces.
     Limit,
     /// The first derivatives of all guards that do not vanish, where first-order data are doubtful.
     Germs,
-    /// Two surfaces that touch one another: the modes are tried for a moment.
-    Trial,
     /// The rule of sliding that the caller chose ends.
     Law,
-    /// The jump of the field across one surface vanishes while the motion slides on several.
-    VanishingJump,
     /// The relay problem of a field that is affine in the signs.
     Relay,
     /// The signs of too many surfaces multiply one another.
@@ -46,15 +38,11 @@ impl Rule {
         match self {
             Rule::Region => "region",
             Rule::Touch => "touch",
-            Rule::OthersJump => "others_jump",
+            Rule::Entangled => "entangled",
             Rule::OneSurface => "one_surface",
-            Rule::Bends => "bends",
-            Rule::Coinciding => "coinciding",
             Rule::Limit => "limit",
             Rule::Germs => "germs",
-            Rule::Trial => "trial",
             Rule::Law => "sliding_rule",
-            Rule::VanishingJump => "vanishing_jump",
             Rule::Relay => "relay",
             Rule::TooMany => "too_many",
             Rule::FirstOrder => "first_order",

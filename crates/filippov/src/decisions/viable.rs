@@ -1,6 +1,8 @@
 //! Which modes can follow at a point: those that are consistent with their own signs, and all of whose guards begin positive.
 
 use super::blow_up::beginnings;
+use super::coinciding::{coinciding_kinks, touch_one_another, Kink};
+use super::consistency::{consistency, Consistency};
 use super::germ::{Germ, MotionSeries};
 use super::look_ahead::{try_mode, Trial};
 use super::point::{Cause, Left, Lefts, Notes, Point};
@@ -11,7 +13,6 @@ use crate::mode::Mode;
 use crate::switching::{
     first_nonzero, is_undetermined, stable_roots_with_border, Leading, NormalFields,
 };
-use crate::system::dot_magnitude;
 use crate::tolerances::{AT_SIDE, DOUBTFUL, MOST_MEETING, TANGENT};
 
 /// A mode in which a motion can go on.
@@ -52,6 +53,8 @@ pub(super) struct Survey {
     pub failing: Vec<(Mode, EventFunction)>,
     /// Modes about which derivatives at the point do not decide, nor a trial.
     pub open: Vec<Mode>,
+    /// Modes that would slide between fields that differ in the signs of these functions too.
+    pub between: Vec<(Mode, Vec<usize>)>,
 }
 
 enum Verdict {
@@ -74,7 +77,10 @@ pub(super) fn survey(
     let Ok(fields) = corners.normal_fields() else {
         return Ok(None);
     };
+    let pace = corners.pace(|i| at.scale.size(i, at.x[i]));
     let noise = noise_of(at, meeting, &fields)?;
+    let kinks = coinciding_kinks(at, notes, meeting.mode, meeting.surfaces)?;
+    let touches = kinks.is_empty() && touches(at, meeting)?;
     let mut found = Survey::default();
     for index in 0..3_usize.pow(m as u32) {
         let entries = (0..m).map(|i| 1 - (index / 3_usize.pow(i as u32) % 3) as i8);
@@ -82,11 +88,57 @@ pub(super) fn survey(
             return Ok(None);
         }
         let entries = Mode::new(entries.collect());
-        let mode = meeting.on_all(&entries);
+        let Some(with_kinks) = name_kinks(meeting, &kinks, &entries) else {
+            continue;
+        };
+        let (mode, vanishing) = match consistency(at, notes, meeting, &entries)? {
+            Consistency::Agrees { mode, vanishing } => (mode, vanishing),
+            Consistency::Contradicts(j) => {
+                let guard = EventFunction::Surface(j);
+                found.failing.push((meeting.on_all(&entries), guard));
+                continue;
+            }
+            Consistency::Between(jumping) => {
+                found.between.push((meeting.on_all(&entries), jumping));
+                continue;
+            }
+        };
+        let differs = |j: usize| {
+            let is_outside = meeting.surfaces.binary_search(&j).is_err();
+            is_outside && mode.entries()[j] != meeting.mode.entries()[j]
+        };
+        let others;
+        let fields = match (0..mode.entries().len()).any(differs) {
+            true => match at.corners(notes, meeting.surfaces, &mode)?.normal_fields() {
+                Ok(fields) => {
+                    others = fields;
+                    &others
+                }
+                Err(_) => return Ok(None),
+            },
+            false => &fields,
+        };
+        let guarded: Vec<bool> = vanishing
+            .iter()
+            .zip(&with_kinks)
+            .map(|(vanishes, follows)| *vanishes && !follows)
+            .collect();
+        let candidate = Candidate {
+            meeting,
+            fields,
+            noise: &noise,
+            pace,
+            entries: &entries,
+            mode: &mode,
+            guarded: &guarded,
+        };
         let verdict = match entries.codimension() {
             _ if has_ended(at, meeting, &mode) => Verdict::Fails(at.arrival.functions()[0]),
-            0 => of_region(at, meeting, (&fields, &noise), (&entries, &mode))?,
-            _ => of_sliding(at, notes, meeting, (&fields, &noise), (&entries, &mode))?,
+            // Where surfaces touch to rounding, derivatives at the point are those of a point beside it.
+            2 if touches => continue,
+            _ if touches => Verdict::Open,
+            0 => of_region(at, &candidate)?,
+            _ => of_sliding(at, notes, &candidate)?,
         };
         match verdict {
             Verdict::Viable(viable) => found.viable.push(viable),
@@ -94,11 +146,58 @@ pub(super) fn survey(
             Verdict::Open => match try_mode(at, notes, &mode, meeting.surfaces)? {
                 Trial::Leaves(left) => found.viable.push(Viable::strictly(mode, left)),
                 Trial::Ends => found.failing.push((mode, guard_of(meeting, &entries))),
+                Trial::WithinRounding if touches => {}
                 Trial::WithinRounding => found.open.push(mode),
             },
         }
     }
     Ok(Some(found))
+}
+
+/// Which surfaces of a meeting follow another one that is slid on with these entries: kinks in its place. They keep their
+/// side; with another entry it is the same mode once more, and `None`.
+fn name_kinks(meeting: &Meeting, kinks: &[Kink], entries: &Mode) -> Option<Vec<bool>> {
+    let place = |j: usize| meeting.surfaces.iter().position(|&k| k == j);
+    let mut follows = vec![false; meeting.surfaces.len()];
+    for kink in kinks {
+        let (Some(own), Some(beside)) = (place(kink.surface), place(kink.beside)) else {
+            continue;
+        };
+        let entry = entries.entries()[own];
+        if entry == 0 {
+            return None;
+        }
+        if entries.entries()[beside] == 0 {
+            let kept = meeting.mode.entries()[kink.surface];
+            if entry != if kept == 0 { 1 } else { kept } {
+                return None;
+            }
+            follows[own] = true;
+        }
+    }
+    Some(follows)
+}
+
+/// Two surfaces that touch one another and are not in one place: no motion stays on both.
+fn touches(at: &Point, meeting: &Meeting) -> Result<bool, FieldError> {
+    match *meeting.surfaces {
+        [j, k] => touch_one_another(at, j, k, meeting.mode),
+        _ => Ok(false),
+    }
+}
+
+/// A mode that agrees with all switching functions.
+struct Candidate<'c> {
+    meeting: &'c Meeting<'c>,
+    fields: &'c NormalFields,
+    noise: &'c [f64],
+    /// The rate at which the fields around the point change the state.
+    pace: f64,
+    /// On the surfaces of the meeting.
+    entries: &'c Mode,
+    mode: &'c Mode,
+    /// Of which surfaces of the meeting is the function a guard: it vanishes here, and not all along the motion?
+    guarded: &'c [bool],
 }
 
 /// Is this the mode of a motion that one of its own exit functions has just ended?
@@ -107,19 +206,45 @@ fn has_ended(at: &Point, meeting: &Meeting, mode: &Mode) -> bool {
     meeting.is_exit() && !is_touch && mode == meeting.mode && !at.arrival.functions().is_empty()
 }
 
-fn of_region(
-    at: &Point,
-    meeting: &Meeting,
-    (fields, noise): (&NormalFields, &[f64]),
-    (entries, mode): (&Mode, &Mode),
-) -> Result<Verdict, FieldError> {
+fn of_region(at: &Point, candidate: &Candidate) -> Result<Verdict, FieldError> {
+    let Candidate {
+        meeting,
+        fields,
+        noise,
+        entries,
+        mode,
+        guarded,
+        ..
+    } = *candidate;
     let signs = mode.signs();
     let g = fields.in_region(entries.entries());
+    let is_tangent = (0..noise.len()).any(|i| guarded[i] && g[i].abs() <= noise[i]);
+    let series = is_tangent
+        .then(|| MotionSeries::of(at, mode, &[], candidate.pace))
+        .flatten();
     let mut viable = Viable::strictly(mode.clone(), Lefts::new());
     for (i, &j) in meeting.surfaces.iter().enumerate() {
+        if !guarded[i] {
+            continue;
+        }
         let side = mode.entries()[j];
-        let known = usize::from(g[i].abs() <= noise[i]);
-        let leading = first_nonzero(at.system, j, side, known, at.t, at.x, &signs)?;
+        let leading = match (g[i].abs() > noise[i], &series) {
+            (true, _) if g[i] * f64::from(side) < 0.0 => {
+                return Ok(Verdict::Fails(EventFunction::Surface(j)));
+            }
+            (true, _) | (false, None) => {
+                let known = usize::from(g[i].abs() <= noise[i]);
+                first_nonzero(at.system, j, side, known, at.t, at.x, &signs)?
+            }
+            (false, Some(series)) => match series.of_surface(at, j)? {
+                Germ::Begins(leading) => leading,
+                Germ::Zero => Leading {
+                    order: 0,
+                    value: 0.0,
+                },
+                Germ::Unknown => first_nonzero(at.system, j, side, 1, at.t, at.x, &signs)?,
+            },
+        };
         if leading.order == 0 {
             let corner: Vec<f64> = entries.entries().iter().map(|&k| f64::from(k)).collect();
             viable.is_pressed |= is_pressed(fields, noise, &corner, i);
@@ -132,24 +257,25 @@ fn of_region(
     Ok(Verdict::Viable(viable))
 }
 
-fn of_sliding(
-    at: &Point,
-    notes: &mut Notes,
-    meeting: &Meeting,
-    (fields, noise): (&NormalFields, &[f64]),
-    (entries, mode): (&Mode, &Mode),
-) -> Result<Verdict, FieldError> {
+fn of_sliding(at: &Point, notes: &mut Notes, candidate: &Candidate) -> Result<Verdict, FieldError> {
+    let Candidate {
+        meeting,
+        fields,
+        noise,
+        entries,
+        ..
+    } = *candidate;
     let face = fields.restrict(entries.entries());
     let is_silent = silent_rows((fields, noise), entries.entries());
     if entries.sliding_set().any(|i| is_silent[i]) {
-        return of_blown_up(at, notes, meeting, (entries, mode), &is_silent);
+        return of_blown_up(at, notes, candidate, &is_silent);
     }
     if is_undetermined(&face) {
         return Ok(Verdict::Open);
     }
     let mut verdict = Verdict::Fails(guard_of(meeting, entries));
     for lambda in stable_roots_with_border(&face, at.patience) {
-        match at_root(at, meeting, (fields, noise), (entries, mode), &lambda)? {
+        match at_root(at, candidate, &lambda)? {
             Verdict::Viable(viable) => return Ok(Verdict::Viable(viable)),
             Verdict::Open => verdict = Verdict::Open,
             Verdict::Fails(guard) => {
@@ -187,7 +313,7 @@ fn is_neutral(fields: &NormalFields, noise: &[f64], entries: &[i8], i: usize) ->
 }
 
 /// To which surfaces of the meeting are all fields around the surfaces slid on tangent?
-fn silent_rows((fields, noise): (&NormalFields, &[f64]), entries: &[i8]) -> Vec<bool> {
+pub(super) fn silent_rows((fields, noise): (&NormalFields, &[f64]), entries: &[i8]) -> Vec<bool> {
     let slid: Vec<usize> = (0..entries.len()).filter(|&i| entries[i] == 0).collect();
     let mut is_silent = vec![true; fields.m()];
     let mut region = entries.to_vec();
@@ -207,10 +333,16 @@ fn silent_rows((fields, noise): (&NormalFields, &[f64]), entries: &[i8]) -> Vec<
 fn of_blown_up(
     at: &Point,
     notes: &mut Notes,
-    meeting: &Meeting,
-    (entries, mode): (&Mode, &Mode),
+    candidate: &Candidate,
     is_silent: &[bool],
 ) -> Result<Verdict, FieldError> {
+    let Candidate {
+        meeting,
+        entries,
+        mode,
+        guarded,
+        ..
+    } = *candidate;
     let mut verdict = None;
     for beginning in beginnings(at, notes, meeting, mode, is_silent)? {
         let mut left = Lefts::new();
@@ -224,7 +356,7 @@ fn of_blown_up(
         for (i, &j) in meeting.surfaces.iter().enumerate() {
             let side = f64::from(entries.entries()[i]);
             let value = beginning.rates[i];
-            if side == 0.0 {
+            if side == 0.0 || !guarded[i] {
                 continue;
             }
             if value.abs() <= DOUBTFUL * largest {
@@ -259,13 +391,16 @@ fn of_blown_up(
     Ok(verdict.unwrap_or(Verdict::Fails(guard_of(meeting, entries))))
 }
 
-fn at_root(
-    at: &Point,
-    meeting: &Meeting,
-    (fields, noise): (&NormalFields, &[f64]),
-    (entries, mode): (&Mode, &Mode),
-    lambda: &[f64],
-) -> Result<Verdict, FieldError> {
+fn at_root(at: &Point, candidate: &Candidate, lambda: &[f64]) -> Result<Verdict, FieldError> {
+    let Candidate {
+        meeting,
+        fields,
+        noise,
+        entries,
+        mode,
+        guarded,
+        ..
+    } = *candidate;
     let mut next = lambda.iter();
     let held = entries.entries().iter();
     let full: Vec<f64> = held
@@ -281,7 +416,7 @@ fn at_root(
     let (mut left, mut tangent) = (Lefts::new(), Vec::new());
     for (i, &j) in meeting.surfaces.iter().enumerate() {
         let side = f64::from(entries.entries()[i]);
-        if side == 0.0 {
+        if side == 0.0 || !guarded[i] {
             continue;
         }
         if g[i].abs() <= noise[i] {
@@ -311,7 +446,7 @@ fn at_root(
     if tangent.is_empty() && ends.is_empty() {
         return Ok(Verdict::Viable(viable));
     }
-    let Some(series) = MotionSeries::of(at, mode, lambda) else {
+    let Some(series) = MotionSeries::of(at, mode, lambda, candidate.pace) else {
         return Ok(Verdict::Open);
     };
     for j in tangent {
@@ -376,8 +511,12 @@ pub(super) fn noise_of(
             let partials = at
                 .system
                 .rate_gradient(j, at.t, at.x, &signs, &mut gradient)?;
-            let size = dot_magnitude(&gradient, at.x) + (partials.time * at.t).abs();
-            largest = largest.max(TANGENT * size);
+            let parts = gradient.iter().zip(at.x).enumerate();
+            let size: f64 = parts
+                .map(|(i, (g, x))| g.abs() * at.scale.size(i, *x))
+                .filter(|part| part.is_finite())
+                .sum();
+            largest = largest.max(TANGENT * (size + (partials.time * at.t).abs()));
         }
         noise.push(largest);
     }

@@ -5,7 +5,7 @@ use super::weights::product_weights;
 use crate::error::FieldError;
 use crate::switching::{Matrix, NormalFields, SignGroup, Undecided};
 use crate::system::{dot, PiecewiseSystem};
-use crate::tolerances::{TANGENT, TANGENT_TO_ALL};
+use crate::tolerances::{MOST_MEETING, TANGENT, TANGENT_TO_ALL};
 
 /// The fields around an intersection of m surfaces, and the gradients of the switching functions.
 ///
@@ -26,6 +26,8 @@ pub struct MeetingFields {
     gradients: Vec<f64>,
     time_derivatives: Vec<f64>,
     signs: Vec<f64>,
+    /// Do the normals depend on the signs? Then those of each pattern are taken.
+    bends: bool,
 }
 
 impl MeetingFields {
@@ -45,8 +47,9 @@ impl MeetingFields {
 
     fn of_groups(system: &dyn PiecewiseSystem, set: &[usize], groups: Vec<Vec<usize>>) -> Self {
         let (n, m) = (system.n_states(), set.len());
-        // One and two surfaces have closed forms, for all of their patterns.
-        let groups = if m <= 2 {
+        let bends = m > 1 && m <= MOST_MEETING && system.has_nested_signs();
+        // One and two surfaces have closed forms, for all of their patterns. Normals that bend are no sums.
+        let groups = if m <= 2 || bends {
             vec![(0..m).collect()]
         } else {
             groups
@@ -61,6 +64,7 @@ impl MeetingFields {
             gradients: vec![0.0; n * m],
             time_derivatives: vec![0.0; m],
             signs: Vec::new(),
+            bends,
         }
     }
 
@@ -160,6 +164,13 @@ impl MeetingFields {
             };
             self.components[row * m + i] = of_time + dot(gradient, field);
         }
+        if self.bends {
+            let mut gradient = vec![0.0; n];
+            for (i, &j) in self.set.iter().enumerate() {
+                let of_time = system.gradient(j, t, x, &self.signs, &mut gradient)?;
+                self.components[row * m + i] = of_time + dot(&gradient, field);
+            }
+        }
         Ok(evaluations)
     }
 
@@ -243,6 +254,19 @@ impl MeetingFields {
             over_groups(&|row| self.components[row * m + i].abs()) > TANGENT_TO_ALL * size
         };
         (0..m).filter(is_telling).collect()
+    }
+
+    /// The largest rate at which the fields change components of the state, in units of these sizes.
+    pub fn pace(&self, size: impl Fn(usize) -> f64) -> f64 {
+        let mut row = 0;
+        let groups = self.groups.iter().map(|group| {
+            let rows = row * self.n..(row + (1 << group.len())) * self.n;
+            row += 1 << group.len();
+            let rates = self.fields[rows].iter().enumerate();
+            let rates = rates.map(|(i, v)| v.abs() / size(i % self.n));
+            rates.fold(0.0, f64::max)
+        });
+        groups.sum()
     }
 
     /// Has a normal component one sign in all fields where it is not zero, so that no mixture of all of them stays on its

@@ -11,7 +11,6 @@ mod enclosed_root;
 mod fold;
 mod hidden;
 mod incoming;
-mod intersection;
 mod lie;
 mod normal_fields;
 mod p_matrix;
@@ -38,7 +37,6 @@ pub use hidden::{
     Outcome as HiddenOutcome,
 };
 pub use incoming::{ExitKind, Incoming};
-pub use intersection::{decide_intersection, region_at_rest, IntersectionDecision};
 pub use lie::{first_nonzero, normal_component, Leading};
 pub use normal_fields::{NormalFields, SignGroup};
 pub use p_matrix::is_p_matrix;

@@ -165,6 +165,18 @@ impl NormalFields {
         high.abs().max(low.abs())
     }
 
+    /// Does this hold for the component normal to some surface in some pattern? Of several groups only the least and the
+    /// largest components are looked at.
+    pub fn any_component(&self, holds: impl Fn(usize, f64) -> bool) -> bool {
+        match &self.groups[..] {
+            [group] => {
+                let values = group.values.iter().enumerate();
+                values.into_iter().any(|(k, v)| holds(k % self.m, *v))
+            }
+            _ => (0..self.m).any(|j| self.row_range(j).iter().any(|v| holds(j, *v))),
+        }
+    }
+
     /// The least and the largest component normal to surface j, over all patterns, and so over the cube.
     pub fn row_range(&self, j: usize) -> [f64; 2] {
         self.range_over(j, |_, _| true)
