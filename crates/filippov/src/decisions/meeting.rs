@@ -8,9 +8,7 @@ use super::rule::{How, Meeting};
 use super::settle::place_on;
 use super::spiral::outward_leap;
 use crate::error::FieldError;
-use crate::event::EventFunction;
-use crate::field::ModeField;
-use crate::field::{IntersectionExit, MeetingFields};
+use crate::field::{Guard, MeetingFields, ModeField, RootEnd};
 use crate::mode::Mode;
 use crate::status::Stop;
 use crate::switching::{
@@ -142,25 +140,23 @@ fn incoming(
         .arrival
         .functions()
         .iter()
-        .find_map(|function| match function {
-            EventFunction::Exit(index) => Some(*index),
-            _ => None,
-        });
-    let (Some(index), ModeField::Intersection(field), true) = (exit, &**field, meeting.is_exit())
+        .find(|guard| !guard.is_surface());
+    let (Some(exit), ModeField::Intersection(field), true) = (exit, &**field, meeting.is_exit())
     else {
         return Ok(Incoming::Face {
             mode: entries,
             multipliers,
         });
     };
-    let kind = match field.exit(index) {
-        IntersectionExit::Side { .. } => ExitKind::Side,
-        IntersectionExit::Fold => ExitKind::Fold,
-        IntersectionExit::Stability => ExitKind::Stability,
+    let kind = match exit {
+        Guard::Root(RootEnd::Fold) => ExitKind::Fold,
+        Guard::Root(RootEnd::Stability) => ExitKind::Stability,
+        _ => ExitKind::Side,
     };
     let mut lambda = multipliers;
-    if let IntersectionExit::Side { position, end } = field.exit(index) {
-        lambda[position] = f64::from(end);
+    if let Guard::Multiplier { surface, end } = *exit {
+        let position = field.set().iter().position(|&j| j == surface);
+        lambda[position.unwrap_or(0)] = f64::from(end);
     }
     if kind == ExitKind::Fold && meeting.surfaces.len() > 2 {
         let merged = merged_root(fields, &lambda);

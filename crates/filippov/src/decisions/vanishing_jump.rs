@@ -9,9 +9,7 @@ use super::point::{Decided, Left, Lefts, Next, Notes, Point};
 use super::rule::Meeting;
 
 use crate::error::FieldError;
-use crate::event::EventFunction;
-use crate::field::ModeField;
-use crate::field::{IntersectionExit, SmoothField};
+use crate::field::{Guard, ModeField, SmoothField};
 use crate::mode::Mode;
 use crate::switching::{admissible_within, Leading};
 use crate::system::dot;
@@ -49,12 +47,10 @@ pub(super) fn decide_where_jump_vanishes(
 ) -> Result<Option<Decided>, FieldError> {
     let (is_exit, mode, meeting) = (meeting.is_exit(), meeting.mode, meeting.surfaces);
     let is_end_of_root = match &**at.arrival.field.borrow() {
-        ModeField::Intersection(field) => at.arrival.functions().iter().any(|f| match f {
-            EventFunction::Exit(index) => {
-                !matches!(field.exit(*index), IntersectionExit::Side { .. })
-            }
-            _ => false,
-        }),
+        ModeField::Intersection(_) => {
+            let mut guards = at.arrival.functions().iter();
+            guards.any(|guard| matches!(guard, Guard::Root(_)))
+        }
         _ => false,
     };
     if !is_exit || !is_end_of_root || meeting.len() > MOST_LISTED {

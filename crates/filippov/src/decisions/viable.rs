@@ -6,7 +6,7 @@ use super::look_ahead::{try_mode, Trial};
 use super::point::{Cause, Left, Lefts, Notes, Point};
 use super::rule::Meeting;
 use crate::error::FieldError;
-use crate::event::EventFunction;
+use crate::field::Guard;
 use crate::mode::Mode;
 use crate::switching::{
     first_nonzero, is_undetermined, stable_roots_with_border, Leading, NormalFields,
@@ -49,14 +49,14 @@ impl Viable {
 pub(super) struct Survey {
     pub viable: Vec<Viable>,
     /// The others, each with a guard that begins negative.
-    pub failing: Vec<(Mode, EventFunction)>,
+    pub failing: Vec<(Mode, Guard)>,
     /// Modes about which derivatives at the point do not decide, nor a trial.
     pub open: Vec<Mode>,
 }
 
 enum Verdict {
     Viable(Viable),
-    Fails(EventFunction),
+    Fails(Guard),
     Open,
 }
 
@@ -125,7 +125,7 @@ fn of_region(
             viable.is_pressed |= is_pressed(fields, noise, &corner, i);
             viable.is_strict = false;
         } else if leading.sign() != side {
-            return Ok(Verdict::Fails(EventFunction::Surface(j)));
+            return Ok(Verdict::Fails(Guard::Surface(j)));
         }
         viable.left.push(Left::Surface(j, leading));
     }
@@ -163,9 +163,9 @@ fn of_sliding(
 }
 
 /// The first surface slid on: a mode without a stable root does not last there.
-fn guard_of(meeting: &Meeting, entries: &Mode) -> EventFunction {
+fn guard_of(meeting: &Meeting, entries: &Mode) -> Guard {
     let place = entries.sliding_set().next().unwrap_or(0);
-    EventFunction::Surface(meeting.surfaces[place])
+    Guard::Surface(meeting.surfaces[place])
 }
 
 /// A motion with these multipliers and sides stays on surface i of the meeting. Does the field beyond the surface press it
@@ -230,7 +230,7 @@ fn of_blown_up(
             if value.abs() <= DOUBTFUL * largest {
                 is_open = true;
             } else if side * value < 0.0 {
-                failing = Some(EventFunction::Surface(j));
+                failing = Some(Guard::Surface(j));
             }
             let order = 1 + usize::from(is_silent[i]);
             left.push(Left::Surface(j, Leading { order, value }));
@@ -240,11 +240,9 @@ fn of_blown_up(
             (None, true) => verdict = Some(Verdict::Open),
             (None, false) => {
                 if entries.codimension() == 1 {
-                    for (function, value) in [EventFunction::ExitMinus, EventFunction::ExitPlus]
-                        .into_iter()
-                        .zip(beginning.components)
-                    {
-                        left.push(Left::Exit(function, Leading { order: 1, value }));
+                    let slid = entries.sliding_set().map(|i| meeting.surfaces[i]);
+                    for (guard, value) in slid.flat_map(Guard::ends).zip(beginning.components) {
+                        left.push(Left::Exit(guard, Leading { order: 1, value }));
                     }
                 }
                 return Ok(Verdict::Viable(Viable {
@@ -287,7 +285,7 @@ fn at_root(
         if g[i].abs() <= noise[i] {
             tangent.push(j);
         } else if side * g[i] < 0.0 {
-            return Ok(Verdict::Fails(EventFunction::Surface(j)));
+            return Ok(Verdict::Fails(Guard::Surface(j)));
         } else {
             left.push(Left::Surface(
                 j,
@@ -321,7 +319,7 @@ fn at_root(
             Germ::Begins(leading) if leading.sign() == side => {
                 viable.left.push(Left::Surface(j, leading))
             }
-            Germ::Begins(_) => return Ok(Verdict::Fails(EventFunction::Surface(j))),
+            Germ::Begins(_) => return Ok(Verdict::Fails(Guard::Surface(j))),
             Germ::Zero if is_neutral(fields, noise, entries.entries(), i) => {
                 viable.is_strict = false;
                 viable.left.push(Left::Surface(
@@ -334,17 +332,15 @@ fn at_root(
             }
             // It slides, with a multiplier at its end.
             Germ::Zero if is_pressed(fields, noise, &full, i) => {
-                return Ok(Verdict::Fails(EventFunction::Surface(j)));
+                return Ok(Verdict::Fails(Guard::Surface(j)));
             }
             Germ::Zero | Germ::Unknown => return Ok(Verdict::Open),
         }
     }
+    let slid = entries.sliding_set().map(|i| meeting.surfaces[i]);
+    let guards: Vec<Guard> = slid.flat_map(Guard::ends).collect();
     for index in ends {
-        let function = match (lambda.len(), index) {
-            (1, 0) => EventFunction::ExitMinus,
-            (1, _) => EventFunction::ExitPlus,
-            _ => EventFunction::Exit(index),
-        };
+        let function = guards[index];
         match series.of_exit(index) {
             Germ::Begins(leading) if leading.value > 0.0 => {
                 if leading.order > 0 {

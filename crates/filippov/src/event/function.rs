@@ -5,33 +5,8 @@ use filippov_expr::{Enclosure, Motion};
 use smallvec::SmallVec;
 
 use crate::error::FieldError;
+use crate::field::Guard;
 use crate::tolerances::TURNS_BACK;
-
-/// A function whose zeros end a piece of motion, or are reported.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EventFunction {
-    /// The switching function h_j.
-    Surface(usize),
-    /// The normal component of f- while sliding: positive until its zero.
-    ExitMinus,
-    /// Minus the normal component of f+ while sliding: positive until its zero.
-    ExitPlus,
-    /// An exit function of sliding on an intersection, by its index
-    /// ([`crate::field::IntersectionField::exit`]): positive until its zero.
-    Exit(usize),
-}
-
-impl EventFunction {
-    /// The index of an exit function among those of its motion.
-    pub fn exit_index(self) -> Option<usize> {
-        match self {
-            EventFunction::Surface(_) => None,
-            EventFunction::ExitMinus => Some(0),
-            EventFunction::ExitPlus => Some(1),
-            EventFunction::Exit(index) => Some(index),
-        }
-    }
-}
 
 /// The earliest zero of a step.
 #[derive(Clone, Debug)]
@@ -39,7 +14,7 @@ pub struct Found {
     /// Where, in steps.
     pub theta: f64,
     /// What vanishes there.
-    pub functions: SmallVec<[EventFunction; 4]>,
+    pub functions: SmallVec<[Guard; 4]>,
     /// The functions come within rounding of zero without a change of sign.
     pub touch: bool,
 }
@@ -69,7 +44,9 @@ pub struct Deflation {
 #[derive(Clone, Copy, Debug)]
 pub struct Monitored {
     /// The function.
-    pub function: EventFunction,
+    pub guard: Guard,
+    /// Its place among the switching functions, or among the exit functions of the motion.
+    pub place: usize,
     /// +1 or -1: the sign of the function inside of the mode. All values below are times this.
     pub orientation: f64,
     /// Value at the start of the step.
@@ -89,10 +66,12 @@ pub struct Monitored {
 impl Monitored {
     /// The switching function that it is, if it is one.
     pub fn surface(&self) -> Option<usize> {
-        match self.function {
-            EventFunction::Surface(j) => Some(j),
-            _ => None,
-        }
+        self.guard.is_surface().then_some(self.place)
+    }
+
+    /// The exit function that it is, if it is one.
+    pub fn exit(&self) -> Option<usize> {
+        (!self.guard.is_surface()).then_some(self.place)
     }
 
     /// Predicted time to the next zero, from value, rate and curvature; infinite if none is ahead.

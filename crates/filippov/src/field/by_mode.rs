@@ -2,7 +2,9 @@
 
 use smallvec::{smallvec, SmallVec};
 
-use super::{ContactField, IntersectionField, RegionField, SlidingField, SmoothField};
+use super::{
+    ContactField, Guard, Guards, IntersectionField, RegionField, SlidingField, SmoothField,
+};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::options::{Options, SlidingRule};
@@ -78,13 +80,13 @@ impl<'a> ModeField<'a> {
         }
     }
 
-    /// Number of functions that end sliding.
-    pub fn n_exits(&self) -> usize {
+    /// What ends sliding, in the order of the exit functions.
+    pub fn guards(&self) -> Guards {
         match self {
-            ModeField::Region(_) => 0,
-            ModeField::Sliding(_) => 2,
-            ModeField::Intersection(field) => field.n_exits(),
-            ModeField::Contact(field) => field.n_exits(),
+            ModeField::Region(_) => Guards::new(),
+            ModeField::Sliding(field) => Guards::from_slice(&Guard::ends(field.surface())),
+            ModeField::Intersection(field) => field.guards().collect(),
+            ModeField::Contact(field) => field.guards().collect(),
         }
     }
 

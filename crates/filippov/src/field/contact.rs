@@ -1,6 +1,6 @@
 //! The field of a body in contact: h = 0 and h' = 0 at unilateral constraints, with sliding on other surfaces.
 
-use super::{eval_on_side, SmoothField};
+use super::{eval_on_side, Guard, SmoothField};
 use crate::action::Actions;
 use crate::error::FieldError;
 use crate::mode::{Mode, Signs};
@@ -76,14 +76,10 @@ impl<'a> ContactField<'a> {
         self.contacts.iter().map(|(j, _)| *j)
     }
 
-    /// The surfaces slid on.
-    pub fn sliding(&self) -> &[usize] {
-        &self.sliding
-    }
-
-    /// Number of exit functions.
-    pub fn n_exits(&self) -> usize {
-        self.contacts.len() + 2 * self.sliding.len()
+    /// What ends the motion, in the order of the exit functions.
+    pub fn guards(&self) -> impl Iterator<Item = Guard> + '_ {
+        let ends = self.sliding.iter().flat_map(|&j| Guard::ends(j));
+        self.contacts().map(Guard::Force).chain(ends)
     }
 
     /// The exit functions of the last evaluation, positive inside: nu of each contact, then r + lambda and

@@ -1,7 +1,7 @@
 //! The sliding field on an intersection of surfaces.
 
 use super::weights::RuleFailure;
-use super::{AffineLaw, Canopy, MeetingFields, Projector, RuleLaw, SmoothField};
+use super::{AffineLaw, Canopy, Guard, MeetingFields, Projector, RootEnd, RuleLaw, SmoothField};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::options::SlidingRule;
@@ -9,39 +9,6 @@ use crate::sparse::SparseRows;
 use crate::switching::Patience;
 use crate::system::PiecewiseSystem;
 use crate::tolerances::{MOST_MEETING, MOST_TRACKED};
-
-/// What ends sliding on an intersection of m surfaces: functions that are positive until then.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum IntersectionExit {
-    /// A multiplier reaches -1 or +1: 1 + lambda_i and 1 - lambda_i, i counted within the set. For a rule other
-    /// than the canopy: a motion on that side of surface i begins to leave the intersection.
-    Side {
-        /// Which multiplier.
-        position: usize,
-        /// The end, -1 or +1.
-        end: i8,
-    },
-    /// Two roots meet: (-1)^m det G, for two surfaces the discriminant. For a rule other than the canopy: a
-    /// premise of the rule fails.
-    Fold,
-    /// No scaling of the surfaces makes the root stable any longer: -min(G11, G22). For more than two surfaces, it is
-    /// not stable for the given scaling: the last Hurwitz determinant. For a rule other than the canopy: the fields begin to wind outwards.
-    Stability,
-}
-
-impl IntersectionExit {
-    /// Exit function `index` of sliding on m surfaces.
-    pub fn of(index: usize, m: usize) -> Self {
-        match index {
-            _ if index < 2 * m => IntersectionExit::Side {
-                position: index / 2,
-                end: if index.is_multiple_of(2) { -1 } else { 1 },
-            },
-            _ if index == 2 * m => IntersectionExit::Fold,
-            _ => IntersectionExit::Stability,
-        }
-    }
-}
 
 /// Filippov's field on an intersection of m >= 2 surfaces: the multilinear combination ("canopy") of the
 /// fields around it with the multipliers lambda in [-1, 1]^m that make it tangent to all surfaces,
@@ -186,9 +153,12 @@ impl<'a> IntersectionField<'a> {
         self.start = self.tracked.first().map(|(_, lambda)| (t, lambda.clone()));
     }
 
-    /// Lets the multiplier of an exit function go beyond its end by this much.
-    pub fn set_slack(&mut self, index: usize, slack: f64) {
-        self.slack[index] = slack;
+    /// Lets the multiplier of a guard go beyond its end by this much.
+    pub fn set_slack(&mut self, guard: Guard, slack: f64) {
+        let place = self.guards().position(|own| own == guard);
+        if let Some(own) = place.and_then(|place| self.slack.get_mut(place)) {
+            *own = slack;
+        }
     }
 
     /// Do redundant contacts share their load at the last evaluation? The equations then do not determine the multipliers.
@@ -256,14 +226,10 @@ impl<'a> IntersectionField<'a> {
         &self.set
     }
 
-    /// Number of functions that end the motion.
-    pub fn n_exits(&self) -> usize {
-        self.exits.len()
-    }
-
-    /// What exit function `index` is.
-    pub fn exit(&self, index: usize) -> IntersectionExit {
-        IntersectionExit::of(index, self.set().len())
+    /// What ends the motion, in the order of the exit functions: the ends of the multipliers, then those of the root.
+    pub fn guards(&self) -> impl Iterator<Item = Guard> + '_ {
+        let ends = self.set.iter().flat_map(|&j| Guard::ends(j));
+        ends.chain([RootEnd::Fold, RootEnd::Stability].map(Guard::Root))
     }
 
     /// The multipliers at the last evaluation, in the order of the set; none if there is no root.

@@ -19,8 +19,7 @@ use crate::action::Actions;
 use crate::decisions::{root_ends, Cause};
 use crate::error::{Error, FieldError};
 use crate::event::{Found, UserEvent};
-use crate::field::ModeField;
-use crate::field::SmoothField;
+use crate::field::{Guard, ModeField, SmoothField};
 use crate::integrate::actions::timetable::Timetable;
 use crate::integrate::detection::detector::Detector;
 use crate::integrate::detection::user_functions::UserEvents;
@@ -93,8 +92,8 @@ pub struct Integrator<'a> {
     pub(super) last_switch: (f64, u32),
     /// How long a step the series allows that was taken at the start of the motion, until the step.
     pub(super) series_reach: Option<f64>,
-    /// Exit functions of this mode whose multipliers were held at their ends, with what they may go beyond.
-    pub(super) slacks: Vec<(usize, f64)>,
+    /// Guards of this mode whose multipliers were held at their ends, with what they may go beyond.
+    pub(super) slacks: Vec<(Guard, f64)>,
     pub(super) watch: Watch<'a>,
 }
 

@@ -11,8 +11,8 @@ use crate::decisions::{
     Reached, Rule, Values, RULES,
 };
 use crate::error::FieldError;
-use crate::event::{Deflation, EventFunction, Found};
-use crate::field::{eval_on_side, ModeField, SmoothField};
+use crate::event::{Deflation, Found};
+use crate::field::{eval_on_side, Guard, ModeField, SmoothField};
 use crate::integrate::integrator::Integrator;
 use crate::integrate::steps::pace::excursion;
 use crate::mode::Mode;
@@ -21,12 +21,6 @@ use crate::status::Stop;
 use crate::stepper::{initial_step, restart_step};
 use crate::switching::{Kind, Patience};
 use crate::tolerances::{MOST_SWITCHES_AT_ONE_TIME, NO_PROGRESS, SMALLEST_GUESS, SMALL_JUMP};
-
-/// How many normal components of sliding on one surface vanish.
-fn n_exits(event: &Found) -> usize {
-    let exits = [EventFunction::ExitMinus, EventFunction::ExitPlus];
-    event.functions.iter().filter(|f| exits.contains(f)).count()
-}
 
 impl<'a> Integrator<'a> {
     /// Asks a question about the current place; counts what the answer cost, and keeps its warnings.
@@ -38,8 +32,8 @@ impl<'a> Integrator<'a> {
     ) -> Result<R, FieldError> {
         let mut departing = SmallVec::new();
         for monitored in &self.motion.monitored {
-            if let (EventFunction::Surface(j), Some(Deflation { order: 2.., .. })) =
-                (monitored.function, monitored.deflation)
+            if let (Guard::Surface(j), Some(Deflation { order: 2.., .. })) =
+                (monitored.guard, monitored.deflation)
             {
                 departing.push(j);
             }
@@ -146,13 +140,14 @@ impl<'a> Integrator<'a> {
                 return Ok(done);
             }
         }
-        let n_exits = n_exits(event);
         let mut at_two_fold = false;
-        if n_exits > 0 {
+        let is_end = |guard: &&Guard| matches!(guard, Guard::Multiplier { .. });
+        let n_ends = event.functions.iter().filter(is_end).count();
+        if n_ends > 0 && self.motion.sliding.len() == 1 {
             if let Some(done) = self.pass_double_zero(event)? {
                 return Ok(done);
             }
-            at_two_fold = self.arrives_at_two_fold(event, n_exits)?;
+            at_two_fold = self.arrives_at_two_fold(event, n_ends)?;
         }
         let vanishing = std::mem::take(&mut self.detector.vanishing);
         let mut reached = Reached::default();
@@ -233,7 +228,7 @@ impl<'a> Integrator<'a> {
         }
         if surfaces.is_empty() {
             let named = event.functions.iter().filter_map(|f| match f {
-                EventFunction::Surface(j) => Some(*j),
+                Guard::Surface(j) => Some(*j),
                 _ => None,
             });
             surfaces.extend(named);
@@ -268,8 +263,8 @@ impl<'a> Integrator<'a> {
     }
 
     /// Has sliding on one surface come to a two-fold? Then the point is moved there.
-    fn arrives_at_two_fold(&mut self, event: &Found, n_exits: usize) -> Result<bool, FieldError> {
-        if n_exits == 1 && !self.approaches_two_fold() {
+    fn arrives_at_two_fold(&mut self, event: &Found, n_ends: usize) -> Result<bool, FieldError> {
+        if n_ends == 1 && !self.approaches_two_fold() {
             return Ok(false);
         }
         let Reached {
@@ -409,8 +404,8 @@ impl<'a> Integrator<'a> {
                 if start.is_some_and(|start| start.is_given) {
                     field.hold_at_start(self.t);
                 }
-                for &(index, slack) in &self.slacks {
-                    field.set_slack(index, slack);
+                for &(guard, slack) in &self.slacks {
+                    field.set_slack(guard, slack);
                 }
             }
             ModeField::Sliding(field) => {

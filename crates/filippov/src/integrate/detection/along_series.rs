@@ -6,7 +6,8 @@ use crate::event::filter::may_vanish_between;
 use crate::event::isolate::{is_steep, Bracket};
 use crate::event::locate::refine;
 use crate::event::series::{FirstZero, Near, Series, NO_TERMS};
-use crate::event::{EventFunction, Monitored};
+use crate::event::Monitored;
+use crate::field::{Guard, ModeField};
 use crate::integrate::detection::curve::Curve;
 use crate::integrate::detection::search::Polynomial;
 use crate::integrate::integrator::Integrator;
@@ -46,8 +47,8 @@ impl Integrator<'_> {
         let mut buffer = NO_TERMS;
         let rows = &mut buffer[..self.n_rows()];
         let mut has_series = false;
-        let likeness = match m.function {
-            EventFunction::Surface(j) if self.is_polynomial(&m) => {
+        let likeness = match m.guard {
+            Guard::Surface(j) if self.is_polynomial(&m) => {
                 self.affine_series(j, &m, dt, rows)?;
                 Some(Likeness {
                     margin: 0.0,
@@ -121,10 +122,7 @@ impl Integrator<'_> {
             return Ok(None);
         };
         let sticks = |j: &usize| self.system.sticks_at(*j);
-        let is_one_of_two = matches!(
-            m.function,
-            EventFunction::ExitMinus | EventFunction::ExitPlus
-        );
+        let is_one_of_two = matches!(self.motion.field, ModeField::Sliding(_));
         // Where the motion sticks its limits are others than those of the series.
         if !is_one_of_two
             || m.deflation.is_some()
@@ -189,7 +187,7 @@ impl Integrator<'_> {
         }: Between,
     ) -> Result<Option<f64>, FieldError> {
         let m = self.motion.monitored[index];
-        let noise = self.noise_of(m.function)?;
+        let noise = self.noise_of(&m)?;
         self.motion.monitored[index].noise = noise;
         let doubt = noise.max(likeness.margin);
         let g_lo = series.value(lo);
@@ -251,7 +249,7 @@ impl Integrator<'_> {
             self.prove_clear(index, value_at_end, reach)
         };
         if proof == Proof::Silent && !self.exit_may_vanish(&m) {
-            self.detector.dismissed |= matches!(m.function, EventFunction::Exit(_));
+            self.detector.dismissed |= self.motion.ends_root(&m);
             return Ok((None, reach));
         }
         if proof == Proof::Clear {
@@ -264,7 +262,7 @@ impl Integrator<'_> {
 
     /// May an exit function about which there are no bounds vanish, to judge by its values at the stages?
     fn exit_may_vanish(&self, m: &Monitored) -> bool {
-        let stages = m.function.exit_index();
+        let stages = m.exit();
         let stages = stages.and_then(|index| self.detector.stages.get(index));
         let is_known = m.deflation.is_none() && !self.stepper.is_taylor();
         stages.is_none_or(|stages| !is_known || may_vanish_between(stages))
@@ -278,7 +276,7 @@ impl Integrator<'_> {
         dt: f64,
     ) -> Result<Option<(f64, bool)>, FieldError> {
         let m = self.motion.monitored[index];
-        let EventFunction::Surface(j) = m.function else {
+        let Guard::Surface(j) = m.guard else {
             return Ok(None);
         };
         let mut buffer = NO_TERMS;

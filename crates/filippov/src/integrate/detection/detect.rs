@@ -6,8 +6,8 @@ use crate::error::FieldError;
 use crate::event::certificate::{prove, Proof};
 use crate::event::filter::{may_vanish, may_vanish_bent, may_vanish_between, may_vanish_deflated};
 use crate::event::isolate::PROBES;
-use crate::event::{Deflation, EventFunction, Found, Monitored};
-use crate::field::{AffineBounds, ModeField};
+use crate::event::{Deflation, Found, Monitored};
+use crate::field::{AffineBounds, Guard, ModeField};
 use crate::integrate::detection::bounds::BoundedCurve;
 use crate::integrate::detection::detector::Detector;
 use crate::integrate::detection::detector::CLEAR_OF_NOISE;
@@ -85,14 +85,14 @@ impl Integrator<'_> {
         for index in 0..self.motion.monitored.len() {
             let m = self.motion.monitored[index];
             let (value, _) = self.detector.right[index];
-            let is_surface = matches!(m.function, EventFunction::Surface(_));
+            let is_surface = m.guard.is_surface();
             if m.deflation.is_none() || !is_surface || value >= 0.0 {
                 continue;
             }
             if value < -CLEAR_OF_NOISE * self.noise_beside(&m)? {
                 return Ok(Some(Found {
                     theta: 0.0,
-                    functions: smallvec![m.function],
+                    functions: smallvec![m.guard],
                     touch: false,
                 }));
             }
@@ -103,8 +103,7 @@ impl Integrator<'_> {
     /// The filter: which functions may vanish within the step?
     fn collect_suspects(&mut self, dt: f64) -> Result<(), FieldError> {
         self.detector.suspects.clear();
-        let is_polynomial =
-            |m: &Monitored| m.affine && matches!(m.function, EventFunction::Surface(_));
+        let is_polynomial = |m: &Monitored| m.affine && m.guard.is_surface();
         if !self.motion.monitored.iter().all(is_polynomial) {
             self.stepper.extend_order4(&self.x);
         }
@@ -124,13 +123,13 @@ impl Integrator<'_> {
             } else {
                 self.prove_clear(index, value, 1.0)
             };
-            let suspect = match (m.function, m.deflation, proof) {
+            let suspect = match (m.guard, m.deflation, proof) {
                 (_, _, Proof::Clear) => false,
                 (_, _, Proof::Open) => true,
-                (EventFunction::Surface(_), None, _) if m.affine => {
+                (Guard::Surface(_), None, _) if m.affine => {
                     may_vanish(m.value, m.rate * dt, value, rate * dt)
                 }
-                (EventFunction::Surface(j), None, _) => {
+                (Guard::Surface(j), None, _) => {
                     if !probed {
                         self.probe_surfaces(dt)?;
                         probed = true;
@@ -139,7 +138,7 @@ impl Integrator<'_> {
                     let probes = [0, 1].map(|k| (PROBES[k], m.orientation * at[k][j]));
                     may_vanish_bent(m.value, m.rate * dt, value, rate * dt, &probes)
                 }
-                (EventFunction::Surface(_), Some(deflation), _) => {
+                (Guard::Surface(_), Some(deflation), _) => {
                     let noise = self.motion.monitored[index].noise;
                     let Deflation {
                         t, order, leading, ..
@@ -150,17 +149,13 @@ impl Integrator<'_> {
                     let known = m.affine && t == self.t && clear;
                     !known || may_vanish_deflated(leading, order, value, rate * dt)
                 }
-                (EventFunction::ExitMinus, None, _) => may_vanish_between(&self.detector.stages[0]),
-                (EventFunction::ExitPlus, None, _) => may_vanish_between(&self.detector.stages[1]),
-                (EventFunction::Exit(index), None, _) => {
-                    may_vanish_between(&self.detector.stages[index])
-                }
+                (_, None, _) => may_vanish_between(&self.detector.stages[m.place]),
                 (_, Some(_), _) => true,
             };
             if suspect {
                 self.detector.suspects.push((index, proof == Proof::Open));
             } else if proof == Proof::Silent {
-                self.detector.dismissed |= matches!(m.function, EventFunction::Exit(_));
+                self.detector.dismissed |= self.motion.ends_root(&m);
             }
         }
         Ok(())
@@ -195,19 +190,15 @@ impl Integrator<'_> {
     }
 
     /// Rounding of a monitored function over the step.
-    pub(in crate::integrate) fn noise_of(
-        &mut self,
-        function: EventFunction,
-    ) -> Result<f64, FieldError> {
+    pub(in crate::integrate) fn noise_of(&mut self, m: &Monitored) -> Result<f64, FieldError> {
         let step = (self.t, &self.x[..], self.stepper.end());
-        self.detector
-            .noise(self.system, &self.motion, function, step)
+        self.detector.noise(self.system, &self.motion, m, step)
     }
 
     /// The same, or what blurred the zero that is divided out.
     pub(in crate::integrate) fn noise_beside(&mut self, m: &Monitored) -> Result<f64, FieldError> {
         let blur = m.deflation.map_or(0.0, |zero| zero.blur);
-        Ok(self.noise_of(m.function)?.max(blur))
+        Ok(self.noise_of(m)?.max(blur))
     }
 
     /// All switching functions at the probes of the step.
@@ -277,18 +268,18 @@ impl Integrator<'_> {
         dt: f64,
     ) {
         let Some((theta, touch)) = zero else { return };
-        let function = self.motion.monitored[index].function;
+        let guard = self.motion.monitored[index].guard;
         let together = self.together(dt);
         match found {
             Some(event) if theta > event.theta + together => {}
             Some(event) if theta >= event.theta - together => {
-                event.functions.push(function);
+                event.functions.push(guard);
                 event.touch &= touch;
             }
             _ => {
                 *found = Some(Found {
                     theta,
-                    functions: smallvec![function],
+                    functions: smallvec![guard],
                     touch,
                 })
             }

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 
 use crate::error::FieldError;
-use crate::event::{EventFunction, Monitored};
+use crate::event::Monitored;
 use crate::field::Exits;
 use crate::integrate::detection::bounds::{Piece, RootPiece};
 use crate::integrate::motion::Motion;
@@ -88,22 +88,15 @@ impl Detector {
         (t, x, v): (f64, &[f64], &[f64]),
         stage: usize,
     ) -> Result<(), FieldError> {
-        let with_surfaces = motion
-            .monitored
-            .iter()
-            .any(|m| matches!(m.function, EventFunction::Surface(_)));
+        let with_surfaces = motion.monitored.iter().any(|m| m.guard.is_surface());
         if with_surfaces {
             system.surface_rates(t, x, &motion.signs, v, &mut self.h, &mut self.rate)?;
         }
         self.right.clear();
         for m in &motion.monitored {
-            self.right.push(match m.function {
-                EventFunction::Surface(j) => {
-                    (m.orientation * self.h[j], m.orientation * self.rate[j])
-                }
-                EventFunction::ExitMinus => (self.stages[0][stage], f64::NAN),
-                EventFunction::ExitPlus => (self.stages[1][stage], f64::NAN),
-                EventFunction::Exit(index) => (self.stages[index][stage], f64::NAN),
+            self.right.push(match m.surface() {
+                Some(j) => (m.orientation * self.h[j], m.orientation * self.rate[j]),
+                None => (self.stages[m.place][stage], f64::NAN),
             });
         }
         Ok(())
@@ -148,10 +141,10 @@ impl Detector {
         &mut self,
         system: &dyn PiecewiseSystem,
         motion: &Motion,
-        function: EventFunction,
+        m: &Monitored,
         (t, start, end): (f64, &[f64], &[f64]),
     ) -> Result<f64, FieldError> {
-        let EventFunction::Surface(j) = function else {
+        let Some(j) = m.surface() else {
             let stages = &self.stages;
             let noise = *self.exit_noise.get_or_insert_with(|| {
                 let values = stages.iter().flatten();

@@ -8,8 +8,8 @@
 use smallvec::SmallVec;
 
 use crate::error::FieldError;
-use crate::event::Found;
-use crate::event::{EventFunction, Monitored};
+use crate::event::{Found, Monitored};
+use crate::field::Guard;
 use crate::integrate::integrator::Integrator;
 use crate::stepper::StepMethod;
 use crate::tolerances::{EPS, EXPLAINED, MAX_LIE_ORDER, MOST_HALVINGS, TOUCH_DEPTH};
@@ -75,7 +75,7 @@ impl Integrator<'_> {
     /// May the zero that was found be a multiple one? Rounding blurs it, or the function is back above zero at the end of
     /// the step.
     pub(in crate::integrate) fn may_be_multiple(&self, event: &Found) -> bool {
-        let [EventFunction::Surface(_)] = event.functions[..] else {
+        let [Guard::Surface(_)] = event.functions[..] else {
             return false;
         };
         if event.theta > 1.0 {
@@ -89,7 +89,7 @@ impl Integrator<'_> {
             return false;
         }
         let mut values = self.motion.monitored.iter().zip(&self.detector.right);
-        values.any(|(m, (value, _))| m.function == event.functions[0] && *value > 0.0)
+        values.any(|(m, (value, _))| m.guard == event.functions[0] && *value > 0.0)
     }
 
     /// Looks at what lies around a zero of one surface that may be a multiple one, and moves it there. Returns whether it is
@@ -101,11 +101,11 @@ impl Integrator<'_> {
         event: &mut Found,
         dt: f64,
     ) -> Result<bool, FieldError> {
-        let &[function @ EventFunction::Surface(j)] = event.functions.as_slice() else {
+        let &[guard @ Guard::Surface(j)] = event.functions.as_slice() else {
             return Ok(true);
         };
         let monitored = &self.motion.monitored;
-        let Some(m) = monitored.iter().find(|m| m.function == function) else {
+        let Some(m) = monitored.iter().find(|m| m.guard == guard) else {
             return Ok(true);
         };
         // Beside a zero that was just left and is divided out, the function is near zero anyway.
@@ -113,7 +113,7 @@ impl Integrator<'_> {
             return Ok(true);
         }
         let (m, theta) = (*m, event.theta);
-        let noise = self.noise_of(function)?;
+        let noise = self.noise_of(&m)?;
         let depth = noise.max(self.depth_of_touches(j, theta)?);
         // Up to where it is clear of zero on both sides.
         let least = 4.0 * EPS * (1.0 + self.t.abs() / dt);

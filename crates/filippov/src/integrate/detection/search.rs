@@ -7,7 +7,8 @@ use crate::event::isolate::{
 use crate::event::locate::{refine, Located};
 use crate::event::proved::{expected_zero_proved, first_zero_proved, Proved};
 use crate::event::series::{Near, Series};
-use crate::event::{EventFunction, Found, Monitored};
+use crate::event::{Found, Monitored};
+use crate::field::Guard;
 use crate::integrate::detection::bounds::BoundedCurve;
 use crate::integrate::detection::curve::{grazes, Curve};
 use crate::integrate::integrator::Integrator;
@@ -41,7 +42,8 @@ pub(in crate::integrate) enum AtZero {
 
 /// A piece of a step that was searched.
 pub(in crate::integrate) struct Searched {
-    pub function: EventFunction,
+    /// A touch ends nothing.
+    pub passes_touches: bool,
     pub piece: (f64, f64),
     /// Largest value among the samples.
     pub scale: f64,
@@ -68,7 +70,7 @@ impl Searched {
             None => SearchOutcome::Nothing,
             Some(Zero::Touch(theta)) if theta <= from => SearchOutcome::Nothing,
             // A multiplier that touches its end goes on; it may leave later in the step.
-            Some(Zero::Touch(theta)) if matches!(self.function, EventFunction::Exit(_)) => {
+            Some(Zero::Touch(theta)) if self.passes_touches => {
                 let rest = theta + BEYOND_TOUCH * (to - from);
                 if rest >= to {
                     SearchOutcome::Nothing
@@ -115,8 +117,8 @@ impl Integrator<'_> {
         dt: f64,
     ) -> Result<Option<(f64, bool)>, FieldError> {
         let m = self.motion.monitored[index];
-        let polynomial = match m.function {
-            EventFunction::Surface(j) if self.is_polynomial(&m) => {
+        let polynomial = match m.guard {
+            Guard::Surface(j) if self.is_polynomial(&m) => {
                 if self.stepper.has_series() {
                     return self.search_series(index, (from, to), dt);
                 }
@@ -129,7 +131,7 @@ impl Integrator<'_> {
 
     /// Is a function a polynomial along the step?
     pub(in crate::integrate) fn is_polynomial(&self, m: &Monitored) -> bool {
-        m.affine && self.motion.is_straight && matches!(m.function, EventFunction::Surface(_))
+        m.affine && self.motion.is_straight && m.guard.is_surface()
     }
 
     /// The first zero up to `reach`, looked for at first not far beyond where it is expected; and how far was
@@ -167,6 +169,7 @@ impl Integrator<'_> {
         let m = self.motion.monitored[index];
         let noise = self.noise_beside(&m)?;
         self.motion.monitored[index].noise = noise;
+        let ends_root = self.motion.ends_root(&m);
         let by_multipliers = !self.motion.slides_by_rule() && self.motion.has_bounds();
         let interpolant = self.stepper.interpolant();
         let bounds = BoundedCurve {
@@ -257,25 +260,25 @@ impl Integrator<'_> {
                 _ => g(theta)?,
             };
         }
-        let evidence = match (m.function, is_bounded) {
+        let evidence = match (m.guard, is_bounded) {
             (_, true) => Evidence::Bounds {
                 bounds: &mut over,
                 divided,
-                patience: match m.function {
-                    EventFunction::Exit(_) => UNPROVED_DEPTH,
-                    _ => UNBOUNDED_DEPTH,
+                patience: match ends_root {
+                    true => UNPROVED_DEPTH,
+                    false => UNBOUNDED_DEPTH,
                 },
             },
             // Along the step an affine surface is a quintic; the quartic and its remainder describe it.
-            (EventFunction::Surface(_), _) if m.affine => Evidence::Probes(&[]),
-            (EventFunction::Surface(_), _) => Evidence::Probes(&PROBES),
+            (Guard::Surface(_), _) if m.affine => Evidence::Probes(&[]),
+            (Guard::Surface(_), _) => Evidence::Probes(&PROBES),
             _ => Evidence::Probes(&PROBES[..1]),
         };
         let isolated = first_zero_sampled(&mut g, from, to, values, noise, evidence)?;
         self.detector.unresolved |= isolated.depth > RESOLVED_DEPTH && !is_bounded;
         self.detector.uncertain |= isolated.exhausted || isolated.not_finite;
         let searched = Searched {
-            function: m.function,
+            passes_touches: ends_root,
             piece: (from, to),
             scale: values.iter().fold(0.0_f64, |m, v| m.max(v.abs())),
             noise,
@@ -351,7 +354,7 @@ impl Integrator<'_> {
         found: &mut Option<Found>,
         dt: f64,
     ) -> Result<(), FieldError> {
-        let is_exit = |f: &EventFunction| matches!(f, EventFunction::Exit(_));
+        let is_exit = |guard: &Guard| !guard.is_surface();
         let Some(theta) = found
             .as_ref()
             .filter(|event| self.detector.dismissed && event.functions.iter().any(is_exit))
@@ -375,8 +378,8 @@ impl Integrator<'_> {
             return Ok(());
         };
         for index in 0..self.motion.monitored.len() {
-            let function = self.motion.monitored[index].function;
-            if matches!(function, EventFunction::Exit(side) if side < n_sides) {
+            let guard = self.motion.monitored[index].guard;
+            if matches!(guard, Guard::Multiplier { .. } | Guard::Force(_)) {
                 let zero = self.search((index, false), (0.0, before), dt)?;
                 self.keep_earliest(found, index, zero, dt);
             }

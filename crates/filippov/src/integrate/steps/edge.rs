@@ -4,8 +4,8 @@
 use crate::error::FieldError;
 use crate::event::isolate::Bracket;
 use crate::event::locate::refine;
-use crate::event::{EventFunction, Found, Monitored};
-use crate::field::{ModeField, SmoothField};
+use crate::event::{Found, Monitored};
+use crate::field::{Guard, ModeField, SmoothField};
 use crate::integrate::integrator::Integrator;
 use crate::status::{Warning, WarningCode};
 use crate::stepper::Attempt;
@@ -63,7 +63,7 @@ impl Integrator<'_> {
     pub(in crate::integrate) fn arrival_at_edge(&mut self) -> Result<Option<Found>, FieldError> {
         let mut gradient = vec![0.0; self.x.len()];
         for m in &self.motion.monitored {
-            let EventFunction::Surface(j) = m.function else {
+            let Guard::Surface(j) = m.guard else {
                 continue;
             };
             let signs = &self.motion.signs;
@@ -73,7 +73,7 @@ impl Integrator<'_> {
             if m.rate < 0.0 && m.value <= ARRIVED * tolerance {
                 return Ok(Some(Found {
                     theta: 0.0,
-                    functions: smallvec::smallvec![m.function],
+                    functions: smallvec::smallvec![m.guard],
                     touch: false,
                 }));
             }
@@ -138,7 +138,7 @@ impl Integrator<'_> {
         };
         let mut longest = dt;
         for m in &self.motion.monitored {
-            let EventFunction::Surface(j) = m.function else {
+            let Guard::Surface(j) = m.guard else {
                 continue;
             };
             if m.deflation.is_some() || m.value <= 0.0 {

@@ -2,7 +2,7 @@
 
 use crate::error::FieldError;
 use crate::event::Monitored;
-use crate::field::ModeField;
+use crate::field::{Guard, ModeField};
 use crate::integrate::integrator::Integrator;
 use crate::integrate::motion::Motion;
 use crate::integrate::steps::stiffness::Derivatives;
@@ -263,7 +263,7 @@ impl Integrator<'_> {
 
     /// An exit function along the step, as far as its series describes it, into `rows`; `false` if there is none.
     pub(in crate::integrate) fn exit_series(&self, m: &Monitored, rows: &mut [f64]) -> bool {
-        let place = m.function.exit_index().and_then(|index| {
+        let place = m.exit().and_then(|index| {
             let jets = self.motion.jets.as_ref()?;
             jets.exit(index)
         });
@@ -271,7 +271,7 @@ impl Integrator<'_> {
             return false;
         };
         taylor.column(place, rows);
-        let own = |slack: &&(usize, f64)| m.function.exit_index() == Some(slack.0);
+        let own = |slack: &&(Guard, f64)| slack.0 == m.guard;
         rows[0] += self.slacks.iter().find(own).map_or(0.0, |slack| slack.1);
         true
     }
