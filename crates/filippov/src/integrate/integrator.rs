@@ -18,8 +18,8 @@ use super::Stats;
 use crate::action::Actions;
 use crate::decisions::{root_ends, Cause};
 use crate::error::{Error, FieldError};
-use crate::event::{Found, UserEvent};
-use crate::field::{Guard, ModeField, SmoothField};
+use crate::event::{Found, Seen, UserEvent};
+use crate::field::{Guard, ModeField, SlidingField, SmoothField};
 use crate::integrate::actions::timetable::Timetable;
 use crate::integrate::detection::detector::Detector;
 use crate::integrate::detection::user_functions::UserEvents;
@@ -287,6 +287,7 @@ impl<'a> Integrator<'a> {
     }
 
     fn attempt(&mut self, dt: f64) -> Result<Attempt, FieldError> {
+        self.detector.seen.iter_mut().for_each(Seen::begin);
         match self.stepper.in_use() {
             StepMethod::Taylor => self.attempt_series(dt),
             StepMethod::Rodas5p => self.attempt_implicit(dt),
@@ -298,36 +299,18 @@ impl<'a> Integrator<'a> {
 
     pub(super) fn attempt_explicit(&mut self, dt: f64) -> Result<Attempt, FieldError> {
         let (t, x, scale) = (self.t, &self.x, &self.scale);
-        let stepper = &mut self.stepper.dopri5;
+        let (stepper, seen) = (&mut self.stepper.dopri5, &mut self.detector.seen);
         match &mut self.motion.field {
-            ModeField::Region(field) => stepper.attempt(field, |_, _| {}, t, x, dt, scale),
+            ModeField::Region(field) => stepper.attempt(field, |_| {}, t, x, dt, scale),
             ModeField::Sliding(field) => {
-                let stages = &mut self.detector.stages;
-                let observe = |stage: usize, field: &crate::field::SlidingField| {
+                let observe = |field: &SlidingField| {
                     let a = field.last();
-                    stages[0][stage] = a.minus;
-                    stages[1][stage] = -a.plus;
+                    seen[0].see(a.minus);
+                    seen[1].see(-a.plus);
                 };
                 stepper.attempt(&mut **field, observe, t, x, dt, scale)
             }
-            ModeField::Intersection(field) => {
-                let stages = &mut self.detector.stages;
-                let observe = |stage: usize, field: &crate::field::IntersectionField| {
-                    for (exit, value) in stages.iter_mut().zip(field.exits()) {
-                        exit[stage] = *value;
-                    }
-                };
-                stepper.attempt(&mut **field, observe, t, x, dt, scale)
-            }
-            ModeField::Contact(field) => {
-                let stages = &mut self.detector.stages;
-                let observe = |stage: usize, field: &crate::field::ContactField| {
-                    for (exit, value) in stages.iter_mut().zip(field.exits()) {
-                        exit[stage] = value;
-                    }
-                };
-                stepper.attempt(&mut **field, observe, t, x, dt, scale)
-            }
+            field => stepper.attempt(field, self.detector.observer(), t, x, dt, scale),
         }
     }
 
@@ -335,13 +318,7 @@ impl<'a> Integrator<'a> {
         let Some(dop853) = &mut self.stepper.dop853 else {
             return Ok(Attempt::NotFinite);
         };
-        let stages = &mut self.detector.stages;
-        let observe = |stage: usize, field: &ModeField| {
-            for (exit, value) in stages.iter_mut().zip(field.last_exits()) {
-                exit[stage] = value;
-            }
-        };
-        let field = &mut self.motion.field;
+        let (field, observe) = (&mut self.motion.field, self.detector.observer());
         dop853.attempt(field, observe, self.t, &self.x, dt, &self.scale)
     }
 

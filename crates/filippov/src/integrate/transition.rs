@@ -11,7 +11,7 @@ use crate::decisions::{
     Reached, Rule, Values, RULES,
 };
 use crate::error::FieldError;
-use crate::event::{Deflation, Found};
+use crate::event::{Deflation, Found, Seen};
 use crate::field::{eval_on_side, Guard, ModeField, SmoothField};
 use crate::integrate::integrator::Integrator;
 use crate::integrate::steps::pace::excursion;
@@ -297,21 +297,21 @@ impl<'a> Integrator<'a> {
     /// Is the difference of the normal components at the end of the step so small, compared with the speed, that the
     /// multiplier may be lost? Far from it nothing else has to be looked at.
     fn may_lose_multiplier(&self) -> bool {
-        let [minus, plus, ..] = self.detector.stages.as_slice() else {
+        let [minus, plus, ..] = self.detector.seen.as_slice() else {
             return false;
         };
         let speed = self.stepper.end_derivative().iter();
         let speed = speed.fold(0.0_f64, |most, v| most.max(v.abs()));
-        let least = (minus[0] + plus[0]).min(minus[6] + plus[6]);
+        let least = (minus.start + plus.start).min(minus.end + plus.end);
         least <= (SMALL_JUMP * self.options.rtol).min(1.0) * speed
     }
 
     /// Does the share of f+ change fast in the step just made, towards a two-fold?
     pub(in crate::integrate) fn approaches_two_fold(&self) -> bool {
-        let [minus, plus, ..] = self.detector.stages.as_slice() else {
+        let [minus, plus, ..] = self.detector.seen.as_slice() else {
             return false;
         };
-        let (before, after) = (minus[0] + plus[0], minus[6] + plus[6]);
+        let (before, after) = (minus.start + plus.start, minus.end + plus.end);
         self.motion.sliding.len() == 1 && after < 0.99 * before
     }
 
@@ -445,7 +445,7 @@ impl<'a> Integrator<'a> {
             return Ok(Some(Stop::NotFinite));
         }
         let start = (self.t, &self.x[..], derivative);
-        self.detector.measure(self.system, &self.motion, start, 0)?;
+        self.detector.measure(self.system, &self.motion, start)?;
         self.detector.accept_start(&mut self.motion.monitored);
         self.user_events.restart(self.t, &self.x)?;
         self.controller.restart();
@@ -514,9 +514,9 @@ impl<'a> Integrator<'a> {
             self.go_without_equations();
         }
         let exits = self.motion.field.last_exits();
-        self.detector.stages.clear();
-        let stages = exits.iter().map(|&exit| [exit; 7]);
-        self.detector.stages.extend(stages);
+        self.detector.seen.clear();
+        let seen = exits.iter().map(|&exit| Seen::at_start(exit));
+        self.detector.seen.extend(seen);
         Ok(())
     }
 

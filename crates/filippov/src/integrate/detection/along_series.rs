@@ -262,10 +262,9 @@ impl Integrator<'_> {
 
     /// May an exit function about which there are no bounds vanish, to judge by its values at the stages?
     fn exit_may_vanish(&self, m: &Monitored) -> bool {
-        let stages = m.exit();
-        let stages = stages.and_then(|index| self.detector.stages.get(index));
+        let seen = m.exit().and_then(|place| self.detector.seen.get(place));
         let is_known = m.deflation.is_none() && !self.stepper.is_taylor();
-        stages.is_none_or(|stages| !is_known || may_vanish_between(stages))
+        seen.is_none_or(|seen| !is_known || may_vanish_between(seen.range))
     }
 
     /// The first zero of an affine h on a piece of a Taylor step.

@@ -7,7 +7,7 @@ use smallvec::SmallVec;
 
 use crate::event::certificate::Bound;
 use crate::event::tube::Tube;
-use crate::event::Monitored;
+use crate::event::{Monitored, Seen};
 use crate::field::{AffineBounds, Guard, RootEnd};
 use crate::mode::Signs;
 use crate::stepper::Interpolant;
@@ -23,8 +23,8 @@ pub(in crate::integrate) struct BoundedCurve<'a> {
     pub sliding: &'a [usize],
     /// How far the projection onto a curved surface moves the extension.
     pub margin: &'a [f64],
-    /// The exit functions of the motion at the stages of the step.
-    pub stages: &'a [[f64; 7]],
+    /// The exit functions of the motion in the step.
+    pub seen: &'a [Seen],
     /// Bounds of many multipliers, where the field is affine in the signs.
     pub affine: Option<&'a AffineBounds>,
     /// Whether the exit functions are those of the multipliers of the canopy.
@@ -132,8 +132,8 @@ impl BoundedCurve<'_> {
     fn enclosed_root(&self, a: f64, b: f64) -> Option<RootBounds> {
         if let (Some(bounds), Some(affine)) = (self.affine, self.system.affine_signs()) {
             let tube = Tube::new(self.interpolant, (a, b), self.margin);
-            let exits = self.stages.chunks_exact(2).take(self.sliding.len());
-            let middles = exits.map(|pair| 0.5 * (pair[0][0] + pair[0][6]) - 1.0);
+            let exits = self.seen.chunks_exact(2).take(self.sliding.len());
+            let middles = exits.map(|pair| 0.5 * (pair[0].start + pair[0].end) - 1.0);
             let near: Vector = middles.collect();
             let found = bounds.enclose(affine, self.sliding, &tube, self.signs, &near);
             return Some(found.map_or(RootBounds::Unproved, |found| {
@@ -145,8 +145,8 @@ impl BoundedCurve<'_> {
             }));
         }
         let components = self.all_components(a, b)?;
-        let exits = self.stages.chunks_exact(2).take(self.sliding.len());
-        let ends = exits.map(|pair| Interval::hull(pair[0][0] - 1.0, pair[0][6] - 1.0));
+        let exits = self.seen.chunks_exact(2).take(self.sliding.len());
+        let ends = exits.map(|pair| Interval::hull(pair[0].start - 1.0, pair[0].end - 1.0));
         let ends: IntervalVector = ends.collect();
         let boxes = ROOT_BOXES.into_iter().map(|radius| {
             let wider = |l: &Interval| Interval::hull(l.lo - radius, l.hi + radius);

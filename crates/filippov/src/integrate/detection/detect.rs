@@ -39,7 +39,7 @@ impl Integrator<'_> {
         if self.motion.monitored.is_empty() {
             return Ok(None);
         }
-        self.detector.measure(self.system, &self.motion, end, 6)?;
+        self.detector.measure(self.system, &self.motion, end)?;
         self.stats.n_surface_evaluations += 1;
         if self.detector.right.iter().any(|(value, _)| value.is_nan()) {
             self.detector.uncertain = true;
@@ -149,7 +149,7 @@ impl Integrator<'_> {
                     let known = m.affine && t == self.t && clear;
                     !known || may_vanish_deflated(leading, order, value, rate * dt)
                 }
-                (_, None, _) => may_vanish_between(&self.detector.stages[m.place]),
+                (_, None, _) => may_vanish_between(self.detector.seen[m.place].range),
                 (_, Some(_), _) => true,
             };
             if suspect {
@@ -300,7 +300,7 @@ impl Integrator<'_> {
             signs: &self.motion.signs,
             sliding: self.motion.sliding(),
             margin: &self.detector.margin,
-            stages: &self.detector.stages,
+            seen: &self.detector.seen,
             affine: self.motion.affine_bounds(),
             by_multipliers: !self.motion.slides_by_rule() && self.motion.has_bounds(),
             known_exits: &self.detector.enclosed_exits,

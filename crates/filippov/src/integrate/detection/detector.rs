@@ -3,8 +3,8 @@
 use std::cell::RefCell;
 
 use crate::error::FieldError;
-use crate::event::Monitored;
-use crate::field::Exits;
+use crate::event::{Monitored, Seen};
+use crate::field::{Exits, ModeField};
 use crate::integrate::detection::bounds::{Piece, RootPiece};
 use crate::integrate::motion::Motion;
 use crate::system::PiecewiseSystem;
@@ -15,8 +15,8 @@ pub(super) const CLEAR_OF_NOISE: f64 = 1e3;
 
 /// Scratch space of the event stage, and values at the end of the step.
 pub(in crate::integrate) struct Detector {
-    /// The exit functions of the motion at the seven stages.
-    pub stages: Vec<[f64; 7]>,
+    /// The exit functions of the motion in the step.
+    pub seen: Vec<Seen>,
     /// The step did not resolve a monitored function; it may not grow.
     pub unresolved: bool,
     /// A monitored function could not be searched; the step has to be shortened.
@@ -57,7 +57,7 @@ pub(in crate::integrate) struct Detector {
 impl Detector {
     pub fn new(n: usize, d: usize) -> Self {
         Detector {
-            stages: Vec::new(),
+            seen: Vec::new(),
             unresolved: false,
             uncertain: false,
             dismissed: false,
@@ -80,13 +80,21 @@ impl Detector {
         }
     }
 
+    /// What takes down the exit functions at the stages of a step.
+    pub fn observer(&mut self) -> impl FnMut(&ModeField) + '_ {
+        |field| {
+            for (seen, value) in self.seen.iter_mut().zip(field.last_exits()) {
+                seen.see(value);
+            }
+        }
+    }
+
     /// Values and rates of the monitored functions at (t, x) with velocity `v`, into `right`.
     pub fn measure(
         &mut self,
         system: &dyn PiecewiseSystem,
         motion: &Motion,
         (t, x, v): (f64, &[f64], &[f64]),
-        stage: usize,
     ) -> Result<(), FieldError> {
         let with_surfaces = motion.monitored.iter().any(|m| m.guard.is_surface());
         if with_surfaces {
@@ -96,7 +104,7 @@ impl Detector {
         for m in &motion.monitored {
             self.right.push(match m.surface() {
                 Some(j) => (m.orientation * self.h[j], m.orientation * self.rate[j]),
-                None => (self.stages[m.place][stage], f64::NAN),
+                None => (self.seen[m.place].end, f64::NAN),
             });
         }
         Ok(())
@@ -115,8 +123,8 @@ impl Detector {
                 cleared = true;
             }
         }
-        for stages in &mut self.stages {
-            stages[0] = stages[6];
+        for seen in &mut self.seen {
+            seen.start = seen.end;
         }
         cleared
     }
@@ -145,10 +153,9 @@ impl Detector {
         (t, start, end): (f64, &[f64], &[f64]),
     ) -> Result<f64, FieldError> {
         let Some(j) = m.surface() else {
-            let stages = &self.stages;
+            let seen = &self.seen;
             let noise = *self.exit_noise.get_or_insert_with(|| {
-                let values = stages.iter().flatten();
-                4.0 * SURFACE_NOISE * values.fold(0.0_f64, |m, v| m.max(v.abs()))
+                4.0 * SURFACE_NOISE * seen.iter().fold(0.0_f64, |m, seen| m.max(seen.size()))
             });
             return Ok(noise);
         };

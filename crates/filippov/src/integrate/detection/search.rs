@@ -178,7 +178,7 @@ impl Integrator<'_> {
             signs: &self.motion.signs,
             sliding: &self.motion.sliding,
             margin: &self.detector.margin,
-            stages: &self.detector.stages,
+            seen: &self.detector.seen,
             affine: self.motion.affine_bounds.as_ref().and_then(Option::as_ref),
             by_multipliers,
             known_exits: &self.detector.enclosed_exits,

@@ -181,18 +181,16 @@ impl Integrator<'_> {
         let Some(midpoint) = &mut self.stepper.midpoint else {
             return Ok(Attempt::NotFinite);
         };
-        let stages = &mut self.detector.stages;
-        let observe = |number: usize, field: &ModeField| {
-            for (exit, value) in stages.iter_mut().zip(field.last_exits()) {
-                match number {
-                    6 => exit[6] = value,
-                    _ => exit[1..6].fill(value),
-                }
-            }
-        };
         // On a surface the field is there at the end too, which is projected onto it.
         let evaluates_end = !matches!(self.motion.field, ModeField::Region(_));
         let field = (&mut self.motion.field, evaluates_end);
-        midpoint.attempt(field, observe, self.t, &self.x, dt, &self.scale)
+        midpoint.attempt(
+            field,
+            self.detector.observer(),
+            self.t,
+            &self.x,
+            dt,
+            &self.scale,
+        )
     }
 }

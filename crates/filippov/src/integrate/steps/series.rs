@@ -1,7 +1,7 @@
 //! Steps by Taylor series.
 
 use crate::error::FieldError;
-use crate::event::Monitored;
+use crate::event::{Monitored, Seen};
 use crate::field::{Guard, ModeField};
 use crate::integrate::integrator::Integrator;
 use crate::integrate::motion::Motion;
@@ -115,7 +115,7 @@ impl Integrator<'_> {
             None if taylor.is_expanded() => return Ok(()),
             None => {
                 let (system, t, x) = (self.system, self.t, &self.x);
-                let signs = multipliers_in(&self.motion, &self.detector.stages);
+                let signs = multipliers_in(&self.motion, &self.detector.seen);
                 let signs = signs.as_deref().unwrap_or(&self.motion.signs);
                 let fill = |rows: &mut [f64]| system.eval_jets(jets, t, x, signs, rows);
                 let allowed = taylor.expand(jets.width(), x, &self.scale, fill);
@@ -249,10 +249,7 @@ impl Integrator<'_> {
         };
         let field = &mut self.motion.field;
         let attempt = taylor.attempt(field, self.t, &self.x, dt, &self.scale)?;
-        let exits = self.detector.stages.iter_mut();
-        for (stages, exit) in exits.zip(self.motion.field.last_exits()) {
-            stages[1..].fill(exit);
-        }
+        self.detector.observer()(&self.motion.field);
         Ok(attempt)
     }
 
@@ -302,13 +299,13 @@ impl Integrator<'_> {
 }
 
 /// The signs of sliding on several surfaces, with the multipliers at the start of the step in their places.
-fn multipliers_in(motion: &Motion, stages: &[[f64; 7]]) -> Option<Signs> {
+fn multipliers_in(motion: &Motion, seen: &[Seen]) -> Option<Signs> {
     let ModeField::Intersection(_) = motion.field else {
         return None;
     };
     let mut signs = motion.signs.clone();
-    for (pair, &j) in stages.chunks_exact(2).zip(motion.sliding()) {
-        signs[j] = 0.5 * (pair[0][0] - pair[1][0]);
+    for (pair, &j) in seen.chunks_exact(2).zip(motion.sliding()) {
+        signs[j] = 0.5 * (pair[0].start - pair[1].start);
     }
     Some(signs)
 }
