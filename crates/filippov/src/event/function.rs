@@ -8,15 +8,54 @@ use crate::error::FieldError;
 use crate::field::Guard;
 use crate::tolerances::TURNS_BACK;
 
+/// What the event stage says of a step.
+#[derive(Clone, Debug)]
+pub enum Event {
+    /// No guard vanishes in it.
+    None,
+    /// Here the first ones vanish.
+    At(Found),
+    /// A step as short as this is needed to tell.
+    Shorten(f64),
+}
+
 /// The earliest zero of a step.
 #[derive(Clone, Debug)]
 pub struct Found {
     /// Where, in steps.
     pub theta: f64,
     /// What vanishes there.
-    pub functions: SmallVec<[Guard; 4]>,
-    /// The functions come within rounding of zero without a change of sign.
+    pub guards: SmallVec<[Guard; 4]>,
+    /// They come within rounding of zero without a change of sign.
     pub touch: bool,
+    /// Rounding blurs it: it may be a multiple one.
+    pub is_blurred: bool,
+    /// What is known of it if it is a multiple one.
+    pub multiple: Multiple,
+}
+
+/// A multiple zero.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Multiple {
+    /// How far below zero a function that touches may be there.
+    pub depth: f64,
+    /// Rounding of the function over the step.
+    pub blur: f64,
+    /// How many derivatives along f- and f+ vanish.
+    pub vanishing: [usize; 2],
+}
+
+impl Found {
+    /// Guards that vanish at the start of the step.
+    pub fn here(guards: SmallVec<[Guard; 4]>) -> Self {
+        Found {
+            theta: 0.0,
+            guards,
+            touch: false,
+            is_blurred: false,
+            multiple: Multiple::default(),
+        }
+    }
 }
 
 /// A zero at the start of the motion that is divided out: near `t` the function is

@@ -18,7 +18,7 @@ use super::Stats;
 use crate::action::Actions;
 use crate::decisions::{root_ends, Cause};
 use crate::error::{Error, FieldError};
-use crate::event::{Found, Seen, UserEvent};
+use crate::event::{Event, Found, Seen, UserEvent};
 use crate::field::{Guard, ModeField, SlidingField, SmoothField};
 use crate::integrate::actions::timetable::Timetable;
 use crate::integrate::detection::detector::Detector;
@@ -241,14 +241,10 @@ impl<'a> Integrator<'a> {
         let shortest = (SHORTEST_STEP * self.t.abs()).max(SHORTEST_STEP_AT_ZERO);
         if dt < shortest && dt < remaining {
             let lost = self.ask(Cause::Start, root_ends::lost_functions)?;
-            if let Some(functions) = lost {
+            if let Some(lost) = lost {
                 self.dt = f64::NAN;
                 self.one_sided = false;
-                return self.switch(&Found {
-                    theta: 0.0,
-                    functions,
-                    touch: false,
-                });
+                return self.switch(&Found::here(lost));
             }
             if !self.one_sided {
                 return Ok(Some(Stop::StepTooSmall));
@@ -330,22 +326,16 @@ impl<'a> Integrator<'a> {
         } else {
             self.t + dt
         };
-        let mut found = self.detect(t1, dt)?;
-        if self.detector.uncertain {
-            self.count_rejection(sliding);
-            self.halve_step(dt);
-            return Ok(None);
-        }
-        if let Some(event) = found.as_mut().filter(|event| self.may_be_multiple(event)) {
-            if !self.resolve_multiple_zero(event, dt)? {
-                found = None;
-            }
-            if self.detector.uncertain {
+        let (event, longest) = self.first_event(t1, dt)?;
+        let found = match event {
+            Event::None => None,
+            Event::At(found) => Some(found),
+            Event::Shorten(dt) => {
                 self.count_rejection(sliding);
-                self.halve_step(dt);
+                self.shorten_step(dt);
                 return Ok(None);
             }
-        }
+        };
         if sliding && self.system.has_nested_signs() {
             let (mut end, mut t) = (self.stepper.end().to_vec(), t1);
             if let Some(event) = &found {
@@ -357,7 +347,7 @@ impl<'a> Integrator<'a> {
                     return Ok(Some(stop));
                 }
                 self.count_rejection(sliding);
-                self.halve_step(dt);
+                self.shorten_step(0.5 * dt);
                 return Ok(None);
             }
         }
@@ -365,7 +355,7 @@ impl<'a> Integrator<'a> {
         let is_implicit = self.stepper.in_use() == StepMethod::Rodas5p;
         let crosses = found
             .as_ref()
-            .is_some_and(|event| !event.touch && !self.detector.blurred);
+            .is_some_and(|event| !event.touch && !event.is_blurred);
         if is_implicit && crosses && self.aims_again(theta, dt) {
             return Ok(None);
         }
@@ -380,7 +370,7 @@ impl<'a> Integrator<'a> {
         let t_stop = if is_last { last } else { t_stop };
         let Some(zeros) = self.find_user_zeros(theta, t_stop)? else {
             self.count_rejection(sliding);
-            self.halve_step(dt);
+            self.shorten_step(0.5 * dt);
             return Ok(None);
         };
         self.n_aims = 0;
@@ -404,11 +394,8 @@ impl<'a> Integrator<'a> {
         if let Some(stop) = self.record_user_zeros(zeros, theta, t_stop)? {
             return Ok(Some(stop));
         }
-        if self.detector.unresolved {
-            self.dt = self.dt.min(dt);
-        }
-        self.one_sided = self.detector.next_dt.is_some();
-        self.dt = self.dt.min(self.detector.next_dt.unwrap_or(f64::INFINITY));
+        self.one_sided = longest < dt;
+        self.dt = self.dt.min(longest);
         if self.recorder.keeps_dense() {
             self.stepper.extend_order4(&self.x);
         }

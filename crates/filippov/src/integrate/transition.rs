@@ -11,7 +11,7 @@ use crate::decisions::{
     Reached, Rule, Values, RULES,
 };
 use crate::error::FieldError;
-use crate::event::{Deflation, Found, Seen};
+use crate::event::{Deflation, Found, Multiple, Seen};
 use crate::field::{eval_on_side, Guard, ModeField, SmoothField};
 use crate::integrate::integrator::Integrator;
 use crate::integrate::steps::pace::excursion;
@@ -142,19 +142,18 @@ impl<'a> Integrator<'a> {
         }
         let mut at_two_fold = false;
         let is_end = |guard: &&Guard| matches!(guard, Guard::Multiplier { .. });
-        let n_ends = event.functions.iter().filter(is_end).count();
+        let n_ends = event.guards.iter().filter(is_end).count();
         if n_ends > 0 && self.motion.sliding.len() == 1 {
             if let Some(done) = self.pass_double_zero(event)? {
                 return Ok(done);
             }
             at_two_fold = self.arrives_at_two_fold(event, n_ends)?;
         }
-        let vanishing = std::mem::take(&mut self.detector.vanishing);
         let mut reached = Reached::default();
         let cause = Cause::Event {
-            functions: &event.functions,
+            functions: &event.guards,
             touch: event.touch,
-            vanishing,
+            vanishing: event.multiple.vanishing,
             at_two_fold,
         };
         let Decision { decided, rule } = self.decide_where_reached(cause, &mut reached)?;
@@ -188,11 +187,11 @@ impl<'a> Integrator<'a> {
                 let sliding = self.motion.sliding().iter().copied();
                 let slides_on = next.mode.sliding_set().eq(sliding);
                 let field = &self.motion.field;
-                if slides_on && root_ends::loses_stability(field, &event.functions) {
+                if slides_on && root_ends::loses_stability(field, &event.guards) {
                     next.start_mut().oscillates = true;
                 }
                 if before == next.mode {
-                    root_ends::loosen(field, &event.functions, &mut self.slacks);
+                    root_ends::loosen(field, &event.guards, &mut self.slacks);
                 } else {
                     self.slacks.clear();
                 }
@@ -204,7 +203,7 @@ impl<'a> Integrator<'a> {
                 return self.jump_to(limit, next.mode);
             }
         }
-        self.begin(next)
+        self.begin_behind(next, &event.multiple)
     }
 
     /// How many switches came before this one without any progress of time.
@@ -227,7 +226,7 @@ impl<'a> Integrator<'a> {
             return self.jump_to(limit, mode);
         }
         if surfaces.is_empty() {
-            let named = event.functions.iter().filter_map(|f| match f {
+            let named = event.guards.iter().filter_map(|f| match f {
                 Guard::Surface(j) => Some(*j),
                 _ => None,
             });
@@ -286,7 +285,7 @@ impl<'a> Integrator<'a> {
     /// The surfaces that vanish at an event, those slid on left out, and the mode before.
     fn vanishing_surfaces(&mut self, event: &Found) -> Result<Reached, FieldError> {
         let cause = Cause::Event {
-            functions: &event.functions,
+            functions: &event.guards,
             touch: event.touch,
             vanishing: [0; 2],
             at_two_fold: false,
@@ -370,6 +369,15 @@ impl<'a> Integrator<'a> {
 
     /// Starts a motion at the current point.
     pub(in crate::integrate) fn begin(&mut self, next: Next) -> Result<Option<Stop>, FieldError> {
+        self.begin_behind(next, &Multiple::default())
+    }
+
+    /// The same where what the motion leaves has a multiple zero.
+    fn begin_behind(
+        &mut self,
+        next: Next,
+        multiple: &Multiple,
+    ) -> Result<Option<Stop>, FieldError> {
         let Next {
             mode,
             mut left,
@@ -446,7 +454,8 @@ impl<'a> Integrator<'a> {
         }
         let start = (self.t, &self.x[..], derivative);
         self.detector.measure(self.system, &self.motion, start)?;
-        self.detector.accept_start(&mut self.motion.monitored);
+        self.detector
+            .accept_start(&mut self.motion.monitored, multiple);
         self.user_events.restart(self.t, &self.x)?;
         self.controller.restart();
         self.dt = self.first_step(&left)?;

@@ -114,11 +114,11 @@ impl Integrator<'_> {
         }
         let mode = self.motion.mode.clone();
         let (surfaces, rates) = self.ask(Cause::Anew(&mode), |at, _| {
-            let mut surfaces = located_surfaces(&event.functions);
+            let mut surfaces = located_surfaces(&event.guards);
             add_vanishing_surfaces(at, &mut surfaces, h)?;
             Ok((surfaces, rates_here(at)?))
         })?;
-        let located = |j: usize| event.functions.contains(&Guard::Surface(j));
+        let located = |j: usize| event.guards.contains(&Guard::Surface(j));
         let entries = self.motion.mode.entries();
         let reached = surfaces.iter().copied().filter(|&j| {
             let approaches = rates[j] * f64::from(entries[j]) < 0.0;

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 
 use crate::error::FieldError;
-use crate::event::{Monitored, Seen};
+use crate::event::{Monitored, Multiple, Seen};
 use crate::field::{Exits, ModeField};
 use crate::integrate::detection::bounds::{Piece, RootPiece};
 use crate::integrate::motion::Motion;
@@ -13,31 +13,17 @@ use crate::tolerances::SURFACE_NOISE;
 /// A function is clear of a zero that was divided out beyond this multiple of its rounding.
 pub(super) const CLEAR_OF_NOISE: f64 = 1e3;
 
-/// Scratch space of the event stage, and values at the end of the step.
+/// Scratch space of the event stage, and values of what is monitored.
 pub(in crate::integrate) struct Detector {
     /// The exit functions of the motion in the step.
     pub seen: Vec<Seen>,
-    /// The step did not resolve a monitored function; it may not grow.
-    pub unresolved: bool,
-    /// A monitored function could not be searched; the step has to be shortened.
-    pub uncertain: bool,
-    /// An exit function was not searched though nothing was proved about it.
-    pub dismissed: bool,
-    /// Rounding blurs the zero that was found: it may be a multiple one.
-    pub blurred: bool,
-    /// How far below zero the touch that was found may be, else 0.
-    pub depth: f64,
-    /// Rounding of the function whose multiple zero was found, over the step, else 0.
-    pub blur: f64,
-    /// How many derivatives along f- and f+ vanish at the multiple zero that was found.
-    pub vanishing: [usize; 2],
-    /// Length of the next step, if the event stage knows better than the error control.
-    pub next_dt: Option<f64>,
     /// Exit functions computed in the search of this step, by theta.
     pub exits: Vec<(f64, Exits)>,
     pub h: Vec<f64>,
     /// Switching functions at the probes of the step.
     pub(super) probed: [Vec<f64>; 2],
+    /// They were evaluated in this step.
+    pub(super) is_probed: bool,
     pub(super) rate: Vec<f64>,
     pub x: Vec<f64>,
     /// How far the projection onto a curved surface moves the extension in this step; else empty.
@@ -50,25 +36,16 @@ pub(in crate::integrate) struct Detector {
     pub right: Vec<(f64, f64)>,
     /// Rounding of the exit functions in this step, once it was needed.
     pub(super) exit_noise: Option<f64>,
-    /// Which monitored functions could not be cleared, and whether bounds say anything about them.
-    pub(super) suspects: Vec<(usize, bool)>,
 }
 
 impl Detector {
     pub fn new(n: usize, d: usize) -> Self {
         Detector {
             seen: Vec::new(),
-            unresolved: false,
-            uncertain: false,
-            dismissed: false,
-            blurred: false,
-            depth: 0.0,
-            blur: 0.0,
-            vanishing: [0; 2],
-            next_dt: None,
             exits: Vec::new(),
             h: vec![0.0; d],
             probed: [vec![0.0; d], vec![0.0; d]],
+            is_probed: false,
             rate: vec![0.0; d],
             x: vec![0.0; n],
             margin: Vec::new(),
@@ -76,8 +53,17 @@ impl Detector {
             enclosed_roots: RefCell::default(),
             right: Vec::new(),
             exit_noise: None,
-            suspects: Vec::new(),
         }
+    }
+
+    /// Forgets what is known of the last step.
+    pub fn forget_step(&mut self) {
+        self.exits.clear();
+        self.enclosed_exits.get_mut().clear();
+        self.enclosed_roots.get_mut().clear();
+        self.margin.clear();
+        self.exit_noise = None;
+        self.is_probed = false;
     }
 
     /// What takes down the exit functions at the stages of a step.
@@ -129,13 +115,13 @@ impl Detector {
         cleared
     }
 
-    /// Makes the values just measured those at the start of a motion.
-    pub fn accept_start(&mut self, monitored: &mut [Monitored]) {
+    /// Makes the values just measured those at the start of a motion that leaves a multiple zero, if it does.
+    pub fn accept_start(&mut self, monitored: &mut [Monitored], left: &Multiple) {
         for (m, &(value, rate)) in monitored.iter_mut().zip(&self.right) {
             (m.value, m.rate) = (value, rate);
             if let Some(zero) = &mut m.deflation {
-                zero.blur = self.blur;
-                zero.residual = if value.abs() <= self.depth {
+                zero.blur = left.blur;
+                zero.residual = if value.abs() <= left.depth {
                     value
                 } else {
                     0.0

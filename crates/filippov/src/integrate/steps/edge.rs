@@ -46,8 +46,8 @@ impl Integrator<'_> {
     }
 
     /// After a step whose events could not be decided.
-    pub(in crate::integrate) fn halve_step(&mut self, dt: f64) {
-        self.dt = 0.5 * dt;
+    pub(in crate::integrate) fn shorten_step(&mut self, dt: f64) {
+        self.dt = dt;
         self.one_sided = true;
         self.controller.not_finite();
     }
@@ -71,11 +71,7 @@ impl Integrator<'_> {
                 .gradient(j, self.t, &self.x, signs, &mut gradient)?;
             let tolerance = self.scale.along(&gradient, &self.x);
             if m.rate < 0.0 && m.value <= ARRIVED * tolerance {
-                return Ok(Some(Found {
-                    theta: 0.0,
-                    functions: smallvec::smallvec![m.guard],
-                    touch: false,
-                }));
+                return Ok(Some(Found::here(smallvec::smallvec![m.guard])));
             }
         }
         Ok(None)

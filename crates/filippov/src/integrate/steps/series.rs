@@ -1,8 +1,8 @@
 //! Steps by Taylor series.
 
 use crate::error::FieldError;
-use crate::event::{Monitored, Seen};
-use crate::field::{Guard, ModeField};
+use crate::event::Seen;
+use crate::field::ModeField;
 use crate::integrate::integrator::Integrator;
 use crate::integrate::motion::Motion;
 use crate::integrate::steps::stiffness::Derivatives;
@@ -251,50 +251,6 @@ impl Integrator<'_> {
         let attempt = taylor.attempt(field, self.t, &self.x, dt, &self.scale)?;
         self.detector.observer()(&self.motion.field);
         Ok(attempt)
-    }
-
-    /// Coefficients of the step.
-    pub(in crate::integrate) fn n_rows(&self) -> usize {
-        self.stepper.interpolant().coefficients().len() / self.x.len()
-    }
-
-    /// An exit function along the step, as far as its series describes it, into `rows`; `false` if there is none.
-    pub(in crate::integrate) fn exit_series(&self, m: &Monitored, rows: &mut [f64]) -> bool {
-        let place = m.exit().and_then(|index| {
-            let jets = self.motion.jets.as_ref()?;
-            jets.exit(index)
-        });
-        let (Some(place), Some(taylor)) = (place, &self.stepper.taylor) else {
-            return false;
-        };
-        taylor.column(place, rows);
-        let own = |slack: &&(Guard, f64)| slack.0 == m.guard;
-        rows[0] += self.slacks.iter().find(own).map_or(0.0, |slack| slack.1);
-        true
-    }
-
-    /// An affine switching function along the step, positive inside of the mode, into `rows`.
-    ///
-    /// # Errors
-    /// If a function of the user raises.
-    pub(in crate::integrate) fn affine_series(
-        &self,
-        j: usize,
-        m: &Monitored,
-        dt: f64,
-        rows: &mut [f64],
-    ) -> Result<(), FieldError> {
-        let extension = self.stepper.interpolant().coefficients();
-        let (point, signs) = ((self.t, &self.x[..]), &self.motion.signs);
-        let ht = self
-            .system
-            .gradient_products(j, point, signs, extension, rows)?;
-        if m.orientation < 0.0 {
-            rows.iter_mut().for_each(|row| *row = -*row);
-        }
-        rows[0] = m.value;
-        rows[1] += m.orientation * ht * dt;
-        Ok(())
     }
 }
 
