@@ -14,7 +14,7 @@ use crate::tolerances::{AT_FOLD, AT_SIDE, FIRST_SLACK};
 pub(crate) fn lost_functions(
     at: &Point,
     notes: &mut Notes,
-) -> Result<Option<SmallVec<[Guard; 4]>>, FieldError> {
+) -> Result<Option<SmallVec<[Guard; 2]>>, FieldError> {
     if at.arrival.slides_on_several() {
         if has_lost_jump(at, notes)? {
             return Ok(Some(smallvec![Guard::Root(RootEnd::Stability)]));

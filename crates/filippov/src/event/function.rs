@@ -25,7 +25,7 @@ pub struct Found {
     /// Where, in steps.
     pub theta: f64,
     /// What vanishes there.
-    pub guards: SmallVec<[Guard; 4]>,
+    pub guards: SmallVec<[Guard; 2]>,
     /// They come within rounding of zero without a change of sign.
     pub touch: bool,
     /// Rounding blurs it: it may be a multiple one.
@@ -47,7 +47,7 @@ pub struct Multiple {
 
 impl Found {
     /// Guards that vanish at the start of the step.
-    pub fn here(guards: SmallVec<[Guard; 4]>) -> Self {
+    pub fn here(guards: SmallVec<[Guard; 2]>) -> Self {
         Found {
             theta: 0.0,
             guards,

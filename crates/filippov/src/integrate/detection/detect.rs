@@ -81,12 +81,12 @@ impl Integrator<'_> {
     /// decided on the side, and it is decided anew.
     fn wrong_from_the_start(&mut self) -> Result<Option<Found>, FieldError> {
         for index in 0..self.motion.monitored.len() {
-            let m = self.motion.monitored[index];
+            let m = &self.motion.monitored[index];
             let (value, _) = self.detector.right[index];
-            let is_surface = m.guard.is_surface();
-            if m.deflation.is_none() || !is_surface || value >= 0.0 {
+            if value >= 0.0 || m.deflation.is_none() || !m.guard.is_surface() {
                 continue;
             }
+            let m = *m;
             if value < -CLEAR_OF_NOISE * self.noise_beside(&m)? {
                 return Ok(Some(Found::here(smallvec![m.guard])));
             }

@@ -149,8 +149,8 @@ impl Piece {
 impl Integrator<'_> {
     /// Searches the step for a zero of one guard that comes first; `false` if a shorter step is needed.
     pub(super) fn search(&mut self, index: usize, sought: &mut Sought) -> Result<bool, FieldError> {
-        let m = self.motion.monitored[index];
-        if m.deflation.is_some() {
+        if self.motion.monitored[index].deflation.is_some() {
+            let m = self.motion.monitored[index];
             self.motion.monitored[index].noise = self.noise_beside(&m)?;
         }
         let mut proof = None;
