@@ -1,7 +1,12 @@
 //! The sliding field on an intersection of surfaces.
 
+use smallvec::SmallVec;
+
+use super::guard::Guards;
 use super::weights::RuleFailure;
-use super::{AffineLaw, Canopy, Guard, MeetingFields, Projector, RootEnd, RuleLaw, SmoothField};
+use super::{
+    AffineLaw, Canopy, Guard, MeetingFields, Motion, Projector, RootEnd, RuleLaw, SmoothField,
+};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::options::SlidingRule;
@@ -155,7 +160,7 @@ impl<'a> IntersectionField<'a> {
 
     /// Lets the multiplier of a guard go beyond its end by this much.
     pub fn set_slack(&mut self, guard: Guard, slack: f64) {
-        let place = self.guards().position(|own| own == guard);
+        let place = self.guards().iter().position(|own| *own == guard);
         if let Some(own) = place.and_then(|place| self.slack.get_mut(place)) {
             *own = slack;
         }
@@ -226,45 +231,9 @@ impl<'a> IntersectionField<'a> {
         &self.set
     }
 
-    /// What ends the motion, in the order of the exit functions: the ends of the multipliers, then those of the root.
-    pub fn guards(&self) -> impl Iterator<Item = Guard> + '_ {
-        let ends = self.set.iter().flat_map(|&j| Guard::ends(j));
-        ends.chain([RootEnd::Fold, RootEnd::Stability].map(Guard::Root))
-    }
-
-    /// The multipliers at the last evaluation, in the order of the set; none if there is no root.
-    pub fn multipliers(&self) -> &[f64] {
-        &self.lambda
-    }
-
     /// Were all fields there at the last evaluation, but no multipliers?
     pub fn is_rootless(&self) -> bool {
         self.is_rootless
-    }
-
-    /// The exit functions at the last evaluation.
-    pub fn exits(&self) -> &[f64] {
-        &self.exits
-    }
-
-    /// Moves `x` onto the intersection, if the motion is projected.
-    ///
-    /// # Errors
-    /// If a function of the user raises.
-    pub fn project(&mut self, t: f64, x: &mut [f64]) -> Result<(), FieldError> {
-        if self.restoring.is_some() {
-            return Ok(());
-        }
-        match &mut self.affine {
-            Some(law)
-                if self.set.len() > MOST_MEETING || law.is_shared() || law.projects_at_once() =>
-            {
-                law.project(t, x, &self.signs)
-            }
-            _ => self
-                .projector
-                .project_onto(self.system, &self.set, t, x, &self.signs),
-        }
     }
 
     /// Evaluates multipliers and exit functions at (t, x) and writes the field. Where there is no root they are NaN.
@@ -354,6 +323,39 @@ fn by_distance(tracked: &[(f64, Vec<f64>)], t: f64) -> Vec<&[f64]> {
     let mut all: Vec<&(f64, Vec<f64>)> = tracked.iter().rev().collect();
     all.sort_by(|a, b| (a.0 - t).abs().total_cmp(&(b.0 - t).abs()));
     all.into_iter().map(|found| &found.1[..]).collect()
+}
+
+impl Motion for IntersectionField<'_> {
+    /// The ends of the multipliers, then those of the root.
+    fn guards(&self) -> Guards {
+        let ends = self.set.iter().flat_map(|&j| Guard::ends(j));
+        ends.chain([RootEnd::Fold, RootEnd::Stability].map(Guard::Root))
+            .collect()
+    }
+
+    fn last_exits(&self) -> &[f64] {
+        &self.exits
+    }
+
+    fn multipliers(&self) -> SmallVec<[f64; 2]> {
+        SmallVec::from_slice(&self.lambda)
+    }
+
+    fn project(&mut self, t: f64, x: &mut [f64]) -> Result<(), FieldError> {
+        if self.restoring.is_some() {
+            return Ok(());
+        }
+        match &mut self.affine {
+            Some(law)
+                if self.set.len() > MOST_MEETING || law.is_shared() || law.projects_at_once() =>
+            {
+                law.project(t, x, &self.signs)
+            }
+            _ => self
+                .projector
+                .project_onto(self.system, &self.set, t, x, &self.signs),
+        }
+    }
 }
 
 impl SmoothField for IntersectionField<'_> {

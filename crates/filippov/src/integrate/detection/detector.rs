@@ -70,7 +70,7 @@ impl Detector {
     pub fn observer(&mut self) -> impl FnMut(&ModeField) + '_ {
         |field| {
             for (seen, value) in self.seen.iter_mut().zip(field.last_exits()) {
-                seen.see(value);
+                seen.see(*value);
             }
         }
     }
