@@ -1,6 +1,6 @@
 //! Decisions of a run as Python dictionaries, and back.
 
-use filippov::event::EventFunction;
+use filippov::field::{Guard, RootEnd};
 use filippov::{DecisionCause, DecisionOutcome, DecisionPoint, DecisionRecord, Mode};
 use numpy::PyReadonlyArray1;
 use pyo3::exceptions::PyValueError;
@@ -11,8 +11,8 @@ use crate::prepared_run::{ActionRow, PreparedRun};
 use crate::solve::RunOptions;
 use crate::systems::{raised, CoreSystem};
 
-/// The name of a function, and the number of the surface or of the exit function.
-type FunctionRow = (String, usize);
+/// The name of a guard, and the number of its surface if it has one, else 0.
+type GuardRow = (String, usize);
 
 /// What was asked and what was decided, in one dictionary each.
 pub fn record_as_pair<'py>(
@@ -53,10 +53,7 @@ fn check_point(point: &DecisionPoint, system: &CoreSystem) -> PyResult<()> {
         DecisionCause::Start => {}
         DecisionCause::Anew(memory) => modes.push(memory),
         DecisionCause::Event { functions, .. } => {
-            surfaces.extend(functions.iter().filter_map(|function| match function {
-                EventFunction::Surface(j) => Some(*j),
-                _ => None,
-            }));
+            surfaces.extend(functions.iter().map(|&guard| guard_as_row(guard).1));
         }
         DecisionCause::Limit(meeting) => surfaces.extend(meeting),
     }
@@ -75,26 +72,31 @@ fn mode_as_tuple<'py>(py: Python<'py>, mode: &Mode) -> PyResult<Bound<'py, PyTup
     PyTuple::new(py, mode.entries())
 }
 
-fn function_as_row(function: EventFunction) -> FunctionRow {
-    let (name, index) = match function {
-        EventFunction::Surface(j) => ("surface", j),
-        EventFunction::ExitMinus => ("exit_minus", 0),
-        EventFunction::ExitPlus => ("exit_plus", 1),
-        EventFunction::Exit(index) => ("exit", index),
+/// The name of a kind of guard, and the guard of that kind at a surface.
+type GuardKind = (&'static str, fn(usize) -> Guard);
+
+const GUARDS: [GuardKind; 6] = [
+    ("surface", Guard::Surface),
+    ("multiplier_minus", |j| Guard::ends(j)[0]),
+    ("multiplier_plus", |j| Guard::ends(j)[1]),
+    ("force", Guard::Force),
+    ("fold", |_| Guard::Root(RootEnd::Fold)),
+    ("stability", |_| Guard::Root(RootEnd::Stability)),
+];
+
+fn guard_as_row(guard: Guard) -> GuardRow {
+    let j = match guard {
+        Guard::Surface(j) | Guard::Multiplier { surface: j, .. } | Guard::Force(j) => j,
+        Guard::Root(_) => 0,
     };
-    (name.into(), index)
+    let row = GUARDS.iter().find(|(_, make)| make(j) == guard);
+    (row.map_or("", |row| row.0).into(), j)
 }
 
-fn read_function((name, index): FunctionRow) -> PyResult<EventFunction> {
-    match name.as_str() {
-        "surface" => Ok(EventFunction::Surface(index)),
-        "exit_minus" => Ok(EventFunction::ExitMinus),
-        "exit_plus" => Ok(EventFunction::ExitPlus),
-        "exit" => Ok(EventFunction::Exit(index)),
-        _ => Err(PyValueError::new_err(format!(
-            "point: unknown function {name:?}"
-        ))),
-    }
+fn read_guard((name, surface): GuardRow) -> PyResult<Guard> {
+    let unknown = || PyValueError::new_err(format!("point: unknown function {name:?}"));
+    let row = GUARDS.iter().find(|row| row.0 == name);
+    row.map(|(_, make)| make(surface)).ok_or_else(unknown)
 }
 
 fn point_as_dict<'py>(py: Python<'py>, point: &DecisionPoint) -> PyResult<Bound<'py, PyDict>> {
@@ -112,7 +114,7 @@ fn point_as_dict<'py>(py: Python<'py>, point: &DecisionPoint) -> PyResult<Bound<
             at_two_fold,
         } => {
             dict.set_item("cause", "event")?;
-            let rows = functions.iter().map(|&f| function_as_row(f));
+            let rows = functions.iter().map(|&guard| guard_as_row(guard));
             dict.set_item("functions", rows.collect::<Vec<_>>())?;
             dict.set_item("touch", touch)?;
             dict.set_item("vanishing", vanishing.to_vec())?;
@@ -150,8 +152,8 @@ fn read_point(dict: &Bound<'_, PyDict>) -> PyResult<DecisionPoint> {
         "start" => DecisionCause::Start,
         "anew" => DecisionCause::Anew(Mode::new(get("memory")?.extract()?)),
         "event" => {
-            let rows: Vec<FunctionRow> = get("functions")?.extract()?;
-            let functions = rows.into_iter().map(read_function);
+            let rows: Vec<GuardRow> = get("functions")?.extract()?;
+            let functions = rows.into_iter().map(read_guard);
             DecisionCause::Event {
                 functions: functions.collect::<PyResult<_>>()?,
                 touch: get("touch")?.extract()?,
@@ -194,7 +196,7 @@ fn outcome_as_dict<'py>(
     let candidates = outcome.candidates.iter();
     let candidates: PyResult<Vec<_>> = candidates.map(|mode| mode_as_tuple(py, mode)).collect();
     let zeros = outcome.zeros.iter();
-    let zeros = zeros.map(|zero| (function_as_row(zero.function), zero.order, zero.sign));
+    let zeros = zeros.map(|zero| (guard_as_row(zero.guard), zero.order, zero.sign));
     dict.set_item("mode", mode.transpose()?)?;
     dict.set_item("stop", outcome.stop)?;
     dict.set_item("rule", outcome.rule)?;

@@ -4,7 +4,7 @@ use smallvec::SmallVec;
 
 use crate::decisions::DecisionRecord;
 use crate::error::FieldError;
-use crate::field::{IntersectionField, Projector, SlidingField, SmoothField};
+use crate::field::{IntersectionField, Motion, Projector, SlidingField, SmoothField};
 use crate::integrate::Stats;
 use crate::mode::Mode;
 use crate::options::SlidingRule;
@@ -251,10 +251,7 @@ impl Solution {
                 let field = IntersectionField::new(system, &set, &mode.signs(), near);
                 let mut field = field.with_rule(self.sliding);
                 field.eval(t, &mut y, &mut vec![0.0; self.n_states])?;
-                let values = field
-                    .multipliers()
-                    .iter()
-                    .map(|&lambda| as_multiplier(lambda));
+                let values = field.multipliers().into_iter().map(as_multiplier);
                 set.into_iter().zip(values).collect()
             }
         })

@@ -2,6 +2,7 @@
 
 use crate::error::FieldError;
 use crate::field::weights::RuleFailure;
+use crate::field::{Guard, RootEnd};
 use crate::mode::Mode;
 use crate::options::SlidingRule;
 use crate::switching::{TwoFoldMotion, Undecided};
@@ -61,8 +62,8 @@ pub enum Stop {
     Intersection {
         /// The surfaces.
         surfaces: Vec<usize>,
-        /// The attracting modes of codimension 0 and 1.
-        candidates: Vec<Mode>,
+        /// Where the guards were looked at: for each mode one that fails.
+        failing: Vec<(Mode, Guard)>,
         /// Why the decision failed.
         reason: Undecided,
     },
@@ -201,18 +202,14 @@ impl Stop {
             }
             Stop::Intersection {
                 surfaces,
-                candidates,
+                failing,
                 reason,
             } => format!(
                 "Stopped at t = {t:.10}: the motion arrived at the intersection of {} from mode ({mode}), and what \
                  follows is not decided: {}{}.",
                 names(surfaces),
                 reason.named(|place| names(&surfaces[place..=place])),
-                if candidates.is_empty() {
-                    String::new()
-                } else {
-                    format!("; candidates of lower codimension: {}", modes(candidates))
-                }
+                what_fails(failing, surface_name)
             ),
             Stop::SlidesAcrossJump { surfaces, jumping } => format!(
                 "Stopped at t = {t:.10}: from mode ({mode}) the motion would slide on {}, between fields that differ in the \
@@ -327,4 +324,34 @@ pub struct Warning {
     pub candidates: Vec<Mode>,
     /// The rule of the decision that it comes from; empty for others.
     pub rule: &'static str,
+}
+
+/// So many modes are named in a message.
+const MOST_NAMED: usize = 9;
+
+/// What ends each mode at once, in words; of many modes the first ones.
+fn what_fails(failing: &[(Mode, Guard)], surface_name: impl Fn(usize) -> String) -> String {
+    let word = |(mode, guard): &(Mode, Guard)| {
+        let what = match *guard {
+            Guard::Surface(j) => surface_name(j),
+            Guard::Multiplier { surface, end } => {
+                format!("the multiplier of {} at {end:+}", surface_name(surface))
+            }
+            Guard::Force(j) => format!("the force at {}", surface_name(j)),
+            Guard::Root(RootEnd::Fold) => "its multipliers".into(),
+            Guard::Root(RootEnd::Stability) => "its stability".into(),
+        };
+        format!("({mode}) {what}")
+    };
+    let words: Vec<String> = failing.iter().take(MOST_NAMED).map(word).collect();
+    match (failing.len(), words.join(", ")) {
+        (0, _) => String::new(),
+        (n, words) if n > MOST_NAMED => {
+            format!(
+                "; the guard that fails in each mode: {words}, and {} more",
+                n - MOST_NAMED
+            )
+        }
+        (_, words) => format!("; the guard that fails in each mode: {words}"),
+    }
 }

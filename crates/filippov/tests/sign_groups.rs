@@ -4,7 +4,7 @@
 
 mod random_fields;
 
-use filippov::field::{IntersectionField, MeetingFields, SmoothField};
+use filippov::field::{IntersectionField, MeetingFields, Motion, SmoothField};
 use filippov::switching::{
     independent_parts, is_stable, limit_of_hidden_dynamics, of_part, resolve, roots_in_cube,
     stability_margins, HiddenOutcome, Incoming, Matrix, NormalFields, SignGroup, Undecided,

@@ -4,9 +4,7 @@
 //! in the place of another surface, as `x` beside `x + x*abs(x)` or both arguments of a maximum that vanish together, it has no
 //! multiplier: the other one decides, and the kink goes with it.
 
-use super::point::{Decided, Left, Lefts, Next, Notes, Point};
-use super::rule::{How, Meeting};
-use super::settle::settle;
+use super::point::{Left, Lefts, Next, Notes, Point};
 use crate::error::FieldError;
 use crate::field::Projector;
 use crate::mode::Mode;

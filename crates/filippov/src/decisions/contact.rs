@@ -2,9 +2,7 @@
 
 use super::point::{Decided, Left, Lefts, Next, Notes, Point};
 use crate::error::FieldError;
-use crate::event::EventFunction;
-use crate::field::ModeField;
-use crate::field::{ContactField, SmoothField};
+use crate::field::{ContactField, Guard, ModeField, SmoothField};
 use crate::mode::Mode;
 use crate::status::Stop;
 use crate::switching::Leading;
@@ -45,21 +43,13 @@ pub(super) fn decide_in_contact(
 
 /// The entries that follow from the exit functions that vanish at an event.
 fn vanished(at: &Point) -> Vec<Known> {
-    let field = at.arrival.field.borrow();
-    let ModeField::Contact(field) = &**field else {
+    if !matches!(&**at.arrival.field.borrow(), ModeField::Contact(_)) {
         return Vec::new();
-    };
-    let contacts: Vec<usize> = field.contacts().collect();
-    let entry = |function: &EventFunction| match *function {
-        EventFunction::Exit(index) if index < contacts.len() => {
-            Some((contacts[index], at.triggers().side(contacts[index], None)))
-        }
-        EventFunction::Exit(index) => {
-            let (position, end) = ((index - contacts.len()) / 2, (index - contacts.len()) % 2);
-            let side = if end == 0 { -1 } else { 1 };
-            field.sliding().get(position).map(|&j| (j, side))
-        }
-        _ => None,
+    }
+    let entry = |guard: &Guard| match *guard {
+        Guard::Force(j) => Some((j, at.triggers().side(j, None))),
+        Guard::Multiplier { surface, end } => Some((surface, end)),
+        Guard::Surface(_) | Guard::Root(_) => None,
     };
     at.arrival.functions().iter().filter_map(entry).collect()
 }

@@ -6,8 +6,7 @@ use super::rule::{How, Meeting};
 use smallvec::SmallVec;
 
 use crate::error::FieldError;
-use crate::event::EventFunction;
-use crate::field::eval_on_side;
+use crate::field::{eval_on_side, Guard};
 use crate::mode::Mode;
 use crate::switching::{first_nonzero, normal_component, Arrival as SurfaceArrival, Leading};
 use crate::system::dot;
@@ -15,10 +14,10 @@ use crate::tolerances::{DEPARTS_TANGENTIALLY, SURFACE_NOISE};
 
 /// The surfaces among the functions of an event, in order.
 #[inline]
-pub(crate) fn located_surfaces(functions: &[EventFunction]) -> SmallVec<[usize; 4]> {
+pub(crate) fn located_surfaces(functions: &[Guard]) -> SmallVec<[usize; 4]> {
     let mut surfaces = SmallVec::new();
     for function in functions {
-        if let EventFunction::Surface(j) = *function {
+        if let Guard::Surface(j) = *function {
             surfaces.push(j);
         }
     }
@@ -112,8 +111,8 @@ pub(super) fn arrival_at_surface(arrival: &Arrival, fresh: &[usize]) -> Option<S
                 _ => SurfaceArrival::Flat(side, vanishing),
             })
         }
-        ([_], [], [EventFunction::ExitMinus, ..]) => Some(SurfaceArrival::ExitMinus),
-        ([_], [], [EventFunction::ExitPlus, ..]) => Some(SurfaceArrival::ExitPlus),
+        ([_], [], [Guard::Multiplier { end: -1, .. }, ..]) => Some(SurfaceArrival::ExitMinus),
+        ([_], [], [Guard::Multiplier { .. }, ..]) => Some(SurfaceArrival::ExitPlus),
         _ => None,
     }
 }

@@ -8,12 +8,12 @@ use super::leave_by_rule::slides_by_rule;
 use super::meeting::hidden_limit;
 use super::point::{Decided, Left, Next, Notes, Point};
 use super::rule::{How, Meeting};
-use super::viable::{noise_of, survey, Viable};
+use super::viable::{noise_of, survey, Survey, Viable};
 use crate::error::FieldError;
 use crate::field::SmoothField;
 use crate::mode::Mode;
 use crate::status::Stop;
-use crate::switching::{NormalFields, Resolution, Undecided};
+use crate::switching::{NormalFields, Undecided};
 use crate::tolerances::{EQUAL_SHARES, MOST_MEETING, TANGENT};
 
 /// Rule: switching functions jump between the regions around the point, surfaces are in one place or touch one another.
@@ -31,14 +31,12 @@ pub(super) fn decide_if_entangled(
     if !is_entangled || slides_by_rule(at.arrival) {
         return Ok(None);
     }
-    let Some(surfaces) = wider else {
-        return Ok(decide_by_germs(at, notes, meeting)?.ok());
-    };
+    let surfaces = wider.unwrap_or_else(|| meeting.surfaces.to_vec());
     let meeting = &Meeting {
         surfaces: &surfaces,
         ..*meeting
     };
-    decide_undecided(at, notes, meeting, Err(Undecided::NoOutcome)).map(Some)
+    decide_undecided(at, notes, meeting, None).map(Some)
 }
 
 /// Are all fields around the point tangent to one of several surfaces?
@@ -91,43 +89,43 @@ pub(super) fn decide_if_doubtful(
     }
 }
 
-/// What follows at an intersection of which first-order data do not decide, as `resolution` says.
+/// What follows at an intersection of which first-order data do not decide; why, if that is known.
 pub(super) fn decide_undecided(
     at: &Point,
     notes: &mut Notes,
     meeting: &Meeting,
-    resolution: Result<Resolution, Undecided>,
+    reason: Option<Undecided>,
 ) -> Result<Decided, FieldError> {
     notes.leaf = "germs";
     Ok(match decide_by_germs(at, notes, meeting)? {
         Ok(decided) => decided,
-        Err(between) if !between.is_empty() => Err(Stop::SlidesAcrossJump {
+        Err(found) if !found.between.is_empty() => Err(Stop::SlidesAcrossJump {
             surfaces: meeting.surfaces.to_vec(),
-            jumping: between,
+            jumping: found.jumping(),
         }),
-        Err(_) => Err(Stop::Intersection {
+        Err(found) => Err(Stop::Intersection {
             surfaces: meeting.surfaces.to_vec(),
-            candidates: Vec::new(),
-            reason: resolution.err().unwrap_or(Undecided::NoOutcome),
+            reason: reason.unwrap_or(match found.open.is_empty() {
+                true => Undecided::NoneViable,
+                false => Undecided::NoOutcome,
+            }),
+            failing: found.failing,
         }),
     })
 }
 
-/// The viable mode that follows. If there is none, the functions that jump on what could be slid on.
+/// The viable mode that follows. If there is none, what is known of all modes.
 fn decide_by_germs(
     at: &Point,
     notes: &mut Notes,
     meeting: &Meeting,
-) -> Result<Result<Decided, Vec<usize>>, FieldError> {
+) -> Result<Result<Decided, Survey>, FieldError> {
     let Some(mut found) = survey(at, notes, meeting)? else {
-        return Ok(Err(Vec::new()));
+        return Ok(Err(Survey::default()));
     };
     drop_other_names(at, notes, meeting, &mut found.viable)?;
     if found.viable.is_empty() {
-        let mut jumping: Vec<usize> = found.between.into_iter().flat_map(|(_, j)| j).collect();
-        jumping.sort_unstable();
-        jumping.dedup();
-        return Ok(Err(jumping));
+        return Ok(Err(found));
     }
     let mut chosen = preferred(at, notes, meeting, &found.viable)?;
     let viable = found.viable.iter().map(|viable| viable.mode.clone());
@@ -143,7 +141,9 @@ fn decide_by_germs(
         .viable
         .into_iter()
         .find(|viable| viable.mode == chosen);
-    Ok(viable.map(|viable| Ok(begin(viable))).ok_or_else(Vec::new))
+    Ok(viable
+        .map(|viable| Ok(begin(viable)))
+        .ok_or_else(Survey::default))
 }
 
 /// The mode that is taken among several, if none is asked for: the limit of the hidden dynamics; the mode before; a mode all

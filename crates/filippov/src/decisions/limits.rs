@@ -116,7 +116,7 @@ pub(super) fn stay_at_limit(
         if !stays_tangent(at, notes, mode, meeting, &telling)? {
             return Ok(Some(Err(Stop::Intersection {
                 surfaces: meeting.to_vec(),
-                candidates: Vec::new(),
+                failing: Vec::new(),
                 reason: Undecided::Tangent { surface },
             })));
         }

@@ -3,18 +3,14 @@
 //! So it is where two surfaces touch one another: seen from the point they are one, and a moment later they are two, in an
 //! order that decides.
 
-use super::coinciding::touch_one_another;
 use super::departures::velocity_in;
-use super::point::{Decided, Left, Lefts, Next, Notes, Point};
-use super::rule::Meeting;
+use super::point::{Left, Lefts, Notes, Point};
 use crate::error::FieldError;
 use crate::field::ModeField;
 use crate::field::SmoothField;
 use crate::mode::Mode;
 use crate::switching::Leading;
-use crate::tolerances::{
-    LONGER_TRIAL, MAX_LIE_ORDER, MOST_LENGTHENINGS, MOST_TRIED, SURFACE_NOISE,
-};
+use crate::tolerances::{LONGER_TRIAL, MAX_LIE_ORDER, MOST_LENGTHENINGS, SURFACE_NOISE};
 
 /// Follows a motion in this mode for a moment, and longer until it is clear of rounding.
 pub(super) fn try_mode(

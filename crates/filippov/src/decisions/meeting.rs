@@ -8,9 +8,7 @@ use super::rule::{How, Meeting};
 use super::settle::place_on;
 use super::spiral::outward_leap;
 use crate::error::FieldError;
-use crate::event::EventFunction;
-use crate::field::ModeField;
-use crate::field::{IntersectionExit, MeetingFields};
+use crate::field::{Guard, MeetingFields, ModeField, RootEnd};
 use crate::mode::Mode;
 use crate::status::Stop;
 use crate::switching::{
@@ -113,7 +111,7 @@ pub(super) fn too_many(
         Err(Stop::Intersection {
             reason: Undecided::TooMany { n: surfaces.len() },
             surfaces,
-            candidates: Vec::new(),
+            failing: Vec::new(),
         })
     }))
 }
@@ -141,25 +139,23 @@ fn incoming(
         .arrival
         .functions()
         .iter()
-        .find_map(|function| match function {
-            EventFunction::Exit(index) => Some(*index),
-            _ => None,
-        });
-    let (Some(index), ModeField::Intersection(field), true) = (exit, &**field, meeting.is_exit())
+        .find(|guard| !guard.is_surface());
+    let (Some(exit), ModeField::Intersection(field), true) = (exit, &**field, meeting.is_exit())
     else {
         return Ok(Incoming::Face {
             mode: entries,
             multipliers,
         });
     };
-    let kind = match field.exit(index) {
-        IntersectionExit::Side { .. } => ExitKind::Side,
-        IntersectionExit::Fold => ExitKind::Fold,
-        IntersectionExit::Stability => ExitKind::Stability,
+    let kind = match exit {
+        Guard::Root(RootEnd::Fold) => ExitKind::Fold,
+        Guard::Root(RootEnd::Stability) => ExitKind::Stability,
+        _ => ExitKind::Side,
     };
     let mut lambda = multipliers;
-    if let IntersectionExit::Side { position, end } = field.exit(index) {
-        lambda[position] = f64::from(end);
+    if let Guard::Multiplier { surface, end } = *exit {
+        let position = field.set().iter().position(|&j| j == surface);
+        lambda[position.unwrap_or(0)] = f64::from(end);
     }
     if kind == ExitKind::Fold && meeting.surfaces.len() > 2 {
         let merged = merged_root(fields, &lambda);
@@ -218,7 +214,7 @@ fn follow(
     }
     let resolution = match resolution {
         Ok(resolution) if !resolution.degenerate => resolution,
-        other => return decide_undecided(at, notes, place, other),
+        other => return decide_undecided(at, notes, place, other.err()),
     };
     notes.leaf = resolution.leaf;
     notes.spirals = resolution.candidates.contains(&Continuation::OutwardSpiral);
@@ -236,10 +232,10 @@ fn follow(
             Some(asked) => (asked.clone(), None),
             None => match outward_leap(at, meeting, mode, fields) {
                 Some(leap) => (leap.region.clone(), Some(leap)),
-                None => return decide_undecided(at, notes, place, Ok(resolution)),
+                None => return decide_undecided(at, notes, place, None),
             },
         },
-        None => return decide_undecided(at, notes, place, Ok(resolution)),
+        None => return decide_undecided(at, notes, place, None),
     };
     let preferred = after.clone();
     if !resolution.unique || is_spiral || candidates.len() > 1 {

@@ -54,8 +54,8 @@ fn rate_of_sliding(at: &Point, j: usize, on_surface: &[bool]) -> Result<Option<f
         return Ok(None);
     }
     let rate = rates_here(at)?[j];
-    let exits = at.arrival.field.borrow().last_exits();
-    let is_admissible = exits.iter().all(|&exit| exit > 0.0);
+    let field = at.arrival.field.borrow();
+    let is_admissible = field.last_exits().iter().all(|&exit| exit > 0.0);
     let mut gradient = vec![0.0; at.x.len()];
     let signs = &at.arrival.signs;
     let ht = at.system.gradient(j, at.t, at.x, signs, &mut gradient)?;

@@ -8,8 +8,8 @@ use smallvec::{smallvec, SmallVec};
 
 use crate::action::Actions;
 use crate::error::FieldError;
-use crate::event::{Deflation, EventFunction};
-use crate::field::{eval_on_side, Law, MeetingFields, ModeField};
+use crate::event::Deflation;
+use crate::field::{eval_on_side, Guard, Law, MeetingFields, ModeField};
 use crate::mode::{Mode, Signs};
 use crate::options::{NonUnique, Options};
 use crate::solution::Switch;
@@ -90,7 +90,7 @@ pub(crate) enum Cause<'p> {
     Anew(&'p Mode),
     /// These functions of the motion vanish here.
     Event {
-        functions: &'p [EventFunction],
+        functions: &'p [Guard],
         /// They come within rounding of zero without a change of sign.
         touch: bool,
         /// How many derivatives along f- and f+ vanish at a multiple zero.
@@ -143,7 +143,7 @@ impl Arrival<'_, '_> {
     }
 
     /// The functions that vanish, if the motion ends with an event.
-    pub fn functions(&self) -> &[EventFunction] {
+    pub fn functions(&self) -> &[Guard] {
         match self.cause {
             Cause::Event { functions, .. } => functions,
             _ => &[],
@@ -352,40 +352,38 @@ pub(crate) enum Left {
     /// The surface is left with this derivative of h.
     Surface(usize, Leading),
     /// Sliding starts with a vanishing exit function; the derivative of the normal component.
-    Exit(EventFunction, Leading),
+    Exit(Guard, Leading),
 }
 
 impl Left {
     /// What vanishes after the decision at surface `j`.
     #[inline]
     pub fn after(j: usize, decision: &Decision) -> Lefts {
+        let [minus, plus] = Guard::ends(j);
         if let Some(motion) = decision.starts_at_two_fold() {
             let first = |value: f64| Leading { order: 1, value };
             return smallvec![
-                Left::Exit(EventFunction::ExitMinus, first(motion.minus)),
-                Left::Exit(EventFunction::ExitPlus, first(motion.plus)),
+                Left::Exit(minus, first(motion.minus)),
+                Left::Exit(plus, first(motion.plus)),
             ];
         }
         match decision.entry {
             -1 => smallvec![Left::Surface(j, decision.minus)],
             1 => smallvec![Left::Surface(j, decision.plus)],
-            _ => [
-                (EventFunction::ExitMinus, decision.minus),
-                (EventFunction::ExitPlus, decision.plus),
-            ]
-            .into_iter()
-            .filter(|(_, leading)| leading.order > 1)
-            .map(|(function, leading)| {
-                // The normal component is the derivative of h: one order less.
-                Left::Exit(
-                    function,
-                    Leading {
-                        order: leading.order - 1,
-                        value: leading.value,
-                    },
-                )
-            })
-            .collect(),
+            _ => [(minus, decision.minus), (plus, decision.plus)]
+                .into_iter()
+                .filter(|(_, leading)| leading.order > 1)
+                .map(|(function, leading)| {
+                    // The normal component is the derivative of h: one order less.
+                    Left::Exit(
+                        function,
+                        Leading {
+                            order: leading.order - 1,
+                            value: leading.value,
+                        },
+                    )
+                })
+                .collect(),
         }
     }
 
@@ -398,9 +396,9 @@ impl Left {
     }
 
     /// The zero to divide out of the function along the motion from `t`.
-    pub fn deflation(self, t: f64) -> Option<(EventFunction, Deflation)> {
+    pub fn deflation(self, t: f64) -> Option<(Guard, Deflation)> {
         let (function, leading) = match self {
-            Left::Surface(j, leading) => (EventFunction::Surface(j), leading),
+            Left::Surface(j, leading) => (Guard::Surface(j), leading),
             Left::Exit(function, leading) => (function, leading),
         };
         (leading.order > 0).then(|| {

@@ -9,8 +9,7 @@ use super::event::Reached;
 use super::point::{Arrival, Cause, Left, Next, Notes, Point, Policy};
 use crate::action::Actions;
 use crate::error::FieldError;
-use crate::event::EventFunction;
-use crate::field::{ContactField, Law, ModeField, SlidingSet, SmoothField};
+use crate::field::{ContactField, Guard, Law, ModeField, SlidingSet, SmoothField};
 use crate::mode::Mode;
 use crate::options::Options;
 use crate::stepper::ErrorScale;
@@ -27,7 +26,7 @@ pub enum DecisionCause {
     /// Functions of the motion vanished.
     Event {
         /// Which.
-        functions: Vec<EventFunction>,
+        functions: Vec<Guard>,
         /// They came to zero without a change of sign.
         touch: bool,
         /// How many derivatives along f- and f+ vanished at a multiple zero.
@@ -79,7 +78,7 @@ pub struct DecisionPoint {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StartingZero {
     /// The function.
-    pub function: EventFunction,
+    pub guard: Guard,
     /// The order of its first derivative that does not vanish.
     pub order: usize,
     /// The sign of that derivative.
@@ -287,12 +286,12 @@ impl DecisionOutcome {
 
 impl From<Left> for StartingZero {
     fn from(left: Left) -> Self {
-        let (function, leading): (_, Leading) = match left {
-            Left::Surface(j, leading) => (EventFunction::Surface(j), leading),
-            Left::Exit(function, leading) => (function, leading),
+        let (guard, leading): (_, Leading) = match left {
+            Left::Surface(j, leading) => (Guard::Surface(j), leading),
+            Left::Exit(guard, leading) => (guard, leading),
         };
         StartingZero {
-            function,
+            guard,
             order: leading.order,
             sign: leading.sign(),
         }

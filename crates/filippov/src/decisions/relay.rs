@@ -6,8 +6,7 @@ use super::departures::departures;
 use super::point::{Decided, Left, Lefts, Next, Notes, Point};
 use super::rule::{How, Meeting};
 use crate::error::FieldError;
-use crate::event::EventFunction;
-use crate::field::SmoothField;
+use crate::field::{Guard, SmoothField};
 use crate::mode::Mode;
 use crate::status::Stop;
 use crate::switching::{relay_at, RelaySolution, Undecided, Uniqueness};
@@ -33,7 +32,7 @@ pub(super) fn decide_by_relay(
     if !is_event && meeting.len() == 2 && !have_parallels(at, meeting, mode)? {
         return Ok(None);
     }
-    let is_exit = |f: &EventFunction| !matches!(f, EventFunction::Surface(_));
+    let is_exit = |guard: &Guard| !guard.is_surface();
     let exits = is_event && at.arrival.functions().iter().any(is_exit);
     let mut found = solve_relay_at(at, notes, mode, meeting, exits)?;
     let is_degenerate = |found: &Option<RelaySolution>| {
@@ -50,7 +49,7 @@ pub(super) fn decide_by_relay(
     if found.n_sharing > MOST_IN_LOOP {
         return Ok(Some(Err(Stop::Intersection {
             surfaces: meeting.to_vec(),
-            candidates: Vec::new(),
+            failing: Vec::new(),
             reason: Undecided::TooRedundant { n: found.n_sharing },
         })));
     }

@@ -5,8 +5,7 @@ use super::two_fold::{beyond_double_zero, two_fold_here};
 use smallvec::{smallvec, SmallVec};
 
 use crate::error::FieldError;
-use crate::event::EventFunction;
-use crate::field::{IntersectionExit, ModeField};
+use crate::field::{Guard, ModeField, RootEnd};
 use crate::tolerances::{AT_FOLD, AT_SIDE, FIRST_SLACK, VANISHED};
 
 /// The functions that count as vanishing where steps of sliding shrink to nothing: the jump of the field across a surface has
@@ -14,19 +13,18 @@ use crate::tolerances::{AT_FOLD, AT_SIDE, FIRST_SLACK, VANISHED};
 pub(crate) fn lost_functions(
     at: &Point,
     notes: &mut Notes,
-) -> Result<Option<SmallVec<[EventFunction; 4]>>, FieldError> {
+) -> Result<Option<SmallVec<[Guard; 2]>>, FieldError> {
     if at.arrival.slides_on_several() {
-        let m = at.arrival.sliding.len();
         if has_lost_jump(at, notes)? {
-            return Ok(Some(smallvec![EventFunction::Exit(2 * m + 1)]));
+            return Ok(Some(smallvec![Guard::Root(RootEnd::Stability)]));
         }
-        return Ok(has_lost_root(at)?.then(|| smallvec![EventFunction::Exit(2 * m)]));
+        return Ok(has_lost_root(at)?.then(|| smallvec![Guard::Root(RootEnd::Fold)]));
     }
     let &[j] = at.arrival.sliding else {
         return Ok(None);
     };
     let arrived = beyond_double_zero(at, j)?.is_some() || two_fold_here(at)?.is_some();
-    Ok(arrived.then(|| smallvec![EventFunction::ExitMinus, EventFunction::ExitPlus]))
+    Ok(arrived.then(|| Guard::ends(j).as_slice().into()))
 }
 
 /// Have the components normal to one of the surfaces slid on vanished in all fields, compared with a moment before?
@@ -51,50 +49,38 @@ fn has_lost_jump(at: &Point, notes: &mut Notes) -> Result<bool, FieldError> {
 /// Has sliding on several surfaces come to a fold of its multipliers?
 fn has_lost_root(at: &Point) -> Result<bool, FieldError> {
     let mut field = at.arrival.field.borrow_mut();
-    let fold = match &**field {
+    match &**field {
         ModeField::Intersection(field) if field.set().len() > 2 && field.is_rootless() => {
             return Ok(true)
         }
-        ModeField::Intersection(field) => 2 * field.set().len(),
+        ModeField::Intersection(_) => {}
         _ => return Ok(false),
-    };
+    }
     let exits = field.exits(at.t, &mut at.x.to_vec())?;
-    Ok(exits.get(fold).is_some_and(|exit| exit.abs() < AT_FOLD))
+    let mut ends = field.guards().into_iter().zip(exits);
+    Ok(ends.any(|(guard, exit)| guard == Guard::Root(RootEnd::Fold) && exit.abs() < AT_FOLD))
 }
 
 /// Is it the root of three and more surfaces that is no longer stable?
-pub(crate) fn loses_stability(field: &ModeField, functions: &[EventFunction]) -> bool {
+pub(crate) fn loses_stability(field: &ModeField, functions: &[Guard]) -> bool {
     let ModeField::Intersection(field) = field else {
         return false;
     };
-    let is_stability = |f: &EventFunction| match f {
-        EventFunction::Exit(index) => field.exit(*index) == IntersectionExit::Stability,
-        _ => false,
-    };
-    field.set().len() > 2 && functions.iter().any(is_stability)
+    field.set().len() > 2 && functions.contains(&Guard::Root(RootEnd::Stability))
 }
 
-/// How far multipliers may go beyond their ends, by exit function, after an event whose decision is that the motion slides on:
+/// How far multipliers may go beyond their ends, by guard, after an event whose decision is that the motion slides on:
 /// there forces balance to rounding. Ten times as far each time, so that the motion gets on.
-pub(crate) fn loosen(
-    field: &ModeField,
-    functions: &[EventFunction],
-    slacks: &mut Vec<(usize, f64)>,
-) {
-    let ModeField::Intersection(field) = field else {
+pub(crate) fn loosen(field: &ModeField, functions: &[Guard], slacks: &mut Vec<(Guard, f64)>) {
+    if !matches!(field, ModeField::Intersection(_)) {
         slacks.clear();
         return;
-    };
-    for function in functions {
-        let EventFunction::Exit(index) = *function else {
-            continue;
-        };
-        if !matches!(field.exit(index), IntersectionExit::Side { .. }) {
-            continue;
-        }
-        match slacks.iter_mut().find(|held| held.0 == index) {
+    }
+    let is_end = |guard: &&Guard| matches!(guard, Guard::Multiplier { .. });
+    for &guard in functions.iter().filter(is_end) {
+        match slacks.iter_mut().find(|held| held.0 == guard) {
             Some(held) => held.1 = (10.0 * held.1).min(AT_SIDE),
-            None => slacks.push((index, FIRST_SLACK)),
+            None => slacks.push((guard, FIRST_SLACK)),
         }
     }
 }

@@ -75,13 +75,6 @@ pub(crate) enum How {
     Limit,
 }
 
-impl How {
-    /// A start on surface `j` where a motion in this mode came from.
-    pub fn on_one_surface(mode: &Mode, j: usize) -> Self {
-        How::Start(SurfaceArrival::from_side(mode.entries()[j]))
-    }
-}
-
 impl Meeting<'_> {
     /// The full mode with these entries on the surfaces.
     pub fn on_all(&self, entries: &Mode) -> Mode {

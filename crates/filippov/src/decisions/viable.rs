@@ -8,7 +8,7 @@ use super::look_ahead::{try_mode, Trial};
 use super::point::{Cause, Left, Lefts, Notes, Point};
 use super::rule::Meeting;
 use crate::error::FieldError;
-use crate::event::EventFunction;
+use crate::field::{Guard, RootEnd};
 use crate::mode::Mode;
 use crate::switching::{
     first_nonzero, is_undetermined, stable_roots_with_border, Leading, NormalFields,
@@ -50,16 +50,26 @@ impl Viable {
 pub(super) struct Survey {
     pub viable: Vec<Viable>,
     /// The others, each with a guard that begins negative.
-    pub failing: Vec<(Mode, EventFunction)>,
+    pub failing: Vec<(Mode, Guard)>,
     /// Modes about which derivatives at the point do not decide, nor a trial.
     pub open: Vec<Mode>,
     /// Modes that would slide between fields that differ in the signs of these functions too.
     pub between: Vec<(Mode, Vec<usize>)>,
 }
 
+impl Survey {
+    /// The functions that jump on what could be slid on.
+    pub fn jumping(self) -> Vec<usize> {
+        let mut jumping: Vec<usize> = self.between.into_iter().flat_map(|(_, j)| j).collect();
+        jumping.sort_unstable();
+        jumping.dedup();
+        jumping
+    }
+}
+
 enum Verdict {
     Viable(Viable),
-    Fails(EventFunction),
+    Fails(Guard),
     Open,
 }
 
@@ -94,7 +104,7 @@ pub(super) fn survey(
         let (mode, vanishing) = match consistency(at, notes, meeting, &entries)? {
             Consistency::Agrees { mode, vanishing } => (mode, vanishing),
             Consistency::Contradicts(j) => {
-                let guard = EventFunction::Surface(j);
+                let guard = Guard::Surface(j);
                 found.failing.push((meeting.on_all(&entries), guard));
                 continue;
             }
@@ -145,7 +155,9 @@ pub(super) fn survey(
             Verdict::Fails(guard) => found.failing.push((mode, guard)),
             Verdict::Open => match try_mode(at, notes, &mode, meeting.surfaces)? {
                 Trial::Leaves(left) => found.viable.push(Viable::strictly(mode, left)),
-                Trial::Ends => found.failing.push((mode, guard_of(meeting, &entries))),
+                Trial::Ends => found
+                    .failing
+                    .push((mode, guard_of(meeting, fields, &entries))),
                 Trial::WithinRounding if touches => {}
                 Trial::WithinRounding => found.open.push(mode),
             },
@@ -230,7 +242,7 @@ fn of_region(at: &Point, candidate: &Candidate) -> Result<Verdict, FieldError> {
         let side = mode.entries()[j];
         let leading = match (g[i].abs() > noise[i], &series) {
             (true, _) if g[i] * f64::from(side) < 0.0 => {
-                return Ok(Verdict::Fails(EventFunction::Surface(j)));
+                return Ok(Verdict::Fails(Guard::Surface(j)));
             }
             (true, _) | (false, None) => {
                 let known = usize::from(g[i].abs() <= noise[i]);
@@ -250,7 +262,7 @@ fn of_region(at: &Point, candidate: &Candidate) -> Result<Verdict, FieldError> {
             viable.is_pressed |= is_pressed(fields, noise, &corner, i);
             viable.is_strict = false;
         } else if leading.sign() != side {
-            return Ok(Verdict::Fails(EventFunction::Surface(j)));
+            return Ok(Verdict::Fails(Guard::Surface(j)));
         }
         viable.left.push(Left::Surface(j, leading));
     }
@@ -273,7 +285,7 @@ fn of_sliding(at: &Point, notes: &mut Notes, candidate: &Candidate) -> Result<Ve
     if is_undetermined(&face) {
         return Ok(Verdict::Open);
     }
-    let mut verdict = Verdict::Fails(guard_of(meeting, entries));
+    let mut verdict = Verdict::Fails(guard_of(meeting, fields, entries));
     for lambda in stable_roots_with_border(&face, at.patience) {
         match at_root(at, candidate, &lambda)? {
             Verdict::Viable(viable) => return Ok(Verdict::Viable(viable)),
@@ -288,10 +300,17 @@ fn of_sliding(at: &Point, notes: &mut Notes, candidate: &Candidate) -> Result<Ve
     Ok(verdict)
 }
 
-/// The first surface slid on: a mode without a stable root does not last there.
-fn guard_of(meeting: &Meeting, entries: &Mode) -> EventFunction {
-    let place = entries.sliding_set().next().unwrap_or(0);
-    EventFunction::Surface(meeting.surfaces[place])
+/// The guard of a mode that slides and has no stable root: on one surface the end of the multiplier whose field points away.
+fn guard_of(meeting: &Meeting, fields: &NormalFields, entries: &Mode) -> Guard {
+    let Some(place) = entries.sliding() else {
+        return Guard::Root(RootEnd::Stability);
+    };
+    let on_side = |side| fields.in_region(entries.with(place, side).entries())[place];
+    let end = if on_side(-1) <= 0.0 { -1 } else { 1 };
+    Guard::Multiplier {
+        surface: meeting.surfaces[place],
+        end,
+    }
 }
 
 /// A motion with these multipliers and sides stays on surface i of the meeting. Does the field beyond the surface press it
@@ -338,6 +357,7 @@ fn of_blown_up(
 ) -> Result<Verdict, FieldError> {
     let Candidate {
         meeting,
+        fields,
         entries,
         mode,
         guarded,
@@ -362,7 +382,7 @@ fn of_blown_up(
             if value.abs() <= DOUBTFUL * largest {
                 is_open = true;
             } else if side * value < 0.0 {
-                failing = Some(EventFunction::Surface(j));
+                failing = Some(Guard::Surface(j));
             }
             let order = 1 + usize::from(is_silent[i]);
             left.push(Left::Surface(j, Leading { order, value }));
@@ -372,11 +392,9 @@ fn of_blown_up(
             (None, true) => verdict = Some(Verdict::Open),
             (None, false) => {
                 if entries.codimension() == 1 {
-                    for (function, value) in [EventFunction::ExitMinus, EventFunction::ExitPlus]
-                        .into_iter()
-                        .zip(beginning.components)
-                    {
-                        left.push(Left::Exit(function, Leading { order: 1, value }));
+                    let slid = entries.sliding_set().map(|i| meeting.surfaces[i]);
+                    for (guard, value) in slid.flat_map(Guard::ends).zip(beginning.components) {
+                        left.push(Left::Exit(guard, Leading { order: 1, value }));
                     }
                 }
                 return Ok(Verdict::Viable(Viable {
@@ -388,7 +406,7 @@ fn of_blown_up(
         }
     }
     // No way to begin is stable.
-    Ok(verdict.unwrap_or(Verdict::Fails(guard_of(meeting, entries))))
+    Ok(verdict.unwrap_or(Verdict::Fails(guard_of(meeting, fields, entries))))
 }
 
 fn at_root(at: &Point, candidate: &Candidate, lambda: &[f64]) -> Result<Verdict, FieldError> {
@@ -422,7 +440,7 @@ fn at_root(at: &Point, candidate: &Candidate, lambda: &[f64]) -> Result<Verdict,
         if g[i].abs() <= noise[i] {
             tangent.push(j);
         } else if side * g[i] < 0.0 {
-            return Ok(Verdict::Fails(EventFunction::Surface(j)));
+            return Ok(Verdict::Fails(Guard::Surface(j)));
         } else {
             left.push(Left::Surface(
                 j,
@@ -456,7 +474,7 @@ fn at_root(at: &Point, candidate: &Candidate, lambda: &[f64]) -> Result<Verdict,
             Germ::Begins(leading) if leading.sign() == side => {
                 viable.left.push(Left::Surface(j, leading))
             }
-            Germ::Begins(_) => return Ok(Verdict::Fails(EventFunction::Surface(j))),
+            Germ::Begins(_) => return Ok(Verdict::Fails(Guard::Surface(j))),
             Germ::Zero if is_neutral(fields, noise, entries.entries(), i) => {
                 viable.is_strict = false;
                 viable.left.push(Left::Surface(
@@ -469,17 +487,15 @@ fn at_root(at: &Point, candidate: &Candidate, lambda: &[f64]) -> Result<Verdict,
             }
             // It slides, with a multiplier at its end.
             Germ::Zero if is_pressed(fields, noise, &full, i) => {
-                return Ok(Verdict::Fails(EventFunction::Surface(j)));
+                return Ok(Verdict::Fails(Guard::Surface(j)));
             }
             Germ::Zero | Germ::Unknown => return Ok(Verdict::Open),
         }
     }
+    let slid = entries.sliding_set().map(|i| meeting.surfaces[i]);
+    let guards: Vec<Guard> = slid.flat_map(Guard::ends).collect();
     for index in ends {
-        let function = match (lambda.len(), index) {
-            (1, 0) => EventFunction::ExitMinus,
-            (1, _) => EventFunction::ExitPlus,
-            _ => EventFunction::Exit(index),
-        };
+        let function = guards[index];
         match series.of_exit(index) {
             Germ::Begins(leading) if leading.value > 0.0 => {
                 if leading.order > 0 {

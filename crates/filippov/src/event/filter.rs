@@ -62,12 +62,11 @@ pub fn may_vanish_bent(g0: f64, slope0: f64, g1: f64, slope1: f64, probes: &[(f6
     may_vanish(g0 - shift, slope0, g1 - shift, slope1)
 }
 
-/// May an exit function with these values at the stages of the step vanish inside of the step?
+/// May a function vanish inside of the step whose values at both ends and at the stages have this range?
 #[inline]
-pub fn may_vanish_between(stages: &[f64; 7]) -> bool {
-    let low = stages.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = stages.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let excluded = low > STAGE_SPREAD * (high - low) && stages.iter().all(|v| v.is_finite());
+pub fn may_vanish_between([least, most]: [f64; 2]) -> bool {
+    let spread = most - least;
+    let excluded = least > STAGE_SPREAD * spread && spread.is_finite();
     !excluded
 }
 

@@ -5,32 +5,18 @@ use filippov_expr::{Enclosure, Motion};
 use smallvec::SmallVec;
 
 use crate::error::FieldError;
+use crate::field::Guard;
 use crate::tolerances::TURNS_BACK;
 
-/// A function whose zeros end a piece of motion, or are reported.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EventFunction {
-    /// The switching function h_j.
-    Surface(usize),
-    /// The normal component of f- while sliding: positive until its zero.
-    ExitMinus,
-    /// Minus the normal component of f+ while sliding: positive until its zero.
-    ExitPlus,
-    /// An exit function of sliding on an intersection, by its index
-    /// ([`crate::field::IntersectionField::exit`]): positive until its zero.
-    Exit(usize),
-}
-
-impl EventFunction {
-    /// The index of an exit function among those of its motion.
-    pub fn exit_index(self) -> Option<usize> {
-        match self {
-            EventFunction::Surface(_) => None,
-            EventFunction::ExitMinus => Some(0),
-            EventFunction::ExitPlus => Some(1),
-            EventFunction::Exit(index) => Some(index),
-        }
-    }
+/// What the event stage says of a step.
+#[derive(Clone, Debug)]
+pub enum Event {
+    /// No guard vanishes in it.
+    None,
+    /// Here the first ones vanish.
+    At(Found),
+    /// A step as short as this is needed to tell.
+    Shorten(f64),
 }
 
 /// The earliest zero of a step.
@@ -39,9 +25,37 @@ pub struct Found {
     /// Where, in steps.
     pub theta: f64,
     /// What vanishes there.
-    pub functions: SmallVec<[EventFunction; 4]>,
-    /// The functions come within rounding of zero without a change of sign.
+    pub guards: SmallVec<[Guard; 2]>,
+    /// They come within rounding of zero without a change of sign.
     pub touch: bool,
+    /// Rounding blurs it: it may be a multiple one.
+    pub is_blurred: bool,
+    /// What is known of it if it is a multiple one.
+    pub multiple: Multiple,
+}
+
+/// A multiple zero.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Multiple {
+    /// How far below zero a function that touches may be there.
+    pub depth: f64,
+    /// Rounding of the function over the step.
+    pub blur: f64,
+    /// How many derivatives along f- and f+ vanish.
+    pub vanishing: [usize; 2],
+}
+
+impl Found {
+    /// Guards that vanish at the start of the step.
+    pub fn here(guards: SmallVec<[Guard; 2]>) -> Self {
+        Found {
+            theta: 0.0,
+            guards,
+            touch: false,
+            is_blurred: false,
+            multiple: Multiple::default(),
+        }
+    }
 }
 
 /// A zero at the start of the motion that is divided out: near `t` the function is
@@ -69,7 +83,9 @@ pub struct Deflation {
 #[derive(Clone, Copy, Debug)]
 pub struct Monitored {
     /// The function.
-    pub function: EventFunction,
+    pub guard: Guard,
+    /// Its place among the switching functions, or among the exit functions of the motion.
+    pub place: usize,
     /// +1 or -1: the sign of the function inside of the mode. All values below are times this.
     pub orientation: f64,
     /// Value at the start of the step.
@@ -89,10 +105,12 @@ pub struct Monitored {
 impl Monitored {
     /// The switching function that it is, if it is one.
     pub fn surface(&self) -> Option<usize> {
-        match self.function {
-            EventFunction::Surface(j) => Some(j),
-            _ => None,
-        }
+        self.guard.is_surface().then_some(self.place)
+    }
+
+    /// The exit function that it is, if it is one.
+    pub fn exit(&self) -> Option<usize> {
+        (!self.guard.is_surface()).then_some(self.place)
     }
 
     /// Predicted time to the next zero, from value, rate and curvature; infinite if none is ahead.
@@ -144,6 +162,51 @@ impl Monitored {
         } else {
             value / power
         }
+    }
+}
+
+/// What a step shows of an exit function: its values at both ends, and the range of those at the ends and the stages.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen {
+    /// At the start of the step.
+    pub start: f64,
+    /// At its end, once the step was attempted.
+    pub end: f64,
+    /// The least and the largest value; NaN if one of them is.
+    pub range: [f64; 2],
+}
+
+impl Seen {
+    /// This value at the start of a motion.
+    pub fn at_start(value: f64) -> Self {
+        Seen {
+            start: value,
+            end: value,
+            range: [value; 2],
+        }
+    }
+
+    /// A step is attempted.
+    pub fn begin(&mut self) {
+        self.range = [self.start; 2];
+    }
+
+    /// The value at a stage, last that at the end.
+    #[inline(always)]
+    pub fn see(&mut self, value: f64) {
+        let [least, most] = &mut self.range;
+        if value < *least || value.is_nan() {
+            *least = value;
+        }
+        if value > *most || value.is_nan() {
+            *most = value;
+        }
+        self.end = value;
+    }
+
+    /// The largest magnitude.
+    pub fn size(&self) -> f64 {
+        self.range[0].abs().max(self.range[1].abs())
     }
 }
 

@@ -16,7 +16,7 @@ pub mod proved;
 pub mod series;
 pub mod tube;
 
-pub use function::{Deflation, EventFunction, Found, Monitored, UserEvent, UserFunction};
+pub use function::{Deflation, Event, Found, Monitored, Multiple, Seen, UserEvent, UserFunction};
 
 #[cfg(test)]
 mod tests;

@@ -1,14 +1,16 @@
 //! The field of a mode, whatever its kind.
 
-use smallvec::{smallvec, SmallVec};
+use std::ops::{Deref, DerefMut};
 
-use super::{ContactField, IntersectionField, RegionField, SlidingField, SmoothField};
+use smallvec::SmallVec;
+
+use super::{ContactField, IntersectionField, Motion, RegionField, SlidingField, SmoothField};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::options::{Options, SlidingRule};
 use crate::system::PiecewiseSystem;
 
-/// The smooth field of a mode.
+/// The motion of a mode, whatever its kind.
 pub(crate) enum ModeField<'a> {
     Region(RegionField<'a>),
     Sliding(Box<SlidingField<'a>>),
@@ -48,9 +50,6 @@ impl Law<'_> {
 /// The surfaces slid on, in order.
 pub(crate) type SlidingSet = SmallVec<[usize; 4]>;
 
-/// Values of the exit functions of a motion: positive inside.
-pub(crate) type Exits = SmallVec<[f64; 6]>;
-
 impl<'a> ModeField<'a> {
     /// The field of a mode without contact.
     pub fn of(system: &'a dyn PiecewiseSystem, law: Law<'a>, mode: &Mode) -> Self {
@@ -78,75 +77,6 @@ impl<'a> ModeField<'a> {
         }
     }
 
-    /// Number of functions that end sliding.
-    pub fn n_exits(&self) -> usize {
-        match self {
-            ModeField::Region(_) => 0,
-            ModeField::Sliding(_) => 2,
-            ModeField::Intersection(field) => field.n_exits(),
-            ModeField::Contact(field) => field.n_exits(),
-        }
-    }
-
-    /// The exit functions at the last evaluation.
-    pub fn last_exits(&self) -> Exits {
-        match self {
-            ModeField::Region(_) => Exits::new(),
-            ModeField::Sliding(field) => field.last().exits(),
-            ModeField::Intersection(field) => Exits::from_slice(field.exits()),
-            ModeField::Contact(field) => field.exits().collect(),
-        }
-    }
-
-    /// The exit functions at (t, x), after projection.
-    pub fn exits(&mut self, t: f64, x: &mut [f64]) -> Result<Exits, FieldError> {
-        match self {
-            ModeField::Region(_) => {}
-            ModeField::Sliding(field) => {
-                field.normal_components(t, x)?;
-            }
-            ModeField::Intersection(_) | ModeField::Contact(_) => {
-                self.eval(t, x, &mut vec![0.0; x.len()])?;
-            }
-        }
-        Ok(self.last_exits())
-    }
-
-    /// The exit functions at a point (t, x) of the surfaces slid on.
-    pub fn exits_at(&mut self, t: f64, x: &mut [f64]) -> Result<Exits, FieldError> {
-        match self {
-            ModeField::Region(_) => {}
-            ModeField::Sliding(field) => {
-                field.normal_components_at(t, x)?;
-            }
-            ModeField::Intersection(_) | ModeField::Contact(_) => {
-                self.eval_unprojected(t, x, &mut vec![0.0; x.len()])?;
-            }
-        }
-        Ok(self.last_exits())
-    }
-
-    /// The multipliers at the last evaluation, in the order of the surfaces slid on.
-    #[inline]
-    pub fn multipliers(&self) -> SmallVec<[f64; 2]> {
-        match self {
-            ModeField::Region(_) => SmallVec::new(),
-            ModeField::Sliding(field) => smallvec![field.multiplier()],
-            ModeField::Intersection(field) => SmallVec::from_slice(field.multipliers()),
-            ModeField::Contact(field) => field.lambdas().into(),
-        }
-    }
-
-    /// Moves `x` onto the surfaces slid on.
-    pub fn project(&mut self, t: f64, x: &mut [f64]) -> Result<(), FieldError> {
-        match self {
-            ModeField::Region(_) => Ok(()),
-            ModeField::Sliding(field) => field.project(t, x),
-            ModeField::Intersection(field) => field.project(t, x),
-            ModeField::Contact(field) => field.project(t, x),
-        }
-    }
-
     /// Becomes the field of another mode of its kind; `false` if it is of another kind.
     pub(crate) fn restart(&mut self, sliding: &[usize], signs: &[f64]) -> bool {
         match (self, sliding) {
@@ -158,14 +88,35 @@ impl<'a> ModeField<'a> {
     }
 }
 
+impl<'a> Deref for ModeField<'a> {
+    type Target = dyn Motion + 'a;
+
+    #[inline]
+    fn deref(&self) -> &Self::Target {
+        match self {
+            ModeField::Region(field) => field,
+            ModeField::Sliding(field) => &**field,
+            ModeField::Intersection(field) => &**field,
+            ModeField::Contact(field) => &**field,
+        }
+    }
+}
+
+impl DerefMut for ModeField<'_> {
+    #[inline]
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        match self {
+            ModeField::Region(field) => field,
+            ModeField::Sliding(field) => &mut **field,
+            ModeField::Intersection(field) => &mut **field,
+            ModeField::Contact(field) => &mut **field,
+        }
+    }
+}
+
 impl SmoothField for ModeField<'_> {
     fn eval(&mut self, t: f64, x: &mut [f64], dx: &mut [f64]) -> Result<(), FieldError> {
-        match self {
-            ModeField::Region(field) => field.eval(t, x, dx),
-            ModeField::Sliding(field) => field.eval(t, x, dx),
-            ModeField::Intersection(field) => field.eval(t, x, dx),
-            ModeField::Contact(field) => field.eval(t, x, dx),
-        }
+        (**self).eval(t, x, dx)
     }
 
     fn eval_unprojected(
@@ -174,20 +125,10 @@ impl SmoothField for ModeField<'_> {
         x: &mut [f64],
         dx: &mut [f64],
     ) -> Result<(), FieldError> {
-        match self {
-            ModeField::Region(field) => field.eval(t, x, dx),
-            ModeField::Sliding(field) => field.eval_unprojected(t, x, dx),
-            ModeField::Intersection(field) => field.eval_unprojected(t, x, dx),
-            ModeField::Contact(field) => field.eval(t, x, dx),
-        }
+        (**self).eval_unprojected(t, x, dx)
     }
 
     fn n_evaluations(&self) -> u64 {
-        match self {
-            ModeField::Region(field) => field.n_evaluations(),
-            ModeField::Sliding(field) => field.n_evaluations(),
-            ModeField::Intersection(field) => field.n_evaluations(),
-            ModeField::Contact(field) => field.n_evaluations(),
-        }
+        (**self).n_evaluations()
     }
 }

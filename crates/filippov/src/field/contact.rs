@@ -1,6 +1,9 @@
 //! The field of a body in contact: h = 0 and h' = 0 at unilateral constraints, with sliding on other surfaces.
 
-use super::{eval_on_side, SmoothField};
+use smallvec::SmallVec;
+
+use super::guard::Guards;
+use super::{eval_on_side, Guard, Motion, SmoothField};
 use crate::action::Actions;
 use crate::error::FieldError;
 use crate::mode::{Mode, Signs};
@@ -33,6 +36,8 @@ pub struct ContactField<'a> {
     noise: Vec<f64>,
     /// Ratio of static to kinetic friction at the surfaces slid on, at the last evaluation.
     ratios: Vec<f64>,
+    /// nu of each contact, then r + lambda and r - lambda of each surface slid on, at the last evaluation.
+    exits: Vec<f64>,
 }
 
 impl<'a> ContactField<'a> {
@@ -68,6 +73,7 @@ impl<'a> ContactField<'a> {
             multipliers: Vec::new(),
             noise: Vec::new(),
             ratios: Vec::new(),
+            exits: Vec::new(),
         })
     }
 
@@ -76,76 +82,10 @@ impl<'a> ContactField<'a> {
         self.contacts.iter().map(|(j, _)| *j)
     }
 
-    /// The surfaces slid on.
-    pub fn sliding(&self) -> &[usize] {
-        &self.sliding
-    }
-
-    /// Number of exit functions.
-    pub fn n_exits(&self) -> usize {
-        self.contacts.len() + 2 * self.sliding.len()
-    }
-
-    /// The exit functions of the last evaluation, positive inside: nu of each contact, then r + lambda and
-    /// r - lambda of each surface slid on.
-    pub fn exits(&self) -> impl Iterator<Item = f64> + '_ {
-        let (nu, mu) = self.multipliers.split_at(self.contacts.len());
-        let lambdas = mu.iter().map(|mu| 2.0 * mu - 1.0);
-        let sides = lambdas.zip(&self.ratios).flat_map(|(l, r)| [r + l, r - l]);
-        nu.iter().copied().chain(sides)
-    }
-
     /// Does every contact push, clearly?
     pub fn presses(&self) -> bool {
         let mut forces = self.multipliers.iter().zip(&self.noise);
         forces.all(|(nu, noise)| nu > noise)
-    }
-
-    /// lambda / r of each surface slid on, NaN for those in contact, in the order of the surfaces.
-    pub fn lambdas(&self) -> Vec<f64> {
-        let mut all: Vec<(usize, f64)> = self.contacts().map(|j| (j, f64::NAN)).collect();
-        let mu = self.multipliers[self.contacts.len()..].iter();
-        let lambdas = mu.zip(&self.ratios).map(|(mu, r)| (2.0 * mu - 1.0) / r);
-        all.extend(self.sliding.iter().copied().zip(lambdas));
-        all.sort_by_key(|(j, _)| *j);
-        all.into_iter().map(|(_, lambda)| lambda).collect()
-    }
-
-    /// Moves `x` onto all surfaces, by their gradients, and the velocities of the contacts to zero, along their
-    /// impulses.
-    ///
-    /// # Errors
-    /// If a function of the user raises.
-    pub fn project(&mut self, t: f64, x: &mut [f64]) -> Result<(), FieldError> {
-        let set: Vec<usize> = self
-            .contacts()
-            .chain(self.sliding.iter().copied())
-            .collect();
-        let mut projector = super::Projector::new(x.len(), self.system.n_surfaces());
-        projector.project_onto(self.system, &set, t, x, &self.signs)?;
-        let n = x.len();
-        for _ in 0..2 {
-            let (mut rows, mut rates) = (Vec::new(), Vec::new());
-            let mut is_still = true;
-            for &(j, _) in &self.contacts {
-                let mut row = vec![0.0; n];
-                let rate = self.system.rate_gradient(j, t, x, &self.signs, &mut row)?;
-                is_still &= rate.rate.abs() <= SURFACE_NOISE * rate.magnitude;
-                rates.push(rate.rate);
-                rows.push(row);
-            }
-            if is_still {
-                break;
-            }
-            let impulses = self.impulses(t, x, &rows)?;
-            let Some(shifts) = gram(&rows, &impulses).solve(&rates) else {
-                break;
-            };
-            for (impulse, shift) in impulses.iter().zip(shifts) {
-                x.iter_mut().zip(impulse).for_each(|(x, w)| *x -= shift * w);
-            }
-        }
-        Ok(())
     }
 
     /// The directions W, in units of the acceleration that they give on the free side; NaN where the map has no
@@ -202,6 +142,62 @@ fn gram(rows: &[Vec<f64>], directions: &[Vec<f64>]) -> Matrix {
     matrix
 }
 
+impl Motion for ContactField<'_> {
+    /// The forces of the contacts, then the ends of the multipliers.
+    fn guards(&self) -> Guards {
+        let ends = self.sliding.iter().flat_map(|&j| Guard::ends(j));
+        self.contacts().map(Guard::Force).chain(ends).collect()
+    }
+
+    fn last_exits(&self) -> &[f64] {
+        &self.exits
+    }
+
+    /// lambda / r of each surface slid on, NaN for those in contact, in the order of the surfaces.
+    fn multipliers(&self) -> SmallVec<[f64; 2]> {
+        let mut all: Vec<(usize, f64)> = self.contacts().map(|j| (j, f64::NAN)).collect();
+        let mu = self.multipliers[self.contacts.len()..].iter();
+        let lambdas = mu.zip(&self.ratios).map(|(mu, r)| (2.0 * mu - 1.0) / r);
+        all.extend(self.sliding.iter().copied().zip(lambdas));
+        all.sort_by_key(|(j, _)| *j);
+        all.into_iter().map(|(_, lambda)| lambda).collect()
+    }
+
+    /// Moves `x` onto all surfaces, by their gradients, and the velocities of the contacts to zero, along their
+    /// impulses.
+    fn project(&mut self, t: f64, x: &mut [f64]) -> Result<(), FieldError> {
+        let set: Vec<usize> = self
+            .contacts()
+            .chain(self.sliding.iter().copied())
+            .collect();
+        let mut projector = super::Projector::new(x.len(), self.system.n_surfaces());
+        projector.project_onto(self.system, &set, t, x, &self.signs)?;
+        let n = x.len();
+        for _ in 0..2 {
+            let (mut rows, mut rates) = (Vec::new(), Vec::new());
+            let mut is_still = true;
+            for &(j, _) in &self.contacts {
+                let mut row = vec![0.0; n];
+                let rate = self.system.rate_gradient(j, t, x, &self.signs, &mut row)?;
+                is_still &= rate.rate.abs() <= SURFACE_NOISE * rate.magnitude;
+                rates.push(rate.rate);
+                rows.push(row);
+            }
+            if is_still {
+                break;
+            }
+            let impulses = self.impulses(t, x, &rows)?;
+            let Some(shifts) = gram(&rows, &impulses).solve(&rates) else {
+                break;
+            };
+            for (impulse, shift) in impulses.iter().zip(shifts) {
+                x.iter_mut().zip(impulse).for_each(|(x, w)| *x -= shift * w);
+            }
+        }
+        Ok(())
+    }
+}
+
 impl SmoothField for ContactField<'_> {
     fn eval(&mut self, t: f64, x: &mut [f64], dx: &mut [f64]) -> Result<(), FieldError> {
         self.project(t, x)?;
@@ -234,6 +230,11 @@ impl SmoothField for ContactField<'_> {
             Some(found) => found.into_vec(),
             None => vec![f64::NAN; rows.len()],
         };
+        let (nu, mu) = self.multipliers.split_at(self.contacts.len());
+        let lambdas = mu.iter().map(|mu| 2.0 * mu - 1.0);
+        let sides = lambdas.zip(&self.ratios).flat_map(|(l, r)| [r + l, r - l]);
+        self.exits.clear();
+        self.exits.extend(nu.iter().copied().chain(sides));
         dx.copy_from_slice(&base);
         for (multiplier, direction) in self.multipliers.iter().zip(&directions) {
             dx.iter_mut()

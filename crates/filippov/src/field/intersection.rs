@@ -1,7 +1,12 @@
 //! The sliding field on an intersection of surfaces.
 
+use smallvec::SmallVec;
+
+use super::guard::Guards;
 use super::weights::RuleFailure;
-use super::{AffineLaw, Canopy, MeetingFields, Projector, RuleLaw, SmoothField};
+use super::{
+    AffineLaw, Canopy, Guard, MeetingFields, Motion, Projector, RootEnd, RuleLaw, SmoothField,
+};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::options::SlidingRule;
@@ -9,39 +14,6 @@ use crate::sparse::SparseRows;
 use crate::switching::Patience;
 use crate::system::PiecewiseSystem;
 use crate::tolerances::{MOST_MEETING, MOST_TRACKED};
-
-/// What ends sliding on an intersection of m surfaces: functions that are positive until then.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum IntersectionExit {
-    /// A multiplier reaches -1 or +1: 1 + lambda_i and 1 - lambda_i, i counted within the set. For a rule other
-    /// than the canopy: a motion on that side of surface i begins to leave the intersection.
-    Side {
-        /// Which multiplier.
-        position: usize,
-        /// The end, -1 or +1.
-        end: i8,
-    },
-    /// Two roots meet: (-1)^m det G, for two surfaces the discriminant. For a rule other than the canopy: a
-    /// premise of the rule fails.
-    Fold,
-    /// No scaling of the surfaces makes the root stable any longer: -min(G11, G22). For more than two surfaces, it is
-    /// not stable for the given scaling: the last Hurwitz determinant. For a rule other than the canopy: the fields begin to wind outwards.
-    Stability,
-}
-
-impl IntersectionExit {
-    /// Exit function `index` of sliding on m surfaces.
-    pub fn of(index: usize, m: usize) -> Self {
-        match index {
-            _ if index < 2 * m => IntersectionExit::Side {
-                position: index / 2,
-                end: if index.is_multiple_of(2) { -1 } else { 1 },
-            },
-            _ if index == 2 * m => IntersectionExit::Fold,
-            _ => IntersectionExit::Stability,
-        }
-    }
-}
 
 /// Filippov's field on an intersection of m >= 2 surfaces: the multilinear combination ("canopy") of the
 /// fields around it with the multipliers lambda in [-1, 1]^m that make it tangent to all surfaces,
@@ -186,9 +158,12 @@ impl<'a> IntersectionField<'a> {
         self.start = self.tracked.first().map(|(_, lambda)| (t, lambda.clone()));
     }
 
-    /// Lets the multiplier of an exit function go beyond its end by this much.
-    pub fn set_slack(&mut self, index: usize, slack: f64) {
-        self.slack[index] = slack;
+    /// Lets the multiplier of a guard go beyond its end by this much.
+    pub fn set_slack(&mut self, guard: Guard, slack: f64) {
+        let place = self.guards().iter().position(|own| *own == guard);
+        if let Some(own) = place.and_then(|place| self.slack.get_mut(place)) {
+            *own = slack;
+        }
     }
 
     /// Do redundant contacts share their load at the last evaluation? The equations then do not determine the multipliers.
@@ -256,49 +231,9 @@ impl<'a> IntersectionField<'a> {
         &self.set
     }
 
-    /// Number of functions that end the motion.
-    pub fn n_exits(&self) -> usize {
-        self.exits.len()
-    }
-
-    /// What exit function `index` is.
-    pub fn exit(&self, index: usize) -> IntersectionExit {
-        IntersectionExit::of(index, self.set().len())
-    }
-
-    /// The multipliers at the last evaluation, in the order of the set; none if there is no root.
-    pub fn multipliers(&self) -> &[f64] {
-        &self.lambda
-    }
-
     /// Were all fields there at the last evaluation, but no multipliers?
     pub fn is_rootless(&self) -> bool {
         self.is_rootless
-    }
-
-    /// The exit functions at the last evaluation.
-    pub fn exits(&self) -> &[f64] {
-        &self.exits
-    }
-
-    /// Moves `x` onto the intersection, if the motion is projected.
-    ///
-    /// # Errors
-    /// If a function of the user raises.
-    pub fn project(&mut self, t: f64, x: &mut [f64]) -> Result<(), FieldError> {
-        if self.restoring.is_some() {
-            return Ok(());
-        }
-        match &mut self.affine {
-            Some(law)
-                if self.set.len() > MOST_MEETING || law.is_shared() || law.projects_at_once() =>
-            {
-                law.project(t, x, &self.signs)
-            }
-            _ => self
-                .projector
-                .project_onto(self.system, &self.set, t, x, &self.signs),
-        }
     }
 
     /// Evaluates multipliers and exit functions at (t, x) and writes the field. Where there is no root they are NaN.
@@ -388,6 +323,39 @@ fn by_distance(tracked: &[(f64, Vec<f64>)], t: f64) -> Vec<&[f64]> {
     let mut all: Vec<&(f64, Vec<f64>)> = tracked.iter().rev().collect();
     all.sort_by(|a, b| (a.0 - t).abs().total_cmp(&(b.0 - t).abs()));
     all.into_iter().map(|found| &found.1[..]).collect()
+}
+
+impl Motion for IntersectionField<'_> {
+    /// The ends of the multipliers, then those of the root.
+    fn guards(&self) -> Guards {
+        let ends = self.set.iter().flat_map(|&j| Guard::ends(j));
+        ends.chain([RootEnd::Fold, RootEnd::Stability].map(Guard::Root))
+            .collect()
+    }
+
+    fn last_exits(&self) -> &[f64] {
+        &self.exits
+    }
+
+    fn multipliers(&self) -> SmallVec<[f64; 2]> {
+        SmallVec::from_slice(&self.lambda)
+    }
+
+    fn project(&mut self, t: f64, x: &mut [f64]) -> Result<(), FieldError> {
+        if self.restoring.is_some() {
+            return Ok(());
+        }
+        match &mut self.affine {
+            Some(law)
+                if self.set.len() > MOST_MEETING || law.is_shared() || law.projects_at_once() =>
+            {
+                law.project(t, x, &self.signs)
+            }
+            _ => self
+                .projector
+                .project_onto(self.system, &self.set, t, x, &self.signs),
+        }
+    }
 }
 
 impl SmoothField for IntersectionField<'_> {

@@ -2,7 +2,7 @@
 
 use smallvec::SmallVec;
 
-use super::SmoothField;
+use super::{Motion, SmoothField};
 use crate::error::FieldError;
 use crate::mode::Signs;
 use crate::system::PiecewiseSystem;
@@ -70,6 +70,8 @@ impl SmoothField for RegionField<'_> {
         self.n_evaluations
     }
 }
+
+impl Motion for RegionField<'_> {}
 
 /// Moves a point that lies on surfaces up to rounding into the region of `signs`: off every surface
 /// that is nearer than the distance `offset`, or up to `reach` on the wrong side.

@@ -2,7 +2,9 @@
 
 use smallvec::{smallvec, SmallVec};
 
-use super::{Projector, SmoothField};
+use super::guard::Guards;
+use super::motion::Exits;
+use super::{Guard, Motion, Projector, SmoothField};
 use crate::error::FieldError;
 use crate::mode::Signs;
 use crate::system::{BothSides, PiecewiseSystem};
@@ -25,11 +27,6 @@ impl NormalComponents {
         } else {
             self.minus / (self.minus - self.plus)
         }
-    }
-
-    /// The exit functions: positive until sliding ends.
-    pub fn exits(&self) -> SmallVec<[f64; 6]> {
-        smallvec![self.minus, -self.plus]
     }
 
     /// The multiplier lambda in [-1, 1]: +1 is the field of the side h > 0,
@@ -55,7 +52,8 @@ pub struct SlidingField<'a> {
     /// The factor of the term that draws the motion back, in place of the projection.
     restoring: Option<f64>,
     n_evaluations: u64,
-    last: NormalComponents,
+    /// The guards at the last evaluation: a- and -a+.
+    exits: [f64; 2],
     last_time: f64,
     /// The time at which sliding starts at a two-fold, and the share of f+ there.
     two_fold: Option<(f64, f64)>,
@@ -72,10 +70,7 @@ impl<'a> SlidingField<'a> {
             projector: Projector::new(system.n_states(), system.n_surfaces()),
             restoring: None,
             n_evaluations: 0,
-            last: NormalComponents {
-                minus: f64::NAN,
-                plus: f64::NAN,
-            },
+            exits: [f64::NAN; 2],
             last_time: f64::NAN,
             two_fold: None,
         }
@@ -117,7 +112,7 @@ impl<'a> SlidingField<'a> {
 
     /// The multiplier of the last evaluation.
     pub fn multiplier(&self) -> f64 {
-        2.0 * self.weight_plus(self.last_time, self.last) - 1.0
+        2.0 * self.weight_plus(self.last_time, self.last()) - 1.0
     }
 
     /// The surface slid on.
@@ -127,19 +122,10 @@ impl<'a> SlidingField<'a> {
 
     /// Normal components of the last evaluation.
     pub fn last(&self) -> NormalComponents {
-        self.last
-    }
-
-    /// Moves `x` onto the surface, if the motion is projected.
-    ///
-    /// # Errors
-    /// If a function of the user raises.
-    pub fn project(&mut self, t: f64, x: &mut [f64]) -> Result<(), FieldError> {
-        if self.restoring.is_some() {
-            return Ok(());
+        NormalComponents {
+            minus: self.exits[0],
+            plus: -self.exits[1],
         }
-        self.projector
-            .project(self.system, self.surface, t, x, &self.signs)
     }
 
     /// The normal components at (t, x), after projection.
@@ -168,12 +154,42 @@ impl<'a> SlidingField<'a> {
         self.n_evaluations += self
             .system
             .both_sides(self.surface, t, x, &self.signs, sides)?;
-        self.last = NormalComponents {
-            minus: sides.normal_minus,
-            plus: sides.normal_plus,
-        };
+        self.exits = [sides.normal_minus, -sides.normal_plus];
         self.last_time = t;
-        Ok(self.last)
+        Ok(self.last())
+    }
+}
+
+impl Motion for SlidingField<'_> {
+    fn guards(&self) -> Guards {
+        Guards::from_slice(&Guard::ends(self.surface))
+    }
+
+    #[inline]
+    fn last_exits(&self) -> &[f64] {
+        &self.exits
+    }
+
+    fn exits(&mut self, t: f64, x: &mut [f64]) -> Result<Exits, FieldError> {
+        self.normal_components(t, x)?;
+        Ok(self.exits.as_slice().into())
+    }
+
+    fn exits_at(&mut self, t: f64, x: &mut [f64]) -> Result<Exits, FieldError> {
+        self.normal_components_at(t, x)?;
+        Ok(self.exits.as_slice().into())
+    }
+
+    fn multipliers(&self) -> SmallVec<[f64; 2]> {
+        smallvec![self.multiplier()]
+    }
+
+    fn project(&mut self, t: f64, x: &mut [f64]) -> Result<(), FieldError> {
+        if self.restoring.is_some() {
+            return Ok(());
+        }
+        self.projector
+            .project(self.system, self.surface, t, x, &self.signs)
     }
 }
 

@@ -9,8 +9,7 @@ use crate::decisions::{
     decide, sides, Arrival, Cause, Decision, Notes, Point, Policy, Reached, Sides, RULES,
 };
 use crate::error::FieldError;
-use crate::event::EventFunction;
-use crate::field::{eval_on_side, Law, MeetingFields, ModeField, SmoothField};
+use crate::field::{eval_on_side, Guard, Law, MeetingFields, ModeField, SmoothField};
 use crate::mode::Mode;
 use crate::options::{NonUnique, Options};
 use crate::status::Stop;
@@ -312,30 +311,23 @@ fn vanishing_functions(
     mode: &Mode,
     field: &mut ModeField,
     residuals: &[f64],
-) -> Result<SmallVec<[EventFunction; 4]>, FieldError> {
+) -> Result<SmallVec<[Guard; 4]>, FieldError> {
     let signs = mode.signs();
     let mut h = vec![0.0; signs.len()];
     system.surfaces(t, x, &signs, &mut h)?;
     let mut found = SmallVec::new();
     for (j, residual) in residuals.iter().enumerate() {
         if mode.entries()[j] != 0 && h[j].abs() <= 2.0 * residual {
-            found.push(EventFunction::Surface(j));
+            found.push(Guard::Surface(j));
         }
     }
     let exits = field.exits(t, &mut x.to_vec())?;
     let size = exits
         .iter()
         .fold(0.0_f64, |size, exit| size.max(exit.abs()));
-    let is_one = mode.codimension() == 1;
-    for (index, exit) in exits.iter().enumerate() {
-        if exit.abs() <= AT_SIDE * size {
-            found.push(match (is_one, index) {
-                (true, 0) => EventFunction::ExitMinus,
-                (true, _) => EventFunction::ExitPlus,
-                _ => EventFunction::Exit(index),
-            });
-        }
-    }
+    let ends = field.guards().into_iter().zip(&exits);
+    let vanishing = ends.filter(|(_, exit)| exit.abs() <= AT_SIDE * size);
+    found.extend(vanishing.map(|(guard, _)| guard));
     Ok(found)
 }
 
@@ -366,9 +358,6 @@ fn describe(
         Ok(next) => next,
         Err(stop) => {
             found.reason = reason_of(&stop);
-            if let Stop::Intersection { candidates, .. } = stop {
-                found.candidates = candidates;
-            }
             return Ok(found);
         }
     };

@@ -1,7 +1,7 @@
 //! The field of sliding on an intersection at a point.
 
 use crate::error::FieldError;
-use crate::field::{IntersectionField, SmoothField};
+use crate::field::{IntersectionField, Motion, SmoothField};
 use crate::mode::Mode;
 use crate::system::PiecewiseSystem;
 

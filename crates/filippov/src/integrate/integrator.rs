@@ -18,9 +18,8 @@ use super::Stats;
 use crate::action::Actions;
 use crate::decisions::{root_ends, Cause};
 use crate::error::{Error, FieldError};
-use crate::event::{Found, UserEvent};
-use crate::field::ModeField;
-use crate::field::SmoothField;
+use crate::event::{Event, Found, Seen, UserEvent};
+use crate::field::{Guard, ModeField, SlidingField, SmoothField};
 use crate::integrate::actions::timetable::Timetable;
 use crate::integrate::detection::detector::Detector;
 use crate::integrate::detection::user_functions::UserEvents;
@@ -93,8 +92,8 @@ pub struct Integrator<'a> {
     pub(super) last_switch: (f64, u32),
     /// How long a step the series allows that was taken at the start of the motion, until the step.
     pub(super) series_reach: Option<f64>,
-    /// Exit functions of this mode whose multipliers were held at their ends, with what they may go beyond.
-    pub(super) slacks: Vec<(usize, f64)>,
+    /// Guards of this mode whose multipliers were held at their ends, with what they may go beyond.
+    pub(super) slacks: Vec<(Guard, f64)>,
     pub(super) watch: Watch<'a>,
 }
 
@@ -242,14 +241,10 @@ impl<'a> Integrator<'a> {
         let shortest = (SHORTEST_STEP * self.t.abs()).max(SHORTEST_STEP_AT_ZERO);
         if dt < shortest && dt < remaining {
             let lost = self.ask(Cause::Start, root_ends::lost_functions)?;
-            if let Some(functions) = lost {
+            if let Some(lost) = lost {
                 self.dt = f64::NAN;
                 self.one_sided = false;
-                return self.switch(&Found {
-                    theta: 0.0,
-                    functions,
-                    touch: false,
-                });
+                return self.switch(&Found::here(lost));
             }
             if !self.one_sided {
                 return Ok(Some(Stop::StepTooSmall));
@@ -288,6 +283,7 @@ impl<'a> Integrator<'a> {
     }
 
     fn attempt(&mut self, dt: f64) -> Result<Attempt, FieldError> {
+        self.detector.seen.iter_mut().for_each(Seen::begin);
         match self.stepper.in_use() {
             StepMethod::Taylor => self.attempt_series(dt),
             StepMethod::Rodas5p => self.attempt_implicit(dt),
@@ -299,36 +295,18 @@ impl<'a> Integrator<'a> {
 
     pub(super) fn attempt_explicit(&mut self, dt: f64) -> Result<Attempt, FieldError> {
         let (t, x, scale) = (self.t, &self.x, &self.scale);
-        let stepper = &mut self.stepper.dopri5;
+        let (stepper, seen) = (&mut self.stepper.dopri5, &mut self.detector.seen);
         match &mut self.motion.field {
-            ModeField::Region(field) => stepper.attempt(field, |_, _| {}, t, x, dt, scale),
+            ModeField::Region(field) => stepper.attempt(field, |_| {}, t, x, dt, scale),
             ModeField::Sliding(field) => {
-                let stages = &mut self.detector.stages;
-                let observe = |stage: usize, field: &crate::field::SlidingField| {
+                let observe = |field: &SlidingField| {
                     let a = field.last();
-                    stages[0][stage] = a.minus;
-                    stages[1][stage] = -a.plus;
+                    seen[0].see(a.minus);
+                    seen[1].see(-a.plus);
                 };
                 stepper.attempt(&mut **field, observe, t, x, dt, scale)
             }
-            ModeField::Intersection(field) => {
-                let stages = &mut self.detector.stages;
-                let observe = |stage: usize, field: &crate::field::IntersectionField| {
-                    for (exit, value) in stages.iter_mut().zip(field.exits()) {
-                        exit[stage] = *value;
-                    }
-                };
-                stepper.attempt(&mut **field, observe, t, x, dt, scale)
-            }
-            ModeField::Contact(field) => {
-                let stages = &mut self.detector.stages;
-                let observe = |stage: usize, field: &crate::field::ContactField| {
-                    for (exit, value) in stages.iter_mut().zip(field.exits()) {
-                        exit[stage] = value;
-                    }
-                };
-                stepper.attempt(&mut **field, observe, t, x, dt, scale)
-            }
+            field => stepper.attempt(field, self.detector.observer(), t, x, dt, scale),
         }
     }
 
@@ -336,13 +314,7 @@ impl<'a> Integrator<'a> {
         let Some(dop853) = &mut self.stepper.dop853 else {
             return Ok(Attempt::NotFinite);
         };
-        let stages = &mut self.detector.stages;
-        let observe = |stage: usize, field: &ModeField| {
-            for (exit, value) in stages.iter_mut().zip(field.last_exits()) {
-                exit[stage] = value;
-            }
-        };
-        let field = &mut self.motion.field;
+        let (field, observe) = (&mut self.motion.field, self.detector.observer());
         dop853.attempt(field, observe, self.t, &self.x, dt, &self.scale)
     }
 
@@ -354,22 +326,16 @@ impl<'a> Integrator<'a> {
         } else {
             self.t + dt
         };
-        let mut found = self.detect(t1, dt)?;
-        if self.detector.uncertain {
-            self.count_rejection(sliding);
-            self.halve_step(dt);
-            return Ok(None);
-        }
-        if let Some(event) = found.as_mut().filter(|event| self.may_be_multiple(event)) {
-            if !self.resolve_multiple_zero(event, dt)? {
-                found = None;
-            }
-            if self.detector.uncertain {
+        let (event, longest) = self.first_event(t1, dt)?;
+        let found = match event {
+            Event::None => None,
+            Event::At(found) => Some(found),
+            Event::Shorten(dt) => {
                 self.count_rejection(sliding);
-                self.halve_step(dt);
+                self.shorten_step(dt);
                 return Ok(None);
             }
-        }
+        };
         if sliding && self.system.has_nested_signs() {
             let (mut end, mut t) = (self.stepper.end().to_vec(), t1);
             if let Some(event) = &found {
@@ -381,7 +347,7 @@ impl<'a> Integrator<'a> {
                     return Ok(Some(stop));
                 }
                 self.count_rejection(sliding);
-                self.halve_step(dt);
+                self.shorten_step(0.5 * dt);
                 return Ok(None);
             }
         }
@@ -389,7 +355,7 @@ impl<'a> Integrator<'a> {
         let is_implicit = self.stepper.in_use() == StepMethod::Rodas5p;
         let crosses = found
             .as_ref()
-            .is_some_and(|event| !event.touch && !self.detector.blurred);
+            .is_some_and(|event| !event.touch && !event.is_blurred);
         if is_implicit && crosses && self.aims_again(theta, dt) {
             return Ok(None);
         }
@@ -404,7 +370,7 @@ impl<'a> Integrator<'a> {
         let t_stop = if is_last { last } else { t_stop };
         let Some(zeros) = self.find_user_zeros(theta, t_stop)? else {
             self.count_rejection(sliding);
-            self.halve_step(dt);
+            self.shorten_step(0.5 * dt);
             return Ok(None);
         };
         self.n_aims = 0;
@@ -428,11 +394,8 @@ impl<'a> Integrator<'a> {
         if let Some(stop) = self.record_user_zeros(zeros, theta, t_stop)? {
             return Ok(Some(stop));
         }
-        if self.detector.unresolved {
-            self.dt = self.dt.min(dt);
-        }
-        self.one_sided = self.detector.next_dt.is_some();
-        self.dt = self.dt.min(self.detector.next_dt.unwrap_or(f64::INFINITY));
+        self.one_sided = longest < dt;
+        self.dt = self.dt.min(longest);
         if self.recorder.keeps_dense() {
             self.stepper.extend_order4(&self.x);
         }

@@ -5,7 +5,7 @@ use smallvec::{smallvec, SmallVec};
 use crate::decisions::limits::{limit_of, reach, Limit};
 use crate::decisions::{Cause, Decision};
 use crate::error::FieldError;
-use crate::field::{ContactField, Projector};
+use crate::field::{ContactField, Motion, Projector};
 use crate::integrate::actions::instant::is_reset;
 use crate::integrate::integrator::Integrator;
 use crate::mode::Mode;

@@ -7,8 +7,8 @@ use smallvec::SmallVec;
 use crate::action::Actions;
 use crate::decisions::Left;
 use crate::error::FieldError;
-use crate::event::{EventFunction, Monitored};
-use crate::field::{AffineBounds, ContactField, Law, ModeField, SlidingSet};
+use crate::event::Monitored;
+use crate::field::{AffineBounds, ContactField, Guard, Law, ModeField, SlidingSet};
 use crate::mode::{Mode, Signs};
 use crate::options::SlidingRule;
 use crate::system::{MotionJets, PiecewiseSystem};
@@ -207,8 +207,8 @@ impl<'a> Motion<'a> {
         }
         // Of several for one function the first counts.
         let t = self.t_start;
-        for (function, deflation) in left.iter().rev().filter_map(|l| l.deflation(t)) {
-            let own = self.monitored.iter_mut().filter(|m| m.function == function);
+        for (guard, deflation) in left.iter().rev().filter_map(|l| l.deflation(t)) {
+            let own = self.monitored.iter_mut().filter(|m| m.guard == guard);
             own.for_each(|m| m.deflation = Some(deflation));
         }
         self.note_departure();
@@ -217,8 +217,9 @@ impl<'a> Motion<'a> {
     /// Lists what is monitored in this mode, wherever its motion starts.
     fn list_monitored(&mut self, system: &dyn PiecewiseSystem) {
         let signs = &self.signs;
-        let monitor = |function, orientation, affine| Monitored {
-            function,
+        let monitor = |guard, place, orientation, affine| Monitored {
+            guard,
+            place,
             orientation,
             value: f64::NAN,
             rate: f64::NAN,
@@ -230,17 +231,11 @@ impl<'a> Motion<'a> {
         let surfaces = (0..signs.len()).filter(|&j| {
             self.active[j] && self.mode.entries()[j] != 0 && !self.resting.contains(&j)
         });
-        self.monitored.extend(
-            surfaces.map(|j| monitor(EventFunction::Surface(j), signs[j], system.is_affine(j))),
-        );
-        let one = matches!(self.field, ModeField::Sliding(_));
-        let exits = (0..self.field.n_exits()).map(|index| match (one, index) {
-            (true, 0) => EventFunction::ExitMinus,
-            (true, _) => EventFunction::ExitPlus,
-            _ => EventFunction::Exit(index),
-        });
         self.monitored
-            .extend(exits.map(|exit| monitor(exit, 1.0, false)));
+            .extend(surfaces.map(|j| monitor(Guard::Surface(j), j, signs[j], system.is_affine(j))));
+        let exits = self.field.guards().into_iter().enumerate();
+        self.monitored
+            .extend(exits.map(|(place, guard)| monitor(guard, place, 1.0, false)));
     }
 
     /// Tells the field of a region whether the motion still departs from a surface.
@@ -281,6 +276,11 @@ impl<'a> Motion<'a> {
     /// Is the motion in contact at some surface?
     pub fn is_in_contact(&self) -> bool {
         matches!(self.field, ModeField::Contact(_))
+    }
+
+    /// Does a guard end sliding on several surfaces, or contact?
+    pub fn ends_root(&self, m: &Monitored) -> bool {
+        !m.guard.is_surface() && !matches!(self.field, ModeField::Sliding(_))
     }
 
     /// Bounds of the multipliers, if there are any.

@@ -3,8 +3,7 @@
 
 use crate::decisions::{surfaces_in_the_place_of_those_slid_on, Left};
 use crate::error::FieldError;
-use crate::event::EventFunction;
-use crate::field::{ModeField, Projector, SlidingSet};
+use crate::field::{Guard, ModeField, Projector, SlidingSet};
 use crate::integrate::integrator::Integrator;
 use crate::mode::Mode;
 use crate::status::{Stop, Warning, WarningCode};
@@ -81,14 +80,14 @@ impl Integrator<'_> {
         for index in 0..self.motion.monitored.len() {
             let m = self.motion.monitored[index];
             let (end, _) = self.detector.right[index];
-            let EventFunction::Surface(j) = m.function else {
+            let Guard::Surface(j) = m.guard else {
                 continue;
             };
             // Few functions come this far; the sizes in the noise are not computed for the others.
             if m.deflation.is_some() || m.value.abs().max(end.abs()) > NEARLY_ZERO {
                 continue;
             }
-            let noise = self.noise_of(m.function)?;
+            let noise = self.noise_of(&m)?;
             if m.value.abs().max(end.abs()) > noise {
                 continue;
             }
@@ -134,9 +133,7 @@ impl Integrator<'_> {
         for k in found {
             if !motion.resting.contains(&k) {
                 motion.resting.push(k);
-                motion
-                    .monitored
-                    .retain(|m| m.function != EventFunction::Surface(k));
+                motion.monitored.retain(|m| m.guard != Guard::Surface(k));
             }
         }
         Ok(())

@@ -11,8 +11,8 @@ use crate::decisions::{
     Reached, Rule, Values, RULES,
 };
 use crate::error::FieldError;
-use crate::event::{Deflation, EventFunction, Found};
-use crate::field::{eval_on_side, ModeField, SmoothField};
+use crate::event::{Deflation, Found, Multiple, Seen};
+use crate::field::{eval_on_side, Guard, ModeField, SmoothField};
 use crate::integrate::integrator::Integrator;
 use crate::integrate::steps::pace::excursion;
 use crate::mode::Mode;
@@ -21,12 +21,6 @@ use crate::status::Stop;
 use crate::stepper::{initial_step, restart_step};
 use crate::switching::{Kind, Patience};
 use crate::tolerances::{MOST_SWITCHES_AT_ONE_TIME, NO_PROGRESS, SMALLEST_GUESS, SMALL_JUMP};
-
-/// How many normal components of sliding on one surface vanish.
-fn n_exits(event: &Found) -> usize {
-    let exits = [EventFunction::ExitMinus, EventFunction::ExitPlus];
-    event.functions.iter().filter(|f| exits.contains(f)).count()
-}
 
 impl<'a> Integrator<'a> {
     /// Asks a question about the current place; counts what the answer cost, and keeps its warnings.
@@ -38,8 +32,8 @@ impl<'a> Integrator<'a> {
     ) -> Result<R, FieldError> {
         let mut departing = SmallVec::new();
         for monitored in &self.motion.monitored {
-            if let (EventFunction::Surface(j), Some(Deflation { order: 2.., .. })) =
-                (monitored.function, monitored.deflation)
+            if let (Guard::Surface(j), Some(Deflation { order: 2.., .. })) =
+                (monitored.guard, monitored.deflation)
             {
                 departing.push(j);
             }
@@ -146,20 +140,20 @@ impl<'a> Integrator<'a> {
                 return Ok(done);
             }
         }
-        let n_exits = n_exits(event);
         let mut at_two_fold = false;
-        if n_exits > 0 {
+        let is_end = |guard: &&Guard| matches!(guard, Guard::Multiplier { .. });
+        let n_ends = event.guards.iter().filter(is_end).count();
+        if n_ends > 0 && self.motion.sliding.len() == 1 {
             if let Some(done) = self.pass_double_zero(event)? {
                 return Ok(done);
             }
-            at_two_fold = self.arrives_at_two_fold(event, n_exits)?;
+            at_two_fold = self.arrives_at_two_fold(event, n_ends)?;
         }
-        let vanishing = std::mem::take(&mut self.detector.vanishing);
         let mut reached = Reached::default();
         let cause = Cause::Event {
-            functions: &event.functions,
+            functions: &event.guards,
             touch: event.touch,
-            vanishing,
+            vanishing: event.multiple.vanishing,
             at_two_fold,
         };
         let Decision { decided, rule } = self.decide_where_reached(cause, &mut reached)?;
@@ -193,11 +187,11 @@ impl<'a> Integrator<'a> {
                 let sliding = self.motion.sliding().iter().copied();
                 let slides_on = next.mode.sliding_set().eq(sliding);
                 let field = &self.motion.field;
-                if slides_on && root_ends::loses_stability(field, &event.functions) {
+                if slides_on && root_ends::loses_stability(field, &event.guards) {
                     next.start_mut().oscillates = true;
                 }
                 if before == next.mode {
-                    root_ends::loosen(field, &event.functions, &mut self.slacks);
+                    root_ends::loosen(field, &event.guards, &mut self.slacks);
                 } else {
                     self.slacks.clear();
                 }
@@ -209,7 +203,7 @@ impl<'a> Integrator<'a> {
                 return self.jump_to(limit, next.mode);
             }
         }
-        self.begin(next)
+        self.begin_behind(next, &event.multiple)
     }
 
     /// How many switches came before this one without any progress of time.
@@ -232,8 +226,8 @@ impl<'a> Integrator<'a> {
             return self.jump_to(limit, mode);
         }
         if surfaces.is_empty() {
-            let named = event.functions.iter().filter_map(|f| match f {
-                EventFunction::Surface(j) => Some(*j),
+            let named = event.guards.iter().filter_map(|f| match f {
+                Guard::Surface(j) => Some(*j),
                 _ => None,
             });
             surfaces.extend(named);
@@ -268,8 +262,8 @@ impl<'a> Integrator<'a> {
     }
 
     /// Has sliding on one surface come to a two-fold? Then the point is moved there.
-    fn arrives_at_two_fold(&mut self, event: &Found, n_exits: usize) -> Result<bool, FieldError> {
-        if n_exits == 1 && !self.approaches_two_fold() {
+    fn arrives_at_two_fold(&mut self, event: &Found, n_ends: usize) -> Result<bool, FieldError> {
+        if n_ends == 1 && !self.approaches_two_fold() {
             return Ok(false);
         }
         let Reached {
@@ -291,7 +285,7 @@ impl<'a> Integrator<'a> {
     /// The surfaces that vanish at an event, those slid on left out, and the mode before.
     fn vanishing_surfaces(&mut self, event: &Found) -> Result<Reached, FieldError> {
         let cause = Cause::Event {
-            functions: &event.functions,
+            functions: &event.guards,
             touch: event.touch,
             vanishing: [0; 2],
             at_two_fold: false,
@@ -302,21 +296,21 @@ impl<'a> Integrator<'a> {
     /// Is the difference of the normal components at the end of the step so small, compared with the speed, that the
     /// multiplier may be lost? Far from it nothing else has to be looked at.
     fn may_lose_multiplier(&self) -> bool {
-        let [minus, plus, ..] = self.detector.stages.as_slice() else {
+        let [minus, plus, ..] = self.detector.seen.as_slice() else {
             return false;
         };
         let speed = self.stepper.end_derivative().iter();
         let speed = speed.fold(0.0_f64, |most, v| most.max(v.abs()));
-        let least = (minus[0] + plus[0]).min(minus[6] + plus[6]);
+        let least = (minus.start + plus.start).min(minus.end + plus.end);
         least <= (SMALL_JUMP * self.options.rtol).min(1.0) * speed
     }
 
     /// Does the share of f+ change fast in the step just made, towards a two-fold?
     pub(in crate::integrate) fn approaches_two_fold(&self) -> bool {
-        let [minus, plus, ..] = self.detector.stages.as_slice() else {
+        let [minus, plus, ..] = self.detector.seen.as_slice() else {
             return false;
         };
-        let (before, after) = (minus[0] + plus[0], minus[6] + plus[6]);
+        let (before, after) = (minus.start + plus.start, minus.end + plus.end);
         self.motion.sliding.len() == 1 && after < 0.99 * before
     }
 
@@ -375,6 +369,15 @@ impl<'a> Integrator<'a> {
 
     /// Starts a motion at the current point.
     pub(in crate::integrate) fn begin(&mut self, next: Next) -> Result<Option<Stop>, FieldError> {
+        self.begin_behind(next, &Multiple::default())
+    }
+
+    /// The same where what the motion leaves has a multiple zero.
+    fn begin_behind(
+        &mut self,
+        next: Next,
+        multiple: &Multiple,
+    ) -> Result<Option<Stop>, FieldError> {
         let Next {
             mode,
             mut left,
@@ -409,8 +412,8 @@ impl<'a> Integrator<'a> {
                 if start.is_some_and(|start| start.is_given) {
                     field.hold_at_start(self.t);
                 }
-                for &(index, slack) in &self.slacks {
-                    field.set_slack(index, slack);
+                for &(guard, slack) in &self.slacks {
+                    field.set_slack(guard, slack);
                 }
             }
             ModeField::Sliding(field) => {
@@ -450,8 +453,9 @@ impl<'a> Integrator<'a> {
             return Ok(Some(Stop::NotFinite));
         }
         let start = (self.t, &self.x[..], derivative);
-        self.detector.measure(self.system, &self.motion, start, 0)?;
-        self.detector.accept_start(&mut self.motion.monitored);
+        self.detector.measure(self.system, &self.motion, start)?;
+        self.detector
+            .accept_start(&mut self.motion.monitored, multiple);
         self.user_events.restart(self.t, &self.x)?;
         self.controller.restart();
         self.dt = self.first_step(&left)?;
@@ -519,9 +523,9 @@ impl<'a> Integrator<'a> {
             self.go_without_equations();
         }
         let exits = self.motion.field.last_exits();
-        self.detector.stages.clear();
-        let stages = exits.iter().map(|&exit| [exit; 7]);
-        self.detector.stages.extend(stages);
+        self.detector.seen.clear();
+        let seen = exits.iter().map(|&exit| Seen::at_start(exit));
+        self.detector.seen.extend(seen);
         Ok(())
     }
 

@@ -104,14 +104,11 @@ impl Interpolant {
     pub fn expanded(&self, i: usize, centre: f64) -> Expansion {
         let r = |k: usize| self.coefficients[k * self.n + i];
         let mut d: Expansion = match self.basis {
-            Basis::Nested => SmallVec::from_slice(&[
-                r(0),
-                r(1) + r(2),
-                r(3) + r(4) - r(2),
-                r(5) - r(3) - 2.0 * r(4),
-                r(4) - 2.0 * r(5),
-                r(5),
-            ]),
+            Basis::Nested => {
+                let mut rows: Expansion = (0..6).map(r).collect();
+                powers_of_nested(&mut rows);
+                rows
+            }
             Basis::Powers => {
                 let n_rows = self.coefficients.len() / self.n;
                 // What stands still, or moves evenly, has a short series.
@@ -172,6 +169,14 @@ pub(crate) fn shift(d: &mut [f64], centre: f64) {
     }
 }
 
+/// Makes the six coefficients of a nested form those in powers of theta.
+pub(crate) fn powers_of_nested(rows: &mut [f64]) {
+    if let &mut [_, r1, r2, r3, r4, r5] = rows {
+        let powers = [r1 + r2, r3 + r4 - r2, r5 - r3 - 2.0 * r4, r4 - 2.0 * r5];
+        rows[1..5].copy_from_slice(&powers);
+    }
+}
+
 /// Evaluates rows of coefficients.
 #[inline]
 pub(crate) fn evaluate(basis: Basis, coefficients: &[f64], n: usize, theta: f64, y: &mut [f64]) {
@@ -221,7 +226,7 @@ fn evaluate_nested(coefficients: &[f64], n: usize, theta: f64, y: &mut [f64]) {
 
 /// The nested form of one component.
 #[inline]
-pub(crate) fn nested(r: &[f64; 6], theta: f64) -> f64 {
+fn nested(r: &[f64; 6], theta: f64) -> f64 {
     let u = 1.0 - theta;
     r[0] + theta * (r[1] + u * (r[2] + theta * (r[3] + u * (r[4] + theta * r[5]))))
 }

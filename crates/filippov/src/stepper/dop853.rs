@@ -7,8 +7,8 @@ use super::{Attempt, ErrorScale, Interpolant, Step};
 use crate::error::FieldError;
 use crate::field::SmoothField;
 
-/// The stages at which an observer is called, in order of time, with the numbers that it gets.
-const OBSERVED: [(usize, usize); 5] = [(3, 1), (5, 2), (9, 3), (8, 4), (10, 5)];
+/// The stages at which an observer is called.
+const OBSERVED: [usize; 5] = [3, 5, 8, 9, 10];
 
 /// The stages in order of time, the end of the step last.
 const IN_TIME: [usize; 12] = [0, 1, 2, 3, 6, 4, 7, 5, 9, 8, 10, 12];
@@ -53,15 +53,15 @@ impl Dop853 {
         &self.step
     }
 
-    /// Attempts a step of length `dt`; `observe(number)` is called with the field after the evaluations at five stages,
-    /// in no order of time but numbered so, and at the end, as 6.
+    /// Attempts a step of length `dt`; `observe` is called with the field after the evaluations at five stages, and last
+    /// at the end.
     ///
     /// # Errors
     /// If a function of the user raises.
     pub fn attempt<F: SmoothField>(
         &mut self,
         field: &mut F,
-        mut observe: impl FnMut(usize, &F),
+        mut observe: impl FnMut(&F),
         t: f64,
         y: &[f64],
         dt: f64,
@@ -78,16 +78,15 @@ impl Dop853 {
             };
             fill_stage(stage, y, dt, A[i - 1], before);
             field.eval(t + NODES[i] * dt, stage, &mut rest[0])?;
-            let observed = OBSERVED.iter().find(|(at, _)| *at == i);
-            if let Some((_, number)) = observed {
-                observe(*number, field);
+            if OBSERVED.contains(&i) {
+                observe(field);
             }
             if i == 11 {
                 self.last_stage.copy_from_slice(&self.stage);
             }
         }
         self.step.end_derivative.copy_from_slice(&self.k[12]);
-        observe(6, field);
+        observe(field);
         let error = self.error(y, dt, scale);
         let is_finite =
             error.is_finite() && self.k.iter().take(13).flatten().all(|v| v.is_finite());

@@ -74,15 +74,15 @@ impl Dopri5 {
         field.eval(t, y, &mut self.step.start_derivative)
     }
 
-    /// Attempts a step of length `dt`; `observe(stage)` is called with the field after each
-    /// evaluation.
+    /// Attempts a step of length `dt`; `observe` is called with the field after each evaluation, last
+    /// at the end.
     ///
     /// # Errors
     /// If a function of the user raises.
     pub fn attempt<F: SmoothField>(
         &mut self,
         field: &mut F,
-        observe: impl FnMut(usize, &F),
+        observe: impl FnMut(&F),
         t: f64,
         y: &[f64],
         dt: f64,
@@ -101,7 +101,7 @@ impl Dopri5 {
     fn attempt_sized<const N: usize, F: SmoothField>(
         &mut self,
         field: &mut F,
-        mut observe: impl FnMut(usize, &F),
+        mut observe: impl FnMut(&F),
         t: f64,
         y: &[f64],
         dt: f64,
@@ -124,22 +124,22 @@ impl Dopri5 {
             stage[i] = y[i] + dt * (A2[0] * k1[i]);
         }
         field.eval(t + C[1] * dt, stage, k2)?;
-        observe(1, field);
+        observe(field);
         for i in 0..n {
             stage[i] = y[i] + dt * (A3[0] * k1[i] + A3[1] * k2[i]);
         }
         field.eval(t + C[2] * dt, stage, k3)?;
-        observe(2, field);
+        observe(field);
         for i in 0..n {
             stage[i] = y[i] + dt * (A4[0] * k1[i] + A4[1] * k2[i] + A4[2] * k3[i]);
         }
         field.eval(t + C[3] * dt, stage, k4)?;
-        observe(3, field);
+        observe(field);
         for i in 0..n {
             stage[i] = y[i] + dt * (A5[0] * k1[i] + A5[1] * k2[i] + A5[2] * k3[i] + A5[3] * k4[i]);
         }
         field.eval(t + C[4] * dt, stage, k5)?;
-        observe(4, field);
+        observe(field);
         for i in 0..n {
             stage[i] = y[i]
                 + dt * (A6[0] * k1[i]
@@ -149,13 +149,13 @@ impl Dopri5 {
                     + A6[4] * k5[i]);
         }
         field.eval(t + dt, stage, k6)?;
-        observe(5, field);
+        observe(field);
         for i in 0..n {
             y1[i] = y[i]
                 + dt * (B[0] * k1[i] + B[2] * k3[i] + B[3] * k4[i] + B[4] * k5[i] + B[5] * k6[i]);
         }
         field.eval(t + dt, y1, k7)?;
-        observe(6, field);
+        observe(field);
 
         let mut sum = 0.0;
         for i in 0..n {

@@ -56,15 +56,15 @@ impl Midpoint {
         &mut self.step.start_derivative
     }
 
-    /// Attempts a step of length `dt`; `observe(number)` is called with the field after the evaluation in the middle, as
-    /// 1, and where the end is evaluated there, as 6.
+    /// Attempts a step of length `dt`; `observe` is called with the field after the evaluation in the middle, and where
+    /// the end is evaluated, last there.
     ///
     /// # Errors
     /// If a function of the user raises.
     pub fn attempt<F: SmoothField>(
         &mut self,
         (field, evaluates_end): (&mut F, bool),
-        mut observe: impl FnMut(usize, &F),
+        mut observe: impl FnMut(&F),
         t: f64,
         y: &[f64],
         dt: f64,
@@ -73,12 +73,12 @@ impl Midpoint {
         (self.step.interpolant.t0, self.step.interpolant.dt) = (t, dt);
         advance(&mut self.stage, y, 0.5 * dt, &self.step.start_derivative);
         field.eval(t + 0.5 * dt, &mut self.stage, &mut self.middle)?;
-        observe(1, field);
+        observe(field);
         advance(&mut self.step.end, y, dt, &self.middle);
         self.is_end_evaluated = evaluates_end;
         if evaluates_end {
             field.eval(t + dt, &mut self.step.end, &mut self.step.end_derivative)?;
-            observe(6, field);
+            observe(field);
         } else {
             let rates = self.step.start_derivative.iter().zip(&self.middle);
             for (end, (start, middle)) in self.step.end_derivative.iter_mut().zip(rates) {

@@ -16,7 +16,7 @@ mod step;
 mod taylor;
 
 pub use controller::{Controller, ErrorScale};
-pub(crate) use dense::{evaluate, nested, shift};
+pub(crate) use dense::{evaluate, powers_of_nested, shift};
 pub use dense::{Basis, Expansion, Interpolant};
 pub use dop853::Dop853;
 pub use dopri5::{Attempt, Dopri5};

@@ -85,15 +85,15 @@ impl Rodas5p {
         self.solver.factor(matrix).is_ok()
     }
 
-    /// Attempts a step of length `dt`, for which the matrix was factored; `observe(stage)` is called with the field
-    /// after the evaluations at the stages 2 to 6, counted from 1, and at the end, as stage 6.
+    /// Attempts a step of length `dt`, for which the matrix was factored; `observe` is called with the field
+    /// after the evaluations at the stages 2 to 6, counted from 1, and last at the end.
     ///
     /// # Errors
     /// If a function of the user raises.
     pub fn attempt<F: SmoothField>(
         &mut self,
         field: &mut F,
-        mut observe: impl FnMut(usize, &F),
+        mut observe: impl FnMut(&F),
         t: f64,
         y: &[f64],
         dt: f64,
@@ -115,7 +115,7 @@ impl Rodas5p {
                     field.eval(time, &mut self.stage, rate)?;
                 }
                 if i < 6 {
-                    observe(i, field);
+                    observe(field);
                 }
             }
             right[y.len()..].fill(0.0);
@@ -136,7 +136,7 @@ impl Rodas5p {
             return Ok(Attempt::NotFinite);
         }
         field.eval(t + dt, &mut self.step.end, &mut self.step.end_derivative)?;
-        observe(6, field);
+        observe(field);
         self.extend(y);
         let between = self.error_between(field, t, dt, scale)?;
         let error = error.max(between);

@@ -173,6 +173,9 @@ pub enum Undecided {
          that depends on how it is regularised; another kappa= may have a root"
     )]
     Cycle,
+    /// In each mode a guard begins negative.
+    #[error("no motion can follow")]
+    NoneViable,
     /// The hidden dynamics came to no certain outcome.
     #[error(
         "the hidden dynamics came to no certain outcome; perturb the state or change the scaling"

@@ -309,6 +309,3 @@ pub const DEPENDENT: f64 = 64.0 * EPS;
 pub const LONGER_TRIAL: f64 = 10.0;
 /// See [`LONGER_TRIAL`]: from a moment to about the time in which the state changes by its own size.
 pub const MOST_LENGTHENINGS: i32 = 3;
-
-/// Most surfaces that meet of which all modes are tried.
-pub const MOST_TRIED: usize = 3;

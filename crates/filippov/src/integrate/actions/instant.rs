@@ -18,8 +18,8 @@ use crate::decisions::{
     warn_unknown_side, Cause, Decision, Left, Sides, Triggers, Values,
 };
 use crate::error::FieldError;
-use crate::event::EventFunction;
 use crate::event::Found;
+use crate::field::Guard;
 use crate::integrate::integrator::Integrator;
 use crate::mode::Mode;
 use crate::solution::Switch;
@@ -114,11 +114,11 @@ impl Integrator<'_> {
         }
         let mode = self.motion.mode.clone();
         let (surfaces, rates) = self.ask(Cause::Anew(&mode), |at, _| {
-            let mut surfaces = located_surfaces(&event.functions);
+            let mut surfaces = located_surfaces(&event.guards);
             add_vanishing_surfaces(at, &mut surfaces, h)?;
             Ok((surfaces, rates_here(at)?))
         })?;
-        let located = |j: usize| event.functions.contains(&EventFunction::Surface(j));
+        let located = |j: usize| event.guards.contains(&Guard::Surface(j));
         let entries = self.motion.mode.entries();
         let reached = surfaces.iter().copied().filter(|&j| {
             let approaches = rates[j] * f64::from(entries[j]) < 0.0;

@@ -1,113 +1,118 @@
-//! The search of a Taylor step: the series of a function tells of its zeros.
+//! Guards along a step as series: which have one, and what it tells of their zeros.
 
 use crate::error::FieldError;
-use crate::event::certificate::Proof;
 use crate::event::filter::may_vanish_between;
 use crate::event::isolate::{is_steep, Bracket};
 use crate::event::locate::refine;
-use crate::event::series::{FirstZero, Near, Series, NO_TERMS};
-use crate::event::{EventFunction, Monitored};
+use crate::event::series::Series;
+use crate::event::Monitored;
+use crate::field::{Guard, ModeField};
 use crate::integrate::detection::curve::Curve;
-use crate::integrate::detection::search::Polynomial;
+use crate::integrate::detection::search::AtZero;
 use crate::integrate::integrator::Integrator;
-use crate::tolerances::{EPS, SERIES_MARGIN, SMALL_REST};
+use crate::stepper::{powers_of_nested, Basis};
+use crate::tolerances::{EPS, SERIES_MARGIN};
 
-/// How a series stands for a monitored function.
-#[derive(Clone, Copy, Debug)]
-struct Likeness {
-    /// How far the function may lie beside it.
-    margin: f64,
-    /// They are the same: the function is a polynomial along the step.
-    is_exact: bool,
+/// A guard along a step, as far as it is a polynomial.
+pub(super) enum Polynomial<'a> {
+    /// It is none.
+    None,
+    /// A series.
+    Powers(Series<'a>),
+    /// A series; the zero at the start of this step is divided out.
+    Quotient(Series<'a>),
+    /// A series; a zero before this step is yet to be divided out.
+    Deflated(Series<'a>),
 }
 
-/// Where a zero is, about where, and how large the terms are that were left out to find it.
-struct Between {
-    lo: f64,
-    hi: f64,
-    guess: f64,
-    rest: f64,
+/// How a series stands for a guard.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Likeness {
+    /// How far the guard may lie beside it.
+    pub margin: f64,
+    /// They are the same: the guard is a polynomial along the step.
+    pub is_exact: bool,
+}
+
+impl Likeness {
+    const EXACT: Likeness = Likeness {
+        margin: 0.0,
+        is_exact: true,
+    };
 }
 
 impl Integrator<'_> {
-    /// The first zero of one monitored function in a Taylor step up to `reach`, and how far it was searched: to the
-    /// same point, or to one behind a zero.
-    pub(in crate::integrate) fn search_along_series(
+    /// Is a guard a polynomial along the step?
+    pub(super) fn is_polynomial(&self, m: &Monitored) -> bool {
+        m.affine && self.motion.is_straight && m.guard.is_surface()
+    }
+
+    /// Coefficients of the step.
+    pub(super) fn n_rows(&self) -> usize {
+        self.stepper.interpolant().coefficients().len() / self.x.len()
+    }
+
+    /// The series of a guard in this step, into `rows`: how it stands for the guard, if it does, and whether there is one.
+    pub(super) fn series_along(
         &mut self,
-        index: usize,
-        reach: f64,
-        dt: f64,
-    ) -> Result<(Option<(f64, bool)>, f64), FieldError> {
-        let m = self.motion.monitored[index];
-        if m.deflation.is_some() {
-            self.motion.monitored[index].noise = self.noise_beside(&m)?;
+        m: &Monitored,
+        rows: &mut [f64],
+        value_at_end: f64,
+    ) -> Result<(Option<Likeness>, bool), FieldError> {
+        if self.is_polynomial(m) {
+            self.affine_series(m, rows)?;
+            return Ok((Some(Likeness::EXACT), false));
         }
-        let (value, _) = self.detector.right[index];
-        let mut buffer = NO_TERMS;
-        let rows = &mut buffer[..self.n_rows()];
-        let mut has_series = false;
-        let likeness = match m.function {
-            EventFunction::Surface(j) if self.is_polynomial(&m) => {
-                self.affine_series(j, &m, dt, rows)?;
-                Some(Likeness {
-                    margin: 0.0,
-                    is_exact: true,
-                })
+        if !self.exit_series(m, rows) {
+            return Ok((None, false));
+        }
+        let likeness = self.likeness_of_exit(m, &Series::new(rows), value_at_end)?;
+        Ok((likeness, true))
+    }
+
+    /// A polynomial along the step, with what is to be divided out.
+    pub(super) fn as_polynomial<'a>(&self, m: &Monitored, rows: &'a [f64]) -> Polynomial<'a> {
+        let series = Series::new(rows);
+        match m.deflation {
+            None => Polynomial::Powers(series),
+            Some(zero) if zero.t == self.t => {
+                Polynomial::Quotient(series.divided(zero.order as usize))
             }
-            _ => {
-                has_series = self.exit_series(&m, rows);
-                match has_series {
-                    true => self.likeness_of_exit(&m, &Series::new(rows), value)?,
-                    false => None,
-                }
-            }
+            Some(_) => Polynomial::Deflated(series),
+        }
+    }
+
+    /// An affine switching function along the step, positive inside of the mode, into `rows`.
+    pub(super) fn affine_series(&self, m: &Monitored, rows: &mut [f64]) -> Result<(), FieldError> {
+        let extension = self.stepper.interpolant();
+        let (point, signs) = ((self.t, &self.x[..]), &self.motion.signs);
+        let ht =
+            self.system
+                .gradient_products(m.place, point, signs, extension.coefficients(), rows)?;
+        if m.orientation < 0.0 {
+            rows.iter_mut().for_each(|row| *row = -*row);
+        }
+        rows[0] = m.value;
+        rows[1] += m.orientation * ht * extension.dt;
+        if extension.basis() == Basis::Nested {
+            powers_of_nested(rows);
+        }
+        Ok(())
+    }
+
+    /// An exit function along the step, as far as its series describes it, into `rows`; `false` if there is none.
+    fn exit_series(&self, m: &Monitored, rows: &mut [f64]) -> bool {
+        let place = m.exit().and_then(|index| {
+            let jets = self.motion.jets.as_ref()?;
+            jets.exit(index)
+        });
+        let (Some(place), Some(taylor)) = (place, &self.stepper.taylor) else {
+            return false;
         };
-        let mut polynomial = Polynomial::None;
-        let mut near = None;
-        if let Some(likeness) = likeness {
-            let along = self.as_polynomial(&m, rows);
-            if let Polynomial::Quotient(series) | Polynomial::Powers(series) = &along {
-                let margin = likeness.margin;
-                if value > 0.0 && series.stays_above(margin) {
-                    return Ok((None, reach));
-                }
-                // Leaving small terms out is cheaper, and hardly ever too rough.
-                for spare in [SMALL_REST, 0.0] {
-                    let (found, rest) = series.first_zero(reach, margin, spare);
-                    match found {
-                        FirstZero::Nowhere if value > 0.0 || reach < 1.0 => {
-                            return Ok((None, reach));
-                        }
-                        FirstZero::Between { lo, hi, guess } if value < 0.0 || hi < 1.0 => {
-                            let between = Between {
-                                lo,
-                                hi,
-                                guess,
-                                rest,
-                            };
-                            if let Some(theta) = self.only_zero(index, series, likeness, between)? {
-                                let searched = (theta + self.together(dt)).min(reach);
-                                return Ok((Some((theta, false)), searched));
-                            }
-                        }
-                        _ => {}
-                    }
-                    if rest == 0.0 {
-                        break;
-                    }
-                }
-                near = series.near_zero();
-            }
-            if likeness.is_exact {
-                polynomial = along;
-            }
-        } else if has_series {
-            near = Series::new(rows).near_zero();
-        }
-        if let Polynomial::None = polynomial {
-            return self.search_bounded(index, (value, has_series), near, reach);
-        }
-        self.search_near((index, true), &polynomial, near, reach, dt)
+        taylor.column(place, rows);
+        let own = |slack: &&(Guard, f64)| slack.0 == m.guard;
+        rows[0] += self.slacks.iter().find(own).map_or(0.0, |slack| slack.1);
+        true
     }
 
     /// How the series of an exit function in this step stands for it; `None` if it may change where no coefficient tells.
@@ -121,12 +126,8 @@ impl Integrator<'_> {
             return Ok(None);
         };
         let sticks = |j: &usize| self.system.sticks_at(*j);
-        let is_one_of_two = matches!(
-            m.function,
-            EventFunction::ExitMinus | EventFunction::ExitPlus
-        );
         // Where the motion sticks its limits are others than those of the series.
-        if !is_one_of_two
+        if !matches!(self.motion.field, ModeField::Sliding(_))
             || m.deflation.is_some()
             || !self.motion.is_straight
             || self.motion.sliding().iter().any(sticks)
@@ -135,10 +136,7 @@ impl Integrator<'_> {
         }
         if jets.has_affine_exits() {
             let is_exact = series.leads_between(m.value, value_at_end);
-            return Ok(is_exact.then_some(Likeness {
-                margin: 0.0,
-                is_exact,
-            }));
+            return Ok(is_exact.then_some(Likeness::EXACT));
         }
         if !jets.tells_of_exits() {
             return Ok(None);
@@ -158,7 +156,7 @@ impl Integrator<'_> {
         }))
     }
 
-    /// A monitored function within the step, in the sense of the mode.
+    /// A guard within the step, in the sense of the mode.
     fn value_along(&mut self, m: &Monitored, theta: f64) -> Result<f64, FieldError> {
         let mut curve = Curve {
             system: self.system,
@@ -174,22 +172,17 @@ impl Integrator<'_> {
         curve.value(m, theta)
     }
 
-    /// The only zero of a series between two points, and of the function that it stands for, to rounding; `None` if
-    /// what it may be off by matters for whether it is one.
-    fn only_zero(
+    /// The only zero of a series between two points, `rest` being the size of the terms that were left out to find it; and
+    /// of the guard that it stands for, to rounding. `None` if what it may be off by matters for whether it is one.
+    pub(super) fn only_zero(
         &mut self,
         index: usize,
         series: &Series,
         likeness: Likeness,
-        Between {
-            lo,
-            hi,
-            guess,
-            rest,
-        }: Between,
-    ) -> Result<Option<f64>, FieldError> {
+        (lo, hi, guess, rest): (f64, f64, f64, f64),
+    ) -> Result<Option<(f64, AtZero)>, FieldError> {
         let m = self.motion.monitored[index];
-        let noise = self.noise_of(m.function)?;
+        let noise = self.noise_of(&m)?;
         self.motion.monitored[index].noise = noise;
         let doubt = noise.max(likeness.margin);
         let g_lo = series.value(lo);
@@ -231,60 +224,14 @@ impl Integrator<'_> {
                 (theta, slope) = (located.theta, located.slope);
             }
         }
-        self.detector.blurred |= !is_steep(slope, scale, noise);
-        Ok(Some(theta))
-    }
-
-    /// The first zero of a function up to `reach` as far as bounds tell, and how far was searched.
-    fn search_bounded(
-        &mut self,
-        index: usize,
-        (value_at_end, has_series): (f64, bool),
-        near: Option<Near>,
-        reach: f64,
-    ) -> Result<(Option<(f64, bool)>, f64), FieldError> {
-        let m = self.motion.monitored[index];
-        // Beyond zero at the end: there is a zero, whether there are bounds or not.
-        let proof = if value_at_end <= 0.0 && has_series {
-            Proof::Open
-        } else {
-            self.prove_clear(index, value_at_end, reach)
-        };
-        if proof == Proof::Silent && !self.exit_may_vanish(&m) {
-            self.detector.dismissed |= matches!(m.function, EventFunction::Exit(_));
-            return Ok((None, reach));
-        }
-        if proof == Proof::Clear {
-            return Ok((None, reach));
-        }
-        let bounded = (index, proof == Proof::Open);
-        let dt = self.stepper.interpolant().dt;
-        self.search_near(bounded, &Polynomial::None, near, reach, dt)
+        let kind = AtZero::crossing(is_steep(slope, scale, noise));
+        Ok(Some((theta, kind)))
     }
 
     /// May an exit function about which there are no bounds vanish, to judge by its values at the stages?
-    fn exit_may_vanish(&self, m: &Monitored) -> bool {
-        let stages = m.function.exit_index();
-        let stages = stages.and_then(|index| self.detector.stages.get(index));
+    pub(super) fn exit_may_vanish(&self, m: &Monitored) -> bool {
+        let seen = m.exit().and_then(|place| self.detector.seen.get(place));
         let is_known = m.deflation.is_none() && !self.stepper.is_taylor();
-        stages.is_none_or(|stages| !is_known || may_vanish_between(stages))
-    }
-
-    /// The first zero of an affine h on a piece of a Taylor step.
-    pub(in crate::integrate) fn search_series(
-        &mut self,
-        index: usize,
-        piece: (f64, f64),
-        dt: f64,
-    ) -> Result<Option<(f64, bool)>, FieldError> {
-        let m = self.motion.monitored[index];
-        let EventFunction::Surface(j) = m.function else {
-            return Ok(None);
-        };
-        let mut buffer = NO_TERMS;
-        let rows = &mut buffer[..self.n_rows()];
-        self.affine_series(j, &m, dt, rows)?;
-        let polynomial = self.as_polynomial(&m, rows);
-        self.search_piece((index, true), &polynomial, None, piece, dt)
+        seen.is_none_or(|seen| !is_known || may_vanish_between(seen.range))
     }
 }

@@ -7,8 +7,8 @@ use smallvec::SmallVec;
 
 use crate::event::certificate::Bound;
 use crate::event::tube::Tube;
-use crate::event::{EventFunction, Monitored};
-use crate::field::{AffineBounds, IntersectionExit};
+use crate::event::{Monitored, Seen};
+use crate::field::{AffineBounds, Guard, RootEnd};
 use crate::mode::Signs;
 use crate::stepper::Interpolant;
 use crate::switching::{enclose_root, EnclosedRoot, IntervalVector, RootBounds, Vector};
@@ -23,8 +23,8 @@ pub(in crate::integrate) struct BoundedCurve<'a> {
     pub sliding: &'a [usize],
     /// How far the projection onto a curved surface moves the extension.
     pub margin: &'a [f64],
-    /// The exit functions of the motion at the stages of the step.
-    pub stages: &'a [[f64; 7]],
+    /// The exit functions of the motion in the step.
+    pub seen: &'a [Seen],
     /// Bounds of many multipliers, where the field is affine in the signs.
     pub affine: Option<&'a AffineBounds>,
     /// Whether the exit functions are those of the multipliers of the canopy.
@@ -51,22 +51,23 @@ impl BoundedCurve<'_> {
     /// The bounds of a function from theta = `a` to `b`, if the system can give any.
     pub fn over(&self, m: &Monitored, a: f64, b: f64) -> Option<Bound> {
         // An exit function is positive inside as it is, that of f+ with its sign changed.
-        let (enclosure, orientation) = match (m.function, self.sliding) {
-            (EventFunction::Surface(j), _) => {
+        let (enclosure, orientation) = match (m.guard, self.sliding) {
+            (Guard::Surface(j), _) => {
                 let tube = Tube::new(self.interpolant, (a, b), self.margin);
                 let enclosure = self.system.enclose_surface(j, &tube, self.signs)?;
                 (enclosure, m.orientation)
             }
-            (EventFunction::ExitMinus, &[j]) => (self.normal_components(j, a, b)?[0], 1.0),
-            (EventFunction::ExitPlus, &[j]) => (self.normal_components(j, a, b)?[1], -1.0),
-            (EventFunction::Exit(index), _) => return self.exit(index, a, b),
-            _ => return None,
+            (Guard::Multiplier { end, .. }, &[j]) => {
+                let components = self.normal_components(j, a, b)?;
+                (components[m.place], -f64::from(end))
+            }
+            (guard, _) => return self.exit(guard, a, b),
         };
         Some(Bound::new(enclosure, orientation, self.interpolant.dt))
     }
 
     /// An exit function of sliding on an intersection, from bounds of the multipliers.
-    fn exit(&self, index: usize, a: f64, b: f64) -> Option<Bound> {
+    fn exit(&self, guard: Guard, a: f64, b: f64) -> Option<Bound> {
         let m = self.sliding.len();
         if !self.by_multipliers || m > MOST_ENCLOSED && self.affine.is_none() {
             return None;
@@ -85,7 +86,7 @@ impl BoundedCurve<'_> {
         };
         match &known[place].2 {
             RootBounds::Proved(root) => {
-                let enclosure = exit_bound(IntersectionExit::of(index, m), root)?;
+                let enclosure = exit_bound(guard, self.sliding, root)?;
                 Some(Bound::new(enclosure, 1.0, self.interpolant.dt))
             }
             RootBounds::Unproved => Some(Bound::new(Enclosure::UNKNOWN, 1.0, 1.0)),
@@ -131,8 +132,8 @@ impl BoundedCurve<'_> {
     fn enclosed_root(&self, a: f64, b: f64) -> Option<RootBounds> {
         if let (Some(bounds), Some(affine)) = (self.affine, self.system.affine_signs()) {
             let tube = Tube::new(self.interpolant, (a, b), self.margin);
-            let exits = self.stages.chunks_exact(2).take(self.sliding.len());
-            let middles = exits.map(|pair| 0.5 * (pair[0][0] + pair[0][6]) - 1.0);
+            let exits = self.seen.chunks_exact(2).take(self.sliding.len());
+            let middles = exits.map(|pair| 0.5 * (pair[0].start + pair[0].end) - 1.0);
             let near: Vector = middles.collect();
             let found = bounds.enclose(affine, self.sliding, &tube, self.signs, &near);
             return Some(found.map_or(RootBounds::Unproved, |found| {
@@ -144,8 +145,8 @@ impl BoundedCurve<'_> {
             }));
         }
         let components = self.all_components(a, b)?;
-        let exits = self.stages.chunks_exact(2).take(self.sliding.len());
-        let ends = exits.map(|pair| Interval::hull(pair[0][0] - 1.0, pair[0][6] - 1.0));
+        let exits = self.seen.chunks_exact(2).take(self.sliding.len());
+        let ends = exits.map(|pair| Interval::hull(pair[0].start - 1.0, pair[0].end - 1.0));
         let ends: IntervalVector = ends.collect();
         let boxes = ROOT_BOXES.into_iter().map(|radius| {
             let wider = |l: &Interval| Interval::hull(l.lo - radius, l.hi + radius);
@@ -178,23 +179,25 @@ fn known_components(known: &[Piece], a: f64, b: f64) -> Option<[Enclosure; 2]> {
 }
 
 /// Bounds of an exit function where the multipliers are bounded; none for the stability of three and more.
-fn exit_bound(exit: IntersectionExit, root: &EnclosedRoot) -> Option<Enclosure> {
+fn exit_bound(guard: Guard, sliding: &[usize], root: &EnclosedRoot) -> Option<Enclosure> {
     let mut rate = Interval::ALL;
-    let value = match exit {
-        IntersectionExit::Side { position, end } => {
+    let value = match guard {
+        Guard::Multiplier { surface, end } => {
+            let position = sliding.iter().position(|&j| j == surface)?;
             if let Some(bounds) = root.rates.get(position) {
                 rate = bounds.scaled(-f64::from(end));
             }
             Interval::point(1.0) + root.multipliers[position].scaled(-f64::from(end))
         }
         // The root is the only one in its box: it meets no other.
-        IntersectionExit::Fold => Interval::point(FAR),
+        Guard::Root(RootEnd::Fold) => Interval::point(FAR),
         // Each entry is in units of its surface: only the sign counts.
-        IntersectionExit::Stability => match root.diagonal[..] {
+        Guard::Root(RootEnd::Stability) => match root.diagonal[..] {
             [] => Interval::point(FAR),
             [first, second] => Interval::hull(-first.hi.min(second.hi), FAR),
             _ => return None,
         },
+        Guard::Surface(_) | Guard::Force(_) => return None,
     };
     Some(Enclosure { value, rate })
 }

@@ -1,7 +1,7 @@
 //! A monitored function along the continuous extension of a step.
 
 use crate::error::FieldError;
-use crate::event::{EventFunction, Monitored};
+use crate::event::Monitored;
 use crate::field::{Exits, ModeField};
 use crate::stepper::Interpolant;
 use crate::system::PiecewiseSystem;
@@ -26,7 +26,7 @@ impl Curve<'_, '_> {
     pub fn value(&mut self, m: &Monitored, theta: f64) -> Result<f64, FieldError> {
         let t = self.interpolant.t0 + theta * self.interpolant.dt;
         self.interpolant.at(theta, self.x);
-        let Some(index) = m.function.exit_index() else {
+        let Some(place) = m.exit() else {
             return self.surface(m, t);
         };
         let known = self.exits.iter().position(|(at, _)| *at == theta);
@@ -42,12 +42,12 @@ impl Curve<'_, '_> {
                 self.exits.len() - 1
             }
         };
-        Ok(self.exits[at].1.get(index).copied().unwrap_or(f64::NAN))
+        Ok(self.exits[at].1.get(place).copied().unwrap_or(f64::NAN))
     }
 
     /// A switching function at the point in `x`, projected onto curved surfaces.
     fn surface(&mut self, m: &Monitored, t: f64) -> Result<f64, FieldError> {
-        let EventFunction::Surface(j) = m.function else {
+        let Some(j) = m.surface() else {
             return Ok(f64::NAN);
         };
         if !self.is_straight {

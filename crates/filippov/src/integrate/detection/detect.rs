@@ -4,214 +4,149 @@ use smallvec::smallvec;
 
 use crate::error::FieldError;
 use crate::event::certificate::{prove, Proof};
-use crate::event::filter::{may_vanish, may_vanish_bent, may_vanish_between, may_vanish_deflated};
+use crate::event::filter::{may_vanish, may_vanish_bent, may_vanish_deflated};
 use crate::event::isolate::PROBES;
-use crate::event::{Deflation, EventFunction, Found, Monitored};
+use crate::event::{Event, Found, Monitored};
 use crate::field::{AffineBounds, ModeField};
 use crate::integrate::detection::bounds::BoundedCurve;
 use crate::integrate::detection::detector::Detector;
 use crate::integrate::detection::detector::CLEAR_OF_NOISE;
+use crate::integrate::detection::search::{Search, Sought};
 use crate::integrate::integrator::Integrator;
 use crate::options::SlidingRule;
 use crate::tolerances::{EPS, EXTRAPOLATION, MARGIN, ONE_SIDED_AIM, PROOF_DEPTH};
 
 impl Integrator<'_> {
-    /// The earliest event of the step that was just computed.
-    pub(in crate::integrate) fn detect(
+    /// The first event of the step that was just computed, and how long the next step may be. Where the field ends beyond
+    /// the end of this one that is shorter.
+    pub(in crate::integrate) fn first_event(
         &mut self,
         t1: f64,
         dt: f64,
-    ) -> Result<Option<Found>, FieldError> {
-        let end = (t1, self.stepper.end(), self.stepper.end_derivative());
-        self.detector.unresolved = false;
-        self.detector.uncertain = false;
-        self.detector.dismissed = false;
-        self.detector.blurred = false;
-        self.detector.depth = 0.0;
-        self.detector.blur = 0.0;
-        self.detector.vanishing = [0; 2];
-        self.detector.exits.clear();
-        self.detector.enclosed_exits.get_mut().clear();
-        self.detector.enclosed_roots.get_mut().clear();
-        self.detector.margin.clear();
-        self.detector.exit_noise = None;
-        self.detector.next_dt = None;
+    ) -> Result<(Event, f64), FieldError> {
+        let mut sought = Sought::new(dt);
+        self.detector.forget_step();
         if self.motion.monitored.is_empty() {
-            return Ok(None);
+            return Ok((Event::None, sought.longest));
         }
-        self.detector.measure(self.system, &self.motion, end, 6)?;
+        if !self.seek(t1, &mut sought)? {
+            return Ok((Event::Shorten(0.5 * dt), sought.longest));
+        }
+        let event = match sought.found {
+            Some(found) if self.may_be_multiple(&found) => self.resolve_multiple_zero(found, dt)?,
+            Some(found) => Event::At(found),
+            None => self.wrong_from_the_start()?.map_or(Event::None, Event::At),
+        };
+        Ok((event, sought.longest))
+    }
+
+    /// Searches the step for the first zero; `false` if a shorter step is needed. Guards that are beyond zero at the end come
+    /// first: the others need not be looked at after the first zero.
+    fn seek(&mut self, t1: f64, sought: &mut Sought) -> Result<bool, FieldError> {
+        let end = (t1, self.stepper.end(), self.stepper.end_derivative());
+        self.detector.measure(self.system, &self.motion, end)?;
         self.stats.n_surface_evaluations += 1;
         if self.detector.right.iter().any(|(value, _)| value.is_nan()) {
-            self.detector.uncertain = true;
-            return Ok(None);
+            return Ok(false);
         }
         if self.detector.right.iter().any(|&(value, _)| value <= 0.0) {
             // There will be a search: the extension that it needs serves the filter too.
             self.extend()?;
         }
-        let mut found = if self.stepper.has_series() {
-            self.detect_along_series(dt)?
-        } else {
-            self.detect_among_suspects(dt)?
-        };
-        if found.is_none() && !self.detector.uncertain {
-            found = self.wrong_from_the_start()?;
+        if !self.motion.monitored.iter().all(|m| self.is_polynomial(m)) {
+            self.stepper.extend_order4(&self.x);
         }
-        Ok(found)
-    }
-
-    /// The earliest event of a step without series: the filter, then a search for what it lets through.
-    fn detect_among_suspects(&mut self, dt: f64) -> Result<Option<Found>, FieldError> {
-        self.collect_suspects(dt)?;
-        let mut found: Option<Found> = None;
-        if !self.detector.suspects.is_empty() {
-            self.extend()?;
-            for k in 0..self.detector.suspects.len() {
-                let (index, bounded) = self.detector.suspects[k];
-                let zero = self.search((index, bounded), (0.0, 1.0), dt)?;
-                self.keep_earliest(&mut found, index, zero, dt);
+        self.measure_margin(sought.dt)?;
+        if self.motion.sliding.len() > 1 {
+            self.prepare_bounds();
+        }
+        for is_beyond in [true, false] {
+            for index in 0..self.motion.monitored.len() {
+                let (value, _) = self.detector.right[index];
+                if (value <= 0.0) == is_beyond && !self.search(index, sought)? {
+                    return Ok(false);
+                }
             }
         }
-        self.look_before_exit(&mut found, dt)?;
-        if found.is_none() && self.one_sided && !self.detector.uncertain {
-            self.detect_beyond(dt, &mut found)?;
+        if !self.look_before_exit(sought)? {
+            return Ok(false);
         }
-        Ok(found)
+        if sought.found.is_none() && self.one_sided {
+            self.seek_beyond(sought)?;
+        }
+        Ok(true)
     }
 
     /// A surface that the motion was to leave to one side and is on the other side of, without a zero in between: rounding
     /// decided on the side, and it is decided anew.
     fn wrong_from_the_start(&mut self) -> Result<Option<Found>, FieldError> {
         for index in 0..self.motion.monitored.len() {
-            let m = self.motion.monitored[index];
+            let m = &self.motion.monitored[index];
             let (value, _) = self.detector.right[index];
-            let is_surface = matches!(m.function, EventFunction::Surface(_));
-            if m.deflation.is_none() || !is_surface || value >= 0.0 {
+            if value >= 0.0 || m.deflation.is_none() || !m.guard.is_surface() {
                 continue;
             }
+            let m = *m;
             if value < -CLEAR_OF_NOISE * self.noise_beside(&m)? {
-                return Ok(Some(Found {
-                    theta: 0.0,
-                    functions: smallvec![m.function],
-                    touch: false,
-                }));
+                return Ok(Some(Found::here(smallvec![m.guard])));
             }
         }
         Ok(None)
     }
 
-    /// The filter: which functions may vanish within the step?
-    fn collect_suspects(&mut self, dt: f64) -> Result<(), FieldError> {
-        self.detector.suspects.clear();
-        let is_polynomial =
-            |m: &Monitored| m.affine && matches!(m.function, EventFunction::Surface(_));
-        if !self.motion.monitored.iter().all(is_polynomial) {
-            self.stepper.extend_order4(&self.x);
-        }
-        self.measure_margin(dt)?;
-        if self.motion.sliding.len() > 1 {
-            self.prepare_bounds();
-        }
-        let mut probed = false;
-        for index in 0..self.motion.monitored.len() {
-            let m = self.motion.monitored[index];
-            let (value, rate) = self.detector.right[index];
-            if m.deflation.is_some() {
-                self.motion.monitored[index].noise = self.noise_beside(&m)?;
+    /// May a guard vanish within a step whose extension costs evaluations? What bounds tell of it; `None` if it does not vanish.
+    pub(super) fn filter(
+        &mut self,
+        index: usize,
+        sought: &mut Sought,
+    ) -> Result<Option<Proof>, FieldError> {
+        let m = self.motion.monitored[index];
+        let (dt, (value, rate)) = (sought.dt, self.detector.right[index]);
+        let proof = match m.affine && m.guard.is_surface() {
+            true => Proof::Silent,
+            false => self.prove_clear(index, value, 1.0),
+        };
+        let may_vanish = match (m.surface(), m.deflation) {
+            _ if proof != Proof::Silent => proof == Proof::Open,
+            (Some(_), None) if m.affine => may_vanish(m.value, m.rate * dt, value, rate * dt),
+            (Some(j), None) => {
+                self.probe_surfaces(dt)?;
+                let at = &self.detector.probed;
+                let probes = [0, 1].map(|k| (PROBES[k], m.orientation * at[k][j]));
+                may_vanish_bent(m.value, m.rate * dt, value, rate * dt, &probes)
             }
-            let proof = if is_polynomial(&m) {
-                Proof::Silent
-            } else {
-                self.prove_clear(index, value, 1.0)
-            };
-            let suspect = match (m.function, m.deflation, proof) {
-                (_, _, Proof::Clear) => false,
-                (_, _, Proof::Open) => true,
-                (EventFunction::Surface(_), None, _) if m.affine => {
-                    may_vanish(m.value, m.rate * dt, value, rate * dt)
-                }
-                (EventFunction::Surface(j), None, _) => {
-                    if !probed {
-                        self.probe_surfaces(dt)?;
-                        probed = true;
-                    }
-                    let at = &self.detector.probed;
-                    let probes = [0, 1].map(|k| (PROBES[k], m.orientation * at[k][j]));
-                    may_vanish_bent(m.value, m.rate * dt, value, rate * dt, &probes)
-                }
-                (EventFunction::Surface(_), Some(deflation), _) => {
-                    let noise = self.motion.monitored[index].noise;
-                    let Deflation {
-                        t, order, leading, ..
-                    } = deflation;
-                    // A multiple zero stays within rounding for long: the end has to be clear of it.
-                    let clear = order == 1 || order == 2 && value > CLEAR_OF_NOISE * noise;
-                    let leading = leading * dt.powi(order);
-                    let known = m.affine && t == self.t && clear;
-                    !known || may_vanish_deflated(leading, order, value, rate * dt)
-                }
-                (EventFunction::ExitMinus, None, _) => may_vanish_between(&self.detector.stages[0]),
-                (EventFunction::ExitPlus, None, _) => may_vanish_between(&self.detector.stages[1]),
-                (EventFunction::Exit(index), None, _) => {
-                    may_vanish_between(&self.detector.stages[index])
-                }
-                (_, Some(_), _) => true,
-            };
-            if suspect {
-                self.detector.suspects.push((index, proof == Proof::Open));
-            } else if proof == Proof::Silent {
-                self.detector.dismissed |= matches!(m.function, EventFunction::Exit(_));
+            (Some(_), Some(zero)) => {
+                // A multiple zero stays within rounding for long: the end has to be clear of it.
+                let is_clear = zero.order == 1
+                    || zero.order == 2
+                        && value > CLEAR_OF_NOISE * self.motion.monitored[index].noise;
+                let leading = zero.leading * dt.powi(zero.order);
+                let is_known = m.affine && zero.t == self.t && is_clear;
+                !is_known || may_vanish_deflated(leading, zero.order, value, rate * dt)
             }
-        }
-        Ok(())
-    }
-
-    /// The earliest event of a Taylor step. Functions that are beyond zero at its end come first: the others need not
-    /// be looked at after the first zero.
-    fn detect_along_series(&mut self, dt: f64) -> Result<Option<Found>, FieldError> {
-        self.measure_margin(dt)?;
-        if self.motion.sliding.len() > 1 {
-            self.prepare_bounds();
-        }
-        let mut found: Option<Found> = None;
-        // What was searched for the first zero is all that the others are searched for.
-        let mut reach = 1.0;
-        for is_beyond in [true, false] {
-            for index in 0..self.motion.monitored.len() {
-                let (value, _) = self.detector.right[index];
-                if (value <= 0.0) != is_beyond {
-                    continue;
-                }
-                let (zero, searched) = self.search_along_series(index, reach, dt)?;
-                self.keep_earliest(&mut found, index, zero, dt);
-                reach = searched;
-            }
-        }
-        self.look_before_exit(&mut found, dt)?;
-        if found.is_none() && self.one_sided && !self.detector.uncertain {
-            self.detect_beyond(dt, &mut found)?;
-        }
-        Ok(found)
+            (None, _) => self.exit_may_vanish(&m),
+        };
+        sought.dismissed |= !may_vanish && proof == Proof::Silent && self.motion.ends_root(&m);
+        Ok(may_vanish.then_some(proof))
     }
 
     /// Rounding of a monitored function over the step.
-    pub(in crate::integrate) fn noise_of(
-        &mut self,
-        function: EventFunction,
-    ) -> Result<f64, FieldError> {
+    pub(in crate::integrate) fn noise_of(&mut self, m: &Monitored) -> Result<f64, FieldError> {
         let step = (self.t, &self.x[..], self.stepper.end());
-        self.detector
-            .noise(self.system, &self.motion, function, step)
+        self.detector.noise(self.system, &self.motion, m, step)
     }
 
     /// The same, or what blurred the zero that is divided out.
     pub(in crate::integrate) fn noise_beside(&mut self, m: &Monitored) -> Result<f64, FieldError> {
         let blur = m.deflation.map_or(0.0, |zero| zero.blur);
-        Ok(self.noise_of(m.function)?.max(blur))
+        Ok(self.noise_of(m)?.max(blur))
     }
 
-    /// All switching functions at the probes of the step.
+    /// Evaluates all switching functions at the probes of the step, once.
     fn probe_surfaces(&mut self, dt: f64) -> Result<(), FieldError> {
+        if std::mem::replace(&mut self.detector.is_probed, true) {
+            return Ok(());
+        }
         for (theta, h) in PROBES.into_iter().zip(&mut self.detector.probed) {
             self.stepper.interpolant().at(theta, &mut self.detector.x);
             let t = self.t + theta * dt;
@@ -235,29 +170,24 @@ impl Integrator<'_> {
     }
 
     /// One-sided fields: the surface just beyond the end of the step, within reach of the continuous extension.
-    pub(in crate::integrate) fn detect_beyond(
-        &mut self,
-        dt: f64,
-        found: &mut Option<Found>,
-    ) -> Result<(), FieldError> {
+    fn seek_beyond(&mut self, sought: &mut Sought) -> Result<(), FieldError> {
         for index in 0..self.motion.monitored.len() {
-            let (value, rate) = self.detector.right[index];
+            let (dt, (value, rate)) = (sought.dt, self.detector.right[index]);
             let near = rate < 0.0 && value < -rate * dt * 1.5 * (EXTRAPOLATION - 1.0);
             if near {
                 self.extend()?;
-                let zero = self.search((index, false), (1.0, EXTRAPOLATION), dt)?;
                 // What lies beyond the end of the step may not exist; that is no reason to shorten it.
-                self.detector.uncertain = false;
-                let Some((theta, _)) = zero else { continue };
+                let zero = self.search_on(index, (1.0, EXTRAPOLATION), sought)?;
+                let Search::At(theta, _) = zero else { continue };
                 if self.t + theta * dt > self.horizon {
                     continue;
                 }
                 // An extrapolation that is not accurate enough still says how far to go.
                 if self.stepper.extension_defect(theta, &self.scale) > 1.0 {
                     let gap = ONE_SIDED_AIM * (theta - 1.0) * dt;
-                    self.detector.next_dt = Some(self.detector.next_dt.map_or(gap, |d| d.min(gap)));
+                    sought.longest = sought.longest.min(gap);
                 } else {
-                    self.keep_earliest(found, index, zero, dt);
+                    self.keep(index, zero, sought);
                 }
             }
         }
@@ -267,32 +197,6 @@ impl Integrator<'_> {
     /// Zeros that are closer than this, in steps, are one event.
     pub(in crate::integrate) fn together(&self, dt: f64) -> f64 {
         4.0 * EPS * (1.0 + self.t.abs() / dt)
-    }
-
-    pub(in crate::integrate) fn keep_earliest(
-        &self,
-        found: &mut Option<Found>,
-        index: usize,
-        zero: Option<(f64, bool)>,
-        dt: f64,
-    ) {
-        let Some((theta, touch)) = zero else { return };
-        let function = self.motion.monitored[index].function;
-        let together = self.together(dt);
-        match found {
-            Some(event) if theta > event.theta + together => {}
-            Some(event) if theta >= event.theta - together => {
-                event.functions.push(function);
-                event.touch &= touch;
-            }
-            _ => {
-                *found = Some(Found {
-                    theta,
-                    functions: smallvec![function],
-                    touch,
-                })
-            }
-        }
     }
 
     /// What bounds over the step up to `reach` prove about a function.
@@ -309,7 +213,7 @@ impl Integrator<'_> {
             signs: &self.motion.signs,
             sliding: self.motion.sliding(),
             margin: &self.detector.margin,
-            stages: &self.detector.stages,
+            seen: &self.detector.seen,
             affine: self.motion.affine_bounds(),
             by_multipliers: !self.motion.slides_by_rule() && self.motion.has_bounds(),
             known_exits: &self.detector.enclosed_exits,

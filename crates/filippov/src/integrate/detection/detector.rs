@@ -3,8 +3,8 @@
 use std::cell::RefCell;
 
 use crate::error::FieldError;
-use crate::event::{EventFunction, Monitored};
-use crate::field::Exits;
+use crate::event::{Monitored, Multiple, Seen};
+use crate::field::{Exits, ModeField};
 use crate::integrate::detection::bounds::{Piece, RootPiece};
 use crate::integrate::motion::Motion;
 use crate::system::PiecewiseSystem;
@@ -13,31 +13,17 @@ use crate::tolerances::SURFACE_NOISE;
 /// A function is clear of a zero that was divided out beyond this multiple of its rounding.
 pub(super) const CLEAR_OF_NOISE: f64 = 1e3;
 
-/// Scratch space of the event stage, and values at the end of the step.
+/// Scratch space of the event stage, and values of what is monitored.
 pub(in crate::integrate) struct Detector {
-    /// The exit functions of the motion at the seven stages.
-    pub stages: Vec<[f64; 7]>,
-    /// The step did not resolve a monitored function; it may not grow.
-    pub unresolved: bool,
-    /// A monitored function could not be searched; the step has to be shortened.
-    pub uncertain: bool,
-    /// An exit function was not searched though nothing was proved about it.
-    pub dismissed: bool,
-    /// Rounding blurs the zero that was found: it may be a multiple one.
-    pub blurred: bool,
-    /// How far below zero the touch that was found may be, else 0.
-    pub depth: f64,
-    /// Rounding of the function whose multiple zero was found, over the step, else 0.
-    pub blur: f64,
-    /// How many derivatives along f- and f+ vanish at the multiple zero that was found.
-    pub vanishing: [usize; 2],
-    /// Length of the next step, if the event stage knows better than the error control.
-    pub next_dt: Option<f64>,
+    /// The exit functions of the motion in the step.
+    pub seen: Vec<Seen>,
     /// Exit functions computed in the search of this step, by theta.
     pub exits: Vec<(f64, Exits)>,
     pub h: Vec<f64>,
     /// Switching functions at the probes of the step.
     pub(super) probed: [Vec<f64>; 2],
+    /// They were evaluated in this step.
+    pub(super) is_probed: bool,
     pub(super) rate: Vec<f64>,
     pub x: Vec<f64>,
     /// How far the projection onto a curved surface moves the extension in this step; else empty.
@@ -50,25 +36,16 @@ pub(in crate::integrate) struct Detector {
     pub right: Vec<(f64, f64)>,
     /// Rounding of the exit functions in this step, once it was needed.
     pub(super) exit_noise: Option<f64>,
-    /// Which monitored functions could not be cleared, and whether bounds say anything about them.
-    pub(super) suspects: Vec<(usize, bool)>,
 }
 
 impl Detector {
     pub fn new(n: usize, d: usize) -> Self {
         Detector {
-            stages: Vec::new(),
-            unresolved: false,
-            uncertain: false,
-            dismissed: false,
-            blurred: false,
-            depth: 0.0,
-            blur: 0.0,
-            vanishing: [0; 2],
-            next_dt: None,
+            seen: Vec::new(),
             exits: Vec::new(),
             h: vec![0.0; d],
             probed: [vec![0.0; d], vec![0.0; d]],
+            is_probed: false,
             rate: vec![0.0; d],
             x: vec![0.0; n],
             margin: Vec::new(),
@@ -76,7 +53,25 @@ impl Detector {
             enclosed_roots: RefCell::default(),
             right: Vec::new(),
             exit_noise: None,
-            suspects: Vec::new(),
+        }
+    }
+
+    /// Forgets what is known of the last step.
+    pub fn forget_step(&mut self) {
+        self.exits.clear();
+        self.enclosed_exits.get_mut().clear();
+        self.enclosed_roots.get_mut().clear();
+        self.margin.clear();
+        self.exit_noise = None;
+        self.is_probed = false;
+    }
+
+    /// What takes down the exit functions at the stages of a step.
+    pub fn observer(&mut self) -> impl FnMut(&ModeField) + '_ {
+        |field| {
+            for (seen, value) in self.seen.iter_mut().zip(field.last_exits()) {
+                seen.see(*value);
+            }
         }
     }
 
@@ -86,24 +81,16 @@ impl Detector {
         system: &dyn PiecewiseSystem,
         motion: &Motion,
         (t, x, v): (f64, &[f64], &[f64]),
-        stage: usize,
     ) -> Result<(), FieldError> {
-        let with_surfaces = motion
-            .monitored
-            .iter()
-            .any(|m| matches!(m.function, EventFunction::Surface(_)));
+        let with_surfaces = motion.monitored.iter().any(|m| m.guard.is_surface());
         if with_surfaces {
             system.surface_rates(t, x, &motion.signs, v, &mut self.h, &mut self.rate)?;
         }
         self.right.clear();
         for m in &motion.monitored {
-            self.right.push(match m.function {
-                EventFunction::Surface(j) => {
-                    (m.orientation * self.h[j], m.orientation * self.rate[j])
-                }
-                EventFunction::ExitMinus => (self.stages[0][stage], f64::NAN),
-                EventFunction::ExitPlus => (self.stages[1][stage], f64::NAN),
-                EventFunction::Exit(index) => (self.stages[index][stage], f64::NAN),
+            self.right.push(match m.surface() {
+                Some(j) => (m.orientation * self.h[j], m.orientation * self.rate[j]),
+                None => (self.seen[m.place].end, f64::NAN),
             });
         }
         Ok(())
@@ -122,19 +109,19 @@ impl Detector {
                 cleared = true;
             }
         }
-        for stages in &mut self.stages {
-            stages[0] = stages[6];
+        for seen in &mut self.seen {
+            seen.start = seen.end;
         }
         cleared
     }
 
-    /// Makes the values just measured those at the start of a motion.
-    pub fn accept_start(&mut self, monitored: &mut [Monitored]) {
+    /// Makes the values just measured those at the start of a motion that leaves a multiple zero, if it does.
+    pub fn accept_start(&mut self, monitored: &mut [Monitored], left: &Multiple) {
         for (m, &(value, rate)) in monitored.iter_mut().zip(&self.right) {
             (m.value, m.rate) = (value, rate);
             if let Some(zero) = &mut m.deflation {
-                zero.blur = self.blur;
-                zero.residual = if value.abs() <= self.depth {
+                zero.blur = left.blur;
+                zero.residual = if value.abs() <= left.depth {
                     value
                 } else {
                     0.0
@@ -148,14 +135,13 @@ impl Detector {
         &mut self,
         system: &dyn PiecewiseSystem,
         motion: &Motion,
-        function: EventFunction,
+        m: &Monitored,
         (t, start, end): (f64, &[f64], &[f64]),
     ) -> Result<f64, FieldError> {
-        let EventFunction::Surface(j) = function else {
-            let stages = &self.stages;
+        let Some(j) = m.surface() else {
+            let seen = &self.seen;
             let noise = *self.exit_noise.get_or_insert_with(|| {
-                let values = stages.iter().flatten();
-                4.0 * SURFACE_NOISE * values.fold(0.0_f64, |m, v| m.max(v.abs()))
+                4.0 * SURFACE_NOISE * seen.iter().fold(0.0_f64, |m, seen| m.max(seen.size()))
             });
             return Ok(noise);
         };

@@ -8,8 +8,8 @@
 use smallvec::SmallVec;
 
 use crate::error::FieldError;
-use crate::event::Found;
-use crate::event::{EventFunction, Monitored};
+use crate::event::{Event, Found, Monitored};
+use crate::field::Guard;
 use crate::integrate::integrator::Integrator;
 use crate::stepper::StepMethod;
 use crate::tolerances::{EPS, EXPLAINED, MAX_LIE_ORDER, MOST_HALVINGS, TOUCH_DEPTH};
@@ -75,45 +75,45 @@ impl Integrator<'_> {
     /// May the zero that was found be a multiple one? Rounding blurs it, or the function is back above zero at the end of
     /// the step.
     pub(in crate::integrate) fn may_be_multiple(&self, event: &Found) -> bool {
-        let [EventFunction::Surface(_)] = event.functions[..] else {
+        let [Guard::Surface(_)] = event.guards[..] else {
             return false;
         };
         if event.theta > 1.0 {
             return false;
         }
         // Rounding of forces that balance blurs functions of a sliding motion for long: there is no zero to be moved to.
-        if self.detector.blurred {
+        if event.is_blurred {
             return self.motion.sliding.is_empty();
         }
         if self.stepper.in_use() == StepMethod::Taylor {
             return false;
         }
         let mut values = self.motion.monitored.iter().zip(&self.detector.right);
-        values.any(|(m, (value, _))| m.function == event.functions[0] && *value > 0.0)
+        values.any(|(m, (value, _))| m.guard == event.guards[0] && *value > 0.0)
     }
 
-    /// Looks at what lies around a zero of one surface that may be a multiple one, and moves it there. Returns whether it is
-    /// in this step: a zero behind its end is left to the next one.
+    /// Looks at what lies around a zero of one surface that may be a multiple one, and moves it there. A zero behind the end of
+    /// the step is left to the next one.
     #[cold]
     #[inline(never)]
     pub(in crate::integrate) fn resolve_multiple_zero(
         &mut self,
-        event: &mut Found,
+        mut event: Found,
         dt: f64,
-    ) -> Result<bool, FieldError> {
-        let &[function @ EventFunction::Surface(j)] = event.functions.as_slice() else {
-            return Ok(true);
+    ) -> Result<Event, FieldError> {
+        let &[guard @ Guard::Surface(j)] = event.guards.as_slice() else {
+            return Ok(Event::At(event));
         };
         let monitored = &self.motion.monitored;
-        let Some(m) = monitored.iter().find(|m| m.function == function) else {
-            return Ok(true);
+        let Some(m) = monitored.iter().find(|m| m.guard == guard) else {
+            return Ok(Event::At(event));
         };
         // Beside a zero that was just left and is divided out, the function is near zero anyway.
         if m.deflation.is_some() {
-            return Ok(true);
+            return Ok(Event::At(event));
         }
         let (m, theta) = (*m, event.theta);
-        let noise = self.noise_of(function)?;
+        let noise = self.noise_of(&m)?;
         let depth = noise.max(self.depth_of_touches(j, theta)?);
         // Up to where it is clear of zero on both sides.
         let least = 4.0 * EPS * (1.0 + self.t.abs() / dt);
@@ -141,22 +141,26 @@ impl Integrator<'_> {
         };
         if right > noise {
             let zero = self.zero_of(&m, Derivative::Rate, (before, behind), least)?;
-            let Some(vertex) = zero else { return Ok(true) };
+            let Some(vertex) = zero else {
+                return Ok(Event::At(event));
+            };
             if self.along(&m, vertex)?.0 < -depth {
-                return Ok(true);
+                return Ok(Event::At(event));
             }
             (event.theta, event.touch) = (vertex, true);
-            self.detector.depth = depth;
+            event.multiple.depth = depth;
         } else if right < -depth {
             event.touch = false;
         }
         let Some((order, zero)) = self.multiplicity(&m, &blur)? else {
-            return Ok(true);
+            return Ok(Event::At(event));
         };
         if zero > 1.0 {
             // A step that ended below zero would be taken for one behind a crossing.
-            self.detector.uncertain = right < -noise && before > 0.0;
-            return Ok(false);
+            return Ok(match right < -noise && before > 0.0 {
+                true => Event::Shorten(0.5 * dt),
+                false => Event::None,
+            });
         }
         // Errors of the step move a touch along with the extension.
         let is_placed = event.touch && right > noise && order == 2;
@@ -164,11 +168,11 @@ impl Integrator<'_> {
             (event.theta, event.touch) = (zero.max(0.0), order % 2 == 0);
         }
         if event.touch {
-            self.detector.depth = depth;
+            event.multiple.depth = depth;
         }
-        self.detector.blur = noise;
-        self.detector.vanishing = self.vanishing(&m, &blur, order, event.theta)?;
-        Ok(true)
+        event.multiple.blur = noise;
+        event.multiple.vanishing = self.vanishing(&m, &blur, order, event.theta)?;
+        Ok(Event::At(event))
     }
 
     /// The order of the zero in a blur and where it is, if it is a multiple one: the first order whose derivative alone

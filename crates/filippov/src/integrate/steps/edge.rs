@@ -4,8 +4,8 @@
 use crate::error::FieldError;
 use crate::event::isolate::Bracket;
 use crate::event::locate::refine;
-use crate::event::{EventFunction, Found, Monitored};
-use crate::field::{ModeField, SmoothField};
+use crate::event::{Found, Monitored};
+use crate::field::{Guard, ModeField, SmoothField};
 use crate::integrate::integrator::Integrator;
 use crate::status::{Warning, WarningCode};
 use crate::stepper::Attempt;
@@ -46,8 +46,8 @@ impl Integrator<'_> {
     }
 
     /// After a step whose events could not be decided.
-    pub(in crate::integrate) fn halve_step(&mut self, dt: f64) {
-        self.dt = 0.5 * dt;
+    pub(in crate::integrate) fn shorten_step(&mut self, dt: f64) {
+        self.dt = dt;
         self.one_sided = true;
         self.controller.not_finite();
     }
@@ -63,7 +63,7 @@ impl Integrator<'_> {
     pub(in crate::integrate) fn arrival_at_edge(&mut self) -> Result<Option<Found>, FieldError> {
         let mut gradient = vec![0.0; self.x.len()];
         for m in &self.motion.monitored {
-            let EventFunction::Surface(j) = m.function else {
+            let Guard::Surface(j) = m.guard else {
                 continue;
             };
             let signs = &self.motion.signs;
@@ -71,11 +71,7 @@ impl Integrator<'_> {
                 .gradient(j, self.t, &self.x, signs, &mut gradient)?;
             let tolerance = self.scale.along(&gradient, &self.x);
             if m.rate < 0.0 && m.value <= ARRIVED * tolerance {
-                return Ok(Some(Found {
-                    theta: 0.0,
-                    functions: smallvec::smallvec![m.function],
-                    touch: false,
-                }));
+                return Ok(Some(Found::here(smallvec::smallvec![m.guard])));
             }
         }
         Ok(None)
@@ -138,7 +134,7 @@ impl Integrator<'_> {
         };
         let mut longest = dt;
         for m in &self.motion.monitored {
-            let EventFunction::Surface(j) = m.function else {
+            let Guard::Surface(j) = m.guard else {
                 continue;
             };
             if m.deflation.is_some() || m.value <= 0.0 {
@@ -181,18 +177,16 @@ impl Integrator<'_> {
         let Some(midpoint) = &mut self.stepper.midpoint else {
             return Ok(Attempt::NotFinite);
         };
-        let stages = &mut self.detector.stages;
-        let observe = |number: usize, field: &ModeField| {
-            for (exit, value) in stages.iter_mut().zip(field.last_exits()) {
-                match number {
-                    6 => exit[6] = value,
-                    _ => exit[1..6].fill(value),
-                }
-            }
-        };
         // On a surface the field is there at the end too, which is projected onto it.
         let evaluates_end = !matches!(self.motion.field, ModeField::Region(_));
         let field = (&mut self.motion.field, evaluates_end);
-        midpoint.attempt(field, observe, self.t, &self.x, dt, &self.scale)
+        midpoint.attempt(
+            field,
+            self.detector.observer(),
+            self.t,
+            &self.x,
+            dt,
+            &self.scale,
+        )
     }
 }

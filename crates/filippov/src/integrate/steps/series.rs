@@ -1,7 +1,7 @@
 //! Steps by Taylor series.
 
 use crate::error::FieldError;
-use crate::event::Monitored;
+use crate::event::Seen;
 use crate::field::ModeField;
 use crate::integrate::integrator::Integrator;
 use crate::integrate::motion::Motion;
@@ -115,7 +115,7 @@ impl Integrator<'_> {
             None if taylor.is_expanded() => return Ok(()),
             None => {
                 let (system, t, x) = (self.system, self.t, &self.x);
-                let signs = multipliers_in(&self.motion, &self.detector.stages);
+                let signs = multipliers_in(&self.motion, &self.detector.seen);
                 let signs = signs.as_deref().unwrap_or(&self.motion.signs);
                 let fill = |rows: &mut [f64]| system.eval_jets(jets, t, x, signs, rows);
                 let allowed = taylor.expand(jets.width(), x, &self.scale, fill);
@@ -249,66 +249,19 @@ impl Integrator<'_> {
         };
         let field = &mut self.motion.field;
         let attempt = taylor.attempt(field, self.t, &self.x, dt, &self.scale)?;
-        let exits = self.detector.stages.iter_mut();
-        for (stages, exit) in exits.zip(self.motion.field.last_exits()) {
-            stages[1..].fill(exit);
-        }
+        self.detector.observer()(&self.motion.field);
         Ok(attempt)
-    }
-
-    /// Coefficients of the step.
-    pub(in crate::integrate) fn n_rows(&self) -> usize {
-        self.stepper.interpolant().coefficients().len() / self.x.len()
-    }
-
-    /// An exit function along the step, as far as its series describes it, into `rows`; `false` if there is none.
-    pub(in crate::integrate) fn exit_series(&self, m: &Monitored, rows: &mut [f64]) -> bool {
-        let place = m.function.exit_index().and_then(|index| {
-            let jets = self.motion.jets.as_ref()?;
-            jets.exit(index)
-        });
-        let (Some(place), Some(taylor)) = (place, &self.stepper.taylor) else {
-            return false;
-        };
-        taylor.column(place, rows);
-        let own = |slack: &&(usize, f64)| m.function.exit_index() == Some(slack.0);
-        rows[0] += self.slacks.iter().find(own).map_or(0.0, |slack| slack.1);
-        true
-    }
-
-    /// An affine switching function along the step, positive inside of the mode, into `rows`.
-    ///
-    /// # Errors
-    /// If a function of the user raises.
-    pub(in crate::integrate) fn affine_series(
-        &self,
-        j: usize,
-        m: &Monitored,
-        dt: f64,
-        rows: &mut [f64],
-    ) -> Result<(), FieldError> {
-        let extension = self.stepper.interpolant().coefficients();
-        let (point, signs) = ((self.t, &self.x[..]), &self.motion.signs);
-        let ht = self
-            .system
-            .gradient_products(j, point, signs, extension, rows)?;
-        if m.orientation < 0.0 {
-            rows.iter_mut().for_each(|row| *row = -*row);
-        }
-        rows[0] = m.value;
-        rows[1] += m.orientation * ht * dt;
-        Ok(())
     }
 }
 
 /// The signs of sliding on several surfaces, with the multipliers at the start of the step in their places.
-fn multipliers_in(motion: &Motion, stages: &[[f64; 7]]) -> Option<Signs> {
+fn multipliers_in(motion: &Motion, seen: &[Seen]) -> Option<Signs> {
     let ModeField::Intersection(_) = motion.field else {
         return None;
     };
     let mut signs = motion.signs.clone();
-    for (pair, &j) in stages.chunks_exact(2).zip(motion.sliding()) {
-        signs[j] = 0.5 * (pair[0][0] - pair[1][0]);
+    for (pair, &j) in seen.chunks_exact(2).zip(motion.sliding()) {
+        signs[j] = 0.5 * (pair[0].start - pair[1].start);
     }
     Some(signs)
 }

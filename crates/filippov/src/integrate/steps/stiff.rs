@@ -175,13 +175,7 @@ impl Integrator<'_> {
             self.stepper.go_on_with(StepMethod::Dopri5);
             return self.attempt_explicit(dt);
         }
-        let stages = &mut self.detector.stages;
-        let observe = |stage: usize, field: &crate::field::ModeField| {
-            for (exit, value) in stages.iter_mut().zip(field.last_exits()) {
-                exit[stage] = value;
-            }
-        };
-        let field = &mut self.motion.field;
+        let (field, observe) = (&mut self.motion.field, self.detector.observer());
         let attempt = rodas5p.attempt(field, observe, self.t, &self.x, dt, &self.scale)?;
         let is_beside = rodas5p.linearisation().is_exact() && !self.motion.is_straight;
         if attempt == Attempt::NotFinite && is_beside {

@@ -81,7 +81,7 @@ fn steps_have_local_order_nine_and_their_extension_eight() {
             .unwrap();
         let scale = ErrorScale::new(1e-2, &[1e-2], 1);
         let attempt = stepper
-            .attempt(&mut Decay, |_, _| {}, t, &y, dt, &scale)
+            .attempt(&mut Decay, |_| {}, t, &y, dt, &scale)
             .unwrap();
         assert!(matches!(attempt, Attempt::Error(error) if error <= 1.0));
         [0.4, 1.0].map(|theta| {

@@ -174,7 +174,7 @@ fn step(field: &mut Decay, stepper: &mut Rodas5p, t: f64, y: &[f64], dt: f64) ->
     })));
     assert!(stepper.factor(dt));
     let scale = ErrorScale::new(1e-6, &[1e-6], 1);
-    let attempt = stepper.attempt(field, |_, _| {}, t, y, dt, &scale).unwrap();
+    let attempt = stepper.attempt(field, |_| {}, t, y, dt, &scale).unwrap();
     assert!(matches!(attempt, Attempt::Error(_)));
     stepper.step().end[0]
 }
