@@ -23,9 +23,9 @@ use crate::mode::Mode;
 const LIST: [(Rule, Apply); 9] = [
     (Rule::Region, region),
     (Rule::Touch, touch),
+    (Rule::Limit, stay_at_limit),
     (Rule::Entangled, decide_if_entangled),
     (Rule::OneSurface, one_surface),
-    (Rule::Limit, stay_at_limit),
     (Rule::Law, leave_by_rule),
     (Rule::Relay, decide_by_relay),
     (Rule::Germs, decide_if_doubtful),

@@ -22,14 +22,18 @@ pub(super) fn decide_if_entangled(
     notes: &mut Notes,
     meeting: &Meeting,
 ) -> Result<Option<Decided>, FieldError> {
-    if !(1..=MOST_MEETING).contains(&meeting.surfaces.len()) {
+    if !(1..=MOST_MEETING).contains(&meeting.surfaces.len()) || slides_by_rule(at.arrival) {
         return Ok(None);
     }
     let wider = with_those_that_jump(at, notes, meeting)?;
-    let is_entangled =
-        wider.is_some() || is_parallel(at, notes, meeting)? || is_silent(at, notes, meeting)?;
-    if !is_entangled || slides_by_rule(at.arrival) {
-        return Ok(None);
+    if wider.is_none() {
+        // To rounding, surfaces that touch are one, and the rules for surfaces that cross may still apply.
+        if is_parallel(at, notes, meeting)? {
+            return Ok(decide_by_germs(at, notes, meeting)?.ok());
+        }
+        if !is_silent(at, notes, meeting)? {
+            return Ok(None);
+        }
     }
     let surfaces = wider.unwrap_or_else(|| meeting.surfaces.to_vec());
     let meeting = &Meeting {
