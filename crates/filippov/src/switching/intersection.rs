@@ -1,6 +1,6 @@
 //! The decision where several surfaces meet, as far as codimension 1 answers it.
 
-use super::codim2::Bilinear;
+use super::bilinear::Bilinear;
 use super::lie::{first_nonzero, normal_component, Leading};
 use super::normal_fields::NormalFields;
 use super::patience::Patience;

@@ -4,14 +4,14 @@
 //! functions that vanish there; they return data. First-order data decide; where they vanish, the
 //! first Lie derivative that does not.
 
-mod accumulation;
+mod bilinear;
 mod codim1;
-pub mod codim2;
 mod enclosed_root;
 mod fold;
 mod hidden;
 mod incoming;
 mod intersection;
+mod lap;
 mod lie;
 mod normal_fields;
 mod p_matrix;
@@ -24,12 +24,11 @@ mod resolution;
 mod resolve;
 mod roots;
 mod shared_load;
-mod single;
 mod small_matrix;
 mod stability;
 mod stick;
 
-pub use accumulation::{accumulate, Accumulation, Return};
+pub use bilinear::{Bilinear, Root};
 pub use codim1::{decide, weight_at_two_fold, Arrival, Decision, TwoFoldMotion};
 pub use enclosed_root::{enclose_root, EnclosedRoot, IntervalVector, RootBounds};
 pub use fold::{merged_root, MergedRoot};
@@ -39,6 +38,7 @@ pub use hidden::{
 };
 pub use incoming::{ExitKind, Incoming};
 pub use intersection::{decide_intersection, region_at_rest, IntersectionDecision};
+pub use lap::Lap;
 pub use lie::{first_nonzero, normal_component, Leading};
 pub use normal_fields::{NormalFields, SignGroup};
 pub use p_matrix::is_p_matrix;

@@ -167,25 +167,11 @@ impl NormalFields {
 
     /// The least and the largest component normal to surface j, over all patterns, and so over the cube.
     pub fn row_range(&self, j: usize) -> [f64; 2] {
-        self.range_over(j, |_, _| true)
-    }
-
-    /// The same over the patterns of one side of surface j.
-    pub fn side_range(&self, j: usize, side: i8) -> [f64; 2] {
-        self.range_over(j, |group, pattern| {
-            let bit = group.members.iter().position(|&member| member == j);
-            bit.is_none_or(|bit| (pattern >> bit & 1 == 1) == (side > 0))
-        })
-    }
-
-    fn range_over(&self, j: usize, counts: impl Fn(&SignGroup, usize) -> bool) -> [f64; 2] {
         let ranges = self.groups.iter().map(|group| {
-            let row = group.values.iter().skip(j).step_by(self.m).enumerate();
-            let row = row.filter(|&(pattern, _)| counts(group, pattern));
-            row.fold(
-                [f64::INFINITY, f64::NEG_INFINITY],
-                |[low, high], (_, &v)| [low.min(v), high.max(v)],
-            )
+            let row = group.values.iter().skip(j).step_by(self.m);
+            row.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &v| {
+                [low.min(v), high.max(v)]
+            })
         });
         ranges.fold([0.0; 2], |[low, high], [l, h]| [low + l, high + h])
     }
@@ -265,13 +251,13 @@ impl NormalFields {
     /// The fields with the components of surface j multiplied by `factors[j]`: another scaling of h_j.
     #[must_use]
     pub fn scaled(&self, factors: &[f64]) -> NormalFields {
-        self.map(|_, j, value| factors[j] * value)
+        self.map(|_, _, j, value| factors[j] * value)
     }
 
     /// The fields with `by[j]` added to all components of surface j: what a short time makes of them.
     #[must_use]
     pub fn shifted(&self, by: &[f64]) -> NormalFields {
-        self.map(|group, j, value| if group == 0 { value + by[j] } else { value })
+        self.map(|group, _, j, value| if group == 0 { value + by[j] } else { value })
     }
 
     /// Is g affine in lambda, up to rounding? So it is where each sign enters the field by a term of
@@ -328,12 +314,15 @@ impl NormalFields {
         enlarged
     }
 
-    /// Changes every value: `change(group, surface, value)`.
-    pub(super) fn map(&self, mut change: impl FnMut(usize, usize, f64) -> f64) -> NormalFields {
+    /// Changes every value: `change(group, pattern, surface, value)`.
+    pub(super) fn map(
+        &self,
+        mut change: impl FnMut(usize, usize, usize, f64) -> f64,
+    ) -> NormalFields {
         let mut mapped = self.clone();
         for (index, group) in mapped.groups.iter_mut().enumerate() {
             for (i, value) in group.values.iter_mut().enumerate() {
-                *value = change(index, i % self.m, *value);
+                *value = change(index, i / self.m, i % self.m, *value);
             }
         }
         mapped
@@ -412,7 +401,7 @@ mod tests {
     use super::{NormalFields, SignGroup};
 
     #[test]
-    fn ranges_of_one_side_are_those_of_its_patterns() {
+    fn ranges_are_those_of_the_patterns() {
         let group = |members: &[usize], seed: usize| SignGroup {
             members: members.to_vec(),
             values: (0..3 << members.len())
@@ -421,22 +410,10 @@ mod tests {
         };
         let fields = NormalFields::of_groups(3, vec![group(&[0, 2], 1), group(&[1], 2)]).unwrap();
         for j in 0..3 {
-            let on = |side: Option<usize>| {
-                let counts = |k: &usize| side.is_none_or(|side| k >> j & 1 == side);
-                let patterns = (0..8).filter(counts);
-                let values: Vec<f64> = patterns.map(|k| fields.at(k)[j]).collect();
-                let least = values.iter().copied().fold(f64::INFINITY, f64::min);
-                [
-                    least,
-                    values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
-                ]
-            };
-            let close = |a: [f64; 2], b: [f64; 2]| {
-                (a[0] - b[0]).abs() < 1e-15 && (a[1] - b[1]).abs() < 1e-15
-            };
-            assert!(close(fields.row_range(j), on(None)));
-            assert!(close(fields.side_range(j, -1), on(Some(0))));
-            assert!(close(fields.side_range(j, 1), on(Some(1))));
+            let values = || (0..8).map(|k| fields.at(k)[j]);
+            let [low, high] = fields.row_range(j);
+            assert!((low - values().fold(f64::INFINITY, f64::min)).abs() < 1e-15);
+            assert!((high - values().fold(f64::NEG_INFINITY, f64::max)).abs() < 1e-15);
         }
     }
 }

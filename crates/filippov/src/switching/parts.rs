@@ -201,11 +201,11 @@ fn unchanged(
 /// The decisions of all parts as one. Of many combinations of candidates those are listed that differ from the
 /// chosen one in a single part. `None` if the motion spirals in one part: around two of more surfaces.
 fn joined(m: usize, parts: &[Vec<usize>], decided: &[Resolution]) -> Option<Resolution> {
-    let chosen: Vec<Option<&Continuation>> = decided.iter().map(|d| d.chosen.as_ref()).collect();
-    let combine = |picked: &[Option<&Continuation>]| -> Option<Continuation> {
+    let chosen: Vec<&Continuation> = decided.iter().map(|d| &d.chosen).collect();
+    let combine = |picked: &[&Continuation]| -> Option<Continuation> {
         let mut entries = vec![0; m];
         for (part, continuation) in parts.iter().zip(picked) {
-            let mode = continuation.and_then(Continuation::as_mode)?;
+            let mode = continuation.as_mode()?;
             for (&i, &entry) in part.iter().zip(mode.entries()) {
                 entries[i] = entry;
             }
@@ -223,7 +223,7 @@ fn joined(m: usize, parts: &[Vec<usize>], decided: &[Resolution]) -> Option<Reso
         for base in bases {
             for candidate in &resolution.candidates {
                 let mut other = base.clone();
-                other[index] = Some(candidate);
+                other[index] = candidate;
                 if !picked.contains(&other) {
                     picked.push(other);
                 }
@@ -232,7 +232,7 @@ fn joined(m: usize, parts: &[Vec<usize>], decided: &[Resolution]) -> Option<Reso
     }
     let leading = decided.iter().find(|d| !d.leaf.is_empty());
     let leaf = leading.map_or("hidden/sliding", |d| d.leaf);
-    let mut whole = Resolution::among(leaf, Some(combine(&chosen)?), Vec::new());
+    let mut whole = Resolution::sure(leaf, combine(&chosen)?);
     whole.unique = decided.iter().all(|d| d.unique);
     whole.add_candidates(&picked.iter().filter_map(|p| combine(p)).collect::<Vec<_>>());
     whole.oscillates = decided.iter().any(|d| d.oscillates);

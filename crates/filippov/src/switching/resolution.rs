@@ -9,7 +9,7 @@ pub enum Continuation {
     /// In this mode; one entry per surface of the intersection, in their order.
     Mode(Mode),
     /// It winds around the intersection of two surfaces, further out with each lap, without any mode
-    /// of its own near to it (`codim2::Lap::outward` starts it).
+    /// of its own near to it ([`super::Lap`]).
     OutwardSpiral,
 }
 
@@ -31,18 +31,16 @@ impl Continuation {
 /// The decision at an intersection: the common currency of all rules for two and more surfaces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Resolution {
-    /// The leaf of the decision tree, or the kind of outcome of the hidden dynamics
-    /// (`docs/theory/intersections.md` lists them).
+    /// `only`, or the kind of outcome of the hidden dynamics (`docs/theory/intersections.md` lists them).
     pub leaf: &'static str,
-    /// What follows. `None` only from a tree whose leaf has two solutions that are equally good; then
-    /// [`super::resolve`] has the hidden dynamics choose, and never returns `None`.
-    pub chosen: Option<Continuation>,
+    /// What follows.
+    pub chosen: Continuation,
     /// lambda of the surfaces that the chosen mode slides on, in their order.
     pub multipliers: Vec<f64>,
-    /// Is the outcome the same for all scalings of the surfaces? For two surfaces by proof, for more by
-    /// trial, except where the fields are affine in the signs.
+    /// Is there no other candidate?
     pub unique: bool,
-    /// All outcomes that occur for some scaling; the chosen one among them.
+    /// The chosen continuation, and all others that are possible: of one and two surfaces those that attract, except
+    /// where the root that is left decides which of them follows; of more those that a trial of scalings finds.
     pub candidates: Vec<Continuation>,
     /// Does the hidden dynamics go around the root instead of coming to rest in it? The regularised
     /// motion then oscillates within the intersection, and the multipliers are those of the root.
@@ -57,24 +55,14 @@ pub struct Resolution {
 }
 
 impl Resolution {
-    /// A decision that does not depend on the scaling.
+    /// A decision with one candidate.
     pub(super) fn sure(leaf: &'static str, chosen: Continuation) -> Self {
-        let candidates = vec![chosen.clone()];
-        Resolution::among(leaf, Some(chosen), candidates)
-    }
-
-    /// A decision whose outcome is one of several.
-    pub(super) fn among(
-        leaf: &'static str,
-        chosen: Option<Continuation>,
-        candidates: Vec<Continuation>,
-    ) -> Self {
         Resolution {
             leaf,
+            candidates: vec![chosen.clone()],
             chosen,
             multipliers: Vec::new(),
-            unique: candidates.len() == 1,
-            candidates,
+            unique: true,
             oscillates: false,
             margin: f64::INFINITY,
             degenerate: false,
@@ -82,9 +70,9 @@ impl Resolution {
         }
     }
 
-    /// The chosen mode, if there is one.
+    /// The chosen mode, unless the motion spirals.
     pub fn mode(&self) -> Option<&Mode> {
-        self.chosen.as_ref().and_then(Continuation::as_mode)
+        self.chosen.as_mode()
     }
 
     /// Adds the candidates of another decision, each once.
@@ -207,36 +195,5 @@ impl Undecided {
             },
             other => other,
         }
-    }
-}
-
-/// The signs of the quantities that a decision rests on, with the smallest of them.
-#[derive(Debug)]
-pub(super) struct Signs {
-    smallest: f64,
-}
-
-impl Signs {
-    pub(super) fn new() -> Self {
-        Signs {
-            smallest: f64::INFINITY,
-        }
-    }
-
-    /// Is this quantity, of size about 1, positive?
-    pub(super) fn positive(&mut self, value: f64) -> bool {
-        self.smallest = self.smallest.min(value.abs());
-        value > 0.0
-    }
-
-    /// Is this quantity, of size about 1, negative?
-    pub(super) fn negative(&mut self, value: f64) -> bool {
-        self.positive(-value)
-    }
-
-    /// The decision with the margin that its signs had.
-    pub(super) fn settle(&self, mut resolution: Resolution) -> Resolution {
-        resolution.margin = self.smallest;
-        resolution
     }
 }

@@ -1,6 +1,6 @@
 //! Roots of the sliding equations g(lambda) = 0: all of them in the cube, one by Newton's method.
 
-use super::codim2::Bilinear;
+use super::bilinear::Bilinear;
 use super::normal_fields::{NormalFields, SignGroup};
 use super::patience::Patience;
 use super::small_matrix::Matrix;

@@ -21,6 +21,7 @@ mod returns;
 mod space;
 mod strip;
 
+pub(super) use admissible::attracting;
 pub use admissible::{admissible, admissible_within, Admissible};
 
 use super::normal_fields::NormalFields;

@@ -5,7 +5,7 @@ use super::cell::{Cell, StepEnd};
 use super::first_zero::{first_loss, value};
 use super::strip::{Strip, StripEnd};
 use super::{line, plane, space, Outcome};
-use crate::switching::codim2::Bilinear;
+use crate::switching::bilinear::Bilinear;
 use crate::switching::patience::Patience;
 use crate::switching::NormalFields;
 
