@@ -1,11 +1,11 @@
 //! How a motion comes to an intersection, and where its hidden dynamics starts.
 
-use super::bilinear::Bilinear;
-use super::fold::merged_root;
-use super::normal_fields::NormalFields;
-use super::patience::Patience;
-use super::resolution::Undecided;
-use super::roots::{multiplier_rates, newton, stable_roots_within};
+use crate::cube::merged_root;
+use crate::cube::Bilinear;
+use crate::cube::NormalFields;
+use crate::cube::{multiplier_rates, newton, stable_roots_within};
+use crate::error::Undecided;
+use crate::patience::Patience;
 use crate::tolerances::{AFTER_THE_EXIT, AT_SIDE, CORNER_OFFSETS, UNSTABLE_START};
 
 /// What the motion did before.

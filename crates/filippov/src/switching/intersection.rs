@@ -1,12 +1,12 @@
 //! The decision where several surfaces meet, as far as codimension 1 answers it.
 
-use super::bilinear::Bilinear;
 use super::lie::{first_nonzero, normal_component, Leading};
-use super::normal_fields::NormalFields;
-use super::patience::Patience;
+use crate::cube::Bilinear;
+use crate::cube::NormalFields;
 use crate::error::FieldError;
 use crate::field::MeetingFields;
 use crate::mode::Mode;
+use crate::patience::Patience;
 use crate::system::PiecewiseSystem;
 use crate::tolerances::{AT_SIDE, TANGENT};
 

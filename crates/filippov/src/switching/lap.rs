@@ -1,6 +1,6 @@
 //! Motion that winds around an intersection of two surfaces.
 
-use super::normal_fields::NormalFields;
+use crate::cube::NormalFields;
 
 /// One lap around the intersection under constant fields, through all four regions.
 ///

@@ -5,13 +5,14 @@
 //! the parts, and two surfaces among many still have their trees.
 
 use super::incoming::{ExitKind, Incoming};
-use super::normal_fields::{NormalFields, SignGroup};
-use super::patience::Patience;
-use super::resolution::{Continuation, Resolution, Undecided};
+use super::resolution::{Continuation, Resolution};
 use super::resolve::resolve_within;
-use super::roots::{newton, stable_roots_within};
-use super::stability::stability_margins;
+use crate::cube::stability_margins;
+use crate::cube::{newton, stable_roots_within};
+use crate::cube::{NormalFields, SignGroup};
+use crate::error::Undecided;
 use crate::mode::Mode;
+use crate::patience::Patience;
 use crate::tolerances::{AT_SIDE, EPS, MOST_COMBINED};
 
 /// The surfaces in parts that do not know of each other, each increasing.

@@ -1,14 +1,15 @@
 //! The decision at an intersection, whatever came before and however many surfaces meet.
 
-use super::bilinear::Bilinear;
 use super::hidden::{attracting, limit_within, Outcome};
 use super::incoming::{ExitKind, Incoming};
-use super::normal_fields::NormalFields;
 use super::parts::{independent_parts, resolve_parts};
-use super::patience::Patience;
-use super::resolution::{Continuation, Resolution, Undecided};
-use super::roots::{newton, stable_roots_within};
-use super::stability::{is_negative_p_matrix, is_stable_for};
+use super::resolution::{Continuation, Resolution};
+use crate::cube::Bilinear;
+use crate::cube::NormalFields;
+use crate::cube::{is_negative_p_matrix, is_stable_for};
+use crate::cube::{newton, stable_roots_within};
+use crate::error::Undecided;
+use crate::patience::Patience;
 use crate::tolerances::{
     AFTER_THE_EXIT, DOUBTFUL, MOST_MEETING, MOST_SCALED_SINGLY, UNSTABLE_START,
 };

@@ -1,11 +1,11 @@
 //! All modes in which a motion can leave an intersection, or stay on it.
 
-use crate::switching::bilinear::Bilinear;
+use crate::cube::stable_roots_within;
+use crate::cube::Bilinear;
+use crate::cube::NormalFields;
+use crate::patience::Patience;
 use crate::switching::lap::Lap;
-use crate::switching::normal_fields::NormalFields;
-use crate::switching::patience::Patience;
 use crate::switching::resolution::Continuation;
-use crate::switching::roots::stable_roots_within;
 
 /// A continuation that is possible without regard to the past.
 #[derive(Clone, Debug, PartialEq)]

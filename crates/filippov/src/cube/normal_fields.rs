@@ -2,8 +2,8 @@
 
 use std::borrow::Cow;
 
-use super::resolution::Undecided;
 use super::small_matrix::Matrix;
+use crate::error::Undecided;
 use crate::tolerances::MOST_MEETING;
 
 /// The normal components f_j^k = dh_j/dt along f^k of the m surfaces that meet, for all 2^m sign
@@ -63,7 +63,7 @@ impl NormalFields {
     ///
     /// # Example
     /// ```
-    /// use filippov::switching::{NormalFields, SignGroup};
+    /// use filippov::cube::{NormalFields, SignGroup};
     ///
     /// // g = (1 - 2 x, 3 - y, -z): three surfaces that do not know of each other.
     /// let group = |i: usize, minus: f64, plus: f64| {
@@ -201,7 +201,7 @@ impl NormalFields {
     }
 
     /// The derivative of g by lambda_p: a column of G.
-    pub(super) fn derivative(&self, lambda: &[f64], p: usize) -> Vec<f64> {
+    pub(crate) fn derivative(&self, lambda: &[f64], p: usize) -> Vec<f64> {
         let mut column = vec![0.0; self.m];
         let own = self.groups.iter().find(|group| group.members.contains(&p));
         if let Some(group) = own {
@@ -315,7 +315,7 @@ impl NormalFields {
     }
 
     /// Changes every value: `change(group, pattern, surface, value)`.
-    pub(super) fn map(
+    pub(crate) fn map(
         &self,
         mut change: impl FnMut(usize, usize, usize, f64) -> f64,
     ) -> NormalFields {
@@ -329,7 +329,7 @@ impl NormalFields {
     }
 
     /// Other surfaces with these groups.
-    pub(super) fn with_groups(&self, m: usize, groups: Vec<SignGroup>) -> NormalFields {
+    pub(crate) fn with_groups(&self, m: usize, groups: Vec<SignGroup>) -> NormalFields {
         NormalFields { m, groups }.with_few_joined()
     }
 
@@ -351,12 +351,12 @@ impl NormalFields {
 
 impl SignGroup {
     /// The share of the m components at one pattern.
-    pub(super) fn at(&self, pattern: usize, m: usize) -> &[f64] {
+    pub(crate) fn at(&self, pattern: usize, m: usize) -> &[f64] {
         &self.values[pattern * m..(pattern + 1) * m]
     }
 
     /// The number of the pattern with these signs of all surfaces; a zero entry leaves its bit unset.
-    pub(super) fn pattern_of(&self, signs: &[i8]) -> usize {
+    pub(crate) fn pattern_of(&self, signs: &[i8]) -> usize {
         let bits = self.members.iter().enumerate();
         bits.fold(0, |pattern, (bit, &i)| {
             pattern | usize::from(signs[i] > 0) << bit
