@@ -114,7 +114,7 @@ fn trees_and_hidden_dynamics_agree() {
         let start = entry_state(&fields, mode);
         tally.note(&leaf, &fields, start, [1.0, random.ratio(1.5)]);
     }
-    let mut exits = |n: usize, make: fn(&mut Random) -> Exit, decide: Leave| {
+    let mut exits = |n: usize, make: Make, decide: Leave| {
         for _ in 0..n {
             let exit = make(&mut random);
             let leaf = decide(&Corners::new(&exit.at), exit.root).unwrap();
@@ -139,7 +139,7 @@ fn trees_and_selection_agree() {
         let leaf = enter(&Corners::new(&fields), mode).unwrap();
         selection_agrees(&leaf, &fields, &face(mode), [1.0, random.ratio(1.5)]);
     }
-    let kinds: [(ExitKind, fn(&mut Random) -> Exit, Leave); 3] = [
+    let kinds: [(ExitKind, Make, Leave); 3] = [
         (ExitKind::Side, exit_side, leave_at_side),
         (ExitKind::Fold, exit_fold, leave_at_fold),
         (ExitKind::Stability, exit_stability, leave_where_unstable),
@@ -200,6 +200,7 @@ fn face(mode: [i8; 2]) -> Incoming {
     }
 }
 
+type Make = fn(&mut Random) -> Exit;
 type Leave = fn(&Corners, [f64; 2]) -> Result<Leaf, Refused>;
 
 /// Both outcomes of an ambiguous entry occur, one for each extreme of the scaling.

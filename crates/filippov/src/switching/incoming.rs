@@ -305,7 +305,7 @@ fn exit_state(
         ExitKind::Stability => {
             let along = |n: usize| {
                 let mut axis = vec![0.0; lambda.len()];
-                axis[n / 2] = if n % 2 == 0 { 1.0 } else { -1.0 };
+                axis[n / 2] = if n.is_multiple_of(2) { 1.0 } else { -1.0 };
                 displaced(lambda, &axis)
             };
             (0..2 * lambda.len()).map(along).collect()

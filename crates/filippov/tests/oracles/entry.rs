@@ -55,11 +55,11 @@ fn normal_frame(corners: &Corners, mode: [i8; 2]) -> Result<(Frame, Corners, f64
     if !(minus[0] > 0.0 && plus[0] < 0.0) {
         return Err(Refused::NotArriving(usize::from(frame.exchange)));
     }
-    if !(minus[0] * plus[1] - plus[0] * minus[1] > 0.0) {
+    if minus[0] * plus[1] - plus[0] * minus[1] <= 0.0 {
         return Err(Refused::NotArriving(usize::from(!frame.exchange)));
     }
     let [left, right] = [seen.at([-1, 1])[0], seen.at([1, 1])[0]];
-    frame.reflect[0] = !(left * plus[0] - right * minus[0] > 0.0);
+    frame.reflect[0] = left * plus[0] - right * minus[0] <= 0.0;
     let seen = frame.corners(corners);
     let [minus, plus] = [seen.at([-1, -1])[0], seen.at([1, -1])[0]];
     Ok((frame, seen, (minus + plus) / (minus - plus)))
@@ -135,7 +135,7 @@ impl Entry {
     fn has_barrier(&self) -> bool {
         let bottom = self.bilinear.value([self.x0, -1.0])[1];
         let top = self.bilinear.value([self.x0, 1.0])[1];
-        if !(top < 0.0) {
+        if top >= 0.0 {
             return false;
         }
         let height = (bottom + top) / (bottom - top);
