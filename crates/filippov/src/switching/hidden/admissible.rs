@@ -45,14 +45,15 @@ pub(in crate::switching) fn attracting(
     let (mut found, mut margin) = (Vec::new(), f64::INFINITY);
     let mut mode = vec![-1_i8; fields.m()];
     loop {
-        let face = fields.restrict(&mode);
-        let (roots, slides) = match face.m() {
-            0 => (vec![Vec::new()], f64::INFINITY),
-            1 | 2 => {
-                let slides = root_margin(fields, &mode, &face);
-                (stable_roots_within(&face, patience), slides)
-            }
-            _ => (stable_roots_within(&face, patience), f64::INFINITY),
+        let (roots, slides) = if mode.contains(&0) {
+            let face = fields.restrict(&mode);
+            let slides = match face.m() {
+                1 | 2 => root_margin(fields, &mode, &face),
+                _ => f64::INFINITY,
+            };
+            (stable_roots_within(&face, patience), slides)
+        } else {
+            (vec![Vec::new()], f64::INFINITY)
         };
         let fails = roots.is_empty().then_some(slides);
         margin = margin.min(fails.map_or(f64::INFINITY, f64::abs));
