@@ -53,8 +53,10 @@ class Classification:
     rule : str
         The rule that decided, as in the column ``rule`` of ``sol.switches``.
     leaf : str
-        Which part of the rule ``first_order`` decided at an intersection: ``start/only``, ``start/several``,
-        ``higher-order``, or ``rest`` of a region at rest; otherwise empty.
+        Which part of the rule ``first_order`` decided at an intersection: ``only`` if one continuation
+        attracts; if several do, ``hidden/classical``, ``hidden/sliding``, ``hidden/oscillation`` or
+        ``hidden/spiral``, for what the hidden dynamics tends to; ``germs`` if first-order data do not decide;
+        otherwise empty.
     reason : str
         Why there is no decision; empty if there is one.
     normal_components : ndarray, shape (2, ..., 2, m)

@@ -2,6 +2,8 @@
 
 use std::any::Any;
 
+use crate::tolerances::MOST_IN_LOOP;
+
 /// Why a run could not be started.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
@@ -73,5 +75,121 @@ impl FieldError {
     /// Wraps the payload of an exception.
     pub fn new(payload: impl Any + Send) -> Self {
         FieldError(Box::new(payload))
+    }
+}
+
+/// Why there is no decision: one variant per cause.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Undecided {
+    /// The caller has waited long enough.
+    #[error("the decision was interrupted")]
+    Interrupted,
+    /// The number of values does not fit the number of surfaces.
+    #[error("{found} normal components do not fit {m} surfaces: each group needs m * 2^(its surfaces), of which it may have 6")]
+    Shape {
+        /// The number of surfaces.
+        m: usize,
+        /// The number of values.
+        found: usize,
+    },
+    /// The signs of too many surfaces multiply one another.
+    #[error("the signs of {n} of the surfaces that meet multiply one another in the field; at most 6 may")]
+    TooMany {
+        /// How many.
+        n: usize,
+    },
+    /// Too many redundant contacts share one load.
+    #[error(
+        "{n} contacts close loops with one another and share one load; at most {MOST_IN_LOOP} may"
+    )]
+    TooRedundant {
+        /// How many.
+        n: usize,
+    },
+    /// The motion before is given for another number of surfaces, or a region by a mode with zeros.
+    #[error("the motion before does not fit the {m} surfaces that meet")]
+    IncomingShape {
+        /// The number of surfaces.
+        m: usize,
+    },
+    /// The scaling is not one positive number per surface.
+    #[error("kappa must have {m} positive entries")]
+    Scaling {
+        /// The number of surfaces.
+        m: usize,
+    },
+    /// A normal component is not finite.
+    #[error("a normal component is not finite; look at the fields at this point")]
+    NotFinite,
+    /// No field has a component normal to a surface.
+    #[error("all fields are tangent to surface {surface} of the intersection; first-order data do not decide")]
+    Tangent {
+        /// The surface, counted within the intersection.
+        surface: usize,
+    },
+    /// The normal components of both surfaces are proportional.
+    #[error("the normal components of both surfaces are proportional: are they the same surface?")]
+    Proportional,
+    /// The motion before does not arrive at the intersection.
+    #[error("the motion before does not arrive at surface {surface} of the intersection")]
+    NotArriving {
+        /// The surface, counted within the intersection.
+        surface: usize,
+    },
+    /// The data of an exit do not fit its kind.
+    #[error("these normal components are not those of an exit of this kind")]
+    NotAnExit,
+    /// An exit from three and more surfaces needs the rate at which the normal components change.
+    #[error("an exit from {m} surfaces needs the drift of the normal components")]
+    NoDrift {
+        /// The number of surfaces.
+        m: usize,
+    },
+    /// The hidden dynamics rests at a point that does not attract.
+    #[error("the hidden dynamics rests at a point that does not attract; perturb the state")]
+    AtRest,
+    /// The hidden dynamics stays within the intersection and goes around no root.
+    #[error(
+        "the hidden dynamics goes around in a cycle with no stable root: the regularised motion slides with a mean \
+         that depends on how it is regularised; another kappa= may have a root"
+    )]
+    Cycle,
+    /// In each mode a guard begins negative.
+    #[error("no motion can follow")]
+    NoneViable,
+    /// The hidden dynamics came to no certain outcome.
+    #[error(
+        "the hidden dynamics came to no certain outcome; perturb the state or change the scaling"
+    )]
+    NoOutcome,
+}
+
+impl Undecided {
+    /// The reason in words, with the surfaces of the intersection by their names.
+    pub fn named(&self, name: impl Fn(usize) -> String) -> String {
+        match *self {
+            Undecided::Tangent { surface } => format!(
+                "all fields are tangent to {} here; first-order data do not decide",
+                name(surface)
+            ),
+            Undecided::NotArriving { surface } => {
+                format!("the motion before does not arrive at {}", name(surface))
+            }
+            _ => self.to_string(),
+        }
+    }
+
+    /// The reason for a part of an intersection, with its surfaces counted within the whole.
+    pub(crate) fn in_whole(self, part: &[usize]) -> Self {
+        let place = |surface: usize| part.get(surface).copied().unwrap_or(surface);
+        match self {
+            Undecided::Tangent { surface } => Undecided::Tangent {
+                surface: place(surface),
+            },
+            Undecided::NotArriving { surface } => Undecided::NotArriving {
+                surface: place(surface),
+            },
+            other => other,
+        }
     }
 }

@@ -33,6 +33,7 @@
 
 pub mod action;
 mod clock;
+pub mod cube;
 mod decisions;
 mod error;
 pub mod event;
@@ -41,6 +42,7 @@ mod inspect;
 mod integrate;
 mod mode;
 mod options;
+mod patience;
 mod recorder;
 mod saved;
 pub mod section;

@@ -1,13 +1,12 @@
-//! Formulas at an intersection: roots, their continuation past a fold, laps, the end of infinitely
-//! many laps.
+//! Formulas at an intersection: roots, their continuation past a fold, laps.
 #![allow(clippy::unwrap_used)]
 
+mod oracles;
 mod random_fields;
 
-use filippov::switching::codim2::{extrapolated_jump, Bilinear, Lap};
 use filippov::switching::{
-    accumulate, is_scaling_stable, is_stable_for, multiplier_rates, newton, resolve, roots_in_cube,
-    stable_roots, ExitKind, Incoming, NormalFields, Return,
+    is_scaling_stable, is_stable_for, multiplier_rates, newton, resolve, roots_in_cube,
+    stable_roots, Bilinear, ExitKind, Incoming, Lap, NormalFields,
 };
 use random_fields::{exit_fold, exit_side, rotation, Around, Random};
 
@@ -247,134 +246,29 @@ fn laps_are_straight_lines() {
     }
 }
 
-/// Fields in three dimensions that vary, h_1 = x_1, h_2 = x_2: f^k(x) = f^k + A^k x.
-struct Varying {
-    constant: [[f64; 3]; 4],
-    linear: [[[f64; 3]; 3]; 4],
-}
-
-impl Varying {
-    fn random(random: &mut Random) -> Self {
-        loop {
-            let fields = rotation(random);
-            let gamma = Lap::around(&fields, [-1, -1]).unwrap().gamma;
-            if !(0.1..=0.6).contains(&gamma) {
-                continue;
-            }
-            return Varying {
-                constant: [0, 1, 2, 3].map(|p| [fields.at(p)[0], fields.at(p)[1], random.normal()]),
-                linear: std::array::from_fn(|_| std::array::from_fn(|_| random.normals())),
-            };
-        }
-    }
-
-    fn at(&self, k: [i8; 2], x: [f64; 3]) -> [f64; 3] {
-        let p = usize::from(k[0] > 0) + 2 * usize::from(k[1] > 0);
-        [0, 1, 2].map(|i: usize| {
-            let varying: f64 = (0..3).map(|j| self.linear[p][i][j] * x[j]).sum();
-            self.constant[p][i] + varying
-        })
-    }
-
-    fn normal_fields(&self, x: [f64; 3]) -> NormalFields {
-        let regions = [[-1, -1], [1, -1], [-1, 1], [1, 1]];
-        let values = regions.map(|k| [self.at(k, x)[0], self.at(k, x)[1]]);
-        NormalFields::new(2, values.concat()).unwrap()
-    }
-
-    /// A lap from x by the classical Runge-Kutta method with s = h_j as the independent variable.
-    fn travel(&self, lap: &Lap, mut x: [f64; 3], mut t: f64) -> ([f64; 3], f64) {
-        for n in 0..4 {
-            let next = lap.regions[(n + 1) % 4];
-            let hit = usize::from(lap.regions[n][0] == next[0]);
-            let slope = |x: [f64; 3]| {
-                let f = self.at(lap.regions[n], x);
-                [f[0] / f[hit], f[1] / f[hit], f[2] / f[hit], 1.0 / f[hit]]
-            };
-            let steps = 40;
-            let ds = -x[hit] / f64::from(steps);
-            for _ in 0..steps {
-                let moved = |k: [f64; 4], by: f64| [0, 1, 2].map(|i: usize| x[i] + by * ds * k[i]);
-                let k1 = slope(x);
-                let k2 = slope(moved(k1, 0.5));
-                let k3 = slope(moved(k2, 0.5));
-                let k4 = slope(moved(k3, 1.0));
-                let mean = |i: usize| (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]) / 6.0;
-                t += ds * mean(3);
-                x = [0, 1, 2].map(|i: usize| x[i] + ds * mean(i));
-            }
-            x[hit] = 0.0;
-        }
-        (x, t)
-    }
-
-    /// The estimate of the end of all laps, as [x_3, t].
-    fn end(&self, x: [f64; 3], t: f64) -> [f64; 2] {
-        let lap = Lap::around(&self.normal_fields([0.0, 0.0, x[2]]), [-1, -1]).unwrap();
-        let jump = lap.inward(x[0].abs().max(x[1].abs())).unwrap();
-        let fields = lap.regions.map(|k| self.at(k, [0.0, 0.0, x[2]]));
-        let moved = jump.displacement([&fields[0], &fields[1], &fields[2], &fields[3]]);
-        [x[2] + moved[2], t + jump.duration()]
-    }
-
-    /// Errors of the jump from distance delta, and of the extrapolation of two.
-    fn errors(&self, delta: f64) -> [f64; 2] {
-        let lap = Lap::around(&self.normal_fields([0.0; 3]), [-1, -1]).unwrap();
-        let from = usize::from(lap.regions[3][0] == lap.regions[0][0]);
-        let mut x = [0.0; 3];
-        x[1 - from] = -delta;
-        let first = self.end(x, 0.0);
-        let (mut later, mut t) = self.travel(&lap, x, 0.0);
-        let gamma = later[1 - from] / x[1 - from];
-        let second = self.end(later, t);
-        let extrapolated = extrapolated_jump(&first, &second, gamma);
-        while later[1 - from].abs() > 1e-11 {
-            (later, t) = self.travel(&lap, later, t);
-        }
-        let exact = self.end(later, t);
-        let error = |a: &[f64]| (a[0] - exact[0]).hypot(a[1] - exact[1]);
-        [error(&first), error(&extrapolated)]
-    }
-}
-
-/// The jump to the end of all laps has an error in delta^2, the extrapolated one in delta^3.
+/// The same equation twice, with zeros in the square; and without: two surfaces that are both crossed.
 #[test]
-fn orders_of_the_jump() {
+fn proportional_equations_are_undetermined() {
+    let same = NormalFields::new(2, vec![1.0, 2.0, -1.0, -2.0, 0.5, 1.0, -0.5, -1.0]).unwrap();
+    assert!(Bilinear::of_fields(&same).is_undetermined());
+    let crossed = NormalFields::new(2, vec![1.0; 8]).unwrap();
+    assert!(!Bilinear::of_fields(&crossed).is_undetermined());
+    assert!(Lap::around(&crossed, [-1, -1]).is_none());
+}
+
+/// The margin of a root is positive where there is one in the square, and nowhere else.
+#[test]
+fn the_margin_of_a_root_has_its_sign() {
     let mut random = Random::new(8);
-    let mut orders = [Vec::new(), Vec::new()];
-    for _ in 0..60 {
-        let varying = Varying::random(&mut random);
-        let (coarse, fine) = (varying.errors(1e-3), varying.errors(2.5e-4));
-        for n in 0..2 {
-            orders[n].push((coarse[n] / fine[n]).log(4.0));
-        }
+    let mut counts = [0; 2];
+    for _ in 0..50_000 {
+        let fields = random.fields(2);
+        let bilinear = Bilinear::of_fields(&fields);
+        let is_inside = bilinear.root().is_some_and(|root| root.in_square());
+        assert_eq!(is_inside, bilinear.root_margin() > 0.0, "{fields:?}");
+        counts[usize::from(is_inside)] += 1;
     }
-    for (orders, expected) in orders.iter_mut().zip([2.0, 3.0]) {
-        orders.sort_by(f64::total_cmp);
-        let (low, median, high) = (orders[6], orders[30], orders[53]);
-        assert!((median - expected).abs() < 0.02, "median {median}");
-        // A few field sets have a small constant and show their next order still.
-        assert!((low - expected).abs() < 0.2 && (high - expected).abs() < 0.2);
-    }
-}
-
-#[test]
-fn accumulating_returns_have_a_limit() {
-    let returns = |ratio: f64, n: i32| -> Vec<Return> {
-        let at = |k: i32| Return {
-            time: 2.0 - ratio.powi(k),
-            distance: 0.1 * ratio.powi(k),
-        };
-        (0..n).map(at).collect()
-    };
-    let limit = accumulate(&returns(0.5, 6), 0.01).unwrap();
-    assert!((limit.time - 2.0).abs() < 1e-14 && (limit.ratio - 0.5).abs() < 1e-14);
-    assert!(accumulate(&returns(0.5, 3), 1.0).is_none(), "too few");
-    assert!(accumulate(&returns(0.5, 6), 1e-3).is_none(), "too far");
-    assert!(accumulate(&returns(1.1, 6), 1.0).is_none(), "growing");
-    let mut uneven = returns(0.5, 6);
-    uneven[3].distance *= 1.3;
-    assert!(accumulate(&uneven, 0.1).is_none(), "uneven");
+    assert!(counts.iter().all(|&n| n > 2000), "{counts:?}");
 }
 
 /// Exits of three surfaces, the third of which only holds the motion, are those of the first two.

@@ -2,6 +2,7 @@
 //! groups, and agrees with the fields of all 2^m sign patterns.
 #![allow(clippy::unwrap_used)]
 
+mod oracles;
 mod random_fields;
 
 use filippov::field::{IntersectionField, MeetingFields, Motion, SmoothField};

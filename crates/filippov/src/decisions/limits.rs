@@ -1,24 +1,55 @@
-//! Limits of infinitely many switches in finite time, and what follows there.
+//! Limits of infinitely many switches or impacts in finite time, and what follows there.
 
 use super::departures::velocity_in;
 use super::point::{Decided, Lefts, Next, Notes, Point};
 use super::rule::{How, Meeting};
 use crate::error::FieldError;
-use crate::field::Projector;
+use crate::field::{ContactField, Motion, Projector};
 use crate::mode::Mode;
 use crate::solution::Switch;
 use crate::status::Stop;
 use crate::stepper::ErrorScale;
-use crate::switching::{accumulate, admissible_within, least_multipliers, Kind, Return, Undecided};
+use crate::switching::{admissible_within, least_multipliers, Kind, Undecided};
 use crate::system::dot;
-use crate::tolerances::{LONGEST_TURN, MOST_MEETING, NEAREST_ACCUMULATION, SURFACE_NOISE};
+use crate::tolerances::{
+    ACCUMULATION_AGREEMENT, LONGEST_TURN, MOST_MEETING, NEAREST_ACCUMULATION, SURFACE_NOISE,
+    UNRESOLVED_FLIGHT,
+};
 
-/// The limit of accumulating switches.
+/// The limit of accumulating switches or impacts.
 pub(crate) struct Limit {
     pub t: f64,
     pub x: Vec<f64>,
-    /// The surfaces that meet there.
-    pub meeting: Vec<usize>,
+    /// The surfaces that meet there; the one at which the impacts are.
+    pub surfaces: Vec<usize>,
+    /// Do impacts end there?
+    pub is_rest: bool,
+}
+
+impl Limit {
+    /// The limit of the rest of a series of which the last four members are known, if the two quotients of intervals agree with
+    /// one another, and with `others`: the rest is geometric, up to a multiple of the square of the last interval.
+    fn of(turns: [&Switch; 4], others: &[f64], surfaces: Vec<usize>) -> Option<Limit> {
+        let [before, last] = [turns[2], turns[3]];
+        let [a, b, c] = [1, 2, 3].map(|k| turns[k].t - turns[k - 1].t);
+        let ratio = shrinks_by(&[&[b / a, c / b], others].concat())?;
+        let share = ratio / (1.0 - ratio);
+        let states = last.y_after.iter().zip(&before.y_after);
+        Some(Limit {
+            t: last.t + share * c,
+            x: states.map(|(y, before)| y + share * (y - before)).collect(),
+            surfaces,
+            is_rest: false,
+        })
+    }
+}
+
+/// The second of these ratios, if all lie between 0 and 1 and agree with it.
+fn shrinks_by(ratios: &[f64]) -> Option<f64> {
+    let ratio = ratios[1];
+    let near = ACCUMULATION_AGREEMENT * ratio.min(1.0 - ratio);
+    let agrees = |&r: &f64| r > 0.0 && r < 1.0 && (r - ratio).abs() <= near;
+    ratios.iter().all(agrees).then_some(ratio)
 }
 
 /// Does a later switch repeat an earlier one?
@@ -28,50 +59,104 @@ fn repeats(a: &Switch, b: &Switch) -> bool {
 
 /// The limit that the last switches tend to: turns of equally many switches, each turn shorter and nearer to
 /// an intersection than the one before by the same ratio (`docs/theory/intersections.md`).
-pub(crate) fn limit_of(at: &Point) -> Result<Option<Limit>, FieldError> {
+pub(crate) fn limit_of_switches(at: &Point) -> Result<Option<Limit>, FieldError> {
     let switches = at.arrival.switches;
     let Some(turn) = turn_of(switches) else {
         return Ok(None);
     };
     let last = switches.len() - 1;
     let turns = [3, 2, 1, 0].map(|k| &switches[last - k * turn]);
-    let intervals = [1, 2, 3].map(|k| turns[k].t - turns[k - 1].t);
-    if !(intervals[2] < intervals[1] && intervals[1] < intervals[0]) {
-        return Ok(None);
-    }
     let Some(meeting) = meeting_of(&switches[last + 1 - turn..]) else {
         return Ok(None);
     };
-    let mut returns = [Return {
-        time: 0.0,
-        distance: 0.0,
-    }; 4];
-    for (found, switch) in returns.iter_mut().zip(turns) {
-        found.time = switch.t;
-        found.distance = distance(at, &meeting, switch)?;
+    let mut distances = [0.0; 3];
+    for (found, switch) in distances.iter_mut().zip(&turns[1..]) {
+        *found = distance(at, &meeting, switch)?;
     }
-    let Some(limit) = accumulate(&returns, reach(at.scale, at.x)).filter(|limit| limit.time > at.t)
-    else {
+    let [a, b, c] = distances;
+    let limit = Limit::of(turns, &[b / a, c / b], meeting);
+    let Some(mut limit) = limit.filter(|limit| c < reach(at.scale, at.x) && limit.t > at.t) else {
         return Ok(None);
     };
-    let share = limit.ratio / (1.0 - limit.ratio);
-    let states = turns[3].y_after.iter().zip(&turns[2].y_after);
-    let mut x: Vec<f64> = states.map(|(y, before)| y + share * (y - before)).collect();
-    let mut projector = Projector::new(x.len(), at.system.n_surfaces());
-    projector.project_onto(at.system, &meeting, limit.time, &mut x, at.arrival.signs)?;
-    let limit = Limit {
-        t: limit.time,
-        x,
-        meeting,
-    };
+    project(at, &mut limit)?;
     Ok(is_on_all(at, &limit)?.then_some(limit))
+}
+
+/// Where and when the last impacts end, if the speed after them is below what the tolerance resolves: the limit of the
+/// series, and this point if the flights do not rise above rounding. `before` is the number of switches before this
+/// instant, in which the body departs in mode `after`.
+pub(crate) fn limits_of_impacts(
+    at: &Point,
+    before: usize,
+    after: &Mode,
+) -> Result<[Option<Limit>; 2], FieldError> {
+    let Some((earlier, [last])) = at.arrival.switches.split_at_checked(before) else {
+        return Ok([None, None]);
+    };
+    let &[j] = &last.surfaces[..] else {
+        return Ok([None, None]);
+    };
+    let triggers = at.triggers();
+    let side = after.entries()[j];
+    let departs = side == triggers.side(j, None) && at.arrival.mode == after;
+    if last.kind != Kind::Reset || !departs || !triggers.is_only_trigger(j) {
+        return Ok([None, None]);
+    }
+    let signs = after.signs();
+    let mut row = vec![0.0; at.x.len()];
+    let rate = at.system.rate_gradient(j, at.t, at.x, &signs, &mut row)?;
+    let falls = at
+        .system
+        .lie_derivative(j, j, &[side, side], at.t, at.x, &signs)?;
+    if falls.value * f64::from(side) >= 0.0 {
+        return Ok([None, None]);
+    }
+    let height = 0.5 * rate.rate * rate.rate / falls.value.abs();
+    let size = at.system.surface_size(j, at.t, at.x, &signs)?;
+    let is_unresolved = height <= UNRESOLVED_FLIGHT * SURFACE_NOISE * size;
+    let distance = rate.rate.abs() / dot(&row, &row).sqrt();
+    if !is_unresolved && distance >= reach(at.scale, at.x) {
+        return Ok([None, None]);
+    }
+    let same = |s: &Switch| {
+        s.kind == last.kind && s.surfaces == last.surfaces && s.mode_after == last.mode_after
+    };
+    let series = match earlier {
+        [.., a, b, c] if [a, b, c].into_iter().all(same) => {
+            Limit::of([a, b, c, last], &[], vec![j])
+        }
+        _ => None,
+    };
+    let here = is_unresolved.then(|| Limit {
+        t: at.t,
+        x: at.x.to_vec(),
+        surfaces: vec![j],
+        is_rest: true,
+    });
+    let mut limits = [series, here];
+    let (contact, sides) = (after.with(j, 0), at.arrival.sides);
+    let mut field = ContactField::new(at.system, at.actions, &contact, sides, at.q);
+    for limit in limits.iter_mut().flatten() {
+        limit.is_rest = true;
+        if let Some(field) = &mut field {
+            field.project(limit.t, &mut limit.x)?;
+        }
+    }
+    Ok(limits)
+}
+
+/// Moves the state of a limit onto its surfaces.
+fn project(at: &Point, limit: &mut Limit) -> Result<(), FieldError> {
+    let mut projector = Projector::new(limit.x.len(), at.system.n_surfaces());
+    let signs = at.arrival.signs;
+    projector.project_onto(at.system, &limit.surfaces, limit.t, &mut limit.x, signs)
 }
 
 /// Do the surfaces meet at the limit? Three lines in a plane need not.
 fn is_on_all(at: &Point, limit: &Limit) -> Result<bool, FieldError> {
     let (signs, mut h) = (at.arrival.signs, vec![0.0; at.system.n_surfaces()]);
     at.system.surfaces(limit.t, &limit.x, signs, &mut h)?;
-    for &j in &limit.meeting {
+    for &j in &limit.surfaces {
         let size = at.system.surface_size(j, limit.t, &limit.x, signs)?;
         if h[j].abs() > SURFACE_NOISE * size {
             return Ok(false);
@@ -89,14 +174,14 @@ pub(crate) fn limit_here(at: &Point, meeting: &[usize]) -> Result<Option<Limit>,
     if !only_crosses || !(2..=MOST_MEETING).contains(&meeting.len()) {
         return Ok(None);
     }
-    let mut x = at.x.to_vec();
-    let mut projector = Projector::new(x.len(), at.system.n_surfaces());
-    projector.project_onto(at.system, meeting, at.t, &mut x, at.arrival.signs)?;
-    Ok(Some(Limit {
+    let mut limit = Limit {
         t: at.t,
-        x,
-        meeting: meeting.to_vec(),
-    }))
+        x: at.x.to_vec(),
+        surfaces: meeting.to_vec(),
+        is_rest: false,
+    };
+    project(at, &mut limit)?;
+    Ok(Some(limit))
 }
 
 /// Rule: a limit of infinitely many switches, where the motion slides on all surfaces if that is possible.
@@ -159,7 +244,7 @@ fn stays_tangent(
 }
 
 /// Distance of a switch to the intersection, h_j in units of its gradient.
-pub(crate) fn distance(at: &Point, meeting: &[usize], switch: &Switch) -> Result<f64, FieldError> {
+fn distance(at: &Point, meeting: &[usize], switch: &Switch) -> Result<f64, FieldError> {
     let (signs, n) = (switch.mode_after.signs(), switch.y_after.len());
     let mut h = vec![0.0; at.system.n_surfaces()];
     let mut gradient = vec![0.0; n];
@@ -175,7 +260,7 @@ pub(crate) fn distance(at: &Point, meeting: &[usize], switch: &Switch) -> Result
 }
 
 /// From where the limit is known to the tolerance: its error is a multiple of the square of the distance.
-pub(crate) fn reach(scale: &ErrorScale, x: &[f64]) -> f64 {
+fn reach(scale: &ErrorScale, x: &[f64]) -> f64 {
     let scales = x.iter().enumerate();
     let scales = scales.map(|(i, x)| scale.tolerance(i, *x, *x));
     scales
@@ -215,4 +300,19 @@ fn meeting_of(turn: &[Switch]) -> Option<Vec<usize>> {
     (2..=MOST_MEETING)
         .contains(&meeting.len())
         .then_some(meeting)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::shrinks_by;
+
+    #[test]
+    fn ratios_that_agree_are_a_limit() {
+        assert_eq!(shrinks_by(&[0.5, 0.51, 0.49]), Some(0.51));
+        assert_eq!(shrinks_by(&[0.5, 0.56]), None, "uneven");
+        assert_eq!(shrinks_by(&[1.1, 1.1]), None, "growing");
+        assert_eq!(shrinks_by(&[0.98, 0.981]), Some(0.981));
+        assert_eq!(shrinks_by(&[0.97, 0.98]), None, "the sum is not known");
+        assert_eq!(shrinks_by(&[f64::NAN, 0.5]), None);
+    }
 }

@@ -224,18 +224,17 @@ fn follow(
         let mode = mode.as_mode().map(on_all);
         candidates.extend(mode.filter(|mode| !candidates.contains(mode)));
     }
-    let is_spiral = matches!(resolution.chosen, Some(Continuation::OutwardSpiral));
+    let is_spiral = resolution.chosen == Continuation::OutwardSpiral;
     let asked = asked(at, notes).filter(|asked| candidates.contains(asked));
     let (mut after, leap) = match &resolution.chosen {
-        Some(Continuation::Mode(chosen)) => (on_all(chosen), None),
-        Some(Continuation::OutwardSpiral) => match asked {
+        Continuation::Mode(chosen) => (on_all(chosen), None),
+        Continuation::OutwardSpiral => match asked {
             Some(asked) => (asked.clone(), None),
             None => match outward_leap(at, meeting, mode, fields) {
                 Some(leap) => (leap.region.clone(), Some(leap)),
                 None => return decide_undecided(at, notes, place, None),
             },
         },
-        None => return decide_undecided(at, notes, place, None),
     };
     let preferred = after.clone();
     if !resolution.unique || is_spiral || candidates.len() > 1 {
@@ -272,11 +271,12 @@ fn follow(
     Ok(Ok(next))
 }
 
-/// All attracting continuations at an intersection that is reached, whatever the regularisation selects: Filippov
-/// solutions, and several if the solution is not unique. Not looked for where many surfaces meet.
+/// All attracting continuations at an intersection of three surfaces that is reached, whatever the regularisation selects:
+/// Filippov solutions, and several if the solution is not unique. Those of two are listed by the resolution; those of more
+/// are not looked for.
 fn other_solutions(at: &Point, fields: &NormalFields, incoming: &Incoming) -> Vec<Continuation> {
     let is_exit = matches!(incoming, Incoming::Exit { .. });
-    if is_exit || fields.m() > MOST_LISTED || has_one_mode_only(fields) {
+    if is_exit || fields.m() != MOST_LISTED || has_one_mode_only(fields) {
         return Vec::new();
     }
     let found = admissible_within(fields, at.patience).into_iter();

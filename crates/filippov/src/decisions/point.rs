@@ -15,7 +15,6 @@ use crate::options::{NonUnique, Options};
 use crate::solution::Switch;
 use crate::status::{Stop, Warning};
 use crate::stepper::ErrorScale;
-use crate::switching::codim2::Lap;
 use crate::switching::{Decision, Leading, Patience};
 use crate::system::PiecewiseSystem;
 use crate::tolerances::{MOMENT, MOST_SHORTENINGS, TOO_LARGE_A_CHANGE};
@@ -333,11 +332,9 @@ pub(crate) struct Leap {
     pub region: Mode,
     /// The surface on its border on which it enters.
     pub(super) border: usize,
-    pub(super) lap: Lap,
-    /// The fields of the regions of the lap.
-    pub(super) fields: [Vec<f64>; 4],
-    /// The free parameter of the family: a distance in units of the switching functions.
-    pub(super) distance: f64,
+    /// How long it takes, and how far it leads.
+    pub(super) duration: f64,
+    pub(super) shift: Vec<f64>,
 }
 
 /// The motion that follows, or why the run ends.

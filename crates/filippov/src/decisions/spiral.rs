@@ -5,7 +5,7 @@ use super::point::{Leap, Lefts, Notes, Point};
 use crate::error::FieldError;
 use crate::field::{MeetingFields, Projector};
 use crate::mode::Mode;
-use crate::switching::codim2::Lap;
+use crate::switching::Lap;
 use crate::tolerances::SPIRAL_START;
 
 /// Where a leap ends.
@@ -25,21 +25,24 @@ pub(super) fn outward_leap(
     fields: &MeetingFields,
 ) -> Option<Leap> {
     let lap = Lap::around(&fields.normal_fields().ok()?, [-1, -1])?;
+    if lap.gamma <= 1.0 {
+        return None;
+    }
     let pattern = |k: [i8; 2]| usize::from(k[0] > 0) + 2 * usize::from(k[1] > 0);
     let scales = at.x.iter().enumerate();
     let scales = scales.map(|(i, x)| at.scale.tolerance(i, *x, *x));
+    // The free parameter of the family: a distance in units of the switching functions.
     let distance = SPIRAL_START * scales.fold(f64::INFINITY, f64::min);
-    lap.outward(distance)?;
     let [first, .., last] = lap.regions;
     let mut region = mode.clone();
     let entries = meeting.iter().zip(first);
     entries.for_each(|(&j, entry)| region.set(j, entry));
+    let shift = lap.displacement(lap.regions.map(|k| fields.field(pattern(k))));
     Some(Leap {
         region,
         border: meeting[usize::from(first[0] == last[0])],
-        fields: lap.regions.map(|k| fields.field(pattern(k)).to_vec()),
-        lap,
-        distance,
+        duration: distance * lap.duration,
+        shift: shift.into_iter().map(|s| distance * s).collect(),
     })
 }
 
@@ -49,21 +52,18 @@ pub(crate) fn landing(
     at: &Point,
     notes: &mut Notes,
     room: f64,
-) -> Result<Option<Landing>, FieldError> {
-    let Some(mut jump) = leap.lap.outward(leap.distance) else {
-        return Ok(None);
+) -> Result<Landing, FieldError> {
+    let share = if leap.duration > room {
+        0.5 * room / leap.duration
+    } else {
+        1.0
     };
-    if jump.duration() > room {
-        let nearer = 0.5 * leap.distance * room / jump.duration();
-        jump = leap.lap.outward(nearer).unwrap_or(jump);
-    }
-    let [a, b, c, d] = &leap.fields;
-    let shift = jump.displacement([a, b, c, d]);
-    let mut x: Vec<f64> = at.x.iter().zip(&shift).map(|(x, s)| x + s).collect();
-    let t = at.t + jump.duration();
+    let pairs = at.x.iter().zip(&leap.shift);
+    let mut x: Vec<f64> = pairs.map(|(x, s)| x + share * s).collect();
+    let t = at.t + share * leap.duration;
     let signs = leap.region.signs();
     let mut projector = Projector::new(x.len(), at.system.n_surfaces());
     projector.project(at.system, leap.border, t, &mut x, &signs)?;
     let left = departures(&at.moved(t, &x), notes, &leap.region, &[leap.border], &[])?;
-    Ok(Some(Landing { t, x, left }))
+    Ok(Landing { t, x, left })
 }

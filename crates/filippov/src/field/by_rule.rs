@@ -5,7 +5,7 @@ use super::MeetingFields;
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::options::SlidingRule;
-use crate::switching::codim2::Lap;
+use crate::switching::Lap;
 use crate::switching::NormalFields;
 use crate::system::PiecewiseSystem;
 

@@ -2,7 +2,7 @@
 
 use super::MeetingFields;
 use crate::error::FieldError;
-use crate::switching::codim2::Bilinear;
+use crate::switching::Bilinear;
 use crate::switching::{
     least_multipliers, newton, scaling_margin, stability_margins, stable_roots_within, Matrix,
     NormalFields, Patience,

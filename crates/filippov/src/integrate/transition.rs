@@ -488,9 +488,6 @@ impl<'a> Integrator<'a> {
         let discrete = &self.motion.discrete;
         self.recorder
             .begin_segment(self.t, &leap.region, SmallVec::new(), discrete);
-        let Some(landing) = landing else {
-            return Ok(Lefts::new());
-        };
         self.move_straight(landing.t, landing.x)?;
         Ok(landing.left)
     }

@@ -10,7 +10,7 @@ mod order;
 mod rows;
 mod solver;
 
-pub use order::{components, Component};
+pub use order::{components, coupled_blocks, Component};
 pub use rows::{SparseProduct, SparseRows};
 pub use solver::{is_positive_definite, Pattern, Singular, SparseSolver};
 

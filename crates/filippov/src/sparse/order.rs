@@ -55,6 +55,17 @@ pub fn components(matrix: &SparseRows) -> Vec<Component> {
     found
 }
 
+/// The components with what couples their unknowns, which are in increasing order.
+pub fn coupled_blocks(matrix: &SparseRows) -> Vec<(Vec<usize>, SparseRows)> {
+    let parts = components(matrix).into_iter().map(|component| {
+        let mut unknowns = component.unknowns;
+        unknowns.sort_unstable();
+        let block = matrix.principal(&unknowns);
+        (unknowns, block)
+    });
+    parts.collect()
+}
+
 /// For each unknown the others it meets in a row or a column, those with few neighbours first.
 fn neighbours(matrix: &SparseRows) -> Vec<Vec<usize>> {
     let mut lists: Vec<Vec<usize>> = vec![Vec::new(); matrix.n_rows()];

@@ -134,16 +134,24 @@ impl SparseRows {
         }
     }
 
-    /// Rows and columns of a square matrix that `kept` lists in increasing order; `position` says for every
-    /// index where it is in `kept`, `usize::MAX` if it is not.
+    /// Rows and columns of a square matrix that `kept` lists in increasing order.
     #[must_use]
-    pub fn principal(&self, kept: &[usize], position: &[usize]) -> SparseRows {
+    pub fn principal(&self, kept: &[usize]) -> SparseRows {
         let mut block = SparseRows::new(kept.len());
         for &i in kept {
-            let entries = self.row(i).filter(|&(j, _)| position[j] != usize::MAX);
-            block.push_row(entries.map(|(j, value)| (position[j], value)));
+            let place = |(j, value)| kept.binary_search(&j).ok().map(|place| (place, value));
+            block.push_row(self.row(i).filter_map(place));
         }
         block
+    }
+
+    /// The matrix with each column multiplied by a factor.
+    #[must_use]
+    pub fn with_columns_scaled(&self, factors: &[f64]) -> SparseRows {
+        let mut scaled = self.clone();
+        let entries = scaled.values.iter_mut().zip(&self.columns);
+        entries.for_each(|(value, &j)| *value *= factors[j]);
+        scaled
     }
 
     /// Are all values finite?

@@ -1,11 +1,12 @@
 //! How a motion comes to an intersection, and where its hidden dynamics starts.
 
-use super::fold::merged_root;
-use super::normal_fields::NormalFields;
-use super::patience::Patience;
-use super::resolution::Undecided;
-use super::roots::{multiplier_rates, newton, stable_roots_within};
-use crate::tolerances::{AFTER_THE_EXIT, BESIDE_THE_ROOT, CORNER_OFFSETS, UNSTABLE_START};
+use crate::cube::merged_root;
+use crate::cube::Bilinear;
+use crate::cube::NormalFields;
+use crate::cube::{multiplier_rates, newton, stable_roots_within};
+use crate::error::Undecided;
+use crate::patience::Patience;
+use crate::tolerances::{AFTER_THE_EXIT, AT_SIDE, CORNER_OFFSETS, UNSTABLE_START};
 
 /// What the motion did before.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,8 +31,8 @@ pub enum Incoming {
         kind: ExitKind,
         /// The root.
         lambda: Vec<f64>,
-        /// The rate at which g changes with time at fixed lambda. For two surfaces it serves where two
-        /// solutions are equally good; more surfaces need it.
+        /// The rate at which g changes with time at fixed lambda. For two surfaces it serves where stability is
+        /// lost; more surfaces need it.
         drift: Option<Vec<f64>>,
     },
     /// The run starts here.
@@ -85,7 +86,12 @@ impl Incoming {
                 kind,
                 lambda,
                 drift,
-            } => exit_state(fields, *kind, lambda, drift.as_deref()),
+            } if fields.m() > 2 => exit_state(fields, *kind, lambda, drift.as_deref()),
+            Incoming::Exit {
+                kind,
+                lambda,
+                drift,
+            } => exit_of_few(fields, *kind, lambda, drift.as_deref(), kappa),
             Incoming::Start => Ok(same(vec![vec![0.0; fields.m()]])),
         }
     }
@@ -185,23 +191,97 @@ fn polished(
     root.ok_or(not_sliding)
 }
 
-/// The root itself, in fields that have drifted for a short time. Where two roots meet, in fields that have been moved
-/// to the point where they do; where stability is lost, a little beside it.
+/// One or two surfaces: the root, in fields moved so that it has just been lost. What follows does not depend on how else
+/// the fields move.
+///
+/// | exit | the fields are moved so that | state |
+/// |---|---|---|
+/// | at a side | the root is beyond it, straight ahead | the root |
+/// | at a fold | there is no root | beside the root, where the motion leads from there |
+/// | by stability | no diagonal entry of G is negative | beside the root, in the direction in which it moves |
+fn exit_of_few(
+    fields: &NormalFields,
+    kind: ExitKind,
+    lambda: &[f64],
+    drift: Option<&[f64]>,
+    kappa: &[f64],
+) -> Result<Starts, Undecided> {
+    let m = fields.m();
+    let fields = &match kind {
+        ExitKind::Side | ExitKind::Fold if m == 2 => stabilised(fields, lambda, kappa),
+        _ => fields.clone(),
+    };
+    let jacobian = fields.jacobian(lambda);
+    let by = |j: usize| AFTER_THE_EXIT * fields.row_size(j);
+    let mut state = lambda.to_vec();
+    let fields = match kind {
+        ExitKind::Side => {
+            let i = usize::from(m == 2 && lambda[1].abs() > lambda[0].abs());
+            if 1.0 - lambda[i].abs() > AT_SIDE {
+                return Err(Undecided::NotAnExit);
+            }
+            state[i] = lambda[i].signum();
+            // Of one surface the component that vanishes tells whether the multiplier comes back.
+            let comes_back = m == 1 && drift.is_some_and(|rate| state[0] * rate[0] <= 0.0);
+            let beyond = if comes_back { -state[i] } else { state[i] };
+            let column: Vec<f64> = (0..m).map(|j| jacobian[(j, i)]).collect();
+            let relative = (0..m).map(|j| column[j].abs() / by(j));
+            let length = beyond / relative.fold(0.0, f64::max);
+            let shift: Vec<f64> = column.iter().map(|g| -length * g).collect();
+            fields.shifted(&shift)
+        }
+        ExitKind::Fold if m == 2 && jacobian[(0, 0)].min(jacobian[(1, 1)]) < 0.0 => {
+            let unit = |j: usize, p: usize| jacobian[(j, p)] / fields.row_size(j);
+            let larger = |size: &dyn Fn(usize) -> f64| usize::from(size(1) > size(0));
+            let row = larger(&|j| unit(j, 0).abs().max(unit(j, 1).abs()));
+            let column = larger(&|p| unit(0, p).abs().max(unit(1, p).abs()));
+            // G v = 0 and e G = 0. With the scaling K the motion is (e . g)/(e . K^-1 v) along v, and this denominator is
+            // the trace of K G times an entry of G. The trace was negative.
+            let v = [-unit(row, 1), unit(row, 0)];
+            let e = [-jacobian[(1, column)], jacobian[(0, column)]];
+            let canopy = Bilinear::of_fields(fields);
+            let bend = v[0] * v[1] * (0..2).map(|j| e[j] * canopy.rows()[j][3]).sum::<f64>();
+            let along = -bend * jacobian[(row, column)];
+            state = displaced(lambda, &v.map(|v| along.signum() * v));
+            fields.shifted(&[0, 1].map(|j| by(j) * (bend * e[j]).signum()))
+        }
+        ExitKind::Stability if m == 2 => {
+            state = beside(fields, lambda, drift);
+            let slopes = [0, 1].map(|j| (by(j) - jacobian[(j, j)]).max(0.0));
+            fields.map(|_, pattern, j, value| {
+                let side = if pattern >> j & 1 == 1 { 1.0 } else { -1.0 };
+                value + slopes[j] * (side - lambda[j])
+            })
+        }
+        _ => return Err(Undecided::NotAnExit),
+    };
+    Ok(Starts {
+        fields,
+        states: vec![state],
+    })
+}
+
+/// Two surfaces: the fields, scaled so that the root is stable if it is so for some scaling. Where it is not stable for
+/// kappa, the motion went around it, and is followed as if it had slid.
+fn stabilised(fields: &NormalFields, lambda: &[f64], kappa: &[f64]) -> NormalFields {
+    let jacobian = fields.jacobian(lambda);
+    let [a, b] = [0, 1].map(|j| kappa[j] * jacobian[(j, j)]);
+    match a + b < 0.0 {
+        true => fields.clone(),
+        false if a < 0.0 => fields.scaled(&[-2.0 * b / a, 1.0]),
+        false if b < 0.0 => fields.scaled(&[1.0, -2.0 * a / b]),
+        false => fields.clone(),
+    }
+}
+
+/// Three and more surfaces: the root itself, in fields that have drifted for a short time. Where two roots meet, in fields that
+/// have been moved to the point where they do; where stability is lost, a little beside it.
 fn exit_state(
     fields: &NormalFields,
     kind: ExitKind,
     lambda: &[f64],
     drift: Option<&[f64]>,
 ) -> Result<Starts, Undecided> {
-    if lambda.len() != fields.m() {
-        return Err(Undecided::NotAnExit);
-    }
-    if kind == ExitKind::Stability && fields.m() == 2 {
-        return Ok(Starts {
-            fields: fields.clone(),
-            states: vec![beside(fields, lambda, drift)],
-        });
-    }
     let drift = drift.ok_or(Undecided::NoDrift { m: fields.m() })?;
     let largest = drift.iter().fold(0.0_f64, |m, d| m.max(d.abs()));
     let factor = match kind {
@@ -222,7 +302,14 @@ fn exit_state(
                 .for_each(|(shift, g)| *shift -= g);
             vec![merged.lambda]
         }
-        ExitKind::Stability => around(lambda),
+        ExitKind::Stability => {
+            let along = |n: usize| {
+                let mut axis = vec![0.0; lambda.len()];
+                axis[n / 2] = if n.is_multiple_of(2) { 1.0 } else { -1.0 };
+                displaced(lambda, &axis)
+            };
+            (0..2 * lambda.len()).map(along).collect()
+        }
         ExitKind::Side => vec![lambda.to_vec()],
     };
     Ok(Starts {
@@ -231,29 +318,18 @@ fn exit_state(
     })
 }
 
-/// States around a root that is no longer stable, in the directions of all axes.
-fn around(lambda: &[f64]) -> Vec<Vec<f64>> {
-    let room = lambda.iter().map(|l| 1.0 - l.abs());
-    let distance = room.fold(2.0 * UNSTABLE_START, f64::min) * 0.5;
-    let mut states = Vec::with_capacity(2 * lambda.len());
-    for i in 0..lambda.len() {
-        for side in [1.0, -1.0] {
-            let mut state = lambda.to_vec();
-            state[i] += side * distance;
-            states.push(state);
-        }
-    }
-    states
-}
-
 /// The root, displaced in the direction in which it moves; along the diagonal if that is not known.
 fn beside(fields: &NormalFields, lambda: &[f64], drift: Option<&[f64]>) -> Vec<f64> {
     let rates = drift.and_then(|drift| multiplier_rates(fields, lambda, drift));
     let rates = rates.filter(|rates| rates.iter().any(|&r| r != 0.0));
-    let rates = rates.unwrap_or_else(|| vec![1.0; lambda.len()]);
-    let length = rates.iter().map(|r| r * r).sum::<f64>().sqrt();
-    let moved = lambda.iter().zip(&rates);
-    moved
-        .map(|(l, r)| l + BESIDE_THE_ROOT * r / length)
-        .collect()
+    let direction = rates.unwrap_or_else(|| vec![1.0; lambda.len()]);
+    displaced(lambda, &direction)
+}
+
+/// A point beside a root in the cube, away from the border.
+fn displaced(lambda: &[f64], direction: &[f64]) -> Vec<f64> {
+    let size = |v: &[f64]| v.iter().fold(0.0_f64, |size, v| size.max(v.abs()));
+    let length = UNSTABLE_START.min(0.5 * (1.0 - size(lambda))) / size(direction);
+    let pairs = lambda.iter().zip(direction);
+    pairs.map(|(l, d)| l + length * d).collect()
 }

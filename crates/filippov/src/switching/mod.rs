@@ -4,63 +4,46 @@
 //! functions that vanish there; they return data. First-order data decide; where they vanish, the
 //! first Lie derivative that does not.
 
-mod accumulation;
 mod codim1;
-pub mod codim2;
-mod enclosed_root;
-mod fold;
 mod hidden;
 mod incoming;
+mod lap;
 mod lie;
-mod normal_fields;
-mod p_matrix;
 mod parts;
-mod patience;
-mod redundant;
 mod relay;
 mod relay_at;
 mod resolution;
 mod resolve;
-mod roots;
 mod shared_load;
-mod single;
-mod small_matrix;
-mod stability;
 mod stick;
 
-pub use accumulation::{accumulate, Accumulation, Return};
+pub(crate) use crate::cube::invert;
+pub use crate::cube::{
+    enclose_root, is_negative_p_matrix, is_p_matrix, is_scaling_stable, is_stable, is_stable_for,
+    is_undetermined, least_multipliers, merged_root, multiplier_rates, newton, roots_in_cube,
+    scaling_margin, stability_margins, stable_roots, stable_roots_with_border, stable_roots_within,
+    Bilinear, EnclosedRoot, IntervalVector, Matrix, MergedRoot, NormalFields, Root, RootBounds,
+    Roots, SignGroup, Vector,
+};
+pub use crate::error::Undecided;
+pub use crate::patience::Patience;
 pub use codim1::{decide, weight_at_two_fold, Arrival, Decision, TwoFoldMotion};
-pub use enclosed_root::{enclose_root, EnclosedRoot, IntervalVector, RootBounds};
-pub use fold::{merged_root, MergedRoot};
 pub use hidden::{
     admissible, admissible_within, limit as limit_of_hidden_dynamics, Admissible,
     Outcome as HiddenOutcome,
 };
 pub use incoming::{ExitKind, Incoming};
+pub use lap::Lap;
 pub use lie::{first_nonzero, normal_component, Leading};
-pub use normal_fields::{NormalFields, SignGroup};
-pub use p_matrix::is_p_matrix;
 pub use parts::{independent_parts, of_part};
-pub use patience::Patience;
-pub use redundant::least_multipliers;
 pub use relay::{
     all_relay_modes, solve_relay, solve_relay_within, RelayError, RelayProblem, RelaySolution,
     Uniqueness,
 };
 pub use relay_at::relay_at;
-pub use resolution::{Continuation, Resolution, Undecided};
+pub use resolution::{Continuation, Resolution};
 pub use resolve::{has_one_mode_only, resolve, resolve_within};
-pub use roots::{
-    is_undetermined, multiplier_rates, newton, roots_in_cube, stable_roots,
-    stable_roots_with_border, stable_roots_within, Roots,
-};
 pub use shared_load::{SharedLoad, SharedLoads};
-pub(crate) use small_matrix::invert;
-pub use small_matrix::{Matrix, Vector};
-pub use stability::{
-    is_negative_p_matrix, is_scaling_stable, is_stable, is_stable_for, scaling_margin,
-    stability_margins,
-};
 
 /// The word for what happened, as the field uses it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

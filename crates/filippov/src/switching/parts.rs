@@ -5,13 +5,14 @@
 //! the parts, and two surfaces among many still have their trees.
 
 use super::incoming::{ExitKind, Incoming};
-use super::normal_fields::{NormalFields, SignGroup};
-use super::patience::Patience;
-use super::resolution::{Continuation, Resolution, Undecided};
+use super::resolution::{Continuation, Resolution};
 use super::resolve::resolve_within;
-use super::roots::{newton, stable_roots_within};
-use super::stability::stability_margins;
+use crate::cube::stability_margins;
+use crate::cube::{newton, stable_roots_within};
+use crate::cube::{NormalFields, SignGroup};
+use crate::error::Undecided;
 use crate::mode::Mode;
+use crate::patience::Patience;
 use crate::tolerances::{AT_SIDE, EPS, MOST_COMBINED};
 
 /// The surfaces in parts that do not know of each other, each increasing.
@@ -201,11 +202,11 @@ fn unchanged(
 /// The decisions of all parts as one. Of many combinations of candidates those are listed that differ from the
 /// chosen one in a single part. `None` if the motion spirals in one part: around two of more surfaces.
 fn joined(m: usize, parts: &[Vec<usize>], decided: &[Resolution]) -> Option<Resolution> {
-    let chosen: Vec<Option<&Continuation>> = decided.iter().map(|d| d.chosen.as_ref()).collect();
-    let combine = |picked: &[Option<&Continuation>]| -> Option<Continuation> {
+    let chosen: Vec<&Continuation> = decided.iter().map(|d| &d.chosen).collect();
+    let combine = |picked: &[&Continuation]| -> Option<Continuation> {
         let mut entries = vec![0; m];
         for (part, continuation) in parts.iter().zip(picked) {
-            let mode = continuation.and_then(Continuation::as_mode)?;
+            let mode = continuation.as_mode()?;
             for (&i, &entry) in part.iter().zip(mode.entries()) {
                 entries[i] = entry;
             }
@@ -223,7 +224,7 @@ fn joined(m: usize, parts: &[Vec<usize>], decided: &[Resolution]) -> Option<Reso
         for base in bases {
             for candidate in &resolution.candidates {
                 let mut other = base.clone();
-                other[index] = Some(candidate);
+                other[index] = candidate;
                 if !picked.contains(&other) {
                     picked.push(other);
                 }
@@ -232,7 +233,7 @@ fn joined(m: usize, parts: &[Vec<usize>], decided: &[Resolution]) -> Option<Reso
     }
     let leading = decided.iter().find(|d| !d.leaf.is_empty());
     let leaf = leading.map_or("hidden/sliding", |d| d.leaf);
-    let mut whole = Resolution::among(leaf, Some(combine(&chosen)?), Vec::new());
+    let mut whole = Resolution::sure(leaf, combine(&chosen)?);
     whole.unique = decided.iter().all(|d| d.unique);
     whole.add_candidates(&picked.iter().filter_map(|p| combine(p)).collect::<Vec<_>>());
     whole.oscillates = decided.iter().any(|d| d.oscillates);

@@ -22,9 +22,9 @@
 //! References: Cottle, Pang, Stone (1992); Júdice, Pires, *A block principal pivoting algorithm* (1994);
 //! Guglielmi, Hairer (2022); `docs/theory/switching.md`.
 
-use super::p_matrix::is_p_matrix;
-use super::patience::Patience;
 use super::shared_load::{has_one_motion, let_stick};
+use crate::cube::is_p_matrix;
+use crate::patience::Patience;
 use crate::sparse::{Singular, SparseRows, SparseSolver};
 use crate::tolerances::{EPS, PIVOTS_PER_LOOK, RELAY_DAMPING};
 
@@ -213,13 +213,9 @@ impl RelayProblem {
 
     /// The problem of some surfaces, in increasing order, without the others.
     fn restricted(&self, kept: &[usize]) -> Self {
-        let mut position = vec![usize::MAX; self.nu.len()];
-        for (place, &i) in kept.iter().enumerate() {
-            position[i] = place;
-        }
         RelayProblem {
             nu: kept.iter().map(|&i| self.nu[i]).collect(),
-            n: self.n.principal(kept, &position),
+            n: self.n.principal(kept),
             noise: self.noise,
         }
     }
@@ -359,18 +355,12 @@ impl RelayProblem {
         let m = modes.len();
         let mut signs: Vec<f64> = modes.iter().map(|&mode| f64::from(mode)).collect();
         let sliding: Vec<usize> = (0..m).filter(|&i| modes[i] == 0).collect();
-        let mut position = vec![usize::MAX; m];
-        for (place, &i) in sliding.iter().enumerate() {
-            position[i] = place;
-        }
         let mut unknown: Vec<f64> = sliding
             .iter()
             .map(|&i| -self.nu[i] - self.n.dot(i, &signs))
             .collect();
         pivots.n_pivots += 1;
-        pivots
-            .solver
-            .factor(&self.n.principal(&sliding, &position))?;
+        pivots.solver.factor(&self.n.principal(&sliding))?;
         pivots.solver.solve(&mut unknown);
         for (&i, &sign) in sliding.iter().zip(&unknown) {
             signs[i] = sign;

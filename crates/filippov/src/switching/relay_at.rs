@@ -1,10 +1,10 @@
 //! The relay problem of a system at a point where surfaces meet.
 
-use super::patience::Patience;
 use super::relay::{solve_relay_within, RelayProblem, RelaySolution, Uniqueness};
 use super::shared_load::stay_together;
 use crate::error::FieldError;
 use crate::mode::Mode;
+use crate::patience::Patience;
 use crate::system::PiecewiseSystem;
 
 /// Solves the relay problem at a point where the surfaces of `meeting` vanish, with the entries of `mode` there as

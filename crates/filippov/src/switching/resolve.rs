@@ -1,24 +1,23 @@
 //! The decision at an intersection, whatever came before and however many surfaces meet.
 
-use super::codim2::{self, Bilinear, Corners};
-use super::hidden::{admissible_within, limit_within, Outcome};
+use super::hidden::{attracting, limit_within, Outcome};
 use super::incoming::{ExitKind, Incoming};
-use super::normal_fields::NormalFields;
 use super::parts::{independent_parts, resolve_parts};
-use super::patience::Patience;
-use super::resolution::{Continuation, Resolution, Undecided};
-use super::roots::{newton, stable_roots_within};
-use super::single;
-use super::stability::{is_negative_p_matrix, is_stable_for};
+use super::resolution::{Continuation, Resolution};
+use crate::cube::Bilinear;
+use crate::cube::NormalFields;
+use crate::cube::{is_negative_p_matrix, is_stable_for};
+use crate::cube::{newton, stable_roots_within};
+use crate::error::Undecided;
+use crate::patience::Patience;
 use crate::tolerances::{
     AFTER_THE_EXIT, DOUBTFUL, MOST_MEETING, MOST_SCALED_SINGLY, UNSTABLE_START,
 };
 
 /// Decides what follows at an intersection of m surfaces, scaled by `kappa`.
 ///
-/// One surface has its two figures, two surfaces their decision trees; where a tree says that the
-/// outcome depends on the scaling, and for three and more surfaces, the hidden dynamics at `kappa`
-/// decides. If a quantity whose sign decided is doubtful (`tolerances/`), the decision is
+/// Of one and two surfaces, and at a start, all attracting continuations are listed: a single one follows. Among
+/// several, and for three and more surfaces, the hidden dynamics at `kappa` selects. If a quantity whose sign decided is doubtful (`tolerances/`), the decision is
 /// repeated with perturbed fields: if they agree, theirs counts, and if not,
 /// [`Resolution::degenerate`] says so. Surfaces in parts that do not know of each other are decided part by part.
 ///
@@ -31,7 +30,7 @@ use crate::tolerances::{
 /// let fields = NormalFields::new(2, vec![1.75, 0.25, -0.25, 1.25, 1.25, -1.75, -0.75, -0.75])?;
 /// let incoming = Incoming::Face { mode: vec![0, -1], multipliers: vec![0.75] };
 /// let resolution = resolve(&fields, &incoming, &[1.0, 1.0])?;
-/// assert_eq!(resolution.leaf, "E.A/root/turn");
+/// assert_eq!(resolution.leaf, "only");
 /// assert_eq!(resolution.mode(), Some(&Mode::new(vec![0, 0])));
 /// assert!((resolution.multipliers[0] - 0.5).abs() < 1e-15);
 /// assert!(resolution.unique);
@@ -127,91 +126,94 @@ fn decide(
     kappa: &[f64],
     patience: Patience,
 ) -> Result<Resolution, Undecided> {
-    if fields.m() == 2 && Bilinear::of_fields(fields).is_undetermined() {
-        let tangent = (0..2).find(|&surface| fields.row_size(surface) == 0.0);
+    let m = fields.m();
+    let is_undetermined = match m {
+        1 => fields.size() == 0.0,
+        2 => Bilinear::of_fields(fields).is_undetermined(),
+        _ => false,
+    };
+    if is_undetermined {
+        let tangent = (0..m).find(|&surface| fields.row_size(surface) == 0.0);
         return Err(match tangent {
             Some(surface) => Undecided::Tangent { surface },
             None => Undecided::Proportional,
         });
     }
-    let mut resolution = match (fields.m(), incoming) {
-        (_, Incoming::Start) => start(fields, kappa, patience),
-        (1, _) => at_one_surface(fields, incoming),
-        (2, Incoming::Face { .. } | Incoming::Exit { .. }) => {
-            by_tree(fields, incoming, kappa, patience)
-        }
-        (2, _) => by_hidden_dynamics(fields, incoming, &[kappa.to_vec()], patience),
-        _ => by_hidden_dynamics(
-            fields,
-            incoming,
-            &comparable_scalings(fields, incoming, kappa),
-            patience,
-        ),
+    let mut resolution = match incoming {
+        Incoming::Start if m <= MOST_MEETING => among_attracting(fields, incoming, kappa, patience),
+        _ if m <= 2 => among_attracting(fields, incoming, kappa, patience),
+        // Not all 3^m modes can be looked at.
+        _ => by_trial(fields, incoming, kappa, patience),
     }?;
     complete(&mut resolution, fields, kappa, patience);
     Ok(resolution)
 }
 
-fn at_one_surface(fields: &NormalFields, incoming: &Incoming) -> Result<Resolution, Undecided> {
-    match incoming {
-        Incoming::Exit { lambda, drift, .. } => {
-            single::leave(fields, lambda[0], drift.as_ref().map(|drift| drift[0]))
-        }
-        Incoming::Corner { region: entry } | Incoming::Face { mode: entry, .. }
-            if entry[0] != 0 =>
-        {
-            single::arrive(fields, entry[0])
-        }
-        _ => Err(Undecided::NotArriving { surface: 0 }),
-    }
-}
-
-/// Two surfaces: the trees, and the hidden dynamics for the leaves that depend on the scaling.
-fn by_tree(
+/// The only attracting continuation, or that of several to which the hidden dynamics tends.
+///
+/// Where sliding on both of two surfaces ends at a side or at a fold, it tends to the same one for every scaling for which the
+/// root was stable before: the others are no candidates.
+fn among_attracting(
     fields: &NormalFields,
     incoming: &Incoming,
     kappa: &[f64],
     patience: Patience,
 ) -> Result<Resolution, Undecided> {
-    let corners = Corners::new(fields)?;
-    let mut resolution = match incoming {
-        Incoming::Exit { kind, lambda, .. } => {
-            let leave = match kind {
-                ExitKind::Side => codim2::leave_at_side,
-                ExitKind::Fold => codim2::leave_at_fold,
-                ExitKind::Stability => codim2::leave_where_unstable,
-            };
-            leave(&corners, [lambda[0], lambda[1]])?
+    let is_start = *incoming == Incoming::Start;
+    let starts = incoming.starts(fields, kappa, patience)?;
+    let (found, margin) = attracting(&starts.fields, patience);
+    let mut resolution = if let [only] = found.as_slice() {
+        let mut resolution = Resolution::sure("only", only.continuation.clone());
+        if fields.m() > 2 {
+            resolution.multipliers.clone_from(&only.multipliers);
         }
-        Incoming::Face { mode, .. } => codim2::enter(&corners, [mode[0], mode[1]])?,
-        Incoming::Corner { .. } | Incoming::Start => return Err(Undecided::NoOutcome),
-    };
-    if !resolution.unique {
-        let starts = incoming.starts(fields, kappa, patience)?;
-        let outcome = limit_within(&starts.fields, &starts.states[0], kappa, patience);
+        resolution
+    } else {
+        let found: Vec<Continuation> = found.into_iter().map(|one| one.continuation).collect();
+        let from = |u: &[f64]| limit_within(&starts.fields, u, kappa, patience);
+        let is_lost = |outcome: &Outcome| {
+            continuation(outcome).is_ok_and(|limit| !oscillates(outcome) && !found.contains(&limit))
+        };
+        let mut outcome = from(&starts.states[0]);
+        // u = 0 may be at rest in some directions, or on the border of two basins.
+        if is_start && is_lost(&outcome) && !found.is_empty() {
+            outcome = from(&vec![UNSTABLE_START; fields.m()]);
+        }
+        let chosen = match (continuation(&outcome), found.last()) {
+            // Fields in balance: as good as any other is the last one, that of the most entries +1.
+            (Err(Undecided::AtRest), Some(last)) if is_start => last.clone(),
+            (chosen, _) => chosen?,
+        };
+        let mut resolution = Resolution::sure(leaf_of(&outcome), chosen);
+        resolution.degenerate = !is_start && is_lost(&outcome);
+        resolution.oscillates = oscillates(&outcome);
         resolution.n_motions = 1;
-        match continuation(&outcome) {
-            Ok(found) if resolution.candidates.contains(&found) => {
-                resolution.oscillates = oscillates(&outcome);
-                resolution.chosen = Some(found);
-            }
-            other if resolution.chosen.is_none() => {
-                return Err(other.err().unwrap_or(Undecided::NoOutcome))
-            }
-            // The tree says what follows for scalings that are not extreme.
-            _ => resolution.degenerate = true,
+        let kind = match incoming {
+            Incoming::Exit { kind, .. } => Some(*kind),
+            _ => None,
+        };
+        if !matches!(kind, Some(ExitKind::Side | ExitKind::Fold)) {
+            resolution.add_candidates(&found);
         }
-    }
+        resolution.unique = resolution.candidates.len() == 1;
+        resolution
+    };
+    // A mode that is left at no speed at first is none in which a motion starts.
+    resolution.margin = match is_start {
+        true => smallest_component(fields),
+        false => margin,
+    };
     Ok(resolution)
 }
 
-/// All start states and scalings; the first of each decides.
-fn by_hidden_dynamics(
+/// The hidden dynamics from all start states and for several scalings; the first of each decides.
+fn by_trial(
     fields: &NormalFields,
     incoming: &Incoming,
-    scalings: &[Vec<f64>],
+    kappa: &[f64],
     patience: Patience,
 ) -> Result<Resolution, Undecided> {
+    let scalings = comparable_scalings(fields, incoming, kappa);
     let starts = incoming.starts(fields, &scalings[0], patience)?;
     let outcome = limit_within(&starts.fields, &starts.states[0], &scalings[0], patience);
     let chosen = continuation(&outcome)?;
@@ -237,53 +239,8 @@ fn by_hidden_dynamics(
             Err(_) => resolution.unique = false,
         }
     }
-    resolution.unique &= resolution.candidates.len() == 1;
-    Ok(resolution)
-}
-
-/// Without a past: the only admissible mode, or the one that the hidden dynamics tends to from u = 0.
-fn start(
-    fields: &NormalFields,
-    kappa: &[f64],
-    patience: Patience,
-) -> Result<Resolution, Undecided> {
-    if fields.m() > MOST_MEETING {
-        // Not all 3^m modes can be looked at.
-        let mut resolution =
-            by_hidden_dynamics(fields, &Incoming::Start, &scalings(kappa), patience)?;
-        resolution.unique = has_one_mode_only(fields);
-        return Ok(resolution);
-    }
-    let found = admissible_within(fields, patience);
-    let margin = smallest_component(fields);
-    let mut resolution = if let [only] = found.as_slice() {
-        let mut resolution = Resolution::sure("start/only", only.continuation.clone());
-        resolution.multipliers = only.multipliers.clone();
-        resolution
-    } else {
-        let from = |u: f64| limit_within(fields, &vec![u; fields.m()], kappa, patience);
-        let mut outcome = from(0.0);
-        // u = 0 may be at rest in some directions, or on the border of two basins.
-        let is_found = |limit: &Continuation| found.iter().any(|one| one.continuation == *limit);
-        let is_lost =
-            !oscillates(&outcome) && continuation(&outcome).is_ok_and(|limit| !is_found(&limit));
-        if is_lost && !found.is_empty() {
-            outcome = from(UNSTABLE_START);
-        }
-        let chosen = match (continuation(&outcome), found.last()) {
-            // Fields in balance: as good as any other is the last one, that of the most entries +1.
-            (Err(Undecided::AtRest), Some(last)) => last.continuation.clone(),
-            (chosen, _) => chosen?,
-        };
-        let mut resolution = Resolution::sure("start/several", chosen);
-        resolution.oscillates = oscillates(&outcome);
-        resolution.n_motions = 1;
-        let candidates: Vec<Continuation> = found.into_iter().map(|a| a.continuation).collect();
-        resolution.add_candidates(&candidates);
-        resolution.unique = resolution.candidates.len() == 1;
-        resolution
-    };
-    resolution.margin = margin;
+    // Without a past many more modes are possible than the trial looks at.
+    resolution.unique &= resolution.candidates.len() == 1 && *incoming != Incoming::Start;
     Ok(resolution)
 }
 
@@ -436,7 +393,7 @@ fn perturbations(fields: &NormalFields) -> impl Iterator<Item = NormalFields> + 
     let sizes: Vec<f64> = (0..fields.m()).map(|j| fields.row_size(j)).collect();
     directions.map(move |(root, sign)| {
         let mut count = 0;
-        fields.map(|_, j, value| {
+        fields.map(|_, _, j, value| {
             count += 1;
             let direction = 2.0 * (root * f64::from(count)).fract() - 1.0;
             value + 2.0 * DOUBTFUL * sign * direction * sizes[j]

@@ -18,10 +18,10 @@
 //! Reference: G. M. Ziegler, *Lectures on Polytopes* (1995), section 7.3 (zonotopes); for the uniqueness of the motion,
 //! Cottle, Pang, Stone, *The Linear Complementarity Problem* (1992), section 3.1.
 
-use super::p_matrix::{is_p_matrix, symmetrising_scale};
 use super::relay::{largest, negative, with_diagonal, RelayProblem, RelaySolution, SOLVED};
-use super::small_matrix::{Matrix, Vector};
-use crate::sparse::{components, is_positive_definite, SparseRows, SparseSolver};
+use crate::cube::{is_p_matrix, symmetrising_scale};
+use crate::cube::{Matrix, Vector};
+use crate::sparse::{coupled_blocks, is_positive_definite, SparseRows, SparseSolver};
 use crate::tolerances::{DEFINITE_PIVOT, EPS, MOST_IN_LOOP, REDUNDANT_PIVOT};
 
 /// The multipliers of surfaces some of which are redundant.
@@ -57,13 +57,9 @@ enum PartLaw {
 impl SharedLoads {
     /// `None` if the jumps are not those of friction, or if too many contacts close one loop.
     pub fn new(normal: &SparseRows) -> Option<Self> {
-        let mut position = vec![usize::MAX; normal.n_rows()];
         let (acting, idle): (Vec<usize>, Vec<usize>) =
             (0..normal.n_rows()).partition(|&j| has_effect(normal, j));
-        for (place, &j) in acting.iter().enumerate() {
-            position[j] = place;
-        }
-        let parts = parts_of(&normal.principal(&acting, &position)).into_iter();
+        let parts = coupled_blocks(&normal.principal(&acting)).into_iter();
         let parts = parts.map(|(places, block)| {
             let mut solver = SparseSolver::default();
             let law = match solver.factor(&block) {
@@ -137,26 +133,10 @@ fn has_effect(normal: &SparseRows, j: usize) -> bool {
     })
 }
 
-/// The connected components: their surfaces in increasing order, and what couples them.
-fn parts_of(normal: &SparseRows) -> Vec<(Vec<usize>, SparseRows)> {
-    let mut position = vec![usize::MAX; normal.n_rows()];
-    let parts = components(normal).into_iter().map(|component| {
-        let mut surfaces = component.unknowns;
-        surfaces.sort_unstable();
-        for (place, &i) in surfaces.iter().enumerate() {
-            position[i] = place;
-        }
-        let block = normal.principal(&surfaces, &position);
-        surfaces.iter().for_each(|&i| position[i] = usize::MAX);
-        (surfaces, block)
-    });
-    parts.collect()
-}
-
 /// Is the motion that solves a relay problem with this N the only one, though its signs may not be? So it is if -N is a
 /// P-matrix, or becomes symmetric and semidefinite by a scaling of the columns, in each component.
 pub fn has_one_motion(normal: &SparseRows) -> bool {
-    parts_of(normal).into_iter().all(|(_, block)| {
+    coupled_blocks(normal).into_iter().all(|(_, block)| {
         let block = negative(&block);
         is_p_matrix(&block) == Some(true) || is_semidefinite(&block)
     })
@@ -166,10 +146,7 @@ fn is_semidefinite(block: &SparseRows) -> bool {
     let Some(scale) = symmetrising_scale(block) else {
         return false;
     };
-    let mut scaled = SparseRows::new(block.n_columns());
-    for i in 0..block.n_rows() {
-        scaled.push_row(block.row(i).map(|(j, value)| (j, value * scale[j])));
-    }
+    let scaled = block.with_columns_scaled(&scale);
     let transposed = scaled.transposed();
     let is_symmetric = (0..scaled.n_rows()).all(|i| {
         scaled.row(i).all(|(j, value)| {
@@ -191,16 +168,12 @@ pub(super) fn stay_together(
     gradients: &SparseRows,
     sticking: &[usize],
 ) -> bool {
-    let mut position = vec![usize::MAX; normal.n_rows()];
-    for (place, &i) in sticking.iter().enumerate() {
-        position[i] = place;
-    }
     let rows = |matrix: &SparseRows, places: &[usize]| {
         let picked = places.iter().map(|&place| matrix.row(sticking[place]));
         let picked = picked.map(|row| row.collect::<Vec<(usize, f64)>>());
         rank(picked.collect(), matrix.n_columns())
     };
-    let parts = parts_of(&normal.principal(sticking, &position)).into_iter();
+    let parts = coupled_blocks(&normal.principal(sticking)).into_iter();
     let mut parts = parts.filter(|(_, block)| SparseSolver::default().factor(block).is_err());
     parts.all(|(places, _)| rows(gradients, &places) == rows(normal, &places))
 }
@@ -248,18 +221,14 @@ pub(super) fn let_stick(problem: &RelayProblem, solution: &mut RelaySolution) {
         solution.modes[*i] == 0 || solution.rates[*i].abs() <= rounding
     };
     let sticking: Vec<usize> = (0..problem.nu.len()).filter(sticks).collect();
-    let mut position = vec![usize::MAX; problem.nu.len()];
-    for (place, &i) in sticking.iter().enumerate() {
-        position[i] = place;
-    }
     let here: Vec<f64> = sticking.iter().map(|&i| solution.signs[i]).collect();
     let rates: Vec<f64> = sticking
         .iter()
         .map(|&i| problem.nu[i] + problem.n.dot(i, &solution.signs))
         .collect();
-    let normal = problem.n.principal(&sticking, &position);
+    let normal = problem.n.principal(&sticking);
     let is_singular = |block: &SparseRows| SparseSolver::default().factor(block).is_err();
-    let loops = parts_of(&normal).into_iter();
+    let loops = coupled_blocks(&normal).into_iter();
     let loops = loops.filter(|(_, block)| is_singular(block));
     solution.n_sharing = loops.map(|(surfaces, _)| surfaces.len()).max().unwrap_or(0);
     let loads = SharedLoads::new(&normal);

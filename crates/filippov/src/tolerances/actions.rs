@@ -12,10 +12,6 @@ pub const NO_IMPULSE: f64 = 1e-8;
 /// Actions in one instant at most. A chain of bodies that pass an impulse on needs about the square of their number.
 pub const MOST_ACTIONS_AT_ONE_TIME: usize = 1000;
 
-/// The ratios of the last intervals between impacts agree within this share of their distance to 1: the time of rest
-/// is then known to that share of the time until then.
-pub const IMPACTS_AGREE: f64 = 0.1;
-
 /// Impacts whose flights rise less than this multiple of the rounding of the surface are not resolved.
 pub const UNRESOLVED_FLIGHT: f64 = 64.0;
 

@@ -34,21 +34,14 @@ pub const AT_SIDE: f64 = 1e-6;
 /// functions. It grows up to `AT_SIDE`.
 pub const FIRST_SLACK: f64 = 1e-12;
 
-/// The diagonal entry that vanishes at an exit by loss of stability is below this fraction of the
-/// other one. Only the kind of event is confirmed by it, so it may be coarse.
-pub const VANISHING_DIAGONAL: f64 = 1e-2;
-
 /// A sign that decided at an intersection is doubtful if its quantity is smaller than this fraction
 /// of its size: about the error of the fields at a located event. The fields are perturbed by as
 /// much then.
 pub const DOUBTFUL: f64 = 1e-8;
 
-/// Where an exit leaves several ways open, the hidden dynamics starts beside the root by this much.
-pub const BESIDE_THE_ROOT: f64 = 1e-6;
-
-/// Distance from a root of three and more surfaces that loses stability at which the hidden dynamics starts: the pair
-/// of eigenvalues vanishes there, and the motion off the root grows like the square of the distance. Also the distance from
-/// u = 0 of a second start, if the hidden dynamics from there rests in a repelling mode.
+/// Largest distance from a root that loses stability or meets another one at which the hidden
+/// dynamics starts: an eigenvalue vanishes there, and the motion off the root grows like the square of the distance. Also
+/// the distance from u = 0 of a second start, if the hidden dynamics from there rests in a repelling mode.
 pub const UNSTABLE_START: f64 = 0.1;
 
 /// Drift of the normal components after an exit, as a fraction of their size: small enough to leave
@@ -66,11 +59,9 @@ pub const CORNER_OFFSETS: [f64; 9] = [0.05, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0, 30.0, 
 /// that rounding does not matter.
 pub const BASIN_SHARE: f64 = 0.9;
 
-/// Successive ratios of accumulating returns agree within this fraction.
+/// The ratios of accumulating switches and impacts agree within this part of themselves and of their distance to 1: the
+/// limit is then known to that share of the time until then.
 pub const ACCUMULATION_AGREEMENT: f64 = 0.1;
-
-/// Returns that shrink by less than this do not accumulate soon enough to be extrapolated.
-pub const SLOWEST_ACCUMULATION: f64 = 0.95;
 
 /// Pieces (corners, strips, steps of a series) that one run of the hidden dynamics may take: some
 /// tenths of a second. Of 830 000 random runs one did not end within, a fold passed at a ratio of
@@ -300,10 +291,6 @@ pub const VANISHED: f64 = 1e-3;
 /// The fields of both sides have equal shares where the multiplier is nearer to zero than this: a moment before a jump vanishes
 /// the multiplier is a quotient of two small numbers.
 pub const EQUAL_SHARES: f64 = 1e-6;
-
-/// A gradient depends on others where the square of its part orthogonal to them is below this fraction of its own: the
-/// rounding of inner products.
-pub const DEPENDENT: f64 = 64.0 * EPS;
 
 /// A trial of the modes is lengthened by this factor, up to so many times, until every function is clear of rounding.
 pub const LONGER_TRIAL: f64 = 10.0;

@@ -1,8 +1,9 @@
 //! Random normal components for every situation at an intersection of two surfaces.
 #![allow(dead_code, clippy::unwrap_used)]
 
-use filippov::switching::codim2::Frame;
 use filippov::switching::NormalFields;
+
+use crate::oracles::Frame;
 
 /// A small generator with a seed (SplitMix64), so that every run is the same.
 pub struct Random(u64);
@@ -90,7 +91,7 @@ pub fn entry(random: &mut Random) -> (NormalFields, [i8; 2]) {
         if values[0] * values[3] - values[2] * values[1] > 0.0 {
             let frame = random.frame();
             let fields = NormalFields::new(2, values.to_vec()).unwrap();
-            return (frame.fields(&fields).unwrap(), frame.of([0, -1]));
+            return (frame.fields(&fields), frame.of([0, -1]));
         }
     }
 }
@@ -116,8 +117,8 @@ impl Exit {
         let frame = random.frame();
         let exchanged = |v: [f64; 2]| if frame.exchange { [v[1], v[0]] } else { v };
         Exit {
-            at: frame.fields(&at.fields()).unwrap(),
-            after: frame.fields(&after.fields()).unwrap(),
+            at: frame.fields(&at.fields()),
+            after: frame.fields(&after.fields()),
             root: frame.of(at.centre),
             start: frame.of(start),
             kappa: exchanged(kappa),

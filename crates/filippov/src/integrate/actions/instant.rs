@@ -24,7 +24,7 @@ use crate::integrate::integrator::Integrator;
 use crate::mode::Mode;
 use crate::solution::Switch;
 use crate::status::Stop;
-use crate::switching::{Kind, Leading};
+use crate::switching::Leading;
 use crate::tolerances::{MOST_ACTIONS_AT_ONE_TIME, PENETRATION, SURFACE_NOISE};
 
 /// The surfaces in one instant, as far as they trigger actions.
@@ -255,7 +255,7 @@ impl Integrator<'_> {
         self.passing.clear();
         self.recorder.set_last_mode(first, &next.mode);
         if let Some(rest) = self.impacts_end(first, &next.mode)? {
-            return self.come_to_rest(rest, next.mode);
+            return self.jump_to(rest, next.mode);
         }
         let t = self.t;
         let stop = self.begin(next)?;
@@ -474,9 +474,4 @@ impl Integrator<'_> {
         }
         sides
     }
-}
-
-/// Is this the kind of an impact, or of another action at a surface?
-pub(in crate::integrate) fn is_reset(switch: &Switch) -> bool {
-    switch.kind == Kind::Reset && switch.surfaces.len() == 1
 }

@@ -1,11 +1,11 @@
 //! All modes in which a motion can leave an intersection, or stay on it.
 
-use crate::mode::Mode;
-use crate::switching::codim2::Lap;
-use crate::switching::normal_fields::NormalFields;
-use crate::switching::patience::Patience;
+use crate::cube::stable_roots_within;
+use crate::cube::Bilinear;
+use crate::cube::NormalFields;
+use crate::patience::Patience;
+use crate::switching::lap::Lap;
 use crate::switching::resolution::Continuation;
-use crate::switching::roots::stable_roots_within;
 
 /// A continuation that is possible without regard to the past.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,10 +32,41 @@ pub fn admissible(fields: &NormalFields) -> Vec<Admissible> {
 
 /// As [`admissible`]; some of them when the caller has waited long enough.
 pub fn admissible_within(fields: &NormalFields, patience: Patience) -> Vec<Admissible> {
-    let mut found = Vec::new();
+    attracting(fields, patience).0
+}
+
+/// As [`admissible_within`], with the distance of the fields to others that have another list, as a fraction of their size:
+/// the smallest of all modes, each as far from this as the condition that it fails most clearly, or fulfils
+/// least. Neither the stability of roots nor roots of three and more multipliers count.
+pub(in crate::switching) fn attracting(
+    fields: &NormalFields,
+    patience: Patience,
+) -> (Vec<Admissible>, f64) {
+    let (mut found, mut margin) = (Vec::new(), f64::INFINITY);
     let mut mode = vec![-1_i8; fields.m()];
     loop {
-        found.extend(in_mode(fields, &mode, patience));
+        let (roots, slides) = if mode.contains(&0) {
+            let face = fields.restrict(&mode);
+            let slides = match face.m() {
+                1 | 2 => root_margin(fields, &mode, &face),
+                _ => f64::INFINITY,
+            };
+            (stable_roots_within(&face, patience), slides)
+        } else {
+            (vec![Vec::new()], f64::INFINITY)
+        };
+        let fails = roots.is_empty().then_some(slides);
+        margin = margin.min(fails.map_or(f64::INFINITY, f64::abs));
+        for multipliers in roots {
+            let leaves = smallest_departure(fields, &mode, &multipliers);
+            margin = margin.min(leaves.min(slides).abs());
+            if leaves > 0.0 {
+                found.push(Admissible {
+                    continuation: Continuation::mode(&mode),
+                    multipliers,
+                });
+            }
+        }
         // The next mode in counting order.
         let Some(i) = mode.iter().position(|&k| k < 1) else {
             break;
@@ -49,29 +80,29 @@ pub fn admissible_within(fields: &NormalFields, patience: Patience) -> Vec<Admis
             multipliers: Vec::new(),
         });
     }
-    found
+    (found, margin)
 }
 
-fn in_mode(fields: &NormalFields, mode: &[i8], patience: Patience) -> Vec<Admissible> {
-    let leaves = |multipliers: &Vec<f64>| {
-        let mut next = multipliers.iter();
-        let held = |&k: &i8| {
-            if k == 0 {
-                next.next().copied()
-            } else {
-                Some(f64::from(k))
-            }
-        };
-        let lambda: Vec<f64> = mode.iter().filter_map(held).collect();
-        let g = fields.interpolate(&lambda);
-        mode.iter()
-            .zip(g)
-            .all(|(&k, g)| k == 0 || f64::from(k) * g > 0.0)
+/// How clearly there is a root on a face of one or two multipliers.
+fn root_margin(fields: &NormalFields, mode: &[i8], face: &NormalFields) -> f64 {
+    if face.m() == 2 {
+        return Bilinear::of_fields(face).root_margin();
+    }
+    let slid_on = mode.iter().position(|&k| k == 0).unwrap_or(0);
+    face.at(0)[0].min(-face.at(1)[0]) / fields.row_size(slid_on)
+}
+
+/// How clearly the field at these multipliers leaves the surfaces that the mode does not slide on, by the one least left.
+fn smallest_departure(fields: &NormalFields, mode: &[i8], multipliers: &[f64]) -> f64 {
+    let mut next = multipliers.iter();
+    let held = |&k: &i8| match k {
+        0 => next.next().copied(),
+        side => Some(f64::from(side)),
     };
-    let roots = stable_roots_within(&fields.restrict(mode), patience);
-    let admissible = |multipliers| Admissible {
-        continuation: Continuation::Mode(Mode::new(mode.to_vec())),
-        multipliers,
-    };
-    roots.into_iter().filter(leaves).map(admissible).collect()
+    let lambda: Vec<f64> = mode.iter().filter_map(held).collect();
+    let g = fields.interpolate(&lambda);
+    let left = (0..mode.len()).filter(|&i| mode[i] != 0);
+    // All fields may be tangent to a surface; that is not left.
+    left.map(|i| f64::from(mode[i]) * g[i] / fields.row_size(i).max(f64::MIN_POSITIVE))
+        .fold(f64::INFINITY, f64::min)
 }

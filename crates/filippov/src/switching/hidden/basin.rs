@@ -1,6 +1,6 @@
 //! A neighbourhood of a stable root from which the hidden dynamics of two surfaces surely tends to it.
 
-use crate::switching::codim2::Bilinear;
+use crate::cube::Bilinear;
 use crate::tolerances::BASIN_SHARE;
 
 /// The ellipse {e . Q e <= level} around the root, e the distance from it, where e . Q e decreases.

@@ -1,7 +1,7 @@
 //! Hidden dynamics within one cell, by Taylor series.
 
 use super::first_zero::{first_loss, value};
-use crate::switching::normal_fields::{NormalFields, SignGroup};
+use crate::cube::{NormalFields, SignGroup};
 
 /// Order of the series. By Jorba and Zou (2005) the best order for double precision is about
 /// -ln(eps)/2 + 1 = 19, with steps of 1/e^2 of the radius of convergence.

@@ -1,8 +1,8 @@
 //! When is the hidden dynamics of many surfaces sure to stay on a face?
 
-use crate::switching::normal_fields::NormalFields;
-use crate::switching::roots::newton;
-use crate::switching::stability::is_stable;
+use crate::cube::is_stable;
+use crate::cube::newton;
+use crate::cube::NormalFields;
 use crate::tolerances::{HIDDEN_OUTWARDS, HIDDEN_REST, HIDDEN_REST_REACH};
 
 /// The multipliers at which the motion comes to rest on the face of these sides, if it is sure to

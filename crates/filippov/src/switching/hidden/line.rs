@@ -1,8 +1,8 @@
 //! Hidden dynamics of one surface.
 
 use super::Outcome;
+use crate::cube::NormalFields;
 use crate::mode::Mode;
-use crate::switching::normal_fields::NormalFields;
 
 /// g is affine between -1 and 1: u moves in one direction until the first zero of g, or for ever.
 pub(super) fn limit(fields: &NormalFields, u: f64) -> Outcome {

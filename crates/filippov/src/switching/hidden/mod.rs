@@ -21,11 +21,12 @@ mod returns;
 mod space;
 mod strip;
 
+pub(super) use admissible::attracting;
 pub use admissible::{admissible, admissible_within, Admissible};
 
-use super::normal_fields::NormalFields;
+use crate::cube::NormalFields;
 use crate::mode::Mode;
-use crate::switching::patience::Patience;
+use crate::patience::Patience;
 
 /// What the hidden dynamics tends to.
 #[derive(Clone, Debug, PartialEq)]

@@ -5,10 +5,11 @@ use super::cell::{Cell, StepEnd};
 use super::returns::{Returns, Verdict};
 use super::strip::{Strip, StripEnd};
 use super::{clipped, side, Outcome};
+use crate::cube::Bilinear;
+use crate::cube::NormalFields;
 use crate::mode::Mode;
-use crate::switching::codim2::{Bilinear, Lap};
-use crate::switching::normal_fields::NormalFields;
-use crate::switching::patience::Patience;
+use crate::patience::Patience;
+use crate::switching::lap::Lap;
 use crate::tolerances::{MOST_PIECES, MOST_TESTS};
 
 /// Follows the motion from u, piece by piece: corner, strip, or a step within the square.

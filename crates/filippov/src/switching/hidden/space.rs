@@ -3,10 +3,10 @@
 use super::cell::Cell;
 use super::certificate::rest_on_face;
 use super::{clipped, side, Outcome};
+use crate::cube::stable_roots_within;
+use crate::cube::NormalFields;
 use crate::mode::Mode;
-use crate::switching::normal_fields::NormalFields;
-use crate::switching::patience::Patience;
-use crate::switching::roots::stable_roots_within;
+use crate::patience::Patience;
 use crate::tolerances::{
     AT_THE_ROOT, FIRST_WATCH, LAST_WATCH, MOST_PIECES, MOST_TESTS, STEADY_CYCLE,
 };

@@ -5,8 +5,8 @@ use super::cell::{Cell, StepEnd};
 use super::first_zero::{first_loss, value};
 use super::strip::{Strip, StripEnd};
 use super::{line, plane, space, Outcome};
-use crate::switching::codim2::Bilinear;
-use crate::switching::patience::Patience;
+use crate::cube::Bilinear;
+use crate::patience::Patience;
 use crate::switching::NormalFields;
 
 /// A generator with a seed: SplitMix64, uniform in [-1, 1).

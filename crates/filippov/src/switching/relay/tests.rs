@@ -1,7 +1,7 @@
 //! Relay problems: by hand, the cases of `tests/data`, random ones against all modes, chains.
 
-use super::super::p_matrix::tests::smallest_minor;
 use super::{all_relay_modes, RelayError, RelayProblem, RelaySolution, Uniqueness};
+use crate::cube::smallest_minor;
 use crate::sparse::SparseRows;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;

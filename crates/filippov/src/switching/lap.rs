@@ -1,7 +1,6 @@
-//! Motion that winds around an intersection of two surfaces: one lap, the end of infinitely many inward
-//! laps, the start of infinitely many outward laps.
+//! Motion that winds around an intersection of two surfaces.
 
-use crate::switching::normal_fields::NormalFields;
+use crate::cube::NormalFields;
 
 /// One lap around the intersection under constant fields, through all four regions.
 ///
@@ -21,15 +20,6 @@ pub struct Lap {
     pub gamma: f64,
     /// The sum of the times.
     pub duration: f64,
-}
-
-/// A displacement of the state that consists of motion in several regions.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Jump {
-    /// The regions.
-    pub regions: [[i8; 2]; 4],
-    /// Time spent in each of them.
-    pub times: [f64; 4],
 }
 
 /// Counter-clockwise; clockwise is the reverse.
@@ -57,49 +47,13 @@ impl Lap {
         })
     }
 
-    /// From distance `delta` to the end of all laps on the intersection, if the motion is attracted
-    /// (gamma < 1): times delta t_j/(1 - gamma). The state has to be projected onto the
-    /// intersection then. Under fields that vary the error is a multiple of delta^2.
-    pub fn inward(&self, delta: f64) -> Option<Jump> {
-        (self.gamma < 1.0).then(|| self.jump(delta / (1.0 - self.gamma)))
-    }
-
-    /// From the intersection to distance (gamma - 1) delta by the infinitely many laps of an
-    /// outward spiral (gamma > 1): the times are those of one lap from distance delta, a free
-    /// parameter.
-    pub fn outward(&self, delta: f64) -> Option<Jump> {
-        (self.gamma > 1.0).then(|| self.jump(delta))
-    }
-
-    fn jump(&self, factor: f64) -> Jump {
-        Jump {
-            regions: self.regions,
-            times: self.times.map(|t| factor * t),
-        }
-    }
-}
-
-impl Jump {
-    /// The time that it takes.
-    pub fn duration(&self) -> f64 {
-        self.times.iter().sum()
-    }
-
-    /// The displacement sum_j t_j f^(j), with `fields[j]` the field of `regions[j]`.
+    /// The displacement sum_j t_j f^(j) of a lap from distance 1, with `fields[j]` the field of `regions[j]`. From the
+    /// intersection the infinitely many laps of an outward spiral (gamma > 1) lead to distance (gamma - 1) delta by
+    /// delta times this, in delta times its duration.
     pub fn displacement(&self, fields: [&[f64]; 4]) -> Vec<f64> {
         let component = |i: usize| (0..4).map(|n| self.times[n] * fields[n][i]).sum();
         (0..fields[0].len()).map(component).collect()
     }
-}
-
-/// The end of the laps from two estimates of it, the second one from one lap later:
-/// (second - gamma^2 first)/(1 - gamma^2). This removes the error in delta^2 and leaves one in delta^3.
-pub fn extrapolated_jump(first: &[f64], second: &[f64], gamma: f64) -> Vec<f64> {
-    let square = gamma * gamma;
-    let pairs = first.iter().zip(second);
-    pairs
-        .map(|(a, b)| (b - square * a) / (1.0 - square))
-        .collect()
 }
 
 /// The regions in the order in which rotating fields visit them.

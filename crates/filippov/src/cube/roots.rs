@@ -1,10 +1,10 @@
 //! Roots of the sliding equations g(lambda) = 0: all of them in the cube, one by Newton's method.
 
-use super::codim2::Bilinear;
+use super::bilinear::Bilinear;
 use super::normal_fields::{NormalFields, SignGroup};
-use super::patience::Patience;
 use super::small_matrix::Matrix;
 use super::stability::is_scaling_stable;
+use crate::patience::Patience;
 use crate::tolerances::{
     AT_SIDE, BOXES_PER_LOOK, DOUBTFUL, FAR_FROM_THE_CUBE, INJECTIVE, MOST_BOXES, MOST_BOX_WORK,
     NARROWEST_BOX, NEWTON_DONE, NEWTON_STEPS, SAME_ROOT,

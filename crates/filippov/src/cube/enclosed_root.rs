@@ -206,10 +206,10 @@ mod tests {
         }
         let root = |shift: f64| {
             let values = (0..4).flat_map(|pattern| [0, 1].map(|i| value(pattern, i, shift)));
-            let fields = crate::switching::NormalFields::new(2, values.collect());
+            let fields = crate::cube::NormalFields::new(2, values.collect());
             let found = fields
                 .ok()
-                .and_then(|f| crate::switching::newton(&f, &[0.2, -0.1]));
+                .and_then(|f| crate::cube::newton(&f, &[0.2, -0.1]));
             found.unwrap_or_default()
         };
         let centre = root(0.0);

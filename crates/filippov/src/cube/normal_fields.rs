@@ -2,8 +2,8 @@
 
 use std::borrow::Cow;
 
-use super::resolution::Undecided;
 use super::small_matrix::Matrix;
+use crate::error::Undecided;
 use crate::tolerances::MOST_MEETING;
 
 /// The normal components f_j^k = dh_j/dt along f^k of the m surfaces that meet, for all 2^m sign
@@ -63,7 +63,7 @@ impl NormalFields {
     ///
     /// # Example
     /// ```
-    /// use filippov::switching::{NormalFields, SignGroup};
+    /// use filippov::cube::{NormalFields, SignGroup};
     ///
     /// // g = (1 - 2 x, 3 - y, -z): three surfaces that do not know of each other.
     /// let group = |i: usize, minus: f64, plus: f64| {
@@ -179,25 +179,11 @@ impl NormalFields {
 
     /// The least and the largest component normal to surface j, over all patterns, and so over the cube.
     pub fn row_range(&self, j: usize) -> [f64; 2] {
-        self.range_over(j, |_, _| true)
-    }
-
-    /// The same over the patterns of one side of surface j.
-    pub fn side_range(&self, j: usize, side: i8) -> [f64; 2] {
-        self.range_over(j, |group, pattern| {
-            let bit = group.members.iter().position(|&member| member == j);
-            bit.is_none_or(|bit| (pattern >> bit & 1 == 1) == (side > 0))
-        })
-    }
-
-    fn range_over(&self, j: usize, counts: impl Fn(&SignGroup, usize) -> bool) -> [f64; 2] {
         let ranges = self.groups.iter().map(|group| {
-            let row = group.values.iter().skip(j).step_by(self.m).enumerate();
-            let row = row.filter(|&(pattern, _)| counts(group, pattern));
-            row.fold(
-                [f64::INFINITY, f64::NEG_INFINITY],
-                |[low, high], (_, &v)| [low.min(v), high.max(v)],
-            )
+            let row = group.values.iter().skip(j).step_by(self.m);
+            row.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &v| {
+                [low.min(v), high.max(v)]
+            })
         });
         ranges.fold([0.0; 2], |[low, high], [l, h]| [low + l, high + h])
     }
@@ -227,7 +213,7 @@ impl NormalFields {
     }
 
     /// The derivative of g by lambda_p: a column of G.
-    pub(super) fn derivative(&self, lambda: &[f64], p: usize) -> Vec<f64> {
+    pub(crate) fn derivative(&self, lambda: &[f64], p: usize) -> Vec<f64> {
         let mut column = vec![0.0; self.m];
         let own = self.groups.iter().find(|group| group.members.contains(&p));
         if let Some(group) = own {
@@ -277,13 +263,13 @@ impl NormalFields {
     /// The fields with the components of surface j multiplied by `factors[j]`: another scaling of h_j.
     #[must_use]
     pub fn scaled(&self, factors: &[f64]) -> NormalFields {
-        self.map(|_, j, value| factors[j] * value)
+        self.map(|_, _, j, value| factors[j] * value)
     }
 
     /// The fields with `by[j]` added to all components of surface j: what a short time makes of them.
     #[must_use]
     pub fn shifted(&self, by: &[f64]) -> NormalFields {
-        self.map(|group, j, value| if group == 0 { value + by[j] } else { value })
+        self.map(|group, _, j, value| if group == 0 { value + by[j] } else { value })
     }
 
     /// Is g affine in lambda, up to rounding? So it is where each sign enters the field by a term of
@@ -340,19 +326,22 @@ impl NormalFields {
         enlarged
     }
 
-    /// Changes every value: `change(group, surface, value)`.
-    pub(super) fn map(&self, mut change: impl FnMut(usize, usize, f64) -> f64) -> NormalFields {
+    /// Changes every value: `change(group, pattern, surface, value)`.
+    pub(crate) fn map(
+        &self,
+        mut change: impl FnMut(usize, usize, usize, f64) -> f64,
+    ) -> NormalFields {
         let mut mapped = self.clone();
         for (index, group) in mapped.groups.iter_mut().enumerate() {
             for (i, value) in group.values.iter_mut().enumerate() {
-                *value = change(index, i % self.m, *value);
+                *value = change(index, i / self.m, i % self.m, *value);
             }
         }
         mapped
     }
 
     /// Other surfaces with these groups.
-    pub(super) fn with_groups(&self, m: usize, groups: Vec<SignGroup>) -> NormalFields {
+    pub(crate) fn with_groups(&self, m: usize, groups: Vec<SignGroup>) -> NormalFields {
         NormalFields { m, groups }.with_few_joined()
     }
 
@@ -374,12 +363,12 @@ impl NormalFields {
 
 impl SignGroup {
     /// The share of the m components at one pattern.
-    pub(super) fn at(&self, pattern: usize, m: usize) -> &[f64] {
+    pub(crate) fn at(&self, pattern: usize, m: usize) -> &[f64] {
         &self.values[pattern * m..(pattern + 1) * m]
     }
 
     /// The number of the pattern with these signs of all surfaces; a zero entry leaves its bit unset.
-    pub(super) fn pattern_of(&self, signs: &[i8]) -> usize {
+    pub(crate) fn pattern_of(&self, signs: &[i8]) -> usize {
         let bits = self.members.iter().enumerate();
         bits.fold(0, |pattern, (bit, &i)| {
             pattern | usize::from(signs[i] > 0) << bit
@@ -424,7 +413,7 @@ mod tests {
     use super::{NormalFields, SignGroup};
 
     #[test]
-    fn ranges_of_one_side_are_those_of_its_patterns() {
+    fn ranges_are_those_of_the_patterns() {
         let group = |members: &[usize], seed: usize| SignGroup {
             members: members.to_vec(),
             values: (0..3 << members.len())
@@ -433,22 +422,10 @@ mod tests {
         };
         let fields = NormalFields::of_groups(3, vec![group(&[0, 2], 1), group(&[1], 2)]).unwrap();
         for j in 0..3 {
-            let on = |side: Option<usize>| {
-                let counts = |k: &usize| side.is_none_or(|side| k >> j & 1 == side);
-                let patterns = (0..8).filter(counts);
-                let values: Vec<f64> = patterns.map(|k| fields.at(k)[j]).collect();
-                let least = values.iter().copied().fold(f64::INFINITY, f64::min);
-                [
-                    least,
-                    values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
-                ]
-            };
-            let close = |a: [f64; 2], b: [f64; 2]| {
-                (a[0] - b[0]).abs() < 1e-15 && (a[1] - b[1]).abs() < 1e-15
-            };
-            assert!(close(fields.row_range(j), on(None)));
-            assert!(close(fields.side_range(j, -1), on(Some(0))));
-            assert!(close(fields.side_range(j, 1), on(Some(1))));
+            let values = || (0..8).map(|k| fields.at(k)[j]);
+            let [low, high] = fields.row_range(j);
+            assert!((low - values().fold(f64::INFINITY, f64::min)).abs() < 1e-15);
+            assert!((high - values().fold(f64::NEG_INFINITY, f64::max)).abs() < 1e-15);
         }
     }
 }

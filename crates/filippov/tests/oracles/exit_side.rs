@@ -1,8 +1,7 @@
 //! The root leaves the square through a side: Figure 4.6.
 
-use super::{Bilinear, Corners, Frame};
-use crate::switching::resolution::{Continuation, Resolution, Signs, Undecided};
-use crate::tolerances::AT_SIDE;
+use super::{Corners, Frame, Leaf, Refused};
+use filippov::switching::{Bilinear, Continuation};
 
 /// Decides what follows where a multiplier of sliding on two surfaces reaches -1 or +1.
 ///
@@ -18,27 +17,26 @@ use crate::tolerances::AT_SIDE;
 ///
 /// # Errors
 /// If neither multiplier is -1 or +1.
-pub fn leave_at_side(corners: &Corners, lambda: [f64; 2]) -> Result<Resolution, Undecided> {
+pub fn leave_at_side(corners: &Corners, lambda: [f64; 2]) -> Result<Leaf, Refused> {
     let exchange = lambda[1].abs() > lambda[0].abs();
     let leaving = lambda[usize::from(exchange)];
-    let on_side = (leaving.abs() - 1.0).abs() <= AT_SIDE;
+    let on_side = (leaving.abs() - 1.0).abs() <= 1e-6;
     if !on_side {
-        return Err(Undecided::NotAnExit);
+        return Err(Refused::NotAnExit);
     }
     let frame = Frame {
         exchange,
         reflect: [leaving < 0.0, false],
     };
-    let bilinear = Bilinear::of(&frame.corners(corners));
+    let bilinear = frame.corners(corners).canopy();
     let [_, [g21, g22]] = bilinear.jacobian(frame.of(lambda));
-    let mut signs = Signs::new();
-    let (leaf, k) = if signs.negative(g22) {
+    let (leaf, k) = if g22 < 0.0 {
         ("Xa/sliding", [1, 0])
-    } else if signs.positive(g21) {
+    } else if g21 > 0.0 {
         ("Xa/down", [1, -1])
     } else {
         ("Xa/up", [1, 1])
     };
     let continuation = Continuation::mode(&frame.back(k));
-    Ok(signs.settle(Resolution::sure(leaf, continuation)))
+    Ok(Leaf::sure(leaf, continuation))
 }

@@ -1,7 +1,7 @@
 //! From sliding on one surface into the intersection with another: Figures 4.3 to 4.5.
 
-use super::{Bilinear, Corners, Frame};
-use crate::switching::resolution::{Continuation, Resolution, Signs, Undecided};
+use super::{Corners, Frame, Leaf, Refused};
+use filippov::switching::{Bilinear, Continuation};
 
 /// Decides what follows where sliding in `mode`, one entry of which is 0, reaches the other surface.
 ///
@@ -25,33 +25,26 @@ use crate::switching::resolution::{Continuation, Resolution, Signs, Undecided};
 /// # Errors
 /// If there is no attractive sliding in this mode, if it does not arrive, or if the normal
 /// components of the surfaces are proportional.
-pub fn enter(corners: &Corners, mode: [i8; 2]) -> Result<Resolution, Undecided> {
+pub fn enter(corners: &Corners, mode: [i8; 2]) -> Result<Leaf, Refused> {
     if mode.iter().filter(|&&k| k == 0).count() != 1 {
-        return Err(Undecided::NotArriving { surface: 0 });
+        return Err(Refused::NotArriving(0));
     }
-    let mut signs = Signs::new();
-    let (frame, corners, x0) = normal_frame(corners, mode, &mut signs)?;
-    let bilinear = Bilinear::of(&corners);
+    let (frame, corners, x0) = normal_frame(corners, mode)?;
+    let bilinear = corners.canopy();
     if bilinear.is_undetermined() {
-        return Err(Undecided::Proportional);
+        return Err(Refused::Proportional);
     }
-    let mut entry = Entry {
+    let entry = Entry {
         frame,
         corners,
         bilinear,
         x0,
-        signs,
     };
-    let resolution = entry.decide();
-    Ok(entry.signs.settle(resolution))
+    Ok(entry.decide())
 }
 
 /// The frame of the tree, the corners in it, and the stable zero x0 of g_1(., -1).
-fn normal_frame(
-    corners: &Corners,
-    mode: [i8; 2],
-    signs: &mut Signs,
-) -> Result<(Frame, Corners, f64), Undecided> {
+fn normal_frame(corners: &Corners, mode: [i8; 2]) -> Result<(Frame, Corners, f64), Refused> {
     let mut frame = Frame {
         exchange: mode[0] != 0,
         reflect: [false, false],
@@ -59,18 +52,14 @@ fn normal_frame(
     frame.reflect[1] = frame.of(mode)[1] > 0;
     let seen = frame.corners(corners);
     let [minus, plus] = [seen.at([-1, -1]), seen.at([1, -1])];
-    if !(signs.positive(minus[0]) && signs.negative(plus[0])) {
-        return Err(Undecided::NotArriving {
-            surface: usize::from(frame.exchange),
-        });
+    if !(minus[0] > 0.0 && plus[0] < 0.0) {
+        return Err(Refused::NotArriving(usize::from(frame.exchange)));
     }
-    if !signs.positive(minus[0] * plus[1] - plus[0] * minus[1]) {
-        return Err(Undecided::NotArriving {
-            surface: usize::from(!frame.exchange),
-        });
+    if minus[0] * plus[1] - plus[0] * minus[1] <= 0.0 {
+        return Err(Refused::NotArriving(usize::from(!frame.exchange)));
     }
     let [left, right] = [seen.at([-1, 1])[0], seen.at([1, 1])[0]];
-    frame.reflect[0] = !signs.positive(left * plus[0] - right * minus[0]);
+    frame.reflect[0] = left * plus[0] - right * minus[0] <= 0.0;
     let seen = frame.corners(corners);
     let [minus, plus] = [seen.at([-1, -1])[0], seen.at([1, -1])[0]];
     Ok((frame, seen, (minus + plus) / (minus - plus)))
@@ -82,17 +71,16 @@ struct Entry {
     corners: Corners,
     bilinear: Bilinear,
     x0: f64,
-    signs: Signs,
 }
 
 impl Entry {
-    fn decide(&mut self) -> Resolution {
-        let case_a = self.signs.positive(self.corners.at([-1, -1])[1]);
+    fn decide(&self) -> Leaf {
+        let case_a = self.corners.at([-1, -1])[1] > 0.0;
         let Some([_, y]) = self.root_on_the_left() else {
             return self.without_root(case_a);
         };
         let leaf = |a: &'static str, b: &'static str| if case_a { a } else { b };
-        if self.signs.negative(self.bilinear.value([1.0, y])[1]) {
+        if self.bilinear.value([1.0, y])[1] < 0.0 {
             return self.stays(leaf("E.A/root/trap", "E.B/root/trap"));
         }
         if case_a {
@@ -101,28 +89,17 @@ impl Entry {
         self.around_the_root()
     }
 
-    fn root_on_the_left(&mut self) -> Option<[f64; 2]> {
-        let Some(root) = self.bilinear.root() else {
-            // Where the roots have only just become complex, this is in doubt.
-            let lost = self.bilinear.extended_root()?;
-            if lost.iter().all(|v| v.abs() < 1.0) && lost[0] < self.x0 {
-                self.signs.positive(self.bilinear.discriminant());
-            }
-            return None;
-        };
-        // Distances to the border, as far as each decides whether the root counts.
-        let [x, y] = root.point;
-        let inside = [1.0 - x.abs(), 1.0 - y.abs(), self.x0 - x];
-        let counts = inside.map(|distance| self.signs.positive(distance));
-        counts.iter().all(|&c| c).then_some([x, y])
+    fn root_on_the_left(&self) -> Option<[f64; 2]> {
+        let root = self.bilinear.root()?;
+        (root.in_square() && root.point[0] < self.x0).then_some(root.point)
     }
 
-    fn without_root(&mut self, case_a: bool) -> Resolution {
+    fn without_root(&self, case_a: bool) -> Leaf {
         let leaf = |a: &'static str, b: &'static str| if case_a { a } else { b };
         let [f1, f2] = self.corners.at([-1, 1]);
-        if self.signs.positive(f1) {
+        if f1 > 0.0 {
             self.goes(leaf("E.A/none/top", "E.B/none/top"), [0, 1])
-        } else if self.signs.positive(f2) {
+        } else if f2 > 0.0 {
             self.goes(leaf("E.A/none/classical", "E.B/none/classical"), [-1, 1])
         } else {
             // In case B this cannot happen: g_2 < 0 along the whole left side, and there is a root.
@@ -131,17 +108,17 @@ impl Entry {
     }
 
     /// Case B with g_2(1, P.y) > 0: the motion may pass around the root. Can it reach another mode?
-    fn around_the_root(&mut self) -> Resolution {
+    fn around_the_root(&self) -> Leaf {
         let [f1, f2] = self.corners.at([-1, 1]);
-        let (leaf, other) = if self.signs.negative(f1) {
-            if self.signs.negative(f2) {
+        let (leaf, other) = if f1 < 0.0 {
+            if f2 < 0.0 {
                 return self.stays("E.B/root/closed-left");
             }
             ("E.B/amb/classical", [-1, 1])
         } else {
             let right = self.corners.at([1, 1])[0];
             let top = (f1 + right) / (f1 - right);
-            if self.signs.negative(self.bilinear.value([top, 1.0])[1]) {
+            if self.bilinear.value([top, 1.0])[1] < 0.0 {
                 return self.stays("E.B/root/closed-top");
             }
             ("E.B/amb/top", [0, 1])
@@ -151,25 +128,25 @@ impl Entry {
         }
         let mode = |k: [i8; 2]| Continuation::mode(&self.frame.back(k));
         let stays = mode([0, 0]);
-        Resolution::among(leaf, Some(stays.clone()), vec![stays, mode(other)])
+        Leaf::among(leaf, Some(stays.clone()), vec![stays, mode(other)])
     }
 
     /// Is there a height at which g_2 < 0 for all x in [-1, x0]?
-    fn has_barrier(&mut self) -> bool {
+    fn has_barrier(&self) -> bool {
         let bottom = self.bilinear.value([self.x0, -1.0])[1];
         let top = self.bilinear.value([self.x0, 1.0])[1];
-        if !self.signs.negative(top) {
+        if top >= 0.0 {
             return false;
         }
         let height = (bottom + top) / (bottom - top);
-        self.signs.negative(self.bilinear.value([-1.0, height])[1])
+        self.bilinear.value([-1.0, height])[1] < 0.0
     }
 
-    fn stays(&self, leaf: &'static str) -> Resolution {
+    fn stays(&self, leaf: &'static str) -> Leaf {
         self.goes(leaf, [0, 0])
     }
 
-    fn goes(&self, leaf: &'static str, k: [i8; 2]) -> Resolution {
-        Resolution::sure(leaf, Continuation::mode(&self.frame.back(k)))
+    fn goes(&self, leaf: &'static str, k: [i8; 2]) -> Leaf {
+        Leaf::sure(leaf, Continuation::mode(&self.frame.back(k)))
     }
 }

@@ -2,41 +2,28 @@
 
 use std::ops::Neg;
 
-use crate::switching::normal_fields::NormalFields;
-use crate::switching::resolution::Undecided;
+use filippov::switching::{Bilinear, NormalFields};
 
 /// The normal components of the four fields at an intersection of two surfaces, with each surface
 /// scaled so that its largest component has magnitude 1. Decisions do not depend on such a scaling.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Corners {
-    values: [[f64; 2]; 4],
-}
+#[derive(Clone, Debug, PartialEq)]
+pub struct Corners(NormalFields);
 
 impl Corners {
     /// The four corners of fields at an intersection of two surfaces.
-    ///
-    /// # Errors
-    /// If there are not two surfaces, or if all fields are tangent to one of them.
-    pub fn new(fields: &NormalFields) -> Result<Self, Undecided> {
-        if fields.m() != 2 {
-            return Err(Undecided::Shape {
-                m: fields.m(),
-                found: fields.groups().iter().map(|g| g.values.len()).sum(),
-            });
-        }
-        let sizes = [fields.row_size(0), fields.row_size(1)];
-        if let Some(surface) = sizes.iter().position(|&size| size == 0.0) {
-            return Err(Undecided::Tangent { surface });
-        }
-        let corner = |pattern: usize| [0, 1].map(|j: usize| fields.at(pattern)[j] / sizes[j]);
-        Ok(Corners {
-            values: [0, 1, 2, 3].map(corner),
-        })
+    pub fn new(fields: &NormalFields) -> Self {
+        Corners(fields.scaled(&[0, 1].map(|j| 1.0 / fields.row_size(j))))
+    }
+
+    /// The canopy through them.
+    pub fn canopy(&self) -> Bilinear {
+        Bilinear::of_fields(&self.0)
     }
 
     /// f^k.
     pub fn at(&self, k: [i8; 2]) -> [f64; 2] {
-        self.values[pattern_of(&k)]
+        let f = self.0.in_region(&k);
+        [f[0], f[1]]
     }
 }
 
@@ -77,27 +64,16 @@ impl Frame {
 
     /// The normal components seen in this frame.
     pub fn corners(&self, corners: &Corners) -> Corners {
-        Corners {
-            values: REGIONS.map(|k| self.of(corners.at(self.back(k)))),
-        }
+        Corners(self.fields(&corners.0))
     }
 
     /// Unscaled normal components at an intersection of two surfaces seen in this frame.
-    ///
-    /// # Errors
-    /// If there are not two surfaces.
-    pub fn fields(&self, fields: &NormalFields) -> Result<NormalFields, Undecided> {
-        if fields.m() != 2 {
-            return Err(Undecided::Shape {
-                m: fields.m(),
-                found: fields.groups().iter().map(|g| g.values.len()).sum(),
-            });
-        }
+    pub fn fields(&self, fields: &NormalFields) -> NormalFields {
         let seen = REGIONS.map(|k| {
             let f = fields.in_region(&self.back(k));
             self.of([f[0], f[1]])
         });
-        NormalFields::new(2, seen.concat())
+        NormalFields::new(2, seen.concat()).unwrap()
     }
 
     fn exchanged<T: Copy>(&self, v: [T; 2]) -> [T; 2] {
@@ -112,9 +88,4 @@ impl Frame {
         let side = |j: usize| if self.reflect[j] { -v[j] } else { v[j] };
         [side(0), side(1)]
     }
-}
-
-/// The number of the pattern with these signs.
-fn pattern_of(signs: &[i8; 2]) -> usize {
-    usize::from(signs[0] > 0) | usize::from(signs[1] > 0) << 1
 }

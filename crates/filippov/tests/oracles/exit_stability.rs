@@ -1,8 +1,7 @@
 //! The root is no longer stable for any scaling: Figures 4.8 and 4.9.
 
-use super::{Bilinear, Corners, Frame};
-use crate::switching::resolution::{Continuation, Resolution, Signs, Undecided};
-use crate::tolerances::VANISHING_DIAGONAL;
+use super::{Corners, Frame, Leaf, Refused};
+use filippov::switching::{Bilinear, Continuation};
 
 /// Decides what follows where one diagonal entry of G vanishes at the root `lambda` and the other one
 /// is positive.
@@ -34,25 +33,24 @@ use crate::tolerances::VANISHING_DIAGONAL;
 ///
 /// # Errors
 /// If no diagonal entry of G vanishes, or the other one is not positive.
-pub fn leave_where_unstable(corners: &Corners, lambda: [f64; 2]) -> Result<Resolution, Undecided> {
-    let frame = normal_frame(corners, lambda).ok_or(Undecided::NotAnExit)?;
+pub fn leave_where_unstable(corners: &Corners, lambda: [f64; 2]) -> Result<Leaf, Refused> {
+    let frame = normal_frame(corners, lambda).ok_or(Refused::NotAnExit)?;
     let seen = frame.corners(corners);
-    let mut signs = Signs::new();
-    let resolution = if signs.positive(seen.at([1, 1])[0]) {
-        without_asymptote(frame, &seen, &mut signs)
+    let resolution = if seen.at([1, 1])[0] > 0.0 {
+        without_asymptote(frame, &seen)
     } else {
-        with_asymptote(frame, &seen, &mut signs)
+        with_asymptote(frame, &seen)
     };
-    Ok(signs.settle(resolution))
+    Ok(resolution)
 }
 
 fn normal_frame(corners: &Corners, lambda: [f64; 2]) -> Option<Frame> {
-    let jacobian = Bilinear::of(corners).jacobian(lambda);
+    let jacobian = corners.canopy().jacobian(lambda);
     let exchange = jacobian[1][1].abs() < jacobian[0][0].abs();
     let fits = |frame: &Frame| {
         let seen = frame.corners(corners);
-        let [[g11, g12], [_, g22]] = Bilinear::of(&seen).jacobian(frame.of(lambda));
-        let vanishes = g11.abs() <= VANISHING_DIAGONAL * g22;
+        let [[g11, g12], [_, g22]] = seen.canopy().jacobian(frame.of(lambda));
+        let vanishes = g11.abs() <= 1e-2 * g22;
         vanishes && g12 > 0.0 && seen.at([-1, -1])[0] < 0.0 && seen.at([-1, 1])[0] > 0.0
     };
     Frame::all()
@@ -61,33 +59,33 @@ fn normal_frame(corners: &Corners, lambda: [f64; 2]) -> Option<Frame> {
 }
 
 /// Figure 4.8. If neither region is open, f_2^{+-} < 0 < f_2^{-+} and gamma > 1 follow.
-fn without_asymptote(frame: Frame, seen: &Corners, signs: &mut Signs) -> Resolution {
+fn without_asymptote(frame: Frame, seen: &Corners) -> Leaf {
     let (up, down) = (mode(frame, [1, 1]), mode(frame, [-1, -1]));
-    let up_is_open = signs.positive(seen.at([1, 1])[1]);
-    let down_is_open = signs.negative(seen.at([-1, -1])[1]);
+    let up_is_open = seen.at([1, 1])[1] > 0.0;
+    let down_is_open = seen.at([-1, -1])[1] < 0.0;
     match (up_is_open, down_is_open) {
-        (false, false) => Resolution::sure("Xc8/spiral", Continuation::OutwardSpiral),
-        (true, false) => Resolution::sure("Xc8/up", up),
-        (false, true) => Resolution::sure("Xc8/down", down),
-        (true, true) => Resolution::among("Xc8/two", None, vec![up, down]),
+        (false, false) => Leaf::sure("Xc8/spiral", Continuation::OutwardSpiral),
+        (true, false) => Leaf::sure("Xc8/up", up),
+        (false, true) => Leaf::sure("Xc8/down", down),
+        (true, true) => Leaf::among("Xc8/two", None, vec![up, down]),
     }
 }
 
 /// Figure 4.9.
-fn with_asymptote(frame: Frame, seen: &Corners, signs: &mut Signs) -> Resolution {
+fn with_asymptote(frame: Frame, seen: &Corners) -> Leaf {
     let (up, down) = (mode(frame, [0, 1]), mode(frame, [-1, -1]));
     let [left, right] = [seen.at([-1, 1])[0], seen.at([1, 1])[0]];
     let asymptote = (left + right) / (left - right);
-    let above = Bilinear::of(seen).value([asymptote, 1.0])[1];
-    let up_is_open = signs.positive(above);
-    let down_is_open = signs.negative(seen.at([-1, -1])[1]);
+    let above = seen.canopy().value([asymptote, 1.0])[1];
+    let up_is_open = above > 0.0;
+    let down_is_open = seen.at([-1, -1])[1] < 0.0;
     if !(up_is_open || down_is_open) {
         // f_2^{+-} < 0 follows.
-        return Resolution::sure("Xc9/escape", mode(frame, [1, -1]));
+        return Leaf::sure("Xc9/escape", mode(frame, [1, -1]));
     }
-    let escape_is_free = signs.negative(seen.at([1, -1])[1]);
+    let escape_is_free = seen.at([1, -1])[1] < 0.0;
     let escape = mode(frame, [1, if escape_is_free { -1 } else { 0 }]);
-    let among = Resolution::among;
+    let among = Leaf::among;
     match (up_is_open, down_is_open) {
         (true, true) => among("Xc9/two", None, vec![up, down, escape]),
         (true, false) => among("Xc9/up", Some(up.clone()), vec![up, escape]),

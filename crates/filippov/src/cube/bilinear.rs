@@ -1,7 +1,6 @@
 //! The two bilinear equations of sliding on two surfaces, and the only root that can be followed.
 
-use super::Corners;
-use crate::switching::normal_fields::NormalFields;
+use super::normal_fields::NormalFields;
 use crate::tolerances::{DOUBLE_ROOT, PROPORTIONAL};
 
 /// The canopy of two surfaces, g_j(x, y) = a_j + b_j x + c_j y + d_j x y.
@@ -37,17 +36,9 @@ struct Eliminated {
 }
 
 impl Bilinear {
-    /// The canopy through these corners.
-    pub fn of(corners: &Corners) -> Self {
-        Bilinear::through(|k, j| corners.at(k)[j])
-    }
-
-    /// The canopy of unscaled fields at an intersection of two surfaces.
+    /// The canopy of the fields at an intersection of two surfaces.
     pub fn of_fields(fields: &NormalFields) -> Self {
-        Bilinear::through(|k, j| fields.in_region(&k)[j])
-    }
-
-    fn through(f: impl Fn([i8; 2], usize) -> f64) -> Self {
+        let f = |k: [i8; 2], j: usize| fields.in_region(&k)[j];
         let row = |j: usize| {
             let [mm, mp] = [f([-1, -1], j), f([-1, 1], j)];
             let [pm, pp] = [f([1, -1], j), f([1, 1], j)];
@@ -124,6 +115,20 @@ impl Bilinear {
         let root = self.root().filter(|root| root.in_square())?;
         let jacobian = self.jacobian(root.point);
         (jacobian[0][0] < 0.0 || jacobian[1][1] < 0.0).then_some(root)
+    }
+
+    /// How clearly there is a root in the square, stable or not: positive if and only if there is one, and zero where
+    /// it reaches the border or meets the other one.
+    pub fn root_margin(&self) -> f64 {
+        let canopy = Bilinear {
+            rows: self.normalised(),
+        };
+        let root = self.root().map(|root| root.point);
+        let Some([x, y]) = root.or_else(|| self.extended_root()) else {
+            return -1.0;
+        };
+        let inside = 1.0 - x.abs().max(y.abs());
+        inside.min(canopy.discriminant())
     }
 
     fn normalised(&self) -> [[f64; 4]; 2] {

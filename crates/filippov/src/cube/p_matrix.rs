@@ -4,7 +4,7 @@
 //!
 //! Reference: Cottle, Pang, Stone, *The Linear Complementarity Problem* (1992), section 3.3.
 
-use crate::sparse::{components, is_positive_definite, SparseRows, SparseSolver};
+use crate::sparse::{coupled_blocks, is_positive_definite, SparseRows, SparseSolver};
 use crate::tolerances::DEFINITE_PIVOT;
 
 /// Largest component whose minors are computed; m unknowns take about 2^m eliminations.
@@ -17,18 +17,8 @@ const MOST_MINORS: usize = 10;
 /// definite, A D + D A^T > 0, with D tried so that A D is symmetric if it can be: friction with
 /// different coefficients.
 pub fn is_p_matrix(matrix: &SparseRows) -> Option<bool> {
-    let mut position = vec![usize::MAX; matrix.n_rows()];
     let mut answer = Some(true);
-    for component in components(matrix) {
-        let mut unknowns = component.unknowns;
-        unknowns.sort_unstable();
-        for (place, &i) in unknowns.iter().enumerate() {
-            position[i] = place;
-        }
-        let block = matrix.principal(&unknowns, &position);
-        for &i in &unknowns {
-            position[i] = usize::MAX;
-        }
+    for (_, block) in coupled_blocks(matrix) {
         match decide_block(&block) {
             Some(true) => {}
             Some(false) => return Some(false),
@@ -82,17 +72,12 @@ fn is_h_matrix(block: &SparseRows) -> bool {
 /// Is A D + D A^T positive definite for the D that makes A D symmetric, or for D = 1?
 fn is_diagonally_stable(block: &SparseRows) -> bool {
     is_positive_definite(block)
-        || symmetrising_scale(block).is_some_and(|scale| {
-            let mut scaled = SparseRows::new(block.n_columns());
-            for i in 0..block.n_rows() {
-                scaled.push_row(block.row(i).map(|(j, value)| (j, value * scale[j])));
-            }
-            is_positive_definite(&scaled)
-        })
+        || symmetrising_scale(block)
+            .is_some_and(|scale| is_positive_definite(&block.with_columns_scaled(&scale)))
 }
 
 /// Positive numbers with a_ij d_j = a_ji d_i along a walk through each component.
-pub(super) fn symmetrising_scale(block: &SparseRows) -> Option<Vec<f64>> {
+pub(crate) fn symmetrising_scale(block: &SparseRows) -> Option<Vec<f64>> {
     let transposed = block.transposed();
     let mut scale = vec![0.0; block.n_rows()];
     for start in 0..block.n_rows() {
@@ -145,4 +130,4 @@ fn has_positive_minors(a: &[Vec<f64>]) -> bool {
 }
 
 #[cfg(test)]
-pub(super) mod tests;
+pub(crate) mod tests;

@@ -4,7 +4,7 @@ use std::ops::{Index, IndexMut};
 
 use smallvec::SmallVec;
 
-use crate::tolerances::{DEPENDENT, PROPORTIONAL};
+use crate::tolerances::PROPORTIONAL;
 
 /// A vector of the size of an intersection.
 pub type Vector = SmallVec<[f64; 4]>;
@@ -65,7 +65,7 @@ impl Matrix {
                 }
             }
             let rest = self[(i, i)] - (0..i).map(|k| factor[(i, k)].powi(2)).sum::<f64>();
-            if rest > DEPENDENT * self[(i, i)] {
+            if rest > PROPORTIONAL * self[(i, i)] {
                 factor[(i, i)] = rest.sqrt();
             }
         }
@@ -84,17 +84,8 @@ impl Matrix {
 
     /// The inverse; `None` if a pivot vanishes.
     pub fn inverse(&self) -> Option<Matrix> {
-        let elimination = Elimination::of(self);
-        let mut inverse = Matrix::zeros(self.n);
-        for column in 0..self.n {
-            let unit: Vector = (0..self.n)
-                .map(|i| f64::from(u8::from(i == column)))
-                .collect();
-            for (row, value) in elimination.solve(&unit)?.into_iter().enumerate() {
-                inverse[(row, column)] = value;
-            }
-        }
-        Some(inverse)
+        let mut inverse = self.clone();
+        invert(&mut inverse.entries, self.n).then_some(inverse)
     }
 
     /// The product with another matrix of the same size.

@@ -1,7 +1,7 @@
 //! The root meets the saddle and both disappear: Figure 4.7.
 
-use super::{Bilinear, Corners, Frame};
-use crate::switching::resolution::{Continuation, Resolution, Signs, Undecided};
+use super::{Corners, Frame, Leaf, Refused};
+use filippov::switching::{Bilinear, Continuation};
 
 /// Decides what follows where the two roots of sliding on two surfaces coalesce at `lambda`.
 ///
@@ -26,31 +26,30 @@ use crate::switching::resolution::{Continuation, Resolution, Signs, Undecided};
 ///
 /// # Errors
 /// If the root was not stable for any scaling (G11 > 0 and G22 > 0).
-pub fn leave_at_fold(corners: &Corners, lambda: [f64; 2]) -> Result<Resolution, Undecided> {
-    let mut signs = Signs::new();
-    let frame = normal_frame(&Bilinear::of(corners), lambda, &mut signs);
+pub fn leave_at_fold(corners: &Corners, lambda: [f64; 2]) -> Result<Leaf, Refused> {
+    let frame = normal_frame(&corners.canopy(), lambda);
     let seen = frame.corners(corners);
-    let [[g11, _], [_, g22]] = Bilinear::of(&seen).jacobian(frame.of(lambda));
+    let [[g11, _], [_, g22]] = seen.canopy().jacobian(frame.of(lambda));
     let (low, high) = (seen.at([-1, -1]), seen.at([1, 1]));
-    let (leaf, k) = match (signs.negative(g11), signs.negative(g22)) {
-        (true, false) if signs.positive(low[0]) => ("Xb/a1", [0, -1]),
+    let (leaf, k) = match (g11 < 0.0, g22 < 0.0) {
+        (true, false) if low[0] > 0.0 => ("Xb/a1", [0, -1]),
         (true, false) => ("Xb/a2", [-1, -1]),
-        (true, true) if signs.negative(high[0]) => ("Xb/b1", [0, 1]),
-        (true, true) if signs.negative(high[1]) => ("Xb/b3", [1, 0]),
+        (true, true) if high[0] < 0.0 => ("Xb/b1", [0, 1]),
+        (true, true) if high[1] < 0.0 => ("Xb/b3", [1, 0]),
         (true, true) => ("Xb/b2", [1, 1]),
-        (false, true) if signs.positive(low[1]) => ("Xb/c1", [-1, 0]),
+        (false, true) if low[1] > 0.0 => ("Xb/c1", [-1, 0]),
         (false, true) => ("Xb/c2", [-1, -1]),
-        (false, false) => return Err(Undecided::NotAnExit),
+        (false, false) => return Err(Refused::NotAnExit),
     };
     let continuation = Continuation::mode(&frame.back(k));
-    Ok(signs.settle(Resolution::sure(leaf, continuation)))
+    Ok(Leaf::sure(leaf, continuation))
 }
 
 /// The frame in which the common tangent rises and the curve g_2 = 0 stays above g_1 = 0.
 ///
 /// Around the root, curve j is y = -(G_j1/G_j2) x + (G_j1 d_j/G_j2^2) x^2 + ... The frame is found from
 /// these coefficients: a reflection of h_1 turns the tangent, a rotation by 180 degrees the order.
-fn normal_frame(bilinear: &Bilinear, lambda: [f64; 2], signs: &mut Signs) -> Frame {
+fn normal_frame(bilinear: &Bilinear, lambda: [f64; 2]) -> Frame {
     let jacobian = bilinear.jacobian(lambda);
     let steeper = |row: [f64; 2]| row[0].abs().min(row[1].abs());
     // Both rows are parallel; the one whose entries are farther from zero has the safer signs.
@@ -59,13 +58,13 @@ fn normal_frame(bilinear: &Bilinear, lambda: [f64; 2], signs: &mut Signs) -> Fra
     } else {
         jacobian[1]
     };
-    let rises = signs.positive(-row[0] * row[1]);
+    let rises = -row[0] * row[1] > 0.0;
     let curvature = |j: usize| {
         let [along_x, along_y] = jacobian[j];
         along_x * bilinear.rows()[j][3] / (along_y * along_y)
     };
     // A reflection of h_1 leaves x^2, and with it the order of the curves, as it is.
-    let in_order = signs.positive(curvature(1) - curvature(0));
+    let in_order = curvature(1) - curvature(0) > 0.0;
     Frame {
         exchange: false,
         reflect: [rises != in_order, !in_order],
