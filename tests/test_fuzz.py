@@ -11,6 +11,7 @@ import pytest
 from fuzz.__main__ import check
 from fuzz.comparisons import comparisons
 from fuzz.properties import is_at_two_fold, look_at, violations
+from fuzz.starts import check_start, random_start
 from fuzz.systems import build, random_case
 
 N = 240
@@ -43,6 +44,24 @@ def test_random_systems_have_all_features() -> None:
 
 def kinds_of(seed: int) -> set[str]:
     return set(build(random_case(seed).source).solve().switches.kind)
+
+
+def test_runs_from_degenerate_starts_go_on_in_a_viable_mode() -> None:
+    ends: Counter[str] = Counter()
+    for seed in range(25):
+        end, wrong = check_start(seed)
+        assert not wrong, f"{wrong}\n{random_start(seed).source}"
+        ends[end] += 1
+    assert ends["goes on"] >= 22
+
+
+def test_most_normal_components_of_degenerate_starts_vanish() -> None:
+    fields = [random_start(seed).model.field[i] for seed in range(200) for i in range(2)]
+    n_products = sum(any(mask == 3 for mask in field.parts) for field in fields)
+    assert 100 < n_products < 300
+    origin = (0, 0, 0, 0)
+    constants = [bool(p.terms.get(origin)) for field in fields for mask, p in field.parts.items() if mask < 3]
+    assert 0.2 < sum(constants) / len(constants) < 0.4
 
 
 def test_the_same_seed_gives_the_same_system() -> None:

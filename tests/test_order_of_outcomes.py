@@ -255,6 +255,68 @@ def test_surfaces_may_appear_and_disappear_with_the_mode():
     assert "0" in {str(segment.mode)[sol.surfaces.index("x[1] - 1")] for segment in sol.segments}
 
 
+# ------------------------------------------------- one of several viable modes
+
+
+def test_of_several_modes_the_one_asked_for_follows():
+    branches = fl.solve_ivp(lambda t, x: [np.sign(x[0])], (0, 1), [0.0], nonunique="branch").branches
+    assert [str(branch.mode_at(0.5)) for branch in branches] == ["+", "-"]
+    assert [str(choices[0].mode) for choices in branches.choices] == ["+", "-"]
+    assert [branch.y[0, -1] for branch in branches] == [1.0, -1.0]
+
+
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
+@pytest.mark.parametrize("load", [-0.9, -0.05, 0.05, 0.9])
+def test_of_several_modes_the_limit_of_the_hidden_dynamics_follows(load):
+    # Below x1 = 0 the motion slides on x0 = 0 with the multiplier `load`; beyond, x0 = 0 repels.
+    def f(t, x):
+        return [np.where(x[1] < 0, load - np.sign(x[0]), np.sign(x[0])), 1.0]
+
+    sol = fl.solve_ivp(f, (0, 2), [0.0, -1.0])
+    assert sol.segments[0].mode.is_sliding
+    assert sol.y[0, -1] == pytest.approx(math.copysign(1.0, load))
+    assert len(sol.warnings[0].candidates) == 2
+
+
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
+def test_of_several_modes_that_before_follows():
+    # x = t^2 touches x = 0, below which the field leads away.
+    f = lambda t, x: [np.where(x[0] > 0, 2.0 * t, -1.0)]  # noqa: E731
+    sol = fl.solve_ivp(f, (-1, 1), [1.0])
+    assert {str(segment.mode) for segment in sol.segments} == {"+"}
+    assert sol.y[0, -1] == pytest.approx(1.0)
+    assert set(map(str, sol.warnings[0].candidates)) == {"-", "+"}
+    point = fl.System(f, n=1)
+    assert str(point.classify(0.0, [0.0], before="+").mode) == "+"
+    # Without a mode before, u' = -1/2 at u = 0.
+    assert str(point.classify(0.0, [0.0]).mode) == "-"
+
+
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
+def test_of_several_modes_one_whose_guards_grow_follows():
+    # On one side x = t^2 or -t^2, on the other one it is at rest.
+    for side in (1.0, -1.0):
+        f = lambda t, x, side=side: [np.where(side * x[0] > 0, side * 2.0 * t, 0.0)]  # noqa: E731
+        sol = fl.solve_ivp(f, (0, 1), [0.0])
+        assert sol.y[0, -1] == pytest.approx(side)
+        assert set(map(str, sol.warnings[0].candidates)) == {"-", "+"}
+
+
+@pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
+def test_of_several_modes_at_a_start_that_from_the_middle_of_the_hidden_dynamics_follows():
+    for bias in (0.1, -0.1):
+        sol = fl.solve_ivp(lambda t, x, bias=bias: [bias + np.sign(x[0])], (0, 1), [0.0])
+        assert sol.y[0, -1] == pytest.approx(bias + math.copysign(1.0, bias))
+    # At rest in u = 0: the side where u is positive.
+    assert fl.solve_ivp(lambda t, x: [np.sign(x[0])], (0, 1), [0.0]).y[0, -1] == 1.0
+    both = fl.solve_ivp(lambda t, x: [np.sign(x[0]), np.sign(x[1])], (0, 1), [0.0, 0.0])
+    assert both.y[:, -1].tolist() == [1.0, 1.0]
+    product = fl.solve_ivp(lambda t, x: [-np.sign(x[0]) * np.sign(x[1]), -1.0], (0, 1), [0.0, 0.0])
+    assert str(product.segments[0].mode) == "+-"
+    for sol in (both, product):
+        assert sol.warnings[0].code == "non_unique"
+
+
 # ---------------------------------------------------------------- limits
 
 

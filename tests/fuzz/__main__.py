@@ -1,4 +1,4 @@
-"""`make fuzz`: solve many random systems in two processes, and report what does not hold."""
+"""`make fuzz`: random systems and degenerate starts, in two processes; reports what does not hold."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ import warnings
 from collections import Counter
 from collections.abc import Iterator
 from multiprocessing.connection import Connection, wait
-from typing import Any
+from typing import Any, TypeAlias
 
 from fuzz.comparisons import comparisons
 from fuzz.properties import ends_early, violations
+from fuzz.starts import check_start, random_start
 from fuzz.systems import Case, build, random_case
 
 # A case takes milliseconds; Euler's method and a run to `LONGEST_RUN` some seconds.
@@ -22,6 +23,9 @@ LONGEST_CASE = 60.0
 LONGEST_RUN = 5.0
 SHOWN = 20
 EARLY = ", state moderate"
+SYSTEM, START = "system", "start"
+# A kind of case and its seed.
+Task: TypeAlias = "tuple[str, int]"
 
 
 def check(case: Case, longest: float | None = None) -> tuple[str, list[str]]:
@@ -39,11 +43,13 @@ def check(case: Case, longest: float | None = None) -> tuple[str, list[str]]:
 
 def _work(connection: Connection) -> None:
     warnings.simplefilter("ignore")  # of NumPy, where a plain call overflows
-    while (seed := connection.recv()) is not None:
+    while (task := connection.recv()) is not None:
         try:
-            connection.send((seed, *check(random_case(seed), LONGEST_RUN)))
+            kind, seed = task
+            result = check_start(seed) if kind == START else check(random_case(seed), LONGEST_RUN)
+            connection.send((task, *result))
         except BaseException as error:  # a panic is no Exception
-            connection.send((seed, "raised", [f"{type(error).__name__}: {error}"]))
+            connection.send((task, "raised", [f"{type(error).__name__}: {error}"]))
 
 
 class Worker:
@@ -54,13 +60,13 @@ class Worker:
         self.process = multiprocessing.Process(target=_work, args=(other,), daemon=True)
         self.process.start()
         other.close()
-        self.seed: int | None = None
+        self.task: Task | None = None
         self.since = 0.0
 
-    def give(self, seed: int) -> None:
+    def give(self, task: Task) -> None:
         """Start on a case."""
-        self.seed, self.since = seed, time.monotonic()
-        self.connection.send(seed)
+        self.task, self.since = task, time.monotonic()
+        self.connection.send(task)
 
     def end(self) -> None:
         """End the process, whatever it does."""
@@ -68,31 +74,31 @@ class Worker:
         self.process.join()
 
 
-def results(seeds: Iterator[int], n_processes: int) -> Iterator[tuple[int, str, list[str]]]:
-    """Yield seed, reason and violations of every case, in the order in which they are done."""
+def results(tasks: Iterator[Task], n_processes: int) -> Iterator[tuple[Task, str, list[str]]]:
+    """Yield kind and seed, reason and violations of every case, in the order in which they are done."""
     workers = [Worker() for _ in range(n_processes)]
 
     def give(worker: Worker) -> None:
-        worker.seed = None
-        seed = next(seeds, None)
-        if seed is not None:
-            worker.give(seed)
+        worker.task = None
+        task = next(tasks, None)
+        if task is not None:
+            worker.give(task)
 
     for worker in workers:
         give(worker)
-    while busy := [worker for worker in workers if worker.seed is not None]:
+    while busy := [worker for worker in workers if worker.task is not None]:
         ready = wait([worker.connection for worker in busy], timeout=1.0)
         for worker in busy:
-            assert worker.seed is not None
+            assert worker.task is not None
             result: Any = None
             if worker.connection in ready:
                 try:
                     result = worker.connection.recv()
                 except EOFError:
                     worker.process.join()
-                    result = (worker.seed, "crash", [f"the process ended with {worker.process.exitcode}"])
+                    result = (worker.task, "crash", [f"the process ended with {worker.process.exitcode}"])
             elif time.monotonic() - worker.since > LONGEST_CASE:
-                result = (worker.seed, "hang", [f"no answer after {LONGEST_CASE:g} s"])
+                result = (worker.task, "hang", [f"no answer after {LONGEST_CASE:g} s"])
             if result is None:
                 continue
             if result[1] in ("crash", "hang"):
@@ -111,36 +117,47 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="make fuzz", description=__doc__)
     parser.add_argument("--n", type=int, default=4000, help="number of systems")
     parser.add_argument("--seed", type=int, default=0, help="seed of the first; the others follow")
+    parser.add_argument("--starts", type=int, default=400, help="number of degenerate starts")
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--seconds", type=float, default=1e9, help="give out no more cases after this time")
     arguments = parser.parse_args()
     seeds = range(arguments.seed, arguments.seed + arguments.n)
+    starts = range(arguments.seed, arguments.seed + arguments.starts)
     reasons: Counter[str] = Counter()
     features: Counter[str] = Counter()
-    failed: list[int] = []
+    of_starts: Counter[str] = Counter()
+    failed: list[Task] = []
     early: list[int] = []
     start = time.monotonic()
-    in_time = itertools.takewhile(lambda _: time.monotonic() - start < arguments.seconds, seeds)
-    for seed, reason, found in results(in_time, arguments.processes):
-        case = random_case(seed)
-        reasons[reason] += 1
-        features.update(case.features)
-        if reason.endswith(EARLY):
-            early.append(seed)
+    tasks = itertools.chain(((START, seed) for seed in starts), ((SYSTEM, seed) for seed in seeds))
+    in_time = itertools.takewhile(lambda _: time.monotonic() - start < arguments.seconds, tasks)
+    for (kind, seed), reason, found in results(in_time, arguments.processes):
+        if kind == START:
+            of_starts[reason] += 1
+            source = random_start(seed).source
+        else:
+            case = random_case(seed)
+            source = case.source
+            reasons[reason] += 1
+            features.update(case.features)
+            if reason.endswith(EARLY):
+                early.append(seed)
         if found:
-            failed.append(seed)
+            failed.append((kind, seed))
             if len(failed) <= SHOWN:
-                print(
-                    f"--- seed {seed} ({reason})", *(f"  {text}" for text in found[:4]), case.source, sep="\n"
-                )
+                print(f"--- {kind} {seed} ({reason})", *(f"  {text}" for text in found[:4]), source, sep="\n")
     seconds = time.monotonic() - start
     n_done = reasons.total()
     print(f"{n_done} systems, seeds {seeds.start} to {seeds.start + n_done - 1}, {seconds:.0f} s")
+    print(
+        f"{of_starts.total()} degenerate starts:", ", ".join(f"{a} {b}" for a, b in of_starts.most_common())
+    )
     print("ended by:", ", ".join(f"{name} {count}" for name, count in reasons.most_common()))
     print("with:", ", ".join(f"{name} {count}" for name, count in features.most_common()))
     if early:
         print(f"{len(early)} named stops at states of moderate size, seeds {sorted(early)}")
-    print(f"{len(failed)} violations" + (f", seeds {sorted(failed)}" if failed else ""))
+    which = ", ".join(f"{kind} {seed}" for kind, seed in sorted(failed))
+    print(f"{len(failed)} violations" + (f": {which}" if failed else ""))
     return 1 if failed else 0
 
 
