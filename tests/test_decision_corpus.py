@@ -58,13 +58,10 @@ def test_corpus_has_all_kinds(entries: list[Entry]) -> None:
         "touch",
         "one_surface",
         "germs",
-        "trial",
         "relay",
         "first_order",
-        "coinciding",
-        "bends",
     }
-    assert sources["rule"] >= rules | {"others_jump", "limit", "contact", "triggers", "sliding_rule"}
+    assert sources["rule"] >= rules | {"entangled", "limit", "contact", "triggers", "sliding_rule"}
 
 
 def test_differences_are_found(entries: list[Entry]) -> None:

@@ -39,7 +39,7 @@ def test_parallel_gradients() -> None:
     """
     touching = system(INWARDS, x0, lambda t, x: x[0] + x[1] ** 2)
     point = touching.classify(0.0, [0.0, 0.0, 0.0])
-    assert (point.kind, str(point.mode), point.rule) == ("intersection", "0+", "trial")
+    assert (point.kind, str(point.mode), point.rule) == ("intersection", "0+", "entangled")
     for start in ([0.0, 0.0, 0.0], [0.0, -1e-9, 0.0], [1e-9, -1e-9, 0.0]):
         sol = touching.solve((0, 1), start)
         assert sol.success
@@ -135,4 +135,5 @@ def test_a_target_reached_along_the_switching_curve_names_the_surface_that_says_
     assert sol.status == -1
     assert sol.t[-1] == pytest.approx(2.0, abs=1e-6)
     assert sol.y[:, -1] == pytest.approx([0.0, 0.0], abs=1e-6)
-    assert "all fields are tangent to x[0] + " in sol.message
+    assert "the guard that fails in each mode: (++) x[1]" in sol.message
+    assert "(-+) x[0] + sign(x[1])" in sol.message

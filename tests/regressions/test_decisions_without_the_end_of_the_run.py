@@ -51,7 +51,7 @@ def test_a_jump_that_vanishes(t_end: float) -> None:
 
 def test_a_start_at_the_touching_point_is_decided_like_an_arrival() -> None:
     point = fl.System(touching, n=2).classify(0.0, [0.0, 0.0])
-    assert (str(point.mode), point.rule) == ("+0", "trial")
+    assert (str(point.mode), point.rule) == ("+0", "entangled")
     sol = fl.solve_ivp(touching, (0.0, 0.4), [0.0, 0.0])
     assert [str(segment.mode) for segment in sol.segments] == ["+0", "+-"]
     arrival = fl.System(touching, n=2).classify(0.0, [0.0, 0.0], before="-0")

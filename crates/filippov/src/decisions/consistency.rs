@@ -181,6 +181,25 @@ fn contradicts_itself(
     Ok(false)
 }
 
+/// Has one of the surfaces another normal on the other side of one of them?
+pub(super) fn bends(at: &Point, meeting: &Meeting) -> Result<bool, FieldError> {
+    if !at.system.has_nested_signs() {
+        return Ok(false);
+    }
+    let (mut near, mut far) = (vec![0.0; at.x.len()], vec![0.0; at.x.len()]);
+    for &k in meeting.surfaces {
+        let [minus, plus] = [-1, 1].map(|side| meeting.mode.with(k, side).signs());
+        for &j in meeting.surfaces.iter().filter(|&&j| j != k) {
+            let rate = at.system.gradient(j, at.t, at.x, &minus, &mut near)?;
+            let other = at.system.gradient(j, at.t, at.x, &plus, &mut far)?;
+            if near != far || rate != other {
+                return Ok(true);
+            }
+        }
+    }
+    Ok(false)
+}
+
 /// How far functions may be from zero at a point that lies on surfaces to this: their values, and some times as much for other
 /// slopes.
 fn residual(h: &[f64], at: &Point, meeting: &Meeting) -> f64 {

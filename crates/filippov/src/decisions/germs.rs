@@ -2,7 +2,7 @@
 
 use super::choice::choose;
 use super::coinciding::{coinciding_kinks, have_parallels, touch_one_another};
-use super::consistency::with_those_that_jump;
+use super::consistency::{bends, with_those_that_jump};
 use super::departures::velocity_in;
 use super::leave_by_rule::slides_by_rule;
 use super::meeting::hidden_limit;
@@ -26,7 +26,7 @@ pub(super) fn decide_if_entangled(
         return Ok(None);
     }
     let wider = with_those_that_jump(at, notes, meeting)?;
-    if wider.is_none() {
+    if wider.is_none() && !bends(at, meeting)? {
         // To rounding, surfaces that touch are one, and the rules for surfaces that cross may still apply.
         if is_parallel(at, notes, meeting)? {
             return Ok(decide_by_germs(at, notes, meeting)?.ok());

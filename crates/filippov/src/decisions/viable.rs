@@ -8,11 +8,12 @@ use super::look_ahead::{try_mode, Trial};
 use super::point::{Cause, Left, Lefts, Notes, Point};
 use super::rule::Meeting;
 use crate::error::FieldError;
-use crate::field::{Guard, RootEnd};
+use crate::field::{eval_on_side, Guard, RootEnd};
 use crate::mode::Mode;
 use crate::switching::{
     first_nonzero, is_undetermined, stable_roots_with_border, Leading, NormalFields,
 };
+use crate::system::dot;
 use crate::tolerances::{AT_SIDE, DOUBTFUL, MOST_MEETING, TANGENT};
 
 /// A mode in which a motion can go on.
@@ -113,12 +114,9 @@ pub(super) fn survey(
                 continue;
             }
         };
-        let differs = |j: usize| {
-            let is_outside = meeting.surfaces.binary_search(&j).is_err();
-            is_outside && mode.entries()[j] != meeting.mode.entries()[j]
-        };
         let others;
-        let fields = match (0..mode.entries().len()).any(differs) {
+        // Normals, and signs of other functions, are those of the mode.
+        let fields = match at.system.has_nested_signs() {
             true => match at.corners(notes, meeting.surfaces, &mode)?.normal_fields() {
                 Ok(fields) => {
                     others = fields;
@@ -229,7 +227,10 @@ fn of_region(at: &Point, candidate: &Candidate) -> Result<Verdict, FieldError> {
         ..
     } = *candidate;
     let signs = mode.signs();
-    let g = fields.in_region(entries.entries());
+    let g = match at.system.has_nested_signs() {
+        true => components_in(at, meeting, &signs)?.into(),
+        false => fields.in_region(entries.entries()),
+    };
     let is_tangent = (0..noise.len()).any(|i| guarded[i] && g[i].abs() <= noise[i]);
     let series = is_tangent
         .then(|| MotionSeries::of(at, mode, &[], candidate.pace))
@@ -267,6 +268,18 @@ fn of_region(at: &Point, candidate: &Candidate) -> Result<Verdict, FieldError> {
         viable.left.push(Left::Surface(j, leading));
     }
     Ok(Verdict::Viable(viable))
+}
+
+/// The components normal to the surfaces of the meeting in one region, with its own normals: those of functions that contain
+/// signs of others bend. Where a motion slides it needs none of its own, as it is tangent to what they differ by.
+fn components_in(at: &Point, meeting: &Meeting, signs: &[f64]) -> Result<Vec<f64>, FieldError> {
+    let (mut field, mut normal) = (vec![0.0; at.x.len()], vec![0.0; at.x.len()]);
+    eval_on_side(at.system, at.t, at.x, signs, &mut field)?;
+    let components = meeting.surfaces.iter().map(|&j| {
+        let of_time = at.system.gradient(j, at.t, at.x, signs, &mut normal)?;
+        Ok(of_time + dot(&normal, &field))
+    });
+    components.collect()
 }
 
 fn of_sliding(at: &Point, notes: &mut Notes, candidate: &Candidate) -> Result<Verdict, FieldError> {

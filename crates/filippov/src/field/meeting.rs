@@ -5,7 +5,7 @@ use super::weights::product_weights;
 use crate::error::FieldError;
 use crate::switching::{Matrix, NormalFields, SignGroup, Undecided};
 use crate::system::{dot, PiecewiseSystem};
-use crate::tolerances::{MOST_MEETING, TANGENT, TANGENT_TO_ALL};
+use crate::tolerances::{TANGENT, TANGENT_TO_ALL};
 
 /// The fields around an intersection of m surfaces, and the gradients of the switching functions.
 ///
@@ -26,8 +26,6 @@ pub struct MeetingFields {
     gradients: Vec<f64>,
     time_derivatives: Vec<f64>,
     signs: Vec<f64>,
-    /// Do the normals depend on the signs? Then those of each pattern are taken.
-    bends: bool,
 }
 
 impl MeetingFields {
@@ -47,9 +45,8 @@ impl MeetingFields {
 
     fn of_groups(system: &dyn PiecewiseSystem, set: &[usize], groups: Vec<Vec<usize>>) -> Self {
         let (n, m) = (system.n_states(), set.len());
-        let bends = m > 1 && m <= MOST_MEETING && system.has_nested_signs();
-        // One and two surfaces have closed forms, for all of their patterns. Normals that bend are no sums.
-        let groups = if m <= 2 || bends {
+        // One and two surfaces have closed forms, for all of their patterns.
+        let groups = if m <= 2 {
             vec![(0..m).collect()]
         } else {
             groups
@@ -64,7 +61,6 @@ impl MeetingFields {
             gradients: vec![0.0; n * m],
             time_derivatives: vec![0.0; m],
             signs: Vec::new(),
-            bends,
         }
     }
 
@@ -163,13 +159,6 @@ impl MeetingFields {
                 self.time_derivatives[i]
             };
             self.components[row * m + i] = of_time + dot(gradient, field);
-        }
-        if self.bends {
-            let mut gradient = vec![0.0; n];
-            for (i, &j) in self.set.iter().enumerate() {
-                let of_time = system.gradient(j, t, x, &self.signs, &mut gradient)?;
-                self.components[row * m + i] = of_time + dot(&gradient, field);
-            }
         }
         Ok(evaluations)
     }
