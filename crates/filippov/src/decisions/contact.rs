@@ -137,11 +137,12 @@ fn begin(
         let value = of_time + dot(&row, &velocity);
         let size = of_time.abs() + (dot(&row, &row) * dot(&velocity, &velocity)).sqrt();
         let mut leading = Leading { order, value };
-        let is_tangent = value.abs() <= rounding * size || is_located(j);
-        if is_tangent && mode.codimension() == 0 {
+        let is_tangent = value.abs() <= rounding * size;
+        let has_series = is_tangent && mode.codimension() == 0;
+        if has_series {
             leading = first_nonzero(at.system, j, entry, order, at.t, &x, &signs)?;
         }
-        if is_tangent && (mode.codimension() > 0 || leading.order == 0) {
+        if leading.order == 0 || (is_tangent || is_located(j)) && !has_series {
             is_clear = false;
         } else if leading.sign() != entry {
             return Ok(Trial::Ends);
