@@ -34,6 +34,7 @@
 pub mod action;
 mod clock;
 pub mod cube;
+mod decision_record;
 mod decisions;
 mod error;
 pub mod event;
@@ -55,7 +56,7 @@ mod system;
 mod tolerances;
 
 pub use clock::{Clock, ManualClock};
-pub use decisions::{
+pub use decision_record::{
     replay_decision, DecisionCause, DecisionOutcome, DecisionPoint, DecisionRecord, StartingZero,
 };
 pub use error::{Error, FieldError};

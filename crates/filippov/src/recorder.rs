@@ -2,7 +2,7 @@
 
 use smallvec::SmallVec;
 
-use crate::decisions::DecisionRecord;
+use crate::decision_record::DecisionRecord;
 use crate::integrate::Stats;
 use crate::mode::Mode;
 use crate::options::{Keep, Options, Stabilization};

@@ -2,7 +2,7 @@
 
 use smallvec::SmallVec;
 
-use crate::decisions::DecisionRecord;
+use crate::decision_record::DecisionRecord;
 use crate::error::FieldError;
 use crate::field::{IntersectionField, Motion, Projector, SlidingField, SmoothField};
 use crate::integrate::Stats;

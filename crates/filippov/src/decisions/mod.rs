@@ -23,7 +23,6 @@ mod meeting;
 mod passage;
 mod placement;
 mod point;
-mod record;
 mod relay;
 pub(crate) mod root_ends;
 mod rule;
@@ -42,10 +41,6 @@ pub(crate) use leave_by_rule::refusal;
 pub(crate) use passage::{goes_through, rates_here};
 pub(crate) use placement::{pushed_back, sides, Sides};
 pub(crate) use point::{Arrival, Cause, Leap, Left, Lefts, Next, Notes, Point, Policy, Values};
-pub(crate) use record::decide_and_record;
-pub use record::{
-    replay_decision, DecisionCause, DecisionOutcome, DecisionPoint, DecisionRecord, StartingZero,
-};
 pub(crate) use rule::Rule;
 pub(crate) use sides::{warn_against_direction, warn_unknown_side};
 pub(crate) use spiral::landing;

@@ -4,11 +4,11 @@ use std::cell::RefCell;
 
 use smallvec::{smallvec, SmallVec};
 
+use crate::decision_record::decide_and_record;
 use crate::decisions::{
-    beyond_double_zero, decide, decide_and_record, differs_between_sides, landing,
-    limits::limit_here, refusal, root_ends, two_fold_here, vanishing_surfaces,
-    warn_against_direction, Arrival, Cause, Decision, Leap, Left, Lefts, Next, Notes, Point,
-    Reached, Rule, Values, RULES,
+    beyond_double_zero, decide, differs_between_sides, landing, limits::limit_here, refusal,
+    root_ends, two_fold_here, vanishing_surfaces, warn_against_direction, Arrival, Cause, Decision,
+    Leap, Left, Lefts, Next, Notes, Point, Reached, Rule, Values, RULES,
 };
 use crate::error::FieldError;
 use crate::event::{Deflation, Found, Multiple, Seen};

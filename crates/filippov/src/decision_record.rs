@@ -4,10 +4,10 @@ use std::cell::RefCell;
 
 use smallvec::SmallVec;
 
-use super::decide::{decide, Decision, RULES};
-use super::event::Reached;
-use super::point::{Arrival, Cause, Left, Next, Notes, Point, Policy};
 use crate::action::Actions;
+use crate::decisions::{
+    decide, Arrival, Cause, Decision, Left, Next, Notes, Point, Policy, Reached, RULES,
+};
 use crate::error::FieldError;
 use crate::field::{ContactField, Guard, Law, ModeField, SlidingSet, SmoothField};
 use crate::mode::Mode;
