@@ -63,12 +63,18 @@ def test_contact_and_friction_change_at_one_instant() -> None:
 
 
 def test_friction_that_repels_is_not_slid_on_in_contact() -> None:
-    """The surface x2 = 0 repels: the body rests, and slips to one side."""
-    sol = fl.solve_ivp(
-        lambda t, x: [x[1], -2 - 2 * x[2], 4 * np.sign(x[2])], (0, 0.1), [0.0] * 3, resets=stop(3)
-    )
+    """The surface x2 = 0 repels: the body rests, and slips to one side, by choice to that of the sign +."""
+
+    def rhs(t: float, x: Any) -> Any:
+        return [x[1], -2 - 2 * x[2], 4 * np.sign(x[2])]
+
+    with pytest.warns(fl.FilippovWarning, match="non_unique"):
+        sol = fl.solve_ivp(rhs, (0, 0.1), [0.0] * 3, resets=stop(3))
     assert sol.success, sol.message
-    assert abs(sol.y[2, -1]) == pytest.approx(0.4, abs=1e-9)
+    assert sol.y[2, -1] == pytest.approx(0.4, abs=1e-9)
+    assert sol.y[0, -1] == 0.0
+    branches = fl.solve_ivp(rhs, (0, 0.1), [0.0] * 3, resets=stop(3), nonunique="branch")
+    assert sorted(round(branch.y[2, -1], 9) for branch in branches) == [-0.4, 0.4]
 
 
 def test_lift_off_as_friction_begins_to_slip() -> None:

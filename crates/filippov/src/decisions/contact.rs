@@ -1,5 +1,6 @@
 //! Contact: which bodies stay, which leave, and what slides beside them.
 
+use super::choice::choose;
 use super::look_ahead::{field_of, try_mode, Trial};
 use super::point::{Decided, Left, Lefts, Next, Notes, Point};
 use crate::error::FieldError;
@@ -34,8 +35,8 @@ pub(super) fn decide_in_contact(
 }
 
 /// The mode where bodies touch without velocity (`contacts`) and other surfaces vanish (`meeting`): that with the
-/// most bodies in contact and surfaces slid on, all of whose guards begin positive. If there is none, one in which a guard
-/// stays zero; bodies without a force between them are free.
+/// most bodies in contact and surfaces slid on, all of whose guards begin positive, if no other one is asked for. If there is
+/// none, one in which a guard stays zero; bodies without a force between them are free.
 pub(super) fn place_in_contact(
     at: &Point,
     notes: &mut Notes,
@@ -51,22 +52,42 @@ pub(super) fn place_in_contact(
     for &j in &all {
         let entries = match contacts.contains(&j) {
             true => vec![0, at.triggers().side(j, None)],
-            false => vec![0, -1, 1],
+            false => vec![0, 1, -1],
         };
         let extended = |mode: &Mode| entries.iter().map(|&e| mode.with(j, e)).collect::<Vec<_>>();
         modes = modes.iter().flat_map(extended).collect();
     }
     modes.sort_by_key(|mode| usize::MAX - mode.codimension());
-    let mut neutral = Vec::new();
+    let (mut viable, mut neutral) = (Vec::<Next>::new(), Vec::new());
     for tried in modes {
         if at.patience.is_over() {
             return Ok(Err(Stop::Interrupted));
         }
+        // What sticks slips beyond its static limit only.
+        let slips = |next: &Next| {
+            let mut held = next.mode.sliding_set();
+            held.any(|j| tried.entries()[j] != 0 && at.system.sticks_at(j))
+        };
+        if viable.iter().any(slips) {
+            continue;
+        }
         match begin(at, notes, &tried, contacts, meeting)? {
-            Trial::Leaves(left) => return Ok(Ok(Next::new(tried, left))),
+            Trial::Leaves(left) => viable.push(Next::new(tried, left)),
             Trial::WithinRounding => neutral.push(tried),
             Trial::Ends => {}
         }
+    }
+    if let [first, others @ ..] = &viable[..] {
+        let mut chosen = first.mode.clone();
+        if !others.is_empty() {
+            let modes = viable.iter().map(|next| next.mode.clone()).collect();
+            chosen = match choose(at, notes, &all, chosen, modes) {
+                Ok(chosen) => chosen,
+                Err(stop) => return Ok(Err(stop)),
+            };
+        }
+        let found = viable.into_iter().find(|next| next.mode == chosen);
+        return Ok(found.ok_or(Stop::Contact { surfaces: all }));
     }
     let n_closed = |mode: &Mode| contacts.iter().filter(|&&j| mode.entries()[j] == 0).count();
     let Some(mode) = neutral.into_iter().min_by_key(n_closed) else {
