@@ -10,7 +10,7 @@
 //! v(lambda) = sum over k of w_k(lambda) f^k
 //! ```
 //!
-//! On one surface this is the quadratic equation of a two-fold (Dieci, Lopez 2009, case IV).
+//! On one surface this is the quadratic equation of a two-fold, for which more is known: [`crate::switching::TwoFold`].
 
 use super::point::{Notes, Point};
 use super::rule::Meeting;
@@ -28,8 +28,6 @@ pub(super) struct Beginning {
     pub multipliers: Vec<f64>,
     /// Of every surface of the meeting: how fast h, or its rate if that vanishes in all fields, grows.
     pub rates: Vec<f64>,
-    /// On one surface, how fast the normal components of f- and f+ grow.
-    pub components: [f64; 2],
 }
 
 /// The fields around the surfaces slid on, with the normal components to all surfaces of a meeting.
@@ -78,12 +76,7 @@ pub(super) fn beginnings(
             .any(|root| distance(root, &multipliers) <= AT_SIDE)
         {
             let rates = around.rates(&multipliers);
-            let components = [divided.at(0)[0], divided.at(divided.n_patterns() - 1)[0]];
-            found.push(Beginning {
-                multipliers,
-                rates,
-                components,
-            });
+            found.push(Beginning { multipliers, rates });
         }
     }
     Ok(found)

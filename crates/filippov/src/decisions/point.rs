@@ -358,10 +358,9 @@ impl Left {
     pub fn after(j: usize, decision: &Decision) -> Lefts {
         let [minus, plus] = Guard::ends(j);
         if let Some(motion) = decision.starts_at_two_fold() {
-            let first = |value: f64| Leading { order: 1, value };
             return smallvec![
-                Left::Exit(minus, first(motion.minus)),
-                Left::Exit(plus, first(motion.plus)),
+                Left::Exit(minus, motion.minus),
+                Left::Exit(plus, motion.plus),
             ];
         }
         match decision.entry {
