@@ -6,7 +6,7 @@ use super::consistency::{consistency, Consistency};
 use super::germ::{Germ, MotionSeries};
 use super::look_ahead::{try_mode, Trial};
 use super::point::{Cause, Left, Lefts, Notes, Point};
-use super::rule::Meeting;
+use super::rule::{How, Meeting};
 use smallvec::smallvec;
 
 use crate::error::FieldError;
@@ -378,6 +378,9 @@ fn of_two_fold(at: &Point, candidate: &Candidate, place: usize) -> Result<Verdic
     } = *candidate;
     let slid = meeting.surfaces[place];
     let mut two_fold = TwoFold::new(at.system, slid, 1, (at.t, at.x), &mode.signs());
+    if matches!(meeting.how, How::Event(_)) {
+        two_fold = two_fold.located();
+    }
     let mut verdict = Verdict::Fails(guard_of(meeting, fields, entries));
     for motion in two_fold.motions()? {
         let mut is_open = motion.minus.order == 0 || motion.plus.order == 0;

@@ -248,15 +248,24 @@ impl<'a> Integrator<'a> {
             surfaces,
             before: mode,
         } = self.vanishing_surfaces(event)?;
-        if !surfaces.is_empty() {
-            return Ok(None);
+        match surfaces[..] {
+            [] => self.go_beyond_double_zero(j, mode),
+            _ => Ok(None),
         }
+    }
+
+    /// Goes on beyond a double zero, to where the multiplier is known: what came of that.
+    fn go_beyond_double_zero(
+        &mut self,
+        j: usize,
+        mode: Mode,
+    ) -> Result<Option<Option<Stop>>, FieldError> {
         let beyond = self.ask(Cause::Anew(&mode), |at, _| beyond_double_zero(at, j))?;
         let Some((t, end)) = beyond.filter(|(t, _)| *t <= self.horizon) else {
             return Ok(None);
         };
-        self.record(mode.clone(), mode.clone(), &[], Rule::OneSurface.name())?;
         self.move_straight(t, end)?;
+        self.record(mode.clone(), mode.clone(), &[], Rule::OneSurface.name())?;
         let next = Next::new(mode, Lefts::new());
         Ok(Some(self.begin(next)?))
     }
@@ -459,6 +468,18 @@ impl<'a> Integrator<'a> {
         self.user_events.restart(self.t, &self.x)?;
         self.controller.restart();
         self.dt = self.first_step(&left)?;
+        // Normal components that begin with higher powers of time are lost in rounding for a while, and the multiplier with them.
+        let is_lost = |left: &Left| matches!(left, Left::Exit(_, leading) if leading.order > 1);
+        if let (&[j], true, true) = (
+            self.motion.sliding(),
+            left.len() > 1,
+            left.iter().any(is_lost),
+        ) {
+            let mode = self.motion.mode.clone();
+            if let Some(done) = self.go_beyond_double_zero(j, mode)? {
+                return Ok(done);
+            }
+        }
         Ok(None)
     }
 

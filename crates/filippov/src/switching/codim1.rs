@@ -129,6 +129,9 @@ pub fn decide(
         candidates.push(-1);
     }
     let mut at = TwoFold::new(system, j, vanishing[0].min(vanishing[1]), (t, x), signs);
+    if arrival != Arrival::Start {
+        at = at.located();
+    }
     let (motions, slides) = if minus.order == 1 || plus.order == 1 {
         (SmallVec::new(), minus.sign() >= 0 && plus.sign() <= 0)
     } else {

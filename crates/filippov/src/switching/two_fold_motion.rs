@@ -18,7 +18,7 @@ use super::lie::Leading;
 use crate::error::FieldError;
 use crate::mode::Signs;
 use crate::system::{LieValue, PiecewiseSystem};
-use crate::tolerances::{MAX_LIE_ORDER, MOST_HALVINGS, TANGENT};
+use crate::tolerances::{DOUBTFUL, MAX_LIE_ORDER, MOST_HALVINGS, TANGENT};
 
 /// A sliding motion through a two-fold. It starts there if it attracts. If it repels it is a solution too, but one that may
 /// leave to either side at any time.
@@ -58,6 +58,8 @@ pub struct TwoFold<'s> {
     signs: Signs,
     /// Words of so many letters are known to vanish.
     known: usize,
+    /// As do those below this part of the largest of as many letters.
+    noise: f64,
     highest: usize,
     own: Words,
 }
@@ -93,9 +95,17 @@ impl<'s> TwoFold<'s> {
             x,
             signs: Signs::from_slice(signs),
             known: known.max(1),
+            noise: TANGENT,
             highest: system.max_lie_order().min(MAX_LIE_ORDER),
             own: Words::of(j),
         }
+    }
+
+    /// The same at a located event, where the fields are known less well.
+    #[must_use]
+    pub fn located(mut self) -> Self {
+        self.noise = DOUBTFUL;
+        self
     }
 
     /// The rate at which h grows along the mean of both fields, in the first order in which they leave the surface; zero if it
@@ -268,6 +278,12 @@ impl Words {
                     }
                 }
                 row.push(lie);
+            }
+            let largest = row.iter().fold(0.0_f64, |m, lie| m.max(lie.value.abs()));
+            for lie in &mut row {
+                if lie.value.abs() <= at.noise * largest {
+                    lie.value = 0.0;
+                }
             }
             self.values.push(row);
         }
