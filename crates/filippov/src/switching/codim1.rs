@@ -36,6 +36,20 @@ impl Arrival {
             side => Arrival::Region(side),
         }
     }
+
+    /// The same, from a region, where the normal components of these fields are known to vanish.
+    #[must_use]
+    pub fn to_tangency(self, vanishing: [bool; 2]) -> Self {
+        let (side, known) = match self {
+            Arrival::Region(side) => (side, [0, 0]),
+            Arrival::Flat(side, known) => (side, known),
+            _ => return self,
+        };
+        Arrival::Flat(
+            side,
+            [0, 1].map(|i| known[i].max(usize::from(vanishing[i]))),
+        )
+    }
 }
 
 /// The decision at one surface.
@@ -54,14 +68,15 @@ pub struct Decision {
 }
 
 impl Decision {
-    /// Is the surface left with no more than rounding of what the field beyond has?
-    pub fn leaves_with_rounding(&self) -> bool {
-        let (leaving, other) = match self.entry {
-            -1 => (self.minus, self.plus),
-            1 => (self.plus, self.minus),
-            _ => return false,
+    /// Of which of f- and f+ is the normal component no more than rounding of that of the other one?
+    pub fn is_rounding(&self) -> [bool; 2] {
+        let is_small = |own: Leading, other: Leading| {
+            own.order == 1 && own.value.abs() <= OF_ROUNDING * other.value.abs()
         };
-        leaving.order == 1 && leaving.value.abs() <= OF_ROUNDING * other.value.abs()
+        [
+            is_small(self.minus, self.plus),
+            is_small(self.plus, self.minus),
+        ]
     }
 
     /// The motion that sliding starts with at a two-fold, if it does.
@@ -171,7 +186,7 @@ pub fn decide(
 }
 
 /// The same derivatives, where those of first order are more than the rounding of t and x makes of them. Looked at where
-/// nothing is known of the point but that it is on the surface, and where one is small beside the other.
+/// nothing is known of the point but that it is on the surface.
 fn without_rounding(
     system: &dyn PiecewiseSystem,
     j: usize,
@@ -180,14 +195,12 @@ fn without_rounding(
     x: &[f64],
     signs: &[f64],
 ) -> Result<[Leading; 2], FieldError> {
-    if system.lie_tolerance(2) > TANGENT {
+    if arrival != Arrival::Start || system.lie_tolerance(2) > TANGENT {
         return Ok(firsts);
     }
-    let largest = firsts[0].value.abs().max(firsts[1].value.abs());
     for (index, side) in [-1, 1].into_iter().enumerate() {
         let Leading { order, value } = firsts[index];
-        let is_small = value.abs() <= OF_ROUNDING * largest;
-        if order != 1 || !(is_small || arrival == Arrival::Start) {
+        if order != 1 {
             continue;
         }
         let mut signs = Signs::from_slice(signs);

@@ -132,8 +132,9 @@ impl<'s> TwoFold<'s> {
             let mut lambda: SmallVec<[f64; 6]> = smallvec![2.0 * weight - 1.0];
             let minus = self.first_of_component(0, &mut lambda)?;
             let plus = self.first_of_component(1, &mut lambda)?;
-            // Where both components stay zero the motion is that of a region.
-            if (minus.order, plus.order) != (0, 0) {
+            // With a whole share of one field, along which both components stay zero, it is the motion of a region.
+            let is_region = (minus.order, plus.order) == (0, 0) && (weight == 0.0 || weight == 1.0);
+            if !is_region {
                 found.push(TwoFoldMotion {
                     weight,
                     minus,
