@@ -280,6 +280,7 @@ fn begin(viable: Viable) -> Next {
     if !viable.multipliers.is_empty() {
         let start = next.start_mut();
         (start.multipliers, start.is_given) = (viable.multipliers, viable.is_given);
+        start.two_fold = viable.two_fold;
     }
     next
 }

@@ -14,6 +14,7 @@ use crate::field::{eval_on_side, Guard, RootEnd};
 use crate::mode::Mode;
 use crate::switching::{
     first_nonzero, is_undetermined, stable_roots_with_border, Leading, NormalFields, TwoFold,
+    TwoFoldMotion,
 };
 use crate::system::dot;
 use crate::tolerances::{AT_SIDE, DOUBTFUL, MOST_MEETING, TANGENT};
@@ -28,6 +29,8 @@ pub(super) struct Viable {
     pub multipliers: Vec<f64>,
     /// Do the equations of the multipliers vanish at the point?
     pub is_given: bool,
+    /// On one surface, the motion that slides from a two-fold.
+    pub two_fold: Option<TwoFoldMotion>,
     /// Does no guard stay zero?
     pub is_strict: bool,
     /// Does the field beyond a surface on which the motion stays press it there? Then it may as well slide.
@@ -42,6 +45,7 @@ impl Viable {
             left,
             multipliers: Vec::new(),
             is_given: false,
+            two_fold: None,
             is_strict: true,
             is_pressed: false,
         }
@@ -413,6 +417,7 @@ fn of_two_fold(at: &Point, candidate: &Candidate, place: usize) -> Result<Verdic
                 return Ok(Verdict::Viable(Viable {
                     multipliers: vec![motion.multiplier()],
                     is_given: true,
+                    two_fold: Some(motion),
                     ..Viable::strictly(mode.clone(), left)
                 }))
             }

@@ -248,18 +248,9 @@ impl<'a> Integrator<'a> {
             surfaces,
             before: mode,
         } = self.vanishing_surfaces(event)?;
-        match surfaces[..] {
-            [] => self.go_beyond_double_zero(j, mode),
-            _ => Ok(None),
+        if !surfaces.is_empty() {
+            return Ok(None);
         }
-    }
-
-    /// Goes on beyond a double zero, to where the multiplier is known: what came of that.
-    fn go_beyond_double_zero(
-        &mut self,
-        j: usize,
-        mode: Mode,
-    ) -> Result<Option<Option<Stop>>, FieldError> {
         let beyond = self.ask(Cause::Anew(&mode), |at, _| beyond_double_zero(at, j))?;
         let Some((t, end)) = beyond.filter(|(t, _)| *t <= self.horizon) else {
             return Ok(None);
@@ -413,6 +404,7 @@ impl<'a> Integrator<'a> {
             zero.is_clean = !slid;
         }
         self.choose_stepper();
+        let mut two_fold = None;
         match &mut self.motion.field {
             ModeField::Intersection(field) => {
                 let start = start.as_deref();
@@ -426,8 +418,10 @@ impl<'a> Integrator<'a> {
                 }
             }
             ModeField::Sliding(field) => {
-                if let Some(start) = start.filter(|start| start.is_given) {
-                    field.begin_at_two_fold(self.t, start.multipliers[0]);
+                if let Some(motion) = start.and_then(|start| start.two_fold) {
+                    let reach = motion.reach(self.options.rtol);
+                    two_fold = Some((motion, reach));
+                    field.begin_at_two_fold(self.t, self.t, motion);
                 }
             }
             _ => {}
@@ -468,16 +462,13 @@ impl<'a> Integrator<'a> {
         self.user_events.restart(self.t, &self.x)?;
         self.controller.restart();
         self.dt = self.first_step(&left)?;
-        // Normal components that begin with higher powers of time are lost in rounding for a while, and the multiplier with them.
-        let is_lost = |left: &Left| matches!(left, Left::Exit(_, leading) if leading.order > 1);
-        if let (&[j], true, true) = (
-            self.motion.sliding(),
-            left.len() > 1,
-            left.iter().any(is_lost),
-        ) {
-            let mode = self.motion.mode.clone();
-            if let Some(done) = self.go_beyond_double_zero(j, mode)? {
-                return Ok(done);
+        if let (Some((motion, reach)), ModeField::Sliding(field)) =
+            (two_fold, &mut self.motion.field)
+        {
+            if reach > 0.0 {
+                self.dt = self.dt.min(reach);
+                let until = if reach.is_finite() { reach } else { self.dt };
+                field.begin_at_two_fold(self.t, self.t + until, motion);
             }
         }
         Ok(None)

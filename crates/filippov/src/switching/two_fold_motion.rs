@@ -26,6 +26,10 @@ use crate::tolerances::{DOUBTFUL, MAX_LIE_ORDER, MOST_HALVINGS, TANGENT};
 pub struct TwoFoldMotion {
     /// The share of f+ at the start, in [0, 1].
     pub weight: f64,
+    /// lambda(t) in powers of the time since the start, as far as it was needed: in several powers if the normal components
+    /// begin with higher ones of time, so that the quotient is lost in rounding for a while.
+    series: [f64; MAX_LIE_ORDER],
+    n_known: usize,
     /// The first derivative of the normal component of f- that does not vanish along the motion; order 0 if none is known.
     pub minus: Leading,
     /// The same of f+.
@@ -46,6 +50,27 @@ impl TwoFoldMotion {
     /// lambda at the two-fold.
     pub fn multiplier(&self) -> f64 {
         2.0 * self.weight - 1.0
+    }
+
+    /// The share of f+, and the normal components, this time after the start.
+    pub fn after(&self, time: f64) -> (f64, [f64; 2]) {
+        let known = self.series[..self.n_known].iter().rev();
+        let lambda = known.fold(0.0, |sum, coefficient| sum * time + coefficient);
+        let component = |first: Leading| first.coefficient() * time.powi(first.order as i32);
+        (
+            0.5 * (1.0 + lambda),
+            [component(self.minus), component(self.plus)],
+        )
+    }
+
+    /// How long the series of the multiplier has no larger error than this.
+    pub fn reach(&self, tolerance: f64) -> f64 {
+        let last = self.n_known.saturating_sub(2).max(1)..self.n_known.max(1);
+        let reach = |k: usize| (tolerance / self.series[k].abs()).powf(1.0 / k as f64);
+        match self.n_known {
+            ..=1 => 0.0,
+            _ => last.map(reach).fold(f64::INFINITY, f64::min),
+        }
     }
 }
 
@@ -134,13 +159,22 @@ impl<'s> TwoFold<'s> {
             let plus = self.first_of_component(1, &mut lambda)?;
             // With a whole share of one field, along which both components stay zero, it is the motion of a region.
             let is_region = (minus.order, plus.order) == (0, 0) && (weight == 0.0 || weight == 1.0);
-            if !is_region {
-                found.push(TwoFoldMotion {
-                    weight,
-                    minus,
-                    plus,
-                });
+            if is_region {
+                continue;
             }
+            if minus.order.max(plus.order) > 1 {
+                while self.continue_series(&mut lambda)? {}
+            }
+            let mut series = [0.0; MAX_LIE_ORDER];
+            let n_known = lambda.len().min(series.len());
+            series[..n_known].copy_from_slice(&lambda[..n_known]);
+            found.push(TwoFoldMotion {
+                weight,
+                series,
+                n_known,
+                minus,
+                plus,
+            });
         }
         Ok(found)
     }
@@ -232,7 +266,10 @@ impl<'s> TwoFold<'s> {
         let with = self.own.coefficient(EMPTY, n, lambda);
         let slope = with.value - without.value;
         let is_determined = slope.abs() > TANGENT * with.magnitude;
-        *lambda.last_mut().expect("it was just added") = -without.value / slope;
+        lambda.pop();
+        if is_determined {
+            lambda.push(-without.value / slope);
+        }
         Ok(is_determined)
     }
 

@@ -277,8 +277,8 @@ pub const SETTLED: f64 = 1e-6;
 /// Beyond a two-fold that is slid through the multiplier counts as known where rounding changes it by less than this.
 pub const KNOWN_MULTIPLIER: f64 = 1e-4;
 
-/// The way to there is found by doubling one tolerance, to a thousand million of them at most: the root of a tolerance is below.
-pub const MOST_DOUBLINGS: usize = 30;
+/// The way to there is found by doubling one tolerance: to a million of them at most.
+pub const MOST_DOUBLINGS: usize = 20;
 
 /// A motion that was to stay on a surface has left it where h is above this multiple of the tolerance: errors of many
 /// steps add up.
