@@ -6,9 +6,8 @@ use super::lie::{first_nonzero, first_nonzero_of_both, Leading};
 use super::stick::decide_sticking;
 use super::two_fold_motion::{TwoFold, TwoFoldMotion};
 use crate::error::FieldError;
-use crate::field::eval_on_side;
 use crate::mode::Signs;
-use crate::system::{dot_magnitude, PiecewiseSystem};
+use crate::system::{dot_magnitude, BothSides, PiecewiseSystem};
 use crate::tolerances::{OF_ROUNDING, TANGENT};
 
 /// How the motion came to the surface, and which normal components are known to vanish.
@@ -143,14 +142,17 @@ pub fn decide(
     if minus.sign() < 0 || stays(minus, plus, -1) {
         candidates.push(-1);
     }
-    let mut at = TwoFold::new(system, j, vanishing[0].min(vanishing[1]), (t, x), signs);
-    if arrival != Arrival::Start {
-        at = at.located();
-    }
+    let at_two_fold = || {
+        let at = TwoFold::new(system, j, vanishing[0].min(vanishing[1]), (t, x), signs);
+        match arrival {
+            Arrival::Start => at,
+            _ => at.located(),
+        }
+    };
     let (motions, slides) = if minus.order == 1 || plus.order == 1 {
         (SmallVec::new(), minus.sign() >= 0 && plus.sign() <= 0)
     } else {
-        let motions = at.motions()?;
+        let motions = at_two_fold().motions()?;
         let attracts = motions.iter().any(TwoFoldMotion::attracts);
         (motions, attracts)
     };
@@ -165,13 +167,13 @@ pub fn decide(
     if minus.order == 0 && plus.order == 0 {
         // Neither field leaves the surface: the motion stays on it, and if they differ, any combination
         // of them is a Filippov solution.
-        let agree = fields_agree(system, j, t, x, signs)?;
+        let agree = fields_agree(system, j, (t, x), signs)?;
         candidates = if agree { smallvec![] } else { smallvec![-1, 1] };
         two_fold = None;
     }
     let entry = match candidates[..] {
         [only] => only,
-        _ => choose(&mut at, arrival, &candidates, [minus, plus], &motions)?,
+        _ => choose(at_two_fold, arrival, &candidates, [minus, plus], &motions)?,
     };
     if candidates.is_empty() {
         candidates.push(entry);
@@ -225,32 +227,20 @@ fn stays(own: Leading, other: Leading, side: i8) -> bool {
 fn fields_agree(
     system: &dyn PiecewiseSystem,
     j: usize,
-    t: f64,
-    x: &[f64],
+    (t, x): (f64, &[f64]),
     signs: &[f64],
 ) -> Result<bool, FieldError> {
-    let side = |s: f64| -> Result<Vec<f64>, FieldError> {
-        let mut signs = signs.to_vec();
-        signs[j] = s;
-        let mut f = vec![0.0; x.len()];
-        eval_on_side(system, t, x, &signs, &mut f)?;
-        Ok(f)
-    };
-    let (minus, plus) = (side(-1.0)?, side(1.0)?);
-    let size = minus
-        .iter()
-        .chain(&plus)
-        .fold(0.0_f64, |m, v| m.max(v.abs()));
-    Ok(minus
-        .iter()
-        .zip(&plus)
-        .all(|(a, b)| (a - b).abs() <= TANGENT * size))
+    let mut sides = BothSides::new(x.len(), signs.len());
+    system.both_sides(j, t, x, signs, &mut sides)?;
+    let pairs = || sides.f_minus.iter().zip(&sides.f_plus);
+    let size = pairs().fold(0.0_f64, |m, (a, b)| m.max(a.abs()).max(b.abs()));
+    Ok(pairs().all(|(a, b)| (a - b).abs() <= TANGENT * size))
 }
 
 /// Among several candidates: the side that the motion comes from; at a start the one that the regularised field moves to
 /// from the middle of the transition, lambda = 0; where this does not tell, one that leads away before one at rest.
-fn choose(
-    at: &mut TwoFold,
+fn choose<'s>(
+    at_two_fold: impl FnOnce() -> TwoFold<'s>,
     arrival: Arrival,
     candidates: &[i8],
     sides: [Leading; 2],
@@ -265,7 +255,7 @@ fn choose(
             let repelling = motions.iter().find(|motion| motion.repels());
             repelling.map(|motion| if motion.weight < 0.5 { -1 } else { 1 })
         }
-        Arrival::Start => from_the_middle(at, sides, motions)?,
+        Arrival::Start => from_the_middle(at_two_fold, sides, motions)?,
     };
     let is_candidate = |entry: &i8| candidates.contains(entry);
     if candidates.is_empty() {
@@ -284,15 +274,15 @@ fn choose(
 
 /// Where the regularised motion goes from the middle of the transition, to -1 or +1 or onto the surface at a two-fold. It
 /// follows the mean of both fields at first.
-fn from_the_middle(
-    at: &mut TwoFold,
+fn from_the_middle<'s>(
+    at_two_fold: impl FnOnce() -> TwoFold<'s>,
     sides: [Leading; 2],
     motions: &[TwoFoldMotion],
 ) -> Result<Option<i8>, FieldError> {
     let first = sides.map(|side| if side.order == 1 { side.value } else { 0.0 });
     let mut rate = first[0] + first[1];
     if rate.abs() <= TANGENT * (first[0].abs() + first[1].abs()) {
-        rate = at.rate_of_mean()?;
+        rate = at_two_fold().rate_of_mean()?;
     }
     let between = |motion: &TwoFoldMotion| motion.attracts() && motion.multiplier() * rate >= 0.0;
     Ok(match motions.iter().any(between) {

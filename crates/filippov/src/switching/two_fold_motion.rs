@@ -74,22 +74,27 @@ impl TwoFoldMotion {
     }
 }
 
-/// The derivatives of switching functions along words of both fields of surface `j`, at a point where both are tangent to it.
+/// A point where both fields are tangent to surface `j`.
 pub struct TwoFold<'s> {
+    place: Place<'s>,
+    /// The derivatives of h.
+    own: Words,
+}
+
+struct Place<'s> {
     system: &'s dyn PiecewiseSystem,
     j: usize,
     t: f64,
     x: &'s [f64],
     signs: Signs,
-    /// Words of so many letters are known to vanish.
+    /// Words of h of so many letters are known to vanish.
     known: usize,
     /// As do those below this part of the largest of as many letters.
     noise: f64,
     highest: usize,
-    own: Words,
 }
 
-/// The derivatives of one function, by length and letters: `[length][letters as bits, the first one highest]`.
+/// The derivatives of one function along words of both fields, by length and letters: the first one is the highest bit.
 struct Words {
     surface: usize,
     values: Vec<Vec<LieValue>>,
@@ -113,7 +118,7 @@ impl<'s> TwoFold<'s> {
         (t, x): (f64, &'s [f64]),
         signs: &[f64],
     ) -> Self {
-        TwoFold {
+        let place = Place {
             system,
             j,
             t,
@@ -122,14 +127,15 @@ impl<'s> TwoFold<'s> {
             known: known.max(1),
             noise: TANGENT,
             highest: system.max_lie_order().min(MAX_LIE_ORDER),
-            own: Words::of(j),
-        }
+        };
+        let own = Words::of(j);
+        TwoFold { place, own }
     }
 
     /// The same at a located event, where the fields are known less well.
     #[must_use]
     pub fn located(mut self) -> Self {
-        self.noise = DOUBTFUL;
+        self.place.noise = DOUBTFUL;
         self
     }
 
@@ -143,7 +149,7 @@ impl<'s> TwoFold<'s> {
             return Ok(0.0);
         };
         let mean = self.own.coefficient(EMPTY, length, &[0.0]);
-        let is_clear = mean.value.abs() > self.system.lie_tolerance(length) * mean.magnitude;
+        let is_clear = mean.value.abs() > self.place.system.lie_tolerance(length) * mean.magnitude;
         Ok(if is_clear { mean.value } else { 0.0 })
     }
 
@@ -187,14 +193,14 @@ impl<'s> TwoFold<'s> {
         let mut words = Words::of(i);
         let mut lambda: SmallVec<[f64; 6]> = smallvec![motion.multiplier()];
         let mut factorial = 1.0;
-        for n in 1..=self.highest {
+        for n in 1..=self.place.highest {
             factorial *= n as f64;
             if lambda.len() < n && !self.continue_series(&mut lambda)? {
                 break;
             }
-            words.fill(self, n)?;
+            words.fill(&self.place, n)?;
             let term = words.coefficient(EMPTY, n, &lambda);
-            if term.value.abs() > self.system.lie_tolerance(n) * term.magnitude {
+            if term.value.abs() > self.place.system.lie_tolerance(n) * term.magnitude {
                 let value = factorial * term.value;
                 return Ok(Leading { order: n, value });
             }
@@ -204,8 +210,8 @@ impl<'s> TwoFold<'s> {
 
     /// The length of the shortest words that do not vanish.
     fn first_length(&mut self) -> Result<Option<usize>, FieldError> {
-        for length in self.known + 1..=self.highest {
-            self.fill(length)?;
+        for length in self.place.known + 1..=self.place.highest {
+            self.own.fill(&self.place, length)?;
             let mut words = self.own.values[length].iter();
             if words.any(|lie| lie.value != 0.0) {
                 return Ok(Some(length));
@@ -234,15 +240,15 @@ impl<'s> TwoFold<'s> {
         lambda: &mut SmallVec<[f64; 6]>,
     ) -> Result<Leading, FieldError> {
         let first = self.first_length()?.unwrap_or(0);
-        for n in first.saturating_sub(1)..self.highest {
+        for n in first.saturating_sub(1)..self.place.highest {
             while lambda.len() + first < n + 2 {
                 if !self.continue_series(lambda)? {
                     return Ok(NONE);
                 }
             }
-            self.fill(n + 1)?;
+            self.own.fill(&self.place, n + 1)?;
             let term = self.own.coefficient(with_letter(EMPTY, letter), n, lambda);
-            if term.value.abs() > self.system.lie_tolerance(n + 1) * term.magnitude {
+            if term.value.abs() > self.place.system.lie_tolerance(n + 1) * term.magnitude {
                 let value = (1..=n).fold(term.value, |value, k| value * k as f64);
                 return Ok(Leading { order: n, value });
             }
@@ -256,10 +262,10 @@ impl<'s> TwoFold<'s> {
             return Ok(false);
         };
         let n = first + lambda.len();
-        if n > self.highest {
+        if n > self.place.highest {
             return Ok(false);
         }
-        self.fill(n)?;
+        self.own.fill(&self.place, n)?;
         lambda.push(0.0);
         let without = self.own.coefficient(EMPTY, n, lambda);
         *lambda.last_mut().expect("it was just added") = 1.0;
@@ -271,13 +277,6 @@ impl<'s> TwoFold<'s> {
             lambda.push(-without.value / slope);
         }
         Ok(is_determined)
-    }
-
-    fn fill(&mut self, length: usize) -> Result<(), FieldError> {
-        let mut own = std::mem::replace(&mut self.own, Words::of(self.j));
-        own.fill(self, length)?;
-        self.own = own;
-        Ok(())
     }
 }
 
@@ -295,7 +294,7 @@ impl Words {
     }
 
     /// Finds all words up to a length; those within rounding of zero are zero.
-    fn fill(&mut self, at: &TwoFold, length: usize) -> Result<(), FieldError> {
+    fn fill(&mut self, at: &Place, length: usize) -> Result<(), FieldError> {
         for length in self.values.len()..=length {
             let known = if self.surface == at.j { at.known } else { 0 };
             let mut row = Vec::with_capacity(1 << length);
