@@ -88,7 +88,7 @@ pub enum Stop {
         /// The surface.
         surface: usize,
         /// The motion that slides on from here, if derivatives give one.
-        sliding: Option<TwoFoldMotion>,
+        sliding: Option<Box<TwoFoldMotion>>,
     },
     /// The continuation is not unique, and `NonUnique::Error` was asked for, or a choice is not among the
     /// candidates.

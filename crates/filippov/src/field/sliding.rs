@@ -56,16 +56,23 @@ pub struct SlidingField<'a> {
     /// The guards at the last evaluation: a- and -a+.
     exits: [f64; 2],
     last_time: f64,
-    two_fold: Option<StartAtTwoFold>,
+    two_fold: Option<Box<StartAtTwoFold>>,
 }
 
 /// Sliding starts at a two-fold: from its start until this time the multiplier is its power series, not the quotient of
 /// two numbers that vanish.
-#[derive(Clone, Copy)]
 struct StartAtTwoFold {
     start: f64,
     until: f64,
     motion: TwoFoldMotion,
+}
+
+impl StartAtTwoFold {
+    #[cold]
+    fn given_at(&self, t: f64) -> Option<(f64, [f64; 2])> {
+        let is_near = self.start <= t && t <= self.until;
+        is_near.then(|| self.motion.after(t - self.start))
+    }
 }
 
 impl<'a> SlidingField<'a> {
@@ -103,11 +110,11 @@ impl<'a> SlidingField<'a> {
 
     /// Sliding starts at a two-fold, where the share of f+ is a quotient of two zeros, with the series of this motion.
     pub fn begin_at_two_fold(&mut self, start: f64, until: f64, motion: TwoFoldMotion) {
-        self.two_fold = Some(StartAtTwoFold {
+        self.two_fold = Some(Box::new(StartAtTwoFold {
             start,
             until,
             motion,
-        });
+        }));
     }
 
     /// Does sliding start at a two-fold, and is this time so near that its multiplier is given?
@@ -116,10 +123,9 @@ impl<'a> SlidingField<'a> {
     }
 
     /// The share of f+ and the normal components, if they are given.
+    #[inline(always)]
     fn given_at(&self, t: f64) -> Option<(f64, [f64; 2])> {
-        let held = self.two_fold.as_ref()?;
-        let is_near = held.start <= t && t <= held.until;
-        is_near.then(|| held.motion.after(t - held.start))
+        self.two_fold.as_ref()?.given_at(t)
     }
 
     /// The share of f+ at time t, with these normal components.

@@ -59,7 +59,7 @@ pub struct Decision {
     /// All entries that are Filippov continuations; more than one where the point is not unique.
     pub candidates: SmallVec<[i8; 3]>,
     /// The sliding motion from here, if this is a two-fold: one that attracts, if there is one.
-    pub two_fold: Option<TwoFoldMotion>,
+    pub two_fold: Option<Box<TwoFoldMotion>>,
     /// First non-vanishing derivative of h along f-.
     pub minus: Leading,
     /// First non-vanishing derivative of h along f+.
@@ -79,9 +79,9 @@ impl Decision {
     }
 
     /// The motion that sliding starts with at a two-fold, if it does.
-    pub fn starts_at_two_fold(&self) -> Option<TwoFoldMotion> {
-        let starts = |motion: &TwoFoldMotion| self.entry == 0 && motion.attracts();
-        self.two_fold.filter(starts)
+    pub fn starts_at_two_fold(&self) -> Option<&TwoFoldMotion> {
+        let starts = |motion: &&TwoFoldMotion| self.entry == 0 && motion.attracts();
+        self.two_fold.as_deref().filter(starts)
     }
 
     /// Does neither side continue, nor sliding that attracts? Both fields turn back to the surface, at a two-fold that is
@@ -157,7 +157,7 @@ pub fn decide(
         (motions, attracts)
     };
     let attracting = motions.iter().find(|motion| motion.attracts());
-    let mut two_fold = attracting.or(motions.first()).copied();
+    let mut two_fold = attracting.or(motions.first()).copied().map(Box::new);
     if slides {
         candidates.push(0);
     }
