@@ -87,8 +87,8 @@ pub enum Stop {
     InvisibleTwoFold {
         /// The surface.
         surface: usize,
-        /// The motion that slides on from here, if second derivatives give one.
-        sliding: Option<TwoFoldMotion>,
+        /// The motion that slides on from here, if derivatives give one.
+        sliding: Option<Box<TwoFoldMotion>>,
     },
     /// The continuation is not unique, and `NonUnique::Error` was asked for, or a choice is not among the
     /// candidates.
@@ -239,7 +239,7 @@ impl Stop {
                     Some(_) =>
                         "To keep to the points where both fields are tangent is a solution; whether others wind around \
                          them and away is not decided.",
-                    None => "Derivatives of second order do not tell what follows.",
+                    None => "The derivatives of the fields do not tell what follows.",
                 }
             ),
             Stop::NonUnique {

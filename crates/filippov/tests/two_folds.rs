@@ -58,7 +58,8 @@ fn two_folds_at_a_point_of_rest() {
     );
     let motion = decision.two_fold.unwrap();
     assert!((motion.weight - 0.25).abs() < 1e-9);
-    assert!(motion.minus > 0.0 && motion.plus < 0.0);
+    assert!(motion.attracts());
+    assert_eq!((motion.minus.order, motion.plus.order), (1, 1));
     // No mixture slides: rest is all there is.
     let decision = two_fold(0.0, -1.0, 0.0, -1.0, Start);
     assert_eq!(

@@ -10,12 +10,12 @@
 //! v(lambda) = sum over k of w_k(lambda) f^k
 //! ```
 //!
-//! On one surface this is the quadratic equation of a two-fold (Dieci, Lopez 2009, case IV).
+//! On one surface this is the quadratic equation of a two-fold, for which more is known: [`crate::switching::TwoFold`].
 
 use super::point::{Notes, Point};
 use super::rule::Meeting;
 use crate::error::FieldError;
-use crate::field::eval_on_side;
+use crate::field::{product_weights, MeetingFields};
 use crate::mode::Mode;
 use crate::switching::{stable_roots_with_border, Matrix, NormalFields};
 use crate::system::dot;
@@ -28,16 +28,16 @@ pub(super) struct Beginning {
     pub multipliers: Vec<f64>,
     /// Of every surface of the meeting: how fast h, or its rate if that vanishes in all fields, grows.
     pub rates: Vec<f64>,
-    /// On one surface, how fast the normal components of f- and f+ grow.
-    pub components: [f64; 2],
 }
 
 /// The fields around the surfaces slid on, with the normal components to all surfaces of a meeting.
 struct Around {
     /// The surfaces slid on, counted within the meeting.
     slid: Vec<usize>,
-    /// Of every pattern: the velocity, and one row per surface of the meeting.
-    patterns: Vec<(Vec<f64>, Vec<Row>)>,
+    fields: MeetingFields,
+    /// Of every pattern: one row per surface of the meeting.
+    patterns: Vec<Vec<Row>>,
+    n_states: usize,
     /// The surfaces of the meeting to which all fields are tangent.
     is_silent: Vec<bool>,
 }
@@ -78,12 +78,7 @@ pub(super) fn beginnings(
             .any(|root| distance(root, &multipliers) <= AT_SIDE)
         {
             let rates = around.rates(&multipliers);
-            let components = [divided.at(0)[0], divided.at(divided.n_patterns() - 1)[0]];
-            found.push(Beginning {
-                multipliers,
-                rates,
-                components,
-            });
+            found.push(Beginning { multipliers, rates });
         }
     }
     Ok(found)
@@ -102,15 +97,14 @@ impl Around {
             .filter(|&i| mode.entries()[meeting.surfaces[i]] == 0)
             .collect();
         let surfaces: Vec<usize> = slid.iter().map(|&i| meeting.surfaces[i]).collect();
+        let mut fields = MeetingFields::of_all_patterns(at.system, &surfaces);
+        notes.n_field_evaluations += fields.evaluate(at.system, at.t, at.x, &mode.signs())?;
         let mut patterns = Vec::with_capacity(1 << slid.len());
         for pattern in 0..1_usize << slid.len() {
             if at.patience.is_over() {
                 return Ok(None);
             }
             let signs = mode.on_sides(&surfaces, pattern).signs();
-            let mut velocity = vec![0.0; at.x.len()];
-            notes.n_field_evaluations +=
-                eval_on_side(at.system, at.t, at.x, &signs, &mut velocity)?;
             let mut rows = Vec::with_capacity(meeting.surfaces.len());
             for &j in meeting.surfaces {
                 let mut gradient = vec![0.0; at.x.len()];
@@ -123,40 +117,26 @@ impl Around {
                     gradient,
                 });
             }
-            patterns.push((velocity, rows));
+            patterns.push(rows);
         }
         Ok(Some(Around {
             slid,
+            fields,
             patterns,
+            n_states: at.x.len(),
             is_silent: is_silent.to_vec(),
         }))
     }
 
-    fn weights(&self, lambda: &[f64]) -> Vec<f64> {
-        let mut weights = vec![1.0];
-        for (bit, lambda) in lambda.iter().enumerate() {
-            for pattern in 0..1 << bit {
-                weights.push(0.5 * (1.0 + lambda) * weights[pattern]);
-                weights[pattern] *= 0.5 * (1.0 - lambda);
-            }
-        }
-        weights
-    }
-
-    fn velocity(&self, lambda: &[f64]) -> Vec<f64> {
-        let mut velocity = vec![0.0; self.patterns[0].0.len()];
-        for (weight, (field, _)) in self.weights(lambda).iter().zip(&self.patterns) {
-            velocity
-                .iter_mut()
-                .zip(field)
-                .for_each(|(v, f)| *v += weight * f);
-        }
+    fn velocity(&self, weights: &[f64]) -> Vec<f64> {
+        let mut velocity = vec![0.0; self.n_states];
+        self.fields.combine(weights, &mut velocity);
         velocity
     }
 
     /// The component normal to surface i of the meeting in one pattern, divided by time if it vanishes in all.
     fn component(&self, pattern: usize, i: usize, velocity: &[f64]) -> f64 {
-        let row = &self.patterns[pattern].1[i];
+        let row = &self.patterns[pattern][i];
         match self.is_silent[i] {
             true => row.time + dot(&row.gradient, velocity),
             false => row.value,
@@ -165,7 +145,8 @@ impl Around {
 
     /// How fast every h of the meeting, or its rate, grows with these multipliers.
     fn rates(&self, lambda: &[f64]) -> Vec<f64> {
-        let (weights, velocity) = (self.weights(lambda), self.velocity(lambda));
+        let weights = product_weights(lambda);
+        let velocity = self.velocity(&weights);
         let rate = |i: usize| -> f64 {
             let terms = weights.iter().enumerate();
             terms
@@ -184,7 +165,7 @@ impl Around {
     /// The normal components of the surfaces slid on a moment later, divided by time where they vanish now, along the
     /// motion with these multipliers.
     fn divided(&self, lambda: &[f64]) -> Result<NormalFields, crate::switching::Undecided> {
-        let velocity = self.velocity(lambda);
+        let velocity = self.velocity(&product_weights(lambda));
         let patterns = 0..self.patterns.len();
         let values = patterns.flat_map(|pattern| {
             let velocity = &velocity;

@@ -32,6 +32,7 @@ pub(super) fn follow_at_surface(
     if let Some(motion) = decision.starts_at_two_fold() {
         let start = next.start_mut();
         (start.multipliers, start.is_given) = (vec![motion.multiplier()], true);
+        start.two_fold = Some(*motion);
     }
     Ok(next)
 }

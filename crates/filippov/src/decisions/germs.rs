@@ -280,12 +280,35 @@ fn begin(viable: Viable) -> Next {
     if !viable.multipliers.is_empty() {
         let start = next.start_mut();
         (start.multipliers, start.is_given) = (viable.multipliers, viable.is_given);
+        start.two_fold = viable.two_fold;
     }
     next
 }
 
-/// Is a normal component at some surface not clear of zero?
+/// Is a normal component at some surface not clear of zero, in a region or along a motion that slides on one surface?
 fn is_doubtful(at: &Point, fields: &NormalFields, meeting: &Meeting) -> Result<bool, FieldError> {
     let noise = noise_of(at, meeting, fields)?;
-    Ok(fields.any_component(|i, component| component.abs() <= noise[i]))
+    if fields.any_component(|i, component| component.abs() <= noise[i]) {
+        return Ok(true);
+    }
+    let m = fields.m();
+    for (slid, pattern) in (0..m).flat_map(|i| (0..1_usize << m).map(move |pattern| (i, pattern))) {
+        if pattern >> slid & 1 == 1 {
+            continue;
+        }
+        let side = |i: usize| if pattern >> i & 1 == 1 { 1.0 } else { -1.0 };
+        let mut place: Vec<f64> = (0..m).map(side).collect();
+        let minus = fields.interpolate(&place)[slid];
+        place[slid] = 1.0;
+        let plus = fields.interpolate(&place)[slid];
+        if minus > 0.0 && plus < 0.0 {
+            place[slid] = (minus + plus) / (minus - plus);
+            let components = fields.interpolate(&place);
+            let is_tangent = |i: usize| i != slid && components[i].abs() <= noise[i];
+            if (0..m).any(is_tangent) {
+                return Ok(true);
+            }
+        }
+    }
+    Ok(false)
 }

@@ -92,13 +92,15 @@ pub(super) fn one_surface(
     let (mode, signs) = (meeting.mode, meeting.mode.signs());
     let decision = decide_at_surface(at.system, j, arrival, at.t, at.x, &signs)?;
     let is_event = matches!(meeting.how, How::Event(_));
-    if !is_event || !decision.leaves_with_rounding() {
+    let is_rounding = decision.is_rounding();
+    if !is_event || is_rounding == [false; 2] {
         return Ok(Some(follow_at_surface(at, notes, mode, j, decision)));
     }
-    // A field that comes to rest on the surface: beside it, by rounding, it still points somewhere.
+    // A field that is tangent to the surface: beside it, by rounding, it still points somewhere.
     let mut x = at.x.to_vec();
     let mut projector = Projector::new(x.len(), signs.len());
     projector.project(at.system, j, at.t, &mut x, &signs)?;
+    let arrival = arrival.to_tangency(is_rounding);
     let decision = decide_at_surface(at.system, j, arrival, at.t, &x, &signs)?;
     let decided = follow_at_surface(at, notes, mode, j, decision);
     Ok(Some(decided.map(|mut next| {

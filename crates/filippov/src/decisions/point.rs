@@ -15,7 +15,7 @@ use crate::options::{NonUnique, Options};
 use crate::solution::Switch;
 use crate::status::{Stop, Warning};
 use crate::stepper::ErrorScale;
-use crate::switching::{Decision, Leading, Patience};
+use crate::switching::{Decision, Leading, Patience, TwoFoldMotion};
 use crate::system::PiecewiseSystem;
 use crate::tolerances::{MOMENT, MOST_SHORTENINGS, NO_PROGRESS, TOO_LARGE_A_CHANGE};
 
@@ -318,6 +318,8 @@ pub(crate) struct Start {
     pub oscillates: bool,
     /// Do the equations of the multipliers vanish at the start, so that these hold there?
     pub is_given: bool,
+    /// On one surface, the motion that slides from a two-fold.
+    pub two_fold: Option<TwoFoldMotion>,
     /// The motion begins with the laps of an outward spiral.
     pub leap: Option<Leap>,
     /// The state, where that is not the place of the decision.
@@ -360,10 +362,9 @@ impl Left {
     pub fn after(j: usize, decision: &Decision) -> Lefts {
         let [minus, plus] = Guard::ends(j);
         if let Some(motion) = decision.starts_at_two_fold() {
-            let first = |value: f64| Leading { order: 1, value };
             return smallvec![
-                Left::Exit(minus, first(motion.minus)),
-                Left::Exit(plus, first(motion.plus)),
+                Left::Exit(minus, motion.minus),
+                Left::Exit(plus, motion.plus),
             ];
         }
         match decision.entry {

@@ -8,7 +8,7 @@ use super::point::Point;
 use crate::error::FieldError;
 use crate::field::ModeField;
 use crate::field::{eval_on_side, SmoothField};
-use crate::switching::{weight_at_two_fold, Matrix};
+use crate::switching::{Leading, Matrix, TwoFold, TwoFoldMotion};
 use crate::system::{dot, dot_magnitude, RatePartials};
 use crate::tolerances::{
     AT_TWO_FOLD, EPS, INSIDE_SHARES, KNOWN_MULTIPLIER, LOST_MULTIPLIER, MOST_DOUBLINGS,
@@ -34,11 +34,6 @@ pub(crate) fn two_fold_here(at: &Point) -> Result<Option<(f64, Vec<f64>)>, Field
     let pairs = along_minus.iter().zip(&along_plus);
     let gradient: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
     let tolerance = at.scale.along(&gradient, &x);
-    let size = dot_magnitude(&along_minus, &x) + dot_magnitude(&along_plus, &x);
-    let rounding = TANGENT * (size + (minus.time.abs() + plus.time.abs()) * at.t.abs());
-    if distance.abs() <= rounding {
-        return Ok(Some((at.t, at.x.to_vec())));
-    }
     if distance.abs() > AT_TWO_FOLD * tolerance {
         return Ok(None);
     }
@@ -83,11 +78,20 @@ pub(crate) fn beyond_double_zero(
     if difference.abs() > LOST_MULTIPLIER * error {
         return Ok(None);
     }
-    let signs = at.arrival.signs.clone();
-    let weight = weight_at_two_fold(at.system, j, at.t, at.x, &signs)?;
+    // The motion along which the components stay nearest to zero.
+    let motions = TwoFold::new(at.system, j, 1, (at.t, at.x), at.arrival.signs).motions()?;
+    let rate = |first: Leading| {
+        if first.order == 1 {
+            first.value.abs()
+        } else {
+            0.0
+        }
+    };
+    let rate = |motion: &TwoFoldMotion| rate(motion.minus) + rate(motion.plus);
+    let slowest = motions.iter().min_by(|a, b| rate(a).total_cmp(&rate(b)));
     // At a multiplier near its end the motion may have come to a true exit.
     let is_inside = |weight: &f64| (INSIDE_SHARES..1.0 - INSIDE_SHARES).contains(weight);
-    let Some(weight) = weight.filter(is_inside) else {
+    let Some(weight) = slowest.map(|motion| motion.weight).filter(is_inside) else {
         return Ok(None);
     };
     let mut velocity = vec![0.0; at.x.len()];

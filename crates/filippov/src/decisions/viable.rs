@@ -6,12 +6,15 @@ use super::consistency::{consistency, Consistency};
 use super::germ::{Germ, MotionSeries};
 use super::look_ahead::{try_mode, Trial};
 use super::point::{Cause, Left, Lefts, Notes, Point};
-use super::rule::Meeting;
+use super::rule::{How, Meeting};
+use smallvec::smallvec;
+
 use crate::error::FieldError;
 use crate::field::{eval_on_side, Guard, RootEnd};
 use crate::mode::Mode;
 use crate::switching::{
-    first_nonzero, is_undetermined, stable_roots_with_border, Leading, NormalFields,
+    first_nonzero, is_undetermined, stable_roots_with_border, Leading, NormalFields, TwoFold,
+    TwoFoldMotion,
 };
 use crate::system::dot;
 use crate::tolerances::{AT_SIDE, DOUBTFUL, MOST_MEETING, SURFACE_NOISE, TANGENT};
@@ -26,6 +29,8 @@ pub(super) struct Viable {
     pub multipliers: Vec<f64>,
     /// Do the equations of the multipliers vanish at the point?
     pub is_given: bool,
+    /// On one surface, the motion that slides from a two-fold.
+    pub two_fold: Option<TwoFoldMotion>,
     /// Does no guard stay zero?
     pub is_strict: bool,
     /// Does the field beyond a surface on which the motion stays press it there? Then it may as well slide.
@@ -40,6 +45,7 @@ impl Viable {
             left,
             multipliers: Vec::new(),
             is_given: false,
+            two_fold: None,
             is_strict: true,
             is_pressed: false,
         }
@@ -293,7 +299,10 @@ fn of_sliding(at: &Point, notes: &mut Notes, candidate: &Candidate) -> Result<Ve
     let face = fields.restrict(entries.entries());
     let is_silent = silent_rows((fields, noise), entries.entries());
     if entries.sliding_set().any(|i| is_silent[i]) {
-        return of_blown_up(at, notes, candidate, &is_silent);
+        return match entries.sliding() {
+            Some(place) => of_two_fold(at, candidate, place),
+            None => of_blown_up(at, notes, candidate, &is_silent),
+        };
     }
     if is_undetermined(&face) {
         return Ok(Verdict::Open);
@@ -361,7 +370,63 @@ pub(super) fn silent_rows((fields, noise): (&NormalFields, &[f64]), entries: &[i
     is_silent
 }
 
-/// Sliding where equations of the multipliers vanish.
+/// Sliding on one surface to which both fields are tangent.
+fn of_two_fold(at: &Point, candidate: &Candidate, place: usize) -> Result<Verdict, FieldError> {
+    let Candidate {
+        meeting,
+        fields,
+        entries,
+        mode,
+        guarded,
+        ..
+    } = *candidate;
+    let slid = meeting.surfaces[place];
+    let mut two_fold = TwoFold::new(at.system, slid, 1, (at.t, at.x), &mode.signs());
+    if matches!(meeting.how, How::Event(_)) {
+        two_fold = two_fold.located();
+    }
+    let mut verdict = Verdict::Fails(guard_of(meeting, fields, entries));
+    for motion in two_fold.motions()? {
+        let mut is_open = motion.minus.order == 0 || motion.plus.order == 0;
+        let [minus, plus] = Guard::ends(slid);
+        let mut left: Lefts = smallvec![
+            Left::Exit(minus, motion.minus),
+            Left::Exit(plus, motion.plus),
+        ];
+        let mut failing = None;
+        if motion.minus.sign() < 0 || motion.plus.sign() > 0 {
+            failing = Some(if motion.minus.sign() < 0 { minus } else { plus });
+        }
+        for (i, &j) in meeting.surfaces.iter().enumerate() {
+            let side = entries.entries()[i];
+            if side == 0 || !guarded[i] || failing.is_some() {
+                continue;
+            }
+            let leading = two_fold.first_along(j, &motion)?;
+            is_open |= leading.order == 0;
+            if leading.sign() == -side {
+                failing = Some(Guard::Surface(j));
+            }
+            left.push(Left::Surface(j, leading));
+        }
+        match (failing, &verdict) {
+            (Some(_), Verdict::Open) => {}
+            (Some(guard), _) => verdict = Verdict::Fails(guard),
+            (None, _) if is_open => verdict = Verdict::Open,
+            (None, _) => {
+                return Ok(Verdict::Viable(Viable {
+                    multipliers: vec![motion.multiplier()],
+                    is_given: true,
+                    two_fold: Some(motion),
+                    ..Viable::strictly(mode.clone(), left)
+                }))
+            }
+        }
+    }
+    Ok(verdict)
+}
+
+/// Sliding on several surfaces where equations of the multipliers vanish.
 fn of_blown_up(
     at: &Point,
     notes: &mut Notes,
@@ -404,12 +469,6 @@ fn of_blown_up(
             (Some(guard), _) => verdict = verdict.or(Some(Verdict::Fails(guard))),
             (None, true) => verdict = Some(Verdict::Open),
             (None, false) => {
-                if entries.codimension() == 1 {
-                    let slid = entries.sliding_set().map(|i| meeting.surfaces[i]);
-                    for (guard, value) in slid.flat_map(Guard::ends).zip(beginning.components) {
-                        left.push(Left::Exit(guard, Leading { order: 1, value }));
-                    }
-                }
                 return Ok(Verdict::Viable(Viable {
                     multipliers: beginning.multipliers,
                     is_given: true,

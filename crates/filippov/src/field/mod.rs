@@ -29,6 +29,7 @@ pub use motion::Motion;
 pub use project::Projector;
 pub use region::{eval_off_surface, eval_on_side, move_inside, side_offsets, RegionField};
 pub use sliding::{NormalComponents, SlidingField};
+pub(crate) use weights::product_weights;
 
 use crate::error::FieldError;
 

@@ -7,6 +7,7 @@ use super::motion::Exits;
 use super::{Guard, Motion, Projector, SmoothField};
 use crate::error::FieldError;
 use crate::mode::Signs;
+use crate::switching::TwoFoldMotion;
 use crate::system::{BothSides, PiecewiseSystem};
 
 /// The normal components on both sides of the surface slid on.
@@ -55,8 +56,23 @@ pub struct SlidingField<'a> {
     /// The guards at the last evaluation: a- and -a+.
     exits: [f64; 2],
     last_time: f64,
-    /// The time at which sliding starts at a two-fold, and the share of f+ there.
-    two_fold: Option<(f64, f64)>,
+    two_fold: Option<Box<StartAtTwoFold>>,
+}
+
+/// Sliding starts at a two-fold: from its start until this time the multiplier is its power series, not the quotient of
+/// two numbers that vanish.
+struct StartAtTwoFold {
+    start: f64,
+    until: f64,
+    motion: TwoFoldMotion,
+}
+
+impl StartAtTwoFold {
+    #[cold]
+    fn given_at(&self, t: f64) -> Option<(f64, [f64; 2])> {
+        let is_near = self.start <= t && t <= self.until;
+        is_near.then(|| self.motion.after(t - self.start))
+    }
 }
 
 impl<'a> SlidingField<'a> {
@@ -92,22 +108,30 @@ impl<'a> SlidingField<'a> {
         self.two_fold = None;
     }
 
-    /// Sliding starts at a two-fold, where the share of f+ is a quotient of two zeros and is given as this multiplier.
-    pub fn begin_at_two_fold(&mut self, t: f64, multiplier: f64) {
-        self.two_fold = Some((t, 0.5 * (1.0 + multiplier)));
+    /// Sliding starts at a two-fold, where the share of f+ is a quotient of two zeros, with the series of this motion.
+    pub fn begin_at_two_fold(&mut self, start: f64, until: f64, motion: TwoFoldMotion) {
+        self.two_fold = Some(Box::new(StartAtTwoFold {
+            start,
+            until,
+            motion,
+        }));
     }
 
-    /// Does sliding start at a two-fold, and at this time?
+    /// Does sliding start at a two-fold, and is this time so near that its multiplier is given?
     pub fn is_at_two_fold(&self, t: f64) -> bool {
-        self.two_fold.is_some_and(|(start, _)| start == t)
+        self.given_at(t).is_some()
+    }
+
+    /// The share of f+ and the normal components, if they are given.
+    #[inline(always)]
+    fn given_at(&self, t: f64) -> Option<(f64, [f64; 2])> {
+        self.two_fold.as_ref()?.given_at(t)
     }
 
     /// The share of f+ at time t, with these normal components.
     fn weight_plus(&self, t: f64, components: NormalComponents) -> f64 {
-        match self.two_fold {
-            Some((start, weight)) if start == t => weight,
-            _ => components.weight_plus(),
-        }
+        self.given_at(t)
+            .map_or_else(|| components.weight_plus(), |given| given.0)
     }
 
     /// The multiplier of the last evaluation.
@@ -155,6 +179,9 @@ impl<'a> SlidingField<'a> {
             .system
             .both_sides(self.surface, t, x, &self.signs, sides)?;
         self.exits = [sides.normal_minus, -sides.normal_plus];
+        if let Some((_, [minus, plus])) = self.given_at(t) {
+            self.exits = [minus, -plus];
+        }
         self.last_time = t;
         Ok(self.last())
     }

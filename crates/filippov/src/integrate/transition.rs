@@ -255,8 +255,8 @@ impl<'a> Integrator<'a> {
         let Some((t, end)) = beyond.filter(|(t, _)| *t <= self.horizon) else {
             return Ok(None);
         };
-        self.record(mode.clone(), mode.clone(), &[], Rule::OneSurface.name())?;
         self.move_straight(t, end)?;
+        self.record(mode.clone(), mode.clone(), &[], Rule::OneSurface.name())?;
         let next = Next::new(mode, Lefts::new());
         Ok(Some(self.begin(next)?))
     }
@@ -404,6 +404,7 @@ impl<'a> Integrator<'a> {
             zero.is_clean = !slid;
         }
         self.choose_stepper();
+        let mut two_fold = None;
         match &mut self.motion.field {
             ModeField::Intersection(field) => {
                 let start = start.as_deref();
@@ -417,8 +418,10 @@ impl<'a> Integrator<'a> {
                 }
             }
             ModeField::Sliding(field) => {
-                if let Some(start) = start.filter(|start| start.is_given) {
-                    field.begin_at_two_fold(self.t, start.multipliers[0]);
+                if let Some(motion) = start.and_then(|start| start.two_fold) {
+                    let reach = motion.reach(self.options.rtol);
+                    two_fold = Some((motion, reach));
+                    field.begin_at_two_fold(self.t, self.t, motion);
                 }
             }
             _ => {}
@@ -459,6 +462,15 @@ impl<'a> Integrator<'a> {
         self.user_events.restart(self.t, &self.x)?;
         self.controller.restart();
         self.dt = self.first_step(&left)?;
+        if let (Some((motion, reach)), ModeField::Sliding(field)) =
+            (two_fold, &mut self.motion.field)
+        {
+            if reach > 0.0 {
+                self.dt = self.dt.min(reach);
+                let until = if reach.is_finite() { reach } else { self.dt };
+                field.begin_at_two_fold(self.t, self.t + until, motion);
+            }
+        }
         Ok(None)
     }
 

@@ -2,12 +2,12 @@
 
 use smallvec::{smallvec, SmallVec};
 
-use super::lie::{first_nonzero, first_nonzero_of_both, normal_component, Leading};
+use super::lie::{first_nonzero, first_nonzero_of_both, Leading};
 use super::stick::decide_sticking;
+use super::two_fold_motion::{TwoFold, TwoFoldMotion};
 use crate::error::FieldError;
-use crate::field::eval_on_side;
 use crate::mode::Signs;
-use crate::system::{dot_magnitude, PiecewiseSystem};
+use crate::system::{dot_magnitude, BothSides, PiecewiseSystem};
 use crate::tolerances::{OF_ROUNDING, TANGENT};
 
 /// How the motion came to the surface, and which normal components are known to vanish.
@@ -35,6 +35,20 @@ impl Arrival {
             side => Arrival::Region(side),
         }
     }
+
+    /// The same, from a region, where the normal components of these fields are known to vanish.
+    #[must_use]
+    pub fn to_tangency(self, vanishing: [bool; 2]) -> Self {
+        let (side, known) = match self {
+            Arrival::Region(side) => (side, [0, 0]),
+            Arrival::Flat(side, known) => (side, known),
+            _ => return self,
+        };
+        Arrival::Flat(
+            side,
+            [0, 1].map(|i| known[i].max(usize::from(vanishing[i]))),
+        )
+    }
 }
 
 /// The decision at one surface.
@@ -45,57 +59,29 @@ pub struct Decision {
     /// All entries that are Filippov continuations; more than one where the point is not unique.
     pub candidates: SmallVec<[i8; 3]>,
     /// The sliding motion from here, if this is a two-fold: one that attracts, if there is one.
-    pub two_fold: Option<TwoFoldMotion>,
+    pub two_fold: Option<Box<TwoFoldMotion>>,
     /// First non-vanishing derivative of h along f-.
     pub minus: Leading,
     /// First non-vanishing derivative of h along f+.
     pub plus: Leading,
 }
 
-/// A sliding motion through a two-fold, where its multiplier is a quotient of two zeros. It starts there if it attracts. If
-/// it repels it is a solution too, but one that may leave to either side at any time.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TwoFoldMotion {
-    /// The share of f+, in (0, 1).
-    pub weight: f64,
-    /// The rate at which the normal component of f- grows along the motion.
-    pub minus: f64,
-    /// The same of f+.
-    pub plus: f64,
-}
-
-impl TwoFoldMotion {
-    /// Do both fields point to the surface along it?
-    pub fn attracts(&self) -> bool {
-        self.minus > 0.0 && self.plus < 0.0
-    }
-
-    /// Do both fields point away from the surface along it?
-    pub fn repels(&self) -> bool {
-        self.minus < 0.0 && self.plus > 0.0
-    }
-
-    /// lambda at the two-fold.
-    pub fn multiplier(&self) -> f64 {
-        2.0 * self.weight - 1.0
-    }
-}
-
 impl Decision {
-    /// Is the surface left with no more than rounding of what the field beyond has?
-    pub fn leaves_with_rounding(&self) -> bool {
-        let (leaving, other) = match self.entry {
-            -1 => (self.minus, self.plus),
-            1 => (self.plus, self.minus),
-            _ => return false,
+    /// Of which of f- and f+ is the normal component no more than rounding of that of the other one?
+    pub fn is_rounding(&self) -> [bool; 2] {
+        let is_small = |own: Leading, other: Leading| {
+            own.order == 1 && own.value.abs() <= OF_ROUNDING * other.value.abs()
         };
-        leaving.order == 1 && leaving.value.abs() <= OF_ROUNDING * other.value.abs()
+        [
+            is_small(self.minus, self.plus),
+            is_small(self.plus, self.minus),
+        ]
     }
 
     /// The motion that sliding starts with at a two-fold, if it does.
-    pub fn starts_at_two_fold(&self) -> Option<TwoFoldMotion> {
-        let starts = |motion: &TwoFoldMotion| self.entry == 0 && motion.attracts();
-        self.two_fold.filter(starts)
+    pub fn starts_at_two_fold(&self) -> Option<&TwoFoldMotion> {
+        let starts = |motion: &&TwoFoldMotion| self.entry == 0 && motion.attracts();
+        self.two_fold.as_deref().filter(starts)
     }
 
     /// Does neither side continue, nor sliding that attracts? Both fields turn back to the surface, at a two-fold that is
@@ -125,8 +111,7 @@ impl Decision {
 /// | -, + | R- or R+, not unique: the motion stays on its side |
 ///
 /// which contains the cases I to III of Dieci and Lopez (2009), section 3. Where both normal
-/// components vanish (their case IV, a two-fold) the sliding motion has its own test, see
-/// `two_fold_motions`.
+/// components vanish (their case IV, a two-fold) the sliding motions have their own series, see [`TwoFold`].
 ///
 /// A field all of whose derivatives vanish, as at an equilibrium on the surface, keeps the motion on it for ever: that
 /// is a solution whatever the other field does. Where this presses the motion onto the surface, s = 0 counts as pointing
@@ -157,16 +142,23 @@ pub fn decide(
     if minus.sign() < 0 || stays(minus, plus, -1) {
         candidates.push(-1);
     }
-    let known = vanishing[0].min(vanishing[1]);
-    let mut two_fold = None;
-    // Where the second derivatives vanish, what is left of them by rounding says nothing.
-    if minus.order != 1 && plus.order != 1 && known < 2 {
-        let motions = two_fold_motions(system, j, t, x, signs)?;
-        let attracting = motions.iter().find(|motion| motion.attracts());
-        two_fold = attracting.or(motions.first()).copied();
-    }
-    let attracts = two_fold.is_some_and(|motion| motion.attracts());
-    if attracts || slides(system, j, (minus, plus, known), t, x, signs)? {
+    let at_two_fold = || {
+        let at = TwoFold::new(system, j, vanishing[0].min(vanishing[1]), (t, x), signs);
+        match arrival {
+            Arrival::Start => at,
+            _ => at.located(),
+        }
+    };
+    let (motions, slides) = if minus.order == 1 || plus.order == 1 {
+        (SmallVec::new(), minus.sign() >= 0 && plus.sign() <= 0)
+    } else {
+        let motions = at_two_fold().motions()?;
+        let attracts = motions.iter().any(TwoFoldMotion::attracts);
+        (motions, attracts)
+    };
+    let attracting = motions.iter().find(|motion| motion.attracts());
+    let mut two_fold = attracting.or(motions.first()).copied().map(Box::new);
+    if slides {
         candidates.push(0);
     }
     if plus.sign() > 0 || stays(plus, minus, 1) {
@@ -175,19 +167,14 @@ pub fn decide(
     if minus.order == 0 && plus.order == 0 {
         // Neither field leaves the surface: the motion stays on it, and if they differ, any combination
         // of them is a Filippov solution.
-        let agree = fields_agree(system, j, t, x, signs)?;
+        let agree = fields_agree(system, j, (t, x), signs)?;
         candidates = if agree { smallvec![] } else { smallvec![-1, 1] };
         two_fold = None;
     }
-    let entry = choose(
-        system,
-        j,
-        arrival,
-        (&candidates, [minus, plus]),
-        t,
-        x,
-        signs,
-    )?;
+    let entry = match candidates[..] {
+        [only] => only,
+        _ => choose(at_two_fold, arrival, &candidates, [minus, plus], &motions)?,
+    };
     if candidates.is_empty() {
         candidates.push(entry);
     }
@@ -201,7 +188,7 @@ pub fn decide(
 }
 
 /// The same derivatives, where those of first order are more than the rounding of t and x makes of them. Looked at where
-/// nothing is known of the point but that it is on the surface, and where one is small beside the other.
+/// nothing is known of the point but that it is on the surface.
 fn without_rounding(
     system: &dyn PiecewiseSystem,
     j: usize,
@@ -210,14 +197,12 @@ fn without_rounding(
     x: &[f64],
     signs: &[f64],
 ) -> Result<[Leading; 2], FieldError> {
-    if system.lie_tolerance(2) > TANGENT {
+    if arrival != Arrival::Start || system.lie_tolerance(2) > TANGENT {
         return Ok(firsts);
     }
-    let largest = firsts[0].value.abs().max(firsts[1].value.abs());
     for (index, side) in [-1, 1].into_iter().enumerate() {
         let Leading { order, value } = firsts[index];
-        let is_small = value.abs() <= OF_ROUNDING * largest;
-        if order != 1 || !(is_small || arrival == Arrival::Start) {
+        if order != 1 {
             continue;
         }
         let mut signs = Signs::from_slice(signs);
@@ -242,154 +227,35 @@ fn stays(own: Leading, other: Leading, side: i8) -> bool {
 fn fields_agree(
     system: &dyn PiecewiseSystem,
     j: usize,
-    t: f64,
-    x: &[f64],
+    (t, x): (f64, &[f64]),
     signs: &[f64],
 ) -> Result<bool, FieldError> {
-    let side = |s: f64| -> Result<Vec<f64>, FieldError> {
-        let mut signs = signs.to_vec();
-        signs[j] = s;
-        let mut f = vec![0.0; x.len()];
-        eval_on_side(system, t, x, &signs, &mut f)?;
-        Ok(f)
-    };
-    let (minus, plus) = (side(-1.0)?, side(1.0)?);
-    let size = minus
-        .iter()
-        .chain(&plus)
-        .fold(0.0_f64, |m, v| m.max(v.abs()));
-    Ok(minus
-        .iter()
-        .zip(&plus)
-        .all(|(a, b)| (a - b).abs() <= TANGENT * size))
-}
-
-fn slides(
-    system: &dyn PiecewiseSystem,
-    j: usize,
-    (minus, plus, known): (Leading, Leading, usize),
-    t: f64,
-    x: &[f64],
-    signs: &[f64],
-) -> Result<bool, FieldError> {
-    if minus.order == 1 || plus.order == 1 {
-        return Ok(minus.sign() >= 0 && plus.sign() <= 0);
-    }
-    let orders = [minus.order, plus.order];
-    let is_higher = orders.iter().min() > Some(&1) && orders != [2, 2];
-    Ok(is_higher && attracts_along_all_motions(system, j, (orders, known), t, x, signs)?)
-}
-
-/// Do both normal components vanish to these orders less 1 along every motion, whatever mixture of both fields it follows,
-/// and point to the surface afterwards? So do those that share a factor like (t - 1)^2. `known` derivatives are known to
-/// vanish.
-fn attracts_along_all_motions(
-    system: &dyn PiecewiseSystem,
-    j: usize,
-    (orders, known): ([usize; 2], usize),
-    t: f64,
-    x: &[f64],
-    signs: &[f64],
-) -> Result<bool, FieldError> {
-    // The first letter says whose normal component it is.
-    for (first, order) in [-1, 1].into_iter().zip(orders) {
-        for length in 2.max(known + 1)..=order {
-            let tolerance = system.lie_tolerance(length);
-            for letters in 0..1_u32 << (length - 1) {
-                let others = (0..length - 1).map(|k| if letters >> k & 1 == 0 { -1 } else { 1 });
-                let word: SmallVec<[i8; 8]> = std::iter::once(first).chain(others).collect();
-                let lie = system.lie_derivative(j, j, &word, t, x, signs)?;
-                let is_zero = lie.value.abs() <= tolerance * lie.magnitude;
-                let attracts = !is_zero && lie.value * f64::from(first) < 0.0;
-                if !(if length < order { is_zero } else { attracts }) {
-                    return Ok(false);
-                }
-            }
-        }
-    }
-    Ok(true)
-}
-
-/// The weight of f+ in the motion through a two-fold along which the normal components stay nearest to zero.
-///
-/// # Errors
-/// If a function of the user raises.
-pub fn weight_at_two_fold(
-    system: &dyn PiecewiseSystem,
-    j: usize,
-    t: f64,
-    x: &[f64],
-    signs: &[f64],
-) -> Result<Option<f64>, FieldError> {
-    let motions = two_fold_motions(system, j, t, x, signs)?;
-    let rate = |motion: &TwoFoldMotion| motion.minus.abs() + motion.plus.abs();
-    let slowest = motions.iter().min_by(|a, b| rate(a).total_cmp(&rate(b)));
-    Ok(slowest.map(|motion| motion.weight))
-}
-
-/// The sliding motions through a two-fold. Sliding starts there if it attracts along one of them, B- > 0 > B+ (Dieci,
-/// Lopez 2009, case IV).
-///
-/// With the derivatives p = L-L-h, q = L+L-h, r = L-L+h, s = L+L+h these rates are B- = p + w (q - p) and
-/// B+ = r + w (s - r), and w = B- / (B- - B+) must hold: a quadratic in w.
-fn two_fold_motions(
-    system: &dyn PiecewiseSystem,
-    j: usize,
-    t: f64,
-    x: &[f64],
-    signs: &[f64],
-) -> Result<SmallVec<[TwoFoldMotion; 2]>, FieldError> {
-    let lie = |word: [i8; 2]| -> Result<f64, FieldError> {
-        Ok(system.lie_derivative(j, j, &word, t, x, signs)?.value)
-    };
-    // Words are applied from the left: [-1, 1] is L+ L- h.
-    let (p, q, r, s) = (lie([-1, -1])?, lie([-1, 1])?, lie([1, -1])?, lie([1, 1])?);
-    // w (p - r + w (q - p - s + r)) = p + w (q - p)
-    let (a, b, c) = (q - p - s + r, p - r - (q - p), -p);
-    let roots = if a.abs() <= f64::EPSILON * (b.abs() + c.abs()) {
-        [-c / b, f64::NAN]
-    } else {
-        let d = (b * b - 4.0 * a * c).sqrt();
-        let k = -0.5 * (b + d.copysign(b));
-        [k / a, c / k]
-    };
-    let inside = roots.into_iter().filter(|&w| w > 0.0 && w < 1.0);
-    let rounding = TANGENT * (p.abs() + q.abs() + r.abs() + s.abs());
-    let rate = |value: f64| if value.abs() > rounding { value } else { 0.0 };
-    Ok(inside
-        .map(|w| TwoFoldMotion {
-            weight: w,
-            minus: rate(p + w * (q - p)),
-            plus: rate(r + w * (s - r)),
-        })
-        .collect())
+    let mut sides = BothSides::new(x.len(), signs.len());
+    system.both_sides(j, t, x, signs, &mut sides)?;
+    let pairs = || sides.f_minus.iter().zip(&sides.f_plus);
+    let size = pairs().fold(0.0_f64, |m, (a, b)| m.max(a.abs()).max(b.abs()));
+    Ok(pairs().all(|(a, b)| (a - b).abs() <= TANGENT * size))
 }
 
 /// Among several candidates: the side that the motion comes from; at a start the one that the regularised field moves to
 /// from the middle of the transition, lambda = 0; where this does not tell, one that leads away before one at rest.
-fn choose(
-    system: &dyn PiecewiseSystem,
-    j: usize,
+fn choose<'s>(
+    at_two_fold: impl FnOnce() -> TwoFold<'s>,
     arrival: Arrival,
-    (candidates, sides): (&[i8], [Leading; 2]),
-    t: f64,
-    x: &[f64],
-    signs: &[f64],
+    candidates: &[i8],
+    sides: [Leading; 2],
+    motions: &[TwoFoldMotion],
 ) -> Result<i8, FieldError> {
-    if let [only] = candidates {
-        return Ok(*only);
-    }
     let preferred = match arrival {
         Arrival::Region(side) | Arrival::Flat(side, _) => Some(side),
         Arrival::ExitMinus => Some(-1),
         Arrival::ExitPlus => Some(1),
         Arrival::TwoFold => {
             // Sliding goes on, and repels: the motion leaves to the side whose field has the larger share.
-            let motions = two_fold_motions(system, j, t, x, signs)?;
             let repelling = motions.iter().find(|motion| motion.repels());
             repelling.map(|motion| if motion.weight < 0.5 { -1 } else { 1 })
         }
-        Arrival::Start => from_the_middle(system, j, t, x, signs)?,
+        Arrival::Start => from_the_middle(at_two_fold, sides, motions)?,
     };
     let is_candidate = |entry: &i8| candidates.contains(entry);
     if candidates.is_empty() {
@@ -407,34 +273,21 @@ fn choose(
 }
 
 /// Where the regularised motion goes from the middle of the transition, to -1 or +1 or onto the surface at a two-fold. It
-/// follows the mean of both fields at first: the first derivative of h along that, of the first two.
-fn from_the_middle(
-    system: &dyn PiecewiseSystem,
-    j: usize,
-    t: f64,
-    x: &[f64],
-    signs: &[f64],
+/// follows the mean of both fields at first.
+fn from_the_middle<'s>(
+    at_two_fold: impl FnOnce() -> TwoFold<'s>,
+    sides: [Leading; 2],
+    motions: &[TwoFoldMotion],
 ) -> Result<Option<i8>, FieldError> {
-    let side = |value: f64| if value < 0.0 { -1 } else { 1 };
-    let minus = normal_component(system, j, j, -1, t, x, signs)?;
-    let plus = normal_component(system, j, j, 1, t, x, signs)?;
-    let rate = minus.value + plus.value;
-    if rate.abs() > system.lie_tolerance(1) * (minus.magnitude + plus.magnitude) {
-        return Ok(Some(side(rate)));
+    let first = sides.map(|side| if side.order == 1 { side.value } else { 0.0 });
+    let mut rate = first[0] + first[1];
+    if rate.abs() <= TANGENT * (first[0].abs() + first[1].abs()) {
+        rate = at_two_fold().rate_of_mean()?;
     }
-    let (mut rate, mut size) = (0.0, 0.0);
-    for word in [[-1, -1], [-1, 1], [1, -1], [1, 1]] {
-        let lie = system.lie_derivative(j, j, &word, t, x, signs)?;
-        rate += lie.value;
-        size += lie.magnitude;
-    }
-    let motions = two_fold_motions(system, j, t, x, signs)?;
-    let is_clear = rate.abs() > system.lie_tolerance(2) * size;
-    let between = |motion: &TwoFoldMotion| {
-        motion.attracts() && (!is_clear || motion.multiplier() * rate >= 0.0)
-    };
+    let between = |motion: &TwoFoldMotion| motion.attracts() && motion.multiplier() * rate >= 0.0;
     Ok(match motions.iter().any(between) {
         true => Some(0),
-        false => is_clear.then(|| side(rate)),
+        false if rate == 0.0 => None,
+        false => Some(if rate < 0.0 { -1 } else { 1 }),
     })
 }

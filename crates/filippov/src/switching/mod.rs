@@ -16,6 +16,7 @@ mod resolution;
 mod resolve;
 mod shared_load;
 mod stick;
+mod two_fold_motion;
 
 pub(crate) use crate::cube::invert;
 pub use crate::cube::{
@@ -27,7 +28,7 @@ pub use crate::cube::{
 };
 pub use crate::error::Undecided;
 pub use crate::patience::Patience;
-pub use codim1::{decide, weight_at_two_fold, Arrival, Decision, TwoFoldMotion};
+pub use codim1::{decide, Arrival, Decision};
 pub use hidden::{
     admissible, admissible_within, limit as limit_of_hidden_dynamics, Admissible,
     Outcome as HiddenOutcome,
@@ -44,6 +45,7 @@ pub use relay_at::relay_at;
 pub use resolution::{Continuation, Resolution};
 pub use resolve::{has_one_mode_only, resolve, resolve_within};
 pub use shared_load::{SharedLoad, SharedLoads};
+pub use two_fold_motion::{TwoFold, TwoFoldMotion};
 
 /// The word for what happened, as the field uses it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -161,8 +161,12 @@ impl Integrator<'_> {
     /// The length of step that the states allow, or the monitored functions if they allow less.
     fn limited_by_functions(&self, allowed: f64) -> f64 {
         match &self.motion.jets {
-            Some(jets) if jets.width() > self.x.len() => {
-                allowed.min(self.longest_for_functions(allowed))
+            // Not a number stays: `min` would take the other one.
+            Some(jets) if jets.width() > self.x.len() && !allowed.is_nan() => {
+                match self.longest_for_functions(allowed) {
+                    longest if longest >= allowed => allowed,
+                    longest => longest,
+                }
             }
             _ => allowed,
         }
