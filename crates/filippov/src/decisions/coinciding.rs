@@ -6,11 +6,11 @@
 
 use super::point::{Left, Lefts, Next, Notes, Point};
 use crate::error::FieldError;
-use crate::field::Projector;
+use crate::field::{beside_on, in_the_place_of, normal, parallel};
 use crate::mode::Mode;
 use crate::switching::{first_nonzero, Leading};
 use crate::system::{dot, PiecewiseSystem};
-use crate::tolerances::{BESIDE, COINCIDE, MOST_MEETING, TANGENT};
+use crate::tolerances::{MOST_MEETING, ONE_DIRECTION, SURFACE_NOISE};
 
 /// A kink that coincides with another surface.
 pub(super) struct Kink {
@@ -43,7 +43,7 @@ pub(super) fn coinciding_kinks(
             k != j && !is_kink(k) && !decides
         };
         let others: Vec<usize> = free.iter().copied().filter(|&k| is_open(k)).collect();
-        let found = in_the_place_of(at.system, (at.t, at.x), j, &others, mode)?;
+        let found = in_the_place_of(at.system, (at.t, at.x), j, &others, &mode.signs())?;
         kinks.extend(found.into_iter().map(|surface| Kink { surface, beside: j }));
     }
     notes.meets_kinks |= !kinks.is_empty();
@@ -56,24 +56,86 @@ pub(super) fn have_parallels(
     meeting: &[usize],
     mode: &Mode,
 ) -> Result<bool, FieldError> {
-    let rows = meeting.iter().map(|&j| normal(at, j, mode));
+    let signs = mode.signs();
+    let rows = meeting
+        .iter()
+        .map(|&j| normal(at.system, (at.t, at.x), j, &signs));
     let rows: Vec<Vec<f64>> = rows.collect::<Result<_, _>>()?;
     let pairs = (0..rows.len()).flat_map(|j| (0..j).map(move |k| (j, k)));
     let mut pairs = pairs.map(|(j, k)| parallel(&rows[j], &rows[k]));
     Ok(pairs.any(|parallel| parallel))
 }
 
-/// Have two surfaces the same normal here, without being in one place?
-pub(super) fn touch_one_another(
+/// Two surfaces, counted within a meeting, that touch one another: they have the same normal here, and are not in one place.
+pub(super) struct Touch {
+    pub pair: [usize; 2],
+    /// Have they the same normal to rounding? If not, the point is beside the one where they touch.
+    pub is_exact: bool,
+}
+
+/// The surfaces of a meeting that touch one another.
+pub(super) fn touching(
     at: &Point,
-    j: usize,
-    k: usize,
+    meeting: &[usize],
     mode: &Mode,
-) -> Result<bool, FieldError> {
-    let [one, other] = [normal(at, j, mode)?, normal(at, k, mode)?];
-    let has_none = |normal: &[f64]| normal.iter().all(|v| *v == 0.0);
-    let are_parallel = !has_none(&one) && !has_none(&other) && parallel(&one, &other);
-    Ok(are_parallel && in_the_place_of(at.system, (at.t, at.x), j, &[k], mode)?.is_empty())
+) -> Result<Vec<Touch>, FieldError> {
+    let (place, signs, mut found) = ((at.t, at.x), mode.signs(), Vec::new());
+    let rows = meeting.iter().map(|&j| normal(at.system, place, j, &signs));
+    let rows: Vec<Vec<f64>> = rows.collect::<Result<_, _>>()?;
+    for (i, k) in (0..rows.len()).flat_map(|k| (0..k).map(move |i| (i, k))) {
+        let (one, other) = (&rows[i], &rows[k]);
+        // One that is zero has no direction.
+        let product = dot(one, other);
+        let (j, others) = (meeting[i], [meeting[k]]);
+        if product != 0.0
+            && parallel(one, other)
+            && in_the_place_of(at.system, place, j, &others, &signs)?.is_empty()
+        {
+            let ratio = product / dot(one, one);
+            let mut pairs = other.iter().zip(one);
+            let noise = SURFACE_NOISE * dot(other, other).sqrt();
+            let is_exact = pairs.all(|(b, a)| (b - ratio * a).abs() <= noise);
+            found.push(Touch {
+                pair: [i, k],
+                is_exact,
+            });
+        }
+    }
+    Ok(found)
+}
+
+/// The normal of what two surfaces that touch have in common beside the first of them: if their functions differ by a power
+/// of another one, its normal. `None` if that depends on where one looks.
+pub(super) fn parting(
+    at: &Point,
+    [j, k]: [usize; 2],
+    mode: &Mode,
+) -> Result<Option<Vec<f64>>, FieldError> {
+    let signs = mode.signs();
+    let [one, other] = [j, k].map(|j| normal(at.system, (at.t, at.x), j, &signs));
+    let (one, other) = (one?, other?);
+    let square = dot(&one, &one);
+    let ratio = dot(&one, &other) / square;
+    let mut found: Vec<Vec<f64>> = Vec::new();
+    for side in [-1.0, 1.0] {
+        let (t, x) = beside_on(at.system, (at.t, at.x), j, &signs, side)?;
+        let (near, far) = (
+            normal(at.system, (t, &x), j, &signs)?,
+            normal(at.system, (t, &x), k, &signs)?,
+        );
+        let pairs = far.iter().zip(&near);
+        let mut row: Vec<f64> = pairs.map(|(far, near)| far - ratio * near).collect();
+        // Along the surfaces.
+        let along = dot(&row, &one) / square;
+        row.iter_mut()
+            .zip(&one)
+            .for_each(|(row, one)| *row -= along * one);
+        let size = dot(&row, &row).sqrt();
+        row.iter_mut().for_each(|v| *v /= size);
+        found.push(row);
+    }
+    let product = dot(&found[0], &found[1]);
+    Ok((product.abs() >= 1.0 - ONE_DIRECTION).then(|| found.swap_remove(1)))
 }
 
 /// The active surfaces that coincide with those slid on in a mode: their functions vanish all along the motion.
@@ -83,44 +145,13 @@ pub(crate) fn surfaces_in_the_place_of_those_slid_on(
     mode: &Mode,
     active: &[bool],
 ) -> Result<Vec<usize>, FieldError> {
-    let mut found = Vec::new();
+    let (mut found, signs) = (Vec::new(), mode.signs());
     for j in mode.sliding_set() {
         let others = (0..active.len()).filter(|&k| active[k] && mode.entries()[k] != 0);
-        for k in in_the_place_of(system, place, j, &others.collect::<Vec<_>>(), mode)? {
+        for k in in_the_place_of(system, place, j, &others.collect::<Vec<_>>(), &signs)? {
             if !found.contains(&k) {
                 found.push(k);
             }
-        }
-    }
-    Ok(found)
-}
-
-/// Those of `others` whose functions vanish where that of surface j does, around the place.
-fn in_the_place_of(
-    system: &dyn PiecewiseSystem,
-    (t, x): (f64, &[f64]),
-    j: usize,
-    others: &[usize],
-    mode: &Mode,
-) -> Result<Vec<usize>, FieldError> {
-    // Beside the place, so that surfaces that only touch are told apart.
-    let later = t + BESIDE * (1.0 + t.abs());
-    let shifts = (0..x.len()).map(|i| BESIDE * (1.0 + 1.0 / (2.0 + i as f64)));
-    let pairs = x.iter().zip(shifts);
-    let mut beside: Vec<f64> = pairs.map(|(x, d)| x + d * (1.0 + x.abs())).collect();
-    let signs = mode.signs();
-    let mut h = [(); 2].map(|()| vec![0.0; signs.len()]);
-    let mut projector = Projector::new(beside.len(), signs.len());
-    projector.project(system, j, later, &mut beside, &signs)?;
-    system.surfaces(later, &beside, &signs, &mut h[0])?;
-    system.surfaces(t, x, &signs, &mut h[1])?;
-    let (mut found, mut gradient) = (Vec::new(), vec![0.0; beside.len()]);
-    for &k in others {
-        let rate = system.gradient(k, later, &beside, &signs, &mut gradient)?;
-        let size = rate.abs() + gradient.iter().fold(0.0_f64, |sum, g| sum + g.abs());
-        // One with a multiple zero has no gradient there.
-        if h[0][k].abs().max(h[1][k].abs()) <= COINCIDE * size {
-            found.push(k);
         }
     }
     Ok(found)
@@ -140,7 +171,12 @@ pub(super) fn leave_coinciding(
     for &k in at.arrival.resting {
         for &j in &leaving {
             let is_known = next.left.iter().any(|left| left.surface() == Some(k));
-            if !is_known && parallel(&normal(at, j, &next.mode)?, &normal(at, k, &next.mode)?) {
+            if !is_known
+                && parallel(
+                    &normal_at(at, j, &next.mode)?,
+                    &normal_at(at, k, &next.mode)?,
+                )
+            {
                 leave_together(at, j, k, &mut next.mode, &mut next.left)?;
             }
         }
@@ -163,7 +199,7 @@ fn leave_together(
     let Some(Leading { order, value }) = leading else {
         return Ok(());
     };
-    let (known, other) = (normal(at, j, after)?, normal(at, k, after)?);
+    let (known, other) = (normal_at(at, j, after)?, normal_at(at, k, after)?);
     let ratio = dot(&known, &other) / dot(&known, &known);
     let mut leading = Leading {
         order,
@@ -181,16 +217,6 @@ fn leave_together(
     Ok(())
 }
 
-/// The normal of a surface in time and space: the gradient, then the derivative in time.
-pub(super) fn normal(at: &Point, j: usize, mode: &Mode) -> Result<Vec<f64>, FieldError> {
-    let (signs, n) = (mode.signs(), at.x.len());
-    let mut row = vec![0.0; n + 1];
-    row[n] = at.system.gradient(j, at.t, at.x, &signs, &mut row[..n])?;
-    Ok(row)
-}
-
-/// Are two normals the same, up to their lengths, or is one zero?
-fn parallel(one: &[f64], other: &[f64]) -> bool {
-    let (product, squares) = (dot(one, other), dot(one, one) * dot(other, other));
-    squares - product * product <= TANGENT * squares
+fn normal_at(at: &Point, j: usize, mode: &Mode) -> Result<Vec<f64>, FieldError> {
+    normal(at.system, (at.t, at.x), j, &mode.signs())
 }

@@ -1,7 +1,7 @@
 //! Decide by the germs of the guards if first-order data are doubtful.
 
 use super::choice::choose;
-use super::coinciding::{coinciding_kinks, have_parallels, touch_one_another};
+use super::coinciding::{coinciding_kinks, have_parallels, touching};
 use super::consistency::{bends, with_those_that_jump};
 use super::departures::velocity_in;
 use super::leave_by_rule::slides_by_rule;
@@ -66,11 +66,10 @@ fn is_parallel(at: &Point, notes: &mut Notes, meeting: &Meeting) -> Result<bool,
     if surfaces.len() < 2 || !have_parallels(at, surfaces, mode)? {
         return Ok(false);
     }
-    let touches = match *surfaces {
-        [j, k] => touch_one_another(at, j, k, mode)?,
-        _ => false,
-    };
-    Ok(touches || !coinciding_kinks(at, notes, mode, surfaces)?.is_empty())
+    let corners = at.corners(notes, surfaces, mode)?;
+    Ok(!corners.ties().is_empty()
+        || !touching(at, surfaces, mode)?.is_empty()
+        || !coinciding_kinks(at, notes, mode, surfaces)?.is_empty())
 }
 
 /// Rule: first-order data are doubtful, and the viable modes are known.

@@ -1,20 +1,20 @@
 //! Which modes can follow at a point: those that are consistent with their own signs, and all of whose guards begin positive.
 
 use super::blow_up::beginnings;
-use super::coinciding::{coinciding_kinks, touch_one_another, Kink};
+use super::coinciding::{coinciding_kinks, parting, touching, Kink, Touch};
 use super::consistency::{consistency, Consistency};
 use super::germ::{Germ, MotionSeries};
 use super::look_ahead::{try_mode, Trial};
 use super::point::{Cause, Left, Lefts, Notes, Point};
 use super::rule::Meeting;
 use crate::error::FieldError;
-use crate::field::{eval_on_side, Guard, RootEnd};
+use crate::field::{eval_on_side, normal, Guard, RootEnd, Tie};
 use crate::mode::Mode;
 use crate::switching::{
-    first_nonzero, is_undetermined, stable_roots_with_border, Leading, NormalFields,
+    first_nonzero, is_undetermined, roots_in_cube, stable_roots_with_border, Leading, NormalFields,
 };
 use crate::system::dot;
-use crate::tolerances::{AT_SIDE, DOUBTFUL, MOST_MEETING, TANGENT};
+use crate::tolerances::{AT_SIDE, DOUBTFUL, MOST_MEETING, ONE_DIRECTION, TANGENT};
 
 /// A mode in which a motion can go on.
 #[derive(Clone, Debug)]
@@ -91,7 +91,9 @@ pub(super) fn survey(
     let pace = corners.pace(|i| at.scale.size(i, at.x[i]));
     let noise = noise_of(at, meeting, &fields)?;
     let kinks = coinciding_kinks(at, notes, meeting.mode, meeting.surfaces)?;
-    let touches = kinks.is_empty() && touches(at, meeting)?;
+    let touching = touching(at, meeting.surfaces, meeting.mode)?;
+    // Then derivatives at the point are not those where the surfaces touch.
+    let is_beside = touching.iter().any(|touch| !touch.is_exact);
     let mut found = Survey::default();
     for index in 0..3_usize.pow(m as u32) {
         let entries = (0..m).map(|i| 1 - (index / 3_usize.pow(i as u32) % 3) as i8);
@@ -102,6 +104,13 @@ pub(super) fn survey(
         let Some(with_kinks) = name_kinks(meeting, &kinks, &entries) else {
             continue;
         };
+        if !corners
+            .ties()
+            .iter()
+            .all(|tie| tie.allows(entries.entries()))
+        {
+            continue;
+        }
         let (mode, vanishing) = match consistency(at, notes, meeting, &entries)? {
             Consistency::Agrees { mode, vanishing } => (mode, vanishing),
             Consistency::Contradicts(j) => {
@@ -139,14 +148,23 @@ pub(super) fn survey(
             entries: &entries,
             mode: &mode,
             guarded: &guarded,
+            ties: corners.ties(),
         };
-        let verdict = match entries.codimension() {
-            _ if has_ended(at, meeting, &mode) => Verdict::Fails(at.arrival.functions()[0]),
-            // Where surfaces touch to rounding, derivatives at the point are those of a point beside it.
-            2 if touches => continue,
-            _ if touches => Verdict::Open,
-            0 => of_region(at, &candidate)?,
-            _ => of_sliding(at, notes, &candidate)?,
+        let slides_on = |touch: &&Touch| touch.pair.iter().all(|&i| entries.entries()[i] == 0);
+        let verdict = if has_ended(at, meeting, &mode) {
+            Verdict::Fails(at.arrival.functions()[0])
+        } else if let Some(touch) = touching.iter().find(slides_on) {
+            match parts(at, notes, &candidate, touch.pair)? {
+                true => Verdict::Fails(Guard::Surface(meeting.surfaces[touch.pair[1]])),
+                // Other rules may know.
+                false => continue,
+            }
+        } else if is_beside {
+            Verdict::Open
+        } else if entries.codimension() == 0 {
+            of_region(at, &candidate)?
+        } else {
+            of_sliding(at, notes, &candidate)?
         };
         match verdict {
             Verdict::Viable(viable) => found.viable.push(viable),
@@ -156,7 +174,7 @@ pub(super) fn survey(
                 Trial::Ends => found
                     .failing
                     .push((mode, guard_of(meeting, fields, &entries))),
-                Trial::WithinRounding if touches => {}
+                Trial::WithinRounding if is_beside => {}
                 Trial::WithinRounding => found.open.push(mode),
             },
         }
@@ -188,14 +206,6 @@ fn name_kinks(meeting: &Meeting, kinks: &[Kink], entries: &Mode) -> Option<Vec<b
     Some(follows)
 }
 
-/// Two surfaces that touch one another and are not in one place: no motion stays on both.
-fn touches(at: &Point, meeting: &Meeting) -> Result<bool, FieldError> {
-    match *meeting.surfaces {
-        [j, k] => touch_one_another(at, j, k, meeting.mode),
-        _ => Ok(false),
-    }
-}
-
 /// A mode that agrees with all switching functions.
 struct Candidate<'c> {
     meeting: &'c Meeting<'c>,
@@ -208,12 +218,53 @@ struct Candidate<'c> {
     mode: &'c Mode,
     /// Of which surfaces of the meeting is the function a guard: it vanishes here, and not all along the motion?
     guarded: &'c [bool],
+    ties: &'c [Tie],
 }
 
 /// Is this the mode of a motion that one of its own exit functions has just ended?
 fn has_ended(at: &Point, meeting: &Meeting, mode: &Mode) -> bool {
     let is_touch = matches!(at.arrival.cause, Cause::Event { touch: true, .. });
     meeting.is_exit() && !is_touch && mode == meeting.mode && !at.arrival.functions().is_empty()
+}
+
+/// Sliding on two surfaces that touch: to first order they are one. Does the motion part them, whatever the multipliers?
+fn parts(
+    at: &Point,
+    notes: &mut Notes,
+    candidate: &Candidate,
+    [i, k]: [usize; 2],
+) -> Result<bool, FieldError> {
+    let Candidate {
+        meeting,
+        entries,
+        mode,
+        ..
+    } = *candidate;
+    let pair = [i, k].map(|i| meeting.surfaces[i]);
+    let Some(normal) = parting(at, pair, mode)? else {
+        return Ok(false);
+    };
+    let mut corners = at.corners(notes, meeting.surfaces, mode)?;
+    corners.set_normal(k, &normal);
+    let Ok(fields) = corners.normal_fields() else {
+        return Ok(false);
+    };
+    let face = fields
+        .restrict(entries.entries())
+        .enlarged(1.0 + ONE_DIRECTION);
+    let noise = DOUBTFUL * face.size();
+    let ranges: Vec<[f64; 2]> = (0..face.m()).map(|row| face.row_range(row)).collect();
+    if ranges
+        .iter()
+        .any(|[low, high]| *low > noise || *high < -noise)
+    {
+        return Ok(true);
+    }
+    if ranges.iter().any(|[low, high]| high - low <= noise) {
+        return Ok(false);
+    }
+    let roots = roots_in_cube(&face);
+    Ok(roots.complete && roots.points.is_empty())
 }
 
 fn of_region(at: &Point, candidate: &Candidate) -> Result<Verdict, FieldError> {
@@ -224,6 +275,7 @@ fn of_region(at: &Point, candidate: &Candidate) -> Result<Verdict, FieldError> {
         entries,
         mode,
         guarded,
+        ties,
         ..
     } = *candidate;
     let signs = mode.signs();
@@ -241,6 +293,23 @@ fn of_region(at: &Point, candidate: &Candidate) -> Result<Verdict, FieldError> {
             continue;
         }
         let side = mode.entries()[j];
+        if let Some(tie) = ties.iter().find(|tie| tie.follower == i) {
+            let leader = meeting.surfaces[tie.leader];
+            let [one, other] = [leader, j].map(|j| normal(at.system, (at.t, at.x), j, &signs));
+            let (one, other) = (one?, other?);
+            let ratio = dot(&one, &other) / dot(&one, &one);
+            let of_leader = viable.left.iter().find_map(|left| match left {
+                Left::Surface(k, leading) if *k == leader => Some(*leading),
+                _ => None,
+            });
+            viable
+                .left
+                .extend(of_leader.map(|Leading { order, value }| {
+                    let value = ratio * value;
+                    Left::Surface(j, Leading { order, value })
+                }));
+            continue;
+        }
         let leading = match (g[i].abs() > noise[i], &series) {
             (true, _) if g[i] * f64::from(side) < 0.0 => {
                 return Ok(Verdict::Fails(Guard::Surface(j)));
@@ -477,6 +546,9 @@ fn at_root(at: &Point, candidate: &Candidate, lambda: &[f64]) -> Result<Verdict,
     if tangent.is_empty() && ends.is_empty() {
         return Ok(Verdict::Viable(viable));
     }
+    if let ([tie], [], 2) = (candidate.ties, &tangent[..], lambda.len()) {
+        return at_tied_end(at, candidate, viable, *tie);
+    }
     let Some(series) = MotionSeries::of(at, mode, lambda, candidate.pace) else {
         return Ok(Verdict::Open);
     };
@@ -519,6 +591,55 @@ fn at_root(at: &Point, candidate: &Candidate, lambda: &[f64]) -> Result<Verdict,
             // The multiplier stays at its end.
             Germ::Zero => viable.is_strict = false,
             Germ::Unknown => return Ok(Verdict::Open),
+        }
+    }
+    Ok(Verdict::Viable(viable))
+}
+
+/// Sliding on two surfaces in one place that begins with multipliers at their ends: the motion is that of one region, which
+/// has to lead back to the surfaces.
+fn at_tied_end(
+    at: &Point,
+    candidate: &Candidate,
+    mut viable: Viable,
+    tie: Tie,
+) -> Result<Verdict, FieldError> {
+    let Candidate {
+        meeting,
+        fields,
+        entries,
+        mode,
+        ..
+    } = *candidate;
+    let side: i8 = if viable.multipliers[0] < 0.0 { -1 } else { 1 };
+    let sides = [(tie.leader, 1), (tie.follower, tie.sense)];
+    let (mut region, mut beyond) = (mode.clone(), entries.clone());
+    for (i, sense) in sides {
+        region.set(meeting.surfaces[i], sense * side);
+        beyond.set(i, -sense * side);
+    }
+    let Some(series) = MotionSeries::of(at, &region, &[], candidate.pace) else {
+        return Ok(Verdict::Open);
+    };
+    let held = fields.in_region(beyond.entries())[tie.leader];
+    match series.of_surface(at, meeting.surfaces[tie.leader])? {
+        Germ::Unknown => return Ok(Verdict::Open),
+        Germ::Zero => viable.is_strict = false,
+        Germ::Begins(leading) => {
+            let order = leading.order - 1;
+            let value = 2.0 * leading.value.abs() / held.abs();
+            for (i, sense) in sides {
+                let (surface, end) = (meeting.surfaces[i], sense * side);
+                let guard = Guard::Multiplier { surface, end };
+                if leading.sign() == side {
+                    return Ok(Verdict::Fails(guard));
+                }
+                if order > 0 {
+                    viable
+                        .left
+                        .push(Left::Exit(guard, Leading { order, value }));
+                }
+            }
         }
     }
     Ok(Verdict::Viable(viable))
