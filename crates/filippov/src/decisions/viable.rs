@@ -1,14 +1,14 @@
 //! Which modes can follow at a point: those that are consistent with their own signs, and all of whose guards begin positive.
 
 use super::blow_up::beginnings;
-use super::coinciding::{coinciding_kinks, parting, touching, Kink, Touch};
+use super::coinciding::{parting, Parallels, Touch};
 use super::consistency::{consistency, Consistency};
 use super::germ::{Germ, MotionSeries};
 use super::look_ahead::{try_mode, Trial};
 use super::point::{Cause, Left, Lefts, Notes, Point};
 use super::rule::Meeting;
 use crate::error::FieldError;
-use crate::field::{eval_on_side, normal, Guard, RootEnd, Tie};
+use crate::field::{eval_on_side, normal, Guard, MeetingFields, RootEnd, Tie};
 use crate::mode::Mode;
 use crate::switching::{
     first_nonzero, is_undetermined, roots_in_cube, stable_roots_with_border, Leading, NormalFields,
@@ -90,8 +90,7 @@ pub(super) fn survey(
     };
     let pace = corners.pace(|i| at.scale.size(i, at.x[i]));
     let noise = noise_of(at, meeting, &fields)?;
-    let kinks = coinciding_kinks(at, notes, meeting.mode, meeting.surfaces)?;
-    let touching = touching(at, meeting.surfaces, meeting.mode)?;
+    let touching = Parallels::of(at, meeting.surfaces, meeting.mode)?.touching;
     // Then derivatives at the point are not those where the surfaces touch.
     let is_beside = touching.iter().any(|touch| !touch.is_exact);
     let mut found = Survey::default();
@@ -101,9 +100,6 @@ pub(super) fn survey(
             return Ok(None);
         }
         let entries = Mode::new(entries.collect());
-        let Some(with_kinks) = name_kinks(meeting, &kinks, &entries) else {
-            continue;
-        };
         if !corners
             .ties()
             .iter()
@@ -135,11 +131,6 @@ pub(super) fn survey(
             },
             false => &fields,
         };
-        let guarded: Vec<bool> = vanishing
-            .iter()
-            .zip(&with_kinks)
-            .map(|(vanishes, follows)| *vanishes && !follows)
-            .collect();
         let candidate = Candidate {
             meeting,
             fields,
@@ -147,8 +138,8 @@ pub(super) fn survey(
             pace,
             entries: &entries,
             mode: &mode,
-            guarded: &guarded,
-            ties: corners.ties(),
+            guarded: &vanishing,
+            corners: &corners,
         };
         let slides_on = |touch: &&Touch| touch.pair.iter().all(|&i| entries.entries()[i] == 0);
         let verdict = if has_ended(at, meeting, &mode) {
@@ -182,30 +173,6 @@ pub(super) fn survey(
     Ok(Some(found))
 }
 
-/// Which surfaces of a meeting follow another one that is slid on with these entries: kinks in its place. They keep their
-/// side; with another entry it is the same mode once more, and `None`.
-fn name_kinks(meeting: &Meeting, kinks: &[Kink], entries: &Mode) -> Option<Vec<bool>> {
-    let place = |j: usize| meeting.surfaces.iter().position(|&k| k == j);
-    let mut follows = vec![false; meeting.surfaces.len()];
-    for kink in kinks {
-        let (Some(own), Some(beside)) = (place(kink.surface), place(kink.beside)) else {
-            continue;
-        };
-        let entry = entries.entries()[own];
-        if entry == 0 {
-            return None;
-        }
-        if entries.entries()[beside] == 0 {
-            let kept = meeting.mode.entries()[kink.surface];
-            if entry != if kept == 0 { 1 } else { kept } {
-                return None;
-            }
-            follows[own] = true;
-        }
-    }
-    Some(follows)
-}
-
 /// A mode that agrees with all switching functions.
 struct Candidate<'c> {
     meeting: &'c Meeting<'c>,
@@ -216,9 +183,9 @@ struct Candidate<'c> {
     /// On the surfaces of the meeting.
     entries: &'c Mode,
     mode: &'c Mode,
-    /// Of which surfaces of the meeting is the function a guard: it vanishes here, and not all along the motion?
+    /// Of which surfaces of the meeting is the function a guard: does it vanish here?
     guarded: &'c [bool],
-    ties: &'c [Tie],
+    corners: &'c MeetingFields,
 }
 
 /// Is this the mode of a motion that one of its own exit functions has just ended?
@@ -275,7 +242,7 @@ fn of_region(at: &Point, candidate: &Candidate) -> Result<Verdict, FieldError> {
         entries,
         mode,
         guarded,
-        ties,
+        corners,
         ..
     } = *candidate;
     let signs = mode.signs();
@@ -293,7 +260,7 @@ fn of_region(at: &Point, candidate: &Candidate) -> Result<Verdict, FieldError> {
             continue;
         }
         let side = mode.entries()[j];
-        if let Some(tie) = ties.iter().find(|tie| tie.follower == i) {
+        if let Some(tie) = corners.ties().iter().find(|tie| tie.follower == i) {
             let leader = meeting.surfaces[tie.leader];
             let [one, other] = [leader, j].map(|j| normal(at.system, (at.t, at.x), j, &signs));
             let (one, other) = (one?, other?);
@@ -499,6 +466,7 @@ fn at_root(at: &Point, candidate: &Candidate, lambda: &[f64]) -> Result<Verdict,
         entries,
         mode,
         guarded,
+        corners,
         ..
     } = *candidate;
     let mut next = lambda.iter();
@@ -546,7 +514,7 @@ fn at_root(at: &Point, candidate: &Candidate, lambda: &[f64]) -> Result<Verdict,
     if tangent.is_empty() && ends.is_empty() {
         return Ok(Verdict::Viable(viable));
     }
-    if let ([tie], [], 2) = (candidate.ties, &tangent[..], lambda.len()) {
+    if let ([tie], [], 2) = (corners.ties(), &tangent[..], lambda.len()) {
         return at_tied_end(at, candidate, viable, *tie);
     }
     let Some(series) = MotionSeries::of(at, mode, lambda, candidate.pace) else {
@@ -560,7 +528,9 @@ fn at_root(at: &Point, candidate: &Candidate, lambda: &[f64]) -> Result<Verdict,
                 viable.left.push(Left::Surface(j, leading))
             }
             Germ::Begins(_) => return Ok(Verdict::Fails(Guard::Surface(j))),
-            Germ::Zero if is_neutral(fields, noise, entries.entries(), i) => {
+            Germ::Zero
+                if !corners.depends_on(i) || is_neutral(fields, noise, entries.entries(), i) =>
+            {
                 viable.is_strict = false;
                 viable.left.push(Left::Surface(
                     j,

@@ -1,7 +1,7 @@
 //! All fields that meet at an intersection, with their normal components.
 
 use super::weights::product_weights;
-use super::{eval_on_side, in_the_place_of, parallel, Tie};
+use super::{eval_on_side, parallel, sense_of, Tie};
 use crate::error::FieldError;
 use crate::switching::{Matrix, NormalFields, SignGroup, Undecided};
 use crate::system::{dot, PiecewiseSystem};
@@ -30,7 +30,7 @@ pub struct MeetingFields {
     gradients: Vec<f64>,
     time_derivatives: Vec<f64>,
     signs: Vec<f64>,
-    /// Surfaces in one place on whose signs the fields depend, since the first evaluation.
+    /// Surfaces in one place, since the first evaluation.
     ties: Option<Vec<Tie>>,
 }
 
@@ -71,7 +71,7 @@ impl MeetingFields {
         }
     }
 
-    /// The surfaces that are in the place of others, if the fields depend on the signs of both.
+    /// The surfaces that are in the place of others.
     pub fn ties(&self) -> &[Tie] {
         self.ties.as_deref().unwrap_or_default()
     }
@@ -162,29 +162,18 @@ impl MeetingFields {
         place: (f64, &[f64]),
         signs: &[f64],
     ) -> Result<Vec<Tie>, FieldError> {
-        let (n, m) = (self.n, self.set.len());
         let mut ties: Vec<Tie> = Vec::new();
+        let m = self.set.len();
         if m > MOST_MEETING {
             return Ok(ties);
         }
-        let row = |i: usize| {
-            let mut row = self.gradients[i * n..(i + 1) * n].to_vec();
-            row.push(self.time_derivatives[i]);
-            row
-        };
-        let rows: Vec<Vec<f64>> = (0..m).map(row).collect();
         for (leader, follower) in (0..m).flat_map(|i| (i + 1..m).map(move |k| (i, k))) {
-            let product = dot(&rows[leader], &rows[follower]);
-            let is_tied = ties
-                .iter()
-                .any(|tie| tie.follower == follower || tie.follower == leader);
-            if is_tied || product == 0.0 || !parallel(&rows[leader], &rows[follower]) {
+            let is_tied = |tie: &Tie| tie.follower == follower || tie.follower == leader;
+            if ties.iter().any(is_tied) || !self.has_parallel(leader, follower) {
                 continue;
             }
-            let (j, others) = (self.set[leader], [self.set[follower]]);
-            let matter = self.depends_on(leader) && self.depends_on(follower);
-            if matter && !in_the_place_of(system, place, j, &others, signs)?.is_empty() {
-                let sense = if product > 0.0 { 1 } else { -1 };
+            let pair = [self.set[leader], self.set[follower]];
+            if let Some(sense) = sense_of(system, place, pair, signs)? {
                 ties.push(Tie {
                     leader,
                     follower,
@@ -193,6 +182,16 @@ impl MeetingFields {
             }
         }
         Ok(ties)
+    }
+
+    /// Have two surfaces of the set the same normal?
+    fn has_parallel(&self, i: usize, k: usize) -> bool {
+        let [one, other] = [i, k].map(|i| {
+            let mut row = self.gradients[i * self.n..(i + 1) * self.n].to_vec();
+            row.push(self.time_derivatives[i]);
+            row
+        });
+        parallel(&one, &other)
     }
 
     /// Fills in what stands for the regions that do not exist.
@@ -290,32 +289,20 @@ impl MeetingFields {
         Ok(self.normal_fields()?.scaled(&factors))
     }
 
-    /// Does the field depend on the sign of surface `i` of the set, by more than rounding?
+    /// The largest component of all fields.
+    pub fn size(&self) -> f64 {
+        self.fields.iter().fold(0.0, |size, v| v.abs().max(size))
+    }
+
+    /// Does the field depend on the sign of surface `i`, by more than rounding? Asked where all patterns are held one by one.
     pub fn depends_on(&self, i: usize) -> bool {
-        let size = self
-            .fields
-            .iter()
-            .fold(0.0_f64, |size, v| size.max(v.abs()));
-        let mut first = 0;
-        for group in &self.groups {
-            let patterns = 0..1_usize << group.len();
-            let start = first;
-            first += patterns.len();
-            let Some(bit) = group.iter().position(|&member| member == i) else {
-                continue;
-            };
-            return patterns
-                .filter(|pattern| pattern >> bit & 1 == 1)
-                .any(|up| {
-                    let (up, down) = (
-                        self.field(start + up),
-                        self.field(start + (up ^ (1 << bit))),
-                    );
-                    let mut pairs = up.iter().zip(down);
-                    pairs.any(|(a, b)| (a - b).abs() > TANGENT * size)
-                });
-        }
-        false
+        let noise = TANGENT * self.size();
+        let mut up = (0..1_usize << self.set.len()).filter(|pattern| pattern >> i & 1 == 1);
+        !self.has_all_patterns()
+            || up.any(|up| {
+                let mut pairs = self.field(up).iter().zip(self.field(up ^ 1 << i));
+                pairs.any(|(a, b)| (a - b).abs() > noise)
+            })
     }
 
     /// The surfaces, counted within the set, whose equation says anything about the multipliers. To the others

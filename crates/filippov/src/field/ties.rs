@@ -29,6 +29,33 @@ impl Tie {
     }
 }
 
+/// Have the functions of two surfaces in one place the same sign (+1), or opposite ones (-1)? `None` if they are not in one
+/// place, or if that differs between the sides of the first one, whose sign the second may contain.
+///
+/// # Errors
+/// If a function of the user raises.
+pub fn sense_of(
+    system: &dyn PiecewiseSystem,
+    (t, x): (f64, &[f64]),
+    [j, k]: [usize; 2],
+    signs: &[f64],
+) -> Result<Option<i8>, FieldError> {
+    let (mut signs, mut senses) = (signs.to_vec(), [0; 2]);
+    for (sense, side) in senses.iter_mut().zip([-1.0, 1.0]) {
+        signs[j] = side;
+        let [one, other] = [j, k].map(|j| normal(system, (t, x), j, &signs));
+        let (one, other) = (one?, other?);
+        if !parallel(&one, &other) || in_the_place_of(system, (t, x), j, &[k], &signs)?.is_empty() {
+            return Ok(None);
+        }
+        *sense = dot(&one, &other)
+            .partial_cmp(&0.0)
+            .map_or(0, |order| order as i8);
+    }
+    let [minus, plus] = senses;
+    Ok((minus == plus && plus != 0).then_some(plus))
+}
+
 /// Those of `others` whose functions vanish where that of surface j does, around the place.
 ///
 /// # Errors
