@@ -3,21 +3,21 @@
 //! So it is where two surfaces touch one another: seen from the point they are one, and a moment later they are two, in an
 //! order that decides.
 
-use super::departures::velocity_in;
 use super::point::{Left, Lefts, Notes, Point};
 use crate::error::FieldError;
-use crate::field::ModeField;
-use crate::field::SmoothField;
+use crate::field::{ContactField, ModeField, SmoothField};
 use crate::mode::Mode;
 use crate::switching::Leading;
+use crate::system::dot;
 use crate::tolerances::{LONGER_TRIAL, MAX_LIE_ORDER, MOST_LENGTHENINGS, SURFACE_NOISE};
 
-/// Follows a motion in this mode for a moment, and longer until it is clear of rounding.
+/// Follows a motion in this mode for a moment, and longer until it is clear of rounding: of `noise` times its way.
 pub(super) fn try_mode(
     at: &Point,
     notes: &mut Notes,
     candidate: &Mode,
     meeting: &[usize],
+    noise: f64,
 ) -> Result<Trial, FieldError> {
     let entries = candidate.entries();
     let leaving: Vec<usize> = meeting
@@ -25,19 +25,29 @@ pub(super) fn try_mode(
         .copied()
         .filter(|&j| entries[j] != 0)
         .collect();
-    let mut velocity = vec![0.0; at.x.len()];
-    velocity_in(at, notes, candidate, &[], at.t, at.x, &mut velocity)?;
+    let mut field = field_of(at, candidate);
+    let (mut x, mut velocity) = (at.x.to_vec(), vec![0.0; at.x.len()]);
+    field.eval(at.t, &mut x, &mut velocity)?;
+    notes.n_field_evaluations += field.n_evaluations();
     if velocity.iter().any(|v| !v.is_finite()) {
         return Ok(Trial::WithinRounding);
     }
     let mut moment = at.moment(notes, &candidate.signs(), &velocity)?;
     for _ in 0..=MOST_LENGTHENINGS {
-        match leaves_within(at, notes, candidate, &leaving, moment)? {
+        match leaves_within(at, notes, candidate, &leaving, &velocity, (moment, noise))? {
             Trial::WithinRounding => moment *= LONGER_TRIAL,
             trial => return Ok(trial),
         }
     }
     Ok(Trial::WithinRounding)
+}
+
+/// The field of a mode, with the contact of bodies.
+pub(super) fn field_of<'a>(at: &Point<'_, '_, 'a>, mode: &Mode) -> ModeField<'a> {
+    match ContactField::new(at.system, at.actions, mode, at.arrival.sides, at.q) {
+        Some(field) => ModeField::Contact(Box::new(field)),
+        None => ModeField::of(at.system, at.policy.law, mode),
+    }
 }
 
 /// What becomes of a motion within a short time.
@@ -55,23 +65,49 @@ fn leaves_within(
     notes: &mut Notes,
     candidate: &Mode,
     leaving: &[usize],
-    moment: f64,
+    velocity: &[f64],
+    (moment, noise_of_way): (f64, f64),
 ) -> Result<Trial, FieldError> {
     let mut values = [1.0, 0.5].map(|_| vec![0.0; leaving.len()]);
+    let signs = candidate.signs();
+    let mut gradient = vec![0.0; at.x.len()];
+    let (mut start, mut h) = (vec![0.0; signs.len()], vec![0.0; signs.len()]);
+    at.system.surfaces(at.t, at.x, &signs, &mut start)?;
+    let mut is_clear = true;
     for (share, values) in [1.0, 0.5].into_iter().zip(&mut values) {
-        let Some(h) = surfaces_after(at, notes, candidate, share * moment)? else {
-            return Ok(Trial::Ends);
-        };
-        for (&j, value) in leaving.iter().zip(values) {
-            let (h, size) = h[j];
-            if h.abs() <= SURFACE_NOISE * size {
-                return Ok(Trial::WithinRounding);
-            }
-            if h * f64::from(candidate.entries()[j]) < 0.0 {
+        let mut field = field_of(at, candidate);
+        let (t, mut x) = (at.t + share * moment, at.x.to_vec());
+        follow(&mut field, at.t, &mut x, share * moment)?;
+        field.project(t, &mut x)?;
+        let exits = field.exits(t, &mut x)?;
+        notes.n_field_evaluations += field.n_evaluations();
+        for (i, exit) in exits.iter().enumerate() {
+            let noise = match &field {
+                ModeField::Contact(field) => field.noise_of_exit(i),
+                _ => 0.0,
+            };
+            if exit.is_nan() || *exit <= -noise {
                 return Ok(Trial::Ends);
             }
-            *value = h;
+            is_clear &= *exit > noise;
         }
+        at.system.surfaces(t, &x, &signs, &mut h)?;
+        for (k, &j) in leaving.iter().enumerate() {
+            let size = at.system.surface_size(j, t, &x, &signs)?;
+            // The point is on the surface, but for a residual; fields that balance along the surface do so to rounding.
+            let value = h[j] - start[j];
+            values[k] = value;
+            at.system.gradient(j, at.t, at.x, &signs, &mut gradient)?;
+            let way = (dot(&gradient, &gradient) * dot(velocity, velocity)).sqrt() * moment;
+            if value.abs() <= SURFACE_NOISE * size + noise_of_way * way + start[j].abs() {
+                is_clear = false;
+            } else if value * f64::from(candidate.entries()[j]) < 0.0 {
+                return Ok(Trial::Ends);
+            }
+        }
+    }
+    if !is_clear {
+        return Ok(Trial::WithinRounding);
     }
     let [full, half] = values;
     let pairs = leaving.iter().zip(full.iter().zip(half));
@@ -85,38 +121,22 @@ fn leaves_within(
     Ok(Trial::Leaves(left.collect()))
 }
 
-/// The switching functions, and their sizes, after some time of motion in a mode; `None` if its multipliers are beyond
-/// their ends.
-fn surfaces_after(
-    at: &Point,
-    notes: &mut Notes,
-    candidate: &Mode,
-    time: f64,
-) -> Result<Option<Vec<(f64, f64)>>, FieldError> {
-    let (signs, law) = (candidate.signs(), at.policy.law);
-    let mut field = ModeField::of(at.system, law, candidate);
-    let mut x = at.x.to_vec();
-    let mut velocity = vec![0.0; x.len()];
-    // The midpoint rule.
-    for share in [0.5, 1.0] {
-        let mut from = x.clone();
-        let t = at.t + (share - 0.5) * time;
-        field.eval(t, &mut from, &mut velocity)?;
-        let pairs = x.iter_mut().zip(at.x.iter().zip(&velocity));
-        pairs.for_each(|(x, (start, v))| *x = start + share * time * v);
-        field.project(at.t + share * time, &mut x)?;
+/// Moves x by one step of the classical method of fourth order (Hairer, Norsett, Wanner, Solving Ordinary Differential
+/// Equations I, table II.1.2).
+fn follow(field: &mut ModeField, t: f64, x: &mut [f64], step: f64) -> Result<(), FieldError> {
+    let start = x.to_vec();
+    let (mut stage, mut velocity) = (start.clone(), vec![0.0; start.len()]);
+    for (share, ahead, weight) in [
+        (0.0, 0.5, 1.0),
+        (0.5, 0.5, 2.0),
+        (0.5, 1.0, 2.0),
+        (1.0, 0.0, 1.0),
+    ] {
+        field.eval(t + share * step, &mut stage, &mut velocity)?;
+        for (i, v) in velocity.iter().enumerate() {
+            x[i] += step * weight / 6.0 * v;
+            stage[i] = start[i] + ahead * step * v;
+        }
     }
-    let exits = field.exits(at.t + time, &mut x)?;
-    notes.n_field_evaluations += field.n_evaluations();
-    if exits.iter().any(|exit| exit.is_nan() || *exit <= 0.0) {
-        return Ok(None);
-    }
-    let mut h = vec![0.0; signs.len()];
-    let t = at.t + time;
-    at.system.surfaces(t, &x, &signs, &mut h)?;
-    let sized = h.into_iter().enumerate().map(|(j, h)| {
-        let size = at.system.surface_size(j, t, &x, &signs)?;
-        Ok((h, size))
-    });
-    sized.collect::<Result<Vec<_>, FieldError>>().map(Some)
+    Ok(())
 }

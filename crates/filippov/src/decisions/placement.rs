@@ -233,7 +233,8 @@ fn place_on_triggers(
         let leading = leading_along(at, notes, j, &mode, &meeting, memory)?;
         let is_slow = leading.order == 1 && is_slow(at, j, leading.value, &mode)?;
         let is_still = leading.order != 1 || is_slow;
-        let stays = leading.sign() != side || is_slow;
+        // What slides beside it may press or lift it.
+        let stays = leading.sign() != side || is_slow || !meeting.is_empty();
         if is_still && stays && can_stay(at, j, &mode)? {
             contacts.push(j);
             continue;
@@ -256,7 +257,7 @@ fn place_on_triggers(
     let (rule, decided) = if contacts.is_empty() {
         place_on(at, notes, &mode, &meeting, memory)?
     } else {
-        let decided = place_in_contact(at, notes, mode, &contacts, &meeting, &[])?;
+        let decided = place_in_contact(at, notes, mode, &contacts, &meeting)?;
         (Rule::Contact, decided)
     };
     let decided = decided.map(|mut next| {

@@ -17,7 +17,7 @@ use crate::status::{Stop, Warning};
 use crate::stepper::ErrorScale;
 use crate::switching::{Decision, Leading, Patience};
 use crate::system::PiecewiseSystem;
-use crate::tolerances::{MOMENT, MOST_SHORTENINGS, TOO_LARGE_A_CHANGE};
+use crate::tolerances::{MOMENT, MOST_SHORTENINGS, NO_PROGRESS, TOO_LARGE_A_CHANGE};
 
 /// One value per surface; few are kept without allocation.
 pub(crate) type Values = SmallVec<[f64; 8]>;
@@ -203,7 +203,9 @@ impl<'p, 'm, 'a> Point<'p, 'm, 'a> {
             } else {
                 f64::INFINITY
             };
-            if change <= TOO_LARGE_A_CHANGE * size {
+            // A field that is zero but for rounding changes by more than its size in any time.
+            let of_rounding = change / moment * NO_PROGRESS * self.t.abs();
+            if change <= TOO_LARGE_A_CHANGE * size || size <= of_rounding {
                 break;
             }
             moment *= MOMENT.max(MOMENT * size / change);

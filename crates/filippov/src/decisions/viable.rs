@@ -14,7 +14,7 @@ use crate::switching::{
     first_nonzero, is_undetermined, roots_in_cube, stable_roots_with_border, Leading, NormalFields,
 };
 use crate::system::dot;
-use crate::tolerances::{AT_SIDE, DOUBTFUL, MOST_MEETING, ONE_DIRECTION, TANGENT};
+use crate::tolerances::{AT_SIDE, DOUBTFUL, MOST_MEETING, ONE_DIRECTION, SURFACE_NOISE, TANGENT};
 
 /// A mode in which a motion can go on.
 #[derive(Clone, Debug)]
@@ -160,7 +160,7 @@ pub(super) fn survey(
         match verdict {
             Verdict::Viable(viable) => found.viable.push(viable),
             Verdict::Fails(guard) => found.failing.push((mode, guard)),
-            Verdict::Open => match try_mode(at, notes, &mode, meeting.surfaces)? {
+            Verdict::Open => match try_mode(at, notes, &mode, meeting.surfaces, SURFACE_NOISE)? {
                 Trial::Leaves(left) => found.viable.push(Viable::strictly(mode, left)),
                 Trial::Ends => found
                     .failing

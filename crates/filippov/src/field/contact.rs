@@ -7,9 +7,9 @@ use super::{eval_on_side, Guard, Motion, SmoothField};
 use crate::action::Actions;
 use crate::error::FieldError;
 use crate::mode::{Mode, Signs};
-use crate::switching::Matrix;
+use crate::switching::{is_scaling_stable, Matrix};
 use crate::system::{dot, PiecewiseSystem};
-use crate::tolerances::{NO_FORCE, NO_IMPULSE, SURFACE_NOISE};
+use crate::tolerances::{NO_FORCE, NO_IMPULSE, SURFACE_NOISE, VANISHING_MULTIPLIER};
 
 /// The field of contact,
 ///
@@ -32,6 +32,8 @@ pub struct ContactField<'a> {
     n_evaluations: u64,
     /// nu, then mu, of the last evaluation.
     multipliers: Vec<f64>,
+    /// The changes of the accelerations and rates by the multipliers, at the last evaluation.
+    coupling: Matrix,
     /// The largest nu that would be rounding of the forces.
     noise: Vec<f64>,
     /// Ratio of static to kinetic friction at the surfaces slid on, at the last evaluation.
@@ -71,6 +73,7 @@ impl<'a> ContactField<'a> {
             discrete: discrete.to_vec(),
             n_evaluations: 0,
             multipliers: Vec::new(),
+            coupling: Matrix::zeros(0),
             noise: Vec::new(),
             ratios: Vec::new(),
             exits: Vec::new(),
@@ -82,10 +85,34 @@ impl<'a> ContactField<'a> {
         self.contacts.iter().map(|(j, _)| *j)
     }
 
-    /// Does every contact push, clearly?
-    pub fn presses(&self) -> bool {
-        let mut forces = self.multipliers.iter().zip(&self.noise);
-        forces.all(|(nu, noise)| nu > noise)
+    /// How far from zero a guard with this index may be by rounding, at the last evaluation.
+    pub fn noise_of_exit(&self, index: usize) -> f64 {
+        match index.checked_sub(self.contacts.len()) {
+            None => self.noise[index],
+            Some(end) => VANISHING_MULTIPLIER * self.ratios[end / 2],
+        }
+    }
+
+    /// Do the fields around the surfaces slid on lead to them, with the forces of the contacts?
+    pub fn attracts(&self) -> bool {
+        let (n, m) = (self.contacts.len(), self.sliding.len());
+        if m == 0 {
+            return true;
+        }
+        let closed = self.coupling.principal(&(0..n).collect::<Vec<_>>());
+        let mut rates = Matrix::zeros(m);
+        for k in 0..m {
+            let column: Vec<f64> = (0..n).map(|c| self.coupling[(c, n + k)]).collect();
+            let Some(forces) = closed.solve(&column) else {
+                return false;
+            };
+            for i in 0..m {
+                let of_forces = forces.iter().enumerate();
+                let of_forces = of_forces.map(|(c, force)| self.coupling[(n + i, c)] * force);
+                rates[(i, k)] = self.coupling[(n + i, n + k)] - of_forces.sum::<f64>();
+            }
+        }
+        is_scaling_stable(&rates)
     }
 
     /// The directions W, in units of the acceleration that they give on the free side; NaN where the map has no
@@ -225,8 +252,8 @@ impl SmoothField for ContactField<'_> {
         self.ratios = ratios
             .map(|&j| self.system.stick_ratio(j, t, x, &self.signs))
             .collect();
-        let solved = gram(&rows, &directions).solve(&rates);
-        self.multipliers = match solved {
+        self.coupling = gram(&rows, &directions);
+        self.multipliers = match self.coupling.solve(&rates) {
             Some(found) => found.into_vec(),
             None => vec![f64::NAN; rows.len()],
         };

@@ -43,6 +43,14 @@ impl Guard {
         [-1, 1].map(|end| Guard::Multiplier { surface, end })
     }
 
+    /// The surface that the motion stays on while this guard is positive.
+    pub fn surface_held(self) -> Option<usize> {
+        match self {
+            Guard::Multiplier { surface, .. } | Guard::Force(surface) => Some(surface),
+            Guard::Surface(_) | Guard::Root(_) => None,
+        }
+    }
+
     /// Is it a switching function?
     pub fn is_surface(self) -> bool {
         matches!(self, Guard::Surface(_))
