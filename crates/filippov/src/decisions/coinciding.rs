@@ -69,13 +69,13 @@ pub(super) fn have_parallels(
     Ok(pairs.any(|parallel| parallel))
 }
 
-/// The normal of what two surfaces that touch have in common beside the first of them: if their functions differ by a power
-/// of another one, its normal. `None` if that depends on where one looks.
+/// Two surfaces that touch have functions that differ by a power of another one: its normal, along the surfaces, and whether
+/// the power is odd. `None` if what they differ by depends on where one looks beside the point.
 pub(super) fn parting(
     at: &Point,
     [j, k]: [usize; 2],
     mode: &Mode,
-) -> Result<Option<Vec<f64>>, FieldError> {
+) -> Result<Option<(Vec<f64>, bool)>, FieldError> {
     let signs = mode.signs();
     let [one, other] = [j, k].map(|j| normal(at.system, (at.t, at.x), j, &signs));
     let (one, other) = (one?, other?);
@@ -100,5 +100,6 @@ pub(super) fn parting(
         found.push(row);
     }
     let product = dot(&found[0], &found[1]);
-    Ok((product.abs() >= 1.0 - ONE_DIRECTION).then(|| found.swap_remove(1)))
+    let is_one = product.abs() >= 1.0 - ONE_DIRECTION;
+    Ok(is_one.then(|| (found.swap_remove(1), product > 0.0)))
 }

@@ -145,10 +145,21 @@ pub(super) fn survey(
         let verdict = if has_ended(at, meeting, &mode) {
             Verdict::Fails(at.arrival.functions()[0])
         } else if let Some(touch) = touching.iter().find(slides_on) {
-            match parts(at, notes, &candidate, touch.pair)? {
-                true => Verdict::Fails(Guard::Surface(meeting.surfaces[touch.pair[1]])),
+            match together(at, notes, &candidate, touch.pair)? {
+                Together::Never => Verdict::Fails(Guard::Surface(meeting.surfaces[touch.pair[1]])),
                 // Other rules may know.
-                false => continue,
+                Together::Perhaps => continue,
+                Together::By(fields) => {
+                    let fields = &fields;
+                    of_sliding(
+                        at,
+                        notes,
+                        &Candidate {
+                            fields,
+                            ..candidate
+                        },
+                    )?
+                }
             }
         } else if is_beside {
             Verdict::Open
@@ -174,6 +185,7 @@ pub(super) fn survey(
 }
 
 /// A mode that agrees with all switching functions.
+#[derive(Clone, Copy)]
 struct Candidate<'c> {
     meeting: &'c Meeting<'c>,
     fields: &'c NormalFields,
@@ -194,13 +206,23 @@ fn has_ended(at: &Point, meeting: &Meeting, mode: &Mode) -> bool {
     meeting.is_exit() && !is_touch && mode == meeting.mode && !at.arrival.functions().is_empty()
 }
 
-/// Sliding on two surfaces that touch: to first order they are one. Does the motion part them, whatever the multipliers?
-fn parts(
+/// Do multipliers hold a motion on two surfaces that touch?
+enum Together {
+    /// Whatever they are, it parts the surfaces.
+    Never,
+    Perhaps,
+    /// They solve the equations with these normal components: those of the second surface are divided by their power.
+    By(NormalFields),
+}
+
+/// Sliding on two surfaces that touch: to first order they are one, and the equation of the second is that of what they have
+/// in common beside the point.
+fn together(
     at: &Point,
     notes: &mut Notes,
     candidate: &Candidate,
     [i, k]: [usize; 2],
-) -> Result<bool, FieldError> {
+) -> Result<Together, FieldError> {
     let Candidate {
         meeting,
         entries,
@@ -208,13 +230,13 @@ fn parts(
         ..
     } = *candidate;
     let pair = [i, k].map(|i| meeting.surfaces[i]);
-    let Some(normal) = parting(at, pair, mode)? else {
-        return Ok(false);
+    let Some((normal, is_odd)) = parting(at, pair, mode)? else {
+        return Ok(Together::Perhaps);
     };
     let mut corners = at.corners(notes, meeting.surfaces, mode)?;
     corners.set_normal(k, &normal);
     let Ok(fields) = corners.normal_fields() else {
-        return Ok(false);
+        return Ok(Together::Perhaps);
     };
     let face = fields
         .restrict(entries.entries())
@@ -225,13 +247,18 @@ fn parts(
         .iter()
         .any(|[low, high]| *low > noise || *high < -noise)
     {
-        return Ok(true);
+        return Ok(Together::Never);
     }
     if ranges.iter().any(|[low, high]| high - low <= noise) {
-        return Ok(false);
+        return Ok(Together::Perhaps);
     }
     let roots = roots_in_cube(&face);
-    Ok(roots.complete && roots.points.is_empty())
+    Ok(match roots.complete && roots.points.is_empty() {
+        true => Together::Never,
+        // After an even power no region lies between the surfaces on one side.
+        false if !is_odd => Together::Perhaps,
+        false => Together::By(fields),
+    })
 }
 
 fn of_region(at: &Point, candidate: &Candidate) -> Result<Verdict, FieldError> {

@@ -84,7 +84,7 @@ pub fn in_the_place_of(
     Ok(found)
 }
 
-/// A place beside this one on surface j, a little later; `side` is +1 or -1.
+/// A place beside this one on surface j, a little later if `side` is +1, and before if it is -1.
 ///
 /// # Errors
 /// If a function of the user raises.
@@ -95,8 +95,8 @@ pub fn beside_on(
     signs: &[f64],
     side: f64,
 ) -> Result<(f64, Vec<f64>), FieldError> {
-    let later = t + BESIDE * (1.0 + t.abs());
-    let shifts = (0..x.len()).map(|i| BESIDE * (1.0 + side / (2.0 + i as f64)));
+    let later = t + side * BESIDE * (1.0 + t.abs());
+    let shifts = (0..x.len()).map(|i| side * BESIDE * (1.0 + side / (2.0 + i as f64)));
     let pairs = x.iter().zip(shifts);
     let mut beside: Vec<f64> = pairs.map(|(x, d)| x + d * (1.0 + x.abs())).collect();
     let mut projector = Projector::new(beside.len(), signs.len());
