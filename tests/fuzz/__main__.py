@@ -18,8 +18,8 @@ from fuzz.properties import ends_early, is_moderate, violations
 from fuzz.starts import check_start, random_start
 from fuzz.systems import Case, build, random_case
 
-# A case takes milliseconds; Euler's method some seconds. A run has this much of the processor's time, and on a
-# loaded machine a multiple of it by the clock.
+# A case takes milliseconds; Euler's method some seconds. A run has this much of the processor's time, and
+# on a loaded machine a multiple of it by the clock.
 LONGEST_CASE = 60.0
 LONGEST_RUN = 5.0
 LOADED = 4.0

@@ -45,8 +45,8 @@ KINDS = JUMPS | CHANGES | {"grazing"}
 # Motions that escape to infinity are known to a relative tolerance only.
 ESCAPED = 1e6
 # What the functions of random systems give no reason for unless the state grows: their exponentials leave
-# the range of steps near 25. The first is wrong then, and so is a run that takes long; the others may be honest
-# (resets that shrink to rounding, two-folds), and are listed.
+# the range of steps near 25. The first is wrong then, and so is a run that takes long; the others may be
+# honest (resets that shrink to rounding, two-folds), and are listed.
 WRONG_WHEN_MODERATE = {"field_not_finite"}
 EARLY_WHEN_MODERATE = {"step_too_small", "no_progress"}
 MODERATE = 20.0

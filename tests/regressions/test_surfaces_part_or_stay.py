@@ -1,4 +1,4 @@
-"""Surfaces with one normal at a point: in one place, touching and parted by the motion, touching and slid on."""
+"""Surfaces with one normal at a point: in one place, parted by the motion, or slid on together."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_where_surfaces_are_in_one_place_two_regions_exist(field: Any, slope: fl
 
     system = fl.System(fun, n=2)
     at = system.classify(0.0, [0.0, 0.0])
-    assert str(at.mode) == "00" and at.unique, at
+    assert (str(at.mode), at.unique) == ("00", True)
     sol = system.solve((0.0, 0.5), [-0.1, 0.0])
     assert sol.success, sol.message
     [last] = [segment for segment in sol.segments if segment.mode.is_sliding]
