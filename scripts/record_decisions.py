@@ -105,7 +105,7 @@ def kind_of(point: Dict, outcome: Dict, options: Dict, has_actions: bool) -> str
         *(min(point["mode"].count(0), 4), sorted(changes)[:6], min(len(point["mode"]), 6)),
         *(outcome["stop"], outcome["rule"], outcome["leaf"], len(outcome["candidates"]), outcome["spirals"]),
         *(sorted(zeros)[:4], point["oscillates"], bool(point["resting"]), bool(point["passing"])),
-        *(bool(point["departing"]), point["meets_kinks"], bool(point["q"]), has_actions),
+        *(bool(point["departing"]), bool(point["q"]), has_actions),
         *(options["sliding"], bool(options["kappa"]), options["nonunique"], bool(options["choices"])),
     ]
     return json.dumps(parts)

@@ -13,7 +13,15 @@ import numpy.typing as npt
 
 from fuzz.systems import Problem
 
-__all__ = ["REASONS", "ends_early", "is_at_two_fold", "look_at", "surface_functions", "violations"]
+__all__ = [
+    "REASONS",
+    "ends_early",
+    "is_at_two_fold",
+    "is_moderate",
+    "look_at",
+    "surface_functions",
+    "violations",
+]
 
 Array = npt.NDArray[np.float64]
 Surface = Callable[[float, Array], float] | None
@@ -37,13 +45,15 @@ KINDS = JUMPS | CHANGES | {"grazing"}
 # Motions that escape to infinity are known to a relative tolerance only.
 ESCAPED = 1e6
 # What the functions of random systems give no reason for unless the state grows: their exponentials leave
-# the range of steps near 25. The first two are wrong then; the others may be honest (resets that shrink to
-# rounding, two-folds), and are listed.
-WRONG_WHEN_MODERATE = {"max_wall_time", "field_not_finite"}
+# the range of steps near 25. The first is wrong then, and so is a run that takes long; the others may be
+# honest (resets that shrink to rounding, two-folds), and are listed.
+WRONG_WHEN_MODERATE = {"field_not_finite"}
 EARLY_WHEN_MODERATE = {"step_too_small", "no_progress"}
 MODERATE = 20.0
 # A motion has come to a two-fold where both normal components are as small as this many errors make them.
 TWO_FOLD = 10.0
+# Relative errors of normal components.
+ROUNDING = 8.0 * float(np.finfo(float).eps)
 # A motion that stays on a surface, neither field of which leaves it, has the errors of many steps.
 RESTING = 1e3
 # A piece this short may lie within the error of a tangency at its ends.
@@ -72,7 +82,12 @@ class Checked:
 
 def ends_early(sol: fl.Solution) -> bool:
     """Whether a run stopped, with its reason, where the growth of its state does not explain that."""
-    return bool(sol._run.reason in EARLY_WHEN_MODERATE and np.abs(sol.y).max() < MODERATE)
+    return sol._run.reason in EARLY_WHEN_MODERATE and is_moderate(sol)
+
+
+def is_moderate(sol: fl.Solution) -> bool:
+    """Whether the state never grows so large that the system alone explains an early end."""
+    return bool(np.abs(sol.y).max() < MODERATE)
 
 
 def violations(problem: Problem, sol: fl.Solution) -> Iterator[str]:
@@ -80,7 +95,7 @@ def violations(problem: Problem, sol: fl.Solution) -> Iterator[str]:
     reason = sol._run.reason
     if reason not in REASONS:
         yield f"the reason {reason!r} has no place here"
-    if reason in WRONG_WHEN_MODERATE and np.abs(sol.y).max() < MODERATE:
+    if reason in WRONG_WHEN_MODERATE and is_moderate(sol):
         yield f"stops with {reason} at a state of moderate size: {sol.message}"
     if sol.success != (reason == "end") or not sol.message:
         yield f"success is {sol.success}, the reason {reason}, the message {sol.message!r}"
@@ -242,30 +257,40 @@ def _multipliers(checked: Checked, segment: fl.Segment) -> Iterator[str]:
 
 
 def is_at_two_fold(checked: Checked, mode: fl.Mode, t: float) -> bool:
-    """Whether the multiplier of sliding on one surface is a quotient of errors, near a two-fold."""
-    if mode.codimension != 1 or checked.problem.has_discrete_states:
-        return False
-    (j,) = mode.sliding
-    h = checked.surfaces[j]
-    if h is None:
-        return False
-    entries = list(mode)
+    """Whether the multipliers of sliding are quotients of errors: near a two-fold, or where surfaces touch.
 
-    def difference(t: float, x: Array) -> float:
-        rates = []
-        for entries[j] in (-1, 1):
-            field, step = checked.source.field(t, x, entries), 1e-5
-            rates.append((h(t + step, x + step * field) - h(t - step, x - step * field)) / (2.0 * step))
-        return float(rates[0] - rates[1])
+    They solve linear equations, if no signs multiply, with the matrix of what every sign changes of every
+    normal component. Errors of the state change its smallest singular value by more than that is, or those of
+    rounding divided by it are more than the tolerance.
+    """
+    slid = mode.sliding
+    functions = [h for h in (checked.surfaces[j] for j in slid) if h is not None]
+    if not slid or len(functions) < len(slid) or checked.problem.has_discrete_states:
+        return False
+    entries, step = list(mode), 1e-5
+
+    def matrix(t: float, x: Array) -> Array:
+        changes = np.zeros((len(slid), len(slid)))
+        for sides in itertools.product((-1, 1), repeat=len(slid)):
+            for j, side in zip(slid, sides, strict=True):
+                entries[j] = side
+            move = step * checked.source.field(t, x, entries)
+            rates = [(h(t + step, x + move) - h(t - step, x - move)) / (2.0 * step) for h in functions]
+            changes += np.outer(rates, sides)
+        return changes / 2.0 ** (len(slid) - 1)
 
     x = checked.sol.sol(t)
-    here = abs(difference(t, x))
+    here = matrix(t, x)
+    sizes = np.abs(here).max(axis=1, keepdims=True)
+    sizes[sizes == 0.0] = 1.0
+    smallest = np.linalg.norm(here / sizes, -2)
     error = 0.0
     for i, size in enumerate(1.0 + np.abs(x)):
         moved = x.copy()
         moved[i] += 1e-4 * size
-        error += abs(difference(t, moved) - difference(t, x)) * 1e4
-    return bool(here <= TWO_FOLD * checked.problem.tolerance * error)
+        error += np.linalg.norm((matrix(t, moved) - here) / sizes, 2) * 1e4
+    tolerance = checked.problem.tolerance
+    return bool(smallest <= max(TWO_FOLD * tolerance * error, ROUNDING / tolerance))
 
 
 def _sliding(checked: Checked, segment: fl.Segment) -> Iterator[str]:

@@ -135,7 +135,6 @@ fn point_as_dict<'py>(py: Python<'py>, point: &DecisionPoint) -> PyResult<Bound<
     dict.set_item("sides", point.sides.clone())?;
     dict.set_item("resting", point.resting.clone())?;
     dict.set_item("departing", point.departing.clone())?;
-    dict.set_item("meets_kinks", point.meets_kinks)?;
     dict.set_item("residuals", point.residuals.clone())?;
     dict.set_item("passing", point.passing.clone())?;
     dict.set_item("n_choices", point.n_choices)?;
@@ -180,7 +179,6 @@ fn read_point(dict: &Bound<'_, PyDict>) -> PyResult<DecisionPoint> {
         sides: get("sides")?.extract()?,
         resting: get("resting")?.extract()?,
         departing: get("departing")?.extract()?,
-        meets_kinks: get("meets_kinks")?.extract()?,
         residuals: get("residuals")?.extract()?,
         passing: get("passing")?.extract()?,
         n_choices: get("n_choices")?.extract()?,

@@ -64,8 +64,6 @@ pub struct DecisionPoint {
     pub resting: Vec<usize>,
     /// The surfaces that the motion was still leaving tangentially.
     pub departing: Vec<usize>,
-    /// The run had met kinks in the place of other surfaces.
-    pub meets_kinks: bool,
     /// How far the point lay off each surface by rounding; empty: not at all.
     pub residuals: Vec<f64>,
     /// Triggers that the motion crosses.
@@ -168,7 +166,6 @@ pub fn replay_decision(
         active: &active,
         resting: &point.resting,
         departing: SmallVec::from_slice(&point.departing),
-        meets_kinks: point.meets_kinks,
         switches: &[],
         residuals: &point.residuals,
         passing: &point.passing,
@@ -254,7 +251,6 @@ impl DecisionPoint {
             sides: arrival.sides.to_vec(),
             resting: arrival.resting.to_vec(),
             departing: arrival.departing.to_vec(),
-            meets_kinks: arrival.meets_kinks,
             residuals: arrival.residuals.to_vec(),
             passing: arrival.passing.to_vec(),
             n_choices,

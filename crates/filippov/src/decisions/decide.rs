@@ -2,7 +2,6 @@
 
 use smallvec::SmallVec;
 
-use super::coinciding::leave_coinciding;
 use super::contact::decide_in_contact;
 use super::event::{arrival_at_surface, touch, vanishing_surfaces, Reached};
 use super::germs::{decide_if_doubtful, decide_if_entangled};
@@ -93,12 +92,14 @@ fn after_event(
         return Ok((Rule::Triggers, cross_beside_triggers(at, notes, fresh)?));
     }
     let mut both = SmallVec::<[usize; 4]>::new();
-    let surfaces = match (fresh, at.arrival.sliding) {
-        (fresh, []) => fresh,
-        ([], sliding) => sliding,
-        (fresh, sliding) => {
+    let surfaces = match (fresh, at.arrival.sliding, at.arrival.resting) {
+        (fresh, [], _) => fresh,
+        ([], sliding, []) => sliding,
+        // What the motion rests on while it slides is in the place of what it slides on.
+        (fresh, sliding, resting) => {
             both.extend_from_slice(fresh);
             both.extend_from_slice(sliding);
+            both.extend_from_slice(resting);
             both.sort_unstable();
             both.dedup();
             &both
@@ -111,19 +112,13 @@ fn after_event(
         fresh,
         how,
     };
-    let may_coincide = at.system.has_nested_signs() || at.arrival.meets_kinks;
-    if !(is_touch || may_coincide) {
+    if !(is_touch || at.system.has_nested_signs()) {
         // No rule before that of one surface applies: the list need not be asked.
         if let Some(decided) = one_surface(at, notes, &meeting)? {
             return Ok((Rule::OneSurface, decided));
         }
     }
-    let (rule, decided) = settle(at, notes, &meeting)?;
-    let decided = match decided {
-        Ok(next) if rule != Rule::Touch => Ok(leave_coinciding(at, notes, next)?),
-        decided => decided,
-    };
-    Ok((rule, decided))
+    settle(at, notes, &meeting)
 }
 
 /// What holds for the answers of several rules: friction that has become kinetic is decided once more, and sliding on one

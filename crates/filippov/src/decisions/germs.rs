@@ -1,7 +1,7 @@
 //! Decide by the germs of the guards if first-order data are doubtful.
 
 use super::choice::choose;
-use super::coinciding::{coinciding_kinks, have_parallels, touch_one_another};
+use super::coinciding::Parallels;
 use super::consistency::{bends, with_those_that_jump};
 use super::departures::velocity_in;
 use super::leave_by_rule::slides_by_rule;
@@ -28,7 +28,8 @@ pub(super) fn decide_if_entangled(
     let wider = with_those_that_jump(at, notes, meeting)?;
     if wider.is_none() && !bends(at, meeting)? {
         // To rounding, surfaces that touch are one, and the rules for surfaces that cross may still apply.
-        if is_parallel(at, notes, meeting)? {
+        let parallels = Parallels::of(at, meeting.surfaces, meeting.mode)?;
+        if parallels.coincide || !parallels.touching.is_empty() {
             return Ok(decide_by_germs(at, notes, meeting)?.ok());
         }
         if !is_silent(at, notes, meeting)? {
@@ -58,19 +59,6 @@ fn is_silent(at: &Point, notes: &mut Notes, meeting: &Meeting) -> Result<bool, F
         !sticks && fields.row_range(i).iter().all(|v| v.abs() <= *noise)
     };
     Ok(noise.iter().enumerate().any(is_silent))
-}
-
-/// Are surfaces in one place, or do two touch one another?
-fn is_parallel(at: &Point, notes: &mut Notes, meeting: &Meeting) -> Result<bool, FieldError> {
-    let Meeting { surfaces, mode, .. } = *meeting;
-    if surfaces.len() < 2 || !have_parallels(at, surfaces, mode)? {
-        return Ok(false);
-    }
-    let touches = match *surfaces {
-        [j, k] => touch_one_another(at, j, k, mode)?,
-        _ => false,
-    };
-    Ok(touches || !coinciding_kinks(at, notes, mode, surfaces)?.is_empty())
 }
 
 /// Rule: first-order data are doubtful, and the viable modes are known.
@@ -243,6 +231,8 @@ fn drop_other_names(
         )?;
         velocities.push(velocity);
     }
+    let corners = at.corners(notes, meeting.surfaces, meeting.mode)?;
+    let size = corners.size();
     let stays_on = |one: &Viable, j: usize| {
         let mut left = one.left.iter();
         one.mode.entries()[j] == 0
@@ -256,9 +246,6 @@ fn drop_other_names(
             let (one, other) = (&viable[k], &viable[known]);
             let differs = |j: &&usize| one.mode.entries()[**j] != other.mode.entries()[**j];
             let mut differing = meeting.surfaces.iter().filter(differs);
-            let size = velocities[known]
-                .iter()
-                .fold(0.0_f64, |size, v| size.max(v.abs()));
             let mut pairs = velocities[k].iter().zip(&velocities[known]);
             differing.all(|&j| stays_on(one, j) && stays_on(other, j))
                 && pairs.all(|(a, b)| (a - b).abs() <= TANGENT * size)

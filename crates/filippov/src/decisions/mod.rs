@@ -34,7 +34,6 @@ mod two_fold;
 mod viable;
 
 pub(crate) use between_sides::differs_between_sides;
-pub(crate) use coinciding::surfaces_in_the_place_of_those_slid_on;
 pub(crate) use decide::{decide, Decision, RULES};
 pub(crate) use event::{add_vanishing_surfaces, located_surfaces, vanishing_surfaces, Reached};
 pub(crate) use leave_by_rule::refusal;

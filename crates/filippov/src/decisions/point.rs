@@ -116,8 +116,6 @@ pub(crate) struct Arrival<'p, 'a> {
     pub resting: &'p [usize],
     /// The surfaces that the motion is still leaving tangentially.
     pub departing: SmallVec<[usize; 2]>,
-    /// The run has met kinks in the place of other surfaces.
-    pub meets_kinks: bool,
     /// The last switches of the run.
     pub switches: &'p [Switch],
     /// How far the point lies off each surface by rounding; empty: not at all.
@@ -243,8 +241,6 @@ pub(crate) struct Notes {
     pub warnings: Vec<Warning>,
     /// How many non-unique points the run has met, those of this decision included.
     pub n_choices: usize,
-    /// Kinks were found in the place of other surfaces.
-    pub meets_kinks: bool,
     /// At a non-unique point, all modes among which one was chosen.
     pub candidates: Vec<Mode>,
     /// The motion may spiral outwards.
@@ -268,7 +264,6 @@ impl Notes {
     pub fn add_costs(&mut self, trial: &Notes) {
         self.n_field_evaluations += trial.n_field_evaluations;
         self.n_surface_evaluations += trial.n_surface_evaluations;
-        self.meets_kinks |= trial.meets_kinks;
     }
 }
 

@@ -1,7 +1,7 @@
 //! Which modes can follow at a point: those that are consistent with their own signs, and all of whose guards begin positive.
 
 use super::blow_up::beginnings;
-use super::coinciding::{coinciding_kinks, touch_one_another, Kink};
+use super::coinciding::{parting, Parallels, Touch};
 use super::consistency::{consistency, Consistency};
 use super::germ::{Germ, MotionSeries};
 use super::look_ahead::{try_mode, Trial};
@@ -10,14 +10,18 @@ use super::rule::{How, Meeting};
 use smallvec::smallvec;
 
 use crate::error::FieldError;
-use crate::field::{eval_on_side, Guard, RootEnd};
+use crate::field::{eval_on_side, normal, Guard, MeetingFields, RootEnd, Tie};
 use crate::mode::Mode;
 use crate::switching::{
+<<<<<<< HEAD
     first_nonzero, is_undetermined, stable_roots_with_border, Leading, NormalFields, TwoFold,
     TwoFoldMotion,
+=======
+    first_nonzero, is_undetermined, roots_in_cube, stable_roots_with_border, Leading, NormalFields,
+>>>>>>> touching
 };
 use crate::system::dot;
-use crate::tolerances::{AT_SIDE, DOUBTFUL, MOST_MEETING, SURFACE_NOISE, TANGENT};
+use crate::tolerances::{AT_SIDE, DOUBTFUL, MOST_MEETING, ONE_DIRECTION, SURFACE_NOISE, TANGENT};
 
 /// A mode in which a motion can go on.
 #[derive(Clone, Debug)]
@@ -96,8 +100,9 @@ pub(super) fn survey(
     };
     let pace = corners.pace(|i| at.scale.size(i, at.x[i]));
     let noise = noise_of(at, meeting, &fields)?;
-    let kinks = coinciding_kinks(at, notes, meeting.mode, meeting.surfaces)?;
-    let touches = kinks.is_empty() && touches(at, meeting)?;
+    let touching = Parallels::of(at, meeting.surfaces, meeting.mode)?.touching;
+    // Then derivatives at the point are not those where the surfaces touch.
+    let is_beside = touching.iter().any(|touch| !touch.is_exact);
     let mut found = Survey::default();
     for index in 0..3_usize.pow(m as u32) {
         let entries = (0..m).map(|i| 1 - (index / 3_usize.pow(i as u32) % 3) as i8);
@@ -105,9 +110,13 @@ pub(super) fn survey(
             return Ok(None);
         }
         let entries = Mode::new(entries.collect());
-        let Some(with_kinks) = name_kinks(meeting, &kinks, &entries) else {
+        if !corners
+            .ties()
+            .iter()
+            .all(|tie| tie.allows(entries.entries()))
+        {
             continue;
-        };
+        }
         let (mode, vanishing) = match consistency(at, notes, meeting, &entries)? {
             Consistency::Agrees { mode, vanishing } => (mode, vanishing),
             Consistency::Contradicts(j) => {
@@ -132,11 +141,6 @@ pub(super) fn survey(
             },
             false => &fields,
         };
-        let guarded: Vec<bool> = vanishing
-            .iter()
-            .zip(&with_kinks)
-            .map(|(vanishes, follows)| *vanishes && !follows)
-            .collect();
         let candidate = Candidate {
             meeting,
             fields,
@@ -144,15 +148,35 @@ pub(super) fn survey(
             pace,
             entries: &entries,
             mode: &mode,
-            guarded: &guarded,
+            guarded: &vanishing,
+            corners: &corners,
         };
-        let verdict = match entries.codimension() {
-            _ if has_ended(at, meeting, &mode) => Verdict::Fails(at.arrival.functions()[0]),
-            // Where surfaces touch to rounding, derivatives at the point are those of a point beside it.
-            2 if touches => continue,
-            _ if touches => Verdict::Open,
-            0 => of_region(at, &candidate)?,
-            _ => of_sliding(at, notes, &candidate)?,
+        let slides_on = |touch: &&Touch| touch.pair.iter().all(|&i| entries.entries()[i] == 0);
+        let verdict = if has_ended(at, meeting, &mode) {
+            Verdict::Fails(at.arrival.functions()[0])
+        } else if let Some(touch) = touching.iter().find(slides_on) {
+            match together(at, notes, &candidate, touch.pair)? {
+                Together::Never => Verdict::Fails(Guard::Surface(meeting.surfaces[touch.pair[1]])),
+                // Other rules may know.
+                Together::Perhaps => continue,
+                Together::By(fields) => {
+                    let fields = &fields;
+                    of_sliding(
+                        at,
+                        notes,
+                        &Candidate {
+                            fields,
+                            ..candidate
+                        },
+                    )?
+                }
+            }
+        } else if is_beside {
+            Verdict::Open
+        } else if entries.codimension() == 0 {
+            of_region(at, &candidate)?
+        } else {
+            of_sliding(at, notes, &candidate)?
         };
         match verdict {
             Verdict::Viable(viable) => found.viable.push(viable),
@@ -162,7 +186,7 @@ pub(super) fn survey(
                 Trial::Ends => found
                     .failing
                     .push((mode, guard_of(meeting, fields, &entries))),
-                Trial::WithinRounding if touches => {}
+                Trial::WithinRounding if is_beside => {}
                 Trial::WithinRounding => found.open.push(mode),
             },
         }
@@ -170,39 +194,8 @@ pub(super) fn survey(
     Ok(Some(found))
 }
 
-/// Which surfaces of a meeting follow another one that is slid on with these entries: kinks in its place. They keep their
-/// side; with another entry it is the same mode once more, and `None`.
-fn name_kinks(meeting: &Meeting, kinks: &[Kink], entries: &Mode) -> Option<Vec<bool>> {
-    let place = |j: usize| meeting.surfaces.iter().position(|&k| k == j);
-    let mut follows = vec![false; meeting.surfaces.len()];
-    for kink in kinks {
-        let (Some(own), Some(beside)) = (place(kink.surface), place(kink.beside)) else {
-            continue;
-        };
-        let entry = entries.entries()[own];
-        if entry == 0 {
-            return None;
-        }
-        if entries.entries()[beside] == 0 {
-            let kept = meeting.mode.entries()[kink.surface];
-            if entry != if kept == 0 { 1 } else { kept } {
-                return None;
-            }
-            follows[own] = true;
-        }
-    }
-    Some(follows)
-}
-
-/// Two surfaces that touch one another and are not in one place: no motion stays on both.
-fn touches(at: &Point, meeting: &Meeting) -> Result<bool, FieldError> {
-    match *meeting.surfaces {
-        [j, k] => touch_one_another(at, j, k, meeting.mode),
-        _ => Ok(false),
-    }
-}
-
 /// A mode that agrees with all switching functions.
+#[derive(Clone, Copy)]
 struct Candidate<'c> {
     meeting: &'c Meeting<'c>,
     fields: &'c NormalFields,
@@ -212,14 +205,70 @@ struct Candidate<'c> {
     /// On the surfaces of the meeting.
     entries: &'c Mode,
     mode: &'c Mode,
-    /// Of which surfaces of the meeting is the function a guard: it vanishes here, and not all along the motion?
+    /// Of which surfaces of the meeting is the function a guard: does it vanish here?
     guarded: &'c [bool],
+    corners: &'c MeetingFields,
 }
 
 /// Is this the mode of a motion that one of its own exit functions has just ended?
 fn has_ended(at: &Point, meeting: &Meeting, mode: &Mode) -> bool {
     let is_touch = matches!(at.arrival.cause, Cause::Event { touch: true, .. });
     meeting.is_exit() && !is_touch && mode == meeting.mode && !at.arrival.functions().is_empty()
+}
+
+/// Do multipliers hold a motion on two surfaces that touch?
+enum Together {
+    /// Whatever they are, it parts the surfaces.
+    Never,
+    Perhaps,
+    /// They solve the equations with these normal components: those of the second surface are divided by their power.
+    By(NormalFields),
+}
+
+/// Sliding on two surfaces that touch: to first order they are one, and the equation of the second is that of what they have
+/// in common beside the point.
+fn together(
+    at: &Point,
+    notes: &mut Notes,
+    candidate: &Candidate,
+    [i, k]: [usize; 2],
+) -> Result<Together, FieldError> {
+    let Candidate {
+        meeting,
+        entries,
+        mode,
+        ..
+    } = *candidate;
+    let pair = [i, k].map(|i| meeting.surfaces[i]);
+    let Some((normal, is_odd)) = parting(at, pair, mode)? else {
+        return Ok(Together::Perhaps);
+    };
+    let mut corners = at.corners(notes, meeting.surfaces, mode)?;
+    corners.set_normal(k, &normal);
+    let Ok(fields) = corners.normal_fields() else {
+        return Ok(Together::Perhaps);
+    };
+    let face = fields
+        .restrict(entries.entries())
+        .enlarged(1.0 + ONE_DIRECTION);
+    let noise = DOUBTFUL * face.size();
+    let ranges: Vec<[f64; 2]> = (0..face.m()).map(|row| face.row_range(row)).collect();
+    if ranges
+        .iter()
+        .any(|[low, high]| *low > noise || *high < -noise)
+    {
+        return Ok(Together::Never);
+    }
+    if ranges.iter().any(|[low, high]| high - low <= noise) {
+        return Ok(Together::Perhaps);
+    }
+    let roots = roots_in_cube(&face);
+    Ok(match roots.complete && roots.points.is_empty() {
+        true => Together::Never,
+        // After an even power no region lies between the surfaces on one side.
+        false if !is_odd => Together::Perhaps,
+        false => Together::By(fields),
+    })
 }
 
 fn of_region(at: &Point, candidate: &Candidate) -> Result<Verdict, FieldError> {
@@ -230,6 +279,7 @@ fn of_region(at: &Point, candidate: &Candidate) -> Result<Verdict, FieldError> {
         entries,
         mode,
         guarded,
+        corners,
         ..
     } = *candidate;
     let signs = mode.signs();
@@ -247,6 +297,23 @@ fn of_region(at: &Point, candidate: &Candidate) -> Result<Verdict, FieldError> {
             continue;
         }
         let side = mode.entries()[j];
+        if let Some(tie) = corners.ties().iter().find(|tie| tie.follower == i) {
+            let leader = meeting.surfaces[tie.leader];
+            let [one, other] = [leader, j].map(|j| normal(at.system, (at.t, at.x), j, &signs));
+            let (one, other) = (one?, other?);
+            let ratio = dot(&one, &other) / dot(&one, &one);
+            let of_leader = viable.left.iter().find_map(|left| match left {
+                Left::Surface(k, leading) if *k == leader => Some(*leading),
+                _ => None,
+            });
+            viable
+                .left
+                .extend(of_leader.map(|Leading { order, value }| {
+                    let value = ratio * value;
+                    Left::Surface(j, Leading { order, value })
+                }));
+            continue;
+        }
         let leading = match (g[i].abs() > noise[i], &series) {
             (true, _) if g[i] * f64::from(side) < 0.0 => {
                 return Ok(Verdict::Fails(Guard::Surface(j)));
@@ -489,6 +556,7 @@ fn at_root(at: &Point, candidate: &Candidate, lambda: &[f64]) -> Result<Verdict,
         entries,
         mode,
         guarded,
+        corners,
         ..
     } = *candidate;
     let mut next = lambda.iter();
@@ -536,6 +604,9 @@ fn at_root(at: &Point, candidate: &Candidate, lambda: &[f64]) -> Result<Verdict,
     if tangent.is_empty() && ends.is_empty() {
         return Ok(Verdict::Viable(viable));
     }
+    if let ([tie], [], 2) = (corners.ties(), &tangent[..], lambda.len()) {
+        return at_tied_end(at, candidate, viable, *tie);
+    }
     let Some(series) = MotionSeries::of(at, mode, lambda, candidate.pace) else {
         return Ok(Verdict::Open);
     };
@@ -547,7 +618,9 @@ fn at_root(at: &Point, candidate: &Candidate, lambda: &[f64]) -> Result<Verdict,
                 viable.left.push(Left::Surface(j, leading))
             }
             Germ::Begins(_) => return Ok(Verdict::Fails(Guard::Surface(j))),
-            Germ::Zero if is_neutral(fields, noise, entries.entries(), i) => {
+            Germ::Zero
+                if !corners.depends_on(i) || is_neutral(fields, noise, entries.entries(), i) =>
+            {
                 viable.is_strict = false;
                 viable.left.push(Left::Surface(
                     j,
@@ -578,6 +651,55 @@ fn at_root(at: &Point, candidate: &Candidate, lambda: &[f64]) -> Result<Verdict,
             // The multiplier stays at its end.
             Germ::Zero => viable.is_strict = false,
             Germ::Unknown => return Ok(Verdict::Open),
+        }
+    }
+    Ok(Verdict::Viable(viable))
+}
+
+/// Sliding on two surfaces in one place that begins with multipliers at their ends: the motion is that of one region, which
+/// has to lead back to the surfaces.
+fn at_tied_end(
+    at: &Point,
+    candidate: &Candidate,
+    mut viable: Viable,
+    tie: Tie,
+) -> Result<Verdict, FieldError> {
+    let Candidate {
+        meeting,
+        fields,
+        entries,
+        mode,
+        ..
+    } = *candidate;
+    let side: i8 = if viable.multipliers[0] < 0.0 { -1 } else { 1 };
+    let sides = [(tie.leader, 1), (tie.follower, tie.sense)];
+    let (mut region, mut beyond) = (mode.clone(), entries.clone());
+    for (i, sense) in sides {
+        region.set(meeting.surfaces[i], sense * side);
+        beyond.set(i, -sense * side);
+    }
+    let Some(series) = MotionSeries::of(at, &region, &[], candidate.pace) else {
+        return Ok(Verdict::Open);
+    };
+    let held = fields.in_region(beyond.entries())[tie.leader];
+    match series.of_surface(at, meeting.surfaces[tie.leader])? {
+        Germ::Unknown => return Ok(Verdict::Open),
+        Germ::Zero => viable.is_strict = false,
+        Germ::Begins(leading) => {
+            let order = leading.order - 1;
+            let value = 2.0 * leading.value.abs() / held.abs();
+            for (i, sense) in sides {
+                let (surface, end) = (meeting.surfaces[i], sense * side);
+                let guard = Guard::Multiplier { surface, end };
+                if leading.sign() == side {
+                    return Ok(Verdict::Fails(guard));
+                }
+                if order > 0 {
+                    viable
+                        .left
+                        .push(Left::Exit(guard, Leading { order, value }));
+                }
+            }
         }
     }
     Ok(Verdict::Viable(viable))

@@ -1,17 +1,21 @@
 //! All fields that meet at an intersection, with their normal components.
 
-use super::eval_on_side;
 use super::weights::product_weights;
+use super::{eval_on_side, parallel, sense_of, Tie};
 use crate::error::FieldError;
 use crate::switching::{Matrix, NormalFields, SignGroup, Undecided};
 use crate::system::{dot, PiecewiseSystem};
-use crate::tolerances::{TANGENT, TANGENT_TO_ALL};
+use crate::tolerances::{MOST_MEETING, TANGENT, TANGENT_TO_ALL};
 
 /// The fields around an intersection of m surfaces, and the gradients of the switching functions.
 ///
 /// Where the field is a sum of functions of groups of signs ([`PiecewiseSystem::sign_groups`]), 2^|group| fields
 /// of each group are evaluated, with the signs of the other groups at -1, and kept as differences to the field with
 /// all signs at -1; only the first group is kept as it is. Then sums over all groups are those of the fields.
+///
+/// Of the regions around two surfaces in one place two exist. The others get the mean of these two fields, so that the
+/// combination of all is that of the two, as Filippov has it; and the second row gets a term that vanishes where both
+/// multipliers agree, and leads there.
 #[derive(Clone, Debug)]
 pub struct MeetingFields {
     set: Vec<usize>,
@@ -26,6 +30,8 @@ pub struct MeetingFields {
     gradients: Vec<f64>,
     time_derivatives: Vec<f64>,
     signs: Vec<f64>,
+    /// Surfaces in one place, since the first evaluation.
+    ties: Option<Vec<Tie>>,
 }
 
 impl MeetingFields {
@@ -61,7 +67,13 @@ impl MeetingFields {
             gradients: vec![0.0; n * m],
             time_derivatives: vec![0.0; m],
             signs: Vec::new(),
+            ties: None,
         }
+    }
+
+    /// The surfaces that are in the place of others.
+    pub fn ties(&self) -> &[Tie] {
+        self.ties.as_deref().unwrap_or_default()
     }
 
     /// The surfaces.
@@ -129,7 +141,92 @@ impl MeetingFields {
                 }
             }
         }
+        if self.ties.is_none() {
+            let ties = self.find_ties(system, (t, x), signs)?;
+            let is_split = !ties.is_empty() && !self.has_all_patterns();
+            if is_split {
+                *self = MeetingFields::of_all_patterns(system, &self.set);
+            }
+            self.ties = Some(ties);
+            if is_split {
+                return Ok(evaluations + self.evaluate(system, t, x, signs)?);
+            }
+        }
+        self.tie();
         Ok(evaluations)
+    }
+
+    fn find_ties(
+        &self,
+        system: &dyn PiecewiseSystem,
+        place: (f64, &[f64]),
+        signs: &[f64],
+    ) -> Result<Vec<Tie>, FieldError> {
+        let mut ties: Vec<Tie> = Vec::new();
+        let m = self.set.len();
+        if m > MOST_MEETING {
+            return Ok(ties);
+        }
+        for (leader, follower) in (0..m).flat_map(|i| (i + 1..m).map(move |k| (i, k))) {
+            let is_tied = |tie: &Tie| tie.follower == follower || tie.follower == leader;
+            if ties.iter().any(is_tied) || !self.has_parallel(leader, follower) {
+                continue;
+            }
+            let pair = [self.set[leader], self.set[follower]];
+            if let Some(sense) = sense_of(system, place, pair, signs)? {
+                ties.push(Tie {
+                    leader,
+                    follower,
+                    sense,
+                });
+            }
+        }
+        Ok(ties)
+    }
+
+    /// Have two surfaces of the set the same normal?
+    fn has_parallel(&self, i: usize, k: usize) -> bool {
+        let [one, other] = [i, k].map(|i| {
+            let mut row = self.gradients[i * self.n..(i + 1) * self.n].to_vec();
+            row.push(self.time_derivatives[i]);
+            row
+        });
+        parallel(&one, &other)
+    }
+
+    /// Fills in what stands for the regions that do not exist.
+    fn tie(&mut self) {
+        let (n, m) = (self.n, self.set.len());
+        for tie in self.ties.iter().flatten() {
+            let row = self.components.iter().skip(tie.follower).step_by(m);
+            let size = row.fold(0.0_f64, |size, v| size.max(v.abs()));
+            for pattern in (0..1_usize << m).filter(|pattern| !tie.holds(*pattern)) {
+                let (one, other) = (pattern ^ 1 << tie.leader, pattern ^ 1 << tie.follower);
+                let mean = |rows: &mut [f64], width: usize| {
+                    for k in 0..width {
+                        let sum = rows[one * width + k] + rows[other * width + k];
+                        rows[pattern * width + k] = 0.5 * sum;
+                    }
+                };
+                mean(&mut self.fields, n);
+                mean(&mut self.components, m);
+                let is_up = pattern >> tie.follower & 1 == 1;
+                let push = if is_up { -2.0 * size } else { 2.0 * size };
+                self.components[pattern * m + tie.follower] += push;
+            }
+        }
+    }
+
+    /// Takes another normal, its derivative in time last, for surface `i` of the set.
+    pub fn set_normal(&mut self, i: usize, normal: &[f64]) {
+        let (n, m) = (self.n, self.set.len());
+        self.gradients[i * n..(i + 1) * n].copy_from_slice(&normal[..n]);
+        self.time_derivatives[i] = normal[n];
+        let first = 1_usize << self.groups[0].len();
+        for (row, field) in self.fields.chunks_exact(n).enumerate() {
+            let of_time = if row < first { normal[n] } else { 0.0 };
+            self.components[row * m + i] = of_time + dot(&normal[..n], field);
+        }
     }
 
     /// Evaluates the field at the present signs, as a difference to the first one if so asked.
@@ -192,32 +289,20 @@ impl MeetingFields {
         Ok(self.normal_fields()?.scaled(&factors))
     }
 
-    /// Does the field depend on the sign of surface `i` of the set, by more than rounding?
+    /// The largest component of all fields.
+    pub fn size(&self) -> f64 {
+        self.fields.iter().fold(0.0, |size, v| v.abs().max(size))
+    }
+
+    /// Does the field depend on the sign of surface `i`, by more than rounding? Asked where all patterns are held one by one.
     pub fn depends_on(&self, i: usize) -> bool {
-        let size = self
-            .fields
-            .iter()
-            .fold(0.0_f64, |size, v| size.max(v.abs()));
-        let mut first = 0;
-        for group in &self.groups {
-            let patterns = 0..1_usize << group.len();
-            let start = first;
-            first += patterns.len();
-            let Some(bit) = group.iter().position(|&member| member == i) else {
-                continue;
-            };
-            return patterns
-                .filter(|pattern| pattern >> bit & 1 == 1)
-                .any(|up| {
-                    let (up, down) = (
-                        self.field(start + up),
-                        self.field(start + (up ^ (1 << bit))),
-                    );
-                    let mut pairs = up.iter().zip(down);
-                    pairs.any(|(a, b)| (a - b).abs() > TANGENT * size)
-                });
-        }
-        false
+        let noise = TANGENT * self.size();
+        let mut up = (0..1_usize << self.set.len()).filter(|pattern| pattern >> i & 1 == 1);
+        !self.has_all_patterns()
+            || up.any(|up| {
+                let mut pairs = self.field(up).iter().zip(self.field(up ^ 1 << i));
+                pairs.any(|(a, b)| (a - b).abs() > noise)
+            })
     }
 
     /// The surfaces, counted within the set, whose equation says anything about the multipliers. To the others

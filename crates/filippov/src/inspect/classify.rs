@@ -161,7 +161,6 @@ pub fn classify(
         active: &active,
         resting: &[],
         departing: SmallVec::new(),
-        meets_kinks: false,
         switches: &[],
         residuals: &residuals,
         passing: &[],

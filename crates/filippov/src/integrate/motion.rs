@@ -61,8 +61,6 @@ pub(super) struct Motion<'a> {
     /// Surfaces whose functions were found to be zero in this mode, and that neither rest nor are slid on: they stay
     /// monitored, and are not settled on again.
     pub settled: SmallVec<[usize; 2]>,
-    /// This run has met kinks in the place of other surfaces.
-    pub meets_kinks: bool,
     actions: &'a Actions<'a>,
     /// The side of every surface on which the motion is; where its entry is 0, that on which it was last: the side
     /// of a contact.
@@ -100,7 +98,6 @@ impl<'a> Motion<'a> {
             law,
             resting: SmallVec::new(),
             settled: SmallVec::new(),
-            meets_kinks: false,
             actions,
             sides: actions.sides_at_start(signs.len()).collect(),
             passed: Vec::new(),

@@ -1,7 +1,7 @@
 //! Surfaces whose functions are zero all along the motion: those that neither field leaves, and those in the place of the
 //! one slid on.
 
-use crate::decisions::{surfaces_in_the_place_of_those_slid_on, Left};
+use crate::decisions::Left;
 use crate::error::FieldError;
 use crate::field::{Guard, ModeField, Projector, SlidingSet};
 use crate::integrate::integrator::Integrator;
@@ -116,27 +116,6 @@ impl Integrator<'_> {
             self.warn_zero_surface(j, &self.motion.mode.clone());
         }
         Ok(stop)
-    }
-
-    /// Notes the surfaces that are in the place of those slid on: they vanish all along the motion, and are no events.
-    pub(in crate::integrate) fn rest_on_coinciding(&mut self) -> Result<(), FieldError> {
-        if !(self.system.has_nested_signs() || self.motion.meets_kinks) {
-            return Ok(());
-        }
-        let (place, motion) = ((self.t, &self.x[..]), &mut self.motion);
-        let found = surfaces_in_the_place_of_those_slid_on(
-            self.system,
-            place,
-            &motion.mode,
-            &motion.active,
-        )?;
-        for k in found {
-            if !motion.resting.contains(&k) {
-                motion.resting.push(k);
-                motion.monitored.retain(|m| m.guard != Guard::Surface(k));
-            }
-        }
-        Ok(())
     }
 
     /// Warns where a motion begins at a root around which the regularised motion oscillates.

@@ -47,7 +47,6 @@ impl<'a> Integrator<'a> {
             active: &self.motion.active,
             resting: &self.motion.resting,
             departing,
-            meets_kinks: self.motion.meets_kinks,
             switches: self.recorder.switches(),
             residuals: &self.residuals,
             passing: &self.passing,
@@ -76,7 +75,6 @@ impl<'a> Integrator<'a> {
         self.stats.n_field_evaluations += notes.n_field_evaluations;
         self.stats.n_surface_evaluations += notes.n_surface_evaluations;
         self.n_choices = notes.n_choices;
-        self.motion.meets_kinks |= notes.meets_kinks;
         // What an interrupted decision warns of need not hold.
         if !notes.warnings.is_empty() && self.watch.stop().is_none() {
             self.warnings.append(&mut notes.warnings);
@@ -427,7 +425,6 @@ impl<'a> Integrator<'a> {
             _ => {}
         }
         self.motion.project(self.t, &mut self.x)?;
-        self.rest_on_coinciding()?;
         self.evaluate_start()?;
         if self.motion.sliding.len() > 1 {
             self.note_oscillation();

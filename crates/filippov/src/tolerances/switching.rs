@@ -255,6 +255,9 @@ pub const BESIDE: f64 = 1e-3;
 /// ... and how far apart they may be there, in units of the gradient: far below the square of that distance.
 pub const COINCIDE: f64 = 1e-11;
 
+/// Surfaces that touch part in one direction if two places beside the point show the same to this, far above [`BESIDE`].
+pub const ONE_DIRECTION: f64 = 1e-2;
+
 /// Sliding has come to a two-fold where both normal components vanish within this multiple of the tolerance: then errors
 /// of some steps make up the multiplier.
 pub const AT_TWO_FOLD: f64 = 10.0;

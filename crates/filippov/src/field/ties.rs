@@ -1,0 +1,127 @@
+//! Surfaces in one place: functions that vanish together, as x and x (1 + y) do.
+
+use super::Projector;
+use crate::error::FieldError;
+use crate::system::{dot, PiecewiseSystem};
+use crate::tolerances::{BESIDE, COINCIDE, TANGENT};
+
+/// Two surfaces in one place: of the four regions around them two exist.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tie {
+    /// Counted within a set.
+    pub leader: usize,
+    /// Counted within a set.
+    pub follower: usize,
+    /// Have the functions the same sign (+1), or opposite ones (-1)?
+    pub sense: i8,
+}
+
+impl Tie {
+    /// Do the signs of both surfaces agree in this pattern?
+    pub fn holds(&self, pattern: usize) -> bool {
+        let are_equal = pattern >> self.leader & 1 == pattern >> self.follower & 1;
+        are_equal == (self.sense > 0)
+    }
+
+    /// Is this a mode of motion: on both surfaces, or in a region that exists?
+    pub fn allows(&self, entries: &[i8]) -> bool {
+        entries[self.follower] == self.sense * entries[self.leader]
+    }
+}
+
+/// Have the functions of two surfaces in one place the same sign (+1), or opposite ones (-1)? `None` if they are not in one
+/// place, or if that differs between the sides of the first one, whose sign the second may contain.
+///
+/// # Errors
+/// If a function of the user raises.
+pub fn sense_of(
+    system: &dyn PiecewiseSystem,
+    (t, x): (f64, &[f64]),
+    [j, k]: [usize; 2],
+    signs: &[f64],
+) -> Result<Option<i8>, FieldError> {
+    let (mut signs, mut senses) = (signs.to_vec(), [0; 2]);
+    for (sense, side) in senses.iter_mut().zip([-1.0, 1.0]) {
+        signs[j] = side;
+        let [one, other] = [j, k].map(|j| normal(system, (t, x), j, &signs));
+        let (one, other) = (one?, other?);
+        if !parallel(&one, &other) || in_the_place_of(system, (t, x), j, &[k], &signs)?.is_empty() {
+            return Ok(None);
+        }
+        *sense = dot(&one, &other)
+            .partial_cmp(&0.0)
+            .map_or(0, |order| order as i8);
+    }
+    let [minus, plus] = senses;
+    Ok((minus == plus && plus != 0).then_some(plus))
+}
+
+/// Those of `others` whose functions vanish where that of surface j does, around the place.
+///
+/// # Errors
+/// If a function of the user raises.
+pub fn in_the_place_of(
+    system: &dyn PiecewiseSystem,
+    (t, x): (f64, &[f64]),
+    j: usize,
+    others: &[usize],
+    signs: &[f64],
+) -> Result<Vec<usize>, FieldError> {
+    // Beside the place, so that surfaces that only touch are told apart.
+    let (later, beside) = beside_on(system, (t, x), j, signs, 1.0)?;
+    let mut h = [(); 2].map(|()| vec![0.0; signs.len()]);
+    system.surfaces(later, &beside, signs, &mut h[0])?;
+    system.surfaces(t, x, signs, &mut h[1])?;
+    let (mut found, mut gradient) = (Vec::new(), vec![0.0; beside.len()]);
+    for &k in others {
+        let rate = system.gradient(k, later, &beside, signs, &mut gradient)?;
+        let size = rate.abs() + gradient.iter().fold(0.0_f64, |sum, g| sum + g.abs());
+        // One with a multiple zero has no gradient there.
+        if h[0][k].abs().max(h[1][k].abs()) <= COINCIDE * size {
+            found.push(k);
+        }
+    }
+    Ok(found)
+}
+
+/// A place beside this one on surface j, a little later if `side` is +1, and before if it is -1.
+///
+/// # Errors
+/// If a function of the user raises.
+pub fn beside_on(
+    system: &dyn PiecewiseSystem,
+    (t, x): (f64, &[f64]),
+    j: usize,
+    signs: &[f64],
+    side: f64,
+) -> Result<(f64, Vec<f64>), FieldError> {
+    let later = t + side * BESIDE * (1.0 + t.abs());
+    let shifts = (0..x.len()).map(|i| side * BESIDE * (1.0 + side / (2.0 + i as f64)));
+    let pairs = x.iter().zip(shifts);
+    let mut beside: Vec<f64> = pairs.map(|(x, d)| x + d * (1.0 + x.abs())).collect();
+    let mut projector = Projector::new(beside.len(), signs.len());
+    projector.project(system, j, later, &mut beside, signs)?;
+    Ok((later, beside))
+}
+
+/// The normal of a surface in time and space: the gradient, then the derivative in time.
+///
+/// # Errors
+/// If a function of the user raises.
+pub fn normal(
+    system: &dyn PiecewiseSystem,
+    (t, x): (f64, &[f64]),
+    j: usize,
+    signs: &[f64],
+) -> Result<Vec<f64>, FieldError> {
+    let n = x.len();
+    let mut row = vec![0.0; n + 1];
+    row[n] = system.gradient(j, t, x, signs, &mut row[..n])?;
+    Ok(row)
+}
+
+/// Are two normals the same, up to their lengths, or is one zero?
+pub fn parallel(one: &[f64], other: &[f64]) -> bool {
+    let (product, squares) = (dot(one, other), dot(one, one) * dot(other, other));
+    squares - product * product <= TANGENT * squares
+}
