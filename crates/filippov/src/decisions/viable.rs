@@ -13,12 +13,8 @@ use crate::error::FieldError;
 use crate::field::{eval_on_side, normal, Guard, MeetingFields, RootEnd, Tie};
 use crate::mode::Mode;
 use crate::switching::{
-<<<<<<< HEAD
-    first_nonzero, is_undetermined, stable_roots_with_border, Leading, NormalFields, TwoFold,
-    TwoFoldMotion,
-=======
     first_nonzero, is_undetermined, roots_in_cube, stable_roots_with_border, Leading, NormalFields,
->>>>>>> touching
+    TwoFold, TwoFoldMotion,
 };
 use crate::system::dot;
 use crate::tolerances::{AT_SIDE, DOUBTFUL, MOST_MEETING, ONE_DIRECTION, SURFACE_NOISE, TANGENT};

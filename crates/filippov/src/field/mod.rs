@@ -30,11 +30,8 @@ pub use motion::Motion;
 pub use project::Projector;
 pub use region::{eval_off_surface, eval_on_side, move_inside, side_offsets, RegionField};
 pub use sliding::{NormalComponents, SlidingField};
-<<<<<<< HEAD
-pub(crate) use weights::product_weights;
-=======
 pub(crate) use ties::{beside_on, in_the_place_of, normal, parallel, sense_of, Tie};
->>>>>>> touching
+pub(crate) use weights::product_weights;
 
 use crate::error::FieldError;
 
