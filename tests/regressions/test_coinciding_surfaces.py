@@ -1,4 +1,4 @@
-"""A kink, as of a maximum, in the place of another surface: the motion slides on both, the kink has no say."""
+"""A kink, as of a maximum, in the place of another surface: the motion slides on both."""
 
 from __future__ import annotations
 

@@ -107,7 +107,7 @@ pub(super) fn decide_undecided(
 }
 
 /// The viable mode that follows. If there is none, what is known of all modes.
-fn decide_by_germs(
+pub(super) fn decide_by_germs(
     at: &Point,
     notes: &mut Notes,
     meeting: &Meeting,

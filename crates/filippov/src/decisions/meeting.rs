@@ -2,7 +2,7 @@
 
 use super::choice::{asked, choose};
 use super::departures::departures;
-use super::germs::decide_undecided;
+use super::germs::{decide_by_germs, decide_undecided};
 use super::point::{Decided, Lefts, Next, Notes, Point};
 use super::rule::{How, Meeting};
 use super::settle::place_on;
@@ -12,8 +12,8 @@ use crate::field::{Guard, MeetingFields, ModeField, RootEnd};
 use crate::mode::Mode;
 use crate::status::Stop;
 use crate::switching::{
-    admissible_within, has_one_mode_only, merged_root, resolve_within, Continuation, ExitKind,
-    Incoming, NormalFields, Resolution, Undecided,
+    admissible_within, has_one_mode_only, merged_root, resolve_within, stable_roots_with_border,
+    Continuation, ExitKind, Incoming, NormalFields, Resolution, Undecided,
 };
 use crate::tolerances::{MOST_LISTED, MOST_MEETING};
 
@@ -216,6 +216,11 @@ fn follow(
         Ok(resolution) if !resolution.degenerate => resolution,
         other => return decide_undecided(at, notes, place, other.err()),
     };
+    if !has_root(fields, &resolution, at) {
+        if let Ok(decided) = decide_by_germs(at, notes, place)? {
+            return Ok(decided);
+        }
+    }
     notes.leaf = resolution.leaf;
     notes.spirals = resolution.candidates.contains(&Continuation::OutwardSpiral);
     let on_all = |k: &Mode| place.on_all(k);
@@ -269,6 +274,19 @@ fn follow(
         start.multipliers = multipliers.to_vec();
     }
     Ok(Ok(next))
+}
+
+/// Is there a root of its own with which the motion slides on two surfaces? The hidden dynamics may end on a line of them.
+fn has_root(fields: &MeetingFields, resolution: &Resolution, at: &Point) -> bool {
+    let Some(mode) = resolution.mode().filter(|mode| mode.codimension() == 2) else {
+        return true;
+    };
+    let roots = |fields: NormalFields| {
+        stable_roots_with_border(&fields.restrict(mode.entries()), at.patience)
+    };
+    fields
+        .normal_fields()
+        .is_ok_and(|fields| !roots(fields).is_empty())
 }
 
 /// All attracting continuations at an intersection of three surfaces that is reached, whatever the regularisation selects:
