@@ -16,7 +16,7 @@ _LISTS = "A mode that is not viable is among the candidates"
 # Of each family the kinds of difference, a sentence each; `python -m oracles --record` writes the seeds.
 KNOWN_DIFFERENCES: dict[str, dict[str, str]] = {
     "tangencies": {
-        "run ends": "Sliding with normal components of order t^3 is too stiff for the steps that are allowed.",
+        "run ends": "Sliding with normal components of order t^3 is too stiff for the allowed steps.",
         "arrival run": "At a multiple zero, all derivatives of second order of one side are rounding.",
     },
     "surfaces in one place": {

@@ -122,7 +122,10 @@ def motions(model: Model, entries: Entries) -> list[list[Series]]:
     with localcontext() as context:
         context.prec = DIGITS
         mode = _Mode.of(model, entries, False)
-        if mode is None or mode.verdict() is not Verdict.VIABLE or mode.has_families:
+        try:
+            if mode is None or mode.verdict() is not Verdict.VIABLE or mode.has_families:
+                return []
+        except _NotSure:  # on a curved surface less is known of a mode than on a straight one
             return []
         return [mode._motion(root, orders, ORDER)[0][1:] for root, orders in mode.viable]
 

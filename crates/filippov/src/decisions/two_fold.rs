@@ -34,6 +34,11 @@ pub(crate) fn two_fold_here(at: &Point) -> Result<Option<(f64, Vec<f64>)>, Field
     let pairs = along_minus.iter().zip(&along_plus);
     let gradient: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
     let tolerance = at.scale.along(&gradient, &x);
+    let size = dot_magnitude(&along_minus, &x) + dot_magnitude(&along_plus, &x);
+    let rounding = TANGENT * (size + (minus.time.abs() + plus.time.abs()) * at.t.abs());
+    if distance.abs() <= rounding {
+        return Ok(Some((at.t, at.x.to_vec())));
+    }
     if distance.abs() > AT_TWO_FOLD * tolerance {
         return Ok(None);
     }
