@@ -272,18 +272,35 @@ impl NormalFields {
         self.map(|group, _, j, value| if group == 0 { value + by[j] } else { value })
     }
 
+    /// The columns p of G at the vertices of the cube, each once; it depends on the other multipliers of one group only.
+    pub(crate) fn columns(&self, p: usize) -> impl Iterator<Item = Vec<f64>> + '_ {
+        let own = self.groups.iter().find_map(|group| {
+            let bit = group.members.iter().position(|&i| i == p)?;
+            Some((group, 1 << bit))
+        });
+        own.into_iter().flat_map(move |(group, bit)| {
+            let patterns = (0..1_usize << group.members.len()).filter(move |k| k & bit == 0);
+            patterns.map(move |k| {
+                let pairs = group.at(k | bit, self.m).iter().zip(group.at(k, self.m));
+                pairs.map(|(plus, minus)| 0.5 * (plus - minus)).collect()
+            })
+        })
+    }
+
     /// Is g affine in lambda, up to rounding? So it is where each sign enters the field by a term of
     /// its own, as friction does.
     pub fn is_affine(&self) -> bool {
-        self.groups.iter().all(|group| {
-            let corner = group.at(0, self.m);
-            (0..1_usize << group.members.len()).all(|pattern| {
-                (0..self.m).all(|j| {
-                    let bits = (0..group.members.len()).filter(|i| pattern >> i & 1 == 1);
-                    let sum: f64 = bits.map(|i| group.at(1 << i, self.m)[j] - corner[j]).sum();
-                    let rounding = 16.0 * f64::EPSILON * self.row_size(j);
-                    (group.at(pattern, self.m)[j] - corner[j] - sum).abs() <= rounding
-                })
+        let rounding: Vec<f64> = (0..self.m)
+            .map(|j| 16.0 * f64::EPSILON * self.row_size(j))
+            .collect();
+        (0..self.m).all(|p| {
+            let mut columns = self.columns(p);
+            let first = columns.next().unwrap_or_default();
+            columns.all(|column| {
+                let pairs = column.iter().zip(&first).zip(&rounding);
+                pairs
+                    .into_iter()
+                    .all(|((a, b), rounding)| (a - b).abs() <= *rounding)
             })
         })
     }
@@ -338,11 +355,6 @@ impl NormalFields {
             }
         }
         mapped
-    }
-
-    /// Other surfaces with these groups.
-    pub(crate) fn with_groups(&self, m: usize, groups: Vec<SignGroup>) -> NormalFields {
-        NormalFields { m, groups }.with_few_joined()
     }
 
     /// One or two surfaces have closed forms, for all of their patterns: their groups joined.

@@ -231,25 +231,15 @@ impl SearchBox {
         })
     }
 
-    /// The largest row sum of |I - inverse G| over the box, entry by entry at the vertices. A column of G depends
-    /// on the multipliers of one group.
+    /// The largest row sum of |I - inverse G| over the box, entry by entry at the vertices.
     fn largest_row_deviation(&self, inverse: &Matrix) -> f64 {
         let m = self.fields.m();
         let mut deviation = Matrix::zeros(m);
-        for group in self.fields.groups() {
-            for pattern in 0..1_usize << group.members.len() {
-                let mut vertex = vec![0.0; m];
-                for (bit, &i) in group.members.iter().enumerate() {
-                    vertex[i] = if pattern >> bit & 1 == 1 { 1.0 } else { -1.0 };
-                }
-                for &p in &group.members {
-                    let column = self.fields.derivative(&vertex, p);
-                    for i in 0..m {
-                        let unit = if i == p { 1.0 } else { 0.0 };
-                        let product: f64 = (0..m).map(|k| inverse[(i, k)] * column[k]).sum();
-                        let here = (unit - product).abs();
-                        deviation[(i, p)] = deviation[(i, p)].max(here);
-                    }
+        for p in 0..m {
+            for column in self.fields.columns(p) {
+                for (i, product) in newton_step(inverse, &column).into_iter().enumerate() {
+                    let unit = if i == p { 1.0 } else { 0.0 };
+                    deviation[(i, p)] = deviation[(i, p)].max((unit - product).abs());
                 }
             }
         }

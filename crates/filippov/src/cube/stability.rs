@@ -3,6 +3,7 @@
 //! All questions are asked of the strongly coupled parts of G: it is block triangular in them, and its eigenvalues
 //! are theirs. With groups of surfaces that do not know of each other the parts are small.
 
+use super::normal_fields::NormalFields;
 use super::p_matrix::is_p_matrix;
 use super::small_matrix::Matrix;
 use crate::sparse::SparseRows;
@@ -134,11 +135,25 @@ fn decay(matrix: &Matrix) -> f64 {
     -logarithm
 }
 
-/// Are all principal minors of -G positive? If G is constant, as for fields that are affine in the
-/// signs, then exactly one mode is consistent (Gale, Nikaido 1965).
-pub fn is_negative_p_matrix(jacobian: &Matrix) -> bool {
-    let m = jacobian.n();
-    let rows = (0..m).map(|i| (0..m).map(|j| -jacobian[(i, j)]).collect());
-    let rows: Vec<Vec<f64>> = rows.collect();
-    is_p_matrix(&SparseRows::from_dense(&rows)) == Some(true)
+/// Is exactly one mode consistent, as -G is a P-matrix all over the cube (Gale, Nikaido 1965)?
+///
+/// For affine fields by their constant G; else if the comparison matrix of all -G in the cube, with the least entries on the
+/// diagonal and the largest magnitudes beside it, is an M-matrix.
+pub fn has_one_mode_only(fields: &NormalFields) -> bool {
+    let (m, is_affine) = (fields.m(), fields.is_affine());
+    let mut bound = vec![vec![0.0_f64; m]; m];
+    for p in 0..m {
+        for (k, column) in fields.columns(p).enumerate() {
+            for (j, value) in column.into_iter().enumerate() {
+                let entry = &mut bound[j][p];
+                *entry = match (k, j == p) {
+                    _ if is_affine => -value,
+                    (0, true) => -value,
+                    (_, true) => entry.min(-value),
+                    (_, false) => entry.min(-value.abs()),
+                };
+            }
+        }
+    }
+    is_p_matrix(&SparseRows::from_dense(&bound)) == Some(true)
 }
