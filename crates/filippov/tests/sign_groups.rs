@@ -104,7 +104,7 @@ fn random_sum(random: &mut Random, sizes: &[usize]) -> [NormalFields; 2] {
                 values[pattern * m + i] -= 2.0 * side;
             }
         }
-        SignGroup { members, values }
+        SignGroup::new(&members, &values)
     });
     let fields = NormalFields::of_groups(m, groups.collect()).unwrap();
     let all = fields.values().into_owned();
@@ -186,7 +186,7 @@ fn all_roots_of_many_surfaces_are_those_of_the_group() {
     let m = 14;
     let mut random = Random::new(11);
     let mut groups = vec![SignGroup {
-        members: vec![0, 1],
+        members: [0, 1].as_slice().into(),
         // x y = 1/4 and x + y = 5/4: roots (1, 1/4) moved inwards.
         values: [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]]
             .iter()
@@ -208,10 +208,7 @@ fn all_roots_of_many_surfaces_are_those_of_the_group() {
         let values = [-1.0, 1.0]
             .iter()
             .flat_map(|s| column.iter().map(move |c| s * c));
-        groups.push(SignGroup {
-            members: vec![i],
-            values: values.collect(),
-        });
+        groups.push(SignGroup::new(&[i], &values.collect::<Vec<f64>>()));
     }
     let fields = NormalFields::of_groups(m, groups).unwrap();
     let found = roots_in_cube(&fields);
@@ -235,14 +232,8 @@ fn parts_that_do_not_know_of_each_other_are_decided_alone() {
         values.extend([f[0], 0.0, f[1]]);
     }
     let groups = vec![
-        SignGroup {
-            members: vec![0, 2],
-            values,
-        },
-        SignGroup {
-            members: vec![1],
-            values: vec![0.0, 2.0, 0.0, 0.0, -1.0, 0.0],
-        },
+        SignGroup::new(&[0, 2], &values),
+        SignGroup::new(&[1], &[0.0, 2.0, 0.0, 0.0, -1.0, 0.0]),
     ];
     let fields = NormalFields::of_groups(3, groups).unwrap();
     let kappa = [2.0, 1.0, 0.5];
@@ -277,6 +268,6 @@ fn stability_of_many_coupled_surfaces() {
 fn a_group_of_seven_is_refused_by_name() {
     let members: Vec<usize> = (0..7).collect();
     let values = vec![1.0; 7 << 7];
-    let refused = NormalFields::of_groups(7, vec![SignGroup { members, values }]);
+    let refused = NormalFields::of_groups(7, vec![SignGroup::new(&members, &values)]);
     assert!(matches!(refused, Err(Undecided::Shape { m: 7, .. })));
 }

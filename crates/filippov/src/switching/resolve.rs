@@ -157,7 +157,7 @@ fn decide(
         true => smallest_component(fields),
         false => margin,
     };
-    let is_polished = resolution.leaf == ONLY && matches!(start.fields, Cow::Borrowed(_));
+    let is_polished = m <= 2 && resolution.leaf == ONLY && matches!(start.fields, Cow::Borrowed(_));
     complete(&mut resolution, is_polished, fields, kappa, patience);
     Ok(resolution)
 }
