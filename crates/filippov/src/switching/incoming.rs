@@ -2,11 +2,11 @@
 
 use std::borrow::Cow;
 
+use crate::cube::NormalFields;
 use crate::cube::{merged_root, multiplier_rates, newton, stable_roots_within};
-use crate::cube::{Bilinear, NormalFields};
 use crate::error::Undecided;
 use crate::patience::Patience;
-use crate::tolerances::{AFTER_THE_EXIT, AT_SIDE, UNSTABLE_START};
+use crate::tolerances::{AFTER_THE_EXIT, UNSTABLE_START};
 
 /// What the motion did before.
 #[derive(Clone, Debug, PartialEq)]
@@ -92,7 +92,7 @@ impl Incoming {
                 let drift = drift.as_deref();
                 let (moved, state) = match fields.m() > 2 {
                     true => exit_state(fields, *kind, lambda, drift)?,
-                    false => exit_of_few(fields, *kind, lambda, drift, kappa)?,
+                    false => where_unstable(fields, lambda, drift),
                 };
                 return Ok(HiddenStart {
                     fields: Cow::Owned(moved),
@@ -170,84 +170,22 @@ fn polished(
     root.ok_or(not_sliding)
 }
 
-/// One or two surfaces: the root, in fields moved so that it has just been lost. What follows does not depend on how else
-/// the fields move.
-///
-/// | exit | the fields are moved so that | state |
-/// |---|---|---|
-/// | at a side | the root is beyond it, straight ahead | the root |
-/// | at a fold | there is no root | beside the root, where the motion leads from there |
-/// | by stability | no diagonal entry of G is negative | beside the root, in the direction in which it moves |
-fn exit_of_few(
+/// Two surfaces whose root is stable for no scaling any more: fields moved so that no diagonal entry of G is negative, and a
+/// state beside the root, in the direction in which it moves.
+fn where_unstable(
     fields: &NormalFields,
-    kind: ExitKind,
     lambda: &[f64],
     drift: Option<&[f64]>,
-    kappa: &[f64],
-) -> Result<(NormalFields, Vec<f64>), Undecided> {
-    let m = fields.m();
-    let fields = &match kind {
-        ExitKind::Side | ExitKind::Fold if m == 2 => stabilised(fields, lambda, kappa),
-        _ => fields.clone(),
-    };
+) -> (NormalFields, Vec<f64>) {
     let jacobian = fields.jacobian(lambda);
-    let by = |j: usize| AFTER_THE_EXIT * fields.row_size(j);
-    let mut state = lambda.to_vec();
-    let fields = match kind {
-        ExitKind::Side => {
-            let i = usize::from(m == 2 && lambda[1].abs() > lambda[0].abs());
-            if 1.0 - lambda[i].abs() > AT_SIDE {
-                return Err(Undecided::NotAnExit);
-            }
-            state[i] = lambda[i].signum();
-            // Of one surface the component that vanishes tells whether the multiplier comes back.
-            let comes_back = m == 1 && drift.is_some_and(|rate| state[0] * rate[0] <= 0.0);
-            let beyond = if comes_back { -state[i] } else { state[i] };
-            let column: Vec<f64> = (0..m).map(|j| jacobian[(j, i)]).collect();
-            let relative = (0..m).map(|j| column[j].abs() / by(j));
-            let length = beyond / relative.fold(0.0, f64::max);
-            let shift: Vec<f64> = column.iter().map(|g| -length * g).collect();
-            fields.shifted(&shift)
-        }
-        ExitKind::Fold if m == 2 && jacobian[(0, 0)].min(jacobian[(1, 1)]) < 0.0 => {
-            let unit = |j: usize, p: usize| jacobian[(j, p)] / fields.row_size(j);
-            let larger = |size: &dyn Fn(usize) -> f64| usize::from(size(1) > size(0));
-            let row = larger(&|j| unit(j, 0).abs().max(unit(j, 1).abs()));
-            let column = larger(&|p| unit(0, p).abs().max(unit(1, p).abs()));
-            // G v = 0 and e G = 0. With the scaling K the motion is (e . g)/(e . K^-1 v) along v, and this denominator is
-            // the trace of K G times an entry of G. The trace was negative.
-            let v = [-unit(row, 1), unit(row, 0)];
-            let e = [-jacobian[(1, column)], jacobian[(0, column)]];
-            let canopy = Bilinear::of_fields(fields);
-            let bend = v[0] * v[1] * (0..2).map(|j| e[j] * canopy.rows()[j][3]).sum::<f64>();
-            let along = -bend * jacobian[(row, column)];
-            state = displaced(lambda, &v.map(|v| along.signum() * v));
-            fields.shifted(&[0, 1].map(|j| by(j) * (bend * e[j]).signum()))
-        }
-        ExitKind::Stability if m == 2 => {
-            state = beside(fields, lambda, drift);
-            let slopes = [0, 1].map(|j| (by(j) - jacobian[(j, j)]).max(0.0));
-            fields.map(|_, pattern, j, value| {
-                let side = if pattern >> j & 1 == 1 { 1.0 } else { -1.0 };
-                value + slopes[j] * (side - lambda[j])
-            })
-        }
-        _ => return Err(Undecided::NotAnExit),
-    };
-    Ok((fields, state))
-}
-
-/// Two surfaces: the fields, scaled so that the root is stable if it is so for some scaling. Where it is not stable for
-/// kappa, the motion went around it, and is followed as if it had slid.
-fn stabilised(fields: &NormalFields, lambda: &[f64], kappa: &[f64]) -> NormalFields {
-    let jacobian = fields.jacobian(lambda);
-    let [a, b] = [0, 1].map(|j| kappa[j] * jacobian[(j, j)]);
-    match a + b < 0.0 {
-        true => fields.clone(),
-        false if a < 0.0 => fields.scaled(&[-2.0 * b / a, 1.0]),
-        false if b < 0.0 => fields.scaled(&[1.0, -2.0 * a / b]),
-        false => fields.clone(),
-    }
+    let slopes: Vec<f64> = (0..2)
+        .map(|j| (AFTER_THE_EXIT * fields.row_size(j) - jacobian[(j, j)]).max(0.0))
+        .collect();
+    let moved = fields.map(|_, pattern, j, value| {
+        let side = if pattern >> j & 1 == 1 { 1.0 } else { -1.0 };
+        value + slopes[j] * (side - lambda[j])
+    });
+    (moved, beside(fields, lambda, drift))
 }
 
 /// Three and more surfaces: the root itself, in fields that have drifted for a short time. Where two roots meet, in fields that

@@ -5,6 +5,7 @@
 //! first Lie derivative that does not.
 
 mod codim1;
+mod exits;
 mod hidden;
 mod incoming;
 mod lap;

@@ -30,7 +30,7 @@ impl Continuation {
 /// The decision at an intersection: the common currency of all rules for two and more surfaces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Resolution {
-    /// `only`, or the kind of outcome of the hidden dynamics (`docs/theory/intersections.md` lists them).
+    /// `only`, `exit`, or the kind of outcome of the hidden dynamics (`docs/theory/intersections.md` lists them).
     pub leaf: &'static str,
     /// What follows.
     pub chosen: Continuation,

@@ -2,8 +2,9 @@
 
 use std::borrow::Cow;
 
+use super::exits;
 use super::hidden::{attracting, limit_within, Outcome};
-use super::incoming::{HiddenStart, Incoming};
+use super::incoming::{ExitKind, HiddenStart, Incoming};
 use super::resolution::{Continuation, Resolution};
 use crate::cube::{has_one_mode_only, is_stable_for, newton, stable_roots_within};
 use crate::cube::{Bilinear, NormalFields};
@@ -131,6 +132,21 @@ fn decide(
             Some(surface) => Undecided::Tangent { surface },
             None => Undecided::Proportional,
         });
+    }
+    if let (
+        Incoming::Exit {
+            kind,
+            lambda,
+            drift,
+        },
+        true,
+    ) = (incoming, m <= 2)
+    {
+        if m == 1 || *kind != ExitKind::Stability {
+            let mut resolution = exits::leave(fields, *kind, lambda, drift.as_deref())?;
+            complete(&mut resolution, false, fields, kappa, patience);
+            return Ok(resolution);
+        }
     }
     let is_start = *incoming == Incoming::Start;
     let start = incoming.hidden_start(fields, kappa, patience)?;
