@@ -141,18 +141,14 @@ fn decay(matrix: &Matrix) -> f64 {
 /// diagonal and the largest magnitudes beside it, is an M-matrix.
 pub fn has_one_mode_only(fields: &NormalFields) -> bool {
     let (m, is_affine) = (fields.m(), fields.is_affine());
-    let mut bound = vec![vec![0.0_f64; m]; m];
-    for p in 0..m {
-        for (k, column) in fields.columns(p).enumerate() {
-            for (j, value) in column.into_iter().enumerate() {
-                let entry = &mut bound[j][p];
-                *entry = match (k, j == p) {
-                    _ if is_affine => -value,
-                    (0, true) => -value,
-                    (_, true) => entry.min(-value),
-                    (_, false) => entry.min(-value.abs()),
-                };
-            }
+    let mut bound = vec![vec![0.0; m]; m];
+    for (j, row) in bound.iter_mut().enumerate() {
+        for (p, entry) in row.iter_mut().enumerate() {
+            let values = fields.columns(p).map(|column| match is_affine || j == p {
+                true => -column[j],
+                false => -column[j].abs(),
+            });
+            *entry = values.fold(f64::INFINITY, f64::min);
         }
     }
     is_p_matrix(&SparseRows::from_dense(&bound)) == Some(true)
