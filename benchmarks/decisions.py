@@ -2,8 +2,8 @@
 
 ``python benchmarks/decisions.py`` prints the nanoseconds and the instructions of one decision; ``--against
 FOLDER`` those of the same program in another checkout, and the ratios. The program is
-``crates/filippov/examples/decision_costs.rs``, copied there if it is missing. Times are medians; instructions are
-counted by callgrind where valgrind is installed, as the difference of a long and a short run.
+``crates/filippov/examples/decision_costs.rs``, copied there if it is missing. Times are medians;
+instructions are counted by callgrind where valgrind is installed, as the difference of two runs.
 """
 
 from __future__ import annotations

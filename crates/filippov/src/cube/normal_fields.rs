@@ -25,7 +25,7 @@ use crate::tolerances::MOST_MEETING;
 ///
 /// // One surface, attractive from both sides: f- = 3, f+ = -1.
 /// let fields = NormalFields::new(1, vec![3.0, -1.0])?;
-/// assert_eq!(fields.interpolate(&[0.5]), [0.0]);
+/// assert_eq!(fields.interpolate(&[0.5])[..], [0.0]);
 /// # Ok::<(), filippov::switching::Undecided>(())
 /// ```
 ///
@@ -81,7 +81,7 @@ impl NormalFields {
     /// };
     /// let groups = vec![group(0, 3.0, -1.0), group(1, 4.0, 2.0), group(2, 1.0, -1.0)];
     /// let fields = NormalFields::of_groups(3, groups)?;
-    /// assert_eq!(fields.interpolate(&[0.5, 1.0, 0.25]), [0.0, 2.0, -0.25]);
+    /// assert_eq!(fields.interpolate(&[0.5, 1.0, 0.25])[..], [0.0, 2.0, -0.25]);
     /// # Ok::<(), filippov::switching::Undecided>(())
     /// ```
     ///
