@@ -13,7 +13,7 @@ use crate::field::{ContactField, Guard, Law, ModeField, SlidingSet, SmoothField}
 use crate::mode::Mode;
 use crate::options::Options;
 use crate::stepper::ErrorScale;
-use crate::switching::{Leading, Patience};
+use crate::switching::Patience;
 use crate::system::PiecewiseSystem;
 
 /// Why a decision was asked for.
@@ -282,10 +282,7 @@ impl DecisionOutcome {
 
 impl From<Left> for StartingZero {
     fn from(left: Left) -> Self {
-        let (guard, leading): (_, Leading) = match left {
-            Left::Surface(j, leading) => (Guard::Surface(j), leading),
-            Left::Exit(guard, leading) => (guard, leading),
-        };
+        let Left { guard, leading } = left;
         StartingZero {
             guard,
             order: leading.order,

@@ -93,12 +93,8 @@ pub(super) fn place_in_contact(
     let Some(mode) = neutral.into_iter().min_by_key(n_closed) else {
         return Ok(Err(Stop::Contact { surfaces: all }));
     };
-    let stays = Leading {
-        order: 0,
-        value: 0.0,
-    };
     let left = all.into_iter().filter(|&j| mode.entries()[j] != 0);
-    let left: Lefts = left.map(|j| Left::Surface(j, stays)).collect();
+    let left: Lefts = left.map(Left::stays).collect();
     Ok(Ok(Next::new(mode, left)))
 }
 
@@ -168,7 +164,7 @@ fn begin(
         } else if leading.sign() != entry {
             return Ok(Trial::Ends);
         }
-        left.push(Left::Surface(j, leading));
+        left.push(Left::beside(j, leading));
     }
     if is_clear {
         return Ok(Trial::Leaves(left));

@@ -50,7 +50,7 @@ pub(crate) fn departures(
             let value = acceleration_of(at, notes, after, multipliers, j, &velocity)?;
             Leading { order: 2, value }
         };
-        left.push(Left::Surface(j, leading));
+        left.push(Left::beside(j, leading));
     }
     Ok(left)
 }

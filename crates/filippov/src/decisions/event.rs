@@ -142,7 +142,7 @@ pub(super) fn touch(
             let candidates = vec![mode.clone(), beyond.clone()];
             match choose(at, notes, &[j], mode.clone(), candidates) {
                 Ok(after) if after == beyond => {
-                    let left = Lefts::from_elem(Left::Surface(j, leading), 1);
+                    let left = Lefts::from_elem(Left::beside(j, leading), 1);
                     return Ok(Some(Ok(Next::new(after, left))));
                 }
                 Ok(_) => {}
@@ -156,7 +156,7 @@ pub(super) fn touch(
         let known = vanishing[usize::from(side > 0)].max(1);
         let leading = first_nonzero(at.system, j, side, known, at.t, at.x, &signs)?;
         if leading.sign() == side {
-            left.push(Left::Surface(j, leading));
+            left.push(Left::beside(j, leading));
         }
     }
     Ok(Some(Ok(Next::new(mode.clone(), left))))

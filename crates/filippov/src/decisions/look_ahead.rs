@@ -116,7 +116,7 @@ fn leaves_within(
         let order = order.clamp(1.0, MAX_LIE_ORDER as f64) as usize;
         let factorial: f64 = (1..=order).map(|k| k as f64).product();
         let value = factorial * full / moment.powi(order as i32);
-        Left::Surface(j, Leading { order, value })
+        Left::beside(j, Leading { order, value })
     });
     Ok(Trial::Leaves(left.collect()))
 }

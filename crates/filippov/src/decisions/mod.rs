@@ -7,6 +7,7 @@
 
 mod between_sides;
 mod blow_up;
+mod candidate;
 mod choice;
 mod coinciding;
 mod consistency;

@@ -267,7 +267,7 @@ fn place_on_triggers(
             let entry = next.mode.entries()[touched.surface];
             touched.leading.sign() == entry || touched.side == entry
         });
-        let departing = departing.map(|t| Left::Surface(t.surface, t.leading));
+        let departing = departing.map(|t| Left::beside(t.surface, t.leading));
         next.left.extend(departing);
         next
     });

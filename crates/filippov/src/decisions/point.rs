@@ -342,65 +342,69 @@ pub(crate) type Decided = Result<Next, Stop>;
 /// What vanishes at the start of a motion, seldom more than one function.
 pub(crate) type Lefts = SmallVec<[Left; 1]>;
 
-/// A function that vanishes at the start of a motion, with its first non-vanishing derivative.
+/// A function that vanishes at the start of a motion, with its first non-vanishing derivative; of an exit function on one
+/// surface that of the normal component.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Left {
-    /// The surface is left with this derivative of h.
-    Surface(usize, Leading),
-    /// Sliding starts with a vanishing exit function; the derivative of the normal component.
-    Exit(Guard, Leading),
+pub(crate) struct Left {
+    pub guard: Guard,
+    pub leading: Leading,
 }
 
 impl Left {
+    /// The surface is left with this derivative of h.
+    pub fn beside(j: usize, leading: Leading) -> Self {
+        let guard = Guard::Surface(j);
+        Left { guard, leading }
+    }
+
+    /// The motion stays on the surface.
+    pub fn stays(j: usize) -> Self {
+        let (order, value) = (0, 0.0);
+        Left::beside(j, Leading { order, value })
+    }
+
     /// What vanishes after the decision at surface `j`.
     #[inline]
     pub fn after(j: usize, decision: &Decision) -> Lefts {
-        let [minus, plus] = Guard::ends(j);
+        let ends = Guard::ends(j).into_iter();
+        let exits = |leading: [Leading; 2]| {
+            let pairs = ends.zip(leading);
+            pairs.map(|(guard, leading)| Left { guard, leading })
+        };
         if let Some(motion) = decision.starts_at_two_fold() {
-            return smallvec![
-                Left::Exit(minus, motion.minus),
-                Left::Exit(plus, motion.plus),
-            ];
+            return exits([motion.minus, motion.plus]).collect();
         }
         match decision.entry {
-            -1 => smallvec![Left::Surface(j, decision.minus)],
-            1 => smallvec![Left::Surface(j, decision.plus)],
-            _ => [(minus, decision.minus), (plus, decision.plus)]
-                .into_iter()
-                .filter(|(_, leading)| leading.order > 1)
-                .map(|(function, leading)| {
-                    // The normal component is the derivative of h: one order less.
-                    Left::Exit(
-                        function,
-                        Leading {
-                            order: leading.order - 1,
-                            value: leading.value,
-                        },
-                    )
-                })
-                .collect(),
+            -1 => smallvec![Left::beside(j, decision.minus)],
+            1 => smallvec![Left::beside(j, decision.plus)],
+            _ => {
+                // The normal component is the derivative of h: one order less.
+                let less = |leading: Leading| Leading {
+                    order: leading.order.saturating_sub(1),
+                    ..leading
+                };
+                let left = exits([decision.minus, decision.plus].map(less));
+                left.filter(|left| left.leading.order > 0).collect()
+            }
         }
     }
 
     /// The surface that is left; for an exit function there is none.
     pub fn surface(&self) -> Option<usize> {
-        match self {
-            Left::Surface(j, _) => Some(*j),
-            Left::Exit(..) => None,
+        match self.guard {
+            Guard::Surface(j) => Some(j),
+            _ => None,
         }
     }
 
     /// The zero to divide out of the function along the motion from `t`.
     pub fn deflation(self, t: f64) -> Option<(Guard, Deflation)> {
-        let (function, leading) = match self {
-            Left::Surface(j, leading) => (Guard::Surface(j), leading),
-            Left::Exit(function, leading) => (function, leading),
-        };
+        let Left { guard, leading } = self;
         (leading.order > 0).then(|| {
             let order = i32::try_from(leading.order).unwrap_or(1);
             // In the sense of the mode every monitored function starts out positive.
             (
-                function,
+                guard,
                 Deflation {
                     t,
                     order,

@@ -594,16 +594,11 @@ impl<'a> Integrator<'a> {
             None if self.dt.is_nan() => initial_step(field, t, x, derivative, scale, longest)?,
             None => restart_step(field, t, x, derivative, scale, self.dt.min(longest))?,
         };
-        for l in left {
-            if let Left::Surface(j, leading) = l {
-                let place = (self.t, &self.x[..]);
-                dt = dt.min(excursion(
-                    self.system,
-                    place,
-                    &self.motion.mode,
-                    *j,
-                    *leading,
-                )?);
+        let place = (self.t, &self.x[..]);
+        for left in left {
+            if let Some(j) = left.surface() {
+                let room = excursion(self.system, place, &self.motion.mode, j, left.leading)?;
+                dt = dt.min(room);
             }
         }
         Ok(dt)
