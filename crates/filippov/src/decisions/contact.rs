@@ -1,7 +1,7 @@
 //! Contact: which bodies stay, which leave, and what slides beside them.
 
 use super::choice::choose;
-use super::look_ahead::{field_of, try_mode, Trial};
+use super::look_ahead::{try_mode, Trial};
 use super::point::{Decided, Left, Lefts, Next, Notes, Point};
 use crate::error::FieldError;
 use crate::field::{ModeField, SmoothField};
@@ -108,7 +108,7 @@ fn begin(
     meeting: &[usize],
 ) -> Result<Trial, FieldError> {
     let (mut x, mut velocity) = (at.x.to_vec(), vec![0.0; at.x.len()]);
-    let mut field = field_of(at, mode);
+    let mut field = at.field_of(mode, &[]);
     field.eval(at.t, &mut x, &mut velocity)?;
     notes.n_field_evaluations += field.n_evaluations();
     // What has just been located as zero is not known better than that.

@@ -4,7 +4,6 @@ use super::candidate::{noise_of, Viable};
 use super::choice::choose;
 use super::coinciding::Parallels;
 use super::consistency::{bends, with_those_that_jump};
-use super::departures::velocity_in;
 use super::leave_by_rule::slides_by_rule;
 use super::meeting::hidden_limit;
 use super::point::{Decided, Notes, Point};
@@ -198,8 +197,7 @@ fn multipliers_before(
     }
     let mut velocity = at.arrival.velocity.to_vec();
     let moment = at.moment(notes, at.arrival.signs, &velocity)?;
-    let pairs = at.x.iter().zip(&velocity);
-    let mut past: Vec<f64> = pairs.map(|(x, v)| x - moment * v).collect();
+    let mut past = at.along(&velocity, -moment);
     let mut field = at.arrival.field.borrow_mut();
     field.eval(at.t - moment, &mut past, &mut velocity)?;
     let known = field.multipliers();
@@ -227,18 +225,8 @@ fn drop_other_names(
     }
     viable.sort_by_key(|viable| (viable.is_pressed, viable.next.mode != *meeting.mode));
     let mut velocities: Vec<Vec<f64>> = Vec::with_capacity(viable.len());
-    for one in viable.iter() {
-        let mut velocity = vec![0.0; at.x.len()];
-        velocity_in(
-            at,
-            notes,
-            &one.next.mode,
-            one.next.multipliers(),
-            at.t,
-            at.x,
-            &mut velocity,
-        )?;
-        velocities.push(velocity);
+    for Viable { next, .. } in viable.iter() {
+        velocities.push(at.velocity(notes, &next.mode, next.multipliers())?);
     }
     let corners = at.corners(notes, meeting.surfaces, meeting.mode)?;
     let size = corners.size();

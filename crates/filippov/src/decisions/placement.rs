@@ -2,7 +2,6 @@
 
 use super::choice::follow_at_surface;
 use super::contact::place_in_contact;
-use super::departures::velocity_in;
 use super::point::{Decided, Left, Notes, Point};
 use super::rule::{How, Meeting, Rule};
 use super::settle::place_on;
@@ -11,7 +10,7 @@ use crate::field::{ContactField, Projector, SmoothField};
 use crate::mode::Mode;
 use crate::status::Stop;
 use crate::switching::{decide as decide_at_surface, first_nonzero, Leading};
-use crate::system::{dot, dot_magnitude, surfaces_that_matter};
+use crate::system::{dot, surfaces_that_matter};
 use crate::tolerances::{DEPARTS_TANGENTIALLY, SLIPPED, SLOW, SURFACE_NOISE};
 
 /// The sides that a point is on.
@@ -298,30 +297,14 @@ pub(super) fn leading_along(
             },
         );
         if after.codimension() > 0 {
-            if let Some(value) = rate_in(at, notes, j, &after, &multipliers)? {
+            let velocity = at.velocity(notes, &after, &multipliers)?;
+            let (value, size) = at.rate_of(j, &after.signs(), &velocity)?;
+            if value.abs() > DEPARTS_TANGENTIALLY * size {
                 return Ok(Leading { order: 1, value });
             }
         }
     }
     first_nonzero(at.system, j, side, 0, at.t, at.x, &after.signs())
-}
-
-/// The rate of h_j along sliding in a mode, where that is not tangent to it.
-fn rate_in(
-    at: &Point,
-    notes: &mut Notes,
-    j: usize,
-    after: &Mode,
-    multipliers: &[f64],
-) -> Result<Option<f64>, FieldError> {
-    let mut velocity = vec![0.0; at.x.len()];
-    velocity_in(at, notes, after, multipliers, at.t, at.x, &mut velocity)?;
-    let mut gradient = vec![0.0; at.x.len()];
-    let signs = after.signs();
-    let ht = at.system.gradient(j, at.t, at.x, &signs, &mut gradient)?;
-    let rate = ht + dot(&gradient, &velocity);
-    let size = ht.abs() + dot_magnitude(&gradient, &velocity);
-    Ok((rate.abs() > DEPARTS_TANGENTIALLY * size).then_some(rate))
 }
 
 /// Is this speed at surface j below the tolerance?

@@ -9,14 +9,14 @@ use smallvec::{smallvec, SmallVec};
 use crate::action::Actions;
 use crate::error::FieldError;
 use crate::event::Deflation;
-use crate::field::{eval_on_side, Guard, Law, MeetingFields, ModeField};
+use crate::field::{eval_on_side, ContactField, Guard, Law, MeetingFields, ModeField, SmoothField};
 use crate::mode::{Mode, Signs};
 use crate::options::{NonUnique, Options};
 use crate::solution::Switch;
 use crate::status::{Stop, Warning};
 use crate::stepper::ErrorScale;
 use crate::switching::{Decision, Leading, Patience, TwoFoldMotion};
-use crate::system::PiecewiseSystem;
+use crate::system::{dot, dot_magnitude, PiecewiseSystem};
 use crate::tolerances::{MOMENT, MOST_SHORTENINGS, NO_PROGRESS, TOO_LARGE_A_CHANGE};
 
 /// One value per surface; few are kept without allocation.
@@ -164,6 +164,56 @@ impl<'p, 'm, 'a> Point<'p, 'm, 'a> {
         'p: 'q,
     {
         Point { t, x, ..*self }
+    }
+
+    /// The field of a mode, with the contact of bodies. The multipliers of several surfaces are tracked from these, if they are
+    /// known.
+    pub fn field_of(&self, mode: &Mode, multipliers: &[f64]) -> ModeField<'p> {
+        let sides = self.arrival.sides;
+        if let Some(field) = ContactField::new(self.system, self.actions, mode, sides, self.q) {
+            return ModeField::Contact(Box::new(field));
+        }
+        let mut field = ModeField::of(self.system, self.policy.law, mode);
+        if let ModeField::Intersection(field) = &mut field {
+            field.set_patience(self.patience);
+            field.begin(multipliers, false);
+        }
+        field
+    }
+
+    /// The velocity of a motion in this mode.
+    pub fn velocity(
+        &self,
+        notes: &mut Notes,
+        mode: &Mode,
+        multipliers: &[f64],
+    ) -> Result<Vec<f64>, FieldError> {
+        let mut velocity = vec![0.0; self.x.len()];
+        let mut field = self.field_of(mode, multipliers);
+        field.eval(self.t, &mut self.x.to_vec(), &mut velocity)?;
+        notes.n_field_evaluations += field.n_evaluations();
+        Ok(velocity)
+    }
+
+    /// The state after this time of a motion with this velocity.
+    pub fn along(&self, velocity: &[f64], dt: f64) -> Vec<f64> {
+        let pairs = self.x.iter().zip(velocity);
+        pairs.map(|(x, v)| x + dt * v).collect()
+    }
+
+    /// The rate of h_j along a motion with this velocity, and the size of what it is the sum of.
+    pub fn rate_of(
+        &self,
+        j: usize,
+        signs: &[f64],
+        velocity: &[f64],
+    ) -> Result<(f64, f64), FieldError> {
+        let mut gradient = vec![0.0; velocity.len()];
+        let of_time = self
+            .system
+            .gradient(j, self.t, self.x, signs, &mut gradient)?;
+        let size = of_time.abs() + dot_magnitude(&gradient, velocity);
+        Ok((of_time + dot(&gradient, velocity), size))
     }
 
     /// A short time for a motion with this velocity: within it neither the state nor the field with these signs changes by

@@ -31,8 +31,7 @@ pub(crate) fn lost_functions(
 fn has_lost_jump(at: &Point, notes: &mut Notes) -> Result<bool, FieldError> {
     let (mode, surfaces, velocity) = (at.arrival.mode, at.arrival.sliding, at.arrival.velocity);
     let moment = at.moment(notes, &mode.signs(), velocity)?;
-    let pairs = at.x.iter().zip(velocity);
-    let past: Vec<f64> = pairs.map(|(x, v)| x - moment * v).collect();
+    let past = at.along(velocity, -moment);
     let earlier = at.moved(at.t - moment, &past);
     let here = at.corners(notes, surfaces, mode)?;
     let earlier = earlier.corners(notes, surfaces, mode)?;
