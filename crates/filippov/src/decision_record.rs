@@ -6,7 +6,7 @@ use smallvec::SmallVec;
 
 use crate::action::Actions;
 use crate::decisions::{
-    decide, Arrival, Cause, Decision, Left, Next, Notes, Point, Policy, Reached, RULES,
+    decide, Arrival, Cause, Decision, Left, Next, Notes, Point, Policy, Reached,
 };
 use crate::error::FieldError;
 use crate::field::{ContactField, Guard, Law, ModeField, SlidingSet, SmoothField};
@@ -181,7 +181,6 @@ pub fn replay_decision(
         q: &point.q,
         arrival: &arrival,
         policy: Policy::from(options),
-        rules: &RULES,
         patience: Patience::endless(),
     };
     let mut notes = Notes {

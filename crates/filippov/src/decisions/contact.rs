@@ -9,7 +9,7 @@ use crate::mode::Mode;
 use crate::status::Stop;
 use crate::switching::{first_nonzero, Leading};
 use crate::system::dot;
-use crate::tolerances::{DEPARTS_TANGENTIALLY, MOST_IN_CONTACT, NO_FORCE};
+use crate::tolerances::{AT_SIDE, MOST_IN_CONTACT, NO_FORCE};
 
 /// An event while bodies are in contact, that triggers no action: a body leaves, or a surface of another kind
 /// is reached or left. `surfaces` vanish at the event.
@@ -117,7 +117,7 @@ fn begin(
     // A surface that is reached tangentially is located to the square root of rounding.
     let rounding = match located {
         [] => NO_FORCE,
-        _ => DEPARTS_TANGENTIALLY,
+        _ => AT_SIDE,
     };
     let mut is_clear = true;
     for (i, (guard, exit)) in field.guards().iter().zip(field.last_exits()).enumerate() {

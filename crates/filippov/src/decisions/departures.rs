@@ -6,7 +6,7 @@ use smallvec::smallvec;
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::switching::{first_nonzero, Leading};
-use crate::tolerances::{DEPARTS_TANGENTIALLY, MOST_MEETING};
+use crate::tolerances::{AT_SIDE, MOST_MEETING};
 
 /// The surfaces of `meeting` that the motion in `after` leaves, with the leading derivatives of h.
 pub(crate) fn departures(
@@ -34,7 +34,7 @@ pub(crate) fn departures(
     for j in leaving {
         let (value, size) = at.rate_of(j, &signs, &velocity)?;
         let place = around.binary_search(&j).unwrap_or(0);
-        let leading = if value.abs() > DEPARTS_TANGENTIALLY * size.max(sizes[place]) {
+        let leading = if value.abs() > AT_SIDE * size.max(sizes[place]) {
             Leading { order: 1, value }
         } else if after.codimension() == 0 {
             let side = after.entries()[j];

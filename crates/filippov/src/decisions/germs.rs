@@ -14,7 +14,7 @@ use crate::field::SmoothField;
 use crate::mode::Mode;
 use crate::status::Stop;
 use crate::switching::{NormalFields, Undecided};
-use crate::tolerances::{EQUAL_SHARES, MOST_MEETING, TANGENT};
+use crate::tolerances::{AT_SIDE, MOST_MEETING, TANGENT};
 
 /// Rule: switching functions jump between the regions around the point, surfaces are in one place or touch one another.
 pub(super) fn decide_if_entangled(
@@ -175,7 +175,7 @@ fn preferred(
             side => f64::from(side),
         });
         let parts = place.zip(&before).map(|(own, before)| (own - before).abs());
-        (parts.sum::<f64>() / EQUAL_SHARES).round() as u64
+        (parts.sum::<f64>() / AT_SIDE).round() as u64
     };
     Ok(strict
         .min_by_key(far)

@@ -1,6 +1,5 @@
 //! What a decision is asked about, and what its rules hand to one another.
 
-use super::rule::{Meeting, Rule};
 use super::triggers::Triggers;
 use std::cell::RefCell;
 
@@ -35,29 +34,8 @@ pub(crate) struct Point<'p, 'm, 'a> {
     pub q: &'p [f64],
     pub arrival: &'p Arrival<'m, 'a>,
     pub policy: Policy<'a>,
-    /// The rules where surfaces vanish.
-    pub rules: &'static Rules,
     /// How long the caller waits.
     pub patience: Patience<'p>,
-}
-
-/// A rule: the motion that follows, or why the run ends; `None` where the rule does not apply.
-pub(super) type Apply = fn(&Point, &mut Notes, &Meeting) -> Result<Option<Decided>, FieldError>;
-
-/// The last rule, which always applies.
-pub(super) type Answer = fn(&Point, &mut Notes, &Meeting) -> Result<Decided, FieldError>;
-
-/// What holds for the answers of rules: an answer, checked and completed.
-pub(super) type Check =
-    fn(&Point, &mut Notes, &Meeting, Rule, Decided) -> Result<Decided, FieldError>;
-
-/// The rules in their order.
-pub(crate) struct Rules {
-    pub(super) list: &'static [(Rule, Apply)],
-    /// Where none of the list applies.
-    pub(super) last: (Rule, Answer),
-    /// Asked where several surfaces vanish.
-    pub(super) check: Check,
 }
 
 /// What is chosen where the system leaves a choice.
@@ -189,9 +167,13 @@ impl<'p, 'm, 'a> Point<'p, 'm, 'a> {
         multipliers: &[f64],
     ) -> Result<Vec<f64>, FieldError> {
         let mut velocity = vec![0.0; self.x.len()];
-        let mut field = self.field_of(mode, multipliers);
-        field.eval(self.t, &mut self.x.to_vec(), &mut velocity)?;
-        notes.n_field_evaluations += field.n_evaluations();
+        notes.n_field_evaluations += if mode.codimension() == 0 {
+            eval_on_side(self.system, self.t, self.x, &mode.signs(), &mut velocity)?
+        } else {
+            let mut field = self.field_of(mode, multipliers);
+            field.eval(self.t, &mut self.x.to_vec(), &mut velocity)?;
+            field.n_evaluations()
+        };
         Ok(velocity)
     }
 
