@@ -6,14 +6,14 @@ use smallvec::SmallVec;
 
 use crate::action::Actions;
 use crate::decisions::{
-    decide, Arrival, Cause, Decision, Left, Next, Notes, Point, Policy, Reached, RULES,
+    decide, Arrival, Cause, Decision, Left, Next, Notes, Point, Policy, Reached,
 };
 use crate::error::FieldError;
 use crate::field::{ContactField, Guard, Law, ModeField, SlidingSet, SmoothField};
 use crate::mode::Mode;
 use crate::options::Options;
 use crate::stepper::ErrorScale;
-use crate::switching::{Leading, Patience};
+use crate::switching::Patience;
 use crate::system::PiecewiseSystem;
 
 /// Why a decision was asked for.
@@ -181,7 +181,6 @@ pub fn replay_decision(
         q: &point.q,
         arrival: &arrival,
         policy: Policy::from(options),
-        rules: &RULES,
         patience: Patience::endless(),
     };
     let mut notes = Notes {
@@ -282,10 +281,7 @@ impl DecisionOutcome {
 
 impl From<Left> for StartingZero {
     fn from(left: Left) -> Self {
-        let (guard, leading): (_, Leading) = match left {
-            Left::Surface(j, leading) => (Guard::Surface(j), leading),
-            Left::Exit(guard, leading) => (guard, leading),
-        };
+        let Left { guard, leading } = left;
         StartingZero {
             guard,
             order: leading.order,

@@ -1,41 +1,9 @@
 //! Points where several continuations are Filippov solutions: which is taken, and who is told.
 
-use super::point::{Decided, Left, Next, Notes, Point};
+use super::point::{Notes, Point};
 use crate::mode::Mode;
 use crate::options::NonUnique;
 use crate::status::{Stop, Warning, WarningCode};
-use crate::switching::Decision;
-
-/// The motion after the decision at one surface.
-#[inline]
-pub(super) fn follow_at_surface(
-    at: &Point,
-    notes: &mut Notes,
-    mode: &Mode,
-    j: usize,
-    mut decision: Decision,
-) -> Decided {
-    if decision.turns_back() {
-        return Err(Stop::InvisibleTwoFold {
-            surface: j,
-            sliding: decision.two_fold,
-        });
-    }
-    let mut after = mode.with(j, decision.entry);
-    if decision.candidates.len() > 1 {
-        let candidates = decision.candidates.iter();
-        let candidates = candidates.map(|&entry| mode.with(j, entry)).collect();
-        after = choose(at, notes, &[j], after, candidates)?;
-        decision.entry = after.entries()[j];
-    }
-    let mut next = Next::new(after, Left::after(j, &decision));
-    if let Some(motion) = decision.starts_at_two_fold() {
-        let start = next.start_mut();
-        (start.multipliers, start.is_given) = (vec![motion.multiplier()], true);
-        start.two_fold = Some(*motion);
-    }
-    Ok(next)
-}
 
 /// The mode that [`crate::Options::choices`] asks for at the next non-unique point.
 pub(super) fn asked<'a>(at: &Point<'_, '_, 'a>, notes: &Notes) -> Option<&'a Mode> {

@@ -1,10 +1,12 @@
 //! Which modes are consistent with their own signs: switching functions may contain signs of others, and jump where those change.
 
-use super::point::{Notes, Point};
+use super::point::{Notes, Point, Values};
 use super::rule::Meeting;
 use crate::error::FieldError;
 use crate::mode::Mode;
-use crate::tolerances::{EPS, MOST_MEETING, SURFACE_NOISE};
+use crate::status::Stop;
+use crate::system::PiecewiseSystem;
+use crate::tolerances::{BETWEEN_SIDES, EPS, MOST_MEETING, SURFACE_NOISE};
 
 /// What the switching functions at a point say of a mode.
 pub(super) enum Consistency {
@@ -34,25 +36,22 @@ pub(super) fn consistency(
     if !at.system.has_nested_signs() {
         return Ok(Consistency::Agrees { mode, vanishing });
     }
-    let old = at.surface_values(notes, &meeting.mode.signs())?;
-    let residual = residual(&old, at, meeting);
+    let known = Known::of(at, notes, meeting)?;
     let slid: Vec<usize> = mode
         .sliding_set()
         .filter(|j| surfaces.contains(j))
         .collect();
     let mut first: Option<Mode> = None;
     for pattern in 0..1_usize << slid.len() {
-        let mut region = mode.on_sides(&slid, pattern);
-        let jumped = let_others_jump(at, notes, meeting, &mut region)?.jumped;
-        let signs = region.signs();
-        let h = at.surface_values(notes, &signs)?;
-        for (i, &j) in surfaces.iter().enumerate() {
-            let size = at.system.surface_size(j, at.t, at.x, &signs)?;
-            let noise = SURFACE_NOISE * (size + old[j].abs() + h[j].abs()) + residual;
-            if h[j].abs() <= noise {
+        let region = mode.on_sides(&slid, pattern);
+        let Jumps {
+            jumped, h, region, ..
+        } = known.let_others_jump(at, notes, meeting, region)?;
+        for (i, (&j, entry)) in surfaces.iter().zip(entries.entries()).enumerate() {
+            if known.is_zero(at, j, h[j], &region)? {
                 continue;
             }
-            if h[j] * f64::from(entries.entries()[i]) <= 0.0 {
+            if h[j] * f64::from(*entry) <= 0.0 {
                 return Ok(Consistency::Contradicts(j));
             }
             vanishing[i] = false;
@@ -76,52 +75,83 @@ pub(super) fn consistency(
 }
 
 /// What jumps between two modes.
-#[derive(Default)]
-pub(super) struct Jumps {
+struct Jumps {
     /// To the other side, or to zero.
-    pub jumped: Vec<usize>,
+    jumped: Vec<usize>,
     /// To zero: they keep their side.
-    pub landed: Vec<usize>,
+    landed: Vec<usize>,
+    /// The second mode, with the signs that the functions have in it.
+    region: Mode,
+    /// The functions in it.
+    h: Values,
 }
 
-/// Gives all surfaces that jump between the mode of the meeting and `after` the side that they are on in the second one. Those
-/// of the meeting are not looked at; the point lies on them, up to what their values are.
-fn let_others_jump(
-    at: &Point,
-    notes: &mut Notes,
-    meeting: &Meeting,
-    after: &mut Mode,
-) -> Result<Jumps, FieldError> {
-    let old = at.surface_values(notes, &meeting.mode.signs())?;
-    let residual = residual(&old, at, meeting);
-    let mut jumps = Jumps::default();
-    // A jump may make others jump.
-    for _ in 0..old.len() {
-        let signs = after.signs();
-        let new = at.surface_values(notes, &signs)?;
-        let mut is_final = true;
-        jumps.landed.clear();
-        for j in (0..new.len()).filter(|j| !meeting.surfaces.contains(j)) {
-            let size = at.system.surface_size(j, at.t, at.x, &signs)?;
-            let noise = SURFACE_NOISE * (size + old[j].abs() + new[j].abs()) + residual;
-            if (new[j] - old[j]).abs() <= noise {
-                continue;
+/// The functions in the mode of a meeting.
+struct Known {
+    h: Values,
+    /// How far functions may be from zero at a point that lies on surfaces to this: their values, and some times as much for
+    /// other slopes.
+    residual: f64,
+}
+
+impl Known {
+    fn of(at: &Point, notes: &mut Notes, meeting: &Meeting) -> Result<Self, FieldError> {
+        let h = at.surface_values(notes, &meeting.mode.signs())?;
+        let reached = meeting.fresh.iter().chain(at.arrival.sliding);
+        let residual = reached.fold(0.0, |most, &j| h[j].abs().max(most));
+        let residual = SURFACE_NOISE / EPS * residual;
+        Ok(Known { h, residual })
+    }
+
+    fn noise(&self, at: &Point, j: usize, h: f64, region: &Mode) -> Result<f64, FieldError> {
+        let size = at.system.surface_size(j, at.t, at.x, &region.signs())?;
+        Ok(SURFACE_NOISE * (size + self.h[j].abs() + h.abs()) + self.residual)
+    }
+
+    /// Is this value of h_j in a region zero?
+    fn is_zero(&self, at: &Point, j: usize, h: f64, region: &Mode) -> Result<bool, FieldError> {
+        Ok(h.abs() <= self.noise(at, j, h, region)?)
+    }
+
+    /// Gives all surfaces that jump between the mode of the meeting and `region` the side that they are on in the second one.
+    /// Those of the meeting are not looked at; the point lies on them, up to what their values are.
+    fn let_others_jump(
+        &self,
+        at: &Point,
+        notes: &mut Notes,
+        meeting: &Meeting,
+        mut region: Mode,
+    ) -> Result<Jumps, FieldError> {
+        let (mut jumped, mut landed) = (Vec::new(), Vec::new());
+        // A jump may make others jump.
+        loop {
+            let h = at.surface_values(notes, &region.signs())?;
+            let before = jumped.len();
+            landed.clear();
+            for j in (0..h.len()).filter(|j| !meeting.surfaces.contains(j)) {
+                let noise = self.noise(at, j, h[j], &region)?;
+                if (h[j] - self.h[j]).abs() <= noise {
+                    continue;
+                }
+                let side = if h[j] < 0.0 { -1 } else { 1 };
+                if h[j].abs() <= noise {
+                    landed.push(j);
+                } else if region.entries()[j] != side {
+                    region.set(j, side);
+                    jumped.push(j);
+                }
             }
-            let side = if new[j] < 0.0 { -1 } else { 1 };
-            if new[j].abs() <= noise {
-                jumps.landed.push(j);
-            } else if after.entries()[j] != side {
-                after.set(j, side);
-                jumps.jumped.push(j);
-                is_final = false;
+            if jumped.len() == before || jumped.len() > h.len() {
+                jumped.extend(&landed);
+                return Ok(Jumps {
+                    jumped,
+                    landed,
+                    region,
+                    h,
+                });
             }
-        }
-        if is_final {
-            break;
         }
     }
-    jumps.jumped.extend(&jumps.landed);
-    Ok(jumps)
 }
 
 /// The surfaces of a meeting, with those that vanish in some region around it only; `None` if no function jumps between the
@@ -134,6 +164,7 @@ pub(super) fn with_those_that_jump(
     if !at.system.has_nested_signs() || meeting.surfaces.len() > MOST_MEETING {
         return Ok(None);
     }
+    let functions = Known::of(at, notes, meeting)?;
     let mut surfaces = meeting.surfaces.to_vec();
     let mut any = false;
     let mut known = 0;
@@ -145,40 +176,21 @@ pub(super) fn with_those_that_jump(
             ..*meeting
         };
         for pattern in 0..1_usize << known {
-            let mut region = meeting.mode.on_sides(&extended, pattern);
-            let jumps = let_others_jump(at, notes, &wider, &mut region)?;
+            let region = meeting.mode.on_sides(&extended, pattern);
+            let jumps = functions.let_others_jump(at, notes, &wider, region)?;
             any |= !jumps.jumped.is_empty();
-            let new = jumps.landed.iter().filter(|j| !extended.contains(j));
-            for &j in new {
+            for &j in &jumps.landed {
                 if !surfaces.contains(&j) {
                     surfaces.push(j);
                 }
             }
-            any |= contradicts_itself(at, notes, &wider, &region)?;
+            for &j in &extended {
+                any |= !functions.is_zero(at, j, jumps.h[j], &jumps.region)?;
+            }
         }
         surfaces.sort_unstable();
     }
     Ok((any && surfaces.len() <= MOST_MEETING).then_some(surfaces))
-}
-
-/// Is a surface of the meeting not zero in this region?
-fn contradicts_itself(
-    at: &Point,
-    notes: &mut Notes,
-    meeting: &Meeting,
-    region: &Mode,
-) -> Result<bool, FieldError> {
-    let old = at.surface_values(notes, &meeting.mode.signs())?;
-    let residual = residual(&old, at, meeting);
-    let signs = region.signs();
-    let h = at.surface_values(notes, &signs)?;
-    for &j in meeting.surfaces {
-        let size = at.system.surface_size(j, at.t, at.x, &signs)?;
-        if h[j].abs() > SURFACE_NOISE * (size + old[j].abs() + h[j].abs()) + residual {
-            return Ok(true);
-        }
-    }
-    Ok(false)
 }
 
 /// Has one of the surfaces another normal on the other side of one of them?
@@ -200,9 +212,33 @@ pub(super) fn bends(at: &Point, meeting: &Meeting) -> Result<bool, FieldError> {
     Ok(false)
 }
 
-/// How far functions may be from zero at a point that lies on surfaces to this: their values, and some times as much for other
-/// slopes.
-fn residual(h: &[f64], at: &Point, meeting: &Meeting) -> f64 {
-    let reached = meeting.fresh.iter().chain(at.arrival.sliding);
-    SURFACE_NOISE / EPS * reached.fold(0.0, |most, &j| h[j].abs().max(most))
+/// Surfaces that have another sign on some side of what is slid on than in the mode: the motion would slide between fields
+/// that differ in several signs at once. Those for which `is_checked` is false are not looked at.
+pub(crate) fn differs_between_sides(
+    system: &dyn PiecewiseSystem,
+    (t, x): (f64, &[f64]),
+    mode: &Mode,
+    sliding: &[usize],
+    is_checked: impl Fn(usize) -> bool,
+) -> Result<Option<Stop>, FieldError> {
+    if !(1..=MOST_MEETING).contains(&sliding.len()) {
+        return Ok(None);
+    }
+    let mut h = vec![0.0; mode.entries().len()];
+    for pattern in 0..1_usize << sliding.len() {
+        let side = mode.on_sides(sliding, pattern);
+        let signs = side.signs();
+        system.surfaces(t, x, &signs, &mut h)?;
+        for k in (0..h.len()).filter(|k| !sliding.contains(k) && is_checked(*k)) {
+            let beyond = -h[k] * f64::from(side.entries()[k]);
+            let size = system.surface_size(k, t, x, &signs)?;
+            if beyond > BETWEEN_SIDES * (1.0 + size) {
+                return Ok(Some(Stop::SlidesAcrossJump {
+                    surfaces: sliding.to_vec(),
+                    jumping: vec![k],
+                }));
+            }
+        }
+    }
+    Ok(None)
 }

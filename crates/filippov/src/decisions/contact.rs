@@ -1,7 +1,7 @@
 //! Contact: which bodies stay, which leave, and what slides beside them.
 
 use super::choice::choose;
-use super::look_ahead::{field_of, try_mode, Trial};
+use super::look_ahead::{try_mode, Trial};
 use super::point::{Decided, Left, Lefts, Next, Notes, Point};
 use crate::error::FieldError;
 use crate::field::{ModeField, SmoothField};
@@ -9,7 +9,7 @@ use crate::mode::Mode;
 use crate::status::Stop;
 use crate::switching::{first_nonzero, Leading};
 use crate::system::dot;
-use crate::tolerances::{DEPARTS_TANGENTIALLY, MOST_IN_CONTACT, NO_FORCE};
+use crate::tolerances::{AT_SIDE, MOST_IN_CONTACT, NO_FORCE};
 
 /// An event while bodies are in contact, that triggers no action: a body leaves, or a surface of another kind
 /// is reached or left. `surfaces` vanish at the event.
@@ -93,12 +93,8 @@ pub(super) fn place_in_contact(
     let Some(mode) = neutral.into_iter().min_by_key(n_closed) else {
         return Ok(Err(Stop::Contact { surfaces: all }));
     };
-    let stays = Leading {
-        order: 0,
-        value: 0.0,
-    };
     let left = all.into_iter().filter(|&j| mode.entries()[j] != 0);
-    let left: Lefts = left.map(|j| Left::Surface(j, stays)).collect();
+    let left: Lefts = left.map(Left::stays).collect();
     Ok(Ok(Next::new(mode, left)))
 }
 
@@ -112,7 +108,7 @@ fn begin(
     meeting: &[usize],
 ) -> Result<Trial, FieldError> {
     let (mut x, mut velocity) = (at.x.to_vec(), vec![0.0; at.x.len()]);
-    let mut field = field_of(at, mode);
+    let mut field = at.field_of(mode, &[]);
     field.eval(at.t, &mut x, &mut velocity)?;
     notes.n_field_evaluations += field.n_evaluations();
     // What has just been located as zero is not known better than that.
@@ -121,7 +117,7 @@ fn begin(
     // A surface that is reached tangentially is located to the square root of rounding.
     let rounding = match located {
         [] => NO_FORCE,
-        _ => DEPARTS_TANGENTIALLY,
+        _ => AT_SIDE,
     };
     let mut is_clear = true;
     for (i, (guard, exit)) in field.guards().iter().zip(field.last_exits()).enumerate() {
@@ -168,7 +164,7 @@ fn begin(
         } else if leading.sign() != entry {
             return Ok(Trial::Ends);
         }
-        left.push(Left::Surface(j, leading));
+        left.push(Left::beside(j, leading));
     }
     if is_clear {
         return Ok(Trial::Leaves(left));

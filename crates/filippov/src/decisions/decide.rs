@@ -1,45 +1,18 @@
-//! The one way from a point to the motion that follows: [`decide`], and the rules where surfaces vanish, in their order.
+//! The one way from a point to the motion that follows: [`decide`].
 
 use smallvec::SmallVec;
 
 use super::contact::decide_in_contact;
-use super::event::{arrival_at_surface, touch, vanishing_surfaces, Reached};
-use super::germs::{decide_if_doubtful, decide_if_entangled};
-use super::leave_by_rule::leave_by_rule;
-use super::limits::stay_at_limit;
-use super::meeting::{decide_with_kinetic_friction, resolve_first_order, too_many};
-use super::placement::{one_surface, place};
-use super::point::{Answer, Apply, Cause, Decided, Lefts, Next, Notes, Point, Rules};
-use super::relay::decide_by_relay;
+use super::event::{arrival_at_surface, vanishing_surfaces, Reached};
+use super::one_surface::one_surface;
+use super::placement::place;
+use super::point::{Cause, Decided, Notes, Point};
 use super::rule::{How, Meeting, Rule};
 use super::settle::settle;
 
 use crate::error::FieldError;
 use crate::field::ModeField;
 use crate::mode::Mode;
-
-/// The rules where surfaces vanish: the first that applies decides.
-const LIST: [(Rule, Apply); 9] = [
-    (Rule::Region, region),
-    (Rule::Touch, touch),
-    (Rule::Limit, stay_at_limit),
-    (Rule::Entangled, decide_if_entangled),
-    (Rule::OneSurface, one_surface),
-    (Rule::Law, leave_by_rule),
-    (Rule::Relay, decide_by_relay),
-    (Rule::Germs, decide_if_doubtful),
-    (Rule::TooMany, too_many),
-];
-
-/// The rule where none of them applies.
-const LAST: (Rule, Answer) = (Rule::FirstOrder, resolve_first_order);
-
-/// The list with what holds for its answers.
-pub(crate) const RULES: Rules = Rules {
-    list: &LIST,
-    last: LAST,
-    check,
-};
 
 /// The result of a decision; `Notes` have what was found out beside it.
 pub(crate) struct Decision {
@@ -119,29 +92,6 @@ fn after_event(
         }
     }
     settle(at, notes, &meeting)
-}
-
-/// What holds for the answers of several rules: friction that has become kinetic is decided once more, and sliding on one
-/// surface needs fields that point to it.
-fn check(
-    at: &Point,
-    notes: &mut Notes,
-    meeting: &Meeting,
-    rule: Rule,
-    mut decided: Decided,
-) -> Result<Decided, FieldError> {
-    use Rule::{FirstOrder, Law, Relay, TooMany};
-    let is_event = matches!(meeting.how, How::Event(_));
-    if is_event && matches!(rule, Law | Relay | TooMany | FirstOrder) {
-        decided = decide_with_kinetic_friction(at, notes, decided, meeting)?;
-    }
-    Ok(decided)
-}
-
-/// Rule: the region that the point is in.
-fn region(_: &Point, _: &mut Notes, meeting: &Meeting) -> Result<Option<Decided>, FieldError> {
-    let is_region = meeting.surfaces.is_empty();
-    Ok(is_region.then(|| Ok(Next::new(meeting.mode.clone(), Lefts::new()))))
 }
 
 /// A motion in a region, or sliding, that passes surfaces of triggers in the other direction while further

@@ -4,11 +4,9 @@ use super::point::{Left, Lefts, Notes, Point, Values};
 use smallvec::smallvec;
 
 use crate::error::FieldError;
-use crate::field::{IntersectionField, SlidingField, SmoothField};
 use crate::mode::Mode;
 use crate::switching::{first_nonzero, Leading};
-use crate::system::{dot, dot_magnitude};
-use crate::tolerances::{DEPARTS_TANGENTIALLY, MOST_MEETING};
+use crate::tolerances::{AT_SIDE, MOST_MEETING};
 
 /// The surfaces of `meeting` that the motion in `after` leaves, with the leading derivatives of h.
 pub(crate) fn departures(
@@ -27,30 +25,31 @@ pub(crate) fn departures(
     if leaving.is_empty() {
         return Ok(left);
     }
-    let (n, signs) = (at.x.len(), after.signs());
-    let mut velocity = vec![0.0; n];
-    velocity_in(at, notes, after, multipliers, at.t, at.x, &mut velocity)?;
-    let mut gradient = vec![0.0; n];
+    let signs = after.signs();
+    let velocity = at.velocity(notes, after, multipliers)?;
     // At the exit of a multiplier all forces may balance, and nothing of the motion itself tells how large they are.
     let mut around: Vec<usize> = leaving.iter().copied().chain(after.sliding_set()).collect();
     around.sort_unstable();
     let sizes = component_sizes(at, notes, after, &around)?;
     for j in leaving {
-        let ht = at.system.gradient(j, at.t, at.x, &signs, &mut gradient)?;
-        let value = ht + dot(&gradient, &velocity);
-        let size = ht.abs() + dot_magnitude(&gradient, &velocity);
+        let (value, size) = at.rate_of(j, &signs, &velocity)?;
         let place = around.binary_search(&j).unwrap_or(0);
-        let leading = if value.abs() > DEPARTS_TANGENTIALLY * size.max(sizes[place]) {
+        let leading = if value.abs() > AT_SIDE * size.max(sizes[place]) {
             Leading { order: 1, value }
         } else if after.codimension() == 0 {
             let side = after.entries()[j];
             first_nonzero(at.system, j, side, 1, at.t, at.x, &signs)?
         } else {
             // The normal component vanishes at the exit of a multiplier: its rate along the new motion.
-            let value = acceleration_of(at, notes, after, multipliers, j, &velocity)?;
-            Leading { order: 2, value }
+            let dt = at.moment(notes, &signs, &velocity)?;
+            let x = at.along(&velocity, dt);
+            let later = at.moved(at.t + dt, &x);
+            let velocity = later.velocity(notes, after, multipliers)?;
+            let (then, _) = later.rate_of(j, &signs, &velocity)?;
+            let (order, value) = (2, (then - value) / dt);
+            Leading { order, value }
         };
-        left.push(Left::Surface(j, leading));
+        left.push(Left::beside(j, leading));
     }
     Ok(left)
 }
@@ -78,60 +77,4 @@ fn component_sizes(
     let fields = at.corners(notes, surfaces, mode)?.normal_fields();
     let size = |i| fields.as_ref().map_or(0.0, |fields| fields.row_size(i));
     Ok((0..surfaces.len()).map(size).collect())
-}
-
-/// The rate of dh_j/dt along the motion in `after`, which has this velocity.
-fn acceleration_of(
-    at: &Point,
-    notes: &mut Notes,
-    after: &Mode,
-    multipliers: &[f64],
-    j: usize,
-    velocity: &[f64],
-) -> Result<f64, FieldError> {
-    let (n, signs) = (at.x.len(), after.signs());
-    let mut gradient = vec![0.0; n];
-    let ht = at.system.gradient(j, at.t, at.x, &signs, &mut gradient)?;
-    let now = ht + dot(&gradient, velocity);
-    let dt = at.moment(notes, &signs, velocity)?;
-    let pairs = at.x.iter().zip(velocity);
-    let ahead: Vec<f64> = pairs.map(|(x, v)| x + dt * v).collect();
-    let mut next = vec![0.0; n];
-    velocity_in(at, notes, after, multipliers, at.t + dt, &ahead, &mut next)?;
-    let ht = at
-        .system
-        .gradient(j, at.t + dt, &ahead, &signs, &mut gradient)?;
-    Ok((ht + dot(&gradient, &next) - now) / dt)
-}
-
-/// The field of a mode at a point near the current one.
-pub(super) fn velocity_in(
-    at: &Point,
-    notes: &mut Notes,
-    mode: &Mode,
-    multipliers: &[f64],
-    t: f64,
-    x: &[f64],
-    velocity: &mut [f64],
-) -> Result<(), FieldError> {
-    let (signs, mut x) = (mode.signs(), x.to_vec());
-    let set: Vec<usize> = mode.sliding_set().collect();
-    notes.n_field_evaluations += match set.as_slice() {
-        [] => crate::field::eval_on_side(at.system, t, &x, &signs, velocity)?,
-        &[j] => {
-            let mut field = SlidingField::new(at.system, j, &signs);
-            field.eval(t, &mut x, velocity)?;
-            field.n_evaluations()
-        }
-        _ => {
-            let field = IntersectionField::new(at.system, &set, &signs, multipliers);
-            let field = field
-                .with_rule(at.policy.law.rule)
-                .with_patience(at.patience);
-            let mut field = field.with_scaling(&at.policy.law.scaling(&set));
-            field.eval(t, &mut x, velocity)?;
-            field.n_evaluations()
-        }
-    };
-    Ok(())
 }

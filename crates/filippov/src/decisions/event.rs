@@ -10,7 +10,7 @@ use crate::field::{eval_on_side, Guard};
 use crate::mode::Mode;
 use crate::switching::{first_nonzero, normal_component, Arrival as SurfaceArrival, Leading};
 use crate::system::dot;
-use crate::tolerances::{DEPARTS_TANGENTIALLY, SURFACE_NOISE};
+use crate::tolerances::{AT_SIDE, SURFACE_NOISE};
 
 /// The surfaces among the functions of an event, in order.
 #[inline]
@@ -142,7 +142,7 @@ pub(super) fn touch(
             let candidates = vec![mode.clone(), beyond.clone()];
             match choose(at, notes, &[j], mode.clone(), candidates) {
                 Ok(after) if after == beyond => {
-                    let left = Lefts::from_elem(Left::Surface(j, leading), 1);
+                    let left = Lefts::from_elem(Left::beside(j, leading), 1);
                     return Ok(Some(Ok(Next::new(after, left))));
                 }
                 Ok(_) => {}
@@ -156,7 +156,7 @@ pub(super) fn touch(
         let known = vanishing[usize::from(side > 0)].max(1);
         let leading = first_nonzero(at.system, j, side, known, at.t, at.x, &signs)?;
         if leading.sign() == side {
-            left.push(Left::Surface(j, leading));
+            left.push(Left::beside(j, leading));
         }
     }
     Ok(Some(Ok(Next::new(mode.clone(), left))))
@@ -179,9 +179,8 @@ fn goes_on_beyond(
     at.system.gradient(j, at.t, at.x, &signs, &mut gradient)?;
     let size = (dot(&field, &field) * dot(&gradient, &gradient)).sqrt();
     // A touch is located to the square root of rounding: a component of that size vanishes.
-    let vanishing = vanishing[usize::from(beyond > 0)].max(usize::from(
-        along.value.abs() <= DEPARTS_TANGENTIALLY * size,
-    ));
+    let vanishing =
+        vanishing[usize::from(beyond > 0)].max(usize::from(along.value.abs() <= AT_SIDE * size));
     let leading = first_nonzero(at.system, j, beyond, vanishing, at.t, at.x, &signs)?;
     let goes_on = leading.sign() == beyond || leading.order == 0;
     Ok(goes_on.then_some(leading))

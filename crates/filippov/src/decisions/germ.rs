@@ -20,6 +20,16 @@ pub(super) enum Germ {
     Unknown,
 }
 
+impl Germ {
+    /// That of a first derivative; `otherwise` if none was found.
+    pub fn of(leading: Leading, otherwise: Germ) -> Self {
+        match leading.order {
+            0 => otherwise,
+            _ => Germ::Begins(leading),
+        }
+    }
+}
+
 /// The Taylor coefficients of the motion in a mode.
 pub(super) struct MotionSeries {
     jets: Arc<MotionJets>,

@@ -1,20 +1,20 @@
 //! Decide by the germs of the guards if first-order data are doubtful.
 
+use super::candidate::{noise_of, Viable};
 use super::choice::choose;
 use super::coinciding::Parallels;
 use super::consistency::{bends, with_those_that_jump};
-use super::departures::velocity_in;
 use super::leave_by_rule::slides_by_rule;
 use super::meeting::hidden_limit;
-use super::point::{Decided, Left, Next, Notes, Point};
+use super::point::{Decided, Notes, Point};
 use super::rule::{How, Meeting};
-use super::viable::{noise_of, survey, Survey, Viable};
+use super::viable::{survey, Survey};
 use crate::error::FieldError;
 use crate::field::SmoothField;
 use crate::mode::Mode;
 use crate::status::Stop;
 use crate::switching::Undecided;
-use crate::tolerances::{EQUAL_SHARES, MOST_MEETING, TANGENT};
+use crate::tolerances::{AT_SIDE, MOST_MEETING, TANGENT};
 
 /// Rule: switching functions jump between the regions around the point, surfaces are in one place or touch one another.
 pub(super) fn decide_if_entangled(
@@ -121,7 +121,7 @@ pub(super) fn decide_by_germs(
         return Ok(Err(found));
     }
     let mut chosen = preferred(at, notes, meeting, &found.viable)?;
-    let viable = found.viable.iter().map(|viable| viable.mode.clone());
+    let viable = found.viable.iter().map(|viable| viable.next.mode.clone());
     let mut modes: Vec<Mode> = viable.chain(found.open).collect();
     modes.reverse();
     if modes.len() > 1 {
@@ -133,9 +133,9 @@ pub(super) fn decide_by_germs(
     let viable = found
         .viable
         .into_iter()
-        .find(|viable| viable.mode == chosen);
+        .find(|viable| viable.next.mode == chosen);
     Ok(viable
-        .map(|viable| Ok(begin(viable)))
+        .map(|viable| Ok(viable.next))
         .ok_or_else(Survey::default))
 }
 
@@ -147,9 +147,9 @@ fn preferred(
     meeting: &Meeting,
     viable: &[Viable],
 ) -> Result<Mode, FieldError> {
-    let is_viable = |mode: &Mode| viable.iter().any(|viable| viable.mode == *mode);
+    let is_viable = |mode: &Mode| viable.iter().any(|viable| viable.next.mode == *mode);
     if let [only] = viable {
-        return Ok(only.mode.clone());
+        return Ok(only.next.mode.clone());
     }
     if !is_silent(at, notes, meeting)? {
         let limit = hidden_limit(at, notes, meeting)?;
@@ -166,16 +166,24 @@ fn preferred(
         .filter(|viable| viable.is_strict == is_any_strict);
     let before = multipliers_before(at, notes, meeting)?;
     let far = |viable: &&Viable| {
-        let mut own = viable.multipliers.iter();
-        let entries = meeting.surfaces.iter().map(|&j| viable.mode.entries()[j]);
+        let mut own = viable.next.multipliers().iter();
+        let entries = meeting
+            .surfaces
+            .iter()
+            .map(|&j| viable.next.mode.entries()[j]);
         let place = entries.map(|entry| match entry {
             0 => own.next().copied().unwrap_or(0.0),
             side => f64::from(side),
         });
         let parts = place.zip(&before).map(|(own, before)| (own - before).abs());
-        (parts.sum::<f64>() / EQUAL_SHARES).round() as u64
+        (parts.sum::<f64>() / AT_SIDE).round() as u64
     };
-    Ok(strict.min_by_key(far).unwrap_or(&viable[0]).mode.clone())
+    Ok(strict
+        .min_by_key(far)
+        .unwrap_or(&viable[0])
+        .next
+        .mode
+        .clone())
 }
 
 /// The signs of the motion that arrives, with the multipliers of what it slides on a moment before: at the point itself they
@@ -190,8 +198,7 @@ fn multipliers_before(
     }
     let mut velocity = at.arrival.velocity.to_vec();
     let moment = at.moment(notes, at.arrival.signs, &velocity)?;
-    let pairs = at.x.iter().zip(&velocity);
-    let mut past: Vec<f64> = pairs.map(|(x, v)| x - moment * v).collect();
+    let mut past = at.along(&velocity, -moment);
     let mut field = at.arrival.field.borrow_mut();
     field.eval(at.t - moment, &mut past, &mut velocity)?;
     let known = field.multipliers();
@@ -217,35 +224,24 @@ fn drop_other_names(
     if viable.len() < 2 || viable.iter().all(|viable| viable.is_strict) {
         return Ok(());
     }
-    viable.sort_by_key(|viable| (viable.is_pressed, viable.mode != *meeting.mode));
+    viable.sort_by_key(|viable| (viable.is_pressed, viable.next.mode != *meeting.mode));
     let mut velocities: Vec<Vec<f64>> = Vec::with_capacity(viable.len());
-    for one in viable.iter() {
-        let mut velocity = vec![0.0; at.x.len()];
-        velocity_in(
-            at,
-            notes,
-            &one.mode,
-            &one.multipliers,
-            at.t,
-            at.x,
-            &mut velocity,
-        )?;
-        velocities.push(velocity);
+    for Viable { next, .. } in viable.iter() {
+        velocities.push(at.velocity(notes, &next.mode, next.multipliers())?);
     }
     let corners = at.corners(notes, meeting.surfaces, meeting.mode)?;
     let size = corners.size();
     let stays_on = |one: &Viable, j: usize| {
-        let mut left = one.left.iter();
-        one.mode.entries()[j] == 0
-            || left.any(
-                |left| matches!(left, Left::Surface(k, leading) if *k == j && leading.order == 0),
-            )
+        let mut left = one.next.left.iter();
+        one.next.mode.entries()[j] == 0
+            || left.any(|left| left.surface() == Some(j) && left.leading.order == 0)
     };
     let mut kept: Vec<usize> = Vec::new();
     for k in 0..viable.len() {
         let is_named = kept.iter().any(|&known| {
             let (one, other) = (&viable[k], &viable[known]);
-            let differs = |j: &&usize| one.mode.entries()[**j] != other.mode.entries()[**j];
+            let differs =
+                |j: &&usize| one.next.mode.entries()[**j] != other.next.mode.entries()[**j];
             let mut differing = meeting.surfaces.iter().filter(differs);
             let mut pairs = velocities[k].iter().zip(&velocities[known]);
             differing.all(|&j| stays_on(one, j) && stays_on(other, j))
@@ -261,16 +257,6 @@ fn drop_other_names(
         kept.contains(&(index - 1))
     });
     Ok(())
-}
-
-fn begin(viable: Viable) -> Next {
-    let mut next = Next::new(viable.mode, viable.left);
-    if !viable.multipliers.is_empty() {
-        let start = next.start_mut();
-        (start.multipliers, start.is_given) = (viable.multipliers, viable.is_given);
-        start.two_fold = viable.two_fold;
-    }
-    next
 }
 
 /// Is a normal component at some surface not clear of zero, in a region or along a motion that slides on one surface?

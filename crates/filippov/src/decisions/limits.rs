@@ -1,6 +1,5 @@
 //! Limits of infinitely many switches or impacts in finite time, and what follows there.
 
-use super::departures::velocity_in;
 use super::point::{Decided, Lefts, Next, Notes, Point};
 use super::rule::{How, Meeting};
 use crate::error::FieldError;
@@ -231,11 +230,9 @@ fn stays_tangent(
 ) -> Result<bool, FieldError> {
     let mut after = mode.clone();
     meeting.iter().for_each(|&j| after.set(j, 0));
-    let mut velocity = vec![0.0; at.x.len()];
-    velocity_in(at, notes, &after, &[], at.t, at.x, &mut velocity)?;
+    let velocity = at.velocity(notes, &after, &[])?;
     let moment = at.moment(notes, &after.signs(), &velocity)?;
-    let pairs = at.x.iter().zip(&velocity);
-    let mut ahead: Vec<f64> = pairs.map(|(x, v)| x + moment * v).collect();
+    let mut ahead = at.along(&velocity, moment);
     let t = at.t + moment;
     let mut projector = Projector::new(ahead.len(), at.system.n_surfaces());
     projector.project_onto(at.system, meeting, t, &mut ahead, &after.signs())?;

@@ -5,7 +5,7 @@
 
 use super::point::{Left, Lefts, Notes, Point};
 use crate::error::FieldError;
-use crate::field::{ContactField, ModeField, SmoothField};
+use crate::field::{ModeField, SmoothField};
 use crate::mode::Mode;
 use crate::switching::Leading;
 use crate::system::dot;
@@ -25,10 +25,7 @@ pub(super) fn try_mode(
         .copied()
         .filter(|&j| entries[j] != 0)
         .collect();
-    let mut field = field_of(at, candidate);
-    let (mut x, mut velocity) = (at.x.to_vec(), vec![0.0; at.x.len()]);
-    field.eval(at.t, &mut x, &mut velocity)?;
-    notes.n_field_evaluations += field.n_evaluations();
+    let velocity = at.velocity(notes, candidate, &[])?;
     if velocity.iter().any(|v| !v.is_finite()) {
         return Ok(Trial::WithinRounding);
     }
@@ -40,14 +37,6 @@ pub(super) fn try_mode(
         }
     }
     Ok(Trial::WithinRounding)
-}
-
-/// The field of a mode, with the contact of bodies.
-pub(super) fn field_of<'a>(at: &Point<'_, '_, 'a>, mode: &Mode) -> ModeField<'a> {
-    match ContactField::new(at.system, at.actions, mode, at.arrival.sides, at.q) {
-        Some(field) => ModeField::Contact(Box::new(field)),
-        None => ModeField::of(at.system, at.policy.law, mode),
-    }
 }
 
 /// What becomes of a motion within a short time.
@@ -75,7 +64,7 @@ fn leaves_within(
     at.system.surfaces(at.t, at.x, &signs, &mut start)?;
     let mut is_clear = true;
     for (share, values) in [1.0, 0.5].into_iter().zip(&mut values) {
-        let mut field = field_of(at, candidate);
+        let mut field = at.field_of(candidate, &[]);
         let (t, mut x) = (at.t + share * moment, at.x.to_vec());
         follow(&mut field, at.t, &mut x, share * moment)?;
         field.project(t, &mut x)?;
@@ -116,7 +105,7 @@ fn leaves_within(
         let order = order.clamp(1.0, MAX_LIE_ORDER as f64) as usize;
         let factorial: f64 = (1..=order).map(|k| k as f64).product();
         let value = factorial * full / moment.powi(order as i32);
-        Left::Surface(j, Leading { order, value })
+        Left::beside(j, Leading { order, value })
     });
     Ok(Trial::Leaves(left.collect()))
 }

@@ -5,7 +5,6 @@ use super::departures::departures;
 use super::germs::{decide_by_germs, decide_undecided};
 use super::point::{Decided, Lefts, Next, Notes, Point};
 use super::rule::{How, Meeting};
-use super::settle::place_on;
 use super::spiral::outward_leap;
 use crate::error::FieldError;
 use crate::field::{Guard, MeetingFields, ModeField, RootEnd};
@@ -16,32 +15,6 @@ use crate::switching::{
     NormalFields, Resolution, Undecided,
 };
 use crate::tolerances::MOST_MEETING;
-
-/// Where a body has broken away, or has not been held, its friction is the kinetic one: what the other surfaces do
-/// is decided once more.
-pub(super) fn decide_with_kinetic_friction(
-    at: &Point,
-    notes: &mut Notes,
-    decided: Decided,
-    meeting: &Meeting,
-) -> Result<Decided, FieldError> {
-    let Ok(next) = &decided else {
-        return Ok(decided);
-    };
-    let slips = |j: &usize| at.system.sticks_at(*j) && next.mode.entries()[*j] != 0;
-    let (slipping, others): (Vec<usize>, Vec<usize>) =
-        meeting.surfaces.iter().partition(|j| slips(j));
-    if slipping.is_empty() || others.is_empty() {
-        return Ok(decided);
-    }
-    match place_on(at, notes, &next.mode, &others, Some(&next.mode))? {
-        (_, Ok(again)) if again.mode != next.mode => {
-            let left = departures(at, notes, &again.mode, meeting.surfaces, &[])?;
-            Ok(Ok(Next::new(again.mode, left)))
-        }
-        _ => Ok(decided),
-    }
-}
 
 /// Rule: the first-order data of the fields around the point, for the way in which the motion arrives.
 pub(super) fn resolve_first_order(

@@ -5,8 +5,8 @@
 //! cost. No integrator is in sight: neither the end of the run nor the length of a step is known here. Where a rule has to
 //! look at the motion a moment later, the moment is [`Point::moment`].
 
-mod between_sides;
 mod blow_up;
+mod candidate;
 mod choice;
 mod coinciding;
 mod consistency;
@@ -20,6 +20,7 @@ mod leave_by_rule;
 pub(crate) mod limits;
 mod look_ahead;
 mod meeting;
+mod one_surface;
 mod passage;
 mod placement;
 mod point;
@@ -33,8 +34,8 @@ mod triggers;
 mod two_fold;
 mod viable;
 
-pub(crate) use between_sides::differs_between_sides;
-pub(crate) use decide::{decide, Decision, RULES};
+pub(crate) use consistency::differs_between_sides;
+pub(crate) use decide::{decide, Decision};
 pub(crate) use event::{add_vanishing_surfaces, located_surfaces, vanishing_surfaces, Reached};
 pub(crate) use leave_by_rule::refusal;
 pub(crate) use passage::{goes_through, rates_here};

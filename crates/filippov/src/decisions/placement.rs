@@ -1,18 +1,16 @@
 //! Where a motion starts: the mode at a given point, at the start of a run and after actions.
 
-use super::choice::follow_at_surface;
 use super::contact::place_in_contact;
-use super::departures::velocity_in;
 use super::point::{Decided, Left, Notes, Point};
-use super::rule::{How, Meeting, Rule};
+use super::rule::Rule;
 use super::settle::place_on;
 use crate::error::FieldError;
 use crate::field::{ContactField, Projector, SmoothField};
 use crate::mode::Mode;
 use crate::status::Stop;
-use crate::switching::{decide as decide_at_surface, first_nonzero, Leading};
-use crate::system::{dot, dot_magnitude, surfaces_that_matter};
-use crate::tolerances::{DEPARTS_TANGENTIALLY, SLIPPED, SLOW, SURFACE_NOISE};
+use crate::switching::{first_nonzero, Leading};
+use crate::system::{dot, surfaces_that_matter};
+use crate::tolerances::{AT_SIDE, SLIPPED, SLOW, SURFACE_NOISE};
 
 /// The sides that a point is on.
 pub(crate) struct Sides {
@@ -76,37 +74,6 @@ fn take_sides(
         }
     }
     Ok(Ok(next))
-}
-
-/// Rule: one surface, by the first derivatives of h that do not vanish along the fields of both sides.
-#[inline(always)]
-pub(super) fn one_surface(
-    at: &Point,
-    notes: &mut Notes,
-    meeting: &Meeting,
-) -> Result<Option<Decided>, FieldError> {
-    let (How::Start(arrival) | How::Event(Some(arrival)), &[j]) = (meeting.how, meeting.surfaces)
-    else {
-        return Ok(None);
-    };
-    let (mode, signs) = (meeting.mode, meeting.mode.signs());
-    let decision = decide_at_surface(at.system, j, arrival, at.t, at.x, &signs)?;
-    let is_event = matches!(meeting.how, How::Event(_));
-    let is_rounding = decision.is_rounding();
-    if !is_event || is_rounding == [false; 2] {
-        return Ok(Some(follow_at_surface(at, notes, mode, j, decision)));
-    }
-    // A field that is tangent to the surface: beside it, by rounding, it still points somewhere.
-    let mut x = at.x.to_vec();
-    let mut projector = Projector::new(x.len(), signs.len());
-    projector.project(at.system, j, at.t, &mut x, &signs)?;
-    let arrival = arrival.to_tangency(is_rounding);
-    let decision = decide_at_surface(at.system, j, arrival, at.t, &x, &signs)?;
-    let decided = follow_at_surface(at, notes, mode, j, decision);
-    Ok(Some(decided.map(|mut next| {
-        next.start_mut().moved = Some(x);
-        next
-    })))
 }
 
 /// The side of every surface at the current point; a surface that the point lies on has the side of the mode
@@ -267,7 +234,7 @@ fn place_on_triggers(
             let entry = next.mode.entries()[touched.surface];
             touched.leading.sign() == entry || touched.side == entry
         });
-        let departing = departing.map(|t| Left::Surface(t.surface, t.leading));
+        let departing = departing.map(|t| Left::beside(t.surface, t.leading));
         next.left.extend(departing);
         next
     });
@@ -298,30 +265,14 @@ pub(super) fn leading_along(
             },
         );
         if after.codimension() > 0 {
-            if let Some(value) = rate_in(at, notes, j, &after, &multipliers)? {
+            let velocity = at.velocity(notes, &after, &multipliers)?;
+            let (value, size) = at.rate_of(j, &after.signs(), &velocity)?;
+            if value.abs() > AT_SIDE * size {
                 return Ok(Leading { order: 1, value });
             }
         }
     }
     first_nonzero(at.system, j, side, 0, at.t, at.x, &after.signs())
-}
-
-/// The rate of h_j along sliding in a mode, where that is not tangent to it.
-fn rate_in(
-    at: &Point,
-    notes: &mut Notes,
-    j: usize,
-    after: &Mode,
-    multipliers: &[f64],
-) -> Result<Option<f64>, FieldError> {
-    let mut velocity = vec![0.0; at.x.len()];
-    velocity_in(at, notes, after, multipliers, at.t, at.x, &mut velocity)?;
-    let mut gradient = vec![0.0; at.x.len()];
-    let signs = after.signs();
-    let ht = at.system.gradient(j, at.t, at.x, &signs, &mut gradient)?;
-    let rate = ht + dot(&gradient, &velocity);
-    let size = ht.abs() + dot_magnitude(&gradient, &velocity);
-    Ok((rate.abs() > DEPARTS_TANGENTIALLY * size).then_some(rate))
 }
 
 /// Is this speed at surface j below the tolerance?

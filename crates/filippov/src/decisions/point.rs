@@ -1,6 +1,5 @@
 //! What a decision is asked about, and what its rules hand to one another.
 
-use super::rule::{Meeting, Rule};
 use super::triggers::Triggers;
 use std::cell::RefCell;
 
@@ -9,14 +8,14 @@ use smallvec::{smallvec, SmallVec};
 use crate::action::Actions;
 use crate::error::FieldError;
 use crate::event::Deflation;
-use crate::field::{eval_on_side, Guard, Law, MeetingFields, ModeField};
+use crate::field::{eval_on_side, ContactField, Guard, Law, MeetingFields, ModeField, SmoothField};
 use crate::mode::{Mode, Signs};
 use crate::options::{NonUnique, Options};
 use crate::solution::Switch;
 use crate::status::{Stop, Warning};
 use crate::stepper::ErrorScale;
 use crate::switching::{Decision, Leading, Patience, TwoFoldMotion};
-use crate::system::PiecewiseSystem;
+use crate::system::{dot, dot_magnitude, PiecewiseSystem};
 use crate::tolerances::{MOMENT, MOST_SHORTENINGS, NO_PROGRESS, TOO_LARGE_A_CHANGE};
 
 /// One value per surface; few are kept without allocation.
@@ -35,29 +34,8 @@ pub(crate) struct Point<'p, 'm, 'a> {
     pub q: &'p [f64],
     pub arrival: &'p Arrival<'m, 'a>,
     pub policy: Policy<'a>,
-    /// The rules where surfaces vanish.
-    pub rules: &'static Rules,
     /// How long the caller waits.
     pub patience: Patience<'p>,
-}
-
-/// A rule: the motion that follows, or why the run ends; `None` where the rule does not apply.
-pub(super) type Apply = fn(&Point, &mut Notes, &Meeting) -> Result<Option<Decided>, FieldError>;
-
-/// The last rule, which always applies.
-pub(super) type Answer = fn(&Point, &mut Notes, &Meeting) -> Result<Decided, FieldError>;
-
-/// What holds for the answers of rules: an answer, checked and completed.
-pub(super) type Check =
-    fn(&Point, &mut Notes, &Meeting, Rule, Decided) -> Result<Decided, FieldError>;
-
-/// The rules in their order.
-pub(crate) struct Rules {
-    pub(super) list: &'static [(Rule, Apply)],
-    /// Where none of the list applies.
-    pub(super) last: (Rule, Answer),
-    /// Asked where several surfaces vanish.
-    pub(super) check: Check,
 }
 
 /// What is chosen where the system leaves a choice.
@@ -164,6 +142,60 @@ impl<'p, 'm, 'a> Point<'p, 'm, 'a> {
         'p: 'q,
     {
         Point { t, x, ..*self }
+    }
+
+    /// The field of a mode, with the contact of bodies. The multipliers of several surfaces are tracked from these, if they are
+    /// known.
+    pub fn field_of(&self, mode: &Mode, multipliers: &[f64]) -> ModeField<'p> {
+        let sides = self.arrival.sides;
+        if let Some(field) = ContactField::new(self.system, self.actions, mode, sides, self.q) {
+            return ModeField::Contact(Box::new(field));
+        }
+        let mut field = ModeField::of(self.system, self.policy.law, mode);
+        if let ModeField::Intersection(field) = &mut field {
+            field.set_patience(self.patience);
+            field.begin(multipliers, false);
+        }
+        field
+    }
+
+    /// The velocity of a motion in this mode.
+    pub fn velocity(
+        &self,
+        notes: &mut Notes,
+        mode: &Mode,
+        multipliers: &[f64],
+    ) -> Result<Vec<f64>, FieldError> {
+        let mut velocity = vec![0.0; self.x.len()];
+        notes.n_field_evaluations += if mode.codimension() == 0 {
+            eval_on_side(self.system, self.t, self.x, &mode.signs(), &mut velocity)?
+        } else {
+            let mut field = self.field_of(mode, multipliers);
+            field.eval(self.t, &mut self.x.to_vec(), &mut velocity)?;
+            field.n_evaluations()
+        };
+        Ok(velocity)
+    }
+
+    /// The state after this time of a motion with this velocity.
+    pub fn along(&self, velocity: &[f64], dt: f64) -> Vec<f64> {
+        let pairs = self.x.iter().zip(velocity);
+        pairs.map(|(x, v)| x + dt * v).collect()
+    }
+
+    /// The rate of h_j along a motion with this velocity, and the size of what it is the sum of.
+    pub fn rate_of(
+        &self,
+        j: usize,
+        signs: &[f64],
+        velocity: &[f64],
+    ) -> Result<(f64, f64), FieldError> {
+        let mut gradient = vec![0.0; velocity.len()];
+        let of_time = self
+            .system
+            .gradient(j, self.t, self.x, signs, &mut gradient)?;
+        let size = of_time.abs() + dot_magnitude(&gradient, velocity);
+        Ok((of_time + dot(&gradient, velocity), size))
     }
 
     /// A short time for a motion with this velocity: within it neither the state nor the field with these signs changes by
@@ -342,65 +374,69 @@ pub(crate) type Decided = Result<Next, Stop>;
 /// What vanishes at the start of a motion, seldom more than one function.
 pub(crate) type Lefts = SmallVec<[Left; 1]>;
 
-/// A function that vanishes at the start of a motion, with its first non-vanishing derivative.
+/// A function that vanishes at the start of a motion, with its first non-vanishing derivative; of an exit function on one
+/// surface that of the normal component.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Left {
-    /// The surface is left with this derivative of h.
-    Surface(usize, Leading),
-    /// Sliding starts with a vanishing exit function; the derivative of the normal component.
-    Exit(Guard, Leading),
+pub(crate) struct Left {
+    pub guard: Guard,
+    pub leading: Leading,
 }
 
 impl Left {
+    /// The surface is left with this derivative of h.
+    pub fn beside(j: usize, leading: Leading) -> Self {
+        let guard = Guard::Surface(j);
+        Left { guard, leading }
+    }
+
+    /// The motion stays on the surface.
+    pub fn stays(j: usize) -> Self {
+        let (order, value) = (0, 0.0);
+        Left::beside(j, Leading { order, value })
+    }
+
     /// What vanishes after the decision at surface `j`.
     #[inline]
     pub fn after(j: usize, decision: &Decision) -> Lefts {
-        let [minus, plus] = Guard::ends(j);
+        let ends = Guard::ends(j).into_iter();
+        let exits = |leading: [Leading; 2]| {
+            let pairs = ends.zip(leading);
+            pairs.map(|(guard, leading)| Left { guard, leading })
+        };
         if let Some(motion) = decision.starts_at_two_fold() {
-            return smallvec![
-                Left::Exit(minus, motion.minus),
-                Left::Exit(plus, motion.plus),
-            ];
+            return exits([motion.minus, motion.plus]).collect();
         }
         match decision.entry {
-            -1 => smallvec![Left::Surface(j, decision.minus)],
-            1 => smallvec![Left::Surface(j, decision.plus)],
-            _ => [(minus, decision.minus), (plus, decision.plus)]
-                .into_iter()
-                .filter(|(_, leading)| leading.order > 1)
-                .map(|(function, leading)| {
-                    // The normal component is the derivative of h: one order less.
-                    Left::Exit(
-                        function,
-                        Leading {
-                            order: leading.order - 1,
-                            value: leading.value,
-                        },
-                    )
-                })
-                .collect(),
+            -1 => smallvec![Left::beside(j, decision.minus)],
+            1 => smallvec![Left::beside(j, decision.plus)],
+            _ => {
+                // The normal component is the derivative of h: one order less.
+                let less = |leading: Leading| Leading {
+                    order: leading.order.saturating_sub(1),
+                    ..leading
+                };
+                let left = exits([decision.minus, decision.plus].map(less));
+                left.filter(|left| left.leading.order > 0).collect()
+            }
         }
     }
 
     /// The surface that is left; for an exit function there is none.
     pub fn surface(&self) -> Option<usize> {
-        match self {
-            Left::Surface(j, _) => Some(*j),
-            Left::Exit(..) => None,
+        match self.guard {
+            Guard::Surface(j) => Some(j),
+            _ => None,
         }
     }
 
     /// The zero to divide out of the function along the motion from `t`.
     pub fn deflation(self, t: f64) -> Option<(Guard, Deflation)> {
-        let (function, leading) = match self {
-            Left::Surface(j, leading) => (Guard::Surface(j), leading),
-            Left::Exit(function, leading) => (function, leading),
-        };
+        let Left { guard, leading } = self;
         (leading.order > 0).then(|| {
             let order = i32::try_from(leading.order).unwrap_or(1);
             // In the sense of the mode every monitored function starts out positive.
             (
-                function,
+                guard,
                 Deflation {
                     t,
                     order,

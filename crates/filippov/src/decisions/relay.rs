@@ -106,15 +106,12 @@ fn departures_caught(
 ) -> Result<Lefts, FieldError> {
     let mut left = departures(at, notes, after, meeting, multipliers)?;
     for _ in meeting {
-        let is_wrong = |l: &&Left| match l {
-            Left::Surface(j, leading) => leading.value * f64::from(after.entries()[*j]) <= 0.0,
-            Left::Exit(..) => false,
+        let is_wrong = |left: &&Left| {
+            let entry = left.surface().map_or(0, |j| after.entries()[j]);
+            left.leading.value * f64::from(entry) <= 0.0
         };
-        let wrong: Vec<usize> = left
-            .iter()
-            .filter(is_wrong)
-            .filter_map(Left::surface)
-            .collect();
+        let wrong = left.iter().filter(is_wrong);
+        let wrong: Vec<usize> = wrong.filter_map(Left::surface).collect();
         if wrong.is_empty() {
             break;
         }

@@ -6,7 +6,7 @@ use smallvec::{smallvec, SmallVec};
 
 use crate::error::FieldError;
 use crate::field::{Guard, ModeField, RootEnd};
-use crate::tolerances::{AT_FOLD, AT_SIDE, FIRST_SLACK, VANISHED};
+use crate::tolerances::{AT_FOLD, AT_SIDE, TANGENT, VANISHED};
 
 /// The functions that count as vanishing where steps of sliding shrink to nothing: the jump of the field across a surface has
 /// vanished, the multipliers have met a fold beyond which there are none, or both fields are tangent to the surface.
@@ -23,7 +23,7 @@ pub(crate) fn lost_functions(
     let &[j] = at.arrival.sliding else {
         return Ok(None);
     };
-    let arrived = beyond_double_zero(at, j)?.is_some() || two_fold_here(at)?.is_some();
+    let arrived = beyond_double_zero(at, notes, j)?.is_some() || two_fold_here(at)?.is_some();
     Ok(arrived.then(|| Guard::ends(j).as_slice().into()))
 }
 
@@ -31,8 +31,7 @@ pub(crate) fn lost_functions(
 fn has_lost_jump(at: &Point, notes: &mut Notes) -> Result<bool, FieldError> {
     let (mode, surfaces, velocity) = (at.arrival.mode, at.arrival.sliding, at.arrival.velocity);
     let moment = at.moment(notes, &mode.signs(), velocity)?;
-    let pairs = at.x.iter().zip(velocity);
-    let past: Vec<f64> = pairs.map(|(x, v)| x - moment * v).collect();
+    let past = at.along(velocity, -moment);
     let earlier = at.moved(at.t - moment, &past);
     let here = at.corners(notes, surfaces, mode)?;
     let earlier = earlier.corners(notes, surfaces, mode)?;
@@ -82,7 +81,7 @@ pub(crate) fn loosen(field: &ModeField, functions: &[Guard], slacks: &mut Vec<(G
     for &guard in functions.iter().filter(is_end) {
         match slacks.iter_mut().find(|held| held.0 == guard) {
             Some(held) => held.1 = (10.0 * held.1).min(AT_SIDE),
-            None => slacks.push((guard, FIRST_SLACK)),
+            None => slacks.push((guard, TANGENT)),
         }
     }
 }

@@ -1,42 +1,63 @@
-//! Surfaces vanish together: the first rule that applies answers.
+//! Surfaces vanish together: the rules in their order, of which the first that applies answers.
 
-use super::point::{Decided, Notes, Point};
+use super::departures::departures;
+use super::event::touch;
+use super::germs::{decide_if_doubtful, decide_if_entangled};
+use super::leave_by_rule::leave_by_rule;
+use super::limits::stay_at_limit;
+use super::meeting::{resolve_first_order, too_many};
+use super::one_surface::one_surface;
+use super::point::{Decided, Lefts, Next, Notes, Point};
+use super::relay::decide_by_relay;
 use super::rule::{How, Meeting, Rule};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::status::Stop;
 use crate::switching::Arrival as SurfaceArrival;
 
-/// The answer of the first rule that applies, with its name.
+/// A rule: the motion that follows, or why the run ends; `None` where the rule does not apply.
+type Apply = fn(&Point, &mut Notes, &Meeting) -> Result<Option<Decided>, FieldError>;
+
+const RULES: [(Rule, Apply); 9] = [
+    (Rule::Region, region),
+    (Rule::Touch, touch),
+    (Rule::Limit, stay_at_limit),
+    (Rule::Entangled, decide_if_entangled),
+    (Rule::OneSurface, one_surface),
+    (Rule::Law, leave_by_rule),
+    (Rule::Relay, decide_by_relay),
+    (Rule::Germs, decide_if_doubtful),
+    (Rule::TooMany, too_many),
+];
+
+/// The answer of the first rule that applies, with its name; first-order data where none of the list does.
 pub(super) fn settle(
     at: &Point,
     notes: &mut Notes,
     meeting: &Meeting,
 ) -> Result<(Rule, Decided), FieldError> {
-    let (rule, decided) = first_answer(at, notes, meeting)?;
-    let decided = match meeting.surfaces {
-        [] | [_] => decided,
-        _ => (at.rules.check)(at, notes, meeting, rule, decided)?,
-    };
-    Ok((rule, decided))
-}
-
-fn first_answer(
-    at: &Point,
-    notes: &mut Notes,
-    meeting: &Meeting,
-) -> Result<(Rule, Decided), FieldError> {
-    for &(rule, apply) in at.rules.list {
+    for (rule, apply) in RULES {
         if let Some(decided) = apply(at, notes, meeting)? {
-            return Ok((rule, decided));
+            let is_kinetic = matches!(rule, Rule::Law | Rule::Relay | Rule::TooMany);
+            return Ok(match is_kinetic {
+                true => (rule, with_kinetic_friction(at, notes, decided, meeting)?),
+                false => (rule, decided),
+            });
         }
     }
-    let (rule, answer) = at.rules.last;
     // A rule of the list does not apply, or was interrupted. Of one or two surfaces none takes long.
     if meeting.surfaces.len() > 2 && at.patience.is_over() {
-        return Ok((rule, Err(Stop::Interrupted)));
+        return Ok((Rule::FirstOrder, Err(Stop::Interrupted)));
     }
-    Ok((rule, answer(at, notes, meeting)?))
+    let decided = resolve_first_order(at, notes, meeting)?;
+    let decided = with_kinetic_friction(at, notes, decided, meeting)?;
+    Ok((Rule::FirstOrder, decided))
+}
+
+/// Rule: the region that the point is in.
+fn region(_: &Point, _: &mut Notes, meeting: &Meeting) -> Result<Option<Decided>, FieldError> {
+    let is_region = meeting.surfaces.is_empty();
+    Ok(is_region.then(|| Ok(Next::new(meeting.mode.clone(), Lefts::new()))))
 }
 
 /// The motion from a place where these surfaces matter and vanish. The others have the signs of `mode`.
@@ -59,4 +80,30 @@ pub(super) fn place_on(
         how: How::Start(SurfaceArrival::from_side(entry)),
     };
     settle(at, notes, &meeting)
+}
+
+/// Where a body has broken away, or has not been held, its friction is the kinetic one: what the other surfaces do
+/// is decided once more.
+fn with_kinetic_friction(
+    at: &Point,
+    notes: &mut Notes,
+    decided: Decided,
+    meeting: &Meeting,
+) -> Result<Decided, FieldError> {
+    let (Ok(next), How::Event(_)) = (&decided, meeting.how) else {
+        return Ok(decided);
+    };
+    let slips = |j: &usize| at.system.sticks_at(*j) && next.mode.entries()[*j] != 0;
+    let (slipping, others): (Vec<usize>, Vec<usize>) =
+        meeting.surfaces.iter().partition(|j| slips(j));
+    if slipping.is_empty() || others.is_empty() {
+        return Ok(decided);
+    }
+    match place_on(at, notes, &next.mode, &others, Some(&next.mode))? {
+        (_, Ok(again)) if again.mode != next.mode => {
+            let left = departures(at, notes, &again.mode, meeting.surfaces, &[])?;
+            Ok(Ok(Next::new(again.mode, left)))
+        }
+        _ => Ok(decided),
+    }
 }

@@ -58,8 +58,7 @@ pub(crate) fn landing(
     } else {
         1.0
     };
-    let pairs = at.x.iter().zip(&leap.shift);
-    let mut x: Vec<f64> = pairs.map(|(x, s)| x + share * s).collect();
+    let mut x = at.along(&leap.shift, share);
     let t = at.t + share * leap.duration;
     let signs = leap.region.signs();
     let mut projector = Projector::new(x.len(), at.system.n_surfaces());

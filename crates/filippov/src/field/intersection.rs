@@ -115,11 +115,9 @@ impl<'a> IntersectionField<'a> {
         self
     }
 
-    /// The same with a search for its first multipliers that ends without any when the caller has waited long enough.
-    #[must_use]
-    pub fn with_patience(mut self, patience: Patience<'a>) -> Self {
+    /// The search for its first multipliers ends without any when the caller has waited long enough.
+    pub fn set_patience(&mut self, patience: Patience<'a>) {
         self.patience = patience;
-        self
     }
 
     /// The same drawn back to the surfaces by a term with this factor, if there is one, and not projected.

@@ -27,7 +27,7 @@ pub use intersection::IntersectionField;
 pub use meeting::MeetingFields;
 pub(crate) use motion::Exits;
 pub use motion::Motion;
-pub use project::Projector;
+pub use project::{shares_of_rows, Projector};
 pub use region::{eval_off_surface, eval_on_side, move_inside, side_offsets, RegionField};
 pub use sliding::{NormalComponents, SlidingField};
 pub(crate) use ties::{beside_on, in_the_place_of, normal, parallel, sense_of, Tie};

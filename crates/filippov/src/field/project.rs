@@ -89,8 +89,13 @@ impl Projector {
                 system.gradient(j, t, x, signs, row)?;
                 is_near &= self.h[j].abs() <= 0.25 * SURFACE_NOISE * dot_magnitude(row, x);
             }
-            let shifts = if is_near { None } else { self.shifts(set, n) };
-            let Some(shifts) = shifts else { break };
+            if is_near {
+                break;
+            }
+            let h: Vector = set.iter().map(|&j| self.h[j]).collect();
+            let Some(shifts) = shares_of_rows(&self.rows, &h) else {
+                break;
+            };
             for (row, shift) in self.rows.chunks_exact(n).zip(shifts) {
                 x.iter_mut().zip(row).for_each(|(x, g)| *x -= shift * g);
             }
@@ -119,21 +124,23 @@ impl Projector {
         }
         Ok(())
     }
+}
 
-    /// (N N^T)^-1 h; `None` if h or a gradient is not finite.
-    fn shifts(&self, set: &[usize], n: usize) -> Option<Vector> {
-        let row = |i: usize| &self.rows[i * n..(i + 1) * n];
-        let mut gram = Matrix::zeros(set.len());
-        for i in 0..set.len() {
-            for j in 0..set.len() {
-                gram[(i, j)] = dot(row(i), row(j));
-            }
+/// The combination of some rows, one after the other, that is the shortest vector with these inner products with them:
+/// (N N^T)^-1 h. A row that depends on earlier ones has no share in it. `None` if a number is not finite.
+pub fn shares_of_rows(rows: &[f64], values: &[f64]) -> Option<Vector> {
+    let m = values.len();
+    let n = rows.len() / m;
+    let row = |i: usize| &rows[i * n..(i + 1) * n];
+    let mut gram = Matrix::zeros(m);
+    for i in 0..m {
+        for j in 0..m {
+            gram[(i, j)] = dot(row(i), row(j));
         }
-        let h: Vector = set.iter().map(|&j| self.h[j]).collect();
-        let shifts = gram.solve_gram(&h);
-        let is_finite = shifts.iter().all(|v| v.is_finite());
-        is_finite.then_some(shifts)
     }
+    let shares = gram.solve_gram(values);
+    let is_finite = shares.iter().all(|v| v.is_finite());
+    is_finite.then_some(shares)
 }
 
 #[cfg(test)]

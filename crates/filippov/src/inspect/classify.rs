@@ -6,7 +6,7 @@ use smallvec::SmallVec;
 
 use crate::action::Actions;
 use crate::decisions::{
-    decide, sides, Arrival, Cause, Decision, Notes, Point, Policy, Reached, Sides, RULES,
+    decide, sides, Arrival, Cause, Decision, Notes, Point, Policy, Reached, Sides,
 };
 use crate::error::FieldError;
 use crate::field::{eval_on_side, Guard, Law, MeetingFields, ModeField, SmoothField};
@@ -181,7 +181,6 @@ pub fn classify(
         q: &[],
         arrival,
         policy,
-        rules: &RULES,
         patience: Patience::endless(),
     };
     let event = Cause::Event {

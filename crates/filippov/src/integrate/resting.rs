@@ -18,10 +18,8 @@ impl Integrator<'_> {
         mode: &Mode,
         left: &[Left],
     ) -> Result<(), FieldError> {
-        let resting = left.iter().filter_map(|left| match left {
-            Left::Surface(j, leading) if leading.order == 0 => Some(*j),
-            _ => None,
-        });
+        let resting = left.iter().filter(|left| left.leading.order == 0);
+        let resting = resting.filter_map(Left::surface);
         self.motion.resting.clear();
         self.motion.resting.extend(resting);
         if self.motion.resting.is_empty() {

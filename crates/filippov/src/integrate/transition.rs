@@ -8,7 +8,7 @@ use crate::decision_record::decide_and_record;
 use crate::decisions::{
     beyond_double_zero, decide, differs_between_sides, landing, limits::limit_here, refusal,
     root_ends, two_fold_here, vanishing_surfaces, warn_against_direction, Arrival, Cause, Decision,
-    Leap, Left, Lefts, Next, Notes, Point, Reached, Rule, Values, RULES,
+    Leap, Left, Lefts, Next, Notes, Point, Reached, Rule, Values,
 };
 use crate::error::FieldError;
 use crate::event::{Deflation, Found, Multiple, Seen};
@@ -64,7 +64,6 @@ impl<'a> Integrator<'a> {
             q: &self.motion.discrete,
             arrival: &arrival,
             policy: self.options.into(),
-            rules: &RULES,
             patience: Patience::until(&is_over),
         };
         let mut notes = Notes {
@@ -249,7 +248,9 @@ impl<'a> Integrator<'a> {
         if !surfaces.is_empty() {
             return Ok(None);
         }
-        let beyond = self.ask(Cause::Anew(&mode), |at, _| beyond_double_zero(at, j))?;
+        let beyond = self.ask(Cause::Anew(&mode), |at, notes| {
+            beyond_double_zero(at, notes, j)
+        })?;
         let Some((t, end)) = beyond.filter(|(t, _)| *t <= self.horizon) else {
             return Ok(None);
         };
@@ -594,16 +595,11 @@ impl<'a> Integrator<'a> {
             None if self.dt.is_nan() => initial_step(field, t, x, derivative, scale, longest)?,
             None => restart_step(field, t, x, derivative, scale, self.dt.min(longest))?,
         };
-        for l in left {
-            if let Left::Surface(j, leading) = l {
-                let place = (self.t, &self.x[..]);
-                dt = dt.min(excursion(
-                    self.system,
-                    place,
-                    &self.motion.mode,
-                    *j,
-                    *leading,
-                )?);
+        let place = (self.t, &self.x[..]);
+        for left in left {
+            if let Some(j) = left.surface() {
+                let room = excursion(self.system, place, &self.motion.mode, j, left.leading)?;
+                dt = dt.min(room);
             }
         }
         Ok(dt)

@@ -26,13 +26,9 @@ pub const DOUBLE_ROOT: f64 = 1e-14;
 /// located event is on it up to some roundings only.
 pub const OF_ROUNDING: f64 = 1e-12;
 
-/// A multiplier counts as -1 or +1 at an exit within this distance; the event is located to better
-/// than that.
+/// Events are located to better than this: a multiplier counts as -1 or +1 at an exit within this distance, two multipliers as
+/// one, and a normal component as zero below this fraction of its terms.
 pub const AT_SIDE: f64 = 1e-6;
-
-/// How far a multiplier may go beyond its end at first where forces balance to rounding: clear of the rounding of exit
-/// functions. It grows up to `AT_SIDE`.
-pub const FIRST_SLACK: f64 = 1e-12;
 
 /// A sign that decided at an intersection is doubtful if its quantity is smaller than this fraction
 /// of its size: about the error of the fields at a located event. The fields are perturbed by as
@@ -158,10 +154,6 @@ pub const FOLD_REACH: f64 = 0.2;
 /// Evaluations of which the multipliers are kept to track from: those of a step and its rejected attempts.
 pub const MOST_TRACKED: usize = 16;
 
-/// A normal component below this fraction of its terms, where an intersection is left, is that of a multiplier
-/// that just reached its end; the event is located to better than that.
-pub const DEPARTS_TANGENTIALLY: f64 = 1e-6;
-
 /// An outward spiral starts at this multiple of the tolerance from the intersection: a free parameter of a family
 /// of solutions, small, and well above the error of the event.
 pub const SPIRAL_START: f64 = 100.0;
@@ -258,15 +250,6 @@ pub const SMALL_JUMP: f64 = 1e4;
 /// A multiplier was lost, and not at its end, where the shares of both fields beyond are above this.
 pub const INSIDE_SHARES: f64 = 0.05;
 
-/// Newton's method has come to a two-fold, in tolerances of the state: far below what matters, above rounding.
-pub const SETTLED: f64 = 1e-6;
-
-/// Beyond a two-fold that is slid through the multiplier counts as known where rounding changes it by less than this.
-pub const KNOWN_MULTIPLIER: f64 = 1e-4;
-
-/// The way to there is found by doubling one tolerance: to a million of them at most.
-pub const MOST_DOUBLINGS: usize = 20;
-
 /// A motion that was to stay on a surface has left it where h is above this multiple of the tolerance: errors of many
 /// steps add up.
 pub const LEFT_RESTING: f64 = 1e3;
@@ -274,10 +257,6 @@ pub const LEFT_RESTING: f64 = 1e3;
 /// Normal components have vanished that are below this part of what they were a moment before: a zero is known to much
 /// less than a moment.
 pub const VANISHED: f64 = 1e-3;
-
-/// The fields of both sides have equal shares where the multiplier is nearer to zero than this: a moment before a jump vanishes
-/// the multiplier is a quotient of two small numbers.
-pub const EQUAL_SHARES: f64 = 1e-6;
 
 /// A trial of the modes is lengthened by this factor, up to so many times, until every function is clear of rounding.
 pub const LONGER_TRIAL: f64 = 10.0;

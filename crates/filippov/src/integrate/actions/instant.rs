@@ -337,8 +337,7 @@ impl Integrator<'_> {
             .iter()
             .filter(|(j, _)| self.triggers().is_internal(*j))
         {
-            next.left
-                .push(Left::Surface(j, Leading { order: 1, value }));
+            next.left.push(Left::beside(j, Leading { order: 1, value }));
         }
         self.go_on_in(before, next, rule)
     }
