@@ -6,7 +6,7 @@ use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::patience::Patience;
 use crate::system::{dot, PiecewiseSystem};
-use crate::tolerances::DEPARTS_TANGENTIALLY;
+use crate::tolerances::AT_SIDE;
 
 /// Solves the relay problem at a point where the surfaces of `meeting` vanish, with the entries of `mode` there as
 /// the first guess. `None` if the field is not affine in their signs, or if no solution was found. Returns
@@ -44,7 +44,7 @@ pub fn relay_at(
             };
             let size = problem.nu[i].abs() + sum(&mut problem.n.row(i));
             let normal = parts.time_rates[i].abs() + sum(&mut parts.gradients.row(i));
-            size <= DEPARTS_TANGENTIALLY * normal * speed
+            size <= AT_SIDE * normal * speed
         });
     }
     if let Some(solution) = found.as_mut().filter(|found| found.n_sharing > 0) {
