@@ -369,15 +369,16 @@ pub(super) fn silent_rows((fields, noise): (&NormalFields, &[f64]), entries: &[i
 /// and what the rounding of time and state makes of zero.
 pub(super) fn noise_of(
     at: &Point,
-    meeting: &Meeting,
+    surfaces: &[usize],
+    mode: &Mode,
     fields: &NormalFields,
 ) -> Result<Vec<f64>, FieldError> {
     let mut gradient = vec![0.0; at.x.len()];
-    let mut noise = Vec::with_capacity(meeting.surfaces.len());
-    for (i, &j) in meeting.surfaces.iter().enumerate() {
+    let mut noise = Vec::with_capacity(surfaces.len());
+    for (i, &j) in surfaces.iter().enumerate() {
         let mut largest = DOUBTFUL * fields.row_size(i);
         for side in [-1, 1] {
-            let signs = meeting.mode.with(j, side).signs();
+            let signs = mode.with(j, side).signs();
             let partials = at
                 .system
                 .rate_gradient(j, at.t, at.x, &signs, &mut gradient)?;

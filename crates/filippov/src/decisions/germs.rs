@@ -32,7 +32,7 @@ pub(super) fn decide_if_entangled(
         if parallels.coincide || !parallels.touching.is_empty() {
             return Ok(decide_by_germs(at, notes, meeting)?.ok());
         }
-        if !is_silent(at, notes, meeting)? {
+        if !is_silent(at, notes, meeting.surfaces, meeting.mode)? {
             return Ok(None);
         }
     }
@@ -45,17 +45,22 @@ pub(super) fn decide_if_entangled(
 }
 
 /// Are all fields around the point tangent to one of several surfaces?
-fn is_silent(at: &Point, notes: &mut Notes, meeting: &Meeting) -> Result<bool, FieldError> {
-    if meeting.surfaces.len() < 2 {
+pub(super) fn is_silent(
+    at: &Point,
+    notes: &mut Notes,
+    surfaces: &[usize],
+    mode: &Mode,
+) -> Result<bool, FieldError> {
+    if surfaces.len() < 2 {
         return Ok(false);
     }
-    let corners = at.corners(notes, meeting.surfaces, meeting.mode)?;
+    let corners = at.corners(notes, surfaces, mode)?;
     let Ok(fields) = corners.normal_fields() else {
         return Ok(false);
     };
-    let noise = noise_of(at, meeting, &fields)?;
+    let noise = noise_of(at, surfaces, mode, &fields)?;
     let is_silent = |(i, noise): (usize, &f64)| {
-        let sticks = at.system.sticks_at(meeting.surfaces[i]);
+        let sticks = at.system.sticks_at(surfaces[i]);
         !sticks && fields.row_range(i).iter().all(|v| v.abs() <= *noise)
     };
     Ok(noise.iter().enumerate().any(is_silent))
@@ -150,7 +155,7 @@ fn preferred(
     if let [only] = viable {
         return Ok(only.next.mode.clone());
     }
-    if !is_silent(at, notes, meeting)? {
+    if !is_silent(at, notes, meeting.surfaces, meeting.mode)? {
         let limit = hidden_limit(at, notes, meeting)?;
         if let Some(limit) = limit.filter(is_viable) {
             return Ok(limit);
@@ -260,7 +265,7 @@ fn drop_other_names(
 
 /// Is a normal component at some surface not clear of zero, in a region or along a motion that slides on one surface?
 fn is_doubtful(at: &Point, fields: &NormalFields, meeting: &Meeting) -> Result<bool, FieldError> {
-    let noise = noise_of(at, meeting, fields)?;
+    let noise = noise_of(at, meeting.surfaces, meeting.mode, fields)?;
     if fields.any_component(|i, component| component.abs() <= noise[i]) {
         return Ok(true);
     }

@@ -151,13 +151,10 @@ fn solve_relay_at(
     let (mut t, mut x) = (at.t, at.x.to_vec());
     if later {
         let mut velocity = vec![0.0; x.len()];
-        at.arrival
-            .field
-            .borrow_mut()
-            .eval(t, &mut x, &mut velocity)?;
+        let mut field = at.arrival.field.borrow_mut();
+        field.eval(t, &mut x, &mut velocity)?;
         let dt = at.moment(notes, &mode.signs(), &velocity)?;
-        x.iter_mut().zip(&velocity).for_each(|(x, v)| *x += dt * v);
-        t += dt;
+        (t, x) = (t + dt, at.moved(t, &x).along(&velocity, dt));
     }
     let (found, evaluations) = relay_at(at.system, (t, &x), mode, meeting, at.patience)?;
     notes.n_field_evaluations += evaluations;

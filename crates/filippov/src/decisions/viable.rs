@@ -50,7 +50,7 @@ pub(super) fn survey(
         return Ok(None);
     };
     let pace = corners.pace(|i| at.scale.size(i, at.x[i]));
-    let noise = noise_of(at, meeting, &fields)?;
+    let noise = noise_of(at, meeting.surfaces, meeting.mode, &fields)?;
     let touching = Parallels::of(at, meeting.surfaces, meeting.mode)?.touching;
     // Then derivatives at the point are not those where the surfaces touch.
     let is_beside = touching.iter().any(|touch| !touch.is_exact);
