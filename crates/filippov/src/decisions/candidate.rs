@@ -180,8 +180,8 @@ impl Candidate<'_> {
         };
         let is_tangent = |i: usize| g[i].abs() <= self.noise[i];
         let is_at_end = |index: usize| {
-            let end = if index % 2 == 0 { 1.0 } else { -1.0 };
-            1.0 + end * lambda[index / 2] <= AT_SIDE
+            let sense = [1.0, -1.0][index % 2];
+            1.0 + sense * lambda[index / 2] <= AT_SIDE
         };
         let any_end = (0..2 * lambda.len()).any(is_at_end);
         let any_tangent = self.surfaces().any(|(i, ..)| is_tangent(i));
