@@ -180,8 +180,8 @@ impl Candidate<'_> {
         };
         let is_tangent = |i: usize| g[i].abs() <= self.noise[i];
         let is_at_end = |index: usize| {
-            let end = if index % 2 == 0 { 1.0 } else { -1.0 };
-            1.0 + end * lambda[index / 2] <= AT_SIDE
+            let sense = [1.0, -1.0][index % 2];
+            1.0 + sense * lambda[index / 2] <= AT_SIDE
         };
         let any_end = (0..2 * lambda.len()).any(is_at_end);
         let any_tangent = self.surfaces().any(|(i, ..)| is_tangent(i));
@@ -369,15 +369,16 @@ pub(super) fn silent_rows((fields, noise): (&NormalFields, &[f64]), entries: &[i
 /// and what the rounding of time and state makes of zero.
 pub(super) fn noise_of(
     at: &Point,
-    meeting: &Meeting,
+    surfaces: &[usize],
+    mode: &Mode,
     fields: &NormalFields,
 ) -> Result<Vec<f64>, FieldError> {
     let mut gradient = vec![0.0; at.x.len()];
-    let mut noise = Vec::with_capacity(meeting.surfaces.len());
-    for (i, &j) in meeting.surfaces.iter().enumerate() {
+    let mut noise = Vec::with_capacity(surfaces.len());
+    for (i, &j) in surfaces.iter().enumerate() {
         let mut largest = DOUBTFUL * fields.row_size(i);
         for side in [-1, 1] {
-            let signs = meeting.mode.with(j, side).signs();
+            let signs = mode.with(j, side).signs();
             let partials = at
                 .system
                 .rate_gradient(j, at.t, at.x, &signs, &mut gradient)?;

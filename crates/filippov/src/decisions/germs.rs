@@ -46,18 +46,19 @@ pub(super) fn decide_if_entangled(
 pub(super) fn is_silent(
     at: &Point,
     notes: &mut Notes,
-    meeting: &Meeting,
+    surfaces: &[usize],
+    mode: &Mode,
 ) -> Result<bool, FieldError> {
-    if meeting.surfaces.len() < 2 {
+    if surfaces.len() < 2 {
         return Ok(false);
     }
-    let corners = at.corners(notes, meeting.surfaces, meeting.mode)?;
+    let corners = at.corners(notes, surfaces, mode)?;
     let Ok(fields) = corners.normal_fields() else {
         return Ok(false);
     };
-    let noise = noise_of(at, meeting, &fields)?;
+    let noise = noise_of(at, surfaces, mode, &fields)?;
     let is_silent = |(i, noise): (usize, &f64)| {
-        let sticks = at.system.sticks_at(meeting.surfaces[i]);
+        let sticks = at.system.sticks_at(surfaces[i]);
         !sticks && fields.row_range(i).iter().all(|v| v.abs() <= *noise)
     };
     Ok(noise.iter().enumerate().any(is_silent))
@@ -73,7 +74,7 @@ pub(super) fn decide_if_doubtful(
     if !is_few || slides_by_rule(at.arrival) || !is_doubtful(at, notes, meeting)? {
         return Ok(None);
     }
-    if is_silent(at, notes, meeting)? {
+    if is_silent(at, notes, meeting.surfaces, meeting.mode)? {
         return decide_undecided(at, notes, meeting, None).map(Some);
     }
     if meeting.surfaces.iter().any(|&j| at.system.sticks_at(j)) {
@@ -151,7 +152,7 @@ fn preferred(
     if let [only] = viable {
         return Ok(only.next.mode.clone());
     }
-    if !is_silent(at, notes, meeting)? {
+    if !is_silent(at, notes, meeting.surfaces, meeting.mode)? {
         let limit = hidden_limit(at, notes, meeting)?;
         if let Some(limit) = limit.filter(is_viable) {
             return Ok(limit);
@@ -265,7 +266,7 @@ fn is_doubtful(at: &Point, notes: &mut Notes, meeting: &Meeting) -> Result<bool,
     let Ok(fields) = corners.normal_fields() else {
         return Ok(false);
     };
-    let noise = noise_of(at, meeting, &fields)?;
+    let noise = noise_of(at, meeting.surfaces, meeting.mode, &fields)?;
     if fields.any_component(|i, component| component.abs() <= noise[i]) {
         return Ok(true);
     }

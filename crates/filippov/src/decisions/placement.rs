@@ -20,15 +20,6 @@ pub(crate) struct Sides {
     pub on_surface: Vec<bool>,
 }
 
-/// A surface that triggers actions and switches nothing, on which the point lies.
-struct Touched {
-    surface: usize,
-    /// The side from which the action is triggered.
-    side: i8,
-    /// The first derivative of h that does not vanish.
-    leading: Leading,
-}
-
 /// The motion from a place: at the start of a run, after actions, and where an event was none. `memory` is the mode before.
 pub(crate) fn place(
     at: &Point,
@@ -217,11 +208,7 @@ fn place_on_triggers(
         if leading.order > 0 {
             mode.set(j, leading.sign());
         }
-        touched.push(Touched {
-            surface: j,
-            side,
-            leading,
-        });
+        touched.push((j, side, leading));
     }
     let (rule, decided) = if contacts.is_empty() {
         place_on(at, notes, &mode, &meeting, memory)?
@@ -230,19 +217,45 @@ fn place_on_triggers(
         (Rule::Contact, decided)
     };
     let decided = decided.map(|mut next| {
-        let departing = touched.iter().filter(|touched| {
-            let entry = next.mode.entries()[touched.surface];
-            touched.leading.sign() == entry || touched.side == entry
+        let departing = touched.into_iter().filter(|(j, side, leading)| {
+            let entry = next.mode.entries()[*j];
+            leading.sign() == entry || *side == entry
         });
-        let departing = departing.map(|t| Left::beside(t.surface, t.leading));
+        let departing = departing.map(|(j, _, leading)| Left::beside(j, leading));
         next.left.extend(departing);
         next
     });
     Ok((rule, decided))
 }
 
+/// Does the motion lead from this side through a surface that the point lies on? A body that is pressed on
+/// without velocity does not: it stays.
+pub(crate) fn goes_through(
+    at: &Point,
+    notes: &mut Notes,
+    j: usize,
+    side: i8,
+    mode: &Mode,
+    on_surface: &[bool],
+) -> Result<bool, FieldError> {
+    let mode = mode.with(j, side);
+    let others = (0..on_surface.len()).filter(|&k| {
+        k != j
+            && on_surface[k]
+            && !at.triggers().is_internal(k)
+            && !at.triggers().is_only_trigger(k)
+    });
+    let meeting = surfaces_that_matter(at.system, &mode, others.collect());
+    let leading = leading_along(at, notes, j, &mode, &meeting, None)?;
+    if leading.sign() != -side {
+        return Ok(false);
+    }
+    let is_still = leading.order != 1 || is_slow(at, j, leading.value, &mode)?;
+    Ok(!is_still || !can_stay(at, j, &mode)?)
+}
+
 /// The first derivative of h_j that does not vanish along the motion that follows on the surfaces of `meeting`.
-pub(super) fn leading_along(
+fn leading_along(
     at: &Point,
     notes: &mut Notes,
     j: usize,
@@ -251,19 +264,16 @@ pub(super) fn leading_along(
     memory: Option<&Mode>,
 ) -> Result<Leading, FieldError> {
     let (side, mut after) = (mode.entries()[j], mode.clone());
+    let mut multipliers = Vec::new();
     if !meeting.is_empty() {
         // A trial: what is not unique is warned of when it is decided.
         let mut trial = notes.of_trial();
         let (_, decided) = place_on(at, &mut trial, mode, meeting, memory)?;
         notes.add_costs(&trial);
-        let multipliers = decided.map_or_else(
-            |_| Vec::new(),
-            |next| {
-                let multipliers = next.multipliers().to_vec();
-                after = next.mode;
-                multipliers
-            },
-        );
+        if let Ok(next) = decided {
+            multipliers = next.multipliers().to_vec();
+            after = next.mode;
+        }
         if after.codimension() > 0 {
             let velocity = at.velocity(notes, &after, &multipliers)?;
             let (value, size) = at.rate_of(j, &after.signs(), &velocity)?;
@@ -285,7 +295,7 @@ pub(super) fn is_slow(at: &Point, j: usize, speed: f64, mode: &Mode) -> Result<b
 }
 
 /// Can a body stay in contact at h_j = 0? The action there leaves the point alone and acts on the velocity.
-pub(super) fn can_stay(at: &Point, j: usize, mode: &Mode) -> Result<bool, FieldError> {
+fn can_stay(at: &Point, j: usize, mode: &Mode) -> Result<bool, FieldError> {
     let side = mode.entries()[j];
     let Some(action) = at.actions.from_side(j, side) else {
         return Ok(false);

@@ -177,6 +177,22 @@ impl<'p, 'm, 'a> Point<'p, 'm, 'a> {
         Ok(velocity)
     }
 
+    /// The rates of all switching functions along the motion that arrives here.
+    pub fn rates_here(&self) -> Result<Values, FieldError> {
+        let d = self.system.n_surfaces();
+        let (mut h, mut rates): (Values, Values) = (smallvec![0.0; d], smallvec![0.0; d]);
+        let mut velocity = vec![0.0; self.x.len()];
+        let mut x = self.x.to_vec();
+        self.arrival
+            .field
+            .borrow_mut()
+            .eval(self.t, &mut x, &mut velocity)?;
+        let signs = &self.arrival.signs;
+        self.system
+            .surface_rates(self.t, self.x, signs, &velocity, &mut h, &mut rates)?;
+        Ok(rates)
+    }
+
     /// The state after this time of a motion with this velocity.
     pub fn along(&self, velocity: &[f64], dt: f64) -> Vec<f64> {
         let pairs = self.x.iter().zip(velocity);

@@ -48,7 +48,7 @@ pub(super) fn decide_by_relay(
     let Some(mut found) = found else {
         return Ok(None);
     };
-    if found.may_be_tangent && is_silent(at, notes, question)? {
+    if found.may_be_tangent && is_silent(at, notes, meeting, mode)? {
         return decide_undecided(at, notes, question, None).map(Some);
     }
     if found.n_sharing > MOST_IN_LOOP {
@@ -156,13 +156,10 @@ fn solve_relay_at(
     let (mut t, mut x) = (at.t, at.x.to_vec());
     if later {
         let mut velocity = vec![0.0; x.len()];
-        at.arrival
-            .field
-            .borrow_mut()
-            .eval(t, &mut x, &mut velocity)?;
+        let mut field = at.arrival.field.borrow_mut();
+        field.eval(t, &mut x, &mut velocity)?;
         let dt = at.moment(notes, &mode.signs(), &velocity)?;
-        x.iter_mut().zip(&velocity).for_each(|(x, v)| *x += dt * v);
-        t += dt;
+        (t, x) = (t + dt, at.moved(t, &x).along(&velocity, dt));
     }
     let (found, evaluations) = relay_at(at.system, (t, &x), mode, meeting, at.patience)?;
     notes.n_field_evaluations += evaluations;

@@ -1,12 +1,13 @@
 //! Sliding whose multipliers are lost, or go on beyond their ends by rounding.
 
+use super::germs::is_silent;
 use super::point::{Notes, Point};
 use super::two_fold::{beyond_double_zero, two_fold_here};
 use smallvec::{smallvec, SmallVec};
 
 use crate::error::FieldError;
 use crate::field::{Guard, ModeField, RootEnd};
-use crate::tolerances::{AT_FOLD, AT_SIDE, TANGENT, VANISHED};
+use crate::tolerances::{AT_FOLD, AT_SIDE, TANGENT};
 
 /// The functions that count as vanishing where steps of sliding shrink to nothing: the jump of the field across a surface has
 /// vanished, the multipliers have met a fold beyond which there are none, or both fields are tangent to the surface.
@@ -15,7 +16,7 @@ pub(crate) fn lost_functions(
     notes: &mut Notes,
 ) -> Result<Option<SmallVec<[Guard; 2]>>, FieldError> {
     if at.arrival.slides_on_several() {
-        if has_lost_jump(at, notes)? {
+        if is_silent(at, notes, at.arrival.sliding, at.arrival.mode)? {
             return Ok(Some(smallvec![Guard::Root(RootEnd::Stability)]));
         }
         return Ok(has_lost_root(at)?.then(|| smallvec![Guard::Root(RootEnd::Fold)]));
@@ -25,24 +26,6 @@ pub(crate) fn lost_functions(
     };
     let arrived = beyond_double_zero(at, notes, j)?.is_some() || two_fold_here(at)?.is_some();
     Ok(arrived.then(|| Guard::ends(j).as_slice().into()))
-}
-
-/// Have the components normal to one of the surfaces slid on vanished in all fields, compared with a moment before?
-fn has_lost_jump(at: &Point, notes: &mut Notes) -> Result<bool, FieldError> {
-    let (mode, surfaces, velocity) = (at.arrival.mode, at.arrival.sliding, at.arrival.velocity);
-    let moment = at.moment(notes, &mode.signs(), velocity)?;
-    let past = at.along(velocity, -moment);
-    let earlier = at.moved(at.t - moment, &past);
-    let here = at.corners(notes, surfaces, mode)?;
-    let earlier = earlier.corners(notes, surfaces, mode)?;
-    let (Ok(here), Ok(earlier)) = (here.normal_fields(), earlier.normal_fields()) else {
-        return Ok(false);
-    };
-    let is_lost = |row: usize| {
-        let sticks = at.system.sticks_at(surfaces[row]);
-        !sticks && here.row_size(row) <= VANISHED * earlier.row_size(row)
-    };
-    Ok((0..surfaces.len()).any(is_lost))
 }
 
 /// Has sliding on several surfaces come to a fold of its multipliers?

@@ -10,7 +10,7 @@ use crate::field::{shares_of_rows, ModeField, SmoothField};
 use crate::switching::{Leading, TwoFold, TwoFoldMotion};
 use crate::system::{dot, dot_magnitude};
 use crate::tolerances::{
-    ARRIVED, AT_TWO_FOLD, INSIDE_SHARES, LOST_MULTIPLIER, MOST_HALVINGS, NEWTON_STEPS, TANGENT,
+    ARRIVED, AT_TWO_FOLD, INSIDE_SHARES, MOST_HALVINGS, NEWTON_STEPS, TANGENT,
 };
 
 /// A time and the state there.
@@ -133,7 +133,7 @@ pub(crate) fn beyond_double_zero(
         return Ok(None);
     }
     let (difference, error) = Components::of(at, j, (at.t, at.x))?.difference();
-    if difference.abs() > LOST_MULTIPLIER * error {
+    if difference.abs() > AT_TWO_FOLD * error {
         return Ok(None);
     }
     // The motion along which the components stay nearest to zero.
@@ -153,7 +153,7 @@ pub(crate) fn beyond_double_zero(
     let corners = at.corners(notes, &[j], at.arrival.mode)?;
     corners.combine(&[1.0 - weight, weight], &mut velocity);
     let mut ahead = 1.0 / speed(at, at.x, &velocity);
-    let (mut last, mut is_lost) = (difference, difference.abs() <= AT_TWO_FOLD * error);
+    let mut last = difference;
     // The way is doubled until Newton's method does not come to the surface any more.
     for _ in 0..MOST_HALVINGS {
         let start = (at.t + ahead, at.along(&velocity, ahead));
@@ -163,10 +163,8 @@ pub(crate) fn beyond_double_zero(
         let (difference, error) = Components::of(at, j, (t, &end))?.difference();
         let is_known = difference.abs() > AT_TWO_FOLD * error;
         if is_known && difference.abs() > last.abs() {
-            let is_ahead = is_lost && t > at.t;
-            return Ok((difference > 0.0 && is_ahead).then_some((t, end)));
+            return Ok((difference > 0.0 && t > at.t).then_some((t, end)));
         }
-        is_lost |= !is_known;
         (last, ahead) = (difference, 2.0 * ahead);
     }
     Ok(None)

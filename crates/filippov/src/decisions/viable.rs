@@ -50,7 +50,7 @@ pub(super) fn survey(
         return Ok(None);
     };
     let pace = corners.pace(|i| at.scale.size(i, at.x[i]));
-    let noise = noise_of(at, meeting, &fields)?;
+    let noise = noise_of(at, meeting.surfaces, meeting.mode, &fields)?;
     let touching = Parallels::of(at, meeting.surfaces, meeting.mode)?.touching;
     // Then derivatives at the point are not those where the surfaces touch.
     let is_beside = touching.iter().any(|touch| !touch.is_exact);
@@ -191,10 +191,12 @@ fn together(
         return Ok(Together::Perhaps);
     }
     let roots = roots_in_cube(&face);
+    // A motion divides by the power of the second surface: within rounding of where they touch it may have no field.
+    let has_field = |velocity: Vec<f64>| velocity.iter().all(|v| v.is_finite());
     Ok(match roots.complete && roots.points.is_empty() {
         true => Together::Never,
         // After an even power no region lies between the surfaces on one side.
-        false if !is_odd => Together::Perhaps,
+        false if !is_odd || !has_field(at.velocity(notes, mode, &[])?) => Together::Perhaps,
         false => Together::By(fields),
     })
 }

@@ -205,22 +205,9 @@ pub const REDUNDANT_PIVOT: f64 = 1e-11;
 /// claimed of it (that a mode is the only one) has to be clear of rounding.
 pub const DEFINITE_PIVOT: f64 = 1e-10;
 
-/// The equations of the weights of least norm, normalised, hold up to this: some roundings.
-pub const LEAST_NORM_DONE: f64 = 1e-14;
-
-/// Keeps a Hessian regular where fewer weights are positive than there are equations; so small that Newton's method
-/// is not slowed down.
-pub const LEAST_NORM_RIDGE: f64 = 1e-15;
-
-/// Newton steps for the weights of least norm: one per set of positive weights, of which there are a few.
-pub const LEAST_NORM_STEPS: usize = 100;
-
 /// Where steps shrink to nothing because multipliers end, their determinant is below this: it falls like the
 /// square root of the time that is left.
 pub const AT_FOLD: f64 = 1e-2;
-
-/// At an exit a multiplier vanishes to this fraction of the largest one: the event is located to better than that.
-pub const VANISHING_MULTIPLIER: f64 = 1e-9;
 
 /// Functions above this are not looked at for being zero all along a step: rounding of states up to thousands is below.
 pub const NEARLY_ZERO: f64 = 1e-10;
@@ -238,11 +225,6 @@ pub const ONE_DIRECTION: f64 = 1e-2;
 /// of some steps make up the multiplier.
 pub const AT_TWO_FOLD: f64 = 10.0;
 
-/// Sliding whose multiplier ends, or whose steps shrink to nothing, may have lost it where the difference of the normal
-/// components is below this multiple of errors of the components: it is known to a hundredth there, where every step has the
-/// error that its tolerance allows, and to a tenth where stages of explicit steps are stiff.
-pub const LOST_MULTIPLIER: f64 = 100.0;
-
 /// A multiplier is not lost where the difference is above this multiple of the tolerance, relative to the speed: gradients of
 /// normal components a hundred times larger than what they are made of are not expected.
 pub const SMALL_JUMP: f64 = 1e4;
@@ -253,10 +235,6 @@ pub const INSIDE_SHARES: f64 = 0.05;
 /// A motion that was to stay on a surface has left it where h is above this multiple of the tolerance: errors of many
 /// steps add up.
 pub const LEFT_RESTING: f64 = 1e3;
-
-/// Normal components have vanished that are below this part of what they were a moment before: a zero is known to much
-/// less than a moment.
-pub const VANISHED: f64 = 1e-3;
 
 /// A trial of the modes is lengthened by this factor, up to so many times, until every function is clear of rounding.
 pub const LONGER_TRIAL: f64 = 10.0;

@@ -2,9 +2,7 @@
 
 use super::RuleFailure;
 use crate::switching::{Matrix, NormalFields};
-use crate::tolerances::{
-    LEAST_NORM_DONE, LEAST_NORM_RIDGE, LEAST_NORM_STEPS, MOST_HALVINGS, PROPORTIONAL,
-};
+use crate::tolerances::{EPS, MOST_HALVINGS, PROPORTIONAL};
 
 /// The weights that minimise |w|_2 subject to
 ///
@@ -168,16 +166,16 @@ pub(super) fn by_quadratic_program(fields: &NormalFields) -> Result<Vec<f64>, Ru
     let n_rows = equations.n_rows();
     let mut nu = vec![0.0; n_rows];
     nu[n_rows - 1] = 1.0 / equations.columns.len() as f64;
-    for _ in 0..LEAST_NORM_STEPS {
+    for _ in 0..MOST_HALVINGS {
         let (value, gradient) = equations.dual(&nu);
-        if gradient.iter().all(|g| g.abs() <= LEAST_NORM_DONE) {
+        if gradient.iter().all(|g| g.abs() <= PROPORTIONAL) {
             return Ok(equations.back(&nu).iter().map(|w| w.max(0.0)).collect());
         }
         let weights = equations.back(&nu);
         let mut hessian = equations.gram(|k| weights[k] > 0.0);
         let trace: f64 = (0..n_rows).map(|i| hessian[(i, i)]).sum();
         for i in 0..n_rows {
-            hessian[(i, i)] += LEAST_NORM_RIDGE * trace;
+            hessian[(i, i)] += EPS * trace;
         }
         let step = hessian.solve(&gradient);
         let step = step.ok_or(RuleFailure::NoTangentCombination)?;

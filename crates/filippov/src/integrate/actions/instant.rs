@@ -14,8 +14,8 @@ use smallvec::SmallVec;
 
 use crate::action::Trigger;
 use crate::decisions::{
-    add_vanishing_surfaces, goes_through, located_surfaces, pushed_back, rates_here, sides,
-    warn_unknown_side, Cause, Decision, Left, Sides, Triggers, Values,
+    add_vanishing_surfaces, goes_through, located_surfaces, pushed_back, sides, warn_unknown_side,
+    Cause, Decision, Left, Sides, Triggers, Values,
 };
 use crate::error::FieldError;
 use crate::event::Found;
@@ -116,7 +116,7 @@ impl Integrator<'_> {
         let (surfaces, rates) = self.ask(Cause::Anew(&mode), |at, _| {
             let mut surfaces = located_surfaces(&event.guards);
             add_vanishing_surfaces(at, &mut surfaces, h)?;
-            Ok((surfaces, rates_here(at)?))
+            Ok((surfaces, at.rates_here()?))
         })?;
         let located = |j: usize| event.guards.contains(&Guard::Surface(j));
         let entries = self.motion.mode.entries();
@@ -160,7 +160,7 @@ impl Integrator<'_> {
 
     /// The triggers that the motion reaches here up to rounding.
     fn triggers_reached(&mut self, h: &Values) -> Result<Vec<usize>, FieldError> {
-        let rates = self.ask(Cause::Start, |at, _| rates_here(at))?;
+        let rates = self.ask(Cause::Start, |at, _| at.rates_here())?;
         let mut reached = Vec::new();
         for j in (0..h.len()).filter(|&j| self.actions.at_surface(j).is_some()) {
             let signs = &self.motion.signs;
