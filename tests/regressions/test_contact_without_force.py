@@ -43,15 +43,13 @@ def test_the_force_depends_on_friction_that_begins_to_slide() -> None:
 
 def test_no_force_at_all_beside_friction() -> None:
     """Nothing presses and nothing lifts: the body stays where it is."""
-    sol = fl.solve_ivp(
-        lambda t, x: [x[1], np.sign(x[2]), -np.sign(x[2])], (0, 1), [0.0] * 3, resets=stop(3)
-    )
+    sol = fl.solve_ivp(lambda t, x: [x[1], np.sign(x[2]), -np.sign(x[2])], (0, 1), [0.0] * 3, resets=stop(3))
     assert sol.success, sol.message
     assert np.abs(sol.y[:, -1]).max() == 0.0
 
 
 def test_contact_and_friction_change_at_one_instant() -> None:
-    """The force of the old mode vanishes there, that of the new one presses: the body does not fall through its stop."""
+    """The force of the old mode vanishes there, that of the new one presses: the body stays at its stop."""
 
     def rhs(t: float, x: Any) -> Any:
         return [x[1], -4 + 3 * x[2] - 4 * np.sign(x[2]), -0.5 * np.sign(x[2])]
@@ -63,7 +61,7 @@ def test_contact_and_friction_change_at_one_instant() -> None:
 
 
 def test_friction_that_repels_is_not_slid_on_in_contact() -> None:
-    """The surface x2 = 0 repels: the body rests, and slips to one side, by choice to that of the sign +."""
+    """The surface x2 = 0 repels: the body rests, and slips to one side, by choice to the one of +."""
 
     def rhs(t: float, x: Any) -> Any:
         return [x[1], -2 - 2 * x[2], 4 * np.sign(x[2])]
@@ -78,7 +76,7 @@ def test_friction_that_repels_is_not_slid_on_in_contact() -> None:
 
 
 def test_lift_off_as_friction_begins_to_slip() -> None:
-    """At t = 0 the velocity x2 changes its sign, and with it the force, from 0 to 2: x0'' = 2 + 2 x2 - t, x2' = 3 t."""
+    """At t = 0 the velocity x2 changes its sign, and the force is 2, not 0: x0'' = 2 + 2 x2 - t, x2' = 3 t."""
     y0 = [0, 0, -2 / 16 + 1.5 / 256]
     sol = fl.solve_ivp(
         lambda t, x: [x[1], 1 + 2 * x[2] - t + np.sign(x[2]), 1 + 3 * t - np.sign(x[2])],

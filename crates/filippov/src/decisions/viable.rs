@@ -110,6 +110,7 @@ pub(super) fn survey(
                 Together::Never => Verdict::Fails(Guard::Surface(meeting.surfaces[touch.pair[1]])),
                 // Other rules may know.
                 Together::Perhaps => continue,
+                Together::Lost => Verdict::Open,
                 Together::By(fields) => {
                     let fields = &fields;
                     Candidate {
@@ -149,6 +150,8 @@ enum Together {
     /// Whatever they are, it parts the surfaces.
     Never,
     Perhaps,
+    /// They do, and within rounding of the point the motion has no field: it divides by the power of the second surface.
+    Lost,
     /// They solve the equations with these normal components: those of the second surface are divided by their power.
     By(NormalFields),
 }
@@ -191,12 +194,12 @@ fn together(
         return Ok(Together::Perhaps);
     }
     let roots = roots_in_cube(&face);
-    // A motion divides by the power of the second surface: within rounding of where they touch it may have no field.
     let has_field = |velocity: Vec<f64>| velocity.iter().all(|v| v.is_finite());
     Ok(match roots.complete && roots.points.is_empty() {
         true => Together::Never,
         // After an even power no region lies between the surfaces on one side.
-        false if !is_odd || !has_field(at.velocity(notes, mode, &[])?) => Together::Perhaps,
+        false if !is_odd => Together::Perhaps,
+        false if !has_field(at.velocity(notes, mode, &[])?) => Together::Lost,
         false => Together::By(fields),
     })
 }
