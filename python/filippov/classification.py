@@ -54,9 +54,9 @@ class Classification:
         The rule that decided, as in the column ``rule`` of ``sol.switches``.
     leaf : str
         Which part of the rule ``first_order`` decided at an intersection: ``only`` if one continuation
-        attracts; if several do, ``hidden/classical``, ``hidden/sliding``, ``hidden/oscillation`` or
-        ``hidden/spiral``, for what the hidden dynamics tends to; ``germs`` if first-order data do not decide;
-        otherwise empty.
+        attracts; ``exit`` where sliding on one or two surfaces ends at a side or a fold; if several attract,
+        ``hidden/classical``, ``hidden/sliding``, ``hidden/oscillation`` or ``hidden/spiral``, for what the
+        hidden dynamics tends to; ``germs`` if first-order data do not decide; otherwise empty.
     reason : str
         Why there is no decision; empty if there is one.
     normal_components : ndarray, shape (2, ..., 2, m)

@@ -73,8 +73,8 @@ def test_friction_that_repels_is_not_slid_on_in_contact() -> None:
     assert sol.success, sol.message
     assert sol.y[2, -1] == pytest.approx(0.4, abs=1e-9)
     assert sol.y[0, -1] == 0.0
-    branches = fl.solve_ivp(rhs, (0, 0.1), [0.0] * 3, resets=stop(3), nonunique="branch")
-    assert sorted(round(branch.y[2, -1], 9) for branch in branches) == [-0.4, 0.4]
+    sol = fl.solve_ivp(rhs, (0, 0.1), [0.0] * 3, resets=stop(3), nonunique="branch")
+    assert sorted(round(branch.y[2, -1], 9) for branch in sol.branches) == [-0.4, 0.4]
 
 
 def test_lift_off_as_friction_begins_to_slip() -> None:

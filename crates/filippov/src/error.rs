@@ -178,18 +178,4 @@ impl Undecided {
             _ => self.to_string(),
         }
     }
-
-    /// The reason for a part of an intersection, with its surfaces counted within the whole.
-    pub(crate) fn in_whole(self, part: &[usize]) -> Self {
-        let place = |surface: usize| part.get(surface).copied().unwrap_or(surface);
-        match self {
-            Undecided::Tangent { surface } => Undecided::Tangent {
-                surface: place(surface),
-            },
-            Undecided::NotArriving { surface } => Undecided::NotArriving {
-                surface: place(surface),
-            },
-            other => other,
-        }
-    }
 }

@@ -50,7 +50,7 @@ pub fn merged_root(fields: &NormalFields, near: &[f64]) -> Option<MergedRoot> {
             return None;
         }
         if step.iter().all(|d| d.abs() <= NEWTON_DONE) {
-            let residual = fields.interpolate(&lambda);
+            let residual = fields.interpolate(&lambda).into_vec();
             return Some(MergedRoot { lambda, residual });
         }
     }

@@ -28,7 +28,7 @@ pub use roots::{
 pub(crate) use small_matrix::invert;
 pub use small_matrix::{Matrix, Vector};
 pub use stability::{
-    is_negative_p_matrix, is_scaling_stable, is_stable, is_stable_for, scaling_margin,
+    has_one_mode_only, is_scaling_stable, is_stable, is_stable_for, scaling_margin,
     stability_margins,
 };
 

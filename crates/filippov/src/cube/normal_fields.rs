@@ -2,7 +2,9 @@
 
 use std::borrow::Cow;
 
-use super::small_matrix::Matrix;
+use smallvec::SmallVec;
+
+use super::small_matrix::{Matrix, Vector};
 use crate::error::Undecided;
 use crate::tolerances::MOST_MEETING;
 
@@ -23,7 +25,7 @@ use crate::tolerances::MOST_MEETING;
 ///
 /// // One surface, attractive from both sides: f- = 3, f+ = -1.
 /// let fields = NormalFields::new(1, vec![3.0, -1.0])?;
-/// assert_eq!(fields.interpolate(&[0.5]), [0.0]);
+/// assert_eq!(fields.interpolate(&[0.5])[..], [0.0]);
 /// # Ok::<(), filippov::switching::Undecided>(())
 /// ```
 ///
@@ -35,18 +37,21 @@ use crate::tolerances::MOST_MEETING;
 pub struct NormalFields {
     m: usize,
     /// Of one or two surfaces there is one group.
-    groups: Vec<SignGroup>,
+    groups: SmallVec<[SignGroup; 1]>,
 }
 
 /// A term of g: a function of the multipliers of some surfaces whose signs multiply one another.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SignGroup {
     /// The surfaces, increasing.
-    pub members: Vec<usize>,
+    pub members: SmallVec<[usize; 2]>,
     /// Its share of all m components at the patterns of the members' signs, `[pattern * m + j]`; bit b of a
     /// pattern belongs to `members[b]`.
-    pub values: Vec<f64>,
+    pub values: PatternValues,
 }
+
+/// As many numbers as two surfaces need.
+pub type PatternValues = SmallVec<[f64; 8]>;
 
 impl NormalFields {
     /// Normal components from their values, `m * 2^m` of them.
@@ -55,8 +60,11 @@ impl NormalFields {
     /// [`Undecided::Shape`] if the number of values does not fit, [`Undecided::NotFinite`] if one
     /// of them is not finite.
     pub fn new(m: usize, values: Vec<f64>) -> Result<Self, Undecided> {
-        let members = (0..m).collect();
-        NormalFields::of_groups(m, vec![SignGroup { members, values }])
+        let group = SignGroup {
+            members: (0..m).collect(),
+            values: values.into(),
+        };
+        NormalFields::of_groups(m, vec![group])
     }
 
     /// Normal components of m surfaces as a sum over groups that hold each surface once.
@@ -69,11 +77,11 @@ impl NormalFields {
     /// let group = |i: usize, minus: f64, plus: f64| {
     ///     let mut values = vec![0.0; 6];
     ///     (values[i], values[3 + i]) = (minus, plus);
-    ///     SignGroup { members: vec![i], values }
+    ///     SignGroup::new(&[i], &values)
     /// };
     /// let groups = vec![group(0, 3.0, -1.0), group(1, 4.0, 2.0), group(2, 1.0, -1.0)];
     /// let fields = NormalFields::of_groups(3, groups)?;
-    /// assert_eq!(fields.interpolate(&[0.5, 1.0, 0.25]), [0.0, 2.0, -0.25]);
+    /// assert_eq!(fields.interpolate(&[0.5, 1.0, 0.25])[..], [0.0, 2.0, -0.25]);
     /// # Ok::<(), filippov::switching::Undecided>(())
     /// ```
     ///
@@ -99,6 +107,7 @@ impl NormalFields {
         {
             return Err(Undecided::NotFinite);
         }
+        let groups = groups.into();
         Ok(NormalFields { m, groups }.with_few_joined())
     }
 
@@ -189,8 +198,8 @@ impl NormalFields {
     }
 
     /// g(lambda).
-    pub fn interpolate(&self, lambda: &[f64]) -> Vec<f64> {
-        let mut g = vec![0.0; self.m];
+    pub fn interpolate(&self, lambda: &[f64]) -> Vector {
+        let mut g = Vector::from_elem(0.0, self.m);
         for group in &self.groups {
             for (pattern, weight) in group.weights(lambda, None).into_iter().enumerate() {
                 for (g, f) in g.iter_mut().zip(group.at(pattern, self.m)) {
@@ -213,8 +222,8 @@ impl NormalFields {
     }
 
     /// The derivative of g by lambda_p: a column of G.
-    pub(crate) fn derivative(&self, lambda: &[f64], p: usize) -> Vec<f64> {
-        let mut column = vec![0.0; self.m];
+    pub(crate) fn derivative(&self, lambda: &[f64], p: usize) -> Vector {
+        let mut column = Vector::from_elem(0.0, self.m);
         let own = self.groups.iter().find(|group| group.members.contains(&p));
         if let Some(group) = own {
             for (pattern, weight) in group.weights(lambda, Some(p)).into_iter().enumerate() {
@@ -229,15 +238,15 @@ impl NormalFields {
     /// The fields on a face of the cube: the non-zero entries of `mode` are held, the zero entries are
     /// the surfaces that are left, in their order.
     pub fn restrict(&self, mode: &[i8]) -> NormalFields {
-        let free: Vec<usize> = (0..self.m).filter(|&i| mode[i] == 0).collect();
-        let mut held = vec![0.0; free.len()];
-        let mut groups = Vec::new();
+        let free: SmallVec<[usize; 4]> = (0..self.m).filter(|&i| mode[i] == 0).collect();
+        let mut held = Vector::from_elem(0.0, free.len());
+        let mut groups = SmallVec::<[SignGroup; 1]>::new();
         for group in &self.groups {
-            let bits: Vec<usize> = (0..group.members.len())
+            let bits: SmallVec<[usize; 4]> = (0..group.members.len())
                 .filter(|&bit| mode[group.members[bit]] == 0)
                 .collect();
             let fixed = group.pattern_of(mode);
-            let mut values = Vec::with_capacity(free.len() << bits.len());
+            let mut values = PatternValues::with_capacity(free.len() << bits.len());
             for pattern in 0..1_usize << bits.len() {
                 let bits = bits.iter().enumerate();
                 let full = bits.fold(fixed, |full, (bit, &i)| full | (pattern >> bit & 1) << i);
@@ -272,58 +281,65 @@ impl NormalFields {
         self.map(|group, _, j, value| if group == 0 { value + by[j] } else { value })
     }
 
-    /// Is g affine in lambda, up to rounding? So it is where each sign enters the field by a term of
-    /// its own, as friction does.
-    pub fn is_affine(&self) -> bool {
-        self.groups.iter().all(|group| {
-            let corner = group.at(0, self.m);
-            (0..1_usize << group.members.len()).all(|pattern| {
-                (0..self.m).all(|j| {
-                    let bits = (0..group.members.len()).filter(|i| pattern >> i & 1 == 1);
-                    let sum: f64 = bits.map(|i| group.at(1 << i, self.m)[j] - corner[j]).sum();
-                    let rounding = 16.0 * f64::EPSILON * self.row_size(j);
-                    (group.at(pattern, self.m)[j] - corner[j] - sum).abs() <= rounding
-                })
+    /// The columns p of G at the vertices of the cube, each once; it depends on the other multipliers of one group only.
+    pub(crate) fn columns(&self, p: usize) -> impl Iterator<Item = Vector> + '_ {
+        let own = self.groups.iter().find_map(|group| {
+            let bit = group.members.iter().position(|&i| i == p)?;
+            Some((group, 1 << bit))
+        });
+        own.into_iter().flat_map(move |(group, bit)| {
+            let patterns = (0..1_usize << group.members.len()).filter(move |k| k & bit == 0);
+            patterns.map(move |k| {
+                let pairs = group.at(k | bit, self.m).iter().zip(group.at(k, self.m));
+                pairs.map(|(plus, minus)| 0.5 * (plus - minus)).collect()
             })
         })
     }
 
-    /// The fields whose canopy on the whole cube is that of these on the half of it with
-    /// lambda_axis on this side of 0.
-    #[must_use]
-    pub fn half(&self, axis: usize, side: i8) -> NormalFields {
-        let mut half = self.clone();
-        for group in &mut half.groups {
-            if let Some(bit) = group.members.iter().position(|&i| i == axis) {
-                group.halve(bit, side, self.m);
-            }
-        }
-        half
+    /// Is g affine in lambda, up to rounding? So it is where each sign enters the field by a term of
+    /// its own, as friction does.
+    pub fn is_affine(&self) -> bool {
+        let rounding: Vec<f64> = (0..self.m)
+            .map(|j| 16.0 * f64::EPSILON * self.row_size(j))
+            .collect();
+        (0..self.m).all(|p| {
+            let mut columns = self.columns(p);
+            let first = columns.next().unwrap_or_default();
+            columns.all(|column| {
+                let pairs = column.iter().zip(&first).zip(&rounding);
+                pairs
+                    .into_iter()
+                    .all(|((a, b), rounding)| (a - b).abs() <= *rounding)
+            })
+        })
     }
 
-    /// The same canopy on a cube that is larger by this factor: its values at the vertices of that.
+    /// The fields whose canopy on the whole cube is that of these where lambda_axis runs from `low` to `high`.
     #[must_use]
-    pub fn enlarged(&self, factor: f64) -> NormalFields {
-        let mut enlarged = self.clone();
-        let mut vertex = vec![0.0; self.m];
-        for (group, to) in self.groups.iter().zip(&mut enlarged.groups) {
-            for pattern in 0..1_usize << group.members.len() {
-                for (bit, &i) in group.members.iter().enumerate() {
-                    vertex[i] = if pattern >> bit & 1 == 1 {
-                        factor
-                    } else {
-                        -factor
-                    };
-                }
-                let weights = group.weights(&vertex, None);
+    pub fn on_range(&self, axis: usize, [low, high]: [f64; 2]) -> NormalFields {
+        let mut other = self.clone();
+        for group in &mut other.groups {
+            let Some(bit) = group.members.iter().position(|&i| i == axis) else {
+                continue;
+            };
+            let bit = 1 << bit;
+            for pattern in (0..1_usize << group.members.len()).filter(|k| k & bit == 0) {
                 for j in 0..self.m {
-                    let values = group.values.iter().skip(j).step_by(self.m);
-                    to.values[pattern * self.m + j] =
-                        weights.iter().zip(values).map(|(w, v)| w * v).sum();
+                    let places = [pattern * self.m + j, (pattern | bit) * self.m + j];
+                    let [minus, plus] = places.map(|place| group.values[place]);
+                    let (mean, half) = (0.5 * (plus + minus), 0.5 * (plus - minus));
+                    for (place, at) in places.into_iter().zip([low, high]) {
+                        group.values[place] = match at {
+                            -1.0 => minus,
+                            1.0 => plus,
+                            // Exact where the values do not depend on this multiplier.
+                            _ => mean + at * half,
+                        };
+                    }
                 }
             }
         }
-        enlarged
+        other
     }
 
     /// Changes every value: `change(group, pattern, surface, value)`.
@@ -340,11 +356,6 @@ impl NormalFields {
         mapped
     }
 
-    /// Other surfaces with these groups.
-    pub(crate) fn with_groups(&self, m: usize, groups: Vec<SignGroup>) -> NormalFields {
-        NormalFields { m, groups }.with_few_joined()
-    }
-
     /// One or two surfaces have closed forms, for all of their patterns: their groups joined.
     fn with_few_joined(self) -> NormalFields {
         if self.m > 2 || self.groups.len() <= 1 {
@@ -352,16 +363,24 @@ impl NormalFields {
         }
         let group = SignGroup {
             members: (0..self.m).collect(),
-            values: self.values().into_owned(),
+            values: self.values().into_owned().into(),
         };
         NormalFields {
             m: self.m,
-            groups: vec![group],
+            groups: smallvec::smallvec![group],
         }
     }
 }
 
 impl SignGroup {
+    /// A group from its members and the values of its patterns.
+    pub fn new(members: &[usize], values: &[f64]) -> Self {
+        SignGroup {
+            members: members.into(),
+            values: values.into(),
+        }
+    }
+
     /// The share of the m components at one pattern.
     pub(crate) fn at(&self, pattern: usize, m: usize) -> &[f64] {
         &self.values[pattern * m..(pattern + 1) * m]
@@ -376,8 +395,8 @@ impl SignGroup {
     }
 
     /// The weights prod_i (1 + k_i lambda_i)/2 of all patterns, or their derivatives by one multiplier.
-    fn weights(&self, lambda: &[f64], derivative: Option<usize>) -> Vec<f64> {
-        let mut weights = Vec::with_capacity(1 << self.members.len());
+    fn weights(&self, lambda: &[f64], derivative: Option<usize>) -> PatternValues {
+        let mut weights = PatternValues::with_capacity(1 << self.members.len());
         weights.push(1.0);
         for (bit, &i) in self.members.iter().enumerate() {
             let (minus, plus) = match derivative {
@@ -391,20 +410,6 @@ impl SignGroup {
         }
         weights
     }
-
-    /// Takes the values of half of the range of one member.
-    fn halve(&mut self, bit: usize, side: i8, m: usize) {
-        let before = self.clone();
-        for pattern in 0..1_usize << self.members.len() {
-            let inner = (pattern >> bit & 1 == 1) != (side > 0);
-            if inner {
-                let opposite = before.at(pattern ^ (1 << bit), m);
-                for (j, (v, o)) in before.at(pattern, m).iter().zip(opposite).enumerate() {
-                    self.values[pattern * m + j] = 0.5 * (v + o);
-                }
-            }
-        }
-    }
 }
 
 #[cfg(test)]
@@ -415,7 +420,7 @@ mod tests {
     #[test]
     fn ranges_are_those_of_the_patterns() {
         let group = |members: &[usize], seed: usize| SignGroup {
-            members: members.to_vec(),
+            members: members.into(),
             values: (0..3 << members.len())
                 .map(|k| ((7 * k + seed) as f64).sin())
                 .collect(),

@@ -113,7 +113,11 @@ pub fn stable_roots_within(fields: &NormalFields, patience: Patience) -> Vec<Vec
 /// The same in the cube with its border, and a little beyond it by rounding: multipliers at their ends are -1 or +1.
 pub fn stable_roots_with_border(fields: &NormalFields, patience: Patience) -> Vec<Vec<f64>> {
     let factor = 1.0 + AT_SIDE;
-    let mut roots = stable_roots_within(&fields.enlarged(factor), patience);
+    let mut enlarged = fields.clone();
+    for axis in 0..fields.m() {
+        enlarged = enlarged.on_range(axis, [-factor, factor]);
+    }
+    let mut roots = stable_roots_within(&enlarged, patience);
     for value in roots.iter_mut().flatten() {
         *value = (factor * *value).clamp(-1.0, 1.0);
     }
@@ -231,25 +235,15 @@ impl SearchBox {
         })
     }
 
-    /// The largest row sum of |I - inverse G| over the box, entry by entry at the vertices. A column of G depends
-    /// on the multipliers of one group.
+    /// The largest row sum of |I - inverse G| over the box, entry by entry at the vertices.
     fn largest_row_deviation(&self, inverse: &Matrix) -> f64 {
         let m = self.fields.m();
         let mut deviation = Matrix::zeros(m);
-        for group in self.fields.groups() {
-            for pattern in 0..1_usize << group.members.len() {
-                let mut vertex = vec![0.0; m];
-                for (bit, &i) in group.members.iter().enumerate() {
-                    vertex[i] = if pattern >> bit & 1 == 1 { 1.0 } else { -1.0 };
-                }
-                for &p in &group.members {
-                    let column = self.fields.derivative(&vertex, p);
-                    for i in 0..m {
-                        let unit = if i == p { 1.0 } else { 0.0 };
-                        let product: f64 = (0..m).map(|k| inverse[(i, k)] * column[k]).sum();
-                        let here = (unit - product).abs();
-                        deviation[(i, p)] = deviation[(i, p)].max(here);
-                    }
+        for p in 0..m {
+            for column in self.fields.columns(p) {
+                for (i, product) in newton_step(inverse, &column).into_iter().enumerate() {
+                    let unit = if i == p { 1.0 } else { 0.0 };
+                    deviation[(i, p)] = deviation[(i, p)].max((unit - product).abs());
                 }
             }
         }
@@ -269,12 +263,12 @@ impl SearchBox {
         upper_start[axis] = middle;
         [
             SearchBox {
-                fields: self.fields.half(axis, -1),
+                fields: self.fields.on_range(axis, [-1.0, 0.0]),
                 low: self.low,
                 high: lower_end,
             },
             SearchBox {
-                fields: self.fields.half(axis, 1),
+                fields: self.fields.on_range(axis, [0.0, 1.0]),
                 low: upper_start,
                 high: self.high,
             },
@@ -297,7 +291,7 @@ impl<'a> Eliminated<'a> {
         let m = whole.m();
         let is_alone = |i: usize| {
             let mut groups = whole.groups().iter();
-            groups.any(|group| group.members == [i])
+            groups.any(|group| group.members[..] == [i])
         };
         let (alone, left): (Vec<usize>, Vec<usize>) = (0..m).partition(|&i| is_alone(i));
         if alone.is_empty() || left.is_empty() {

@@ -3,6 +3,7 @@
 //! All questions are asked of the strongly coupled parts of G: it is block triangular in them, and its eigenvalues
 //! are theirs. With groups of surfaces that do not know of each other the parts are small.
 
+use super::normal_fields::NormalFields;
 use super::p_matrix::is_p_matrix;
 use super::small_matrix::Matrix;
 use crate::sparse::SparseRows;
@@ -134,11 +135,21 @@ fn decay(matrix: &Matrix) -> f64 {
     -logarithm
 }
 
-/// Are all principal minors of -G positive? If G is constant, as for fields that are affine in the
-/// signs, then exactly one mode is consistent (Gale, Nikaido 1965).
-pub fn is_negative_p_matrix(jacobian: &Matrix) -> bool {
-    let m = jacobian.n();
-    let rows = (0..m).map(|i| (0..m).map(|j| -jacobian[(i, j)]).collect());
-    let rows: Vec<Vec<f64>> = rows.collect();
-    is_p_matrix(&SparseRows::from_dense(&rows)) == Some(true)
+/// Is exactly one mode consistent, as -G is a P-matrix all over the cube (Gale, Nikaido 1965)?
+///
+/// For affine fields by their constant G; else if the comparison matrix of all -G in the cube, with the least entries on the
+/// diagonal and the largest magnitudes beside it, is an M-matrix.
+pub fn has_one_mode_only(fields: &NormalFields) -> bool {
+    let (m, is_affine) = (fields.m(), fields.is_affine());
+    let mut bound = vec![vec![0.0; m]; m];
+    for (j, row) in bound.iter_mut().enumerate() {
+        for (p, entry) in row.iter_mut().enumerate() {
+            let values = fields.columns(p).map(|column| match is_affine || j == p {
+                true => -column[j],
+                false => -column[j].abs(),
+            });
+            *entry = values.fold(f64::INFINITY, f64::min);
+        }
+    }
+    is_p_matrix(&SparseRows::from_dense(&bound)) == Some(true)
 }

@@ -176,7 +176,7 @@ impl Candidate<'_> {
         let g = match (lambda, at.system.has_nested_signs()) {
             ([], true) => self.components_in_region(at)?,
             ([], false) => self.fields.in_region(self.entries.entries()).into_owned(),
-            _ => self.fields.interpolate(&place),
+            _ => self.fields.interpolate(&place).to_vec(),
         };
         let is_tangent = |i: usize| g[i].abs() <= self.noise[i];
         let is_at_end = |index: usize| {

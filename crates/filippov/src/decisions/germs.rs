@@ -13,7 +13,7 @@ use crate::error::FieldError;
 use crate::field::SmoothField;
 use crate::mode::Mode;
 use crate::status::Stop;
-use crate::switching::{NormalFields, Undecided};
+use crate::switching::Undecided;
 use crate::tolerances::{AT_SIDE, MOST_MEETING, TANGENT};
 
 /// Rule: switching functions jump between the regions around the point, surfaces are in one place or touch one another.
@@ -32,9 +32,7 @@ pub(super) fn decide_if_entangled(
         if parallels.coincide || !parallels.touching.is_empty() {
             return Ok(decide_by_germs(at, notes, meeting)?.ok());
         }
-        if !is_silent(at, notes, meeting.surfaces, meeting.mode)? {
-            return Ok(None);
-        }
+        return Ok(None);
     }
     let surfaces = wider.unwrap_or_else(|| meeting.surfaces.to_vec());
     let meeting = &Meeting {
@@ -73,17 +71,16 @@ pub(super) fn decide_if_doubtful(
     meeting: &Meeting,
 ) -> Result<Option<Decided>, FieldError> {
     let is_few = (2..=MOST_MEETING).contains(&meeting.surfaces.len());
-    let sticks = meeting.surfaces.iter().any(|&j| at.system.sticks_at(j));
-    if !is_few || sticks || slides_by_rule(at.arrival) {
+    if !is_few || slides_by_rule(at.arrival) || !is_doubtful(at, notes, meeting)? {
         return Ok(None);
     }
-    let corners = at.corners(notes, meeting.surfaces, meeting.mode)?;
-    match corners.normal_fields() {
-        Ok(fields) if is_doubtful(at, &fields, meeting)? => {
-            Ok(decide_by_germs(at, notes, meeting)?.ok())
-        }
-        _ => Ok(None),
+    if is_silent(at, notes, meeting.surfaces, meeting.mode)? {
+        return decide_undecided(at, notes, meeting, None).map(Some);
     }
+    if meeting.surfaces.iter().any(|&j| at.system.sticks_at(j)) {
+        return Ok(None);
+    }
+    Ok(decide_by_germs(at, notes, meeting)?.ok())
 }
 
 /// What follows at an intersection of which first-order data do not decide; why, if that is known.
@@ -264,8 +261,12 @@ fn drop_other_names(
 }
 
 /// Is a normal component at some surface not clear of zero, in a region or along a motion that slides on one surface?
-fn is_doubtful(at: &Point, fields: &NormalFields, meeting: &Meeting) -> Result<bool, FieldError> {
-    let noise = noise_of(at, meeting.surfaces, meeting.mode, fields)?;
+fn is_doubtful(at: &Point, notes: &mut Notes, meeting: &Meeting) -> Result<bool, FieldError> {
+    let corners = at.corners(notes, meeting.surfaces, meeting.mode)?;
+    let Ok(fields) = corners.normal_fields() else {
+        return Ok(false);
+    };
+    let noise = noise_of(at, meeting.surfaces, meeting.mode, &fields)?;
     if fields.any_component(|i, component| component.abs() <= noise[i]) {
         return Ok(true);
     }

@@ -11,10 +11,10 @@ use crate::field::{Guard, MeetingFields, ModeField, RootEnd};
 use crate::mode::Mode;
 use crate::status::Stop;
 use crate::switching::{
-    admissible_within, has_one_mode_only, merged_root, resolve_within, stable_roots_with_border,
-    Continuation, ExitKind, Incoming, NormalFields, Resolution, Undecided,
+    merged_root, resolve_within, stable_roots_with_border, Continuation, ExitKind, Incoming,
+    NormalFields, Resolution, Undecided,
 };
-use crate::tolerances::{MOST_LISTED, MOST_MEETING};
+use crate::tolerances::MOST_MEETING;
 
 /// Rule: the first-order data of the fields around the point, for the way in which the motion arrives.
 pub(super) fn resolve_first_order(
@@ -24,7 +24,6 @@ pub(super) fn resolve_first_order(
 ) -> Result<Decided, FieldError> {
     let corners = at.corners(notes, meeting.surfaces, meeting.mode)?;
     let kappa = at.policy.law.scaling(meeting.surfaces);
-    let mut others = Vec::new();
     let resolution = match (corners.normal_fields(), meeting.how) {
         (Err(undecided), _) => Err(undecided),
         (Ok(fields), How::Start(_) | How::Limit) => {
@@ -32,7 +31,6 @@ pub(super) fn resolve_first_order(
         }
         (Ok(fields), How::Event(_)) => {
             let incoming = incoming(at, notes, meeting, (&corners, &fields))?;
-            others = other_solutions(at, &fields, &incoming);
             match resolve_within(&fields, &incoming, &kappa, at.patience) {
                 // The last of many turns is within rounding of all surfaces: its region leads past one of
                 // them, and has no meaning any more.
@@ -45,7 +43,7 @@ pub(super) fn resolve_first_order(
             }
         }
     };
-    follow(at, notes, meeting, &corners, resolution, &others)
+    follow(at, notes, meeting, &corners, resolution)
 }
 
 /// The mode to which the hidden dynamics at the point tends, if first-order data determine it.
@@ -172,14 +170,13 @@ fn drift(
 }
 
 /// Turns a resolution into the motion that follows. Where first-order data do not decide, the first
-/// derivatives that do not vanish may still leave only one way. `others` are further Filippov solutions.
+/// derivatives that do not vanish may still leave only one way.
 fn follow(
     at: &Point,
     notes: &mut Notes,
     place: &Meeting,
     fields: &MeetingFields,
     resolution: Result<Resolution, Undecided>,
-    others: &[Continuation],
 ) -> Result<Decided, FieldError> {
     let (mode, meeting) = (place.mode, place.surfaces);
     if resolution == Err(Undecided::Interrupted) {
@@ -198,7 +195,7 @@ fn follow(
     notes.spirals = resolution.candidates.contains(&Continuation::OutwardSpiral);
     let on_all = |k: &Mode| place.on_all(k);
     let mut candidates: Vec<Mode> = Vec::new();
-    for mode in resolution.candidates.iter().chain(others) {
+    for mode in &resolution.candidates {
         let mode = mode.as_mode().map(on_all);
         candidates.extend(mode.filter(|mode| !candidates.contains(mode)));
     }
@@ -260,16 +257,4 @@ fn has_root(fields: &MeetingFields, resolution: &Resolution, at: &Point) -> bool
     fields
         .normal_fields()
         .is_ok_and(|fields| !roots(fields).is_empty())
-}
-
-/// All attracting continuations at an intersection of three surfaces that is reached, whatever the regularisation selects:
-/// Filippov solutions, and several if the solution is not unique. Those of two are listed by the resolution; those of more
-/// are not looked for.
-fn other_solutions(at: &Point, fields: &NormalFields, incoming: &Incoming) -> Vec<Continuation> {
-    let is_exit = matches!(incoming, Incoming::Exit { .. });
-    if is_exit || fields.m() != MOST_LISTED || has_one_mode_only(fields) {
-        return Vec::new();
-    }
-    let found = admissible_within(fields, at.patience).into_iter();
-    found.map(|found| found.continuation).collect()
 }

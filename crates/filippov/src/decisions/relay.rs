@@ -3,6 +3,7 @@
 use super::choice::choose;
 use super::coinciding::have_parallels;
 use super::departures::departures;
+use super::germs::{decide_undecided, is_silent};
 use super::point::{Decided, Left, Lefts, Next, Notes, Point};
 use super::rule::{How, Meeting};
 use crate::error::FieldError;
@@ -23,7 +24,8 @@ pub(super) fn decide_by_relay(
     notes: &mut Notes,
     meeting: &Meeting,
 ) -> Result<Option<Decided>, FieldError> {
-    let (is_event, mode, meeting) = (
+    let (question, is_event, mode, meeting) = (
+        meeting,
         matches!(meeting.how, How::Event(_)),
         meeting.mode,
         meeting.surfaces,
@@ -46,6 +48,9 @@ pub(super) fn decide_by_relay(
     let Some(mut found) = found else {
         return Ok(None);
     };
+    if found.may_be_tangent && is_silent(at, notes, question.surfaces, question.mode)? {
+        return decide_undecided(at, notes, question, None).map(Some);
+    }
     if found.n_sharing > MOST_IN_LOOP {
         return Ok(Some(Err(Stop::Intersection {
             surfaces: meeting.to_vec(),

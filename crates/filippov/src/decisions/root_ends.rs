@@ -31,14 +31,16 @@ pub(crate) fn lost_functions(
 /// Has sliding on several surfaces come to a fold of its multipliers?
 fn has_lost_root(at: &Point) -> Result<bool, FieldError> {
     let mut field = at.arrival.field.borrow_mut();
-    match &**field {
-        ModeField::Intersection(field) if field.set().len() > 2 && field.is_rootless() => {
-            return Ok(true)
-        }
-        ModeField::Intersection(_) => {}
-        _ => return Ok(false),
+    let is_rootless = |field: &ModeField| matches!(field, ModeField::Intersection(f) if f.set().len() > 2 && f.is_rootless());
+    if !matches!(&**field, ModeField::Intersection(_)) {
+        return Ok(false);
     }
+    let was_rootless = is_rootless(&field);
     let exits = field.exits(at.t, &mut at.x.to_vec())?;
+    // The evaluation here may be the first one without a root.
+    if was_rootless || is_rootless(&field) {
+        return Ok(true);
+    }
     let mut ends = field.guards().into_iter().zip(exits);
     Ok(ends.any(|(guard, exit)| guard == Guard::Root(RootEnd::Fold) && exit.abs() < AT_FOLD))
 }

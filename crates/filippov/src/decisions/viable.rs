@@ -176,9 +176,9 @@ fn together(
     let Ok(fields) = corners.normal_fields() else {
         return Ok(Together::Perhaps);
     };
-    let face = fields
-        .restrict(entries.entries())
-        .enlarged(1.0 + ONE_DIRECTION);
+    let end = 1.0 + ONE_DIRECTION;
+    let face = fields.restrict(entries.entries());
+    let face = (0..face.m()).fold(face, |face, axis| face.on_range(axis, [-end, end]));
     let noise = DOUBTFUL * face.size();
     let ranges: Vec<[f64; 2]> = (0..face.m()).map(|row| face.row_range(row)).collect();
     if ranges

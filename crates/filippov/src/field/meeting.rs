@@ -269,12 +269,9 @@ impl MeetingFields {
         let mut start = 0;
         let groups = self.groups.iter().map(|members| {
             let end = start + (m << members.len());
-            let values = self.components[start..end].to_vec();
+            let group = SignGroup::new(members, &self.components[start..end]);
             start = end;
-            SignGroup {
-                members: members.clone(),
-                values,
-            }
+            group
         });
         NormalFields::of_groups(m, groups.collect())
     }

@@ -1,12 +1,12 @@
 //! How a motion comes to an intersection, and where its hidden dynamics starts.
 
-use crate::cube::merged_root;
-use crate::cube::Bilinear;
+use std::borrow::Cow;
+
 use crate::cube::NormalFields;
-use crate::cube::{multiplier_rates, newton, stable_roots_within};
+use crate::cube::{merged_root, multiplier_rates, newton, stable_roots_within};
 use crate::error::Undecided;
 use crate::patience::Patience;
-use crate::tolerances::{AFTER_THE_EXIT, AT_SIDE, CORNER_OFFSETS, UNSTABLE_START};
+use crate::tolerances::{AFTER_THE_EXIT, UNSTABLE_START};
 
 /// What the motion did before.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,127 +50,106 @@ pub enum ExitKind {
     Stability,
 }
 
-/// The states from which the hidden dynamics starts, and the fields in which it moves. The first
-/// state decides; the others are those that the discontinuous problem cannot tell from it.
-pub(super) struct Starts {
-    pub fields: NormalFields,
-    pub states: Vec<Vec<f64>>,
+/// The state from which the hidden dynamics starts, and the fields in which it moves.
+pub(super) struct HiddenStart<'a> {
+    pub fields: Cow<'a, NormalFields>,
+    pub state: Vec<f64>,
 }
 
 impl Incoming {
-    /// The states from which the hidden dynamics starts.
+    /// Does the hidden dynamics follow the root that is lost? Where sliding on all surfaces ends at a side or at a fold it
+    /// tends to the same continuation for every scaling for which the root was stable before (proved for two surfaces): other
+    /// attracting ones are no candidates.
+    pub(super) fn is_followed(&self) -> bool {
+        matches!(self, Incoming::Exit { kind, .. } if *kind != ExitKind::Stability)
+    }
+
+    /// Where the hidden dynamics starts.
     ///
     /// | before | state |
     /// |---|---|
-    /// | region k | on the line u = tau f^k, where it leaves the corner; others: along the border of the corner |
+    /// | region k | on the line u = tau f^k, where it leaves the corner |
     /// | face | (lambda, e): e the sides from which the other surfaces are reached |
     /// | exit | the root, in fields that have drifted a little |
     /// | start | u = 0 |
-    pub(super) fn starts(
+    pub(super) fn hidden_start<'a>(
         &self,
-        fields: &NormalFields,
+        fields: &'a NormalFields,
         kappa: &[f64],
         patience: Patience,
-    ) -> Result<Starts, Undecided> {
-        let same = |states| Starts {
-            fields: fields.clone(),
-            states,
-        };
-        match self {
-            Incoming::Corner { region } => corner_states(fields, region, kappa).map(same),
+    ) -> Result<HiddenStart<'a>, Undecided> {
+        let state = match self {
+            Incoming::Corner { region } => corner_state(fields, region, kappa)?,
             Incoming::Face { mode, multipliers } => {
                 let multipliers = polished(fields, mode, multipliers, patience)?;
-                face_states(fields, mode, &multipliers).map(same)
+                face_state(fields, mode, &multipliers)?
             }
             Incoming::Exit {
                 kind,
                 lambda,
                 drift,
-            } if fields.m() > 2 => exit_state(fields, *kind, lambda, drift.as_deref()),
-            Incoming::Exit {
-                kind,
-                lambda,
-                drift,
-            } => exit_of_few(fields, *kind, lambda, drift.as_deref(), kappa),
-            Incoming::Start => Ok(same(vec![vec![0.0; fields.m()]])),
-        }
+            } => {
+                let drift = drift.as_deref();
+                let (moved, state) = match fields.m() > 2 {
+                    true => exit_state(fields, *kind, lambda, drift)?,
+                    false => where_unstable(fields, lambda, drift),
+                };
+                return Ok(HiddenStart {
+                    fields: Cow::Owned(moved),
+                    state,
+                });
+            }
+            Incoming::Start => vec![0.0; fields.m()],
+        };
+        Ok(HiddenStart {
+            fields: Cow::Borrowed(fields),
+            state,
+        })
     }
 }
 
-fn corner_states(
+fn corner_state(
     fields: &NormalFields,
     region: &[i8],
     kappa: &[f64],
-) -> Result<Vec<Vec<f64>>, Undecided> {
-    let sides = region.iter().map(|&k| f64::from(k));
+) -> Result<Vec<f64>, Undecided> {
     let components = fields.in_region(region);
     let f = components.iter().zip(kappa).map(|(f, k)| f * k);
-    let speeds: Vec<f64> = sides.zip(f).map(|(side, f)| -side * f).collect();
+    let speeds: Vec<f64> = region
+        .iter()
+        .zip(f)
+        .map(|(&k, f)| -f64::from(k) * f)
+        .collect();
     if let Some(surface) = speeds.iter().position(|&v| v <= 0.0) {
         return Err(Undecided::NotArriving { surface });
     }
     let slowest = speeds.iter().copied().fold(f64::INFINITY, f64::min);
-    let central = speeds.iter().map(|v| v / slowest);
-    let central: Vec<f64> = central
-        .zip(region)
-        .map(|(s, &k)| s * f64::from(k))
-        .collect();
-    let all: Vec<usize> = (0..region.len()).collect();
-    let mut states = vec![central];
-    let corner: Vec<f64> = region.iter().map(|&k| f64::from(k)).collect();
-    states.extend(offsets(&corner, &all));
-    Ok(states)
+    let pairs = speeds.iter().zip(region);
+    Ok(pairs.map(|(v, &k)| f64::from(k) * v / slowest).collect())
 }
 
-/// Sliding on a face: one state, and others along its border if several surfaces are reached at once.
-fn face_states(
+fn face_state(
     fields: &NormalFields,
     mode: &[i8],
     multipliers: &[f64],
-) -> Result<Vec<Vec<f64>>, Undecided> {
-    let mut next = multipliers.iter();
-    let value = |&k: &i8| {
-        if k == 0 {
-            next.next().copied()
-        } else {
-            Some(f64::from(k))
-        }
-    };
-    let state: Vec<f64> = mode.iter().filter_map(value).collect();
+) -> Result<Vec<f64>, Undecided> {
+    let state = with_multipliers(mode, multipliers);
     let g = fields.interpolate(&state);
-    let reached: Vec<usize> = (0..mode.len()).filter(|&i| mode[i] != 0).collect();
-    if reached.is_empty() {
-        return Err(Undecided::NotArriving { surface: 0 });
-    }
-    if let Some(&surface) = reached.iter().find(|&&i| state[i] * g[i] >= 0.0) {
-        return Err(Undecided::NotArriving { surface });
-    }
-    let mut states = vec![state.clone()];
-    if reached.len() > 1 {
-        states.extend(offsets(&state, &reached));
-    }
-    Ok(states)
+    let surface = match mode.iter().all(|&k| k == 0) {
+        true => Some(0),
+        false => (0..mode.len()).find(|&i| mode[i] != 0 && state[i] * g[i] >= 0.0),
+    };
+    surface.map_or(Ok(state), |surface| Err(Undecided::NotArriving { surface }))
 }
 
-/// A state on the border of a corner, moved along it in one of the components that are reached, or
-/// in all but one.
-fn offsets(state: &[f64], reached: &[usize]) -> Vec<Vec<f64>> {
-    let mut states = vec![state.to_vec()];
-    for &i in reached {
-        for offset in CORNER_OFFSETS {
-            let mut one = state.to_vec();
-            let mut others = state.to_vec();
-            for &j in reached {
-                let moved = if i == j { &mut one } else { &mut others };
-                moved[j] *= 1.0 + offset;
-            }
-            states.push(one);
-            if reached.len() > 2 {
-                states.push(others);
-            }
-        }
-    }
-    states
+/// The multipliers of all surfaces: those of the surfaces slid on in their order, and the sides of the others.
+pub(super) fn with_multipliers(mode: &[i8], multipliers: &[f64]) -> Vec<f64> {
+    let mut next = multipliers.iter();
+    let value = |&k: &i8| match k {
+        0 => next.next().copied(),
+        side => Some(f64::from(side)),
+    };
+    mode.iter().filter_map(value).collect()
 }
 
 fn polished(
@@ -191,87 +170,22 @@ fn polished(
     root.ok_or(not_sliding)
 }
 
-/// One or two surfaces: the root, in fields moved so that it has just been lost. What follows does not depend on how else
-/// the fields move.
-///
-/// | exit | the fields are moved so that | state |
-/// |---|---|---|
-/// | at a side | the root is beyond it, straight ahead | the root |
-/// | at a fold | there is no root | beside the root, where the motion leads from there |
-/// | by stability | no diagonal entry of G is negative | beside the root, in the direction in which it moves |
-fn exit_of_few(
+/// Two surfaces whose root is stable for no scaling any more: fields moved so that no diagonal entry of G is negative, and a
+/// state beside the root, in the direction in which it moves.
+fn where_unstable(
     fields: &NormalFields,
-    kind: ExitKind,
     lambda: &[f64],
     drift: Option<&[f64]>,
-    kappa: &[f64],
-) -> Result<Starts, Undecided> {
-    let m = fields.m();
-    let fields = &match kind {
-        ExitKind::Side | ExitKind::Fold if m == 2 => stabilised(fields, lambda, kappa),
-        _ => fields.clone(),
-    };
+) -> (NormalFields, Vec<f64>) {
     let jacobian = fields.jacobian(lambda);
-    let by = |j: usize| AFTER_THE_EXIT * fields.row_size(j);
-    let mut state = lambda.to_vec();
-    let fields = match kind {
-        ExitKind::Side => {
-            let i = usize::from(m == 2 && lambda[1].abs() > lambda[0].abs());
-            if 1.0 - lambda[i].abs() > AT_SIDE {
-                return Err(Undecided::NotAnExit);
-            }
-            state[i] = lambda[i].signum();
-            // Of one surface the component that vanishes tells whether the multiplier comes back.
-            let comes_back = m == 1 && drift.is_some_and(|rate| state[0] * rate[0] <= 0.0);
-            let beyond = if comes_back { -state[i] } else { state[i] };
-            let column: Vec<f64> = (0..m).map(|j| jacobian[(j, i)]).collect();
-            let relative = (0..m).map(|j| column[j].abs() / by(j));
-            let length = beyond / relative.fold(0.0, f64::max);
-            let shift: Vec<f64> = column.iter().map(|g| -length * g).collect();
-            fields.shifted(&shift)
-        }
-        ExitKind::Fold if m == 2 && jacobian[(0, 0)].min(jacobian[(1, 1)]) < 0.0 => {
-            let unit = |j: usize, p: usize| jacobian[(j, p)] / fields.row_size(j);
-            let larger = |size: &dyn Fn(usize) -> f64| usize::from(size(1) > size(0));
-            let row = larger(&|j| unit(j, 0).abs().max(unit(j, 1).abs()));
-            let column = larger(&|p| unit(0, p).abs().max(unit(1, p).abs()));
-            // G v = 0 and e G = 0. With the scaling K the motion is (e . g)/(e . K^-1 v) along v, and this denominator is
-            // the trace of K G times an entry of G. The trace was negative.
-            let v = [-unit(row, 1), unit(row, 0)];
-            let e = [-jacobian[(1, column)], jacobian[(0, column)]];
-            let canopy = Bilinear::of_fields(fields);
-            let bend = v[0] * v[1] * (0..2).map(|j| e[j] * canopy.rows()[j][3]).sum::<f64>();
-            let along = -bend * jacobian[(row, column)];
-            state = displaced(lambda, &v.map(|v| along.signum() * v));
-            fields.shifted(&[0, 1].map(|j| by(j) * (bend * e[j]).signum()))
-        }
-        ExitKind::Stability if m == 2 => {
-            state = beside(fields, lambda, drift);
-            let slopes = [0, 1].map(|j| (by(j) - jacobian[(j, j)]).max(0.0));
-            fields.map(|_, pattern, j, value| {
-                let side = if pattern >> j & 1 == 1 { 1.0 } else { -1.0 };
-                value + slopes[j] * (side - lambda[j])
-            })
-        }
-        _ => return Err(Undecided::NotAnExit),
-    };
-    Ok(Starts {
-        fields,
-        states: vec![state],
-    })
-}
-
-/// Two surfaces: the fields, scaled so that the root is stable if it is so for some scaling. Where it is not stable for
-/// kappa, the motion went around it, and is followed as if it had slid.
-fn stabilised(fields: &NormalFields, lambda: &[f64], kappa: &[f64]) -> NormalFields {
-    let jacobian = fields.jacobian(lambda);
-    let [a, b] = [0, 1].map(|j| kappa[j] * jacobian[(j, j)]);
-    match a + b < 0.0 {
-        true => fields.clone(),
-        false if a < 0.0 => fields.scaled(&[-2.0 * b / a, 1.0]),
-        false if b < 0.0 => fields.scaled(&[1.0, -2.0 * a / b]),
-        false => fields.clone(),
-    }
+    let slopes: Vec<f64> = (0..2)
+        .map(|j| (AFTER_THE_EXIT * fields.row_size(j) - jacobian[(j, j)]).max(0.0))
+        .collect();
+    let moved = fields.map(|_, pattern, j, value| {
+        let side = if pattern >> j & 1 == 1 { 1.0 } else { -1.0 };
+        value + slopes[j] * (side - lambda[j])
+    });
+    (moved, beside(fields, lambda, drift))
 }
 
 /// Three and more surfaces: the root itself, in fields that have drifted for a short time. Where two roots meet, in fields that
@@ -281,7 +195,7 @@ fn exit_state(
     kind: ExitKind,
     lambda: &[f64],
     drift: Option<&[f64]>,
-) -> Result<Starts, Undecided> {
+) -> Result<(NormalFields, Vec<f64>), Undecided> {
     let drift = drift.ok_or(Undecided::NoDrift { m: fields.m() })?;
     let largest = drift.iter().fold(0.0_f64, |m, d| m.max(d.abs()));
     let factor = match kind {
@@ -293,29 +207,17 @@ fn exit_state(
         return Err(Undecided::NoDrift { m: fields.m() });
     }
     let mut shift: Vec<f64> = drift.iter().map(|d| factor * d).collect();
-    let states = match kind {
+    let state = match kind {
         ExitKind::Fold => {
             let merged = merged_root(fields, lambda).ok_or(Undecided::NotAnExit)?;
-            shift
-                .iter_mut()
-                .zip(&merged.residual)
-                .for_each(|(shift, g)| *shift -= g);
-            vec![merged.lambda]
+            let pairs = shift.iter_mut().zip(&merged.residual);
+            pairs.for_each(|(shift, g)| *shift -= g);
+            merged.lambda
         }
-        ExitKind::Stability => {
-            let along = |n: usize| {
-                let mut axis = vec![0.0; lambda.len()];
-                axis[n / 2] = if n.is_multiple_of(2) { 1.0 } else { -1.0 };
-                displaced(lambda, &axis)
-            };
-            (0..2 * lambda.len()).map(along).collect()
-        }
-        ExitKind::Side => vec![lambda.to_vec()],
+        ExitKind::Stability => beside(fields, lambda, Some(drift)),
+        ExitKind::Side => lambda.to_vec(),
     };
-    Ok(Starts {
-        fields: fields.shifted(&shift),
-        states,
-    })
+    Ok((fields.shifted(&shift), state))
 }
 
 /// The root, displaced in the direction in which it moves; along the diagonal if that is not known.

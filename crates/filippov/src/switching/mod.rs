@@ -5,11 +5,11 @@
 //! first Lie derivative that does not.
 
 mod codim1;
+mod exits;
 mod hidden;
 mod incoming;
 mod lap;
 mod lie;
-mod parts;
 mod relay;
 mod relay_at;
 mod resolution;
@@ -20,7 +20,7 @@ mod two_fold_motion;
 
 pub(crate) use crate::cube::invert;
 pub use crate::cube::{
-    enclose_root, is_negative_p_matrix, is_p_matrix, is_scaling_stable, is_stable, is_stable_for,
+    enclose_root, has_one_mode_only, is_p_matrix, is_scaling_stable, is_stable, is_stable_for,
     is_undetermined, least_multipliers, merged_root, multiplier_rates, newton, roots_in_cube,
     scaling_margin, stability_margins, stable_roots, stable_roots_with_border, stable_roots_within,
     Bilinear, EnclosedRoot, IntervalVector, Matrix, MergedRoot, NormalFields, Root, RootBounds,
@@ -36,14 +36,13 @@ pub use hidden::{
 pub use incoming::{ExitKind, Incoming};
 pub use lap::Lap;
 pub use lie::{first_nonzero, normal_component, Leading};
-pub use parts::{independent_parts, of_part};
 pub use relay::{
     all_relay_modes, solve_relay, solve_relay_within, RelayError, RelayProblem, RelaySolution,
     Uniqueness,
 };
 pub use relay_at::relay_at;
 pub use resolution::{Continuation, Resolution};
-pub use resolve::{has_one_mode_only, resolve, resolve_within};
+pub use resolve::{resolve, resolve_within};
 pub use shared_load::{SharedLoad, SharedLoads};
 pub use two_fold_motion::{TwoFold, TwoFoldMotion};
 

@@ -79,6 +79,8 @@ pub struct RelaySolution {
     /// Entries with v_i = 0 and |s_i| = 1 within rounding: `modes` has one of the two possibilities, and
     /// derivatives along the motion decide.
     pub degenerate: Vec<usize>,
+    /// May all fields around be tangent to a surface? They cross it at a small part of their speed.
+    pub may_be_tangent: bool,
     /// How many contacts at most share one load because they are redundant.
     pub n_sharing: usize,
     /// Linear systems solved.
@@ -253,6 +255,7 @@ impl RelayProblem {
             rates,
             uniqueness: solved.uniqueness,
             degenerate,
+            may_be_tangent: false,
             n_sharing: 0,
             n_pivots: solved.n_pivots,
             n_operations: solved.n_operations,

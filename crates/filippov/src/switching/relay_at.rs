@@ -5,7 +5,8 @@ use super::shared_load::stay_together;
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::patience::Patience;
-use crate::system::PiecewiseSystem;
+use crate::system::{dot, PiecewiseSystem};
+use crate::tolerances::AT_SIDE;
 
 /// Solves the relay problem at a point where the surfaces of `meeting` vanish, with the entries of `mode` there as
 /// the first guess. `None` if the field is not affine in their signs, or if no solution was found. Returns
@@ -35,6 +36,17 @@ pub fn relay_at(
         noise: system.lie_tolerance(1),
     };
     let mut found = solve_relay_within(&problem, &before, patience).ok();
+    if let Some(solution) = &mut found {
+        let speed = 1.0 + dot(&parts.field, &parts.field).sqrt();
+        solution.may_be_tangent = (0..meeting.len()).any(|i| {
+            let sum = |row: &mut dyn Iterator<Item = (usize, f64)>| {
+                row.map(|(_, v)| v.abs()).sum::<f64>()
+            };
+            let size = problem.nu[i].abs() + sum(&mut problem.n.row(i));
+            let normal = parts.time_rates[i].abs() + sum(&mut parts.gradients.row(i));
+            size <= AT_SIDE * normal * speed
+        });
+    }
     if let Some(solution) = found.as_mut().filter(|found| found.n_sharing > 0) {
         let sticking: Vec<usize> = (0..meeting.len())
             .filter(|&i| solution.modes[i] == 0)

@@ -30,7 +30,7 @@ impl Continuation {
 /// The decision at an intersection: the common currency of all rules for two and more surfaces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Resolution {
-    /// `only`, or the kind of outcome of the hidden dynamics (`docs/theory/intersections.md` lists them).
+    /// `only`, `exit`, or the kind of outcome of the hidden dynamics (`docs/theory/intersections.md` lists them).
     pub leaf: &'static str,
     /// What follows.
     pub chosen: Continuation,
@@ -38,8 +38,8 @@ pub struct Resolution {
     pub multipliers: Vec<f64>,
     /// Is there no other candidate?
     pub unique: bool,
-    /// The chosen continuation, and all others that are possible: of one and two surfaces those that attract, except
-    /// where the root that is left decides which of them follows; of more those that a trial of scalings finds.
+    /// The chosen continuation, and all others that attract, except where the root that is left decides which of them
+    /// follows. Of more than six surfaces only the chosen one is known.
     pub candidates: Vec<Continuation>,
     /// Does the hidden dynamics go around the root instead of coming to rest in it? The regularised
     /// motion then oscillates within the intersection, and the multipliers are those of the root.
@@ -48,9 +48,6 @@ pub struct Resolution {
     pub margin: f64,
     /// Do the fields, perturbed by a little, lead to another mode?
     pub degenerate: bool,
-    /// How many motions of the hidden dynamics the decision followed: nearly all of its work. Motions for perturbed
-    /// fields that led to an error are not among them.
-    pub n_motions: usize,
 }
 
 impl Resolution {
@@ -65,7 +62,6 @@ impl Resolution {
             oscillates: false,
             margin: f64::INFINITY,
             degenerate: false,
-            n_motions: 0,
         }
     }
 

@@ -1,25 +1,25 @@
 //! The decision at an intersection, whatever came before and however many surfaces meet.
 
+use std::borrow::Cow;
+
+use super::exits;
 use super::hidden::{attracting, limit_within, Outcome};
-use super::incoming::{ExitKind, Incoming};
-use super::parts::{independent_parts, resolve_parts};
+use super::incoming::{ExitKind, HiddenStart, Incoming};
 use super::resolution::{Continuation, Resolution};
-use crate::cube::Bilinear;
-use crate::cube::NormalFields;
-use crate::cube::{is_negative_p_matrix, is_stable_for};
-use crate::cube::{newton, stable_roots_within};
+use crate::cube::{has_one_mode_only, is_stable_for, newton, stable_roots_within};
+use crate::cube::{Bilinear, NormalFields};
 use crate::error::Undecided;
 use crate::patience::Patience;
-use crate::tolerances::{
-    AFTER_THE_EXIT, DOUBTFUL, MOST_MEETING, MOST_SCALED_SINGLY, UNSTABLE_START,
-};
+use crate::tolerances::{DOUBTFUL, MOST_MEETING, UNSTABLE_START};
+
+/// The leaf of decisions with one attracting continuation.
+const ONLY: &str = "only";
 
 /// Decides what follows at an intersection of m surfaces, scaled by `kappa`.
 ///
-/// Of one and two surfaces, and at a start, all attracting continuations are listed: a single one follows. Among
-/// several, and for three and more surfaces, the hidden dynamics at `kappa` selects. If a quantity whose sign decided is doubtful (`tolerances/`), the decision is
-/// repeated with perturbed fields: if they agree, theirs counts, and if not,
-/// [`Resolution::degenerate`] says so. Surfaces in parts that do not know of each other are decided part by part.
+/// All attracting continuations are listed; a single one follows. Among several, and of more than six surfaces, the hidden
+/// dynamics at `kappa` selects. If a quantity whose sign decided is doubtful (`tolerances/`), the decision is
+/// repeated with perturbed fields: if they agree, theirs counts, and if not, [`Resolution::degenerate`] is set.
 ///
 /// # Example
 /// ```
@@ -61,10 +61,6 @@ pub fn resolve_within(
         return Err(Undecided::Scaling { m: fields.m() });
     }
     check_lengths(fields.m(), incoming)?;
-    let parts = independent_parts(fields);
-    if parts.len() > 1 && fields.m() > 2 {
-        return resolve_parts(fields, &parts, incoming, kappa, patience);
-    }
     let resolution = match decide(fields, incoming, kappa, patience) {
         Ok(doubtful) if doubtful.margin <= DOUBTFUL => {
             Ok(in_doubt(doubtful, fields, incoming, kappa, patience))
@@ -87,24 +83,22 @@ fn in_doubt(
     kappa: &[f64],
     patience: Patience,
 ) -> Resolution {
-    let perturbed = perturbations(fields).map(|other| decide(&other, incoming, kappa, patience));
-    let others: Vec<Result<Resolution, Undecided>> = perturbed.collect();
+    let others: Vec<Result<Resolution, Undecided>> = perturbations(fields)
+        .map(|other| decide(&other, incoming, kappa, patience))
+        .collect();
     let agreed: Vec<&Resolution> = others.iter().flatten().collect();
     let agree = agreed.len() == others.len() && agreed.iter().all(|o| o.chosen == agreed[0].chosen);
-    let margin = resolution.margin;
-    let n_motions =
-        agreed.iter().map(|other| other.n_motions).sum::<usize>() + resolution.n_motions;
     if agree {
+        let margin = resolution.margin;
         resolution = agreed[0].clone();
         resolution.margin = margin;
     }
-    resolution.n_motions = n_motions;
     for other in agreed {
         resolution.add_candidates(&other.candidates);
     }
     resolution.degenerate |= !agree;
     resolution.unique &= resolution.candidates.len() == 1 && !resolution.degenerate;
-    complete(&mut resolution, fields, kappa, patience);
+    complete(&mut resolution, false, fields, kappa, patience);
     resolution
 }
 
@@ -139,130 +133,109 @@ fn decide(
             None => Undecided::Proportional,
         });
     }
-    let mut resolution = match incoming {
-        Incoming::Start if m <= MOST_MEETING => among_attracting(fields, incoming, kappa, patience),
-        _ if m <= 2 => among_attracting(fields, incoming, kappa, patience),
-        // Not all 3^m modes can be looked at.
-        _ => by_trial(fields, incoming, kappa, patience),
-    }?;
-    complete(&mut resolution, fields, kappa, patience);
-    Ok(resolution)
-}
-
-/// The only attracting continuation, or that of several to which the hidden dynamics tends.
-///
-/// Where sliding on both of two surfaces ends at a side or at a fold, it tends to the same one for every scaling for which the
-/// root was stable before: the others are no candidates.
-fn among_attracting(
-    fields: &NormalFields,
-    incoming: &Incoming,
-    kappa: &[f64],
-    patience: Patience,
-) -> Result<Resolution, Undecided> {
+    if let (
+        Incoming::Exit {
+            kind,
+            lambda,
+            drift,
+        },
+        true,
+    ) = (incoming, m <= 2)
+    {
+        if m == 1 || *kind != ExitKind::Stability {
+            let mut resolution = exits::leave(fields, *kind, lambda, drift.as_deref())?;
+            complete(&mut resolution, false, fields, kappa, patience);
+            return Ok(resolution);
+        }
+    }
     let is_start = *incoming == Incoming::Start;
-    let starts = incoming.starts(fields, kappa, patience)?;
-    let (found, margin) = attracting(&starts.fields, patience);
-    let mut resolution = if let [only] = found.as_slice() {
-        let mut resolution = Resolution::sure("only", only.continuation.clone());
-        if fields.m() > 2 {
-            resolution.multipliers.clone_from(&only.multipliers);
+    let start = incoming.hidden_start(fields, kappa, patience)?;
+    let listed = attracting(&start.fields, patience);
+    let are_listed = listed.is_some();
+    let (mut found, margin) = listed.unwrap_or((Vec::new(), f64::INFINITY));
+    let mut resolution = match found.pop() {
+        Some(only) if found.is_empty() => {
+            let mut resolution = Resolution::sure(ONLY, only.continuation);
+            resolution.multipliers = only.multipliers;
+            resolution
         }
-        resolution
-    } else {
-        let found: Vec<Continuation> = found.into_iter().map(|one| one.continuation).collect();
-        let from = |u: &[f64]| limit_within(&starts.fields, u, kappa, patience);
-        let is_lost = |outcome: &Outcome| {
-            continuation(outcome).is_ok_and(|limit| !oscillates(outcome) && !found.contains(&limit))
-        };
-        let mut outcome = from(&starts.states[0]);
-        // u = 0 may be at rest in some directions, or on the border of two basins.
-        if is_start && is_lost(&outcome) && !found.is_empty() {
-            outcome = from(&vec![UNSTABLE_START; fields.m()]);
+        last => {
+            found.extend(last);
+            let found: Vec<Continuation> = found.into_iter().map(|one| one.continuation).collect();
+            let mut resolution = selected(&start, &found, incoming, kappa, patience)?;
+            resolution.unique &=
+                are_listed || incoming.is_followed() || has_one_mode_only(&start.fields);
+            resolution
         }
-        let chosen = match (continuation(&outcome), found.last()) {
-            // Fields in balance: as good as any other is the last one, that of the most entries +1.
-            (Err(Undecided::AtRest), Some(last)) if is_start => last.clone(),
-            (chosen, _) => chosen?,
-        };
-        let mut resolution = Resolution::sure(leaf_of(&outcome), chosen);
-        resolution.degenerate = !is_start && is_lost(&outcome);
-        resolution.oscillates = oscillates(&outcome);
-        resolution.n_motions = 1;
-        let kind = match incoming {
-            Incoming::Exit { kind, .. } => Some(*kind),
-            _ => None,
-        };
-        if !matches!(kind, Some(ExitKind::Side | ExitKind::Fold)) {
-            resolution.add_candidates(&found);
-        }
-        resolution.unique = resolution.candidates.len() == 1;
-        resolution
     };
     // A mode that is left at no speed at first is none in which a motion starts.
     resolution.margin = match is_start {
         true => smallest_component(fields),
         false => margin,
     };
+    let is_polished = m <= 2 && resolution.leaf == ONLY && matches!(start.fields, Cow::Borrowed(_));
+    complete(&mut resolution, is_polished, fields, kappa, patience);
     Ok(resolution)
 }
 
-/// The hidden dynamics from all start states and for several scalings; the first of each decides.
-fn by_trial(
-    fields: &NormalFields,
+/// That of several attracting continuations to which the hidden dynamics tends.
+fn selected(
+    start: &HiddenStart,
+    found: &[Continuation],
     incoming: &Incoming,
     kappa: &[f64],
     patience: Patience,
 ) -> Result<Resolution, Undecided> {
-    let scalings = comparable_scalings(fields, incoming, kappa);
-    let starts = incoming.starts(fields, &scalings[0], patience)?;
-    let outcome = limit_within(&starts.fields, &starts.states[0], &scalings[0], patience);
-    let chosen = continuation(&outcome)?;
-    let mut resolution = Resolution::sure(leaf_of(&outcome), chosen.clone());
-    resolution.oscillates = oscillates(&outcome);
-    resolution.margin = smallest_component(fields);
-    resolution.n_motions = 1;
+    let (m, is_start) = (start.fields.m(), *incoming == Incoming::Start);
+    let is_lost = |outcome: &Outcome| {
+        let limit = outcome.continuation();
+        m <= 2 && !outcome.oscillates() && limit.is_ok_and(|limit| !found.contains(&limit))
+    };
+    let from = |u: &[f64]| limit_within(&start.fields, u, kappa, patience);
+    let mut outcome = from(&start.state);
+    // u = 0 may be at rest in some directions, or on the border of two basins.
+    if is_start && is_lost(&outcome) && !found.is_empty() {
+        outcome = from(&vec![UNSTABLE_START; m]);
+    }
+    let chosen = match (outcome.continuation(), found.last()) {
+        // Fields in balance: as good as any other is the last one, that of the most entries +1.
+        (Err(Undecided::AtRest), Some(last)) if is_start => last.clone(),
+        (chosen, _) => chosen?,
+    };
+    let mut resolution = Resolution::sure(outcome.leaf(), chosen);
+    resolution.degenerate = !is_start && is_lost(&outcome);
+    resolution.oscillates = outcome.oscillates();
     if let Outcome::Sliding { multipliers, .. } = outcome {
         resolution.multipliers = multipliers;
     }
-    if has_one_mode_only(fields) && !resolution.oscillates {
-        return Ok(resolution);
+    if !incoming.is_followed() {
+        resolution.add_candidates(found);
     }
-    // Other offsets with the scaling asked for, other scalings without an offset.
-    let offsets = starts.states.iter().map(|state| (state, &scalings[0]));
-    let scaled = scalings.iter().map(|kappa| (&starts.states[0], kappa));
-    let others = offsets.chain(scaled.skip(1));
-    let others = others.map(|(state, kappa)| limit_within(&starts.fields, state, kappa, patience));
-    for other in others.skip(1) {
-        resolution.n_motions += 1;
-        match continuation(&other) {
-            Ok(other) => resolution.add_candidates(&[other]),
-            Err(_) => resolution.unique = false,
-        }
-    }
-    // Without a past many more modes are possible than the trial looks at.
-    resolution.unique &= resolution.candidates.len() == 1 && *incoming != Incoming::Start;
+    resolution.unique = resolution.candidates.len() == 1;
     Ok(resolution)
 }
 
-/// Adds the multipliers of the chosen mode, and whether the regularised motion oscillates in it.
-fn complete(resolution: &mut Resolution, fields: &NormalFields, kappa: &[f64], patience: Patience) {
-    let Some(mode) = resolution.mode() else {
+/// Adds the multipliers of the chosen mode, and whether the regularised motion oscillates in it. Polished ones are roots of
+/// these very fields.
+fn complete(
+    resolution: &mut Resolution,
+    is_polished: bool,
+    fields: &NormalFields,
+    kappa: &[f64],
+    patience: Patience,
+) {
+    let Some(mode) = resolution.mode().filter(|mode| mode.codimension() > 0) else {
         return;
     };
+    if is_polished && mode.codimension() == 1 {
+        return;
+    }
     let face = fields.restrict(mode.entries());
-    let both = || {
-        Bilinear::of_fields(&face)
-            .root()
-            .map(|root| root.point.to_vec())
-    };
-    let root = match face.m() {
-        0 => None,
-        _ if resolution.multipliers.len() == face.m() => {
-            let known = &resolution.multipliers;
-            newton(&face, known).or_else(|| Some(known.clone()))
-        }
-        2 => both(),
-        _ => stable_roots_within(&face, patience).into_iter().next(),
+    let known = &resolution.multipliers;
+    let root = match known.len() == face.m() {
+        true if is_polished => Some(known.clone()),
+        true => newton(&face, known).or_else(|| Some(known.clone())),
+        false => stable_roots_within(&face, patience).into_iter().next(),
     };
     let Some(root) = root else {
         return;
@@ -271,89 +244,6 @@ fn complete(resolution: &mut Resolution, fields: &NormalFields, kappa: &[f64], p
     let free: Vec<f64> = free.map(|(&kappa, _)| kappa).collect();
     resolution.oscillates |= !is_stable_for(&face.jacobian(&root), &free);
     resolution.multipliers = root;
-}
-
-fn continuation(outcome: &Outcome) -> Result<Continuation, Undecided> {
-    match outcome {
-        Outcome::Region(mode) => Ok(Continuation::Mode(mode.clone())),
-        Outcome::Sliding {
-            mode, multipliers, ..
-        } if !multipliers.is_empty() => Ok(Continuation::Mode(mode.clone())),
-        Outcome::Sliding { .. } => Err(Undecided::Cycle),
-        Outcome::Unknown => Err(Undecided::NoOutcome),
-        Outcome::OutwardSpiral { .. } => Ok(Continuation::OutwardSpiral),
-        Outcome::AtRest => Err(Undecided::AtRest),
-    }
-}
-
-fn oscillates(outcome: &Outcome) -> bool {
-    matches!(
-        outcome,
-        Outcome::Sliding {
-            oscillates: true,
-            ..
-        }
-    )
-}
-
-fn leaf_of(outcome: &Outcome) -> &'static str {
-    match outcome {
-        Outcome::Region(_) => "hidden/classical",
-        Outcome::Sliding {
-            oscillates: true, ..
-        } => "hidden/oscillation",
-        Outcome::Sliding { .. } => "hidden/sliding",
-        Outcome::OutwardSpiral { .. } => "hidden/spiral",
-        Outcome::AtRest | Outcome::Unknown => "hidden/unknown",
-    }
-}
-
-/// Is there exactly one consistent mode, by the constant matrix G of affine fields?
-pub fn has_one_mode_only(fields: &NormalFields) -> bool {
-    fields.is_affine() && is_negative_p_matrix(&fields.jacobian(&vec![0.0; fields.m()]))
-}
-
-/// The scalings to compare. After an exit only those count for which the root was stable before.
-fn comparable_scalings(fields: &NormalFields, incoming: &Incoming, kappa: &[f64]) -> Vec<Vec<f64>> {
-    let mut scalings = scalings(kappa);
-    if let Incoming::Exit { kind, lambda, .. } = incoming {
-        if *kind != ExitKind::Stability {
-            let mut jacobian = fields.jacobian(lambda);
-            for i in 0..lambda.len() {
-                // At a fold one eigenvalue vanishes.
-                jacobian[(i, i)] -= AFTER_THE_EXIT * fields.size();
-            }
-            let others = scalings.split_off(1);
-            let stable = others
-                .into_iter()
-                .filter(|kappa| is_stable_for(&jacobian, kappa));
-            scalings.extend(stable);
-        }
-    }
-    scalings
-}
-
-/// The scaling itself, each surface ten times larger and smaller, and all in rising and falling order.
-fn scalings(kappa: &[f64]) -> Vec<Vec<f64>> {
-    let m = kappa.len();
-    let changed = |factor: &dyn Fn(usize) -> f64| -> Vec<f64> {
-        kappa
-            .iter()
-            .enumerate()
-            .map(|(i, k)| factor(i) * k)
-            .collect()
-    };
-    let mut scalings = vec![kappa.to_vec()];
-    let singly = if m <= MOST_SCALED_SINGLY { m } else { 0 };
-    for j in 0..singly {
-        for factor in [0.1, 10.0] {
-            scalings.push(changed(&|i| if i == j { factor } else { 1.0 }));
-        }
-    }
-    let factor = |i: usize| 3.0_f64.powf((i * m.min(6)) as f64 / m as f64);
-    scalings.push(changed(&factor));
-    scalings.push(changed(&|i| factor(m - i)));
-    scalings
 }
 
 /// The smallest normal component as a fraction of the largest one of its surface: of all patterns, or of the ends

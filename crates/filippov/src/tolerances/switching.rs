@@ -46,11 +46,6 @@ pub const UNSTABLE_START: f64 = 0.1;
 /// Also the allowance for the eigenvalue that vanishes there.
 pub const AFTER_THE_EXIT: f64 = 1e-5;
 
-/// Offsets along the border of a corner, in units of the transition, from which the hidden dynamics
-/// is tried. They grow until the strips are crossed without a change; an outcome of a narrower band
-/// of offsets may be missed.
-pub const CORNER_OFFSETS: [f64; 9] = [0.05, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0, 30.0, 1000.0];
-
 /// Share of the largest ellipse around a stable root in which a quadratic form surely decreases: so
 /// that rounding does not matter.
 pub const BASIN_SHARE: f64 = 0.9;
@@ -209,17 +204,6 @@ pub const REDUNDANT_PIVOT: f64 = 1e-11;
 /// A matrix with diagonal 1 counts as definite, or as one with positive minors, if all pivots exceed this: what is
 /// claimed of it (that a mode is the only one) has to be clear of rounding.
 pub const DEFINITE_PIVOT: f64 = 1e-10;
-
-/// Largest number of surfaces at whose intersection all Filippov solutions are listed: there are 3^m modes to look
-/// at, and those of three and more surfaces take a search for all roots.
-pub const MOST_LISTED: usize = 3;
-
-/// Surfaces that know of one another of which each is scaled on its own in the trial for uniqueness; beyond, only all
-/// together are, in two orders.
-pub const MOST_SCALED_SINGLY: usize = 12;
-
-/// Combinations of candidates of the parts of an intersection that are listed.
-pub const MOST_COMBINED: usize = 81;
 
 /// Where steps shrink to nothing because multipliers end, their determinant is below this: it falls like the
 /// square root of the time that is left.

@@ -43,7 +43,7 @@ fn margin(rule: SlidingRule, fields: &NormalFields, entries: &[i8]) -> f64 {
     let m = fields.m();
     let sliding: Vec<usize> = (0..m).filter(|&j| entries[j] == 0).collect();
     let patterns =
-        |k: &usize| (0..m).all(|j| entries[j] == 0 || sign_of(*k, j) == entries[j].into());
+        |k: &usize| (0..m).all(|j| entries[j] == 0 || sign_of(*k, j) == f64::from(entries[j]));
     let face: Vec<usize> = (0..fields.n_patterns()).filter(patterns).collect();
     let (mut margin, shares) = match (sliding.as_slice(), face.as_slice()) {
         ([], _) => (f64::NEG_INFINITY, vec![1.0]),

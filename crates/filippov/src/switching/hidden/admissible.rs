@@ -1,11 +1,12 @@
 //! All modes in which a motion can leave an intersection, or stay on it.
 
-use crate::cube::stable_roots_within;
-use crate::cube::Bilinear;
-use crate::cube::NormalFields;
+use crate::cube::{stable_roots_within, Bilinear, Matrix, NormalFields};
+use crate::mode::Mode;
 use crate::patience::Patience;
+use crate::switching::incoming::with_multipliers;
 use crate::switching::lap::Lap;
 use crate::switching::resolution::Continuation;
+use crate::tolerances::{MOST_MEETING, PROPORTIONAL};
 
 /// A continuation that is possible without regard to the past.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,16 +33,80 @@ pub fn admissible(fields: &NormalFields) -> Vec<Admissible> {
 
 /// As [`admissible`]; some of them when the caller has waited long enough.
 pub fn admissible_within(fields: &NormalFields, patience: Patience) -> Vec<Admissible> {
-    attracting(fields, patience).0
+    attracting_together(fields, patience).0
 }
 
 /// As [`admissible_within`], with the distance of the fields to others that have another list, as a fraction of their size:
 /// the smallest of all modes, each as far from this as the condition that it fails most clearly, or fulfils
 /// least. Neither the stability of roots nor roots of three and more multipliers count.
+///
+/// Surfaces in parts that do not act on one another are looked at part by part: the list is then that of all combinations.
+/// `None` for more than [`MOST_MEETING`] surfaces in one part, or for more combinations than these have modes.
 pub(in crate::switching) fn attracting(
     fields: &NormalFields,
     patience: Patience,
-) -> (Vec<Admissible>, f64) {
+) -> Option<(Vec<Admissible>, f64)> {
+    let m = fields.m();
+    let parts = match m {
+        1 | 2 => vec![(0..m).collect()],
+        _ => independent_parts(fields),
+    };
+    if parts.iter().any(|part| part.len() > MOST_MEETING) {
+        return None;
+    }
+    if let [_] = parts[..] {
+        return Some(attracting_together(fields, patience));
+    }
+    let mut whole = vec![(vec![0; m], vec![0.0; m])];
+    let mut margin = f64::INFINITY;
+    for part in parts {
+        let mut held = vec![-1; m];
+        part.iter().for_each(|&i| held[i] = 0);
+        let (found, own_margin) = attracting_together(&fields.restrict(&held), patience);
+        margin = margin.min(own_margin);
+        let combined = found.iter().flat_map(|one| {
+            let entries = one.continuation.as_mode().map_or(&[][..], Mode::entries);
+            let lambda = with_multipliers(entries, &one.multipliers);
+            let part = &part;
+            whole.iter().map(move |(mode, multipliers)| {
+                let (mut mode, mut multipliers) = (mode.clone(), multipliers.clone());
+                for ((&i, &entry), &value) in part.iter().zip(entries).zip(&lambda) {
+                    (mode[i], multipliers[i]) = (entry, value);
+                }
+                (mode, multipliers)
+            })
+        });
+        whole = combined.collect();
+        if whole.len() > 3_usize.pow(MOST_MEETING as u32) {
+            return None;
+        }
+    }
+    let found = whole.into_iter().map(|(mode, lambda)| Admissible {
+        multipliers: (0..m)
+            .filter(|&i| mode[i] == 0)
+            .map(|i| lambda[i])
+            .collect(),
+        continuation: Continuation::mode(&mode),
+    });
+    Some((found.collect(), margin))
+}
+
+/// The surfaces in parts of which none acts on another one's rates.
+fn independent_parts(fields: &NormalFields) -> Vec<Vec<usize>> {
+    let mut acts = Matrix::zeros(fields.m());
+    let sizes: Vec<f64> = (0..fields.m()).map(|j| fields.row_size(j)).collect();
+    for p in 0..fields.m() {
+        for (j, value) in fields.columns(p).flat_map(|c| c.into_iter().enumerate()) {
+            // An entry that is rounding of its row does not act.
+            if value.abs() > PROPORTIONAL * sizes[j] {
+                (acts[(j, p)], acts[(p, j)]) = (1.0, 1.0);
+            }
+        }
+    }
+    acts.strong_parts()
+}
+
+fn attracting_together(fields: &NormalFields, patience: Patience) -> (Vec<Admissible>, f64) {
     let (mut found, mut margin) = (Vec::new(), f64::INFINITY);
     let mut mode = vec![-1_i8; fields.m()];
     loop {
@@ -94,12 +159,7 @@ fn root_margin(fields: &NormalFields, mode: &[i8], face: &NormalFields) -> f64 {
 
 /// How clearly the field at these multipliers leaves the surfaces that the mode does not slide on, by the one least left.
 fn smallest_departure(fields: &NormalFields, mode: &[i8], multipliers: &[f64]) -> f64 {
-    let mut next = multipliers.iter();
-    let held = |&k: &i8| match k {
-        0 => next.next().copied(),
-        side => Some(f64::from(side)),
-    };
-    let lambda: Vec<f64> = mode.iter().filter_map(held).collect();
+    let lambda = with_multipliers(mode, multipliers);
     let g = fields.interpolate(&lambda);
     let left = (0..mode.len()).filter(|&i| mode[i] != 0);
     // All fields may be tangent to a surface; that is not left.

@@ -24,7 +24,9 @@ mod strip;
 pub(super) use admissible::attracting;
 pub use admissible::{admissible, admissible_within, Admissible};
 
+use super::resolution::Continuation;
 use crate::cube::NormalFields;
+use crate::error::Undecided;
 use crate::mode::Mode;
 use crate::patience::Patience;
 
@@ -52,6 +54,37 @@ pub enum Outcome {
     AtRest,
     /// No certain outcome within the work that is allowed.
     Unknown,
+}
+
+impl Outcome {
+    /// The continuation to which it leads.
+    pub(super) fn continuation(&self) -> Result<Continuation, Undecided> {
+        match self {
+            Outcome::Sliding { multipliers, .. } if multipliers.is_empty() => Err(Undecided::Cycle),
+            Outcome::Region(mode) | Outcome::Sliding { mode, .. } => {
+                Ok(Continuation::Mode(mode.clone()))
+            }
+            Outcome::OutwardSpiral { .. } => Ok(Continuation::OutwardSpiral),
+            Outcome::AtRest => Err(Undecided::AtRest),
+            Outcome::Unknown => Err(Undecided::NoOutcome),
+        }
+    }
+
+    /// Does it go around a root for ever?
+    pub(super) fn oscillates(&self) -> bool {
+        matches!(self, Outcome::Sliding { oscillates, .. } if *oscillates)
+    }
+
+    /// Its name as that of a decision.
+    pub(super) fn leaf(&self) -> &'static str {
+        match self {
+            Outcome::Region(_) => "hidden/classical",
+            Outcome::Sliding { .. } if self.oscillates() => "hidden/oscillation",
+            Outcome::Sliding { .. } => "hidden/sliding",
+            Outcome::OutwardSpiral { .. } => "hidden/spiral",
+            Outcome::AtRest | Outcome::Unknown => "hidden/unknown",
+        }
+    }
 }
 
 /// Follows the hidden dynamics from the state `u` to its limit, with the surfaces scaled by `kappa`.
