@@ -76,7 +76,7 @@ def test_friction_that_repels_is_not_slid_on_in_contact() -> None:
 
 
 def test_lift_off_as_friction_begins_to_slip() -> None:
-    """At t = 0 the velocity x2 changes its sign, and the force is 2, not 0: x0'' = 2 + 2 x2 - t, x2' = 3 t."""
+    """At t = 0 the velocity x2 changes its sign, and the force is 2: x0'' = 2 + 2 x2 - t, x2' = 3 t."""
     y0 = [0, 0, -2 / 16 + 1.5 / 256]
     sol = fl.solve_ivp(
         lambda t, x: [x[1], 1 + 2 * x[2] - t + np.sign(x[2]), 1 + 3 * t - np.sign(x[2])],

@@ -209,6 +209,9 @@ pub const DEFINITE_PIVOT: f64 = 1e-10;
 /// square root of the time that is left.
 pub const AT_FOLD: f64 = 1e-2;
 
+/// At an exit a multiplier vanishes to this fraction of the largest one: the event is located to better than that.
+pub const VANISHING_MULTIPLIER: f64 = 1e-9;
+
 /// Functions above this are not looked at for being zero all along a step: rounding of states up to thousands is below.
 pub const NEARLY_ZERO: f64 = 1e-10;
 
