@@ -41,6 +41,8 @@ pub(super) enum Verdict {
     Fails(Guard),
     /// Derivatives at the point do not decide.
     Open,
+    /// Nor would a trial: the mode has no field at the point.
+    Untold,
 }
 
 /// One way in which a motion starts in a mode, with what is known of its guards.
@@ -100,7 +102,10 @@ impl Candidate<'_> {
         let is_silent = silent_rows((self.fields, self.noise), self.entries.entries());
         if self.entries.sliding_set().any(|i| is_silent[i]) {
             return match self.entries.sliding() {
-                Some(place) => self.at_two_fold(at, place),
+                Some(place) => Ok(match self.at_two_fold(at, place)? {
+                    Verdict::Open => Verdict::Untold,
+                    verdict => verdict,
+                }),
                 None => self.blown_up(at, notes, &is_silent),
             };
         }

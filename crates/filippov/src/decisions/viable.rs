@@ -110,7 +110,7 @@ pub(super) fn survey(
                 Together::Never => Verdict::Fails(Guard::Surface(meeting.surfaces[touch.pair[1]])),
                 // Other rules may know.
                 Together::Perhaps => continue,
-                Together::Lost => Verdict::Open,
+                Together::Lost => Verdict::Untold,
                 Together::By(fields) => {
                     let fields = &fields;
                     Candidate {
@@ -128,6 +128,7 @@ pub(super) fn survey(
         match verdict {
             Verdict::Viable(viable) => found.viable.push(viable),
             Verdict::Fails(guard) => found.failing.push((mode, guard)),
+            Verdict::Untold => found.open.push(mode),
             Verdict::Open => match try_mode(at, notes, &mode, meeting.surfaces, SURFACE_NOISE)? {
                 Trial::Leaves(left) => found.viable.push(Viable::strictly(Next::new(mode, left))),
                 Trial::Ends => found.failing.push((mode.clone(), candidate.guard())),
