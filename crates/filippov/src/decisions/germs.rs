@@ -13,7 +13,7 @@ use crate::error::FieldError;
 use crate::field::SmoothField;
 use crate::mode::Mode;
 use crate::status::Stop;
-use crate::switching::Undecided;
+use crate::switching::{NormalFields, Undecided};
 use crate::tolerances::{AT_SIDE, MOST_MEETING, TANGENT};
 
 /// Rule: switching functions jump between the regions around the point, surfaces are in one place or touch one another.
@@ -57,11 +57,16 @@ pub(super) fn is_silent(
         return Ok(false);
     };
     let noise = noise_of(at, surfaces, mode, &fields)?;
+    Ok(has_silent(at, surfaces, &fields, &noise))
+}
+
+/// The same, of normal components with this noise.
+fn has_silent(at: &Point, surfaces: &[usize], fields: &NormalFields, noise: &[f64]) -> bool {
     let is_silent = |(i, noise): (usize, &f64)| {
         let sticks = at.system.sticks_at(surfaces[i]);
         !sticks && fields.row_range(i).iter().all(|v| v.abs() <= *noise)
     };
-    Ok(noise.iter().enumerate().any(is_silent))
+    noise.iter().enumerate().any(is_silent)
 }
 
 /// Rule: first-order data are doubtful, and the viable modes are known.
@@ -71,10 +76,18 @@ pub(super) fn decide_if_doubtful(
     meeting: &Meeting,
 ) -> Result<Option<Decided>, FieldError> {
     let is_few = (2..=MOST_MEETING).contains(&meeting.surfaces.len());
-    if !is_few || slides_by_rule(at.arrival) || !is_doubtful(at, notes, meeting)? {
+    if !is_few || slides_by_rule(at.arrival) {
         return Ok(None);
     }
-    if is_silent(at, notes, meeting.surfaces, meeting.mode)? {
+    let corners = at.corners(notes, meeting.surfaces, meeting.mode)?;
+    let Ok(fields) = corners.normal_fields() else {
+        return Ok(None);
+    };
+    let noise = noise_of(at, meeting.surfaces, meeting.mode, &fields)?;
+    if !is_doubtful(&fields, &noise) {
+        return Ok(None);
+    }
+    if has_silent(at, meeting.surfaces, &fields, &noise) {
         return decide_undecided(at, notes, meeting, None).map(Some);
     }
     if meeting.surfaces.iter().any(|&j| at.system.sticks_at(j)) {
@@ -261,14 +274,9 @@ fn drop_other_names(
 }
 
 /// Is a normal component at some surface not clear of zero, in a region or along a motion that slides on one surface?
-fn is_doubtful(at: &Point, notes: &mut Notes, meeting: &Meeting) -> Result<bool, FieldError> {
-    let corners = at.corners(notes, meeting.surfaces, meeting.mode)?;
-    let Ok(fields) = corners.normal_fields() else {
-        return Ok(false);
-    };
-    let noise = noise_of(at, meeting.surfaces, meeting.mode, &fields)?;
+fn is_doubtful(fields: &NormalFields, noise: &[f64]) -> bool {
     if fields.any_component(|i, component| component.abs() <= noise[i]) {
-        return Ok(true);
+        return true;
     }
     let m = fields.m();
     for (slid, pattern) in (0..m).flat_map(|i| (0..1_usize << m).map(move |pattern| (i, pattern))) {
@@ -285,9 +293,9 @@ fn is_doubtful(at: &Point, notes: &mut Notes, meeting: &Meeting) -> Result<bool,
             let components = fields.interpolate(&place);
             let is_tangent = |i: usize| i != slid && components[i].abs() <= noise[i];
             if (0..m).any(is_tangent) {
-                return Ok(true);
+                return true;
             }
         }
     }
-    Ok(false)
+    false
 }
