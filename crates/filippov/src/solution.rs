@@ -190,14 +190,13 @@ impl Solution {
 }
 
 impl Solution {
-    /// The multipliers at the start of the segment that `t` belongs to.
-    fn multipliers_near(&self, t: f64, side: Side) -> &[f64] {
+    /// The segment that `t` belongs to.
+    fn segment_at(&self, t: f64, side: Side) -> Option<&Segment> {
         let before = match side {
             Side::Right => self.segments.partition_point(|s| s.t_start <= t),
             Side::Left => self.segments.partition_point(|s| s.t_start < t),
         };
-        let segment = self.segments.get(before.saturating_sub(1));
-        segment.map_or(&[], |segment| &segment.multipliers)
+        self.segments.get(before.saturating_sub(1))
     }
 
     /// The surfaces slid on at `t` and their multipliers; none in a region.
@@ -215,7 +214,8 @@ impl Solution {
             return Ok(Vec::new());
         };
         let set: Vec<usize> = mode.sliding_set().collect();
-        let near = self.multipliers_near(t, side);
+        let segment = self.segment_at(t, side);
+        let near = segment.map_or(&[][..], |segment| &segment.multipliers);
         if near.iter().any(|lambda| lambda.is_nan()) {
             // Contact: the forces depend on the actions of the run.
             return Ok(set.into_iter().zip(near.iter().copied()).collect());
@@ -230,15 +230,20 @@ impl Solution {
                     (0.0, &[known, ..]) => known,
                     _ => as_multiplier(components.multiplier()),
                 };
-                // Near a two-fold it is a quotient of rounding errors.
+                // Near a two-fold it is a quotient of rounding errors, which are those of the largest states on the way.
                 let share = (components.minus - components.plus).abs();
                 let beyond = 0.5 * (lambda.abs() - 1.0) * share;
                 if beyond > 0.0 {
-                    let (mut gradient, mut size) = (y.clone(), 0.0);
+                    let (mut gradient, mut size, mut largest) = (y.clone(), 0.0, y.clone());
+                    if let Some(segment) = segment {
+                        self.evaluate(system, segment.t_start, Side::Right, &mut largest)?;
+                    }
+                    let pairs = largest.iter_mut().zip(&y);
+                    pairs.for_each(|(largest, y)| *largest = largest.abs().max(y.abs()));
                     for side in [-1, 1] {
                         let signs = mode.with(j, side).signs();
                         let rate = system.rate_gradient(j, t, &y, &signs, &mut gradient)?;
-                        size += dot_magnitude(&gradient, &y) + (rate.time * t).abs();
+                        size += dot_magnitude(&gradient, &largest) + (rate.time * t).abs();
                     }
                     if beyond < TANGENT * size {
                         return Ok(vec![(j, lambda.clamp(-1.0, 1.0))]);
