@@ -1,8 +1,8 @@
 //! Surfaces with one normal at a point: are they in one place, or do they touch?
 
-use super::point::Point;
+use super::point::{Point, Values};
 use crate::error::FieldError;
-use crate::field::{beside_on, in_the_place_of, normal, parallel};
+use crate::field::{are_parallel, beside_on, in_the_place_of, normal, parallel};
 use crate::mode::Mode;
 use crate::system::dot;
 use crate::tolerances::{ONE_DIRECTION, SURFACE_NOISE};
@@ -25,23 +25,29 @@ pub(super) struct Parallels {
 impl Parallels {
     /// Looks at all pairs.
     pub fn of(at: &Point, meeting: &[usize], mode: &Mode) -> Result<Self, FieldError> {
-        let (place, signs) = ((at.t, at.x), mode.signs());
-        let rows = meeting.iter().map(|&j| normal(at.system, place, j, &signs));
-        let rows: Vec<Vec<f64>> = rows.collect::<Result<_, _>>()?;
-        let has_normal = |i: usize| rows[i].iter().any(|v| *v != 0.0);
+        let (place, signs, n) = ((at.t, at.x), mode.signs(), at.x.len() + 1);
+        let mut normals = vec![0.0; n * meeting.len()];
+        for (&j, row) in meeting.iter().zip(normals.chunks_exact_mut(n)) {
+            row[n - 1] = at
+                .system
+                .gradient(j, at.t, at.x, &signs, &mut row[..n - 1])?;
+        }
+        let row = |i: usize| &normals[i * n..(i + 1) * n];
+        let squares: Values = (0..meeting.len()).map(|i| dot(row(i), row(i))).collect();
+        let has_normal = |i: usize| squares[i] != 0.0;
         let mut found = Parallels::default();
-        for (i, k) in (0..rows.len()).flat_map(|k| (0..k).map(move |i| (i, k))) {
+        for (i, k) in (0..meeting.len()).flat_map(|k| (0..k).map(move |i| (i, k))) {
             let (i, k) = if has_normal(i) { (i, k) } else { (k, i) };
-            let (one, other) = (&rows[i], &rows[k]);
-            if !has_normal(i) || !parallel(one, other) {
+            let (one, other) = (row(i), row(k));
+            if !has_normal(i) || !are_parallel(dot(one, other), squares[i] * squares[k]) {
                 continue;
             }
             let (j, others) = (meeting[i], [meeting[k]]);
             if !in_the_place_of(at.system, place, j, &others, &signs)?.is_empty() {
                 found.coincide = true;
             } else if has_normal(k) {
-                let ratio = dot(one, other) / dot(one, one);
-                let noise = SURFACE_NOISE * dot(other, other).sqrt();
+                let ratio = dot(one, other) / squares[i];
+                let noise = SURFACE_NOISE * squares[k].sqrt();
                 let mut pairs = other.iter().zip(one);
                 found.touching.push(Touch {
                     pair: [i, k],

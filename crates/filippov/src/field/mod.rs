@@ -30,7 +30,7 @@ pub use motion::Motion;
 pub use project::{shares_of_rows, Projector};
 pub use region::{eval_off_surface, eval_on_side, move_inside, side_offsets, RegionField};
 pub use sliding::{NormalComponents, SlidingField};
-pub(crate) use ties::{beside_on, in_the_place_of, normal, parallel, sense_of, Tie};
+pub(crate) use ties::{are_parallel, beside_on, in_the_place_of, normal, parallel, sense_of, Tie};
 pub(crate) use weights::product_weights;
 
 use crate::error::FieldError;

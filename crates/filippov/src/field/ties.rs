@@ -122,6 +122,10 @@ pub fn normal(
 
 /// Are two normals the same, up to their lengths, or is one zero?
 pub fn parallel(one: &[f64], other: &[f64]) -> bool {
-    let (product, squares) = (dot(one, other), dot(one, one) * dot(other, other));
+    are_parallel(dot(one, other), dot(one, one) * dot(other, other))
+}
+
+/// The same, from the product of the normals and that of their squares.
+pub fn are_parallel(product: f64, squares: f64) -> bool {
     squares - product * product <= TANGENT * squares
 }
