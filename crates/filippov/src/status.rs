@@ -239,7 +239,7 @@ impl Stop {
                     Some(_) =>
                         "To keep to the points where both fields are tangent is a solution; whether others wind around \
                          them and away is not decided.",
-                    None => "The derivatives of the fields do not tell what follows.",
+                    None => "The derivatives of the fields do not decide which motion follows.",
                 }
             ),
             Stop::NonUnique {

@@ -68,7 +68,7 @@ fn after_event(
     let surfaces = match (fresh, at.arrival.sliding, at.arrival.resting) {
         (fresh, [], _) => fresh,
         ([], sliding, []) => sliding,
-        // What the motion rests on while it slides is in the place of what it slides on.
+        // A surface on which a sliding motion rests lies in one place with a surface that it slides on.
         (fresh, sliding, resting) => {
             both.extend_from_slice(fresh);
             both.extend_from_slice(sliding);

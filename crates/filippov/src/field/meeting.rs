@@ -71,7 +71,7 @@ impl MeetingFields {
         }
     }
 
-    /// The surfaces that are in the place of others.
+    /// The pairs of surfaces that lie in one place.
     pub fn ties(&self) -> &[Tie] {
         self.ties.as_deref().unwrap_or_default()
     }

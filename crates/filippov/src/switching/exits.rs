@@ -1,4 +1,4 @@
-//! Exits of sliding on one and two surfaces in closed form: what follows where the multipliers reach a side, or meet the
+//! The motion that follows an exit of sliding on one and two surfaces, in closed form: the multipliers reach a side, or meet the
 //! other root. It is the same for every scaling of the surfaces for which the root was stable.
 
 use super::incoming::ExitKind;

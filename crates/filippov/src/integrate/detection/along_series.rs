@@ -1,4 +1,4 @@
-//! Guards along a step as series: which have one, and what it tells of their zeros.
+//! Some guards have a power series along a step; it bounds them and locates their zeros.
 
 use crate::error::FieldError;
 use crate::event::filter::may_vanish_between;

@@ -94,7 +94,8 @@ impl Integrator<'_> {
         Ok(None)
     }
 
-    /// May a guard vanish within a step whose extension costs evaluations? What bounds tell of it; `None` if it does not vanish.
+    /// Asks whether a guard may vanish within a step whose extension costs evaluations. Returns the answer of the bounds, or
+    /// `None` if the guard does not vanish.
     pub(super) fn filter(
         &mut self,
         index: usize,

@@ -175,8 +175,8 @@ impl Integrator<'_> {
         !matches!(zero, Search::Unsure)
     }
 
-    /// The first zero of a guard, and how far it was searched: to the same point, or to one behind a zero. `proof` is what
-    /// bounds tell of it, if they were asked.
+    /// The first zero of a guard, and how far it was searched: to the same point, or to one behind a zero. `proof` is the
+    /// answer of the bounds, if they were asked.
     fn search_step(
         &mut self,
         index: usize,
