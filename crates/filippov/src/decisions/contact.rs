@@ -125,10 +125,7 @@ fn begin(
             is_clear = false;
             continue;
         }
-        let noise = match &field {
-            ModeField::Contact(field) => field.noise_of_exit(i) * rounding / NO_FORCE,
-            _ => 0.0,
-        };
+        let noise = field.noise_of_exit(i) * rounding / NO_FORCE;
         if exit.is_nan() || *exit < -noise {
             return Ok(Trial::Ends);
         }

@@ -71,10 +71,7 @@ fn leaves_within(
         let exits = field.exits(t, &mut x)?;
         notes.n_field_evaluations += field.n_evaluations();
         for (i, exit) in exits.iter().enumerate() {
-            let noise = match &field {
-                ModeField::Contact(field) => field.noise_of_exit(i),
-                _ => 0.0,
-            };
+            let noise = field.noise_of_exit(i);
             if exit.is_nan() || *exit <= -noise {
                 return Ok(Trial::Ends);
             }

@@ -24,7 +24,8 @@ pub(crate) enum Rule {
     Relay,
     /// The signs of too many surfaces multiply one another.
     TooMany,
-    /// First-order data at an intersection: trees, hidden dynamics, spirals; germs where those do not decide.
+    /// First-order data at an intersection: the attracting continuation, among several the limit of the hidden dynamics, and
+    /// spirals. Germs decide where those do not.
     FirstOrder,
     /// Bodies in contact: the forces that push.
     Contact,

@@ -57,6 +57,14 @@ impl<'a> ModeField<'a> {
         ModeField::new(system, law, &sliding, &mode.signs())
     }
 
+    /// How far from zero a guard with this index may be by rounding, at the last evaluation, where that is known.
+    pub(crate) fn noise_of_exit(&self, index: usize) -> f64 {
+        match self {
+            ModeField::Contact(field) => field.noise_of_exit(index),
+            _ => 0.0,
+        }
+    }
+
     pub(crate) fn new(
         system: &'a dyn PiecewiseSystem,
         law: Law<'a>,
