@@ -12,7 +12,7 @@ use crate::switching::{
     first_nonzero, is_undetermined, stable_roots_with_border, Leading, NormalFields, TwoFold,
 };
 use crate::system::dot;
-use crate::tolerances::{AT_SIDE, DOUBTFUL, TANGENT};
+use crate::tolerances::{AT_SIDE, DOUBTFUL};
 
 /// A mode in which a motion can go on.
 #[derive(Clone, Debug)]
@@ -368,33 +368,4 @@ pub(super) fn silent_rows((fields, noise): (&NormalFields, &[f64]), entries: &[i
         }
     }
     is_silent
-}
-
-/// What a normal component may be without being clear of zero, for each surface: the error of the fields at a located event,
-/// and what the rounding of time and state makes of zero.
-pub(super) fn noise_of(
-    at: &Point,
-    surfaces: &[usize],
-    mode: &Mode,
-    fields: &NormalFields,
-) -> Result<Vec<f64>, FieldError> {
-    let mut gradient = vec![0.0; at.x.len()];
-    let mut noise = Vec::with_capacity(surfaces.len());
-    for (i, &j) in surfaces.iter().enumerate() {
-        let mut largest = DOUBTFUL * fields.row_size(i);
-        for side in [-1, 1] {
-            let signs = mode.with(j, side).signs();
-            let partials = at
-                .system
-                .rate_gradient(j, at.t, at.x, &signs, &mut gradient)?;
-            let parts = gradient.iter().zip(at.x).enumerate();
-            let size: f64 = parts
-                .map(|(i, (g, x))| g.abs() * at.scale.size(i, *x))
-                .filter(|part| part.is_finite())
-                .sum();
-            largest = largest.max(TANGENT * (size + (partials.time * at.t).abs()));
-        }
-        noise.push(largest);
-    }
-    Ok(noise)
 }

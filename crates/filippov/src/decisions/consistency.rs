@@ -171,10 +171,7 @@ pub(super) fn with_those_that_jump(
     while known < surfaces.len() && surfaces.len() <= MOST_MEETING {
         known = surfaces.len();
         let extended = surfaces.clone();
-        let wider = Meeting {
-            surfaces: &extended,
-            ..*meeting
-        };
+        let wider = meeting.with_surfaces(&extended);
         for pattern in 0..1_usize << known {
             let region = meeting.mode.on_sides(&extended, pattern);
             let jumps = functions.let_others_jump(at, notes, &wider, region)?;

@@ -30,12 +30,7 @@ pub(crate) fn decide(
         Cause::Start => place(at, notes, None)?,
         Cause::Anew(memory) => place(at, notes, Some(memory))?,
         Cause::Limit(meeting) => {
-            let meeting = Meeting {
-                mode: at.arrival.mode,
-                surfaces: meeting,
-                fresh: meeting,
-                how: How::Limit,
-            };
+            let meeting = Meeting::new(at.arrival.mode, meeting, meeting, How::Limit);
             settle(at, notes, &meeting)?
         }
         Cause::Event { .. } => {
@@ -79,12 +74,7 @@ fn after_event(
         }
     };
     let how = How::Event(arrival_at_surface(at.arrival, fresh));
-    let meeting = Meeting {
-        mode,
-        surfaces,
-        fresh,
-        how,
-    };
+    let meeting = Meeting::new(mode, surfaces, fresh, how);
     if !(is_touch || at.system.has_nested_signs()) {
         // No rule before that of one surface applies: the list need not be asked.
         if let Some(decided) = one_surface(at, notes, &meeting)? {

@@ -1,6 +1,6 @@
 //! Decide by the germs of the guards if first-order data are doubtful.
 
-use super::candidate::{noise_of, Viable};
+use super::candidate::Viable;
 use super::choice::choose;
 use super::coinciding::Parallels;
 use super::consistency::{bends, with_those_that_jump};
@@ -13,7 +13,7 @@ use crate::error::FieldError;
 use crate::field::SmoothField;
 use crate::mode::Mode;
 use crate::status::Stop;
-use crate::switching::{NormalFields, Undecided};
+use crate::switching::Undecided;
 use crate::tolerances::{AT_SIDE, MOST_MEETING, TANGENT};
 
 /// Rule: switching functions jump between the regions around the point, surfaces are in one place or touch one another.
@@ -35,38 +35,7 @@ pub(super) fn decide_if_entangled(
         return Ok(None);
     }
     let surfaces = wider.unwrap_or_else(|| meeting.surfaces.to_vec());
-    let meeting = &Meeting {
-        surfaces: &surfaces,
-        ..*meeting
-    };
-    decide_undecided(at, notes, meeting, None).map(Some)
-}
-
-/// Are all fields around the point tangent to one of several surfaces?
-pub(super) fn is_silent(
-    at: &Point,
-    notes: &mut Notes,
-    surfaces: &[usize],
-    mode: &Mode,
-) -> Result<bool, FieldError> {
-    if surfaces.len() < 2 {
-        return Ok(false);
-    }
-    let corners = at.corners(notes, surfaces, mode)?;
-    let Ok(fields) = corners.normal_fields() else {
-        return Ok(false);
-    };
-    let noise = noise_of(at, surfaces, mode, &fields)?;
-    Ok(has_silent(at, surfaces, &fields, &noise))
-}
-
-/// The same, of normal components with this noise.
-fn has_silent(at: &Point, surfaces: &[usize], fields: &NormalFields, noise: &[f64]) -> bool {
-    let is_silent = |(i, noise): (usize, &f64)| {
-        let sticks = at.system.sticks_at(surfaces[i]);
-        !sticks && fields.row_range(i).iter().all(|v| v.abs() <= *noise)
-    };
-    noise.iter().enumerate().any(is_silent)
+    decide_undecided(at, notes, &meeting.with_surfaces(&surfaces), None).map(Some)
 }
 
 /// Rule: first-order data are doubtful, and the viable modes are known.
@@ -79,15 +48,13 @@ pub(super) fn decide_if_doubtful(
     if !is_few || slides_by_rule(at.arrival) {
         return Ok(None);
     }
-    let corners = at.corners(notes, meeting.surfaces, meeting.mode)?;
-    let Ok(fields) = corners.normal_fields() else {
+    let Ok(around) = meeting.surroundings(at, notes)? else {
         return Ok(None);
     };
-    let noise = noise_of(at, meeting.surfaces, meeting.mode, &fields)?;
-    if !is_doubtful(&fields, &noise) {
+    if !around.is_doubtful() {
         return Ok(None);
     }
-    if has_silent(at, meeting.surfaces, &fields, &noise) {
+    if around.has_silent(at) {
         return decide_undecided(at, notes, meeting, None).map(Some);
     }
     if meeting.surfaces.iter().any(|&j| at.system.sticks_at(j)) {
@@ -165,7 +132,8 @@ fn preferred(
     if let [only] = viable {
         return Ok(only.next.mode.clone());
     }
-    if !is_silent(at, notes, meeting.surfaces, meeting.mode)? {
+    let around = meeting.surroundings(at, notes)?;
+    if around.is_ok_and(|around| !around.has_silent(at)) {
         let limit = hidden_limit(at, notes, meeting)?;
         if let Some(limit) = limit.filter(is_viable) {
             return Ok(limit);
@@ -243,8 +211,8 @@ fn drop_other_names(
     for Viable { next, .. } in viable.iter() {
         velocities.push(at.velocity(notes, &next.mode, next.multipliers())?);
     }
-    let corners = at.corners(notes, meeting.surfaces, meeting.mode)?;
-    let size = corners.size();
+    let around = meeting.surroundings(at, notes)?;
+    let size = around.map_or(0.0, |around| around.corners.size());
     let stays_on = |one: &Viable, j: usize| {
         let mut left = one.next.left.iter();
         one.next.mode.entries()[j] == 0
@@ -271,31 +239,4 @@ fn drop_other_names(
         kept.contains(&(index - 1))
     });
     Ok(())
-}
-
-/// Is a normal component at some surface not clear of zero, in a region or along a motion that slides on one surface?
-fn is_doubtful(fields: &NormalFields, noise: &[f64]) -> bool {
-    if fields.any_component(|i, component| component.abs() <= noise[i]) {
-        return true;
-    }
-    let m = fields.m();
-    for (slid, pattern) in (0..m).flat_map(|i| (0..1_usize << m).map(move |pattern| (i, pattern))) {
-        if pattern >> slid & 1 == 1 {
-            continue;
-        }
-        let side = |i: usize| if pattern >> i & 1 == 1 { 1.0 } else { -1.0 };
-        let mut place: Vec<f64> = (0..m).map(side).collect();
-        let minus = fields.interpolate(&place)[slid];
-        place[slid] = 1.0;
-        let plus = fields.interpolate(&place)[slid];
-        if minus > 0.0 && plus < 0.0 {
-            place[slid] = (minus + plus) / (minus - plus);
-            let components = fields.interpolate(&place);
-            let is_tangent = |i: usize| i != slid && components[i].abs() <= noise[i];
-            if (0..m).any(is_tangent) {
-                return true;
-            }
-        }
-    }
-    false
 }

@@ -6,8 +6,9 @@ use super::germs::{decide_by_germs, decide_undecided};
 use super::point::{Decided, Lefts, Next, Notes, Point};
 use super::rule::{How, Meeting};
 use super::spiral::outward_leap;
+use super::surroundings::Surroundings;
 use crate::error::FieldError;
-use crate::field::{Guard, MeetingFields, ModeField, RootEnd};
+use crate::field::{Guard, ModeField, RootEnd};
 use crate::mode::Mode;
 use crate::status::Stop;
 use crate::switching::{
@@ -22,28 +23,12 @@ pub(super) fn resolve_first_order(
     notes: &mut Notes,
     meeting: &Meeting,
 ) -> Result<Decided, FieldError> {
-    let corners = at.corners(notes, meeting.surfaces, meeting.mode)?;
-    let kappa = at.policy.law.scaling(meeting.surfaces);
-    let resolution = match (corners.normal_fields(), meeting.how) {
-        (Err(undecided), _) => Err(undecided),
-        (Ok(fields), How::Start(_) | How::Limit) => {
-            resolve_within(&fields, &Incoming::Start, &kappa, at.patience)
-        }
-        (Ok(fields), How::Event(_)) => {
-            let incoming = incoming(at, notes, meeting, (&corners, &fields))?;
-            match resolve_within(&fields, &incoming, &kappa, at.patience) {
-                // The last of many turns is within rounding of all surfaces: its region leads past one of
-                // them, and has no meaning any more.
-                Err(Undecided::NotArriving { .. })
-                    if matches!(incoming, Incoming::Corner { .. }) =>
-                {
-                    resolve_within(&fields, &Incoming::Start, &kappa, at.patience)
-                }
-                decided => decided,
-            }
-        }
+    let around = match meeting.surroundings(at, notes)? {
+        Ok(around) => around,
+        Err(undecided) => return decide_undecided(at, notes, meeting, Some(undecided)),
     };
-    follow(at, notes, meeting, &corners, resolution)
+    let resolution = resolution(at, notes, meeting, around)?;
+    follow(at, notes, meeting, around, resolution)
 }
 
 /// The mode to which the hidden dynamics at the point tends, if first-order data determine it.
@@ -52,19 +37,32 @@ pub(super) fn hidden_limit(
     notes: &mut Notes,
     meeting: &Meeting,
 ) -> Result<Option<Mode>, FieldError> {
-    let corners = at.corners(notes, meeting.surfaces, meeting.mode)?;
-    let Ok(fields) = corners.normal_fields() else {
+    let Ok(around) = meeting.surroundings(at, notes)? else {
         return Ok(None);
     };
+    let resolution = resolution(at, notes, meeting, around)?.ok();
+    let mode = resolution.as_ref().and_then(Resolution::mode);
+    Ok(mode.map(|mode| meeting.on_all(mode)))
+}
+
+fn resolution(
+    at: &Point,
+    notes: &mut Notes,
+    meeting: &Meeting,
+    around: &Surroundings,
+) -> Result<Result<Resolution, Undecided>, FieldError> {
     let kappa = at.policy.law.scaling(meeting.surfaces);
-    let incoming = match meeting.how {
-        How::Event(_) => incoming(at, notes, meeting, (&corners, &fields))?,
-        How::Start(_) | How::Limit => Incoming::Start,
-    };
-    let resolution = resolve_within(&fields, &incoming, &kappa, at.patience);
-    Ok(match resolution {
-        Ok(resolution) => resolution.mode().map(|mode| meeting.on_all(mode)),
-        Err(_) => None,
+    let resolve = |incoming| resolve_within(&around.fields, &incoming, &kappa, at.patience);
+    if !matches!(meeting.how, How::Event(_)) {
+        return Ok(resolve(Incoming::Start));
+    }
+    let incoming = incoming(at, notes, meeting, around)?;
+    let is_corner = matches!(incoming, Incoming::Corner { .. });
+    Ok(match resolve(incoming) {
+        // The last of many turns is within rounding of all surfaces: its region leads past one of them, and has no meaning any
+        // more.
+        Err(Undecided::NotArriving { .. }) if is_corner => resolve(Incoming::Start),
+        decided => decided,
     })
 }
 
@@ -92,7 +90,7 @@ fn incoming(
     at: &Point,
     notes: &mut Notes,
     meeting: &Meeting,
-    (corners, fields): (&MeetingFields, &NormalFields),
+    around: &Surroundings,
 ) -> Result<Incoming, FieldError> {
     let entries = meeting.surfaces.iter().map(|&j| meeting.mode.entries()[j]);
     let entries: Vec<i8> = entries.collect();
@@ -129,10 +127,10 @@ fn incoming(
         lambda[position.unwrap_or(0)] = f64::from(end);
     }
     if kind == ExitKind::Fold && meeting.surfaces.len() > 2 {
-        let merged = merged_root(fields, &lambda);
+        let merged = merged_root(&around.fields, &lambda);
         lambda = merged.map_or(lambda, |merged| merged.lambda);
     }
-    let drift = drift(at, notes, meeting, (corners, fields), &lambda)?;
+    let drift = drift(at, notes, meeting, around, &lambda)?;
     Ok(Incoming::Exit {
         kind,
         lambda,
@@ -145,21 +143,17 @@ fn drift(
     at: &Point,
     notes: &mut Notes,
     meeting: &Meeting,
-    (corners, fields): (&MeetingFields, &NormalFields),
+    around: &Surroundings,
     lambda: &[f64],
 ) -> Result<Vec<f64>, FieldError> {
     let (mut velocity, mut weights) = (vec![0.0; at.x.len()], Vec::new());
-    corners.fill_product_weights(lambda, &mut weights);
-    corners.combine(&weights, &mut velocity);
+    around.corners.fill_product_weights(lambda, &mut weights);
+    around.corners.combine(&weights, &mut velocity);
     let dt = at.moment(notes, &meeting.mode.signs(), &velocity)?;
-    let ahead: Vec<f64> =
-        at.x.iter()
-            .zip(&velocity)
-            .map(|(x, v)| x + dt * v)
-            .collect();
+    let ahead = at.along(&velocity, dt);
     let later = at.moved(at.t + dt, &ahead);
     let corners = later.corners(notes, meeting.surfaces, meeting.mode)?;
-    let (now, then) = (fields.interpolate(lambda), corners.normal_fields());
+    let (now, then) = (around.fields.interpolate(lambda), corners.normal_fields());
     Ok(match then {
         Ok(then) => {
             let pairs = then.interpolate(lambda).into_iter().zip(now);
@@ -175,7 +169,7 @@ fn follow(
     at: &Point,
     notes: &mut Notes,
     place: &Meeting,
-    fields: &MeetingFields,
+    around: &Surroundings,
     resolution: Result<Resolution, Undecided>,
 ) -> Result<Decided, FieldError> {
     let (mode, meeting) = (place.mode, place.surfaces);
@@ -186,7 +180,7 @@ fn follow(
         Ok(resolution) if !resolution.degenerate => resolution,
         other => return decide_undecided(at, notes, place, other.err()),
     };
-    if !has_root(fields, &resolution, at) {
+    if !has_root(&around.fields, &resolution, at) {
         if let Ok(decided) = decide_by_germs(at, notes, place)? {
             return Ok(decided);
         }
@@ -205,7 +199,7 @@ fn follow(
         Continuation::Mode(chosen) => (on_all(chosen), None),
         Continuation::OutwardSpiral => match asked {
             Some(asked) => (asked.clone(), None),
-            None => match outward_leap(at, meeting, mode, fields) {
+            None => match outward_leap(at, meeting, mode, around) {
                 Some(leap) => (leap.region.clone(), Some(leap)),
                 None => return decide_undecided(at, notes, place, None),
             },
@@ -247,14 +241,9 @@ fn follow(
 }
 
 /// Is there a root of its own with which the motion slides on two surfaces? The hidden dynamics may end on a line of them.
-fn has_root(fields: &MeetingFields, resolution: &Resolution, at: &Point) -> bool {
-    let Some(mode) = resolution.mode().filter(|mode| mode.codimension() == 2) else {
-        return true;
-    };
-    let roots = |fields: NormalFields| {
-        stable_roots_with_border(&fields.restrict(mode.entries()), at.patience)
-    };
-    fields
-        .normal_fields()
-        .is_ok_and(|fields| !roots(fields).is_empty())
+fn has_root(fields: &NormalFields, resolution: &Resolution, at: &Point) -> bool {
+    let slides_on_two = resolution.mode().filter(|mode| mode.codimension() == 2);
+    slides_on_two.is_none_or(|mode| {
+        !stable_roots_with_border(&fields.restrict(mode.entries()), at.patience).is_empty()
+    })
 }

@@ -29,6 +29,7 @@ mod rule;
 mod settle;
 mod sides;
 mod spiral;
+mod surroundings;
 mod triggers;
 mod two_fold;
 mod viable;

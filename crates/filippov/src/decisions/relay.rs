@@ -3,9 +3,10 @@
 use super::choice::choose;
 use super::coinciding::have_parallels;
 use super::departures::departures;
-use super::germs::{decide_undecided, is_silent};
+use super::germs::decide_undecided;
 use super::point::{Decided, Left, Lefts, Next, Notes, Point};
 use super::rule::{How, Meeting};
+use super::surroundings::Surroundings;
 use crate::error::FieldError;
 use crate::field::{Guard, SmoothField};
 use crate::mode::Mode;
@@ -48,7 +49,8 @@ pub(super) fn decide_by_relay(
     let Some(mut found) = found else {
         return Ok(None);
     };
-    if found.may_be_tangent && is_silent(at, notes, meeting, mode)? {
+    let is_silent = |around: &Surroundings| around.has_silent(at);
+    if found.may_be_tangent && question.surroundings(at, notes)?.is_ok_and(is_silent) {
         return decide_undecided(at, notes, question, None).map(Some);
     }
     if found.n_sharing > MOST_IN_LOOP {

@@ -1,7 +1,7 @@
 //! Sliding whose multipliers are lost, or go on beyond their ends by rounding.
 
-use super::germs::is_silent;
 use super::point::{Notes, Point};
+use super::surroundings::Surroundings;
 use super::two_fold::{beyond_double_zero, two_fold_here};
 use smallvec::{smallvec, SmallVec};
 
@@ -16,7 +16,8 @@ pub(crate) fn lost_functions(
     notes: &mut Notes,
 ) -> Result<Option<SmallVec<[Guard; 2]>>, FieldError> {
     if at.arrival.slides_on_several() {
-        if is_silent(at, notes, at.arrival.sliding, at.arrival.mode)? {
+        let around = Surroundings::of(at, notes, at.arrival.sliding, at.arrival.mode)?;
+        if around.is_ok_and(|around| around.has_silent(at)) {
             return Ok(Some(smallvec![Guard::Root(RootEnd::Stability)]));
         }
         return Ok(has_lost_root(at)?.then(|| smallvec![Guard::Root(RootEnd::Fold)]));

@@ -1,7 +1,12 @@
 //! Rules where surfaces vanish: how they are named, and what they are asked.
 
+use std::cell::OnceCell;
+
+use super::point::{Notes, Point};
+use super::surroundings::Surroundings;
+use crate::error::FieldError;
 use crate::mode::Mode;
-use crate::switching::Arrival as SurfaceArrival;
+use crate::switching::{Arrival as SurfaceArrival, Undecided};
 
 /// The rule that made a decision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,7 +59,6 @@ impl Rule {
 }
 
 /// What a rule is asked about: surfaces that vanish together.
-#[derive(Clone, Copy)]
 pub(crate) struct Meeting<'m> {
     /// The mode before, or at a start the sides of the point.
     pub mode: &'m Mode,
@@ -63,6 +67,8 @@ pub(crate) struct Meeting<'m> {
     /// Those among them that were reached now.
     pub fresh: &'m [usize],
     pub how: How,
+    /// The fields around them, once they were asked for.
+    surroundings: OnceCell<Result<Surroundings, Undecided>>,
 }
 
 /// How the motion comes to the surfaces of a meeting.
@@ -76,7 +82,38 @@ pub(crate) enum How {
     Limit,
 }
 
-impl Meeting<'_> {
+impl<'m> Meeting<'m> {
+    pub fn new(mode: &'m Mode, surfaces: &'m [usize], fresh: &'m [usize], how: How) -> Self {
+        Meeting {
+            mode,
+            surfaces,
+            fresh,
+            how,
+            surroundings: OnceCell::new(),
+        }
+    }
+
+    /// The same meeting with further surfaces.
+    pub fn with_surfaces<'w>(&'w self, surfaces: &'w [usize]) -> Meeting<'w> {
+        Meeting::new(self.mode, surfaces, self.fresh, self.how)
+    }
+
+    /// The fields around the surfaces, or why there are none.
+    pub fn surroundings(
+        &self,
+        at: &Point,
+        notes: &mut Notes,
+    ) -> Result<Result<&Surroundings, Undecided>, FieldError> {
+        let known = match self.surroundings.get() {
+            Some(known) => known,
+            None => {
+                let found = Surroundings::of(at, notes, self.surfaces, self.mode)?;
+                self.surroundings.get_or_init(|| found)
+            }
+        };
+        Ok(known.as_ref().map_err(Undecided::clone))
+    }
+
     /// The full mode with these entries on the surfaces.
     pub fn on_all(&self, entries: &Mode) -> Mode {
         let mut full = self.mode.clone();

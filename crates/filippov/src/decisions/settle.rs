@@ -73,12 +73,8 @@ pub(super) fn place_on(
         (&[j], Some(memory)) => memory.entries()[j],
         _ => 0,
     };
-    let meeting = Meeting {
-        mode,
-        surfaces,
-        fresh: surfaces,
-        how: How::Start(SurfaceArrival::from_side(entry)),
-    };
+    let how = How::Start(SurfaceArrival::from_side(entry));
+    let meeting = Meeting::new(mode, surfaces, surfaces, how);
     settle(at, notes, &meeting)
 }
 

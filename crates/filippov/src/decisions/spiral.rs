@@ -2,8 +2,9 @@
 
 use super::departures::departures;
 use super::point::{Leap, Lefts, Notes, Point};
+use super::surroundings::Surroundings;
 use crate::error::FieldError;
-use crate::field::{MeetingFields, Projector};
+use crate::field::Projector;
 use crate::mode::Mode;
 use crate::switching::Lap;
 use crate::tolerances::SPIRAL_START;
@@ -22,9 +23,9 @@ pub(super) fn outward_leap(
     at: &Point,
     meeting: &[usize],
     mode: &Mode,
-    fields: &MeetingFields,
+    around: &Surroundings,
 ) -> Option<Leap> {
-    let lap = Lap::around(&fields.normal_fields().ok()?, [-1, -1])?;
+    let lap = Lap::around(&around.fields, [-1, -1])?;
     if lap.gamma <= 1.0 {
         return None;
     }
@@ -37,7 +38,7 @@ pub(super) fn outward_leap(
     let mut region = mode.clone();
     let entries = meeting.iter().zip(first);
     entries.for_each(|(&j, entry)| region.set(j, entry));
-    let shift = lap.displacement(lap.regions.map(|k| fields.field(pattern(k))));
+    let shift = lap.displacement(lap.regions.map(|k| around.corners.field(pattern(k))));
     Some(Leap {
         region,
         border: meeting[usize::from(first[0] == last[0])],

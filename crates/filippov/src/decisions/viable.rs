@@ -1,11 +1,12 @@
 //! Which modes can follow at a point: those that are consistent with their own signs, and all of whose guards begin positive.
 
-use super::candidate::{noise_of, Candidate, Verdict, Viable};
+use super::candidate::{Candidate, Verdict, Viable};
 use super::coinciding::{parting, Parallels, Touch};
 use super::consistency::{consistency, Consistency};
 use super::look_ahead::{try_mode, Trial};
 use super::point::{Cause, Next, Notes, Point};
 use super::rule::Meeting;
+use super::surroundings::Surroundings;
 
 use crate::error::FieldError;
 use crate::field::Guard;
@@ -45,12 +46,15 @@ pub(super) fn survey(
     if m > MOST_MEETING {
         return Ok(None);
     }
-    let corners = at.corners(notes, meeting.surfaces, meeting.mode)?;
-    let Ok(fields) = corners.normal_fields() else {
+    let Ok(Surroundings {
+        corners,
+        fields,
+        noise,
+    }) = meeting.surroundings(at, notes)?
+    else {
         return Ok(None);
     };
     let pace = corners.pace(|i| at.scale.size(i, at.x[i]));
-    let noise = noise_of(at, meeting.surfaces, meeting.mode, &fields)?;
     let touching = Parallels::of(at, meeting.surfaces, meeting.mode)?.touching;
     // Then derivatives at the point are not those where the surfaces touch.
     let is_beside = touching.iter().any(|touch| !touch.is_exact);
@@ -90,17 +94,17 @@ pub(super) fn survey(
                 }
                 Err(_) => return Ok(None),
             },
-            false => &fields,
+            false => fields,
         };
         let candidate = Candidate {
             meeting,
             fields,
-            noise: &noise,
+            noise,
             pace,
             entries: &entries,
             mode: &mode,
             guarded: &vanishing,
-            corners: &corners,
+            corners,
         };
         let slides_on = |touch: &&Touch| touch.pair.iter().all(|&i| entries.entries()[i] == 0);
         let verdict = if has_ended(at, meeting, &mode) {

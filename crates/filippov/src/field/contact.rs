@@ -9,7 +9,7 @@ use crate::error::FieldError;
 use crate::mode::{Mode, Signs};
 use crate::switching::{is_scaling_stable, Matrix};
 use crate::system::{dot, PiecewiseSystem};
-use crate::tolerances::{NO_FORCE, NO_IMPULSE, SURFACE_NOISE, VANISHING_MULTIPLIER};
+use crate::tolerances::{DOUBTFUL, NO_FORCE, NO_IMPULSE, SURFACE_NOISE};
 
 /// The field of contact,
 ///
@@ -89,7 +89,7 @@ impl<'a> ContactField<'a> {
     pub fn noise_of_exit(&self, index: usize) -> f64 {
         match index.checked_sub(self.contacts.len()) {
             None => self.noise[index],
-            Some(end) => VANISHING_MULTIPLIER * self.ratios[end / 2],
+            Some(end) => DOUBTFUL * self.ratios[end / 2],
         }
     }
 

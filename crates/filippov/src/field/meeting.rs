@@ -5,7 +5,7 @@ use super::{eval_on_side, parallel, sense_of, Tie};
 use crate::error::FieldError;
 use crate::switching::{Matrix, NormalFields, SignGroup, Undecided};
 use crate::system::{dot, PiecewiseSystem};
-use crate::tolerances::{MOST_MEETING, TANGENT, TANGENT_TO_ALL};
+use crate::tolerances::{AT_SIDE, MOST_MEETING, TANGENT};
 
 /// The fields around an intersection of m surfaces, and the gradients of the switching functions.
 ///
@@ -322,7 +322,7 @@ impl MeetingFields {
         let is_telling = |&i: &usize| {
             let gradient = &self.gradients[i * self.n..(i + 1) * self.n];
             let size = square(gradient).sqrt() * fastest;
-            over_groups(&|row| self.components[row * m + i].abs()) > TANGENT_TO_ALL * size
+            over_groups(&|row| self.components[row * m + i].abs()) > AT_SIDE * size
         };
         (0..m).filter(is_telling).collect()
     }
@@ -348,7 +348,7 @@ impl MeetingFields {
         self.has_all_patterns()
             && (0..m).any(|i| {
                 let largest = components(i).fold(0.0_f64, |most, v| most.max(v.abs()));
-                let clear = |sign: f64| components(i).any(|v| sign * v > TANGENT_TO_ALL * largest);
+                let clear = |sign: f64| components(i).any(|v| sign * v > AT_SIDE * largest);
                 !(clear(1.0) && clear(-1.0))
             })
     }

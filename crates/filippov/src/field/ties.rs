@@ -3,7 +3,7 @@
 use super::Projector;
 use crate::error::FieldError;
 use crate::system::{dot, PiecewiseSystem};
-use crate::tolerances::{BESIDE, COINCIDE, TANGENT};
+use crate::tolerances::{BESIDE, TANGENT};
 
 /// Two surfaces in one place: of the four regions around them two exist.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,7 +77,7 @@ pub fn in_the_place_of(
         let rate = system.gradient(k, later, &beside, signs, &mut gradient)?;
         let size = rate.abs() + gradient.iter().fold(0.0_f64, |sum, g| sum + g.abs());
         // One with a multiple zero has no gradient there.
-        if h[0][k].abs().max(h[1][k].abs()) <= COINCIDE * size {
+        if h[0][k].abs().max(h[1][k].abs()) <= TANGENT * size {
             found.push(k);
         }
     }

@@ -8,7 +8,7 @@ use crate::integrate::integrator::Integrator;
 use crate::mode::Mode;
 use crate::status::{Stop, Warning, WarningCode};
 use crate::switching::first_nonzero;
-use crate::tolerances::{LEFT_RESTING, NEARLY_ZERO};
+use crate::tolerances::{DOUBTFUL, LEFT_RESTING};
 
 impl Integrator<'_> {
     /// Notes the surfaces that the motion in `mode` does not leave, and names those that the field beyond would not leave
@@ -82,7 +82,7 @@ impl Integrator<'_> {
                 continue;
             };
             // Few functions come this far; the sizes in the noise are not computed for the others.
-            if m.deflation.is_some() || m.value.abs().max(end.abs()) > NEARLY_ZERO {
+            if m.deflation.is_some() || m.value.abs().max(end.abs()) > DOUBTFUL {
                 continue;
             }
             let noise = self.noise_of(&m)?;

@@ -8,7 +8,7 @@ use super::two_fold_motion::{TwoFold, TwoFoldMotion};
 use crate::error::FieldError;
 use crate::mode::Signs;
 use crate::system::{dot_magnitude, BothSides, PiecewiseSystem};
-use crate::tolerances::{OF_ROUNDING, TANGENT};
+use crate::tolerances::TANGENT;
 
 /// How the motion came to the surface, and which normal components are known to vanish.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,7 +70,7 @@ impl Decision {
     /// Of which of f- and f+ is the normal component no more than rounding of that of the other one?
     pub fn is_rounding(&self) -> [bool; 2] {
         let is_small = |own: Leading, other: Leading| {
-            own.order == 1 && own.value.abs() <= OF_ROUNDING * other.value.abs()
+            own.order == 1 && own.value.abs() <= TANGENT * other.value.abs()
         };
         [
             is_small(self.minus, self.plus),

@@ -22,12 +22,9 @@ pub const PROPORTIONAL: f64 = 64.0 * EPS;
 /// known to its square root, are then no better after a Newton step.
 pub const DOUBLE_ROOT: f64 = 1e-14;
 
-/// A normal component below this fraction of that on the other side is looked at again on the surface itself: the point of a
-/// located event is on it up to some roundings only.
-pub const OF_ROUNDING: f64 = 1e-12;
-
 /// Events are located to better than this: a multiplier counts as -1 or +1 at an exit within this distance, two multipliers as
-/// one, and a normal component as zero below this fraction of its terms.
+/// one, and a normal component as zero below this fraction of its terms, also at a point that accumulating switches lead to, or that was
+/// projected.
 pub const AT_SIDE: f64 = 1e-6;
 
 /// A sign that decided at an intersection is doubtful if its quantity is smaller than this fraction
@@ -165,10 +162,6 @@ pub const LONGEST_TURN: usize = 32;
 /// of zero.
 pub const NEAREST_ACCUMULATION: f64 = 1e-20;
 
-/// All fields count as tangent to a surface if their normal components are below this fraction of their size: the
-/// error of a point that accumulating switches lead to, or that was projected.
-pub const TANGENT_TO_ALL: f64 = 1e-7;
-
 /// Surfaces slid on whose multipliers are bounded over a step: for more, m 2^m bounds cost more than samples.
 pub const MOST_ENCLOSED: usize = 3;
 
@@ -209,17 +202,8 @@ pub const DEFINITE_PIVOT: f64 = 1e-10;
 /// square root of the time that is left.
 pub const AT_FOLD: f64 = 1e-2;
 
-/// At an exit a multiplier vanishes to this fraction of the largest one: the event is located to better than that.
-pub const VANISHING_MULTIPLIER: f64 = 1e-9;
-
-/// Functions above this are not looked at for being zero all along a step: rounding of states up to thousands is below.
-pub const NEARLY_ZERO: f64 = 1e-10;
-
-/// Distance, in units of 1 plus the size of a component, at which two surfaces are compared ...
+/// Distance, in units of 1 plus the size of a component, at which two surfaces are compared: its square is far above rounding.
 pub const BESIDE: f64 = 1e-3;
-
-/// ... and how far apart they may be there, in units of the gradient: far below the square of that distance.
-pub const COINCIDE: f64 = 1e-11;
 
 /// Surfaces that touch part in one direction if two places beside the point show the same to this, far above [`BESIDE`].
 pub const ONE_DIRECTION: f64 = 1e-2;

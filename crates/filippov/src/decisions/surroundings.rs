@@ -1,0 +1,93 @@
+//! The fields around the place where surfaces vanish, and what of them is clear of zero.
+
+use super::point::{Notes, Point};
+use crate::error::FieldError;
+use crate::field::MeetingFields;
+use crate::mode::Mode;
+use crate::switching::{NormalFields, Undecided};
+use crate::tolerances::{DOUBTFUL, TANGENT};
+
+/// The fields around the surfaces of a meeting.
+pub(super) struct Surroundings {
+    pub corners: MeetingFields,
+    pub fields: NormalFields,
+    /// What a normal component may be without being clear of zero, for each surface: the error of the fields at a located
+    /// event, and what the rounding of time and state makes of zero.
+    pub noise: Vec<f64>,
+}
+
+impl Surroundings {
+    /// Where these surfaces vanish, the others with the signs of `mode`. Why there are none, if a field is not finite, or there
+    /// are too many.
+    pub fn of(
+        at: &Point,
+        notes: &mut Notes,
+        surfaces: &[usize],
+        mode: &Mode,
+    ) -> Result<Result<Self, Undecided>, FieldError> {
+        let corners = at.corners(notes, surfaces, mode)?;
+        let fields = match corners.normal_fields() {
+            Ok(fields) => fields,
+            Err(undecided) => return Ok(Err(undecided)),
+        };
+        let mut gradient = vec![0.0; at.x.len()];
+        let mut noise = Vec::with_capacity(surfaces.len());
+        for (i, &j) in surfaces.iter().enumerate() {
+            let mut largest = DOUBTFUL * fields.row_size(i);
+            for side in [-1, 1] {
+                let signs = mode.with(j, side).signs();
+                let partials = at
+                    .system
+                    .rate_gradient(j, at.t, at.x, &signs, &mut gradient)?;
+                let parts = gradient.iter().zip(at.x).enumerate();
+                let size: f64 = parts
+                    .map(|(i, (g, x))| g.abs() * at.scale.size(i, *x))
+                    .filter(|part| part.is_finite())
+                    .sum();
+                largest = largest.max(TANGENT * (size + (partials.time * at.t).abs()));
+            }
+            noise.push(largest);
+        }
+        Ok(Ok(Surroundings {
+            corners,
+            fields,
+            noise,
+        }))
+    }
+
+    /// Are all fields tangent to one of several surfaces? One at which bodies stick has a field of its own.
+    pub fn has_silent(&self, at: &Point) -> bool {
+        let set = self.corners.set();
+        let is_silent = |(i, noise): (usize, &f64)| {
+            let sticks = at.system.sticks_at(set[i]);
+            !sticks && self.fields.row_range(i).iter().all(|v| v.abs() <= *noise)
+        };
+        set.len() > 1 && self.noise.iter().enumerate().any(is_silent)
+    }
+
+    /// Is a normal component at some surface not clear of zero, in a region or along a motion that slides on one surface?
+    pub fn is_doubtful(&self) -> bool {
+        let Surroundings { fields, noise, .. } = self;
+        if fields.any_component(|i, component| component.abs() <= noise[i]) {
+            return true;
+        }
+        let m = fields.m();
+        let edges = (0..m).flat_map(|i| (0..1_usize << m).map(move |pattern| (i, pattern)));
+        for (slid, pattern) in edges.filter(|(i, pattern)| pattern >> i & 1 == 0) {
+            let side = |i: usize| if pattern >> i & 1 == 1 { 1.0 } else { -1.0 };
+            let mut place: Vec<f64> = (0..m).map(side).collect();
+            let minus = fields.interpolate(&place)[slid];
+            place[slid] = 1.0;
+            let plus = fields.interpolate(&place)[slid];
+            if minus > 0.0 && plus < 0.0 {
+                place[slid] = (minus + plus) / (minus - plus);
+                let components = fields.interpolate(&place);
+                let is_tangent = |i: usize| i != slid && components[i].abs() <= noise[i];
+                if (0..m).any(is_tangent) {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+}
