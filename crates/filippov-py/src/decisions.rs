@@ -1,6 +1,6 @@
 //! Decisions of a run as Python dictionaries, and back.
 
-use filippov::field::{Guard, RootEnd};
+use filippov::motion::{Guard, RootEnd};
 use filippov::{DecisionCause, DecisionOutcome, DecisionPoint, DecisionRecord, Mode};
 use numpy::PyReadonlyArray1;
 use pyo3::exceptions::PyValueError;

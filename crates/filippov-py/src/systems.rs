@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use filippov::field::{SlidingField, SmoothField};
+use filippov::motion::{SlidingField, SmoothField};
 use filippov::{Definition, Error, FieldError, Laws, PiecewiseSystem, Rules};
 use filippov_expr::{Backend, Names};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};

@@ -34,47 +34,46 @@
 pub mod action;
 mod clock;
 pub mod cube;
-mod decision_record;
 mod decisions;
 mod error;
+mod error_scale;
 pub mod event;
-pub mod field;
 mod inspect;
 mod integrate;
 mod mode;
+pub mod motion;
 mod options;
 mod patience;
-mod recorder;
+mod record;
 mod saved;
-pub mod section;
-mod solution;
 pub mod sparse;
+mod stats;
 mod status;
 pub mod stepper;
+mod switch;
 pub mod switching;
 mod system;
 mod tolerances;
 
 pub use clock::{Clock, ManualClock};
-pub use decision_record::{
-    replay_decision, DecisionCause, DecisionOutcome, DecisionPoint, DecisionRecord, StartingZero,
-};
 pub use error::{Error, FieldError};
-pub use event::{UserEvent, UserFunction};
+pub use event::{UserEvent, UserFunction, UserZero};
 pub use inspect::{
     classify, contradicts, hidden_dynamics, intersection_field, not_finite, state_text,
     Classification, HiddenDynamics, HiddenRoot, Inspection, IntersectionValue, NotFinitePlace,
     PointKind,
 };
-pub use integrate::{
-    solve, solve_interruptible, solve_to_section, solve_with_actions, Integrator, Stats,
-};
+pub use integrate::{solve, solve_interruptible, solve_to_section, solve_with_actions, Integrator};
 pub use mode::{Mode, Signs};
 pub use options::{Keep, Method, NonUnique, Options, SlidingRule, Stabilization};
+pub use record::{
+    as_multiplier, replay_decision, section, DecisionCause, DecisionOutcome, DecisionPoint,
+    DecisionRecord, Segment, Side, Solution, StartingZero,
+};
 pub use saved::{RunnableSystem, SavedAction, SavedSystem};
-pub use solution::{as_multiplier, Segment, Side, Solution, Switch, UserZero};
+pub use stats::Stats;
 pub use status::{Stop, Warning, WarningCode};
-pub use switching::Kind;
+pub use switch::{Kind, Switch};
 pub use system::{
     AffineParts, AffineSigns, BothSides, ClosureSystem, Definition, Law, LawAction, LawMap, Laws,
     LieValue, MotionJacobian, PiecewiseSystem, Rules, SingularSliding, TracedMap, TracedSystem,

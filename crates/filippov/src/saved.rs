@@ -8,14 +8,14 @@ use std::sync::Arc;
 use filippov_expr::container::{Container, Section, Tag, Writer};
 use filippov_expr::{Backend, ExprError};
 
-use crate::action::{Action, Actions, Clock, Trigger};
 use crate::error::{Error, FieldError};
 use crate::event::UserEvent;
 use crate::integrate::solve_with_actions;
 use crate::options::Options;
-use crate::solution::Solution;
-use crate::switching::Kind;
+use crate::record::Solution;
+use crate::switch::Kind;
 use crate::system::{check_index, inconsistent, Definition, Laws, TracedMap, TracedSystem};
+use crate::system::{Action, Actions, Clock, Trigger};
 
 const CONTENT: Tag = Tag(*b"SYST");
 const VALUES: Tag = Tag(*b"VALU");

@@ -1,11 +1,12 @@
 //! How a run ends, and what it warns of.
 
 use crate::error::FieldError;
-use crate::field::weights::RuleFailure;
-use crate::field::{Guard, RootEnd};
+use crate::error::Undecided;
 use crate::mode::Mode;
+use crate::motion::weights::RuleFailure;
+use crate::motion::TwoFoldMotion;
+use crate::motion::{Guard, RootEnd};
 use crate::options::SlidingRule;
-use crate::switching::{TwoFoldMotion, Undecided};
 use crate::tolerances::CHATTER_STEPS;
 
 /// Why a run ended. Whatever the reason, the solution up to that time is kept.

@@ -5,7 +5,7 @@
 mod oracles;
 mod random_fields;
 
-use filippov::field::{IntersectionField, MeetingFields, Motion, SmoothField};
+use filippov::motion::{IntersectionField, MeetingFields, Motion, SmoothField};
 use filippov::switching::{
     is_stable, limit_of_hidden_dynamics, resolve, roots_in_cube, stability_margins, HiddenOutcome,
     Incoming, Matrix, NormalFields, SignGroup, Undecided,

@@ -7,24 +7,34 @@
 mod bilinear;
 mod enclosed_root;
 mod fold;
+mod lap;
 mod normal_fields;
 mod p_matrix;
 mod redundant;
+mod relay;
 mod roots;
+mod shared_load;
 mod small_matrix;
 mod stability;
 
 pub use bilinear::{Bilinear, Root};
 pub use enclosed_root::{enclose_root, EnclosedRoot, IntervalVector, RootBounds};
 pub use fold::{merged_root, MergedRoot};
+pub use lap::Lap;
 pub use normal_fields::{NormalFields, SignGroup};
 pub use p_matrix::is_p_matrix;
 pub(crate) use p_matrix::symmetrising_scale;
 pub use redundant::least_multipliers;
+pub use relay::{
+    all_relay_modes, solve_relay, solve_relay_within, RelayError, RelayProblem, RelaySolution,
+    Uniqueness,
+};
 pub use roots::{
     is_undetermined, multiplier_rates, newton, roots_in_cube, stable_roots,
     stable_roots_with_border, stable_roots_within, Roots,
 };
+pub(crate) use shared_load::stay_together;
+pub use shared_load::{SharedLoad, SharedLoads};
 pub(crate) use small_matrix::invert;
 pub use small_matrix::{Matrix, Vector};
 pub use stability::{

@@ -10,14 +10,14 @@
 //! v(lambda) = sum over k of w_k(lambda) f^k
 //! ```
 //!
-//! On one surface this is the quadratic equation of a two-fold, for which more is known: [`crate::switching::TwoFold`].
+//! On one surface this is the quadratic equation of a two-fold, for which more is known: [`crate::motion::TwoFold`].
 
 use super::point::{Notes, Point};
 use super::rule::Meeting;
+use crate::cube::{stable_roots_with_border, Matrix, NormalFields};
 use crate::error::FieldError;
-use crate::field::{product_weights, MeetingFields};
 use crate::mode::Mode;
-use crate::switching::{stable_roots_with_border, Matrix, NormalFields};
+use crate::motion::{product_weights, MeetingFields};
 use crate::system::dot;
 use crate::tolerances::{
     AT_SIDE, BLOW_UP_STARTS, FAR_FROM_THE_CUBE, NEWTON_STEPS, SAME_ROOT, TANGENT,
@@ -164,7 +164,7 @@ impl Around {
 
     /// The normal components of the surfaces slid on a moment later, divided by time where they vanish now, along the
     /// motion with these multipliers.
-    fn divided(&self, lambda: &[f64]) -> Result<NormalFields, crate::switching::Undecided> {
+    fn divided(&self, lambda: &[f64]) -> Result<NormalFields, crate::error::Undecided> {
         let velocity = self.velocity(&product_weights(lambda));
         let patterns = 0..self.patterns.len();
         let values = patterns.flat_map(|pattern| {

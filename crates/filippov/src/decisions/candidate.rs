@@ -5,13 +5,13 @@ use super::germ::{Germ, MotionSeries};
 use super::point::{Left, Lefts, Next, Notes, Point};
 use super::rule::{How, Meeting};
 
+use crate::cube::{is_undetermined, stable_roots_with_border, NormalFields};
 use crate::error::FieldError;
-use crate::field::{eval_on_side, Guard, MeetingFields, RootEnd, Tie};
 use crate::mode::Mode;
-use crate::switching::{
-    first_nonzero, is_undetermined, stable_roots_with_border, Leading, NormalFields, TwoFold,
-};
+use crate::motion::{first_nonzero, Leading, TwoFold};
+use crate::motion::{Guard, MeetingFields, RootEnd, Tie};
 use crate::system::dot;
+use crate::system::eval_on_side;
 use crate::tolerances::{AT_SIDE, DOUBTFUL};
 
 /// A mode in which a motion can go on.

@@ -2,8 +2,8 @@
 
 use super::point::{Point, Values};
 use crate::error::FieldError;
-use crate::field::{are_parallel, beside_on, in_the_place_of, normal, parallel};
 use crate::mode::Mode;
+use crate::motion::{are_parallel, beside_on, in_the_place_of, normal, parallel};
 use crate::system::dot;
 use crate::tolerances::{ONE_DIRECTION, SURFACE_NOISE};
 

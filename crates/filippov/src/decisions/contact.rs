@@ -4,10 +4,10 @@ use super::choice::choose;
 use super::look_ahead::{try_mode, Trial};
 use super::point::{Decided, Left, Lefts, Next, Notes, Point};
 use crate::error::FieldError;
-use crate::field::{ModeField, SmoothField};
 use crate::mode::Mode;
+use crate::motion::{first_nonzero, Leading};
+use crate::motion::{ModeField, SmoothField};
 use crate::status::Stop;
-use crate::switching::{first_nonzero, Leading};
 use crate::system::dot;
 use crate::tolerances::{AT_SIDE, MOST_IN_CONTACT, NO_FORCE};
 

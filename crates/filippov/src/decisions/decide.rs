@@ -11,8 +11,8 @@ use super::rule::{How, Meeting, Rule};
 use super::settle::settle;
 
 use crate::error::FieldError;
-use crate::field::ModeField;
 use crate::mode::Mode;
+use crate::motion::ModeField;
 
 /// The result of a decision; `Notes` have what was found out beside it.
 pub(crate) struct Decision {

@@ -5,7 +5,7 @@ use smallvec::smallvec;
 
 use crate::error::FieldError;
 use crate::mode::Mode;
-use crate::switching::{first_nonzero, Leading};
+use crate::motion::{first_nonzero, Leading};
 use crate::tolerances::{AT_SIDE, MOST_MEETING};
 
 /// The surfaces of `meeting` that the motion in `after` leaves, with the leading derivatives of h.

@@ -6,10 +6,12 @@ use super::rule::{How, Meeting};
 use smallvec::SmallVec;
 
 use crate::error::FieldError;
-use crate::field::{eval_on_side, Guard};
 use crate::mode::Mode;
-use crate::switching::{first_nonzero, normal_component, Arrival as SurfaceArrival, Leading};
+use crate::motion::Guard;
+use crate::motion::{first_nonzero, normal_component, Leading};
+use crate::switching::Arrival as SurfaceArrival;
 use crate::system::dot;
+use crate::system::eval_on_side;
 use crate::tolerances::{AT_SIDE, SURFACE_NOISE};
 
 /// The surfaces among the functions of an event, in order.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::point::Point;
 use crate::error::FieldError;
 use crate::mode::{Mode, Signs};
-use crate::switching::Leading;
+use crate::motion::Leading;
 use crate::system::{dot, MotionJets};
 use crate::tolerances::{EPS, GERM_ORDER, VANISHING_GERM};
 

@@ -10,10 +10,10 @@ use super::point::{Decided, Notes, Point};
 use super::rule::{How, Meeting};
 use super::viable::{survey, Survey};
 use crate::error::FieldError;
-use crate::field::SmoothField;
+use crate::error::Undecided;
 use crate::mode::Mode;
+use crate::motion::SmoothField;
 use crate::status::Stop;
-use crate::switching::Undecided;
 use crate::tolerances::{AT_SIDE, MOST_MEETING, TANGENT};
 
 /// Rule: switching functions jump between the regions around the point, surfaces are in one place or touch one another.

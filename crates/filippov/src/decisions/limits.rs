@@ -2,13 +2,16 @@
 
 use super::point::{Decided, Lefts, Next, Notes, Point};
 use super::rule::{How, Meeting};
+use crate::cube::least_multipliers;
 use crate::error::FieldError;
-use crate::field::{ContactField, Motion, Projector};
+use crate::error::Undecided;
+use crate::error_scale::ErrorScale;
 use crate::mode::Mode;
-use crate::solution::Switch;
+use crate::motion::{ContactField, Motion, Projector};
 use crate::status::Stop;
-use crate::stepper::ErrorScale;
-use crate::switching::{admissible_within, least_multipliers, Kind, Undecided};
+use crate::switch::Kind;
+use crate::switch::Switch;
+use crate::switching::admissible_within;
 use crate::system::dot;
 use crate::tolerances::{
     ACCUMULATION_AGREEMENT, LONGEST_TURN, MOST_MEETING, NEAREST_ACCUMULATION, SURFACE_NOISE,

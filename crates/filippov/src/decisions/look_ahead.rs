@@ -5,9 +5,9 @@
 
 use super::point::{Left, Lefts, Notes, Point};
 use crate::error::FieldError;
-use crate::field::{ModeField, SmoothField};
 use crate::mode::Mode;
-use crate::switching::Leading;
+use crate::motion::Leading;
+use crate::motion::{ModeField, SmoothField};
 use crate::system::dot;
 use crate::tolerances::{LONGER_TRIAL, MAX_LIE_ORDER, MOST_LENGTHENINGS, SURFACE_NOISE};
 

@@ -7,14 +7,13 @@ use super::point::{Decided, Lefts, Next, Notes, Point};
 use super::rule::{How, Meeting};
 use super::spiral::outward_leap;
 use super::surroundings::Surroundings;
+use crate::cube::{merged_root, stable_roots_with_border, NormalFields};
 use crate::error::FieldError;
-use crate::field::{Guard, ModeField, RootEnd};
+use crate::error::Undecided;
 use crate::mode::Mode;
+use crate::motion::{Guard, ModeField, RootEnd};
 use crate::status::Stop;
-use crate::switching::{
-    merged_root, resolve_within, stable_roots_with_border, Continuation, ExitKind, Incoming,
-    NormalFields, Resolution, Undecided,
-};
+use crate::switching::{resolve_within, Continuation, ExitKind, Incoming, Resolution};
 use crate::tolerances::MOST_MEETING;
 
 /// Rule: the first-order data of the fields around the point, for the way in which the motion arrives.

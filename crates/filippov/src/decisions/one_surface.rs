@@ -4,8 +4,8 @@ use super::choice::choose;
 use super::point::{Decided, Left, Next, Notes, Point};
 use super::rule::{How, Meeting};
 use crate::error::FieldError;
-use crate::field::Projector;
 use crate::mode::Mode;
+use crate::motion::Projector;
 use crate::status::Stop;
 use crate::switching::{decide, Decision};
 

@@ -5,10 +5,10 @@ use super::point::{Decided, Left, Notes, Point};
 use super::rule::Rule;
 use super::settle::place_on;
 use crate::error::FieldError;
-use crate::field::{ContactField, Projector, SmoothField};
 use crate::mode::Mode;
+use crate::motion::{first_nonzero, Leading};
+use crate::motion::{ContactField, Projector, SmoothField};
 use crate::status::Stop;
-use crate::switching::{first_nonzero, Leading};
 use crate::system::{dot, surfaces_that_matter};
 use crate::tolerances::{AT_SIDE, SLIPPED, SLOW, SURFACE_NOISE};
 

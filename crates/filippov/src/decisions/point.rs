@@ -5,16 +5,19 @@ use std::cell::RefCell;
 
 use smallvec::{smallvec, SmallVec};
 
-use crate::action::Actions;
 use crate::error::FieldError;
-use crate::event::Deflation;
-use crate::field::{eval_on_side, ContactField, Guard, Law, MeetingFields, ModeField, SmoothField};
+use crate::error_scale::ErrorScale;
 use crate::mode::{Mode, Signs};
+use crate::motion::Deflation;
+use crate::motion::{ContactField, Guard, Law, MeetingFields, ModeField, SmoothField};
+use crate::motion::{Leading, TwoFoldMotion};
 use crate::options::{NonUnique, Options};
-use crate::solution::Switch;
+use crate::patience::Patience;
 use crate::status::{Stop, Warning};
-use crate::stepper::ErrorScale;
-use crate::switching::{Decision, Leading, Patience, TwoFoldMotion};
+use crate::switch::Switch;
+use crate::switching::Decision;
+use crate::system::eval_on_side;
+use crate::system::Actions;
 use crate::system::{dot, dot_magnitude, PiecewiseSystem};
 use crate::tolerances::{MOMENT, MOST_SHORTENINGS, NO_PROGRESS, TOO_LARGE_A_CHANGE};
 

@@ -7,11 +7,13 @@ use super::germs::decide_undecided;
 use super::point::{Decided, Left, Lefts, Next, Notes, Point};
 use super::rule::{How, Meeting};
 use super::surroundings::Surroundings;
+use crate::cube::{RelaySolution, Uniqueness};
 use crate::error::FieldError;
-use crate::field::{Guard, SmoothField};
+use crate::error::Undecided;
 use crate::mode::Mode;
+use crate::motion::{Guard, SmoothField};
 use crate::status::Stop;
-use crate::switching::{relay_at, RelaySolution, Undecided, Uniqueness};
+use crate::switching::relay_at;
 use crate::tolerances::{AT_SIDE, MOST_IN_LOOP, MOST_MEETING};
 
 /// What follows where the surfaces of `meeting` vanish, if the field is affine in their signs and the relay

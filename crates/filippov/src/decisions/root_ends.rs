@@ -6,7 +6,7 @@ use super::two_fold::{beyond_double_zero, two_fold_here};
 use smallvec::{smallvec, SmallVec};
 
 use crate::error::FieldError;
-use crate::field::{Guard, ModeField, RootEnd};
+use crate::motion::{Guard, ModeField, RootEnd};
 use crate::tolerances::{AT_FOLD, AT_SIDE, TANGENT};
 
 /// The functions that count as vanishing where steps of sliding shrink to nothing: the jump of the field across a surface has

@@ -5,8 +5,9 @@ use std::cell::OnceCell;
 use super::point::{Notes, Point};
 use super::surroundings::Surroundings;
 use crate::error::FieldError;
+use crate::error::Undecided;
 use crate::mode::Mode;
-use crate::switching::{Arrival as SurfaceArrival, Undecided};
+use crate::switching::Arrival as SurfaceArrival;
 
 /// The rule that made a decision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

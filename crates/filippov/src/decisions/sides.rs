@@ -4,8 +4,8 @@ use super::placement::{is_slow, leaves_point_alone};
 use super::point::{Notes, Point};
 use crate::error::FieldError;
 use crate::mode::Mode;
+use crate::motion::first_nonzero;
 use crate::status::{Warning, WarningCode};
-use crate::switching::first_nonzero;
 
 /// Warns of a trigger that the motion crosses from its side in `before` without an action, since its direction is the other
 /// one, if the action would have kept the motion on its side: a wall that is passed from behind. A count, or a relay with

@@ -3,10 +3,10 @@
 use super::departures::departures;
 use super::point::{Leap, Lefts, Notes, Point};
 use super::surroundings::Surroundings;
+use crate::cube::Lap;
 use crate::error::FieldError;
-use crate::field::Projector;
 use crate::mode::Mode;
-use crate::switching::Lap;
+use crate::motion::Projector;
 use crate::tolerances::SPIRAL_START;
 
 /// Where a leap ends.

@@ -1,10 +1,11 @@
 //! The fields around the place where surfaces vanish, and what of them is clear of zero.
 
 use super::point::{Notes, Point};
+use crate::cube::NormalFields;
 use crate::error::FieldError;
-use crate::field::MeetingFields;
+use crate::error::Undecided;
 use crate::mode::Mode;
-use crate::switching::{NormalFields, Undecided};
+use crate::motion::MeetingFields;
 use crate::tolerances::{DOUBTFUL, TANGENT};
 
 /// The fields around the surfaces of a meeting.

@@ -1,8 +1,8 @@
 //! What the surfaces do that trigger actions.
 
-use crate::action::{Action, Actions, Trigger};
 use crate::mode::Mode;
 use crate::system::PiecewiseSystem;
+use crate::system::{Action, Actions, Trigger};
 
 /// The surfaces of a system, as far as they trigger actions.
 #[derive(Clone, Copy)]

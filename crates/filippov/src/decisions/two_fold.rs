@@ -6,8 +6,8 @@
 use super::point::{Notes, Point};
 
 use crate::error::FieldError;
-use crate::field::{shares_of_rows, ModeField, SmoothField};
-use crate::switching::{Leading, TwoFold, TwoFoldMotion};
+use crate::motion::{shares_of_rows, ModeField, SmoothField};
+use crate::motion::{Leading, TwoFold, TwoFoldMotion};
 use crate::system::{dot, dot_magnitude};
 use crate::tolerances::{
     ARRIVED, AT_TWO_FOLD, INSIDE_SHARES, MOST_HALVINGS, NEWTON_STEPS, TANGENT,

@@ -8,10 +8,10 @@ use super::point::{Cause, Next, Notes, Point};
 use super::rule::Meeting;
 use super::surroundings::Surroundings;
 
+use crate::cube::{roots_in_cube, NormalFields};
 use crate::error::FieldError;
-use crate::field::Guard;
 use crate::mode::Mode;
-use crate::switching::{roots_in_cube, NormalFields};
+use crate::motion::Guard;
 use crate::tolerances::{DOUBTFUL, MOST_MEETING, ONE_DIRECTION, SURFACE_NOISE};
 
 /// All modes at a point.

@@ -13,10 +13,14 @@ pub mod function;
 pub mod isolate;
 pub mod locate;
 pub mod proved;
+pub(crate) mod search;
 pub mod series;
 pub mod tube;
+mod user_events;
 
-pub use function::{Deflation, Event, Found, Monitored, Multiple, Seen, UserEvent, UserFunction};
+pub use function::{Event, Found, Multiple, Seen, UserEvent, UserFunction};
+pub use user_events::UserZero;
+pub(crate) use user_events::{UserEvents, TICK};
 
 #[cfg(test)]
 mod tests;

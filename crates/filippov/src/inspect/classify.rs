@@ -4,17 +4,20 @@ use std::cell::RefCell;
 
 use smallvec::SmallVec;
 
-use crate::action::Actions;
 use crate::decisions::{
     decide, sides, Arrival, Cause, Decision, Notes, Point, Policy, Reached, Sides,
 };
 use crate::error::FieldError;
-use crate::field::{eval_on_side, Guard, Law, MeetingFields, ModeField, SmoothField};
+use crate::error_scale::ErrorScale;
 use crate::mode::Mode;
+use crate::motion::Leading;
+use crate::motion::{Guard, Law, MeetingFields, ModeField, SmoothField};
 use crate::options::{NonUnique, Options};
+use crate::patience::Patience;
 use crate::status::Stop;
-use crate::stepper::ErrorScale;
-use crate::switching::{decide as decide_at_surface, Arrival as SurfaceArrival, Leading, Patience};
+use crate::switching::{decide as decide_at_surface, Arrival as SurfaceArrival};
+use crate::system::eval_on_side;
+use crate::system::Actions;
 use crate::system::{dot, surfaces_that_matter, PiecewiseSystem};
 use crate::tolerances::{AT_SIDE, MOST_MEETING, SURFACE_NOISE};
 
@@ -88,7 +91,7 @@ pub struct Classification {
     /// Why there is no decision; empty if there is one.
     pub reason: String,
     /// Normal components of all fields around the point, `[pattern * m + i]` as in
-    /// [`crate::switching::NormalFields`].
+    /// [`crate::cube::NormalFields`].
     pub components: Vec<f64>,
     /// On one surface, the first non-vanishing derivatives of h along f- and f+.
     pub leading: Option<[Leading; 2]>,

@@ -1,10 +1,8 @@
 //! The hidden dynamics at an intersection, as data for a picture.
 
+use crate::cube::{is_stable_for, roots_in_cube, stable_roots, NormalFields};
 use crate::mode::Mode;
-use crate::switching::{
-    is_stable_for, limit_of_hidden_dynamics, roots_in_cube, stable_roots, HiddenOutcome,
-    NormalFields,
-};
+use crate::switching::{limit_of_hidden_dynamics, HiddenOutcome};
 
 /// A root of the normal components: a rest point of the hidden dynamics.
 #[derive(Clone, Debug, PartialEq)]

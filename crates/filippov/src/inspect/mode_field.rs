@@ -1,8 +1,8 @@
 //! The field of sliding on an intersection at a point.
 
 use crate::error::FieldError;
-use crate::field::{IntersectionField, Motion, SmoothField};
 use crate::mode::Mode;
+use crate::motion::{IntersectionField, Motion, SmoothField};
 use crate::system::PiecewiseSystem;
 
 /// The sliding field of an intersection at a point.

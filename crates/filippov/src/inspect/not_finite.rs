@@ -1,7 +1,7 @@
 //! Where a run ended because the field is not finite: which components, and where.
 
-use crate::field::eval_on_side;
 use crate::mode::Mode;
+use crate::system::eval_on_side;
 use crate::system::PiecewiseSystem;
 
 /// Points at which the field is looked at beyond the last time: by the rounding of time, and 16 times further each.

@@ -1,7 +1,8 @@
 //! Points whose answer is known.
 
 use super::{classify, hidden_dynamics, intersection_field, Inspection, PointKind};
-use crate::switching::{HiddenOutcome, NormalFields};
+use crate::cube::NormalFields;
+use crate::switching::HiddenOutcome;
 use crate::{ClosureSystem, Mode};
 
 /// x' = bias - 2 sign(x) componentwise, with z' = 1 - product of the signs.

@@ -14,29 +14,29 @@
 //!
 //! `docs/theory/order_of_outcomes.md` has all of it, with the tests.
 
-use super::Stats;
-use crate::action::Actions;
 use crate::decisions::{root_ends, Cause};
 use crate::error::{Error, FieldError};
+use crate::error_scale::ErrorScale;
+use crate::event::search::Detector;
+use crate::event::search::StepSearch;
+use crate::event::UserEvents;
 use crate::event::{Event, Found, Seen, UserEvent};
-use crate::field::{Guard, ModeField, SlidingField, SmoothField};
 use crate::integrate::actions::timetable::Timetable;
-use crate::integrate::detection::detector::Detector;
-use crate::integrate::detection::user_functions::UserEvents;
-use crate::integrate::motion::Motion;
 use crate::integrate::steps::chatter::ChatterWatch;
 use crate::integrate::steps::pace::Paces;
-use crate::integrate::steps::stiffness::Derivatives;
 use crate::integrate::steps::stiffness::Stiffness;
 use crate::integrate::watch::Watch;
 use crate::mode::Mode;
+use crate::motion::CurrentMotion;
+use crate::motion::{Guard, ModeField, SlidingField, SmoothField};
 use crate::options::{Method, Options};
-use crate::recorder::Recorder;
-use crate::solution::Solution;
+use crate::record::Recorder;
+use crate::record::Solution;
+use crate::stats::Stats;
 use crate::status::{Stop, Warning};
-use crate::stepper::{
-    Attempt, Controller, Dop853, ErrorScale, Midpoint, Rodas5p, StepMethod, Stepper, Taylor,
-};
+use crate::stepper::Derivatives;
+use crate::stepper::{Attempt, Controller, Dop853, Midpoint, Rodas5p, StepMethod, Stepper, Taylor};
+use crate::system::Actions;
 use crate::system::PiecewiseSystem;
 use crate::tolerances::{EPS, SHORTEST_STEP, SHORTEST_STEP_AT_ZERO};
 
@@ -63,7 +63,7 @@ pub struct Integrator<'a> {
     /// The step that was proposed where the horizon shortened it, else 0.
     wanted_dt: f64,
     pub(super) x: Vec<f64>,
-    pub(super) motion: Motion<'a>,
+    pub(super) motion: CurrentMotion<'a>,
     pub(super) stepper: Stepper,
     pub(super) controller: Controller,
     /// Proposed step.
@@ -147,7 +147,7 @@ impl<'a> Integrator<'a> {
             passing: Vec::new(),
             wanted_dt: 0.0,
             x: y0.to_vec(),
-            motion: Motion::new(system, t_span.0, undecided, options.into(), actions),
+            motion: CurrentMotion::new(system, t_span.0, undecided, options.into(), actions),
             stepper,
             controller: Controller::default(),
             dt: f64::NAN,
@@ -226,7 +226,7 @@ impl<'a> Integrator<'a> {
             return self.reach_horizon();
         }
         self.expand()?;
-        if !matches!(self.motion.derivatives, Derivatives::None) {
+        if !matches!(self.stepper.derivatives, Derivatives::None) {
             self.linearise()?;
         }
         let mut dt = self.dt.min(self.options.max_step);
@@ -326,7 +326,7 @@ impl<'a> Integrator<'a> {
         } else {
             self.t + dt
         };
-        let (event, longest) = self.first_event(t1, dt)?;
+        let (event, longest) = self.step_search().0.first_event(t1, dt)?;
         let found = match event {
             Event::None => None,
             Event::At(found) => Some(found),
@@ -437,6 +437,25 @@ impl<'a> Integrator<'a> {
         self.recent_dt = 0.0;
         self.chatter.forget();
         self.switch(&event)
+    }
+
+    /// The search of the step that was computed; and the user's functions.
+    pub(super) fn step_search(&mut self) -> (StepSearch<'_, 'a>, &mut UserEvents<'a>) {
+        let search = StepSearch {
+            system: self.system,
+            scale: &self.scale,
+            t: self.t,
+            x: &self.x,
+            motion: &mut self.motion,
+            stepper: &mut self.stepper,
+            detector: &mut self.detector,
+            stats: &mut self.stats,
+            slacks: &self.slacks,
+            rule: self.options.sliding,
+            horizon: self.horizon,
+            one_sided: self.one_sided,
+        };
+        (search, &mut self.user_events)
     }
 
     fn count_rejection(&mut self, sliding: bool) {

@@ -5,12 +5,12 @@ use smallvec::SmallVec;
 use crate::decisions::limits::{limit_of_switches, limits_of_impacts, Limit};
 use crate::decisions::{Cause, Decision};
 use crate::error::FieldError;
-use crate::field::Projector;
 use crate::integrate::integrator::Integrator;
 use crate::mode::Mode;
-use crate::solution::Switch;
+use crate::motion::Projector;
 use crate::status::Stop;
-use crate::switching::Kind;
+use crate::switch::Kind;
+use crate::switch::Switch;
 
 impl Integrator<'_> {
     /// The limit that the last switches tend to, if they do and it is within the known times.

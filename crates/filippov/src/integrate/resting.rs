@@ -3,11 +3,11 @@
 
 use crate::decisions::Left;
 use crate::error::FieldError;
-use crate::field::{Guard, ModeField, Projector, SlidingSet};
 use crate::integrate::integrator::Integrator;
 use crate::mode::Mode;
+use crate::motion::first_nonzero;
+use crate::motion::{Guard, ModeField, Projector, SlidingSet};
 use crate::status::{Stop, Warning, WarningCode};
-use crate::switching::first_nonzero;
 use crate::tolerances::{DOUBTFUL, LEFT_RESTING};
 
 impl Integrator<'_> {
@@ -85,7 +85,7 @@ impl Integrator<'_> {
             if m.deflation.is_some() || m.value.abs().max(end.abs()) > DOUBTFUL {
                 continue;
             }
-            let noise = self.noise_of(&m)?;
+            let noise = self.step_search().0.noise_of(&m)?;
             if m.value.abs().max(end.abs()) > noise {
                 continue;
             }

@@ -1,13 +1,13 @@
 //! Runs from start to end.
 
 use super::Integrator;
-use crate::action::Actions;
 use crate::error::Error;
 use crate::event::UserEvent;
 use crate::options::Options;
-use crate::section::{Place, Section};
-use crate::solution::Solution;
+use crate::record::section::{Place, Section};
+use crate::record::Solution;
 use crate::status::Stop;
+use crate::system::Actions;
 use crate::system::PiecewiseSystem;
 
 /// Integrates a piecewise-smooth system over `t_span` from `y0`.

@@ -1,9 +1,9 @@
 //! Where a run starts: arguments checked, the mode of the initial state found.
 
-use crate::action::{Actions, Trigger};
 use crate::error::Error;
 use crate::options::Options;
 use crate::system::PiecewiseSystem;
+use crate::system::{Actions, Trigger};
 
 /// Checks the arguments of a run.
 pub(super) fn check(

@@ -4,22 +4,25 @@ use std::cell::RefCell;
 
 use smallvec::{smallvec, SmallVec};
 
-use crate::decision_record::decide_and_record;
 use crate::decisions::{
     beyond_double_zero, decide, differs_between_sides, landing, limits::limit_here, refusal,
     root_ends, two_fold_here, vanishing_surfaces, warn_against_direction, Arrival, Cause, Decision,
     Leap, Left, Lefts, Next, Notes, Point, Reached, Rule, Values,
 };
 use crate::error::FieldError;
-use crate::event::{Deflation, Found, Multiple, Seen};
-use crate::field::{eval_on_side, Guard, ModeField, SmoothField};
+use crate::event::{Found, Multiple, Seen};
 use crate::integrate::integrator::Integrator;
 use crate::integrate::steps::pace::excursion;
 use crate::mode::Mode;
-use crate::solution::Switch;
+use crate::motion::Deflation;
+use crate::motion::{Guard, ModeField, SmoothField};
+use crate::patience::Patience;
+use crate::record::decide_and_record;
 use crate::status::Stop;
 use crate::stepper::{initial_step, restart_step};
-use crate::switching::{Kind, Patience};
+use crate::switch::Kind;
+use crate::switch::Switch;
+use crate::system::eval_on_side;
 use crate::tolerances::{MOST_SWITCHES_AT_ONE_TIME, NO_PROGRESS, SMALLEST_GUESS, SMALL_JUMP};
 
 impl<'a> Integrator<'a> {
@@ -397,7 +400,10 @@ impl<'a> Integrator<'a> {
             }
         }
         self.note_resting(&mode, &left)?;
-        self.motion.restart(self.system, self.t, mode, &left);
+        let t = self.t;
+        let zeros = left.iter().filter_map(|left| left.deflation(t));
+        let zeros: SmallVec<[_; 2]> = zeros.collect();
+        self.motion.restart(self.system, t, mode, &zeros);
         let zeros = self.motion.monitored.iter_mut();
         for zero in zeros.filter_map(|m| m.deflation.as_mut()) {
             zero.is_clean = !slid;

@@ -1,11 +1,11 @@
 //! DOP853: one step, its error estimate and its continuous extension of order 7.
 
 use super::coefficients_dop853::{A, D, E3, E5, NODES};
-use super::controller::root_mean_square;
 use super::dopri5::{jumps_between, stiffness_of};
 use super::{Attempt, ErrorScale, Interpolant, Step};
 use crate::error::FieldError;
-use crate::field::SmoothField;
+use crate::error_scale::root_mean_square;
+use crate::motion::SmoothField;
 
 /// The stages at which an observer is called.
 const OBSERVED: [usize; 5] = [3, 5, 8, 9, 10];

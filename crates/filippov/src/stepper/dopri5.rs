@@ -3,7 +3,7 @@
 use super::coefficients_dopri5::{A2, A3, A4, A5, A6, A8, A9, B, C, C8, C9, D, E};
 use super::{ErrorScale, Interpolant, Step};
 use crate::error::FieldError;
-use crate::field::SmoothField;
+use crate::motion::SmoothField;
 use crate::tolerances::{JUMP_SHARE, JUMP_SIZE};
 
 /// What came of an attempted step.

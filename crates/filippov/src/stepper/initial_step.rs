@@ -2,7 +2,7 @@
 
 use super::ErrorScale;
 use crate::error::FieldError;
-use crate::field::SmoothField;
+use crate::motion::SmoothField;
 use crate::tolerances::SMALLEST_GUESS;
 
 /// Hairer's guess of the first step of a method of order 5, from two derivatives.

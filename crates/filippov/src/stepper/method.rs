@@ -1,8 +1,23 @@
 //! The stepper of a run: the methods that it may use, and which of them takes the current step.
 
 use super::{Dop853, Dopri5, ErrorScale, Interpolant, Midpoint, Rodas5p, Step, Taylor};
+use std::sync::Arc;
+
 use crate::error::FieldError;
-use crate::field::SmoothField;
+use crate::motion::SmoothField;
+use crate::system::MotionJacobian;
+
+/// How a motion is linearised.
+#[derive(Clone, Default)]
+pub(crate) enum Derivatives {
+    /// It is not: an explicit method integrates it.
+    #[default]
+    None,
+    /// By the derivatives of the expression graph.
+    Exact(Arc<MotionJacobian>),
+    /// By differences of its field.
+    Differences,
+}
 
 /// The method that takes a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,6 +47,8 @@ pub struct Stepper {
     pub midpoint: Option<Box<Midpoint>>,
     /// The method for stiff motions, where the run may use it.
     pub rodas5p: Option<Box<Rodas5p>>,
+    /// How the motion is linearised, if the method for stiff motions integrates it.
+    pub(crate) derivatives: Derivatives,
     in_use: StepMethod,
 }
 
@@ -44,6 +61,7 @@ impl Stepper {
             dop853: None,
             midpoint: None,
             rodas5p: None,
+            derivatives: Derivatives::None,
             in_use: StepMethod::Dopri5,
         }
     }

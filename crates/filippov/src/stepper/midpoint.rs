@@ -2,7 +2,7 @@
 
 use super::{Attempt, ErrorScale, Interpolant, Step};
 use crate::error::FieldError;
-use crate::field::SmoothField;
+use crate::motion::SmoothField;
 
 /// The error e counts as e^(5/2) in the control of the step size, which is made for methods of order 5: 1 stays 1, and
 /// steps change as e^(-1/2).

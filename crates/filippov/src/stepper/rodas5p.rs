@@ -1,10 +1,11 @@
 //! Rodas5P: one step for stiff motions, its error estimate and its continuous extension.
 
 use super::coefficients_rodas5p::{A, C, EXTENSION, GAMMA, NODES, TIME_SHARES};
-use super::{Attempt, ErrorScale, Interpolant, Linearisation, Step};
+use super::{Attempt, ErrorScale, Interpolant, Step};
 use crate::error::FieldError;
-use crate::field::SmoothField;
+use crate::motion::SmoothField;
 use crate::sparse::SparseSolver;
+use crate::system::Linearisation;
 
 /// The Rosenbrock-Wanner method of order 5(4) with eight stages, L-stable and stiffly accurate,
 ///

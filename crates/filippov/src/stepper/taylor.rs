@@ -5,7 +5,7 @@ use smallvec::SmallVec;
 use super::controller::{rough_exp2, rough_log2};
 use super::{Attempt, ErrorScale, Interpolant, Step};
 use crate::error::FieldError;
-use crate::field::SmoothField;
+use crate::motion::SmoothField;
 use crate::tolerances::{
     TAYLOR_DEAR, TAYLOR_LARGEST_ORDER, TAYLOR_NOISE, TAYLOR_ORDER_CHEAP, TAYLOR_ORDER_DEAR,
     TAYLOR_SHARE, TAYLOR_SLOW, WARY_GROWTH, WARY_POINTS, WARY_START,

@@ -7,7 +7,7 @@ mod trees;
 use super::coefficients_dopri5::{A2, A3, A4, A5, A6, A8, A9, B, C, C8, C9, D, E};
 use super::{Attempt, Dopri5, ErrorScale};
 use crate::error::FieldError;
-use crate::field::SmoothField;
+use crate::motion::SmoothField;
 
 type Row = [f64; 9];
 

@@ -2,11 +2,10 @@
 
 use smallvec::{smallvec, SmallVec};
 
-use super::lie::{first_nonzero, first_nonzero_of_both, Leading};
 use super::stick::decide_sticking;
-use super::two_fold_motion::{TwoFold, TwoFoldMotion};
 use crate::error::FieldError;
 use crate::mode::Signs;
+use crate::motion::{first_nonzero, first_nonzero_of_both, Leading, TwoFold, TwoFoldMotion};
 use crate::system::{dot_magnitude, BothSides, PiecewiseSystem};
 use crate::tolerances::TANGENT;
 

@@ -1,7 +1,6 @@
 //! The relay problem of a system at a point where surfaces meet.
 
-use super::relay::{solve_relay_within, RelayProblem, RelaySolution, Uniqueness};
-use super::shared_load::stay_together;
+use crate::cube::{solve_relay_within, stay_together, RelayProblem, RelaySolution, Uniqueness};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::patience::Patience;

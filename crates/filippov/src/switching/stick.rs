@@ -7,8 +7,8 @@
 //! force reaches the static limit, and then slips under the fields f- and f+ of the regions.
 
 use super::codim1::{Arrival, Decision};
-use super::lie::{first_nonzero, Leading};
 use crate::error::FieldError;
+use crate::motion::{first_nonzero, Leading};
 use crate::system::{BothSides, PiecewiseSystem};
 use crate::tolerances::NO_GAP;
 

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! so sliding on Z, dh_Z/dt = 0, determines the multipliers by N lambda = -nu, and at an event the mode follows
-//! from the relay problem of [`crate::switching::solve_relay`]. Nothing is formed for 2^m sign patterns; in
+//! from the relay problem of [`crate::cube::solve_relay`]. Nothing is formed for 2^m sign patterns; in
 //! a chain B, grad h and N are sparse, and everything costs O(n).
 //!
 //! References: Piiroinen, Kuznetsov (2008), (21)-(24), with s = 1 - 2 mu; Guglielmi, Hairer (2022), section 7.
@@ -16,8 +16,8 @@ use filippov_expr::{Enclosure, Motion};
 
 use super::PiecewiseSystem;
 use crate::error::FieldError;
-use crate::field::eval_on_side;
 use crate::sparse::{Pattern, SparseProduct, SparseRows, SparseSolver};
+use crate::system::eval_on_side;
 
 /// A system whose field is affine in the signs of some sets of surfaces.
 ///

@@ -4,7 +4,7 @@ use filippov_expr::{Graph, NodeId};
 
 use super::{dot, PiecewiseSystem};
 use crate::error::FieldError;
-use crate::field::{eval_off_surface, eval_on_side};
+use crate::system::{eval_off_surface, eval_on_side};
 
 /// What sliding on one surface needs at a point: the fields of both sides with
 /// their normal components. Also the scratch space for it.

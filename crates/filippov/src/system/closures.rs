@@ -167,7 +167,7 @@ pub(super) fn lie_by_differences<S: PiecewiseSystem + ?Sized>(
     let mut f = vec![0.0; n];
     let mut signs_here = signs.to_vec();
     signs_here[j] = f64::from(last);
-    crate::field::eval_on_side(system, t, x, &signs_here, &mut f)?;
+    crate::system::eval_on_side(system, t, x, &signs_here, &mut f)?;
     if rest.is_empty() {
         let mut gradient = vec![0.0; n];
         let ht = system.gradient(i, t, x, signs, &mut gradient)?;

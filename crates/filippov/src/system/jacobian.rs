@@ -5,7 +5,7 @@ use filippov_expr::{Backend, Gradient, Graph, NodeId};
 use super::blended::{Blended, BySign};
 use super::tiered::TieredProgram;
 use crate::sparse::SparseRows;
-use crate::stepper::Linearisation;
+use crate::system::Linearisation;
 
 /// The derivatives of the field of the motions on a set of surfaces; see [`Linearisation`].
 ///

@@ -6,7 +6,7 @@ use smallvec::SmallVec;
 
 use super::blended::Blended;
 use super::tiered::TieredProgram;
-use crate::switching::invert;
+use crate::cube::invert;
 use crate::tolerances::LARGEST_SERIES_BLOCK;
 
 /// What the multipliers on a set of surfaces follow from.

@@ -16,9 +16,9 @@ use filippov_expr::{Backend, ExprError, Graph, NodeId, Program, Wrt};
 use smallvec::{smallvec, SmallVec};
 
 use super::{PiecewiseSystem, TracedSystem};
-use crate::action::{ActionMap, Clock, Trigger};
 use crate::error::FieldError;
-use crate::switching::Kind;
+use crate::switch::Kind;
+use crate::system::{ActionMap, Clock, Trigger};
 use crate::tolerances::WHOLE_NUMBER;
 
 /// What a discrete state follows; the expressions may contain discrete states of laws before it.

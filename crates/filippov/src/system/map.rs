@@ -5,8 +5,8 @@ use std::sync::OnceLock;
 use filippov_expr::{Backend, NodeId, Program};
 
 use super::{PiecewiseSystem, TracedSystem};
-use crate::action::ActionMap;
 use crate::error::FieldError;
+use crate::system::ActionMap;
 
 /// A map x -> x+ given by expressions in (t, x, p): those of the field of a [`TracedSystem`]. Switching functions in
 /// them are evaluated at the state before.

@@ -4,11 +4,14 @@
 //! switching function h_j(t, x). The signs are *data*: the caller says which smooth field it
 //! wants, also slightly beyond a surface, and the field never looks at the sign of h itself.
 
+mod action;
 mod activity;
 mod affine;
 mod affine_model;
+mod beside;
 mod blended;
 mod both_sides;
+mod clock;
 mod closures;
 mod compiled;
 mod definition;
@@ -17,20 +20,25 @@ mod jacobian;
 mod jet_multipliers;
 mod jets;
 mod laws;
+mod linearisation;
 mod map;
 mod sections;
 mod tiered;
 mod traced;
 
+pub use action::{Action, ActionMap, Actions, Trigger};
 pub(crate) use activity::surfaces_that_matter;
 pub use affine::{AffineParts, AffineSigns, SingularSliding};
+pub use beside::{eval_off_surface, eval_on_side, move_inside, side_offsets};
 pub use both_sides::BothSides;
+pub use clock::Clock;
 pub use closures::ClosureSystem;
 pub(crate) use definition::{check_index, inconsistent};
 pub use definition::{Definition, Rules};
 pub use jacobian::MotionJacobian;
 pub use jets::MotionJets;
 pub use laws::{Law, LawAction, LawMap, Laws};
+pub use linearisation::Linearisation;
 pub use map::TracedMap;
 pub use traced::TracedSystem;
 
@@ -39,7 +47,6 @@ use std::sync::Arc;
 use filippov_expr::{Enclosure, Motion};
 
 use crate::error::FieldError;
-use crate::stepper::Linearisation;
 use crate::tolerances::EPS;
 
 /// The value of a Lie derivative and the sum of the magnitudes that make it up.

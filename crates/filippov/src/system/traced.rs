@@ -15,7 +15,7 @@ use super::{
     Word,
 };
 use crate::error::FieldError;
-use crate::stepper::Linearisation;
+use crate::system::Linearisation;
 use crate::tolerances::{MAX_LIE_ORDER, SURFACE_NOISE, TANGENT};
 
 /// Up to that many states both sides of a surface are compiled into one program; the programs of

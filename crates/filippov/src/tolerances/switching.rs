@@ -23,13 +23,12 @@ pub const PROPORTIONAL: f64 = 64.0 * EPS;
 pub const DOUBLE_ROOT: f64 = 1e-14;
 
 /// Events are located to better than this: a multiplier counts as -1 or +1 at an exit within this distance, two multipliers as
-/// one, and a normal component as zero below this fraction of its terms, also at a point that accumulating switches lead to, or that was
-/// projected.
+/// one, and a normal component as zero below this fraction of its terms.
 pub const AT_SIDE: f64 = 1e-6;
 
 /// A sign that decided at an intersection is doubtful if its quantity is smaller than this fraction
-/// of its size: about the error of the fields at a located event. The fields are perturbed by as
-/// much then.
+/// of its size: about the error of the fields at a located event, or at a limit of switches. The fields are perturbed by
+/// as much then.
 pub const DOUBTFUL: f64 = 1e-8;
 
 /// Largest distance from a root that loses stability or meets another one at which the hidden

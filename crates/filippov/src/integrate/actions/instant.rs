@@ -12,19 +12,19 @@
 
 use smallvec::SmallVec;
 
-use crate::action::Trigger;
 use crate::decisions::{
     add_vanishing_surfaces, goes_through, located_surfaces, pushed_back, sides, warn_unknown_side,
     Cause, Decision, Left, Sides, Triggers, Values,
 };
 use crate::error::FieldError;
 use crate::event::Found;
-use crate::field::Guard;
 use crate::integrate::integrator::Integrator;
 use crate::mode::Mode;
-use crate::solution::Switch;
+use crate::motion::Guard;
+use crate::motion::Leading;
 use crate::status::Stop;
-use crate::switching::Leading;
+use crate::switch::Switch;
+use crate::system::Trigger;
 use crate::tolerances::{MOST_ACTIONS_AT_ONE_TIME, PENETRATION, SURFACE_NOISE};
 
 /// The surfaces in one instant, as far as they trigger actions.

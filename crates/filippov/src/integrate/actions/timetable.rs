@@ -1,6 +1,6 @@
 //! Known times of actions: which come next.
 
-use crate::action::{Actions, Clock, Trigger};
+use crate::system::{Actions, Clock, Trigger};
 use crate::tolerances::SAME_TICK;
 
 /// What is left of the known times of one action.

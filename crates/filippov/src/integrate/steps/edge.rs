@@ -4,9 +4,10 @@
 use crate::error::FieldError;
 use crate::event::isolate::Bracket;
 use crate::event::locate::refine;
-use crate::event::{Found, Monitored};
-use crate::field::{Guard, ModeField, SmoothField};
+use crate::event::Found;
 use crate::integrate::integrator::Integrator;
+use crate::motion::Monitored;
+use crate::motion::{Guard, ModeField, SmoothField};
 use crate::status::{Warning, WarningCode};
 use crate::stepper::Attempt;
 use crate::tolerances::{ARRIVED, EPS, JUMP_SHRINK, ONE_SIDED_AIM};

@@ -3,9 +3,10 @@
 use rustc_hash::FxHashMap;
 
 use crate::error::FieldError;
+use crate::error_scale::ErrorScale;
 use crate::mode::Mode;
-use crate::stepper::{tiny_step, ErrorScale};
-use crate::switching::Leading;
+use crate::motion::Leading;
+use crate::stepper::tiny_step;
 use crate::system::PiecewiseSystem;
 use crate::tolerances::{FAMILIAR, MANY, MAX_LIE_ORDER, REACH, SEVERAL};
 

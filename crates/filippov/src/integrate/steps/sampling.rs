@@ -2,7 +2,7 @@
 
 use crate::error::FieldError;
 use crate::integrate::integrator::Integrator;
-use crate::section::{Observer, Place, Section};
+use crate::record::section::{Observer, Place, Section};
 use crate::status::Stop;
 
 impl Integrator<'_> {

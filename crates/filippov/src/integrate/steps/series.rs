@@ -2,13 +2,13 @@
 
 use crate::error::FieldError;
 use crate::event::Seen;
-use crate::field::ModeField;
 use crate::integrate::integrator::Integrator;
-use crate::integrate::motion::Motion;
-use crate::integrate::steps::stiffness::Derivatives;
 use crate::mode::Signs;
+use crate::motion::CurrentMotion;
+use crate::motion::ModeField;
 use crate::options::Method;
 use crate::status::{Warning, WarningCode};
+use crate::stepper::Derivatives;
 use crate::stepper::{reach as series_reach, Attempt, StepMethod};
 use crate::tolerances::{EPS, MOST_AUTO_SERIES, TAYLOR_SHORTEST};
 
@@ -16,7 +16,7 @@ impl Integrator<'_> {
     /// The motion that starts takes Taylor steps if the run may and the motion has series.
     pub(in crate::integrate) fn choose_stepper(&mut self) {
         self.motion.jets = None;
-        self.motion.derivatives = Derivatives::None;
+        self.stepper.derivatives = Derivatives::None;
         if self.stepper.rodas5p.is_some() && self.motion.resting.is_empty() {
             return self.start_implicit();
         }
@@ -71,7 +71,7 @@ impl Integrator<'_> {
                 .copy_from_slice(&derivative);
             self.note_missing_series();
         }
-        if is_shared && matches!(self.motion.derivatives, Derivatives::Exact(_)) {
+        if is_shared && matches!(self.stepper.derivatives, Derivatives::Exact(_)) {
             self.take_derivatives(Derivatives::Differences);
         }
     }
@@ -259,7 +259,7 @@ impl Integrator<'_> {
 }
 
 /// The signs of sliding on several surfaces, with the multipliers at the start of the step in their places.
-fn multipliers_in(motion: &Motion, seen: &[Seen]) -> Option<Signs> {
+fn multipliers_in(motion: &CurrentMotion, seen: &[Seen]) -> Option<Signs> {
     let ModeField::Intersection(_) = motion.field else {
         return None;
     };

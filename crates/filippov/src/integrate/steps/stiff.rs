@@ -3,12 +3,13 @@
 use smallvec::SmallVec;
 
 use crate::error::FieldError;
-use crate::field::{ModeField, SmoothField};
 use crate::integrate::integrator::Integrator;
-use crate::integrate::steps::stiffness::Derivatives;
+use crate::motion::{ModeField, SmoothField};
 use crate::options::Method;
 use crate::status::{Warning, WarningCode};
-use crate::stepper::{Attempt, Linearisation, Rodas5p, StepMethod};
+use crate::stepper::Derivatives;
+use crate::stepper::{Attempt, Rodas5p, StepMethod};
+use crate::system::Linearisation;
 use crate::tolerances::{AIM_MARGINS, EPS, STIFF_DOP853, STIFF_DOPRI5, STIFF_SERIES};
 
 impl Integrator<'_> {
@@ -31,7 +32,7 @@ impl Integrator<'_> {
                 _ => Linearisation::dense(self.x.len()),
             });
         }
-        self.motion.derivatives = derivatives;
+        self.stepper.derivatives = derivatives;
     }
 
     /// Finds the derivatives at the start of the step. Where they are not finite DOPRI5 takes the step.
@@ -56,7 +57,7 @@ impl Integrator<'_> {
             return Ok(());
         }
         self.stats.n_jacobians += 1;
-        let is_finite = match self.motion.derivatives.clone() {
+        let is_finite = match self.stepper.derivatives.clone() {
             Derivatives::Exact(jacobian) => {
                 let signs = self.signs_and_multipliers()?;
                 let (system, t, x) = (self.system, self.t, &self.x);
@@ -196,7 +197,7 @@ impl Integrator<'_> {
     #[inline(never)]
     pub(in crate::integrate) fn look_at_stiffness(&mut self, dt: f64) -> Result<bool, FieldError> {
         let is_limited = match self.stepper.in_use() {
-            StepMethod::Dopri5 if matches!(self.motion.derivatives, Derivatives::None) => {
+            StepMethod::Dopri5 if matches!(self.stepper.derivatives, Derivatives::None) => {
                 let product = self.stepper.dopri5.stiffness();
                 product.is_some_and(|product| product > STIFF_DOPRI5)
             }

@@ -1,18 +1,6 @@
-//! How a motion is linearised, and what was seen of its stiffness.
+//! What was seen of the stiffness of a run.
 
 use crate::tolerances::{NOT_STIFF_SIGNS, STIFF_SIGNS};
-
-/// How a motion is linearised.
-#[derive(Clone, Default)]
-pub(in crate::integrate) enum Derivatives {
-    /// It is not: an explicit method integrates it.
-    #[default]
-    None,
-    /// By the derivatives of the expression graph.
-    Exact(std::sync::Arc<crate::system::MotionJacobian>),
-    /// By differences of its field.
-    Differences,
-}
 
 /// Accepted steps between two looks, a power of two.
 pub(super) const LOOK_EVERY: u64 = 128;

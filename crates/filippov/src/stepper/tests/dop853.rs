@@ -4,7 +4,7 @@ use super::super::coefficients_dop853::{A, D, E3, E5, NODES};
 use super::super::{Attempt, Dop853, ErrorScale};
 use super::trees::{dot, trees};
 use super::Decay;
-use crate::field::SmoothField;
+use crate::motion::SmoothField;
 
 /// The matrix of all stages; row 12 has the weights of the end of the step.
 fn matrix() -> Vec<Vec<f64>> {

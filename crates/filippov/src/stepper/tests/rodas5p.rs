@@ -1,11 +1,12 @@
 //! Order conditions of Rodas5P and of its continuous extension, its stability, and its steps.
 
 use super::super::coefficients_rodas5p::{A, C, EXTENSION, GAMMA, NODES, TIME_SHARES};
-use super::super::{Attempt, ErrorScale, Linearisation, Rodas5p};
+use super::super::{Attempt, ErrorScale, Rodas5p};
 use super::trees::{dot, trees};
 use crate::error::FieldError;
-use crate::field::SmoothField;
+use crate::motion::SmoothField;
 use crate::sparse::SparseRows;
+use crate::system::Linearisation;
 
 type Square = Vec<Vec<f64>>;
 

@@ -1,10 +1,10 @@
 //! All modes in which a motion can leave an intersection, or stay on it.
 
+use crate::cube::Lap;
 use crate::cube::{stable_roots_within, Bilinear, Matrix, NormalFields};
 use crate::mode::Mode;
 use crate::patience::Patience;
 use crate::switching::incoming::with_multipliers;
-use crate::switching::lap::Lap;
 use crate::switching::resolution::Continuation;
 use crate::tolerances::{MOST_MEETING, PROPORTIONAL};
 

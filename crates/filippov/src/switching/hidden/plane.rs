@@ -6,10 +6,10 @@ use super::returns::{Returns, Verdict};
 use super::strip::{Strip, StripEnd};
 use super::{clipped, side, Outcome};
 use crate::cube::Bilinear;
+use crate::cube::Lap;
 use crate::cube::NormalFields;
 use crate::mode::Mode;
 use crate::patience::Patience;
-use crate::switching::lap::Lap;
 use crate::tolerances::{MOST_PIECES, MOST_TESTS};
 
 /// Follows the motion from u, piece by piece: corner, strip, or a step within the square.

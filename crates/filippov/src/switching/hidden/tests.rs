@@ -6,8 +6,8 @@ use super::first_zero::{first_loss, value};
 use super::strip::{Strip, StripEnd};
 use super::{line, plane, space, Outcome};
 use crate::cube::Bilinear;
+use crate::cube::NormalFields;
 use crate::patience::Patience;
-use crate::switching::NormalFields;
 
 /// A generator with a seed: SplitMix64, uniform in [-1, 1).
 struct Random(u64);

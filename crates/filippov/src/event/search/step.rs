@@ -1,0 +1,262 @@
+//! The event stage of a step: the earliest zero of what the mode monitors.
+
+use smallvec::smallvec;
+
+use super::bounds::BoundedCurve;
+use super::detector::Detector;
+use super::detector::CLEAR_OF_NOISE;
+use super::guard::{Search, Sought};
+use super::StepSearch;
+use crate::error::FieldError;
+use crate::event::certificate::{prove, Proof};
+use crate::event::filter::{may_vanish, may_vanish_bent, may_vanish_deflated};
+use crate::event::isolate::PROBES;
+use crate::event::{Event, Found};
+use crate::motion::Monitored;
+use crate::motion::{AffineBounds, ModeField};
+use crate::options::SlidingRule;
+use crate::tolerances::{EPS, EXTRAPOLATION, MARGIN, ONE_SIDED_AIM, PROOF_DEPTH};
+
+impl StepSearch<'_, '_> {
+    /// The first event of the step that was just computed, and how long the next step may be. Where the field ends beyond
+    /// the end of this one that is shorter.
+    pub(crate) fn first_event(&mut self, t1: f64, dt: f64) -> Result<(Event, f64), FieldError> {
+        let mut sought = Sought::new(dt);
+        self.detector.forget_step();
+        if self.motion.monitored.is_empty() {
+            return Ok((Event::None, sought.longest));
+        }
+        if !self.seek(t1, &mut sought)? {
+            return Ok((Event::Shorten(0.5 * dt), sought.longest));
+        }
+        let event = match sought.found {
+            Some(found) if self.may_be_multiple(&found) => self.resolve_multiple_zero(found, dt)?,
+            Some(found) => Event::At(found),
+            None => self.wrong_from_the_start()?.map_or(Event::None, Event::At),
+        };
+        Ok((event, sought.longest))
+    }
+
+    /// Searches the step for the first zero; `false` if a shorter step is needed. Guards that are beyond zero at the end come
+    /// first: the others need not be looked at after the first zero.
+    fn seek(&mut self, t1: f64, sought: &mut Sought) -> Result<bool, FieldError> {
+        let end = (t1, self.stepper.end(), self.stepper.end_derivative());
+        self.detector.measure(self.system, &self.motion, end)?;
+        self.stats.n_surface_evaluations += 1;
+        if self.detector.right.iter().any(|(value, _)| value.is_nan()) {
+            return Ok(false);
+        }
+        if self.detector.right.iter().any(|&(value, _)| value <= 0.0) {
+            // There will be a search: the extension that it needs serves the filter too.
+            self.extend()?;
+        }
+        if !self.motion.monitored.iter().all(|m| self.is_polynomial(m)) {
+            self.stepper.extend_order4(self.x);
+        }
+        self.measure_margin(sought.dt)?;
+        if self.motion.sliding.len() > 1 {
+            self.prepare_bounds();
+        }
+        for is_beyond in [true, false] {
+            for index in 0..self.motion.monitored.len() {
+                let (value, _) = self.detector.right[index];
+                if (value <= 0.0) == is_beyond && !self.search(index, sought)? {
+                    return Ok(false);
+                }
+            }
+        }
+        if !self.look_before_exit(sought)? {
+            return Ok(false);
+        }
+        if sought.found.is_none() && self.one_sided {
+            self.seek_beyond(sought)?;
+        }
+        Ok(true)
+    }
+
+    /// A surface that the motion was to leave to one side and is on the other side of, without a zero in between: rounding
+    /// decided on the side, and it is decided anew.
+    fn wrong_from_the_start(&mut self) -> Result<Option<Found>, FieldError> {
+        for index in 0..self.motion.monitored.len() {
+            let m = &self.motion.monitored[index];
+            let (value, _) = self.detector.right[index];
+            if value >= 0.0 || m.deflation.is_none() || !m.guard.is_surface() {
+                continue;
+            }
+            let m = *m;
+            if value < -CLEAR_OF_NOISE * self.noise_beside(&m)? {
+                return Ok(Some(Found::here(smallvec![m.guard])));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Asks whether a guard may vanish within a step whose extension costs evaluations. Returns the answer of the bounds, or
+    /// `None` if the guard does not vanish.
+    pub(super) fn filter(
+        &mut self,
+        index: usize,
+        sought: &mut Sought,
+    ) -> Result<Option<Proof>, FieldError> {
+        let m = self.motion.monitored[index];
+        let (dt, (value, rate)) = (sought.dt, self.detector.right[index]);
+        let proof = match m.affine && m.guard.is_surface() {
+            true => Proof::Silent,
+            false => self.prove_clear(index, value, 1.0),
+        };
+        let may_vanish = match (m.surface(), m.deflation) {
+            _ if proof != Proof::Silent => proof == Proof::Open,
+            (Some(_), None) if m.affine => may_vanish(m.value, m.rate * dt, value, rate * dt),
+            (Some(j), None) => {
+                self.probe_surfaces(dt)?;
+                let at = &self.detector.probed;
+                let probes = [0, 1].map(|k| (PROBES[k], m.orientation * at[k][j]));
+                may_vanish_bent(m.value, m.rate * dt, value, rate * dt, &probes)
+            }
+            (Some(_), Some(zero)) => {
+                // A multiple zero stays within rounding for long: the end has to be clear of it.
+                let is_clear = zero.order == 1
+                    || zero.order == 2
+                        && value > CLEAR_OF_NOISE * self.motion.monitored[index].noise;
+                let leading = zero.leading * dt.powi(zero.order);
+                let is_known = m.affine && zero.t == self.t && is_clear;
+                !is_known || may_vanish_deflated(leading, zero.order, value, rate * dt)
+            }
+            (None, _) => self.exit_may_vanish(&m),
+        };
+        sought.dismissed |= !may_vanish && proof == Proof::Silent && self.motion.ends_root(&m);
+        Ok(may_vanish.then_some(proof))
+    }
+
+    /// Rounding of a monitored function over the step.
+    pub(crate) fn noise_of(&mut self, m: &Monitored) -> Result<f64, FieldError> {
+        let step = (self.t, &self.x[..], self.stepper.end());
+        self.detector.noise(self.system, &self.motion, m, step)
+    }
+
+    /// The same, or what blurred the zero that is divided out.
+    pub(crate) fn noise_beside(&mut self, m: &Monitored) -> Result<f64, FieldError> {
+        let blur = m.deflation.map_or(0.0, |zero| zero.blur);
+        Ok(self.noise_of(m)?.max(blur))
+    }
+
+    /// Evaluates all switching functions at the probes of the step, once.
+    fn probe_surfaces(&mut self, dt: f64) -> Result<(), FieldError> {
+        if std::mem::replace(&mut self.detector.is_probed, true) {
+            return Ok(());
+        }
+        for (theta, h) in PROBES.into_iter().zip(&mut self.detector.probed) {
+            self.stepper.interpolant().at(theta, &mut self.detector.x);
+            let t = self.t + theta * dt;
+            self.system
+                .surfaces(t, &self.detector.x, &self.motion.signs, h)?;
+            self.stats.n_surface_evaluations += 1;
+        }
+        Ok(())
+    }
+
+    /// Raises the continuous extension to order 5.
+    pub(crate) fn extend(&mut self) -> Result<(), FieldError> {
+        if self.stepper.is_extended() {
+            return Ok(());
+        }
+        self.stats.n_extensions += 1;
+        self.detector.enclosed_exits.get_mut().clear();
+        self.detector.enclosed_roots.get_mut().clear();
+        self.stepper.extend(&mut self.motion.field, self.x)?;
+        Ok(())
+    }
+
+    /// One-sided fields: the surface just beyond the end of the step, within reach of the continuous extension.
+    fn seek_beyond(&mut self, sought: &mut Sought) -> Result<(), FieldError> {
+        for index in 0..self.motion.monitored.len() {
+            let (dt, (value, rate)) = (sought.dt, self.detector.right[index]);
+            let near = rate < 0.0 && value < -rate * dt * 1.5 * (EXTRAPOLATION - 1.0);
+            if near {
+                self.extend()?;
+                // What lies beyond the end of the step may not exist; that is no reason to shorten it.
+                let zero = self.search_on(index, (1.0, EXTRAPOLATION), sought)?;
+                let Search::At(theta, _) = zero else { continue };
+                if self.t + theta * dt > self.horizon {
+                    continue;
+                }
+                // An extrapolation that is not accurate enough still says how far to go.
+                if self.stepper.extension_defect(theta, &self.scale) > 1.0 {
+                    let gap = ONE_SIDED_AIM * (theta - 1.0) * dt;
+                    sought.longest = sought.longest.min(gap);
+                } else {
+                    self.keep(index, zero, sought);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Zeros that are closer than this, in steps, are one event.
+    pub(crate) fn together(&self, dt: f64) -> f64 {
+        4.0 * EPS * (1.0 + self.t.abs() / dt)
+    }
+
+    /// What bounds over the step up to `reach` prove about a function.
+    pub(crate) fn prove_clear(&self, index: usize, value_at_end: f64, reach: f64) -> Proof {
+        let m = self.motion.monitored[index];
+        let curve = BoundedCurve {
+            system: self.system,
+            interpolant: self.stepper.interpolant(),
+            signs: &self.motion.signs,
+            sliding: self.motion.sliding(),
+            margin: &self.detector.margin,
+            seen: &self.detector.seen,
+            affine: self.motion.affine_bounds(),
+            by_multipliers: !self.motion.slides_by_rule() && self.motion.has_bounds(),
+            known_exits: &self.detector.enclosed_exits,
+            known_roots: &self.detector.enclosed_roots,
+        };
+        // Next to a zero that is divided out the function itself may only rise.
+        let at_start = if m.deflation.is_some() {
+            f64::INFINITY
+        } else {
+            m.value
+        };
+        prove(
+            &mut |a, b| curve.over(&m, a, b),
+            reach,
+            (at_start, (reach == 1.0).then_some(value_at_end)),
+            m.noise,
+            PROOF_DEPTH,
+        )
+    }
+
+    /// Prepares the bounds of many multipliers, once per motion.
+    pub(crate) fn prepare_bounds(&mut self) {
+        let motion = &mut self.motion;
+        if !motion.has_bounds()
+            || motion.affine_bounds.is_some()
+            || self.rule != SlidingRule::Canopy
+        {
+            return;
+        }
+        if let ModeField::Intersection(field) = &motion.field {
+            motion.affine_bounds = Some(field.steady_normal().and_then(AffineBounds::new));
+        }
+    }
+
+    /// How far the motion lies beside the continuous extension, from the probes of the step.
+    pub(crate) fn measure_margin(&mut self, dt: f64) -> Result<(), FieldError> {
+        let Detector { margin, x, .. } = &mut self.detector;
+        if self.motion.is_straight {
+            return Ok(());
+        }
+        margin.resize(x.len(), 0.0);
+        let mut moved = x.clone();
+        for theta in PROBES {
+            self.stepper.interpolant().at(theta, x);
+            moved.copy_from_slice(x);
+            self.motion.project(self.t + theta * dt, &mut moved)?;
+            for ((margin, x), moved) in margin.iter_mut().zip(&*x).zip(&moved) {
+                *margin = margin.max(MARGIN * (moved - x).abs());
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,59 @@
+//! The user's own functions and their zeros so far.
+
+use crate::error::FieldError;
+use crate::event::UserEvent;
+
+/// A zero of a user's function.
+#[derive(Clone, Debug, PartialEq)]
+pub struct UserZero {
+    /// Its time.
+    pub t: f64,
+    /// The state there.
+    pub y: Vec<f64>,
+}
+
+/// The user's functions and their zeros so far.
+pub(crate) struct UserEvents<'a> {
+    pub events: &'a [UserEvent<'a>],
+    /// Value at the start of the step, per event.
+    pub left: Vec<f64>,
+    /// Value at the start of the step before, per event.
+    pub before: Vec<f64>,
+    /// Time of the last zero, per event: divided out while it is the start of the search.
+    pub last: Vec<f64>,
+    pub zeros: Vec<Vec<UserZero>>,
+    /// No step has been taken yet: a zero at the very start counts, as in SciPy.
+    pub at_start: bool,
+    /// The only function is that of the section: its zeros are returns.
+    pub is_section: bool,
+}
+
+/// Stands for a tick among the indices of functions.
+pub const TICK: usize = usize::MAX;
+
+impl<'a> UserEvents<'a> {
+    pub fn new(events: &'a [UserEvent<'a>]) -> Self {
+        let d = events.len();
+        UserEvents {
+            events,
+            left: vec![f64::NAN; d],
+            before: vec![f64::NAN; d],
+            last: vec![f64::NAN; d],
+            zeros: vec![Vec::new(); d],
+            at_start: true,
+            is_section: false,
+        }
+    }
+
+    /// Evaluates the functions at the start of a motion.
+    pub fn restart(&mut self, t: f64, x: &[f64]) -> Result<(), FieldError> {
+        for (event, left) in self.events.iter().zip(&mut self.left) {
+            *left = event.function.value(t, x)?;
+        }
+        Ok(())
+    }
+
+    pub fn into_zeros(self) -> Vec<Vec<UserZero>> {
+        self.zeros
+    }
+}

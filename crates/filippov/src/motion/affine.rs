@@ -1,0 +1,230 @@
+//! The law of sliding on many surfaces where the field is affine in their signs.
+
+use super::canopy::root_ends;
+use crate::cube::{solve_relay, Matrix, RelayProblem, SharedLoad, SharedLoads};
+use crate::error::FieldError;
+use crate::sparse::SparseRows;
+use crate::system::{AffineParts, AffineSigns, PiecewiseSystem};
+use crate::tolerances::{MOST_MEETING, SURFACE_NOISE};
+
+/// Sweeps over all surfaces of a projection; gradients that are orthogonal need one.
+const MOST_SWEEPS: usize = 50;
+
+/// Multipliers by one sparse linear system, however many surfaces there are.
+pub struct AffineLaw<'a> {
+    system: &'a dyn AffineSigns,
+    parts: AffineParts,
+    /// The signs of the last evaluation: those of the mode, with the multipliers last found.
+    signs: Vec<f64>,
+    h: Vec<f64>,
+    /// The scaling of the surfaces, for the stability of the root of three and more.
+    kappa: Vec<f64>,
+    /// The sizes of the rows of N for two surfaces, when they were first looked at: in these units its determinant goes
+    /// through zero where a row does.
+    sizes: Option<[f64; 2]>,
+    /// The exit functions of the root, where they are the same all along the motion and were computed.
+    known_ends: Option<[f64; 2]>,
+    /// No two gradients have a state in common.
+    is_orthogonal: bool,
+    multipliers: Vec<f64>,
+    /// The multipliers last found are not the only ones: redundant contacts share their load.
+    shared: Option<SharedLoad>,
+    loads: Option<SharedLoads>,
+}
+
+impl<'a> AffineLaw<'a> {
+    /// The law for these surfaces; `None` if the field is not affine in their signs.
+    pub fn new(system: &'a dyn PiecewiseSystem, set: &[usize], signs: &[f64]) -> Option<Self> {
+        let affine = system.affine_signs()?;
+        let mut signs = signs.to_vec();
+        set.iter().for_each(|&j| signs[j] = 0.0);
+        let parts = affine.affine_parts(set)?;
+        Some(AffineLaw {
+            system: affine,
+            is_orthogonal: has_disjoint_rows(&parts.gradients),
+            parts,
+            known_ends: None,
+            signs,
+            h: vec![0.0; system.n_surfaces()],
+            kappa: vec![1.0; set.len()],
+            sizes: None,
+            multipliers: vec![f64::NAN; set.len()],
+            shared: None,
+            loads: None,
+        })
+    }
+
+    /// Sets the scaling of the surfaces.
+    pub fn set_scaling(&mut self, kappa: &[f64]) {
+        self.kappa.copy_from_slice(kappa);
+        self.known_ends = None;
+    }
+
+    /// A motion begins.
+    pub fn begin(&mut self) {
+        self.known_ends = None;
+    }
+
+    /// Writes the sliding field at (t, x); NaN, also in the multipliers, where it is not determined. Returns the
+    /// number of evaluations of the right-hand side.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn eval(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<u64, FieldError> {
+        let evaluations = self.parts.evaluate(self.system, t, x, &self.signs)?;
+        self.shared = None;
+        if self.parts.slide(dx).is_ok() {
+            self.multipliers.copy_from_slice(self.parts.multipliers());
+        } else {
+            self.share(dx);
+        }
+        for (&j, &lambda) in self.parts.surfaces().iter().zip(&self.multipliers) {
+            // The nearer the evaluation is to the multipliers, the less cancels.
+            self.signs[j] = if lambda.is_finite() { lambda } else { 0.0 };
+        }
+        Ok(evaluations)
+    }
+
+    /// The field and multipliers where those are not the only ones. All that make the motion slide give the same
+    /// field; those of least norm may be outside of [-1, 1] while others are inside.
+    fn share(&mut self, dx: &mut [f64]) {
+        let surfaces = self.parts.surfaces();
+        let here: Vec<f64> = surfaces.iter().map(|&j| self.signs[j]).collect();
+        let normal = self.parts.normal();
+        if self
+            .loads
+            .as_ref()
+            .is_none_or(|loads| loads.normal() != normal)
+        {
+            self.loads = SharedLoads::new(normal);
+        }
+        let loads = self.loads.as_mut();
+        self.shared = loads.and_then(|loads| loads.at(self.parts.rates(), &here));
+        let Some(shared) = &self.shared else {
+            dx.fill(f64::NAN);
+            self.multipliers.fill(f64::NAN);
+            return;
+        };
+        self.parts.combine(&shared.signs, dx);
+        self.multipliers.copy_from_slice(&shared.signs);
+        let entries = || shared.reserves.iter().zip(&shared.signs);
+        if entries().any(|(reserve, sign)| reserve.is_some() && sign.abs() > 1.0) {
+            let problem = RelayProblem {
+                nu: self.parts.nu(),
+                n: self.parts.normal().clone(),
+                noise: self.system.lie_tolerance(1),
+            };
+            if let Ok(inside) = solve_relay(&problem, &vec![0; here.len()]) {
+                for (place, reserve) in shared.reserves.iter().enumerate() {
+                    if reserve.is_some() {
+                        self.multipliers[place] = inside.signs[place];
+                    }
+                }
+            }
+        }
+    }
+
+    /// The multipliers last found.
+    pub fn multipliers(&self) -> &[f64] {
+        &self.multipliers
+    }
+
+    /// For the multiplier of a contact that shares its load with others, what is left of their strength
+    /// ([`SharedLoad`]); `None` if it is the only one.
+    pub fn reserve(&self, place: usize) -> Option<f64> {
+        self.shared.as_ref()?.reserves[place]
+    }
+
+    /// Do redundant contacts share their load?
+    pub fn is_shared(&self) -> bool {
+        self.shared.is_some()
+    }
+
+    /// The exit functions of the root, as those of the canopy: the determinant of N with the sign of a stable one,
+    /// and the stability ([`root_ends`]). Only for a few surfaces; the friction of many bodies is stable for good.
+    pub fn ends(&mut self, oscillates: &mut Option<bool>) -> [f64; 2] {
+        if self.parts.surfaces().len() > MOST_MEETING || self.is_shared() {
+            return [1.0, 1.0];
+        }
+        let ends = self
+            .known_ends
+            .unwrap_or_else(|| self.present_ends(oscillates));
+        self.known_ends = self.parts.is_steady().then_some(ends);
+        ends
+    }
+
+    /// Those of the last evaluation.
+    fn present_ends(&mut self, oscillates: &mut Option<bool>) -> [f64; 2] {
+        let (normal, m) = (self.parts.normal(), self.parts.surfaces().len());
+        let mut jacobian = Matrix::zeros(m);
+        for i in 0..m {
+            normal.row(i).for_each(|(j, v)| jacobian[(i, j)] = v);
+        }
+        if m > 2 {
+            return root_ends((&jacobian, false), &self.kappa, oscillates);
+        }
+        let size = |i: usize| {
+            let entries = normal.row(i).map(|(_, v)| v.abs());
+            entries.fold(f64::MIN_POSITIVE, f64::max)
+        };
+        let sizes = *self.sizes.get_or_insert_with(|| [size(0), size(1)]);
+        let unit = jacobian.with_rows_scaled(&sizes.map(|size| 1.0 / size));
+        [unit.determinant(), -unit[(0, 0)].min(unit[(1, 1)])]
+    }
+
+    /// N = grad h B, where it is known and the same all along the motion.
+    pub fn steady_normal(&self) -> Option<&SparseRows> {
+        self.parts.is_settled().then(|| self.parts.normal())
+    }
+
+    /// Does one sweep of [`project`](Self::project) do, with gradients that are known for good?
+    pub fn projects_at_once(&self) -> bool {
+        self.is_orthogonal && self.parts.is_settled()
+    }
+
+    /// Moves `x` onto all surfaces, one after the other along their gradients, until all |h| are at the level of
+    /// rounding (Kaczmarz's method). The gradients are those of the last evaluation.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn project(&mut self, t: f64, x: &mut [f64], signs: &[f64]) -> Result<(), FieldError> {
+        // The second sweep takes away what rounding left.
+        let most = if self.projects_at_once() {
+            2
+        } else {
+            MOST_SWEEPS
+        };
+        for _ in 0..most {
+            self.system.surfaces(t, x, signs, &mut self.h)?;
+            let mut is_near = true;
+            let gradients = &self.parts.gradients;
+            // Moves of earlier rows change h of later ones: to first order by their common states.
+            let start = (!self.is_orthogonal).then(|| x.to_vec());
+            for (row, &j) in self.parts.surfaces().iter().enumerate() {
+                let moved = start.as_ref().map_or(0.0, |start| {
+                    let entries = gradients.row(row);
+                    entries.map(|(i, g)| g * (x[i] - start[i])).sum::<f64>()
+                });
+                let h = self.h[j] + moved;
+                let square: f64 = gradients.row(row).map(|(_, g)| g * g).sum();
+                if square == 0.0 || h.abs() <= 0.25 * SURFACE_NOISE * gradients.magnitude(row, x) {
+                    continue;
+                }
+                is_near = false;
+                gradients.row(row).for_each(|(i, g)| x[i] -= g * h / square);
+            }
+            if is_near {
+                break;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn has_disjoint_rows(matrix: &SparseRows) -> bool {
+    let mut columns: Vec<usize> = (0..matrix.n_rows())
+        .flat_map(|row| matrix.columns(row).to_vec())
+        .collect();
+    columns.sort_unstable();
+    columns.windows(2).all(|pair| pair[0] != pair[1])
+}

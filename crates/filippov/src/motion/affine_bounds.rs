@@ -1,0 +1,208 @@
+//! Bounds of the multipliers of many surfaces along a piece of motion.
+
+use std::cell::RefCell;
+
+use filippov_expr::{Interval, Motion};
+
+use crate::cube::{IntervalVector, Vector};
+use crate::mode::Signs;
+use crate::sparse::{SparseRows, SparseSolver};
+use crate::system::AffineSigns;
+
+/// What bounds the multipliers of a mode where gradients and N = grad h B are constant.
+///
+/// With g(lambda_0) the rates of the switching functions at fixed multipliers, lambda = lambda_0 - N^-1 g(lambda_0). For
+/// all g within m +- r
+///
+///   |N^-1 g - N^-1 m| <= `<N>`^-1 r,
+///
+/// where `<N>` has |N_ii| on the diagonal and -|N_ij| beside it, if that is an M-matrix: a sparse system again. The rate
+/// of lambda is bounded as lambda is, from that of g.
+///
+/// Reference: A. Ostrowski, Über die Determinanten mit überwiegender Hauptdiagonale, *Comment. Math. Helv.* 10
+/// (1937); A. Neumaier, *Interval Methods for Systems of Equations* (1990), section 3.7.
+pub struct AffineBounds {
+    normal: RefCell<SparseSolver>,
+    comparison: RefCell<SparseSolver>,
+}
+
+/// The multipliers along a piece of motion, and their rates.
+pub struct EnclosedMultipliers {
+    /// The multipliers.
+    pub values: IntervalVector,
+    /// Their derivatives in time; empty if they are not known to be finite.
+    pub rates: IntervalVector,
+}
+
+impl AffineBounds {
+    /// The bounds where N is this matrix; `None` if it is singular, or its comparison matrix is no M-matrix.
+    pub fn new(matrix: &SparseRows) -> Option<Self> {
+        let (mut normal, mut comparison) = (SparseSolver::default(), SparseSolver::default());
+        normal.factor(matrix).ok()?;
+        comparison.factor(&comparison_of(matrix)).ok()?;
+        let mut positive = vec![1.0; matrix.n_rows()];
+        comparison.solve(&mut positive);
+        // A matrix with this pattern of signs that maps a positive vector to a positive one is an M-matrix.
+        let is_m_matrix = positive.iter().all(|v| v.is_finite() && *v > 0.0);
+        is_m_matrix.then(|| AffineBounds {
+            normal: RefCell::new(normal),
+            comparison: RefCell::new(comparison),
+        })
+    }
+
+    /// The multipliers along a piece of motion, from their values `near` it; `None` if a rate of a switching function has
+    /// no bounds.
+    pub fn enclose(
+        &self,
+        affine: &dyn AffineSigns,
+        set: &[usize],
+        motion: &dyn Motion,
+        signs: &[f64],
+        near: &[f64],
+    ) -> Option<EnclosedMultipliers> {
+        let mut signs = Signs::from_slice(signs);
+        for (&j, &lambda) in set.iter().zip(near) {
+            signs[j] = lambda;
+        }
+        let (mut values, mut rates) = (IntervalVector::new(), IntervalVector::new());
+        for &j in set {
+            let enclosure = affine.enclose_rate(j, motion, &signs)?;
+            values.push(enclosure.value);
+            rates.push(enclosure.rate);
+        }
+        let mut values = self.changes(&values)?;
+        for (value, &lambda) in values.iter_mut().zip(near) {
+            *value = *value + Interval::point(lambda);
+        }
+        let rates = self.changes(&rates).unwrap_or_default();
+        Some(EnclosedMultipliers { values, rates })
+    }
+
+    /// -N^-1 g for all g within these bounds; `None` if one of them is not finite.
+    fn changes(&self, g: &[Interval]) -> Option<IntervalVector> {
+        if !g.iter().all(|g| g.is_bounded()) {
+            return None;
+        }
+        let mut middles: Vector = g.iter().map(|g| 0.5 * (g.lo + g.hi)).collect();
+        let mut radii: Vector = g.iter().map(|g| 0.5 * (g.hi - g.lo)).collect();
+        self.normal.borrow_mut().solve(&mut middles);
+        self.comparison.borrow_mut().solve(&mut radii);
+        let largest = middles.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        // A rounding error per unknown and operation, many times over.
+        let rounding = 1e-12 + 1e-10 * largest;
+        let pairs = middles.iter().zip(&radii);
+        let around =
+            |(m, r): (&f64, &f64)| Interval::around(-m, r.abs() * (1.0 + 1e-10) + rounding);
+        Some(pairs.map(around).collect())
+    }
+}
+
+fn comparison_of(matrix: &SparseRows) -> SparseRows {
+    let mut comparison = SparseRows::new(matrix.n_columns());
+    for i in 0..matrix.n_rows() {
+        let entries = matrix.row(i);
+        comparison.push_row(entries.map(|(j, v)| (j, if i == j { v.abs() } else { -v.abs() })));
+    }
+    comparison
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use filippov_expr::{Backend, Enclosure, Graph, Interval, Motion, Names};
+
+    use super::AffineBounds;
+    use crate::system::{AffineSigns, PiecewiseSystem, TracedSystem};
+
+    /// Three belts that pull at one another: v_i' = sin(t + i) + x_i^2 - sign(v_i) - 0.3 sum of the other signs.
+    fn belts() -> TracedSystem {
+        let mut g = Graph::new();
+        let (time, share) = (g.time(), g.constant(0.3));
+        let signs = [3, 4, 5].map(|i| {
+            let v = g.state(i);
+            g.sign(v)
+        });
+        let mut field = vec![g.constant(0.5), g.constant(-0.2), g.constant(0.1)];
+        for i in 0..3_u32 {
+            let (x, phase) = (g.state(i), g.constant(f64::from(i)));
+            let angle = g.add(time, phase);
+            let (wave, square) = (g.unary(filippov_expr::UnaryOp::Sin, angle), g.mul(x, x));
+            let mut rate = g.add(wave, square);
+            for (k, &sign) in signs.iter().enumerate() {
+                let hold = if k == i as usize {
+                    sign
+                } else {
+                    g.mul(share, sign)
+                };
+                rate = g.sub(rate, hold);
+            }
+            field.push(rate);
+        }
+        TracedSystem::new(g, field, Vec::new(), Names::default(), Backend::Auto).unwrap()
+    }
+
+    /// x from 0.1, 0.2, 0.3 at their constant speeds, v = 0.
+    struct Straight(f64, f64);
+
+    const SPEEDS: [f64; 3] = [0.5, -0.2, 0.1];
+
+    fn state(t: f64) -> [f64; 6] {
+        let x = |i: usize| 0.1 * (i + 1) as f64 + SPEEDS[i] * t;
+        [x(0), x(1), x(2), 0.0, 0.0, 0.0]
+    }
+
+    impl Motion for Straight {
+        fn time(&self) -> Interval {
+            Interval::hull(self.0, self.1)
+        }
+        fn state(&self, index: usize) -> Enclosure {
+            let ends = [state(self.0)[index], state(self.1)[index]];
+            Enclosure {
+                value: Interval::hull(ends[0].min(ends[1]), ends[0].max(ends[1])),
+                rate: Interval::point(SPEEDS.get(index).copied().unwrap_or(0.0)),
+            }
+        }
+    }
+
+    fn multipliers(affine: &dyn AffineSigns, t: f64) -> Vec<f64> {
+        let mut parts = affine.affine_parts(&[0, 1, 2]).unwrap();
+        parts.evaluate(affine, t, &state(t), &[0.0; 3]).unwrap();
+        assert!(parts.is_settled());
+        parts.slide(&mut [0.0; 6]).unwrap();
+        parts.multipliers().to_vec()
+    }
+
+    #[test]
+    fn multipliers_and_their_rates_lie_in_their_bounds() {
+        let system = belts();
+        let affine = system.affine_signs().unwrap();
+        let mut parts = affine.affine_parts(&[0, 1, 2]).unwrap();
+        parts.evaluate(affine, 0.0, &state(0.0), &[0.0; 3]).unwrap();
+        let bounds = AffineBounds::new(parts.normal()).unwrap();
+        let (set, signs) = ([0, 1, 2], [1.0; 3]);
+        for (from, to) in [(0.0, 0.4), (0.3, 0.31), (1.0, 1.7)] {
+            let near = multipliers(affine, 0.5 * (from + to));
+            let motion = Straight(from, to);
+            let found = bounds
+                .enclose(affine, &set, &motion, &signs, &near)
+                .unwrap();
+            for k in 0..=20 {
+                let t = from + (to - from) * f64::from(k) / 20.0;
+                let d = 1e-6;
+                let (lambda, before, after) = (
+                    multipliers(affine, t),
+                    multipliers(affine, t - d),
+                    multipliers(affine, t + d),
+                );
+                for i in 0..3 {
+                    let (value, rate) = (found.values[i], found.rates[i]);
+                    assert!(value.lo <= lambda[i] && lambda[i] <= value.hi);
+                    let slope = (after[i] - before[i]) / (2.0 * d);
+                    assert!(rate.lo - 1e-8 <= slope && slope <= rate.hi + 1e-8);
+                    // No wider than what the motion changes, but for the sums of intervals.
+                    assert!(value.hi - value.lo < 8.0 * (to - from));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,294 @@
+//! The motion in one mode: its field, its signs, and what is monitored.
+
+use std::sync::Arc;
+
+use smallvec::SmallVec;
+
+use super::{AffineBounds, ContactField, Deflation, Guard, Law, ModeField, Monitored, SlidingSet};
+use crate::error::FieldError;
+use crate::mode::{Mode, Signs};
+use crate::options::SlidingRule;
+use crate::system::Actions;
+use crate::system::{MotionJets, PiecewiseSystem};
+
+/// Modes that are remembered: in a run that meets more of them, what follows from a mode is found anew now and then.
+const MOST_KNOWN: usize = 8;
+
+/// What follows from a mode alone, wherever its motion starts.
+struct KnownMode {
+    mode: Mode,
+    active: SmallVec<[bool; 8]>,
+    /// Its Taylor series, once they were asked for and if there are any.
+    jets: Option<Option<Arc<MotionJets>>>,
+    /// What is monitored, where nothing rests and there is no contact.
+    monitored: Option<SmallVec<[Monitored; 2]>>,
+}
+
+/// One piece of constant mode.
+pub(crate) struct CurrentMotion<'a> {
+    pub mode: Mode,
+    pub t_start: f64,
+    /// Signs handed to the field; the surfaces slid on count as +1.
+    pub signs: Signs,
+    /// Surfaces whose sign matters in this mode.
+    pub active: SmallVec<[bool; 8]>,
+    pub field: ModeField<'a>,
+    /// The surfaces slid on, in increasing order.
+    pub sliding: SlidingSet,
+    /// Bounds of their multipliers, once they were asked for and if there are any.
+    pub affine_bounds: Option<Option<AffineBounds>>,
+    /// All of them are affine: the continuous extension of a step does not leave them.
+    pub is_straight: bool,
+    /// Fields of other kinds that earlier motions had, kept for their buffers.
+    idle: Vec<ModeField<'a>>,
+    known: Vec<KnownMode>,
+    /// The place of the present mode among them.
+    current: usize,
+    pub monitored: Vec<Monitored>,
+    /// Its Taylor series, if it is integrated by them.
+    pub jets: Option<Arc<MotionJets>>,
+    /// It slides on several surfaces, some of them with static friction above kinetic.
+    sticks: bool,
+    law: Law<'a>,
+    /// Surfaces that the motion stays on by either field, so that h is zero all along: not monitored.
+    pub resting: SmallVec<[usize; 2]>,
+    /// Surfaces whose functions were found to be zero in this mode, and that neither rest nor are slid on: they stay
+    /// monitored, and are not settled on again.
+    pub settled: SmallVec<[usize; 2]>,
+    actions: &'a Actions<'a>,
+    /// The side of every surface on which the motion is; where its entry is 0, that on which it was last: the side
+    /// of a contact.
+    pub sides: SmallVec<[i8; 16]>,
+    /// Triggers that were crossed against their direction so far.
+    pub passed: Vec<usize>,
+    /// The discrete states.
+    pub discrete: Vec<f64>,
+}
+
+impl<'a> CurrentMotion<'a> {
+    /// The motion in `mode` from `t_start`.
+    pub fn new(
+        system: &'a dyn PiecewiseSystem,
+        t_start: f64,
+        mode: Mode,
+        law: Law<'a>,
+        actions: &'a Actions<'a>,
+    ) -> Self {
+        let (signs, sliding): (_, SlidingSet) = (mode.signs(), mode.sliding_set().collect());
+        let mut motion = CurrentMotion {
+            t_start,
+            active: SmallVec::new(),
+            field: ModeField::new(system, law, &sliding, &signs),
+            affine_bounds: None,
+            is_straight: sliding.iter().all(|&j| system.is_affine(j)),
+            sliding,
+            idle: Vec::new(),
+            known: Vec::with_capacity(MOST_KNOWN),
+            current: 0,
+            monitored: Vec::new(),
+            jets: None,
+            sticks: false,
+            law,
+            resting: SmallVec::new(),
+            settled: SmallVec::new(),
+            actions,
+            sides: actions.sides_at_start(signs.len()).collect(),
+            passed: Vec::new(),
+            discrete: actions.discrete.clone(),
+            signs,
+            mode,
+        };
+        motion.find_monitored(system, &[]);
+        motion
+    }
+
+    /// Becomes the motion in `mode` from `t_start`; zeros to divide out are given per function.
+    pub fn restart(
+        &mut self,
+        system: &'a dyn PiecewiseSystem,
+        t_start: f64,
+        mode: Mode,
+        zeros: &[(Guard, Deflation)],
+    ) {
+        let (signs, sliding): (_, SlidingSet) = (mode.signs(), mode.sliding_set().collect());
+        if !self.actions.list.is_empty() {
+            let known = self.sides.iter_mut().zip(mode.entries());
+            known
+                .filter(|(_, &entry)| entry != 0)
+                .for_each(|(side, &entry)| *side = entry);
+        }
+        let contact = if self.actions.list.is_empty() || sliding.is_empty() {
+            None
+        } else {
+            ContactField::new(system, self.actions, &mode, &self.sides, &self.discrete)
+        };
+        if let Some(contact) = contact {
+            self.replace_field(ModeField::Contact(Box::new(contact)));
+        } else if !self.field.restart(&sliding, &signs) {
+            let known = self
+                .idle
+                .iter_mut()
+                .position(|f| f.restart(&sliding, &signs));
+            let field = match known {
+                Some(index) => self.idle.swap_remove(index),
+                None => ModeField::new(system, self.law, &sliding, &signs),
+            };
+            self.replace_field(field);
+        }
+        if !self.settled.is_empty() && self.mode != mode {
+            self.settled.clear();
+        }
+        self.affine_bounds = None;
+        self.is_straight = sliding.iter().all(|&j| system.is_affine(j));
+        (self.mode, self.t_start, self.signs, self.sliding) = (mode, t_start, signs, sliding);
+        self.find_monitored(system, zeros);
+    }
+
+    /// Takes another field and keeps the one before, if it can be used again.
+    fn replace_field(&mut self, field: ModeField<'a>) {
+        let before = std::mem::replace(&mut self.field, field);
+        if matches!(before, ModeField::Region(_) | ModeField::Sliding(_)) {
+            self.idle.push(before);
+        }
+    }
+
+    /// Finds what is known of the present mode.
+    fn recall(&mut self, system: &dyn PiecewiseSystem) {
+        let place = self.known.iter().position(|known| known.mode == self.mode);
+        self.current = place.unwrap_or_else(|| {
+            if self.known.len() == MOST_KNOWN {
+                self.known.clear();
+            }
+            let mut active = SmallVec::from_elem(false, self.signs.len());
+            system.active(&self.signs, &self.sliding, &mut active);
+            self.known.push(KnownMode {
+                mode: self.mode.clone(),
+                active,
+                jets: None,
+                monitored: None,
+            });
+            self.known.len() - 1
+        });
+        self.active = SmallVec::from_slice(&self.known[self.current].active);
+    }
+
+    /// Takes the Taylor series of the mode; `find` looks for them the first time.
+    pub fn take_jets(&mut self, find: impl FnOnce(&[usize]) -> Option<Arc<MotionJets>>) {
+        let known = &mut self.known[self.current].jets;
+        self.jets = known.get_or_insert_with(|| find(&self.sliding)).clone();
+    }
+
+    fn find_monitored(&mut self, system: &dyn PiecewiseSystem, zeros: &[(Guard, Deflation)]) {
+        self.recall(system);
+        self.sticks = self.sliding.len() > 1 && self.sliding.iter().any(|&j| system.sticks_at(j));
+        let is_plain = self.resting.is_empty()
+            && matches!(self.field, ModeField::Region(_) | ModeField::Sliding(_));
+        let known = self.known[self.current].monitored.as_ref();
+        self.monitored.clear();
+        match known.filter(|_| is_plain) {
+            Some(known) => self.monitored.extend_from_slice(known),
+            None => {
+                self.list_monitored(system);
+                if is_plain {
+                    let listed = SmallVec::from_slice(&self.monitored);
+                    self.known[self.current].monitored = Some(listed);
+                }
+            }
+        }
+        // Of several for one function the first counts.
+        for (guard, deflation) in zeros.iter().rev() {
+            let own = self.monitored.iter_mut().filter(|m| m.guard == *guard);
+            own.for_each(|m| m.deflation = Some(*deflation));
+        }
+        self.note_departure();
+    }
+
+    /// Lists what is monitored in this mode, wherever its motion starts.
+    fn list_monitored(&mut self, system: &dyn PiecewiseSystem) {
+        let signs = &self.signs;
+        let monitor = |guard, place, orientation, affine| Monitored {
+            guard,
+            place,
+            orientation,
+            value: f64::NAN,
+            rate: f64::NAN,
+            curvature: 0.0,
+            affine,
+            deflation: None,
+            noise: 0.0,
+        };
+        let surfaces = (0..signs.len()).filter(|&j| {
+            self.active[j] && self.mode.entries()[j] != 0 && !self.resting.contains(&j)
+        });
+        self.monitored
+            .extend(surfaces.map(|j| monitor(Guard::Surface(j), j, signs[j], system.is_affine(j))));
+        let exits = self.field.guards().into_iter().enumerate();
+        self.monitored
+            .extend(exits.map(|(place, guard)| monitor(guard, place, 1.0, false)));
+    }
+
+    /// Tells the field of a region whether the motion still departs from a surface.
+    pub fn note_departure(&mut self) {
+        let departing = self
+            .monitored
+            .iter()
+            .any(|m| m.deflation.is_some_and(|d| d.order > 1));
+        if let ModeField::Region(field) = &mut self.field {
+            field.set_departing(departing);
+        }
+    }
+
+    /// Do bounds of the multipliers hold for the exit functions?
+    pub fn has_bounds(&self) -> bool {
+        !self.is_in_contact() && !self.sticks
+    }
+
+    /// Is it drawn back to the surfaces slid on, and not projected?
+    pub fn is_drawn_back(&self) -> bool {
+        self.law.restoring.is_some() && !self.sliding.is_empty()
+    }
+
+    /// Is its field the multilinear combination of the fields around the surfaces slid on?
+    pub fn has_canopy_field(&self) -> bool {
+        match &self.field {
+            ModeField::Contact(_) => false,
+            ModeField::Intersection(field) => field.rule() == SlidingRule::Canopy,
+            ModeField::Region(_) | ModeField::Sliding(_) => true,
+        }
+    }
+
+    /// Does it slide on several surfaces by another rule than the canopy?
+    pub fn slides_by_rule(&self) -> bool {
+        matches!(&self.field, ModeField::Intersection(field) if field.rule() != SlidingRule::Canopy)
+    }
+
+    /// Is the motion in contact at some surface?
+    pub fn is_in_contact(&self) -> bool {
+        matches!(self.field, ModeField::Contact(_))
+    }
+
+    /// Does a guard end sliding on several surfaces, or contact?
+    pub fn ends_root(&self, m: &Monitored) -> bool {
+        !m.guard.is_surface() && !matches!(self.field, ModeField::Sliding(_))
+    }
+
+    /// Bounds of the multipliers, if there are any.
+    pub fn affine_bounds(&self) -> Option<&AffineBounds> {
+        self.affine_bounds.as_ref()?.as_ref()
+    }
+
+    /// The surfaces slid on.
+    pub fn sliding(&self) -> &[usize] {
+        &self.sliding
+    }
+
+    /// The multipliers at the last evaluation, in the order of the surfaces slid on.
+    pub fn multipliers(&self) -> SmallVec<[f64; 2]> {
+        self.field.multipliers()
+    }
+
+    /// Moves `x` onto the surfaces slid on.
+    pub fn project(&mut self, t: f64, x: &mut [f64]) -> Result<(), FieldError> {
+        self.field.project(t, x)
+    }
+}

@@ -1,0 +1,383 @@
+//! The sliding field on an intersection of surfaces.
+
+use smallvec::SmallVec;
+
+use super::guard::Guards;
+use super::weights::RuleFailure;
+use super::{
+    AffineLaw, Canopy, Guard, MeetingFields, Motion, Projector, RootEnd, RuleLaw, SmoothField,
+};
+use crate::error::FieldError;
+use crate::mode::Mode;
+use crate::options::SlidingRule;
+use crate::patience::Patience;
+use crate::sparse::SparseRows;
+use crate::system::PiecewiseSystem;
+use crate::tolerances::{MOST_MEETING, MOST_TRACKED};
+
+/// Filippov's field on an intersection of m >= 2 surfaces: the multilinear combination ("canopy") of the
+/// fields around it with the multipliers lambda in [-1, 1]^m that make it tangent to all surfaces,
+///
+///   f_s = sum over k of prod_i (1 + k_i lambda_i)/2 * f^k,   grad h_j . f_s + d_t h_j = 0,
+///
+/// evaluated at the projection of the point onto the intersection. Where the fields are affine in the signs the
+/// multipliers are the solution of one linear system; else, for two surfaces, the root with det G > 0 in closed form;
+/// for more they are tracked by Newton's method.
+///
+/// Reference: Guglielmi, Hairer (2022), sections 2, 4 and 7; `docs/theory/intersections.md`.
+pub struct IntersectionField<'a> {
+    system: &'a dyn PiecewiseSystem,
+    set: Vec<usize>,
+    signs: Vec<f64>,
+    affine: Option<AffineLaw<'a>>,
+    canopy: Option<Canopy>,
+    /// Another combination of the fields, if that was chosen.
+    by_rule: Option<RuleLaw>,
+    /// Why there is none, if one was chosen.
+    refused: Option<RuleFailure>,
+    /// At the last evaluation; none where there is no root.
+    lambda: Vec<f64>,
+    /// Those that were found lately, with their times: from the nearest ones the next are tracked.
+    tracked: Vec<(f64, Vec<f64>)>,
+    exits: Vec<f64>,
+    /// The time of a start at which the equations vanish, and the multipliers there.
+    start: Option<(f64, Vec<f64>)>,
+    is_rootless: bool,
+    /// How far multipliers may go beyond their ends, by exit function.
+    slack: Vec<f64>,
+    /// Whether the regularised motion oscillates around the root of three and more surfaces, once it is known.
+    oscillates: Option<bool>,
+    projector: Projector,
+    /// The factor of the term that draws the motion back, in place of the projection.
+    restoring: Option<f64>,
+    /// How long a search for the first multipliers may take.
+    patience: Patience<'a>,
+    n_evaluations: u64,
+}
+
+impl<'a> IntersectionField<'a> {
+    /// Sliding on the surfaces of `set`, the others with the given signs; the multipliers are tracked from
+    /// `lambda`, or found anew if that is empty. If the signs of more than [`MOST_MEETING`] of them multiply one
+    /// another there are no multipliers.
+    pub fn new(
+        system: &'a dyn PiecewiseSystem,
+        set: &[usize],
+        signs: &[f64],
+        lambda: &[f64],
+    ) -> Self {
+        let affine = AffineLaw::new(system, set, signs);
+        // Its space grows as the square of the number of surfaces: where there are many, only what needs it has it.
+        let has_canopy = match affine {
+            Some(_) => set.len() <= MOST_MEETING,
+            None => {
+                let groups = system.sign_groups(set);
+                groups.iter().all(|group| group.len() <= MOST_MEETING)
+            }
+        };
+        IntersectionField {
+            system,
+            set: set.to_vec(),
+            signs: signs.to_vec(),
+            affine,
+            canopy: has_canopy.then(|| Canopy::new(system, set)),
+            by_rule: None,
+            refused: None,
+            lambda: Vec::new(),
+            tracked: vec![(f64::INFINITY, lambda.to_vec())],
+            exits: vec![f64::NAN; 2 * set.len() + 2],
+            start: None,
+            is_rootless: false,
+            slack: vec![0.0; 2 * set.len()],
+            oscillates: None,
+            projector: Projector::new(system.n_states(), system.n_surfaces()),
+            restoring: None,
+            patience: Patience::endless(),
+            n_evaluations: 0,
+        }
+    }
+
+    /// The same with another combination of the fields, of up to [`MOST_MEETING`] surfaces; of more there is one only
+    /// where the field is affine in the signs, so that all rules but that of Dieci and Lopez are the canopy.
+    #[must_use]
+    pub fn with_rule(mut self, rule: SlidingRule) -> Self {
+        let m = self.set.len();
+        if rule == SlidingRule::Canopy {
+            return self;
+        }
+        if m <= MOST_MEETING {
+            self.by_rule = Some(RuleLaw::new(self.system, &self.set, rule));
+        } else if self.affine.is_none() || rule == SlidingRule::DieciLopez {
+            self.refused = Some(match rule {
+                SlidingRule::Moments => RuleFailure::NotTwoSurfaces { m },
+                _ => RuleFailure::TooManySurfaces { m },
+            });
+        }
+        self
+    }
+
+    /// The search for its first multipliers ends without any when the caller has waited long enough.
+    pub fn set_patience(&mut self, patience: Patience<'a>) {
+        self.patience = patience;
+    }
+
+    /// The same drawn back to the surfaces by a term with this factor, if there is one, and not projected.
+    #[must_use]
+    pub fn with_restoring(mut self, restoring: Option<f64>) -> Self {
+        self.restoring = restoring;
+        self
+    }
+
+    /// The same with the surfaces of the set scaled by `kappa`: for three and more of them it decides how long the
+    /// root counts as stable.
+    #[must_use]
+    pub fn with_scaling(mut self, kappa: &[f64]) -> Self {
+        if let Some(law) = &mut self.affine {
+            law.set_scaling(kappa);
+        }
+        if let Some(canopy) = &mut self.canopy {
+            canopy.set_scaling(kappa);
+        }
+        self
+    }
+
+    /// Begins a motion: its multipliers are tracked from these, if there are any. `oscillates` says that the
+    /// regularised motion goes around the root, so that it need not be stable.
+    pub fn begin(&mut self, lambda: &[f64], oscillates: bool) {
+        self.tracked = vec![(f64::INFINITY, lambda.to_vec())];
+        self.start = None;
+        self.oscillates = oscillates.then_some(true);
+        if let Some(law) = &mut self.affine {
+            law.begin();
+        }
+    }
+
+    /// The equations vanish at the start of the motion: its multipliers there are those that it begins with.
+    pub fn hold_at_start(&mut self, t: f64) {
+        self.start = self.tracked.first().map(|(_, lambda)| (t, lambda.clone()));
+    }
+
+    /// Lets the multiplier of a guard go beyond its end by this much.
+    pub fn set_slack(&mut self, guard: Guard, slack: f64) {
+        let place = self.guards().iter().position(|own| *own == guard);
+        if let Some(own) = place.and_then(|place| self.slack.get_mut(place)) {
+            *own = slack;
+        }
+    }
+
+    /// Do redundant contacts share their load at the last evaluation? The equations then do not determine the multipliers.
+    pub fn shares_load(&self) -> bool {
+        self.affine.as_ref().is_some_and(AffineLaw::is_shared)
+    }
+
+    /// N = grad h B at the last evaluation, where it is the same all along the motion.
+    pub fn steady_normal(&self) -> Option<&SparseRows> {
+        self.affine.as_ref()?.steady_normal()
+    }
+
+    /// Does the regularised motion oscillate around the root, for three and more surfaces?
+    pub fn oscillates(&self) -> bool {
+        self.oscillates == Some(true)
+    }
+
+    /// The multipliers at the last evaluation, or if there are none those that were found nearest to time t.
+    pub fn tracked(&self, t: f64) -> &[f64] {
+        if self.lambda.is_empty() {
+            by_distance(&self.tracked, t)
+                .first()
+                .copied()
+                .unwrap_or(&[])
+        } else {
+            &self.lambda
+        }
+    }
+
+    fn track(&mut self, t: f64) {
+        if self.tracked.len() >= MOST_TRACKED {
+            // Every other one is dropped: they stay spread over the times that were asked for.
+            let mut index = 0;
+            self.tracked.retain(|_| {
+                index += 1;
+                index % 2 == 0
+            });
+        }
+        self.tracked.push((t, self.lambda.clone()));
+    }
+
+    /// The combination of the fields.
+    pub fn rule(&self) -> SlidingRule {
+        self.by_rule
+            .as_ref()
+            .map_or(SlidingRule::Canopy, RuleLaw::rule)
+    }
+
+    /// Why the chosen rule does not give the field at the last evaluation ([`RuleLaw::refusal`]). The canopy
+    /// has its own decisions.
+    pub fn refusal(&self, tolerance: f64) -> Option<RuleFailure> {
+        let by_rule = self.by_rule.as_ref();
+        let refused = self.refused.clone();
+        refused.or_else(|| by_rule?.refusal(tolerance))
+    }
+
+    /// The motions that leave the intersection under the chosen rule ([`RuleLaw::leaving`]).
+    pub fn leaving(&self, tolerance: f64) -> Vec<Mode> {
+        let by_rule = self.by_rule.as_ref();
+        by_rule.map_or_else(Vec::new, |law| law.leaving(tolerance))
+    }
+
+    /// The surfaces slid on.
+    pub fn set(&self) -> &[usize] {
+        &self.set
+    }
+
+    /// Were all fields there at the last evaluation, but no multipliers?
+    pub fn is_rootless(&self) -> bool {
+        self.is_rootless
+    }
+
+    /// Evaluates multipliers and exit functions at (t, x) and writes the field. Where there is no root they are NaN.
+    fn solve(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), FieldError> {
+        self.is_rootless = false;
+        if let Some((_, lambda)) = self.start.as_ref().filter(|(start, _)| *start == t) {
+            let mut around = MeetingFields::new(self.system, &self.set);
+            self.n_evaluations += around.evaluate(self.system, t, x, &self.signs)?;
+            let mut weights = Vec::new();
+            around.fill_product_weights(lambda, &mut weights);
+            around.combine(&weights, dx);
+            self.lambda.clone_from(lambda);
+            // The root was chosen among those that are stable.
+            self.fill_exits([1.0, 1.0]);
+            return Ok(());
+        }
+        if let Some(law) = &mut self.by_rule {
+            let evaluated = (self.system, &self.signs[..]);
+            self.n_evaluations += law.eval(evaluated, t, x, &mut self.lambda, dx)?;
+            self.exits.copy_from_slice(law.exits());
+            return Ok(());
+        }
+        if let Some(law) = &mut self.affine {
+            self.n_evaluations += law.eval(t, x, dx)?;
+            if law.multipliers().iter().all(|l| l.is_finite()) {
+                self.lambda.clear();
+                self.lambda.extend(law.multipliers());
+                let ends = law.ends(&mut self.oscillates);
+                self.fill_exits(ends);
+                return Ok(());
+            }
+        }
+        let found = match &mut self.canopy {
+            Some(canopy) => {
+                self.n_evaluations += canopy.evaluate(self.system, t, x, &self.signs)?;
+                canopy.solve(
+                    &by_distance(&self.tracked, t),
+                    &mut self.oscillates,
+                    dx,
+                    self.patience,
+                )
+            }
+            None => None,
+        };
+        match found {
+            Some((lambda, ends)) => {
+                self.lambda = lambda;
+                self.track(t);
+                self.fill_exits(ends);
+            }
+            None => {
+                let canopy = self.canopy.as_ref();
+                self.is_rootless = canopy.is_some_and(Canopy::is_finite);
+                self.exits.fill(f64::NAN);
+                self.lambda.clear();
+                dx.fill(f64::NAN);
+            }
+        }
+        Ok(())
+    }
+
+    /// The ends of the multipliers, then those of the root.
+    fn fill_exits(&mut self, [fold, stability]: [f64; 2]) {
+        let pairs = self
+            .exits
+            .chunks_exact_mut(2)
+            .zip(self.slack.chunks_exact(2));
+        for ((pair, slack), lambda) in pairs.zip(&self.lambda) {
+            (pair[0], pair[1]) = (1.0 + lambda + slack[0], 1.0 - lambda + slack[1]);
+        }
+        let m = self.lambda.len();
+        // Contacts that share their load give way together.
+        for place in 0..m {
+            let reserve = self.affine.as_ref().and_then(|law| law.reserve(place));
+            if let Some(reserve) = reserve {
+                let slack = &self.slack[2 * place..];
+                (self.exits[2 * place], self.exits[2 * place + 1]) =
+                    (reserve + slack[0], reserve + slack[1]);
+            }
+        }
+        (self.exits[2 * m], self.exits[2 * m + 1]) = (fold, stability);
+    }
+}
+
+/// The multipliers, those with the nearest times first; of several the last.
+fn by_distance(tracked: &[(f64, Vec<f64>)], t: f64) -> Vec<&[f64]> {
+    let mut all: Vec<&(f64, Vec<f64>)> = tracked.iter().rev().collect();
+    all.sort_by(|a, b| (a.0 - t).abs().total_cmp(&(b.0 - t).abs()));
+    all.into_iter().map(|found| &found.1[..]).collect()
+}
+
+impl Motion for IntersectionField<'_> {
+    /// The ends of the multipliers, then those of the root.
+    fn guards(&self) -> Guards {
+        let ends = self.set.iter().flat_map(|&j| Guard::ends(j));
+        ends.chain([RootEnd::Fold, RootEnd::Stability].map(Guard::Root))
+            .collect()
+    }
+
+    fn last_exits(&self) -> &[f64] {
+        &self.exits
+    }
+
+    fn multipliers(&self) -> SmallVec<[f64; 2]> {
+        SmallVec::from_slice(&self.lambda)
+    }
+
+    fn project(&mut self, t: f64, x: &mut [f64]) -> Result<(), FieldError> {
+        if self.restoring.is_some() {
+            return Ok(());
+        }
+        match &mut self.affine {
+            Some(law)
+                if self.set.len() > MOST_MEETING || law.is_shared() || law.projects_at_once() =>
+            {
+                law.project(t, x, &self.signs)
+            }
+            _ => self
+                .projector
+                .project_onto(self.system, &self.set, t, x, &self.signs),
+        }
+    }
+}
+
+impl SmoothField for IntersectionField<'_> {
+    fn eval(&mut self, t: f64, x: &mut [f64], dx: &mut [f64]) -> Result<(), FieldError> {
+        self.project(t, x)?;
+        self.solve(t, x, dx)?;
+        if let Some(factor) = self.restoring {
+            let term = (&self.set[..], factor);
+            self.projector
+                .pull_back(self.system, term, (t, x), &self.signs, dx)?;
+        }
+        Ok(())
+    }
+
+    fn eval_unprojected(
+        &mut self,
+        t: f64,
+        x: &mut [f64],
+        dx: &mut [f64],
+    ) -> Result<(), FieldError> {
+        self.solve(t, x, dx)
+    }
+
+    fn n_evaluations(&self) -> u64 {
+        self.n_evaluations
+    }
+}

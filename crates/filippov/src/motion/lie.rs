@@ -1,0 +1,148 @@
+//! The first Lie derivative that does not vanish.
+
+use crate::error::FieldError;
+use crate::mode::Signs;
+use crate::system::{move_inside, side_offsets};
+use crate::system::{LieValue, PiecewiseSystem};
+use crate::tolerances::{MAX_LIE_ORDER, SIDE_REACH};
+
+/// The first non-vanishing derivative of h along a field: h(t) = value (t - t0)^order / order! + ...
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Leading {
+    /// The order; 0 if none was found up to the highest order looked at.
+    pub order: usize,
+    /// The derivative.
+    pub value: f64,
+}
+
+impl Leading {
+    /// -1, 0 or +1: the side of the surface that the field moves to.
+    pub fn sign(&self) -> i8 {
+        match self.order {
+            0 => 0,
+            _ if self.value > 0.0 => 1,
+            _ => -1,
+        }
+    }
+
+    /// The coefficient of (t - t0)^order.
+    pub fn coefficient(&self) -> f64 {
+        self.value / (1..=self.order).map(|k| k as f64).product::<f64>()
+    }
+}
+
+/// The first non-vanishing Lie derivative of h_j along f with entry `j` of the signs set to `side`.
+///
+/// `vanishing` is the number of orders known to be zero (1 where an exit function was just found to
+/// vanish): they are skipped. Where a derivative does not exist on the surface (a power of the distance),
+/// all orders are looked at just inside of the region.
+///
+/// # Errors
+/// If a function of the user raises.
+pub fn first_nonzero(
+    system: &dyn PiecewiseSystem,
+    j: usize,
+    side: i8,
+    vanishing: usize,
+    t: f64,
+    x: &[f64],
+    signs: &[f64],
+) -> Result<Leading, FieldError> {
+    let mut signs_side = Signs::from_slice(signs);
+    signs_side[j] = f64::from(side);
+    if let Some(leading) = scan(system, j, side, vanishing, t, x, &signs_side)? {
+        return Ok(leading);
+    }
+    for offset in side_offsets(x) {
+        let inside = move_inside(system, t, x, &signs_side, offset, SIDE_REACH * offset)?;
+        if let Some(leading) = scan(system, j, side, 0, t, &inside, &signs_side)? {
+            return Ok(leading);
+        }
+    }
+    Ok(Leading {
+        order: 0,
+        value: 0.0,
+    })
+}
+
+/// As [`first_nonzero`] for both sides, f- and f+, at once: where neither is tangent one evaluation may do.
+///
+/// # Errors
+/// If a function of the user raises.
+pub(crate) fn first_nonzero_of_both(
+    system: &dyn PiecewiseSystem,
+    j: usize,
+    vanishing: [usize; 2],
+    t: f64,
+    x: &[f64],
+    signs: &[f64],
+) -> Result<[Leading; 2], FieldError> {
+    let firsts = system.first_lie_derivatives(j, t, x, signs);
+    let tolerance = system.lie_tolerance(1);
+    let leading = |index: usize, side: i8| match firsts.map(|firsts| firsts[index]) {
+        Some(LieValue { value, magnitude })
+            if vanishing[index] == 0
+                && value.is_finite()
+                && value.abs() > tolerance * magnitude =>
+        {
+            Ok(Leading { order: 1, value })
+        }
+        _ => first_nonzero(system, j, side, vanishing[index], t, x, signs),
+    };
+    Ok([leading(0, -1)?, leading(1, 1)?])
+}
+
+/// As [`first_nonzero`] at this very point; `None` where a derivative is not finite.
+fn scan(
+    system: &dyn PiecewiseSystem,
+    j: usize,
+    side: i8,
+    vanishing: usize,
+    t: f64,
+    x: &[f64],
+    signs: &[f64],
+) -> Result<Option<Leading>, FieldError> {
+    let highest = system.max_lie_order().min(MAX_LIE_ORDER);
+    let word = [side; MAX_LIE_ORDER];
+    for order in vanishing + 1..=highest {
+        let LieValue { value, magnitude } =
+            system.lie_derivative(j, j, &word[..order], t, x, signs)?;
+        if !value.is_finite() {
+            return Ok(None);
+        }
+        if value.abs() > system.lie_tolerance(order) * magnitude {
+            return Ok(Some(Leading { order, value }));
+        }
+    }
+    Ok(Some(Leading {
+        order: 0,
+        value: 0.0,
+    }))
+}
+
+/// The normal component dh_i/dt along f with entry `j` of the signs set to `side`, taken just inside of
+/// the region where it does not exist on the surface.
+///
+/// # Errors
+/// If a function of the user raises.
+pub fn normal_component(
+    system: &dyn PiecewiseSystem,
+    i: usize,
+    j: usize,
+    side: i8,
+    t: f64,
+    x: &[f64],
+    signs: &[f64],
+) -> Result<LieValue, FieldError> {
+    let mut signs_side = Signs::from_slice(signs);
+    signs_side[j] = f64::from(side);
+    let mut lie = system.lie_derivative(i, j, &[side], t, x, &signs_side)?;
+    for offset in side_offsets(x) {
+        if lie.value.is_finite() {
+            break;
+        }
+        let inside = move_inside(system, t, x, &signs_side, offset, SIDE_REACH * offset)?;
+        lie = system.lie_derivative(i, j, &[side], t, &inside, &signs_side)?;
+    }
+    Ok(lie)
+}

@@ -1,0 +1,182 @@
+//! Projection onto a surface, or onto an intersection of surfaces.
+
+use crate::cube::{Matrix, Vector};
+use crate::error::FieldError;
+use crate::system::{dot, dot_magnitude, PiecewiseSystem};
+use crate::tolerances::SURFACE_NOISE;
+
+/// Scratch space of the projection.
+#[derive(Clone, Debug)]
+pub struct Projector {
+    h: Vec<f64>,
+    gradient: Vec<f64>,
+    /// The gradients of several surfaces.
+    rows: Vec<f64>,
+}
+
+impl Projector {
+    /// Space for a system with n states and d surfaces.
+    pub fn new(n: usize, d: usize) -> Self {
+        Projector {
+            h: vec![0.0; d],
+            gradient: vec![0.0; n],
+            rows: Vec::new(),
+        }
+    }
+
+    /// Moves `x` onto h_j(t, x) = 0 along the gradient: x <- x - h grad h / |grad h|^2, repeated
+    /// until |h| is at the level of rounding, at most four times; once if h is affine.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn project(
+        &mut self,
+        system: &dyn PiecewiseSystem,
+        j: usize,
+        t: f64,
+        x: &mut [f64],
+        signs: &[f64],
+    ) -> Result<(), FieldError> {
+        let most = if system.is_affine(j) { 1 } else { 4 };
+        for _ in 0..most {
+            system.surfaces(t, x, signs, &mut self.h)?;
+            let h = self.h[j];
+            if h == 0.0 || !h.is_finite() {
+                break;
+            }
+            system.gradient(j, t, x, signs, &mut self.gradient)?;
+            let norm2: f64 = self.gradient.iter().map(|g| g * g).sum();
+            let size: f64 = self
+                .gradient
+                .iter()
+                .zip(&*x)
+                .map(|(g, x)| (g * x).abs())
+                .sum();
+            if norm2 == 0.0 || h.abs() <= 0.25 * SURFACE_NOISE * size {
+                break;
+            }
+            let shift = h / norm2;
+            x.iter_mut()
+                .zip(&self.gradient)
+                .for_each(|(x, g)| *x -= shift * g);
+        }
+        Ok(())
+    }
+
+    /// Moves `x` onto all surfaces of `set` at once, x <- x - N^T (N N^T)^-1 h with the gradients as the rows of N,
+    /// repeated until every |h| is at the level of rounding, at most eight times. A surface whose gradient depends on those
+    /// of others is in the place of them, and goes with them.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn project_onto(
+        &mut self,
+        system: &dyn PiecewiseSystem,
+        set: &[usize],
+        t: f64,
+        x: &mut [f64],
+        signs: &[f64],
+    ) -> Result<(), FieldError> {
+        if let &[j] = set {
+            return self.project(system, j, t, x, signs);
+        }
+        let n = x.len();
+        self.rows.resize(n * set.len(), 0.0);
+        for _ in 0..8 {
+            system.surfaces(t, x, signs, &mut self.h)?;
+            let mut is_near = true;
+            for (row, &j) in self.rows.chunks_exact_mut(n).zip(set) {
+                system.gradient(j, t, x, signs, row)?;
+                is_near &= self.h[j].abs() <= 0.25 * SURFACE_NOISE * dot_magnitude(row, x);
+            }
+            if is_near {
+                break;
+            }
+            let h: Vector = set.iter().map(|&j| self.h[j]).collect();
+            let Some(shifts) = shares_of_rows(&self.rows, &h) else {
+                break;
+            };
+            for (row, shift) in self.rows.chunks_exact(n).zip(shifts) {
+                x.iter_mut().zip(row).for_each(|(x, g)| *x -= shift * g);
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds the term that draws a point beside the surfaces back to them, -C sum h_j grad h_j.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn pull_back(
+        &mut self,
+        system: &dyn PiecewiseSystem,
+        (set, factor): (&[usize], f64),
+        (t, x): (f64, &[f64]),
+        signs: &[f64],
+        dx: &mut [f64],
+    ) -> Result<(), FieldError> {
+        system.surfaces(t, x, signs, &mut self.h)?;
+        for &j in set {
+            system.gradient(j, t, x, signs, &mut self.gradient)?;
+            let pull = factor * self.h[j];
+            let components = dx.iter_mut().zip(&self.gradient);
+            components.for_each(|(dx, g)| *dx -= pull * g);
+        }
+        Ok(())
+    }
+}
+
+/// The combination of some rows, one after the other, that is the shortest vector with these inner products with them:
+/// (N N^T)^-1 h. A row that depends on earlier ones has no share in it. `None` if a number is not finite.
+pub fn shares_of_rows(rows: &[f64], values: &[f64]) -> Option<Vector> {
+    let m = values.len();
+    let n = rows.len() / m;
+    let row = |i: usize| &rows[i * n..(i + 1) * n];
+    let mut gram = Matrix::zeros(m);
+    for i in 0..m {
+        for j in 0..m {
+            gram[(i, j)] = dot(row(i), row(j));
+        }
+    }
+    let shares = gram.solve_gram(values);
+    let is_finite = shares.iter().all(|v| v.is_finite());
+    is_finite.then_some(shares)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::TracedSystem;
+    use filippov_expr::{Backend, Graph, Names, UnaryOp};
+
+    /// Beside the surface x^2 + y^2 = 0.64 the products of its gradient and that of hypot(x, y) - 0.8 are those of dependent
+    /// vectors up to rounding, which must not decide how far a point is moved.
+    #[test]
+    fn surfaces_in_one_place_are_projected_onto_as_one() {
+        let mut g = Graph::new();
+        let (x, y) = (g.state(0), g.state(1));
+        let (xx, yy) = (g.mul(x, x), g.mul(y, y));
+        let square = g.add(xx, yy);
+        let (limit, radius) = (g.constant(0.64), g.constant(0.8));
+        let length = g.unary(UnaryOp::Sqrt, square);
+        let (h0, h1) = (g.sub(square, limit), g.sub(length, radius));
+        let field = vec![g.sign(h0), g.sign(h1)];
+        let names = Names::default();
+        let system = TracedSystem::new(g, field, Vec::new(), names, Backend::Auto).unwrap();
+        assert_eq!(system.n_surfaces(), 2);
+        let (mut projector, signs) = (Projector::new(2, 2), [1.0, 1.0]);
+        let mut h = [0.0; 2];
+        for k in 0..50_000 {
+            let angle = 1e-4 * f64::from(k);
+            let r = 0.8 + 1e-8 * (1e-3 * f64::from(k)).sin();
+            let mut x = [r * angle.cos(), r * angle.sin()];
+            projector
+                .project_onto(&system, &[0, 1], 0.0, &mut x, &signs)
+                .unwrap();
+            system.surfaces(0.0, &x, &signs, &mut h).unwrap();
+            assert!(h[0].abs().max(h[1].abs()) < 4e-15, "{h:?} at {angle}");
+            assert!((x[1].atan2(x[0]) - angle).sin().abs() < 1e-15);
+        }
+    }
+}

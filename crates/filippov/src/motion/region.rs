@@ -1,0 +1,108 @@
+//! The field of a region.
+
+use super::{Motion, SmoothField};
+use crate::error::FieldError;
+use crate::mode::Signs;
+use crate::system::{move_inside, side_offsets, PiecewiseSystem};
+
+/// The smooth field of one region: f(t, x, s) with fixed signs.
+pub struct RegionField<'a> {
+    system: &'a dyn PiecewiseSystem,
+    signs: Signs,
+    n_evaluations: u64,
+    departing: bool,
+}
+
+impl<'a> RegionField<'a> {
+    /// The field of the region with these signs.
+    pub fn new(system: &'a dyn PiecewiseSystem, signs: &[f64]) -> Self {
+        RegionField {
+            system,
+            signs: Signs::from_slice(signs),
+            n_evaluations: 0,
+            departing: false,
+        }
+    }
+
+    /// Starts anew in another region.
+    pub fn restart(&mut self, signs: &[f64]) {
+        self.signs.copy_from_slice(signs);
+        self.n_evaluations = 0;
+        self.departing = false;
+    }
+
+    /// While the motion departs tangentially from a surface, stages may lie beyond it however short
+    /// the step: a field that is not finite there is continued by its value on the surface.
+    pub fn set_departing(&mut self, departing: bool) {
+        self.departing = departing;
+    }
+
+    /// The field just inside of the region, as near as it is finite.
+    #[cold]
+    fn eval_inside(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), FieldError> {
+        for offset in side_offsets(x) {
+            let inside = move_inside(self.system, t, x, &self.signs, offset, f64::INFINITY)?;
+            self.system.field(t, &inside, &self.signs, dx)?;
+            self.n_evaluations += 1;
+            if dx.iter().all(|v| v.is_finite()) {
+                break;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl SmoothField for RegionField<'_> {
+    #[inline(always)]
+    fn eval(&mut self, t: f64, x: &mut [f64], dx: &mut [f64]) -> Result<(), FieldError> {
+        self.n_evaluations += 1;
+        self.system.field(t, x, &self.signs, dx)?;
+        if self.departing && dx.iter().any(|v| !v.is_finite()) {
+            self.eval_inside(t, x, dx)?;
+        }
+        Ok(())
+    }
+
+    fn n_evaluations(&self) -> u64 {
+        self.n_evaluations
+    }
+}
+
+impl Motion for RegionField<'_> {}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use filippov_expr::{Backend, BinaryOp, Graph, Names};
+
+    use super::RegionField;
+    use crate::motion::SmoothField;
+    use crate::system::TracedSystem;
+
+    /// x' = 1 + (|x|^2 - 1)^(3/2): it exists only outside of the unit circle.
+    fn outside_of_the_circle() -> TracedSystem {
+        let mut g = Graph::new();
+        let (x, y, one) = (g.state(0), g.state(1), g.constant(1.0));
+        let (x2, y2, exponent) = (g.mul(x, x), g.mul(y, y), g.constant(1.5));
+        let radius = g.add(x2, y2);
+        let h = g.sub(radius, one);
+        g.declare_surface(h);
+        let power = g.binary(BinaryOp::Pow, h, exponent);
+        let fast = g.add(one, power);
+        TracedSystem::new(g, vec![fast, one], vec![], Names::default(), Backend::Auto).unwrap()
+    }
+
+    #[test]
+    fn a_stage_far_behind_a_curved_surface_is_continued_from_the_surface_at_once() {
+        let system = outside_of_the_circle();
+        let mut field = RegionField::new(&system, &[1.0]);
+        let (mut x, mut dx) = ([0.7, 0.5], [0.0; 2]);
+        field.eval(0.0, &mut x, &mut dx).unwrap();
+        assert!(dx[0].is_nan());
+        field.set_departing(true);
+        field.eval(0.0, &mut x, &mut dx).unwrap();
+        assert!((dx[0] - 1.0).abs() < 1e-12);
+        // The two that do not exist, and one inside of the region.
+        assert_eq!(field.n_evaluations(), 3);
+    }
+}

@@ -1,0 +1,14 @@
+//! What is kept of a run: steps, segments, switches, decisions, returns to a section.
+
+mod decision_record;
+mod recorder;
+pub mod section;
+mod solution;
+
+pub(crate) use decision_record::decide_and_record;
+pub use decision_record::{
+    replay_decision, DecisionCause, DecisionOutcome, DecisionPoint, DecisionRecord, StartingZero,
+};
+pub(crate) use recorder::Recorder;
+pub(crate) use solution::Step;
+pub use solution::{as_multiplier, Segment, Side, Solution};

@@ -1,0 +1,279 @@
+//! What is kept of a run while it goes on.
+
+use smallvec::SmallVec;
+
+use crate::event::UserZero;
+use crate::mode::Mode;
+use crate::options::{Keep, Options, Stabilization};
+use crate::record::section::Observer;
+use crate::record::DecisionRecord;
+use crate::record::{Segment, Solution, Step};
+use crate::stats::Stats;
+use crate::status::{Stop, Warning};
+use crate::stepper::Interpolant;
+use crate::switch::Switch;
+use crate::tolerances::LATEST_SWITCHES;
+
+/// Room that is made at once for so many steps and switches: more of them take more room then.
+const USUAL_LENGTH: usize = 64;
+
+/// Keeps what a run produces, as far as it is wanted.
+///
+/// The last switches are kept in any case: they tell whether switches accumulate.
+pub(crate) struct Recorder {
+    n: usize,
+    keep: Keep,
+    t: Vec<f64>,
+    y: Vec<f64>,
+    y0: Vec<f64>,
+    keep_dense: bool,
+    steps: Vec<Step>,
+    coefficients: Vec<f64>,
+    segments: Vec<Segment>,
+    switches: Vec<Switch>,
+    /// The last jump of the state.
+    jump: Option<(f64, Vec<f64>)>,
+    /// Wanted times that are sampled as the run goes on, the next one first.
+    wanted: Vec<f64>,
+    next: usize,
+    is_sampled: bool,
+    /// Watches the section, if there is one.
+    pub observer: Option<Observer>,
+    /// The decisions, if they are wanted.
+    pub decisions: Vec<DecisionRecord>,
+}
+
+impl Recorder {
+    pub fn new(n: usize, options: &Options) -> Self {
+        let keeps_steps = options.keep == Keep::Steps;
+        let keep_dense = keeps_steps && options.dense_output;
+        let wanted = options.t_eval.clone().filter(|_| !keep_dense);
+        let room = if keeps_steps { USUAL_LENGTH } else { 0 };
+        Recorder {
+            n,
+            keep: options.keep,
+            t: Vec::with_capacity(room),
+            y: Vec::with_capacity(room * n),
+            y0: vec![0.0; n],
+            keep_dense,
+            steps: Vec::new(),
+            coefficients: Vec::new(),
+            segments: Vec::with_capacity(room),
+            switches: Vec::with_capacity(room),
+            jump: None,
+            is_sampled: wanted.is_some(),
+            wanted: wanted.unwrap_or_default(),
+            next: 0,
+            observer: None,
+            decisions: Vec::new(),
+        }
+    }
+
+    /// Are the continuous extensions kept?
+    pub fn keeps_dense(&self) -> bool {
+        self.keep_dense
+    }
+
+    /// Does every step go into the result?
+    fn keeps_steps(&self) -> bool {
+        self.keep == Keep::Steps && !self.is_sampled
+    }
+
+    fn push(&mut self, t: f64, y: &[f64]) {
+        self.t.push(t);
+        self.y.extend_from_slice(y);
+    }
+
+    pub fn start(&mut self, t: f64, y: &[f64]) {
+        self.y0.copy_from_slice(y);
+        if self.keeps_steps() {
+            self.push(t, y);
+        }
+    }
+
+    /// The next wanted time before `t_stop`, if times are sampled.
+    pub fn wanted_before(&self, t_stop: f64) -> Option<f64> {
+        let t = self.wanted.get(self.next).copied();
+        t.filter(|&t| t < t_stop)
+    }
+
+    /// The state at the next wanted time.
+    pub fn sample(&mut self, y: &[f64]) {
+        let t = self.wanted[self.next];
+        self.next += 1;
+        self.push(t, y);
+    }
+
+    /// The state just recorded has jumped: the limit from the right is kept.
+    pub fn jump(&mut self, t: f64, y: &[f64]) {
+        self.jump = Some((t, y.to_vec()));
+        if self.keeps_steps() {
+            let start = self.y.len() - self.n;
+            self.y[start..].copy_from_slice(y);
+        }
+    }
+
+    /// The states before the first switch of this instant, which is `first`, and after the last one.
+    pub fn set_jump(&mut self, first: usize, before: &[f64], after: &[f64]) {
+        if let Some(switch) = self.switches.get_mut(first) {
+            switch.y_before = SmallVec::from_slice(before);
+        }
+        if let Some(switch) = self.switches[first..].last_mut() {
+            switch.y_after = SmallVec::from_slice(after);
+        }
+    }
+
+    /// The mode after the switches of this instant, of which `first` is the first.
+    pub fn set_last_mode(&mut self, first: usize, after: &Mode) {
+        if let Some(last) = self.switches[first..].last_mut() {
+            last.mode_after = after.clone();
+        }
+    }
+
+    pub fn begin_segment(
+        &mut self,
+        t: f64,
+        mode: &Mode,
+        multipliers: SmallVec<[f64; 2]>,
+        discrete: &[f64],
+    ) {
+        if let Some(observer) = &mut self.observer {
+            observer.begin(t, mode);
+        }
+        let step = self.steps.len();
+        self.close_segment(t);
+        if self.keep == Keep::Last {
+            self.segments.clear();
+        }
+        self.segments.push(Segment {
+            t_start: t,
+            t_end: t,
+            mode: mode.clone(),
+            steps: (step, step),
+            multipliers,
+            discrete: discrete.to_vec(),
+        });
+    }
+
+    fn close_segment(&mut self, t: f64) {
+        let n_steps = self.steps.len();
+        if let Some(segment) = self.segments.last_mut() {
+            segment.t_end = t;
+            segment.steps.1 = n_steps;
+        }
+    }
+
+    /// A step up to `t_stop`, where the state is `y`.
+    pub fn step(&mut self, interpolant: &Interpolant, t_stop: f64, y: &[f64]) {
+        let (t0, dt) = (interpolant.t0, interpolant.dt);
+        if t_stop <= t0 {
+            return;
+        }
+        if self.keep_dense {
+            let (from, coefficients) = (self.coefficients.len(), interpolant.coefficients());
+            if from == 0 {
+                self.steps.reserve(USUAL_LENGTH);
+                self.coefficients.reserve(USUAL_LENGTH * coefficients.len());
+            }
+            self.coefficients.extend_from_slice(coefficients);
+            self.steps.push(Step {
+                t0,
+                dt,
+                t_stop,
+                coefficients: (from, self.coefficients.len()),
+                basis: interpolant.basis(),
+            });
+        }
+        if self.keeps_steps() {
+            self.push(t_stop, y);
+        }
+        if self.keep == Keep::Last && self.switches.len() > 2 * LATEST_SWITCHES {
+            self.switches.drain(..self.switches.len() - LATEST_SWITCHES);
+        }
+    }
+
+    pub fn switch(&mut self, switch: Switch) {
+        if let Some(observer) = &mut self.observer {
+            observer.switched(&switch);
+        }
+        self.switches.push(switch);
+    }
+
+    /// The switches so far.
+    pub fn switches(&self) -> &[Switch] {
+        &self.switches
+    }
+
+    /// The surfaces of the switches recorded at this time.
+    pub fn surfaces_switched_at(&self, t: f64) -> Vec<usize> {
+        let latest = self.switches.iter().rev().take_while(|s| s.t == t);
+        let mut surfaces: Vec<usize> = latest.flat_map(|s| s.surfaces.iter().copied()).collect();
+        surfaces.sort_unstable();
+        surfaces.dedup();
+        surfaces
+    }
+
+    /// Makes the switches, if they are wanted, and the ends the points of the result.
+    fn list_switches(&mut self, t_last: f64, x: &[f64]) {
+        if self.keep == Keep::Switches {
+            let t_start = self.segments.first().map_or(t_last, |s| s.t_start);
+            let y0 = self.y0.clone();
+            self.push(t_start, &y0);
+            for switch in std::mem::take(&mut self.switches) {
+                if switch.t > t_start && switch.t < t_last {
+                    self.push(switch.t, &switch.y_after);
+                }
+                self.switches.push(switch);
+            }
+        }
+        if self.t.last() != Some(&t_last) {
+            self.push(t_last, x);
+        }
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    pub fn finish(
+        mut self,
+        (t_last, x, options): (f64, &[f64], &Options),
+        mode: Mode,
+        stop: Stop,
+        stats: Stats,
+        warnings: Vec<Warning>,
+        user_zeros: Vec<Vec<UserZero>>,
+    ) -> Solution {
+        self.close_segment(t_last);
+        let jump = self.jump.take().filter(|(t, _)| *t == t_last);
+        if self.is_sampled {
+            while self.wanted.get(self.next) == Some(&t_last) {
+                self.sample(x);
+            }
+        } else if self.keep != Keep::Steps {
+            self.list_switches(t_last, x);
+        }
+        if self.keep == Keep::Last {
+            self.switches.clear();
+        }
+        Solution {
+            y_end: jump.map(|(_, y)| y),
+            n_states: self.n,
+            t: self.t,
+            y: self.y,
+            switches: self.switches,
+            segments: self.segments,
+            user_zeros,
+            stop,
+            t_last,
+            sliding: options.sliding,
+            is_projected: options.stabilization == Stabilization::Projection,
+            mode,
+            stats,
+            warnings,
+            steps: self.steps,
+            coefficients: self.coefficients,
+            returns: self.observer.map(Observer::into_returns),
+            decisions: self.decisions,
+            y0: self.y0,
+            y_last: x.to_vec(),
+        }
+    }
+}

@@ -1,0 +1,278 @@
+//! The record of a run: steps, segments, switches.
+
+use smallvec::SmallVec;
+
+use crate::error::FieldError;
+use crate::event::UserZero;
+use crate::mode::Mode;
+use crate::motion::{IntersectionField, Motion, Projector, SlidingField, SmoothField};
+use crate::options::SlidingRule;
+use crate::record::section::Returns;
+use crate::record::DecisionRecord;
+use crate::stats::Stats;
+use crate::status::{Stop, Warning};
+use crate::stepper::Basis;
+use crate::switch::Switch;
+use crate::system::{dot_magnitude, PiecewiseSystem};
+use crate::tolerances::{AT_SIDE, TANGENT};
+
+/// A piece of constant mode.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Segment {
+    /// Start.
+    pub t_start: f64,
+    /// End.
+    pub t_end: f64,
+    /// The mode.
+    pub mode: Mode,
+    /// Index of the first step, and one past the last.
+    pub steps: (usize, usize),
+    /// lambda of the surfaces slid on, in their order, at the start; NaN for those in contact.
+    pub multipliers: SmallVec<[f64; 2]>,
+    /// The discrete states.
+    pub discrete: Vec<f64>,
+}
+
+/// A step, or its part up to an event.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Step {
+    pub t0: f64,
+    pub dt: f64,
+    pub t_stop: f64,
+    /// Where its coefficients begin, and end.
+    pub coefficients: (usize, usize),
+    pub basis: Basis,
+}
+
+/// Which limit is meant at a switch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// From earlier times.
+    Left,
+    /// From later times.
+    Right,
+}
+
+/// What a run computed.
+#[derive(Debug)]
+pub struct Solution {
+    /// Number of states.
+    pub n_states: usize,
+    /// Times: step ends, or `t_eval`.
+    pub t: Vec<f64>,
+    /// States at `t`, one after the other.
+    pub y: Vec<f64>,
+    /// Switches in order of time.
+    pub switches: Vec<Switch>,
+    /// Pieces of constant mode; they tile the time span.
+    pub segments: Vec<Segment>,
+    /// Zeros of the user's events, per event.
+    pub user_zeros: Vec<Vec<UserZero>>,
+    /// Why the run ended.
+    pub stop: Stop,
+    /// The last time reached.
+    pub t_last: f64,
+    /// The sliding field where several surfaces meet.
+    pub sliding: SlidingRule,
+    /// Are sliding motions on their surfaces by projection?
+    pub is_projected: bool,
+    /// The mode at the end.
+    pub mode: Mode,
+    /// Counters.
+    pub stats: Stats,
+    /// Warnings.
+    pub warnings: Vec<Warning>,
+    /// The returns to the section, if the run was observed at one.
+    pub returns: Option<Returns>,
+    /// The first decisions, if they were asked for ([`crate::Options::keep_decisions`]).
+    pub decisions: Vec<DecisionRecord>,
+    pub(crate) steps: Vec<Step>,
+    pub(crate) coefficients: Vec<f64>,
+    pub(crate) y0: Vec<f64>,
+    /// The state at `t_last`.
+    pub(crate) y_last: Vec<f64>,
+    /// The state at the end, if it jumped there.
+    pub(crate) y_end: Option<Vec<f64>>,
+}
+
+impl Solution {
+    /// The state at the last time.
+    pub fn last_state(&self) -> &[f64] {
+        &self.y_last
+    }
+
+    /// Writes the state at `t` from the continuous extension; on the surface while sliding, if it is projected.
+    /// Returns the mode there, or `None` outside of the span or without dense output.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn evaluate(
+        &self,
+        system: &dyn PiecewiseSystem,
+        t: f64,
+        side: Side,
+        y: &mut [f64],
+    ) -> Result<Option<&Mode>, FieldError> {
+        let n = self.n_states;
+        let (Some(first), Some(last)) = (self.segments.first(), self.segments.last()) else {
+            return Ok(None);
+        };
+        if !(t >= first.t_start && t <= last.t_end) {
+            return Ok(None);
+        }
+        match &self.y_end {
+            Some(y_end) if side == Side::Right && t == last.t_end => {
+                y.copy_from_slice(y_end);
+                return Ok(Some(&self.mode));
+            }
+            _ => {}
+        }
+        if self.steps.is_empty() || side == Side::Left && t == first.t_start {
+            y.copy_from_slice(&self.y0);
+            return Ok((t == first.t_start).then_some(&first.mode));
+        }
+        let index = match side {
+            Side::Right => self.steps.partition_point(|s| s.t0 <= t).max(1) - 1,
+            Side::Left => self
+                .steps
+                .partition_point(|s| s.t_stop < t)
+                .min(self.steps.len() - 1),
+        };
+        let step = self.steps[index];
+        let theta = (t - step.t0) / step.dt;
+        let (from, to) = step.coefficients;
+        let Some(coefficients) = self.coefficients.get(from..to) else {
+            return Ok(None);
+        };
+        crate::stepper::evaluate(step.basis, coefficients, n, theta, y);
+        let segment = self
+            .segments
+            .partition_point(|s| s.steps.1 <= index)
+            .min(self.segments.len() - 1);
+        let Segment { mode, discrete, .. } = &self.segments[segment];
+        if mode.codimension() > 0 && self.is_projected {
+            system.set_discrete(discrete);
+            let set: Vec<usize> = mode.sliding_set().collect();
+            Projector::new(n, system.n_surfaces()).project_onto(
+                system,
+                &set,
+                t,
+                y,
+                &mode.signs(),
+            )?;
+        }
+        Ok(Some(mode))
+    }
+}
+
+impl Solution {
+    /// The segment that `t` belongs to.
+    fn segment_at(&self, t: f64, side: Side) -> Option<&Segment> {
+        let before = match side {
+            Side::Right => self.segments.partition_point(|s| s.t_start <= t),
+            Side::Left => self.segments.partition_point(|s| s.t_start < t),
+        };
+        self.segments.get(before.saturating_sub(1))
+    }
+
+    /// The surfaces slid on at `t` and their multipliers; none in a region.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn multipliers(
+        &self,
+        system: &dyn PiecewiseSystem,
+        t: f64,
+        side: Side,
+    ) -> Result<Vec<(usize, f64)>, FieldError> {
+        let mut y = vec![0.0; self.n_states];
+        let Some(mode) = self.evaluate(system, t, side, &mut y)? else {
+            return Ok(Vec::new());
+        };
+        let set: Vec<usize> = mode.sliding_set().collect();
+        let segment = self.segment_at(t, side);
+        let near = segment.map_or(&[][..], |segment| &segment.multipliers);
+        if near.iter().any(|lambda| lambda.is_nan()) {
+            // Contact: the forces depend on the actions of the run.
+            return Ok(set.into_iter().zip(near.iter().copied()).collect());
+        }
+        Ok(match set.as_slice() {
+            [] => Vec::new(),
+            &[j] => {
+                let mut field = SlidingField::new(system, j, &mode.signs());
+                let components = field.normal_components(t, &mut y)?;
+                // At a two-fold from which sliding starts it is a quotient of two zeros, and known from the run.
+                let lambda = match (components.minus - components.plus, near) {
+                    (0.0, &[known, ..]) => known,
+                    _ => as_multiplier(components.multiplier()),
+                };
+                // Near a two-fold it is a quotient of rounding errors, which are those of the largest states on the way.
+                let share = (components.minus - components.plus).abs();
+                let beyond = 0.5 * (lambda.abs() - 1.0) * share;
+                if beyond > 0.0 {
+                    let (mut gradient, mut size, mut largest) = (y.clone(), 0.0, y.clone());
+                    if let Some(segment) = segment {
+                        self.evaluate(system, segment.t_start, Side::Right, &mut largest)?;
+                    }
+                    let pairs = largest.iter_mut().zip(&y);
+                    pairs.for_each(|(largest, y)| *largest = largest.abs().max(y.abs()));
+                    for side in [-1, 1] {
+                        let signs = mode.with(j, side).signs();
+                        let rate = system.rate_gradient(j, t, &y, &signs, &mut gradient)?;
+                        size += dot_magnitude(&gradient, &largest) + (rate.time * t).abs();
+                    }
+                    if beyond < TANGENT * size {
+                        return Ok(vec![(j, lambda.clamp(-1.0, 1.0))]);
+                    }
+                }
+                vec![(j, lambda)]
+            }
+            _ => {
+                // Of several roots that which the motion follows.
+                let field = IntersectionField::new(system, &set, &mode.signs(), near);
+                let mut field = field.with_rule(self.sliding);
+                field.eval(t, &mut y, &mut vec![0.0; self.n_states])?;
+                let values = field.multipliers().into_iter().map(as_multiplier);
+                set.into_iter().zip(values).collect()
+            }
+        })
+    }
+
+    /// Are the continuous extensions kept?
+    pub(crate) fn is_dense(&self) -> bool {
+        !self.steps.is_empty()
+    }
+
+    /// Replaces the step ends by the wanted times, as far as the run came.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub(crate) fn resample(
+        &mut self,
+        system: &dyn PiecewiseSystem,
+        times: &[f64],
+    ) -> Result<(), FieldError> {
+        let mut y = vec![0.0; self.n_states];
+        let (mut t_out, mut y_out) = (Vec::with_capacity(times.len()), Vec::new());
+        for &t in times.iter().filter(|&&t| t <= self.t_last) {
+            if self.evaluate(system, t, Side::Right, &mut y)?.is_some() {
+                t_out.push(t);
+                y_out.extend_from_slice(&y);
+            }
+        }
+        (self.t, self.y) = (t_out, y_out);
+        Ok(())
+    }
+}
+
+/// A multiplier as it is reported: at an exit it is one up to the rounding of the time, or up to what it may go beyond where
+/// forces balance. NaN where there is none, as where both fields are tangent.
+pub fn as_multiplier(lambda: f64) -> f64 {
+    if !lambda.is_finite() {
+        f64::NAN
+    } else if lambda.abs() < 1.0 + 2.0 * AT_SIDE {
+        lambda.clamp(-1.0, 1.0)
+    } else {
+        lambda
+    }
+}
