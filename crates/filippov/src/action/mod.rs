@@ -1,3 +1,9 @@
-//! Actions: what changes the state, or a discrete state, in an instant.
+//! Actions in an instant, and when they are due.
+
+mod instant;
+mod timetable;
+
+pub(crate) use instant::Instant;
+pub(crate) use timetable::Timetable;
 
 pub use crate::system::{Action, ActionMap, Actions, Clock, Trigger};

@@ -4,6 +4,7 @@ use super::point::{Notes, Point, Values};
 use super::rule::Meeting;
 use crate::error::FieldError;
 use crate::mode::Mode;
+use crate::motion::CurrentMotion;
 use crate::status::Stop;
 use crate::system::PiecewiseSystem;
 use crate::tolerances::{BETWEEN_SIDES, EPS, MOST_MEETING, SURFACE_NOISE};
@@ -210,14 +211,15 @@ pub(super) fn bends(at: &Point, meeting: &Meeting) -> Result<bool, FieldError> {
 }
 
 /// Surfaces that have another sign on some side of what is slid on than in the mode: the motion would slide between fields
-/// that differ in several signs at once. Those for which `is_checked` is false are not looked at.
+/// that differ in several signs at once. Those that do not matter
+/// and those that it rests on are not looked at.
 pub(crate) fn differs_between_sides(
     system: &dyn PiecewiseSystem,
     (t, x): (f64, &[f64]),
-    mode: &Mode,
-    sliding: &[usize],
-    is_checked: impl Fn(usize) -> bool,
+    motion: &CurrentMotion,
 ) -> Result<Option<Stop>, FieldError> {
+    let CurrentMotion { mode, sliding, .. } = motion;
+    let is_checked = |k: usize| motion.active[k] && !motion.resting.contains(&k);
     if !(1..=MOST_MEETING).contains(&sliding.len()) {
         return Ok(None);
     }

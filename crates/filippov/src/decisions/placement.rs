@@ -317,3 +317,17 @@ fn can_stay(at: &Point, j: usize, mode: &Mode) -> Result<bool, FieldError> {
     field.eval(at.t, &mut x, &mut dx)?;
     Ok(dx.iter().all(|v| v.is_finite()))
 }
+
+/// The triggers that the motion reaches here up to rounding.
+pub(crate) fn triggers_reached(at: &Point, h: &[f64]) -> Result<Vec<usize>, FieldError> {
+    let rates = at.rates_here()?;
+    let mut reached = Vec::new();
+    for j in (0..h.len()).filter(|&j| at.actions.at_surface(j).is_some()) {
+        let size = at.system.surface_size(j, at.t, at.x, at.arrival.signs)?;
+        let approaches = rates[j] * f64::from(at.arrival.mode.entries()[j]) < 0.0;
+        if approaches && h[j].abs() <= SURFACE_NOISE * size {
+            reached.push(j);
+        }
+    }
+    Ok(reached)
+}

@@ -1,6 +1,6 @@
 //! What a decision is asked about, and what its rules hand to one another.
 
-use super::triggers::Triggers;
+use crate::motion::Triggers;
 use std::cell::RefCell;
 
 use smallvec::{smallvec, SmallVec};

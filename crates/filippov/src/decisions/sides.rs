@@ -9,13 +9,18 @@ use crate::status::{Warning, WarningCode};
 
 /// Warns of a trigger that the motion crosses from its side in `before` without an action, since its direction is the other
 /// one, if the action would have kept the motion on its side: a wall that is passed from behind. A count, or a relay with
-/// two thresholds, is crossed either way.
+/// two thresholds, is crossed either way. Says whether there is such a trigger.
 pub(crate) fn warn_against_direction(
     at: &Point,
     notes: &mut Notes,
     j: usize,
     before: &Mode,
-) -> Result<(), FieldError> {
+) -> Result<bool, FieldError> {
+    let is_trigger = at.triggers().is_only_trigger(j) && !at.triggers().follows_law(j);
+    let mut fires = at.actions.triggered_at(j, before.entries()[j]);
+    if !is_trigger || fires.next().is_some() {
+        return Ok(false);
+    }
     // A map that fails here was not asked for.
     if would_turn_back(at, j, before).unwrap_or(false) {
         let text = format!(
@@ -26,7 +31,7 @@ pub(crate) fn warn_against_direction(
         );
         warn(at, notes, WarningCode::AgainstDirection, j, text);
     }
-    Ok(())
+    Ok(true)
 }
 
 /// Would the action at surface `j`, on which the point lies, leave the motion on the side of the mode?

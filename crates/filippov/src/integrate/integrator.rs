@@ -14,14 +14,15 @@
 //!
 //! `docs/theory/order_of_outcomes.md` has all of it, with the tests.
 
-use crate::decisions::{root_ends, Cause};
+use crate::action::Timetable;
+use crate::decisions::{differs_between_sides, has_left_resting, root_ends, Cause};
 use crate::error::{Error, FieldError};
 use crate::error_scale::ErrorScale;
 use crate::event::search::Detector;
 use crate::event::search::StepSearch;
 use crate::event::UserEvents;
 use crate::event::{Event, Found, Seen, UserEvent};
-use crate::integrate::actions::timetable::Timetable;
+use crate::integrate::progress::Progress;
 use crate::integrate::steps::chatter::ChatterWatch;
 use crate::integrate::steps::pace::Paces;
 use crate::integrate::steps::stiffness::Stiffness;
@@ -71,8 +72,7 @@ pub struct Integrator<'a> {
     /// How the last motion went, by mode.
     pub(super) paces: Paces,
     pub(super) detector: Detector,
-    pub(super) user_events: UserEvents<'a>,
-    pub(super) recorder: Recorder,
+    pub(super) recorder: Recorder<'a>,
     pub(super) stats: Stats,
     pub(super) warnings: Vec<Warning>,
     /// How many non-unique points were met.
@@ -88,8 +88,7 @@ pub struct Integrator<'a> {
     pub(super) recent_dt: f64,
     /// Since a jump of the field that no surface declares, if the steps have been short since then.
     pub(super) chatter: ChatterWatch,
-    /// The first of the last switches without progress of time, and how many came since.
-    pub(super) last_switch: (f64, u32),
+    pub(super) progress: Progress,
     /// How long a step the series allows that was taken at the start of the motion, until the step.
     pub(super) series_reach: Option<f64>,
     /// Guards of this mode whose multipliers were held at their ends, with what they may go beyond.
@@ -153,8 +152,7 @@ impl<'a> Integrator<'a> {
             dt: f64::NAN,
             paces: Paces::default(),
             detector: Detector::new(n, system.n_surfaces()),
-            user_events: UserEvents::new(events),
-            recorder: Recorder::new(n, options),
+            recorder: Recorder::new(n, options, events),
             stats: Stats::default(),
             warnings: Vec::new(),
             n_choices: 0,
@@ -164,7 +162,7 @@ impl<'a> Integrator<'a> {
             n_aims: 0,
             recent_dt: 0.0,
             chatter: ChatterWatch::default(),
-            last_switch: (f64::NAN, 0),
+            progress: Progress::default(),
             series_reach: None,
             slacks: Vec::new(),
             watch: Watch::new(options),
@@ -210,7 +208,7 @@ impl<'a> Integrator<'a> {
             if let Some(stop) = self.watch.stop() {
                 return Ok(stop);
             }
-            if let Some(stop) = self.step()?.or_else(|| self.stop_at_section()) {
+            if let Some(stop) = self.step()?.or_else(|| self.recorder.stop_at_section()) {
                 return Ok(stop);
             }
         }
@@ -342,7 +340,7 @@ impl<'a> Integrator<'a> {
                 self.stepper.interpolant().at(event.theta, &mut end);
                 t = self.t + event.theta * dt;
             }
-            if let Some(stop) = self.differs_between_sides(t, &end)? {
+            if let Some(stop) = differs_between_sides(self.system, (t, &end), &self.motion)? {
                 if dt < SHORTEST_STEP * self.t.abs().max(1.0) / EPS.sqrt() {
                     return Ok(Some(stop));
                 }
@@ -414,7 +412,7 @@ impl<'a> Integrator<'a> {
             if self.detector.accept(&mut self.motion.monitored, dt) {
                 self.motion.note_departure();
             }
-            if !self.motion.resting.is_empty() && self.has_left_resting()? {
+            if !self.motion.resting.is_empty() && self.ask(Cause::Start, has_left_resting)? {
                 return self.go_on_from_here();
             }
             if let Some(j) = zero {
@@ -440,7 +438,7 @@ impl<'a> Integrator<'a> {
     }
 
     /// The search of the step that was computed; and the user's functions.
-    pub(super) fn step_search(&mut self) -> (StepSearch<'_, 'a>, &mut UserEvents<'a>) {
+    pub(super) fn step_search(&mut self) -> (StepSearch<'_, 'a>, &UserEvents<'a>) {
         let search = StepSearch {
             system: self.system,
             scale: &self.scale,
@@ -455,7 +453,7 @@ impl<'a> Integrator<'a> {
             horizon: self.horizon,
             one_sided: self.one_sided,
         };
-        (search, &mut self.user_events)
+        (search, &self.recorder.user_events)
     }
 
     fn count_rejection(&mut self, sliding: bool) {
@@ -467,14 +465,12 @@ impl<'a> Integrator<'a> {
     pub fn finish(mut self, stop: Stop) -> Solution {
         self.stats.n_field_evaluations += self.motion.field.n_evaluations();
         self.stats.stiff_since = self.stiffness.since;
-        let (zeros, recorder) = (self.user_events.into_zeros(), self.recorder);
-        recorder.finish(
+        self.recorder.finish(
             (self.t, &self.x, self.options),
             self.motion.mode,
             stop,
             self.stats,
             self.warnings,
-            zeros,
         )
     }
 }

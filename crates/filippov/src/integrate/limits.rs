@@ -104,10 +104,12 @@ impl Integrator<'_> {
         let h = self.surface_values(&signs)?;
         let passed = (0..h.len()).filter(|&k| {
             let side = before.entries()[k];
-            k != surface && self.triggers().is_only_trigger(k) && h[k] * f64::from(side) < 0.0
+            k != surface
+                && self.motion.triggers(self.system).is_only_trigger(k)
+                && h[k] * f64::from(side) < 0.0
         });
         let passed: Vec<usize> = passed
-            .filter(|&k| self.triggers().side(k, None) == before.entries()[k])
+            .filter(|&k| self.motion.triggers(self.system).side(k, None) == before.entries()[k])
             .collect();
         if passed.is_empty() {
             return Ok(Vec::new());
@@ -119,10 +121,10 @@ impl Integrator<'_> {
         self.motion
             .restart(self.system, self.t, before.clone(), &[]);
         let h = self.surface_values(&signs)?;
-        self.note_residuals(&h, &set);
+        self.residuals = self.motion.residuals(&h, &set);
         let due = passed.iter().flat_map(|&k| {
             let side = before.entries()[k];
-            self.triggered_at(k, side).collect::<Vec<_>>()
+            self.actions.triggered_at(k, side).collect::<Vec<_>>()
         });
         Ok(due.collect())
     }

@@ -3,6 +3,7 @@
 mod actions;
 mod integrator;
 mod limits;
+mod progress;
 mod resting;
 mod solve;
 mod start;

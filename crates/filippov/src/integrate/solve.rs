@@ -164,7 +164,7 @@ pub fn solve_to_section(
     }
     let events = function.as_slice();
     let mut integrator = Integrator::new(system, t_span, y0, options, events, actions)?;
-    integrator.observe(section);
+    integrator.recorder.observe(section, t_span.0);
     Ok(run_to_end(integrator.interruptible(interrupt)))
 }
 

@@ -1,29 +1,27 @@
 //! From a located event, a limit or a start to the next motion: the decision is asked for, recorded and carried out.
 
-use std::cell::RefCell;
-
 use smallvec::{smallvec, SmallVec};
 
 use crate::decisions::{
     beyond_double_zero, decide, differs_between_sides, landing, limits::limit_here, refusal,
-    root_ends, two_fold_here, vanishing_surfaces, warn_against_direction, Arrival, Cause, Decision,
-    Leap, Left, Lefts, Next, Notes, Point, Reached, Rule, Values,
+    resting, root_ends, two_fold_here, vanishing_surfaces, warn_against_direction,
+    warn_oscillation, Cause, Decision, Leap, Left, Lefts, Next, Notes, Point, Reached, Rule, Scene,
+    Values,
 };
 use crate::error::FieldError;
 use crate::event::{Found, Multiple, Seen};
 use crate::integrate::integrator::Integrator;
 use crate::integrate::steps::pace::excursion;
 use crate::mode::Mode;
-use crate::motion::Deflation;
-use crate::motion::{Guard, ModeField, SmoothField};
+use crate::motion::{Guard, ModeField, SlidingSet, SmoothField};
 use crate::patience::Patience;
 use crate::record::decide_and_record;
-use crate::status::Stop;
+use crate::status::{Stop, WarningCode};
 use crate::stepper::{initial_step, restart_step};
 use crate::switch::Kind;
 use crate::switch::Switch;
 use crate::system::eval_on_side;
-use crate::tolerances::{MOST_SWITCHES_AT_ONE_TIME, NO_PROGRESS, SMALLEST_GUESS, SMALL_JUMP};
+use crate::tolerances::{MOST_SWITCHES_AT_ONE_TIME, SMALLEST_GUESS};
 
 impl<'a> Integrator<'a> {
     /// Asks a question about the current place; counts what the answer cost, and keeps its warnings.
@@ -33,55 +31,55 @@ impl<'a> Integrator<'a> {
         cause: Cause,
         question: impl FnOnce(&Point<'_, '_, 'a>, &mut Notes) -> Result<R, FieldError>,
     ) -> Result<R, FieldError> {
-        let mut departing = SmallVec::new();
-        for monitored in &self.motion.monitored {
-            if let (Guard::Surface(j), Some(Deflation { order: 2.., .. })) =
-                (monitored.guard, monitored.deflation)
-            {
-                departing.push(j);
-            }
-        }
-        let arrival = Arrival {
-            cause,
-            mode: &self.motion.mode,
-            signs: &self.motion.signs,
-            sliding: &self.motion.sliding,
-            sides: &self.motion.sides,
-            active: &self.motion.active,
-            resting: &self.motion.resting,
-            departing,
-            switches: self.recorder.switches(),
-            residuals: &self.residuals,
-            passing: &self.passing,
-            velocity: self.stepper.start_derivative(),
-            field: RefCell::new(&mut self.motion.field),
-        };
         let (watch, t) = (&self.watch, self.t);
         let is_over = || watch.stop().is_some() || watch.is_over(watch.now(), t);
-        let at = Point {
+        let scene = Scene {
             system: self.system,
             actions: self.actions,
             scale: &self.scale,
-            t: self.t,
-            x: &self.x,
-            q: &self.motion.discrete,
-            arrival: &arrival,
             policy: self.options.into(),
+            t,
+            x: &self.x,
+            motion: &mut self.motion,
+            residuals: &self.residuals,
+            passing: &self.passing,
+            velocity: self.stepper.start_derivative(),
+            switches: self.recorder.switches(),
             patience: Patience::until(&is_over),
         };
         let mut notes = Notes {
             n_choices: self.n_choices,
             ..Notes::default()
         };
-        let answer = question(&at, &mut notes);
+        let answer = scene.ask(cause, &mut notes, question);
+        self.take_notes(notes);
+        answer
+    }
+
+    /// Counts what questions cost, and keeps their warnings.
+    #[inline]
+    pub(in crate::integrate) fn take_notes(&mut self, notes: Notes) {
         self.stats.n_field_evaluations += notes.n_field_evaluations;
         self.stats.n_surface_evaluations += notes.n_surface_evaluations;
         self.n_choices = notes.n_choices;
         // What an interrupted decision warns of need not hold.
-        if !notes.warnings.is_empty() && self.watch.stop().is_none() {
-            self.warnings.append(&mut notes.warnings);
+        if notes.warnings.is_empty() || self.watch.stop().is_some() {
+            return;
         }
-        answer
+        for warning in notes.warnings {
+            let is_known =
+                warning.code == WarningCode::ZeroSurface && self.is_named(warning.surfaces[0]);
+            if !is_known {
+                self.warnings.push(warning);
+            }
+        }
+    }
+
+    /// Was a warning given about this surface alone: its function is zero along a motion, or the solution is not unique there?
+    pub(in crate::integrate) fn is_named(&self, j: usize) -> bool {
+        let is_about = |code| matches!(code, WarningCode::ZeroSurface | WarningCode::NonUnique);
+        let mut warnings = self.warnings.iter();
+        warnings.any(|warning| is_about(warning.code) && warning.surfaces == [j])
     }
 
     /// Decides which motion follows at the current place.
@@ -130,7 +128,7 @@ impl<'a> Integrator<'a> {
         event: &Found,
     ) -> Result<Option<Stop>, FieldError> {
         self.stats.n_switches += 1;
-        if self.count_switches_here() > MOST_SWITCHES_AT_ONE_TIME {
+        if self.progress.n_switches_at(self.t) > MOST_SWITCHES_AT_ONE_TIME {
             return self.leave_without_progress(event);
         }
         if !self.actions.list.is_empty() {
@@ -206,18 +204,6 @@ impl<'a> Integrator<'a> {
         self.begin_behind(next, &event.multiple)
     }
 
-    /// How many switches came before this one without any progress of time.
-    fn count_switches_here(&mut self) -> u32 {
-        let (since, before) = self.last_switch;
-        let is_progress = self.t != since && self.t - since > NO_PROGRESS * self.t.abs();
-        self.last_switch = if is_progress || since.is_nan() {
-            (self.t, 0)
-        } else {
-            (since, before + 1)
-        };
-        self.last_switch.1
-    }
-
     /// After too many switches without any progress of time: goes on from their limit, or ends the run.
     fn leave_without_progress(&mut self, event: &Found) -> Result<Option<Stop>, FieldError> {
         let mut surfaces = self.recorder.surfaces_switched_at(self.t);
@@ -241,7 +227,9 @@ impl<'a> Integrator<'a> {
         let &[j] = self.motion.sliding() else {
             return Ok(None);
         };
-        if !self.may_lose_multiplier() {
+        let speed = self.stepper.end_derivative().iter();
+        let speed = speed.fold(0.0_f64, |most, v| most.max(v.abs()));
+        if !self.detector.may_lose_multiplier(speed, self.options.rtol) {
             return Ok(None);
         }
         let Reached {
@@ -265,7 +253,7 @@ impl<'a> Integrator<'a> {
 
     /// Has sliding on one surface come to a two-fold? Then the point is moved there.
     fn arrives_at_two_fold(&mut self, event: &Found, n_ends: usize) -> Result<bool, FieldError> {
-        if n_ends == 1 && !self.approaches_two_fold() {
+        if n_ends == 1 && !self.detector.approaches_two_fold() {
             return Ok(false);
         }
         let Reached {
@@ -295,27 +283,6 @@ impl<'a> Integrator<'a> {
         self.ask(cause, vanishing_surfaces)
     }
 
-    /// Is the difference of the normal components at the end of the step so small, compared with the speed, that the
-    /// multiplier may be lost? Far from it nothing else has to be looked at.
-    fn may_lose_multiplier(&self) -> bool {
-        let [minus, plus, ..] = self.detector.seen.as_slice() else {
-            return false;
-        };
-        let speed = self.stepper.end_derivative().iter();
-        let speed = speed.fold(0.0_f64, |most, v| most.max(v.abs()));
-        let least = (minus.start + plus.start).min(minus.end + plus.end);
-        least <= (SMALL_JUMP * self.options.rtol).min(1.0) * speed
-    }
-
-    /// Does the share of f+ change fast in the step just made, towards a two-fold?
-    pub(in crate::integrate) fn approaches_two_fold(&self) -> bool {
-        let [minus, plus, ..] = self.detector.seen.as_slice() else {
-            return false;
-        };
-        let (before, after) = (minus.start + plus.start, minus.end + plus.end);
-        self.motion.sliding.len() == 1 && after < 0.99 * before
-    }
-
     /// Records a switch between two modes that leaves the state as it is.
     pub(in crate::integrate) fn record(
         &mut self,
@@ -326,7 +293,20 @@ impl<'a> Integrator<'a> {
     ) -> Result<(), FieldError> {
         let kind = Kind::between(&before, &after);
         if kind == Kind::Crossing && !self.actions.list.is_empty() {
-            self.look_at_directions(&before, &after, surfaces)?;
+            let crossed = |j: &usize| {
+                let side = before.entries()[*j];
+                side != 0 && after.entries()[*j] == -side
+            };
+            for j in surfaces.iter().copied().filter(crossed) {
+                let is_known = self.motion.passed.contains(&j);
+                if !is_known
+                    && self.ask(Cause::Anew(&before), |at, notes| {
+                        warn_against_direction(at, notes, j, &before)
+                    })?
+                {
+                    self.motion.passed.push(j);
+                }
+            }
         }
         self.recorder.switch(Switch {
             t: self.t,
@@ -339,33 +319,6 @@ impl<'a> Integrator<'a> {
             note: String::new(),
             rule,
         });
-        Ok(())
-    }
-
-    /// Warns of triggers that the motion crosses against their direction. Each is looked at once.
-    #[cold]
-    fn look_at_directions(
-        &mut self,
-        before: &Mode,
-        after: &Mode,
-        surfaces: &[usize],
-    ) -> Result<(), FieldError> {
-        for &j in surfaces {
-            let side = before.entries()[j];
-            let is_crossed = side != 0 && after.entries()[j] == -side;
-            let triggers = self.triggers();
-            if !is_crossed || !triggers.is_only_trigger(j) || triggers.follows_law(j) {
-                continue;
-            }
-            let is_triggered = self.triggered_at(j, side).next().is_some();
-            if is_triggered || self.motion.passed.contains(&j) {
-                continue;
-            }
-            self.motion.passed.push(j);
-            self.ask(Cause::Anew(before), |at, notes| {
-                warn_against_direction(at, notes, j, before)
-            })?;
-        }
         Ok(())
     }
 
@@ -399,7 +352,10 @@ impl<'a> Integrator<'a> {
                 left = self.make_leap(leap)?;
             }
         }
-        self.note_resting(&mode, &left)?;
+        self.motion.resting = match left.iter().all(|left| left.leading.order > 0) {
+            true => SlidingSet::new(),
+            false => self.ask(Cause::Start, |at, notes| resting(at, notes, &mode, &left))?,
+        };
         let t = self.t;
         let zeros = left.iter().filter_map(|left| left.deflation(t));
         let zeros: SmallVec<[_; 2]> = zeros.collect();
@@ -434,7 +390,10 @@ impl<'a> Integrator<'a> {
         self.motion.project(self.t, &mut self.x)?;
         self.evaluate_start()?;
         if self.motion.sliding.len() > 1 {
-            self.note_oscillation();
+            self.ask(Cause::Start, |at, notes| {
+                warn_oscillation(at, notes);
+                Ok(())
+            })?;
         }
         if !leaps {
             let multipliers = self.motion.multipliers();
@@ -451,7 +410,8 @@ impl<'a> Integrator<'a> {
             }
         }
         if self.system.has_nested_signs() {
-            if let Some(stop) = self.differs_between_sides(self.t, &self.x)? {
+            if let Some(stop) = differs_between_sides(self.system, (self.t, &self.x), &self.motion)?
+            {
                 return Ok(Some(stop));
             }
         }
@@ -463,7 +423,7 @@ impl<'a> Integrator<'a> {
         self.detector.measure(self.system, &self.motion, start)?;
         self.detector
             .accept_start(&mut self.motion.monitored, multiple);
-        self.user_events.restart(self.t, &self.x)?;
+        self.recorder.user_events.restart(self.t, &self.x)?;
         self.controller.restart();
         self.dt = self.first_step(&left)?;
         if let (Some((motion, reach)), ModeField::Sliding(field)) =
@@ -476,23 +436,6 @@ impl<'a> Integrator<'a> {
             }
         }
         Ok(None)
-    }
-
-    /// Does the motion slide between fields that differ in more signs than those of the surfaces slid on?
-    pub(in crate::integrate) fn differs_between_sides(
-        &self,
-        t: f64,
-        x: &[f64],
-    ) -> Result<Option<Stop>, FieldError> {
-        let motion = &self.motion;
-        let is_checked = |k: usize| motion.active[k] && !motion.resting.contains(&k);
-        differs_between_sides(
-            self.system,
-            (t, x),
-            &motion.mode,
-            &motion.sliding,
-            is_checked,
-        )
     }
 
     /// Begins the segment of a motion that starts with a leap, and makes that; what the motion leaves at its end.

@@ -2,9 +2,8 @@
 
 use super::integrator::Integrator;
 use crate::error::FieldError;
-use crate::event::{UserZero, TICK};
+use crate::event::TICK;
 use crate::status::Stop;
-use crate::tolerances::{EPS, SAME_TICK};
 
 impl Integrator<'_> {
     /// The zeros (theta, index) of the user's functions up to `theta`, in order; `None` if a shorter step
@@ -16,27 +15,19 @@ impl Integrator<'_> {
     ) -> Result<Option<Vec<(f64, usize)>>, FieldError> {
         let observer = self.recorder.observer.as_ref();
         let has_ticks = observer.is_some_and(|observer| observer.has_tick_up_to(t_stop));
-        if self.user_events.events.is_empty() && !has_ticks {
+        if self.recorder.user_events.events.is_empty() && !has_ticks {
             return Ok(Some(Vec::new()));
         }
         let (mut search, events) = self.step_search();
         let mut found = search.user_zeros(events, theta, has_ticks)?;
         if let Some(zeros) = &mut found {
-            zeros.extend(self.ticks(theta, t_stop));
+            zeros.extend(
+                self.recorder
+                    .ticks(self.stepper.interpolant(), theta, t_stop),
+            );
             zeros.sort_by(|a, b| a.0.total_cmp(&b.0));
         }
         Ok(found)
-    }
-
-    /// The ticks of the section's clock in a step up to `theta`, where the time is `t_stop`.
-    fn ticks(&self, theta: f64, t_stop: f64) -> Vec<(f64, usize)> {
-        let (t0, dt) = (self.stepper.interpolant().t0, self.stepper.interpolant().dt);
-        let latest = t_stop + SAME_TICK * t_stop.abs();
-        let observer = self.recorder.observer.as_ref();
-        let tick = |k| observer.and_then(|observer| observer.tick_after(k));
-        let times = (0..).map_while(tick).take_while(|&t| t <= latest);
-        let place = |t: f64| if t >= t_stop { theta } else { (t - t0) / dt };
-        times.map(|t| (place(t).min(theta), TICK)).collect()
     }
 
     /// Records zeros; at one that ends the run, accepts the step up to there and returns why.
@@ -46,7 +37,7 @@ impl Integrator<'_> {
         theta: f64,
         t_stop: f64,
     ) -> Result<Option<Stop>, FieldError> {
-        if self.user_events.events.is_empty() && zeros.is_empty() {
+        if self.recorder.user_events.events.is_empty() && zeros.is_empty() {
             return Ok(None);
         }
         let (t0, dt) = (self.stepper.interpolant().t0, self.stepper.interpolant().dt);
@@ -63,7 +54,7 @@ impl Integrator<'_> {
             let mut y = vec![0.0; self.x.len()];
             self.stepper.interpolant().at(at, &mut y);
             self.motion.project(t, &mut y)?;
-            if let Some(stop) = self.record_zero(index, t, &y) {
+            if let Some(stop) = self.recorder.zero(index, t, &y) {
                 self.sample(t)?;
                 self.recorder.step(self.stepper.interpolant(), t, &y);
                 self.t = t;
@@ -71,53 +62,13 @@ impl Integrator<'_> {
                 return Ok(Some(stop));
             }
         }
-        self.user_events.at_start = false;
-        for k in 0..self.user_events.events.len() {
-            self.user_events.before[k] = self.user_events.left[k];
-            let function = self.user_events.events[k].function;
+        self.recorder.user_events.at_start = false;
+        for k in 0..self.recorder.user_events.events.len() {
+            self.recorder.user_events.before[k] = self.recorder.user_events.left[k];
+            let function = self.recorder.user_events.events[k].function;
             let (mut search, _) = self.step_search();
-            self.user_events.left[k] = search.user_value(function, theta)?;
+            self.recorder.user_events.left[k] = search.user_value(function, theta)?;
         }
         Ok(None)
-    }
-
-    /// Takes down a zero, or a return to the section; says whether the run ends with it, and why.
-    fn record_zero(&mut self, index: usize, t: f64, y: &[f64]) -> Option<Stop> {
-        let events = &mut self.user_events;
-        if index != TICK {
-            events.last[index] = t;
-        }
-        if index == TICK || events.is_section {
-            let observer = self.recorder.observer.as_mut()?;
-            observer.returned(t, y);
-            return observer.stop();
-        }
-        events.zeros[index].push(UserZero { t, y: y.to_vec() });
-        let terminal = events.events[index].terminal;
-        let is_last = terminal > 0 && events.zeros[index].len() as u64 >= terminal;
-        is_last.then_some(Stop::TerminalEvent(index))
-    }
-
-    /// Records the zeros of functions that are within rounding of zero where the state is about to jump; returns the
-    /// reason if one of them ends the run.
-    pub(super) fn record_zeros_here(&mut self) -> Option<Stop> {
-        let t = self.t;
-        if self.user_events.at_start {
-            return None;
-        }
-        for k in 0..self.user_events.events.len() {
-            let events = &self.user_events;
-            let (before, here) = (events.before[k], events.left[k]);
-            let is_zero = here.abs() <= 4.0 * EPS * before.abs();
-            let direction = events.events[k].direction;
-            if !is_zero || events.last[k] == t || direction * before > 0.0 {
-                continue;
-            }
-            let y = self.x.clone();
-            if let Some(stop) = self.record_zero(k, t, &y) {
-                return Some(stop);
-            }
-        }
-        None
     }
 }

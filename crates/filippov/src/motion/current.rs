@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use smallvec::SmallVec;
 
-use super::{AffineBounds, ContactField, Deflation, Guard, Law, ModeField, Monitored, SlidingSet};
+use super::{
+    AffineBounds, ContactField, Deflation, Guard, Law, ModeField, Monitored, SlidingSet, Triggers,
+};
 use crate::error::FieldError;
 use crate::mode::{Mode, Signs};
 use crate::options::SlidingRule;
@@ -51,7 +53,7 @@ pub(crate) struct CurrentMotion<'a> {
     sticks: bool,
     law: Law<'a>,
     /// Surfaces that the motion stays on by either field, so that h is zero all along: not monitored.
-    pub resting: SmallVec<[usize; 2]>,
+    pub resting: SlidingSet,
     /// Surfaces whose functions were found to be zero in this mode, and that neither rest nor are slid on: they stay
     /// monitored, and are not settled on again.
     pub settled: SmallVec<[usize; 2]>,
@@ -285,6 +287,25 @@ impl<'a> CurrentMotion<'a> {
     /// The multipliers at the last evaluation, in the order of the surfaces slid on.
     pub fn multipliers(&self) -> SmallVec<[f64; 2]> {
         self.field.multipliers()
+    }
+
+    /// What the surfaces do that trigger actions.
+    pub fn triggers<'t>(&'t self, system: &'t dyn PiecewiseSystem) -> Triggers<'t> {
+        Triggers {
+            system,
+            actions: self.actions,
+            sides: &self.sides,
+        }
+    }
+
+    /// How far the point lies off these surfaces and those slid on, by rounding, if the functions have these values there; 0
+    /// for the others.
+    pub fn residuals(&self, h: &[f64], surfaces: &[usize]) -> Vec<f64> {
+        let mut residuals = vec![0.0; h.len()];
+        for &j in surfaces.iter().chain(&self.sliding) {
+            residuals[j] = h[j].abs();
+        }
+        residuals
     }
 
     /// Moves `x` onto the surfaces slid on.

@@ -17,6 +17,7 @@ mod project;
 mod region;
 mod sliding;
 mod ties;
+mod triggers;
 mod two_fold_motion;
 pub mod weights;
 
@@ -39,6 +40,7 @@ pub use project::{shares_of_rows, Projector};
 pub use region::RegionField;
 pub use sliding::{NormalComponents, SlidingField};
 pub(crate) use ties::{are_parallel, beside_on, in_the_place_of, normal, parallel, sense_of, Tie};
+pub(crate) use triggers::Triggers;
 pub use two_fold_motion::{TwoFold, TwoFoldMotion};
 pub(crate) use weights::product_weights;
 

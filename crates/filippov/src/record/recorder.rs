@@ -2,17 +2,17 @@
 
 use smallvec::SmallVec;
 
-use crate::event::UserZero;
+use crate::event::{UserEvent, UserEvents, UserZero, TICK};
 use crate::mode::Mode;
 use crate::options::{Keep, Options, Stabilization};
-use crate::record::section::Observer;
+use crate::record::section::{Observer, Place, Section};
 use crate::record::DecisionRecord;
 use crate::record::{Segment, Solution, Step};
 use crate::stats::Stats;
 use crate::status::{Stop, Warning};
 use crate::stepper::Interpolant;
 use crate::switch::Switch;
-use crate::tolerances::LATEST_SWITCHES;
+use crate::tolerances::{EPS, LATEST_SWITCHES, SAME_TICK};
 
 /// Room that is made at once for so many steps and switches: more of them take more room then.
 const USUAL_LENGTH: usize = 64;
@@ -20,7 +20,7 @@ const USUAL_LENGTH: usize = 64;
 /// Keeps what a run produces, as far as it is wanted.
 ///
 /// The last switches are kept in any case: they tell whether switches accumulate.
-pub(crate) struct Recorder {
+pub(crate) struct Recorder<'a> {
     n: usize,
     keep: Keep,
     t: Vec<f64>,
@@ -38,13 +38,14 @@ pub(crate) struct Recorder {
     next: usize,
     is_sampled: bool,
     /// Watches the section, if there is one.
+    pub user_events: UserEvents<'a>,
     pub observer: Option<Observer>,
     /// The decisions, if they are wanted.
     pub decisions: Vec<DecisionRecord>,
 }
 
-impl Recorder {
-    pub fn new(n: usize, options: &Options) -> Self {
+impl<'a> Recorder<'a> {
+    pub fn new(n: usize, options: &Options, events: &'a [UserEvent<'a>]) -> Self {
         let keeps_steps = options.keep == Keep::Steps;
         let keep_dense = keeps_steps && options.dense_output;
         let wanted = options.t_eval.clone().filter(|_| !keep_dense);
@@ -64,6 +65,7 @@ impl Recorder {
             is_sampled: wanted.is_some(),
             wanted: wanted.unwrap_or_default(),
             next: 0,
+            user_events: UserEvents::new(events),
             observer: None,
             decisions: Vec::new(),
         }
@@ -192,6 +194,67 @@ impl Recorder {
         }
     }
 
+    /// Watches the run at a section; its function, if it has one, is the only one of the user's events.
+    pub fn observe(&mut self, section: &Section, t_start: f64) {
+        self.user_events.is_section = matches!(section.place, Place::Function { .. });
+        self.observer = Some(Observer::new(section, t_start));
+    }
+
+    /// Why the run ends because of its section, if it does.
+    pub fn stop_at_section(&self) -> Option<Stop> {
+        self.observer.as_ref()?.stop()
+    }
+
+    /// The ticks of the section's clock in a step up to `theta`, where the time is `t_stop`.
+    pub fn ticks(&self, step: &Interpolant, theta: f64, t_stop: f64) -> Vec<(f64, usize)> {
+        let latest = t_stop + SAME_TICK * t_stop.abs();
+        let tick = |k| self.observer.as_ref()?.tick_after(k);
+        let times = (0..).map_while(tick).take_while(|&t| t <= latest);
+        let place = |t: f64| match t >= t_stop {
+            true => theta,
+            false => (t - step.t0) / step.dt,
+        };
+        times.map(|t| (place(t).min(theta), TICK)).collect()
+    }
+
+    /// Takes down a zero of a user's function, or a return to the section; says whether the run ends with it, and why.
+    pub fn zero(&mut self, index: usize, t: f64, y: &[f64]) -> Option<Stop> {
+        let events = &mut self.user_events;
+        if index != TICK {
+            events.last[index] = t;
+        }
+        if index == TICK || events.is_section {
+            let observer = self.observer.as_mut()?;
+            observer.returned(t, y);
+            return observer.stop();
+        }
+        events.zeros[index].push(UserZero { t, y: y.to_vec() });
+        let terminal = events.events[index].terminal;
+        let is_last = terminal > 0 && events.zeros[index].len() as u64 >= terminal;
+        is_last.then_some(Stop::TerminalEvent(index))
+    }
+
+    /// Takes down the zeros of functions that are within rounding of zero where the state is about to jump; why the run ends
+    /// with one of them, if it does.
+    pub fn zeros_before_jump(&mut self, t: f64, y: &[f64]) -> Option<Stop> {
+        if self.user_events.at_start {
+            return None;
+        }
+        for k in 0..self.user_events.events.len() {
+            let events = &self.user_events;
+            let (before, here) = (events.before[k], events.left[k]);
+            let is_zero = here.abs() <= 4.0 * EPS * before.abs();
+            let direction = events.events[k].direction;
+            if !is_zero || events.last[k] == t || direction * before > 0.0 {
+                continue;
+            }
+            if let Some(stop) = self.zero(k, t, y) {
+                return Some(stop);
+            }
+        }
+        None
+    }
+
     pub fn switch(&mut self, switch: Switch) {
         if let Some(observer) = &mut self.observer {
             observer.switched(&switch);
@@ -239,7 +302,6 @@ impl Recorder {
         stop: Stop,
         stats: Stats,
         warnings: Vec<Warning>,
-        user_zeros: Vec<Vec<UserZero>>,
     ) -> Solution {
         self.close_segment(t_last);
         let jump = self.jump.take().filter(|(t, _)| *t == t_last);
@@ -260,7 +322,7 @@ impl Recorder {
             y: self.y,
             switches: self.switches,
             segments: self.segments,
-            user_zeros,
+            user_zeros: self.user_events.into_zeros(),
             stop,
             t_last,
             sliding: options.sliding,

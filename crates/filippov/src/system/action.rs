@@ -159,6 +159,19 @@ impl Actions<'_> {
             .map(|(action, ..)| action)
     }
 
+    /// The actions, by their place in the list, that surface `j` triggers for a motion that comes from `side`.
+    pub fn triggered_at(&self, j: usize, side: i8) -> impl Iterator<Item = usize> + '_ {
+        let fires = move |trigger: &Trigger| match trigger {
+            Trigger::Surface {
+                index, direction, ..
+            } => *index == j && (*direction == 0 || *direction == -side),
+            _ => false,
+        };
+        let list = self.list.iter().enumerate();
+        list.filter(move |(_, action)| fires(&action.trigger))
+            .map(|(index, _)| index)
+    }
+
     /// The side of each of `n` surfaces on which a start counts that lies on it: that of the first action there, else +1.
     pub fn sides_at_start(&self, n: usize) -> impl Iterator<Item = i8> + '_ {
         let side = move |j| self.all_at_surface(j).next().map_or(1, |(.., side)| side);

@@ -9,7 +9,7 @@ use crate::motion::CurrentMotion;
 use crate::motion::Monitored;
 use crate::motion::{Exits, ModeField};
 use crate::system::PiecewiseSystem;
-use crate::tolerances::SURFACE_NOISE;
+use crate::tolerances::{SMALL_JUMP, SURFACE_NOISE};
 
 /// A function is clear of a zero that was divided out beyond this multiple of its rounding.
 pub(super) const CLEAR_OF_NOISE: f64 = 1e3;
@@ -74,6 +74,24 @@ impl Detector {
                 seen.see(*value);
             }
         }
+    }
+
+    /// Is the difference of the normal components at an end of the step so small, compared with `speed`, that the multiplier
+    /// may be lost? Far from it nothing else has to be looked at.
+    pub fn may_lose_multiplier(&self, speed: f64, rtol: f64) -> bool {
+        let [minus, plus, ..] = self.seen.as_slice() else {
+            return false;
+        };
+        let least = (minus.start + plus.start).min(minus.end + plus.end);
+        least <= (SMALL_JUMP * rtol).min(1.0) * speed
+    }
+
+    /// Does the share of f+ change fast in the step just made, towards a two-fold? Asked while the motion slides on one surface.
+    pub fn approaches_two_fold(&self) -> bool {
+        let [minus, plus, ..] = self.seen.as_slice() else {
+            return false;
+        };
+        minus.end + plus.end < 0.99 * (minus.start + plus.start)
     }
 
     /// Values and rates of the monitored functions at (t, x) with velocity `v`, into `right`.

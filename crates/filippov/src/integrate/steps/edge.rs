@@ -84,7 +84,11 @@ impl Integrator<'_> {
         let is_short = dt < JUMP_SHRINK * self.recent_dt && dt < self.horizon - self.t;
         // Towards a fold of the multipliers the field of an intersection bends like a square root, and towards a
         // two-fold the multiplier is a quotient of small numbers.
-        let may_bend = self.motion.sliding.len() > 1 || self.approaches_two_fold();
+        let may_bend = match self.motion.sliding.len() {
+            0 => false,
+            1 => self.detector.approaches_two_fold(),
+            _ => true,
+        };
         if is_short && !may_bend && !self.meets_edges && self.stepper.field_jumps() {
             let t = self.t + dt;
             self.warnings.push(Warning {

@@ -1,22 +1,9 @@
-//! Wanted times, sampled as the run goes on where the continuous extensions are not kept; the section of a run.
+//! Wanted times, sampled as the run goes on where the continuous extensions are not kept.
 
 use crate::error::FieldError;
 use crate::integrate::integrator::Integrator;
-use crate::record::section::{Observer, Place, Section};
-use crate::status::Stop;
 
 impl Integrator<'_> {
-    /// Observes the run at a section; its function, if it has one, is the only one of the user's events.
-    pub(in crate::integrate) fn observe(&mut self, section: &Section) {
-        self.user_events.is_section = matches!(section.place, Place::Function { .. });
-        self.recorder.observer = Some(Observer::new(section, self.t));
-    }
-
-    /// Why the run ends at this point because of its section, if it does.
-    pub(in crate::integrate) fn stop_at_section(&self) -> Option<Stop> {
-        self.recorder.observer.as_ref()?.stop()
-    }
-
     /// Samples the wanted times of the step that was just computed, before `t_stop`, where it ends.
     ///
     /// # Errors

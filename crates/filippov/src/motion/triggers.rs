@@ -1,8 +1,7 @@
 //! What the surfaces do that trigger actions.
 
 use crate::mode::Mode;
-use crate::system::PiecewiseSystem;
-use crate::system::{Action, Actions, Trigger};
+use crate::system::{Action, Actions, PiecewiseSystem, Trigger};
 
 /// The surfaces of a system, as far as they trigger actions.
 #[derive(Clone, Copy)]

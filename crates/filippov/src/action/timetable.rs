@@ -13,7 +13,7 @@ enum Pending {
 }
 
 /// The known times of all actions.
-pub(in crate::integrate) struct Timetable {
+pub(crate) struct Timetable {
     /// The action with what is left of its times.
     rows: Vec<(usize, Pending)>,
 }
@@ -39,9 +39,15 @@ impl Timetable {
     }
 
     /// The next time at which something happens.
-    pub fn next(&self, actions: &Actions) -> Option<f64> {
+    fn next(&self, actions: &Actions) -> Option<f64> {
         let times = self.rows.iter().filter_map(|row| row_time(row, actions));
         times.min_by(f64::total_cmp)
+    }
+
+    /// The next such time from `t` on, up to `t_end`.
+    pub fn horizon(&self, actions: &Actions, t: f64, t_end: f64) -> f64 {
+        self.next(actions)
+            .map_or(t_end, |next| next.max(t).min(t_end))
     }
 
     /// The actions whose time is `t`, up to rounding, in their order; their next times follow.

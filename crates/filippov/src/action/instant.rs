@@ -1,0 +1,295 @@
+//! Actions in an instant: which are done, in which order, and what they trigger.
+//!
+//! Specification:
+//!
+//! 1. At one instant the actions whose time has come and those whose surface was reached in their direction are
+//!    done in the order of the list, each on the state that the one before it left.
+//! 2. Then those are done that the jump triggered: it led across their surface in their direction, or onto it with
+//!    a motion that approaches it. This is repeated until there are none.
+//! 3. An action whose state still moves through its surface is not done again in that instant: the motion
+//!    crosses. (A count, or a phase that is set back, at a section.)
+//! 4. The mode is decided for the last state ([`crate::decisions`]).
+
+use smallvec::{smallvec, SmallVec};
+
+use crate::decisions::{
+    goes_through, pushed_back, sides, Cause, Notes, Point, Policy, Scene, Sides, Values,
+};
+use crate::error::FieldError;
+use crate::error_scale::ErrorScale;
+use crate::mode::Mode;
+use crate::motion::CurrentMotion;
+use crate::patience::Patience;
+use crate::status::Stop;
+use crate::switch::Switch;
+use crate::system::{Actions, PiecewiseSystem, Trigger};
+use crate::tolerances::{MOST_ACTIONS_AT_ONE_TIME, PENETRATION, SURFACE_NOISE};
+
+/// An instant in which actions are done: the place and the motion that ends there.
+pub(crate) struct Instant<'i, 'a> {
+    pub system: &'a dyn PiecewiseSystem,
+    pub actions: &'a Actions<'a>,
+    pub scale: &'i ErrorScale,
+    pub policy: Policy<'a>,
+    pub t: f64,
+    /// The state, which the actions change, as they change the discrete states of the motion.
+    pub x: &'i mut Vec<f64>,
+    pub motion: &'i mut CurrentMotion<'a>,
+    pub residuals: &'i [f64],
+    pub velocity: &'i [f64],
+    pub switches: &'i [Switch],
+    pub patience: Patience<'i>,
+    pub notes: &'i mut Notes,
+    /// What was done, also where the instant ends the run.
+    pub done: Vec<Switch>,
+    /// Triggers that the motion goes on through after their actions.
+    pub passing: Vec<usize>,
+}
+
+/// The surfaces in one instant, as far as they trigger actions.
+struct Approach {
+    /// The side that the state is on, or comes from while it is on the surface.
+    side: Vec<i8>,
+    /// The motion goes on through the surface after its action.
+    passes: Vec<bool>,
+}
+
+impl<'a> Instant<'_, 'a> {
+    /// Does these actions and those that they trigger; why the run ends with them, if it does.
+    pub fn act(&mut self, mut due: Vec<usize>) -> Result<Option<Stop>, FieldError> {
+        let before = self.motion.mode.clone();
+        let mut approach = Approach {
+            side: self.free_sides(&before),
+            passes: vec![false; before.entries().len()],
+        };
+        let mut count = 0;
+        self.push_back(&before)?;
+        let start = self.surface_values(&before)?;
+        while !due.is_empty() {
+            for &index in &due {
+                count += 1;
+                if count > MOST_ACTIONS_AT_ONE_TIME {
+                    let names = due.iter().map(|&k| self.actions.list[k].name.clone());
+                    return Ok(Some(Stop::ActionsDoNotEnd {
+                        actions: names.collect(),
+                    }));
+                }
+                let arrives = self.passage(index, &before, &approach)?;
+                if let Some(stop) = self.do_action(index, &before)? {
+                    return Ok(Some(stop));
+                }
+                if let (Some((j, true)), Some((_, true))) =
+                    (arrives, self.passage(index, &before, &approach)?)
+                {
+                    approach.passes[j] = true;
+                }
+            }
+            self.push_back(&before)?;
+            due = self.triggered_by_jump(&due, &mut approach)?;
+        }
+        if let Some(j) = self.penetrates(&before, &start, &approach)? {
+            return Ok(Some(Stop::Contact { surfaces: vec![j] }));
+        }
+        let passing = approach.passes.iter().enumerate();
+        self.passing = passing.filter(|(_, p)| **p).map(|(j, _)| j).collect();
+        Ok(None)
+    }
+
+    fn ask<R>(
+        &mut self,
+        memory: &Mode,
+        question: impl FnOnce(&Point<'_, '_, 'a>, &mut Notes) -> R,
+    ) -> R {
+        let scene = Scene {
+            system: self.system,
+            actions: self.actions,
+            scale: self.scale,
+            policy: self.policy,
+            t: self.t,
+            x: self.x,
+            motion: self.motion,
+            residuals: self.residuals,
+            passing: &[],
+            velocity: self.velocity,
+            switches: self.switches,
+            patience: self.patience,
+        };
+        scene.ask(Cause::Anew(memory), self.notes, question)
+    }
+
+    fn surface_values(&mut self, mode: &Mode) -> Result<Values, FieldError> {
+        let mut h: Values = smallvec![0.0; self.system.n_surfaces()];
+        self.system
+            .surfaces(self.t, self.x, &mode.signs(), &mut h)?;
+        self.notes.n_surface_evaluations += 1;
+        Ok(h)
+    }
+
+    /// The surface of an action, and whether the motion goes through it from here.
+    fn passage(
+        &mut self,
+        index: usize,
+        before: &Mode,
+        approach: &Approach,
+    ) -> Result<Option<(usize, bool)>, FieldError> {
+        let Trigger::Surface { index: j, .. } = self.actions.list[index].trigger else {
+            return Ok(None);
+        };
+        let side = approach.side[j];
+        if side == 0 {
+            return Ok(None);
+        }
+        let sides = self.ask(before, |at, notes| sides(at, notes, Some(before)))?;
+        let Some(Sides { mode, on_surface }) = sides else {
+            return Ok(None);
+        };
+        let goes_on = on_surface[j] && self.goes_through(j, side, &mode, &on_surface)?;
+        Ok(Some((j, goes_on)))
+    }
+
+    /// Does the motion lead from this side through a surface that the point lies on?
+    fn goes_through(
+        &mut self,
+        j: usize,
+        side: i8,
+        mode: &Mode,
+        on_surface: &[bool],
+    ) -> Result<bool, FieldError> {
+        self.ask(mode, |at, notes| {
+            goes_through(at, notes, j, side, mode, on_surface)
+        })
+    }
+
+    /// Moves the state back onto the triggers that it slipped through.
+    fn push_back(&mut self, memory: &Mode) -> Result<(), FieldError> {
+        if let Some(x) = self.ask(memory, |at, notes| pushed_back(at, notes, memory))? {
+            *self.x = x;
+        }
+        Ok(())
+    }
+
+    /// A trigger that the motion has passed by more than the tolerance without an action that carried it across: bodies
+    /// that could not be kept apart.
+    fn penetrates(
+        &mut self,
+        before: &Mode,
+        start: &Values,
+        approach: &Approach,
+    ) -> Result<Option<usize>, FieldError> {
+        let h = self.surface_values(before)?;
+        let is_solid = |j: &usize| {
+            self.motion.triggers(self.system).is_only_trigger(*j)
+                && !self.motion.triggers(self.system).is_internal(*j)
+        };
+        for j in (0..h.len()).filter(|j| is_solid(j) && !approach.passes[*j]) {
+            let side = self.motion.triggers(self.system).side(j, Some(before));
+            let came_from = before.entries()[j] == side || before.entries()[j] == 0;
+            let is_beyond = h[j] * f64::from(side) < 0.0 && came_from;
+            let has_jumped = (h[j] - start[j]).abs() > PENETRATION * h[j].abs();
+            if !is_beyond || has_jumped {
+                continue;
+            }
+            let known = self.residuals.get(j).copied().unwrap_or(0.0);
+            let signs = before.signs();
+            let size = self.system.surface_size(j, self.t, self.x, &signs)?;
+            if h[j].abs() > (SURFACE_NOISE * size).max(known.min(PENETRATION * size)) {
+                return Ok(Some(j));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Does one action and takes it down.
+    fn do_action(&mut self, index: usize, before: &Mode) -> Result<Option<Stop>, FieldError> {
+        let action = &self.actions.list[index];
+        let y_before = SmallVec::from_slice(self.x);
+        let (mut x, mut q) = (self.x.clone(), self.motion.discrete.clone());
+        let signs = &self.motion.signs;
+        action.map.apply(self.t, &mut x, signs, &mut q)?;
+        (*self.x, self.motion.discrete) = (x, q);
+        self.system.set_discrete(&self.motion.discrete);
+        if let Some(kind) = action.kind {
+            let surfaces = match action.trigger {
+                Trigger::Surface { index, .. } => vec![index],
+                _ => Vec::new(),
+            };
+            self.done.push(Switch {
+                t: self.t,
+                y_before,
+                y_after: SmallVec::from_slice(self.x),
+                kind,
+                surfaces: surfaces.into(),
+                mode_before: before.clone(),
+                mode_after: before.clone(),
+                note: action.name.clone(),
+                rule: "",
+            });
+        }
+        let is_finite = self.x.iter().all(|v| v.is_finite());
+        Ok((!is_finite).then(|| Stop::ActionNotFinite {
+            action: action.name.clone(),
+        }))
+    }
+
+    /// The actions that the jump of the state triggered, after `done`.
+    fn triggered_by_jump(
+        &mut self,
+        done: &[usize],
+        approach: &mut Approach,
+    ) -> Result<Vec<usize>, FieldError> {
+        let before = self.motion.mode.clone();
+        let sides = self.ask(&before, |at, notes| sides(at, notes, Some(&before)))?;
+        let Some(Sides { mode, on_surface }) = sides else {
+            return Ok(Vec::new());
+        };
+        let actions = self.actions;
+        let mut due = Vec::new();
+        for j in 0..on_surface.len() {
+            let side = approach.side[j];
+            if side == 0 || actions.at_surface(j).is_none() {
+                continue;
+            }
+            let was_done = actions
+                .triggered_at(j, side)
+                .any(|index| done.contains(&index));
+            if self.motion.triggers(self.system).follows_law(j) && !on_surface[j] {
+                // Whatever led there in this instant, also after its own change: in the end the law holds.
+                if mode.entries()[j] < 0 {
+                    due.extend(actions.triggered_at(j, 1));
+                }
+                continue;
+            }
+            if was_done && self.motion.triggers(self.system).is_internal(j) {
+                continue;
+            }
+            if !on_surface[j] {
+                let now = mode.entries()[j];
+                // The jump of its own action may complete the passage that triggered it.
+                if now != side && !was_done {
+                    due.extend(actions.triggered_at(j, side));
+                }
+                (approach.side[j], approach.passes[j]) = (now, false);
+                continue;
+            }
+            if !self.goes_through(j, side, &mode, &on_surface)? {
+                approach.passes[j] = false;
+            } else if !approach.passes[j] {
+                due.extend(actions.triggered_at(j, side));
+            }
+        }
+        due.sort_unstable();
+        due.dedup();
+        Ok(due)
+    }
+
+    /// The sides of a mode; where it is in contact, the free side.
+    fn free_sides(&self, mode: &Mode) -> Vec<i8> {
+        let mut sides = mode.entries().to_vec();
+        for (j, side) in sides.iter_mut().enumerate() {
+            if *side == 0 && self.motion.triggers(self.system).is_only_trigger(j) {
+                *side = self.motion.triggers(self.system).side(j, None);
+            }
+        }
+        sides
+    }
+}

@@ -1,0 +1,98 @@
+//! Surfaces whose functions are zero all along a motion: those that neither field leaves, and those in the place of the one
+//! slid on.
+
+use super::point::{Left, Notes, Point};
+use crate::error::FieldError;
+use crate::mode::Mode;
+use crate::motion::{first_nonzero, ModeField, SlidingSet};
+use crate::status::{Warning, WarningCode};
+use crate::tolerances::LEFT_RESTING;
+
+/// The surfaces that a motion in `mode` does not leave. Warns of those that the field beyond would not leave either.
+pub(crate) fn resting(
+    at: &Point,
+    notes: &mut Notes,
+    mode: &Mode,
+    left: &[Left],
+) -> Result<SlidingSet, FieldError> {
+    let resting = left.iter().filter(|left| left.leading.order == 0);
+    let resting: SlidingSet = resting.filter_map(Left::surface).collect();
+    for &j in &resting {
+        let beyond = -mode.entries()[j];
+        let leading = first_nonzero(at.system, j, beyond, 0, at.t, at.x, &mode.signs())?;
+        if leading.order == 0 {
+            warn_zero_surface(at, notes, j, mode);
+        }
+    }
+    Ok(resting)
+}
+
+/// Warns of a surface whose function is zero all along the motion in `mode`.
+///
+/// It is no mistake where nothing depends on the sign: where bodies touch without any force, and at a kink, where the
+/// values of both signs agree, as those of `max(h, 0)` and `abs(h)` do where h = 0.
+pub(crate) fn warn_zero_surface(at: &Point, notes: &mut Notes, j: usize, mode: &Mode) {
+    let sliding: SlidingSet = mode.sliding_set().collect();
+    if at.triggers().is_only_trigger(j) || !at.system.jumps_across(j, &mode.signs(), &sliding) {
+        return;
+    }
+    let name = at.system.surface_name(j);
+    notes.warnings.push(Warning {
+        t: at.t,
+        code: WarningCode::ZeroSurface,
+        surfaces: vec![j],
+        text: format!(
+            "{name} is zero all along the motion from here: its sign means nothing, and that of the mode is taken"
+        ),
+        candidates: Vec::new(),
+        rule: "",
+    });
+}
+
+/// Has the motion left a surface that it was to stay on, by more than the tolerance?
+pub(crate) fn has_left_resting(at: &Point, notes: &mut Notes) -> Result<bool, FieldError> {
+    let signs = at.arrival.signs;
+    let h = at.surface_values(notes, signs)?;
+    let mut gradient = vec![0.0; at.x.len()];
+    for &j in at.arrival.resting {
+        at.system.gradient(j, at.t, at.x, signs, &mut gradient)?;
+        let tolerance = at.scale.along(&gradient, at.x);
+        // Bodies that touch have to be held apart at once.
+        let factor = match at.triggers().is_only_trigger(j) {
+            true => 1.0,
+            false => LEFT_RESTING,
+        };
+        if h[j].abs() > factor * tolerance {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
+/// Warns where the motion goes on at a root around which the regularised motion oscillates.
+pub(crate) fn warn_oscillation(at: &Point, notes: &mut Notes) {
+    let field = at.arrival.field.borrow();
+    let ModeField::Intersection(field) = &**field else {
+        return;
+    };
+    if !field.oscillates() {
+        return;
+    }
+    let names = field
+        .set()
+        .iter()
+        .map(|&j| at.system.surface_name(j) + " = 0");
+    let names: Vec<String> = names.collect();
+    notes.warnings.push(Warning {
+        t: at.t,
+        code: WarningCode::Oscillation,
+        surfaces: field.set().to_vec(),
+        text: format!(
+            "sliding at the intersection of {} is not stable for this scaling of the surfaces: the regularised \
+             motion goes around it, with another mean, or away from it; another kappa= may be stable",
+            names.join(", ")
+        ),
+        candidates: Vec::new(),
+        rule: "",
+    });
+}

@@ -1,4 +1,0 @@
-//! Actions: resets, impacts and ticks of clocks, and the contact that they end in.
-
-pub(super) mod instant;
-pub(super) mod timetable;
