@@ -356,3 +356,10 @@ fn what_fails(failing: &[(Mode, Guard)], surface_name: impl Fn(usize) -> String)
         (_, words) => format!("; the guard that fails in each mode: {words}"),
     }
 }
+
+/// Was a warning given about this surface alone: its function is zero along a motion, or the solution is not unique there?
+pub(crate) fn is_named(warnings: &[Warning], j: usize) -> bool {
+    let is_about = |code| matches!(code, WarningCode::ZeroSurface | WarningCode::NonUnique);
+    let mut warnings = warnings.iter();
+    warnings.any(|warning| is_about(warning.code) && warning.surfaces == [j])
+}

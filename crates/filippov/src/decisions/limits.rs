@@ -1,6 +1,6 @@
 //! Limits of infinitely many switches or impacts in finite time, and what follows there.
 
-use super::point::{Decided, Lefts, Next, Notes, Point};
+use super::point::{Decided, Lefts, Next, Notes, Point, Values};
 use super::rule::{How, Meeting};
 use crate::cube::least_multipliers;
 use crate::error::FieldError;
@@ -257,6 +257,46 @@ fn distance(at: &Point, meeting: &[usize], switch: &Switch) -> Result<f64, Field
         square += h[j] * h[j] / dot(&gradient, &gradient);
     }
     Ok(square.sqrt())
+}
+
+/// Triggers that a jump to a limit passed.
+pub(crate) struct Passed {
+    pub triggers: Vec<usize>,
+    /// The point moved back onto them, and the functions there.
+    pub x: Vec<f64>,
+    pub h: Values,
+}
+
+/// The triggers beside `surface` that the jump to the limit there passed, for a motion in the mode `before`.
+pub(crate) fn passed_beside(
+    at: &Point,
+    notes: &mut Notes,
+    before: &Mode,
+    surface: usize,
+) -> Result<Option<Passed>, FieldError> {
+    let (signs, triggers) = (before.signs(), at.triggers());
+    let h = at.surface_values(notes, &signs)?;
+    let passed = (0..h.len()).filter(|&k| {
+        let side = before.entries()[k];
+        k != surface
+            && triggers.is_only_trigger(k)
+            && h[k] * f64::from(side) < 0.0
+            && triggers.side(k, None) == side
+    });
+    let passed: Vec<usize> = passed.collect();
+    if passed.is_empty() {
+        return Ok(None);
+    }
+    let met: Vec<usize> = passed.iter().copied().chain([surface]).collect();
+    let mut x = at.x.to_vec();
+    let mut projector = Projector::new(x.len(), at.system.n_surfaces());
+    projector.project_onto(at.system, &met, at.t, &mut x, &signs)?;
+    let h = at.moved(at.t, &x).surface_values(notes, &signs)?;
+    Ok(Some(Passed {
+        triggers: passed,
+        x,
+        h,
+    }))
 }
 
 /// From where the limit is known to the tolerance: its error is a multiple of the square of the distance.

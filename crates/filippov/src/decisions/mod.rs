@@ -37,7 +37,7 @@ mod viable;
 
 pub(crate) use consistency::differs_between_sides;
 pub(crate) use decide::{decide, Decision};
-pub(crate) use event::{add_vanishing_surfaces, located_surfaces, vanishing_surfaces, Reached};
+pub(crate) use event::{add_vanishing_surfaces, located_surfaces, Reached};
 pub(crate) use leave_by_rule::refusal;
 pub(crate) use placement::{goes_through, pushed_back, sides, triggers_reached, Sides};
 pub(crate) use point::{Arrival, Cause, Leap, Left, Lefts, Next, Notes, Point, Policy, Values};
@@ -46,4 +46,4 @@ pub(crate) use rule::Rule;
 pub(crate) use scene::Scene;
 pub(crate) use sides::{warn_against_direction, warn_unknown_side};
 pub(crate) use spiral::landing;
-pub(crate) use two_fold::{beyond_double_zero, two_fold_here};
+pub(crate) use two_fold::{end_of_sliding, EndOfSliding};

@@ -3,6 +3,7 @@
 //! Before it the motion is attracted from both sides, behind it from none. Near it the multiplier is the quotient of two
 //! small numbers, which are known to the tolerance only: where both vanish within it, the motion has arrived.
 
+use super::event::vanishing_surfaces;
 use super::point::{Notes, Point};
 
 use crate::error::FieldError;
@@ -78,8 +79,42 @@ fn speed(at: &Point, x: &[f64], velocity: &[f64]) -> f64 {
     parts.fold(0.0, f64::max)
 }
 
+/// What the end of sliding on one surface is, where its multiplier may be lost.
+pub(crate) enum EndOfSliding {
+    /// An exit like any other.
+    Exit,
+    /// The motion has come to a two-fold, which is here.
+    TwoFold(Place),
+    /// The difference of the normal components has a double zero, and the motion goes on from here.
+    DoubleZero(Place),
+}
+
+/// What the end of sliding on surface `j` is, if no other surface vanishes. The steps before say whether it may be a double
+/// zero or a two-fold; behind `horizon` there is none.
+pub(crate) fn end_of_sliding(
+    at: &Point,
+    notes: &mut Notes,
+    j: usize,
+    (may_lose, approaches): (bool, bool),
+    horizon: f64,
+) -> Result<EndOfSliding, FieldError> {
+    if !may_lose && !approaches || !vanishing_surfaces(at, notes)?.surfaces.is_empty() {
+        return Ok(EndOfSliding::Exit);
+    }
+    if may_lose {
+        let beyond = beyond_double_zero(at, notes, j)?;
+        if let Some(place) = beyond.filter(|(t, _)| *t <= horizon) {
+            return Ok(EndOfSliding::DoubleZero(place));
+        }
+    }
+    Ok(match approaches {
+        true => two_fold_here(at)?.map_or(EndOfSliding::Exit, EndOfSliding::TwoFold),
+        false => EndOfSliding::Exit,
+    })
+}
+
 /// The two-fold that the motion on one surface has come to, if it has: its time and state.
-pub(crate) fn two_fold_here(at: &Point) -> Result<Option<Place>, FieldError> {
+pub(super) fn two_fold_here(at: &Point) -> Result<Option<Place>, FieldError> {
     let mut field = at.arrival.field.borrow_mut();
     let ModeField::Sliding(field) = &mut **field else {
         return Ok(None);
@@ -124,7 +159,7 @@ pub(crate) fn two_fold_here(at: &Point) -> Result<Option<Place>, FieldError> {
 /// continuation is taken to where it is known again: where the difference is as large as errors of the components,
 /// which is at the root of a tolerance, so that the way is straight up to a tolerance. `None` too where the difference
 /// changes its sign, as at a two-fold.
-pub(crate) fn beyond_double_zero(
+pub(super) fn beyond_double_zero(
     at: &Point,
     notes: &mut Notes,
     j: usize,

@@ -2,14 +2,13 @@
 
 use crate::action::Instant;
 use crate::decisions::{
-    add_vanishing_surfaces, goes_through, located_surfaces, sides, triggers_reached,
-    warn_unknown_side, Cause, Decision, Left, Notes, Sides, Values,
+    add_vanishing_surfaces, goes_through, limits::limits_of_impacts, located_surfaces, sides,
+    triggers_reached, warn_unknown_side, Cause, Notes, Reached, Sides, Values,
 };
 use crate::error::FieldError;
-use crate::event::Found;
+use crate::event::{Found, Multiple};
 use crate::integrate::integrator::Integrator;
 use crate::motion::Guard;
-use crate::motion::Leading;
 use crate::patience::Patience;
 use crate::status::Stop;
 
@@ -44,8 +43,8 @@ impl Integrator<'_> {
             }
         }
         if due.is_empty() {
-            return match self.decide(Cause::Start)?.decided {
-                Ok(next) => self.begin(next),
+            return match self.decide(Cause::Start, &mut Reached::default())?.decided {
+                Ok(next) => self.begin(next, &Multiple::default()),
                 Err(stop) => Ok(Some(stop)),
             };
         }
@@ -61,9 +60,11 @@ impl Integrator<'_> {
         let mut due = self.timetable.take(self.actions, self.t);
         self.horizon = self.timetable.horizon(self.actions, self.t, self.t_end);
         if !self.actions.list.is_empty() {
-            let signs = self.motion.signs.clone();
-            let h = self.surface_values(&signs)?;
-            let reached = self.ask(Cause::Start, |at, _| triggers_reached(at, &h))?;
+            let (h, reached) = self.ask(Cause::Start, |at, notes| {
+                let h = at.surface_values(notes, at.arrival.signs)?;
+                let reached = triggers_reached(at, &h)?;
+                Ok((h, reached))
+            })?;
             self.residuals = self.motion.residuals(&h, &reached);
             for j in reached {
                 due.extend(self.actions.triggered_at(j, self.motion.mode.entries()[j]));
@@ -126,7 +127,7 @@ impl Integrator<'_> {
             .collect();
         if !departing.is_empty() {
             self.residuals = self.motion.residuals(h, &surfaces);
-            return self.go_on_unless_stuck(&departing).map(Some);
+            return self.go_on_from_here(&departing).map(Some);
         }
         if !self.motion.is_in_contact() && surfaces.len() > 1 {
             self.residuals = self.motion.residuals(h, &surfaces);
@@ -150,7 +151,9 @@ impl Integrator<'_> {
         if stopped.is_some() {
             return Ok(stopped);
         }
-        let decided = self.decide(Cause::Anew(&before))?.decided;
+        let decided = self
+            .decide(Cause::Anew(&before), &mut Reached::default())?
+            .decided;
         let next = match decided {
             Ok(next) => next,
             Err(stop) => return Ok(Some(stop)),
@@ -158,11 +161,15 @@ impl Integrator<'_> {
         self.residuals.clear();
         self.passing.clear();
         self.recorder.set_last_mode(first, &next.mode);
-        if let Some(rest) = self.impacts_end(first, &next.mode)? {
+        let limits = self.ask(Cause::Start, |at, _| {
+            limits_of_impacts(at, first, &next.mode)
+        })?;
+        let mut limits = limits.into_iter().flatten();
+        if let Some(rest) = limits.find(|limit| limit.t <= self.horizon) {
             return self.jump_to(rest, next.mode);
         }
         let t = self.t;
-        let stop = self.begin(next)?;
+        let stop = self.begin(next, &Multiple::default())?;
         if self.t == t {
             // Contact that begins with a speed below the tolerance takes that away.
             self.recorder.jump(t, &self.x);
@@ -204,27 +211,5 @@ impl Integrator<'_> {
         self.recorder.jump(t, &self.x);
         self.take_notes(notes);
         stopped
-    }
-
-    /// Decides the mode anew where an event turned out to be none: the motion leaves the surfaces `departing` at these
-    /// rates.
-    fn go_on_unless_stuck(
-        &mut self,
-        departing: &[(usize, f64)],
-    ) -> Result<Option<Stop>, FieldError> {
-        let before = self.motion.mode.clone();
-        let Decision { rule, decided } = self.decide(Cause::Anew(&before))?;
-        self.residuals.clear();
-        let mut next = match decided {
-            Ok(next) => next,
-            Err(stop) => return Ok(Some(stop)),
-        };
-        for &(j, value) in departing
-            .iter()
-            .filter(|(j, _)| self.motion.triggers(self.system).is_internal(*j))
-        {
-            next.left.push(Left::beside(j, Leading { order: 1, value }));
-        }
-        self.go_on_in(before, next, rule)
     }
 }

@@ -413,7 +413,7 @@ impl<'a> Integrator<'a> {
                 self.motion.note_departure();
             }
             if !self.motion.resting.is_empty() && self.ask(Cause::Start, has_left_resting)? {
-                return self.go_on_from_here();
+                return self.go_on_from_here(&[]);
             }
             if let Some(j) = zero {
                 return self.settle_on(j);

@@ -2,38 +2,17 @@
 
 use smallvec::SmallVec;
 
-use crate::decisions::limits::{limit_of_switches, limits_of_impacts, Limit};
-use crate::decisions::{Cause, Decision};
+use crate::decisions::limits::{passed_beside, Limit, Passed};
+use crate::decisions::{Cause, Decision, Reached};
 use crate::error::FieldError;
+use crate::event::Multiple;
 use crate::integrate::integrator::Integrator;
 use crate::mode::Mode;
-use crate::motion::Projector;
 use crate::status::Stop;
 use crate::switch::Kind;
 use crate::switch::Switch;
 
 impl Integrator<'_> {
-    /// The limit that the last switches tend to, if they do and it is within the known times.
-    pub(in crate::integrate) fn accumulation(&mut self) -> Result<Option<Limit>, FieldError> {
-        if self.system.n_surfaces() < 2 {
-            // Nothing can meet.
-            return Ok(None);
-        }
-        let limit = self.ask(Cause::Start, |at, _| limit_of_switches(at))?;
-        Ok(limit.filter(|limit| limit.t <= self.horizon))
-    }
-
-    /// The limit of the last impacts, if they have one within the known times. `before` switches came before this instant.
-    pub(in crate::integrate) fn impacts_end(
-        &mut self,
-        before: usize,
-        after: &Mode,
-    ) -> Result<Option<Limit>, FieldError> {
-        let limits = self.ask(Cause::Start, |at, _| limits_of_impacts(at, before, after))?;
-        let mut known = limits.into_iter().flatten();
-        Ok(known.find(|limit| limit.t <= self.horizon))
-    }
-
     /// Moves to the limit and goes on from there.
     pub(in crate::integrate) fn jump_to(
         &mut self,
@@ -61,9 +40,11 @@ impl Integrator<'_> {
             self.recorder.jump(self.t, &self.x);
         }
         self.stats.n_switches += 1;
-        let due = match surfaces[..] {
-            [surface] if is_rest => self.reached_beside(&before, surface)?,
-            _ => Vec::new(),
+        let passed = match surfaces[..] {
+            [surface] if is_rest => self.ask(Cause::Start, |at, notes| {
+                passed_beside(at, notes, &before, surface)
+            })?,
+            _ => None,
         };
         let switch = |after: &Mode, rule| Switch {
             t,
@@ -76,7 +57,18 @@ impl Integrator<'_> {
             note: String::new(),
             rule,
         };
-        if !due.is_empty() {
+        if let Some(Passed { triggers, x, h }) = passed {
+            self.x = x;
+            self.recorder.jump(self.t, &self.x);
+            self.motion
+                .restart(self.system, self.t, before.clone(), &[]);
+            let met: Vec<usize> = triggers.iter().chain(&surfaces).copied().collect();
+            self.residuals = self.motion.residuals(&h, &met);
+            let due = triggers.iter().flat_map(|&k| {
+                let side = before.entries()[k];
+                self.actions.triggered_at(k, side)
+            });
+            let due = due.collect();
             let y_after = SmallVec::from_slice(&self.x);
             let switch = switch(&before, "");
             self.recorder.switch(Switch { y_after, ..switch });
@@ -86,46 +78,15 @@ impl Integrator<'_> {
             true => Cause::Anew(&before),
             false => Cause::Limit(&surfaces),
         };
-        let Decision { rule, decided } = self.decide(cause)?;
+        let Decision { rule, decided } = self.decide(cause, &mut Reached::default())?;
         // Where nothing is decided the run ends at the limit, having come there all the same.
         let after = decided.as_ref().map_or(&before, |next| &next.mode);
         let y_after = SmallVec::from_slice(&self.x);
         let switch = switch(after, rule.name());
         self.recorder.switch(Switch { y_after, ..switch });
         match decided {
-            Ok(next) => self.begin(next),
+            Ok(next) => self.begin(next, &Multiple::default()),
             Err(stop) => Ok(Some(stop)),
         }
-    }
-
-    /// The actions at other surfaces that the jump to the limit passed: the point is moved back onto them.
-    fn reached_beside(&mut self, before: &Mode, surface: usize) -> Result<Vec<usize>, FieldError> {
-        let signs = before.signs();
-        let h = self.surface_values(&signs)?;
-        let passed = (0..h.len()).filter(|&k| {
-            let side = before.entries()[k];
-            k != surface
-                && self.motion.triggers(self.system).is_only_trigger(k)
-                && h[k] * f64::from(side) < 0.0
-        });
-        let passed: Vec<usize> = passed
-            .filter(|&k| self.motion.triggers(self.system).side(k, None) == before.entries()[k])
-            .collect();
-        if passed.is_empty() {
-            return Ok(Vec::new());
-        }
-        let set: Vec<usize> = passed.iter().copied().chain([surface]).collect();
-        let mut projector = Projector::new(self.x.len(), self.system.n_surfaces());
-        projector.project_onto(self.system, &set, self.t, &mut self.x, &signs)?;
-        self.recorder.jump(self.t, &self.x);
-        self.motion
-            .restart(self.system, self.t, before.clone(), &[]);
-        let h = self.surface_values(&signs)?;
-        self.residuals = self.motion.residuals(&h, &set);
-        let due = passed.iter().flat_map(|&k| {
-            let side = before.entries()[k];
-            self.actions.triggered_at(k, side).collect::<Vec<_>>()
-        });
-        Ok(due.collect())
     }
 }

@@ -4,7 +4,7 @@ use crate::decisions::{warn_zero_surface, Cause};
 use crate::error::FieldError;
 use crate::integrate::integrator::Integrator;
 use crate::motion::{Guard, Projector};
-use crate::status::Stop;
+use crate::status::{is_named, Stop};
 use crate::tolerances::DOUBTFUL;
 
 impl Integrator<'_> {
@@ -32,7 +32,10 @@ impl Integrator<'_> {
             self.stepper.interpolant().at(0.5, &mut self.detector.x);
             let (middle, h) = (0.5 * (self.t + t1), &mut self.detector.h);
             self.system.surfaces(middle, &self.detector.x, &signs, h)?;
-            if h[j].abs() <= noise && !self.is_named(j) && !self.motion.settled.contains(&j) {
+            if h[j].abs() <= noise
+                && !is_named(&self.warnings, j)
+                && !self.motion.settled.contains(&j)
+            {
                 return Ok(Some(j));
             }
         }
@@ -45,7 +48,7 @@ impl Integrator<'_> {
         let signs = self.motion.signs.clone();
         let mut projector = Projector::new(self.x.len(), signs.len());
         projector.project(self.system, j, self.t, &mut self.x, &signs)?;
-        let stop = self.go_on_from_here()?;
+        let stop = self.go_on_from_here(&[])?;
         if !self.motion.sliding().contains(&j) {
             if !self.motion.resting.contains(&j) {
                 self.motion.settled.push(j);

@@ -1,22 +1,22 @@
 //! From a located event, a limit or a start to the next motion: the decision is asked for, recorded and carried out.
 
-use smallvec::{smallvec, SmallVec};
+use smallvec::SmallVec;
 
 use crate::decisions::{
-    beyond_double_zero, decide, differs_between_sides, landing, limits::limit_here, refusal,
-    resting, root_ends, two_fold_here, vanishing_surfaces, warn_against_direction,
-    warn_oscillation, Cause, Decision, Leap, Left, Lefts, Next, Notes, Point, Reached, Rule, Scene,
-    Values,
+    decide, differs_between_sides, end_of_sliding, landing,
+    limits::{limit_here, limit_of_switches},
+    refusal, resting, root_ends, warn_against_direction, warn_oscillation, Cause, Decision,
+    EndOfSliding, Leap, Left, Lefts, Next, Notes, Point, Reached, Rule, Scene,
 };
 use crate::error::FieldError;
 use crate::event::{Found, Multiple, Seen};
 use crate::integrate::integrator::Integrator;
 use crate::integrate::steps::pace::excursion;
 use crate::mode::Mode;
-use crate::motion::{Guard, ModeField, SlidingSet, SmoothField};
+use crate::motion::{Guard, Leading, ModeField, SlidingSet, SmoothField};
 use crate::patience::Patience;
 use crate::record::decide_and_record;
-use crate::status::{Stop, WarningCode};
+use crate::status::{is_named, Stop, WarningCode};
 use crate::stepper::{initial_step, restart_step};
 use crate::switch::Kind;
 use crate::switch::Switch;
@@ -67,29 +67,17 @@ impl<'a> Integrator<'a> {
             return;
         }
         for warning in notes.warnings {
-            let is_known =
-                warning.code == WarningCode::ZeroSurface && self.is_named(warning.surfaces[0]);
+            let is_known = warning.code == WarningCode::ZeroSurface
+                && is_named(&self.warnings, warning.surfaces[0]);
             if !is_known {
                 self.warnings.push(warning);
             }
         }
     }
 
-    /// Was a warning given about this surface alone: its function is zero along a motion, or the solution is not unique there?
-    pub(in crate::integrate) fn is_named(&self, j: usize) -> bool {
-        let is_about = |code| matches!(code, WarningCode::ZeroSurface | WarningCode::NonUnique);
-        let mut warnings = self.warnings.iter();
-        warnings.any(|warning| is_about(warning.code) && warning.surfaces == [j])
-    }
-
-    /// Decides which motion follows at the current place.
-    pub(in crate::integrate) fn decide(&mut self, cause: Cause) -> Result<Decision, FieldError> {
-        self.decide_where_reached(cause, &mut Reached::default())
-    }
-
-    /// The same after an event; `reached` becomes what vanishes there.
+    /// Decides which motion follows at the current place. After an event, `reached` becomes what vanishes there.
     #[inline]
-    fn decide_where_reached(
+    pub(in crate::integrate) fn decide(
         &mut self,
         cause: Cause,
         reached: &mut Reached,
@@ -111,17 +99,6 @@ impl<'a> Integrator<'a> {
         Ok(decision)
     }
 
-    /// Values of all switching functions at the current place.
-    pub(in crate::integrate) fn surface_values(
-        &mut self,
-        signs: &[f64],
-    ) -> Result<Values, FieldError> {
-        let mut h: Values = smallvec![0.0; self.system.n_surfaces()];
-        self.system.surfaces(self.t, &self.x, signs, &mut h)?;
-        self.stats.n_surface_evaluations += 1;
-        Ok(h)
-    }
-
     /// Decides what follows the event and starts it.
     pub(in crate::integrate) fn switch(
         &mut self,
@@ -132,8 +109,9 @@ impl<'a> Integrator<'a> {
             return self.leave_without_progress(event);
         }
         if !self.actions.list.is_empty() {
-            let signs = self.motion.signs.clone();
-            let h = self.surface_values(&signs)?;
+            let h = self.ask(Cause::Start, |at, notes| {
+                at.surface_values(notes, at.arrival.signs)
+            })?;
             if let Some(done) = self.act_at_event(event, &h)? {
                 return Ok(done);
             }
@@ -141,20 +119,41 @@ impl<'a> Integrator<'a> {
         let mut at_two_fold = false;
         let is_end = |guard: &&Guard| matches!(guard, Guard::Multiplier { .. });
         let n_ends = event.guards.iter().filter(is_end).count();
-        if n_ends > 0 && self.motion.sliding.len() == 1 {
-            if let Some(done) = self.pass_double_zero(event)? {
-                return Ok(done);
-            }
-            at_two_fold = self.arrives_at_two_fold(event, n_ends)?;
-        }
-        let mut reached = Reached::default();
-        let cause = Cause::Event {
+        let cause = |at_two_fold| Cause::Event {
             functions: &event.guards,
             touch: event.touch,
             vanishing: event.multiple.vanishing,
             at_two_fold,
         };
-        let Decision { decided, rule } = self.decide_where_reached(cause, &mut reached)?;
+        if let (&[j], true) = (self.motion.sliding(), n_ends > 0) {
+            let speed = self.stepper.end_derivative().iter();
+            let speed = speed.fold(0.0_f64, |most, v| most.max(v.abs()));
+            let signs = (
+                self.detector.may_lose_multiplier(speed, self.options.rtol),
+                n_ends > 1 || self.detector.approaches_two_fold(),
+            );
+            let horizon = self.horizon;
+            let end = self.ask(cause(false), |at, notes| {
+                end_of_sliding(at, notes, j, signs, horizon)
+            })?;
+            match end {
+                EndOfSliding::Exit => {}
+                EndOfSliding::DoubleZero((t, x)) => {
+                    let mode = self.motion.mode.clone();
+                    self.move_straight(t, x)?;
+                    self.record(mode.clone(), mode.clone(), &[], Rule::OneSurface.name())?;
+                    return self.begin(Next::new(mode, Lefts::new()), &Multiple::default());
+                }
+                EndOfSliding::TwoFold((t, x)) => {
+                    at_two_fold = true;
+                    if t > self.t && t <= self.horizon {
+                        self.move_straight(t, x)?;
+                    }
+                }
+            }
+        }
+        let mut reached = Reached::default();
+        let Decision { decided, rule } = self.decide(cause(at_two_fold), &mut reached)?;
         let Reached { surfaces, before } = reached;
         self.residuals.clear();
         let mut next = match decided {
@@ -197,11 +196,12 @@ impl<'a> Integrator<'a> {
         }
         self.record(before, next.mode.clone(), &concerned, rule.name())?;
         if !matches!(rule, Rule::Touch | Rule::Contact | Rule::Triggers) {
-            if let Some(limit) = self.accumulation()? {
+            let limit = self.ask(Cause::Start, |at, _| limit_of_switches(at))?;
+            if let Some(limit) = limit.filter(|limit| limit.t <= self.horizon) {
                 return self.jump_to(limit, next.mode);
             }
         }
-        self.begin_behind(next, &event.multiple)
+        self.begin(next, &event.multiple)
     }
 
     /// After too many switches without any progress of time: goes on from their limit, or ends the run.
@@ -219,68 +219,6 @@ impl<'a> Integrator<'a> {
             surfaces.extend(named);
         }
         Ok(Some(Stop::NoProgress { surfaces }))
-    }
-
-    /// Goes on beyond a double zero of the difference of the normal components, if sliding has come to one: what came of
-    /// that.
-    fn pass_double_zero(&mut self, event: &Found) -> Result<Option<Option<Stop>>, FieldError> {
-        let &[j] = self.motion.sliding() else {
-            return Ok(None);
-        };
-        let speed = self.stepper.end_derivative().iter();
-        let speed = speed.fold(0.0_f64, |most, v| most.max(v.abs()));
-        if !self.detector.may_lose_multiplier(speed, self.options.rtol) {
-            return Ok(None);
-        }
-        let Reached {
-            surfaces,
-            before: mode,
-        } = self.vanishing_surfaces(event)?;
-        if !surfaces.is_empty() {
-            return Ok(None);
-        }
-        let beyond = self.ask(Cause::Anew(&mode), |at, notes| {
-            beyond_double_zero(at, notes, j)
-        })?;
-        let Some((t, end)) = beyond.filter(|(t, _)| *t <= self.horizon) else {
-            return Ok(None);
-        };
-        self.move_straight(t, end)?;
-        self.record(mode.clone(), mode.clone(), &[], Rule::OneSurface.name())?;
-        let next = Next::new(mode, Lefts::new());
-        Ok(Some(self.begin(next)?))
-    }
-
-    /// Has sliding on one surface come to a two-fold? Then the point is moved there.
-    fn arrives_at_two_fold(&mut self, event: &Found, n_ends: usize) -> Result<bool, FieldError> {
-        if n_ends == 1 && !self.detector.approaches_two_fold() {
-            return Ok(false);
-        }
-        let Reached {
-            surfaces,
-            before: mode,
-        } = self.vanishing_surfaces(event)?;
-        if !surfaces.is_empty() {
-            return Ok(false);
-        }
-        let Some((t, x)) = self.ask(Cause::Anew(&mode), |at, _| two_fold_here(at))? else {
-            return Ok(false);
-        };
-        if t > self.t && t <= self.horizon {
-            self.move_straight(t, x)?;
-        }
-        Ok(true)
-    }
-
-    /// The surfaces that vanish at an event, those slid on left out, and the mode before.
-    fn vanishing_surfaces(&mut self, event: &Found) -> Result<Reached, FieldError> {
-        let cause = Cause::Event {
-            functions: &event.guards,
-            touch: event.touch,
-            vanishing: [0; 2],
-            at_two_fold: false,
-        };
-        self.ask(cause, vanishing_surfaces)
     }
 
     /// Records a switch between two modes that leaves the state as it is.
@@ -322,13 +260,8 @@ impl<'a> Integrator<'a> {
         Ok(())
     }
 
-    /// Starts a motion at the current point.
-    pub(in crate::integrate) fn begin(&mut self, next: Next) -> Result<Option<Stop>, FieldError> {
-        self.begin_behind(next, &Multiple::default())
-    }
-
-    /// The same where what the motion leaves has a multiple zero.
-    fn begin_behind(
+    /// Starts a motion at the current point; what it leaves may have a multiple zero.
+    pub(in crate::integrate) fn begin(
         &mut self,
         next: Next,
         multiple: &Multiple,
@@ -485,30 +418,31 @@ impl<'a> Integrator<'a> {
         Ok(())
     }
 
-    /// Decides the mode anew at the current point and goes on.
-    pub(in crate::integrate) fn go_on_from_here(&mut self) -> Result<Option<Stop>, FieldError> {
-        let before = self.motion.mode.clone();
-        let Decision { rule, decided } = self.decide(Cause::Anew(&before))?;
-        match decided {
-            Ok(next) => self.go_on_in(before, next, rule),
-            Err(stop) => Ok(Some(stop)),
-        }
-    }
-
-    /// Records what changes between two modes, if anything does, and starts the motion in the second.
-    pub(in crate::integrate) fn go_on_in(
+    /// Decides the mode anew at the current point, records what changes, and goes on. The motion leaves the surfaces
+    /// `departing` of laws at these rates.
+    pub(in crate::integrate) fn go_on_from_here(
         &mut self,
-        before: Mode,
-        next: Next,
-        rule: Rule,
+        departing: &[(usize, f64)],
     ) -> Result<Option<Stop>, FieldError> {
+        let before = self.motion.mode.clone();
+        let Decision { rule, decided } =
+            self.decide(Cause::Anew(&before), &mut Reached::default())?;
+        self.residuals.clear();
+        let mut next = match decided {
+            Ok(next) => next,
+            Err(stop) => return Ok(Some(stop)),
+        };
+        let triggers = self.motion.triggers(self.system);
+        let departing = departing.iter().filter(|(j, _)| triggers.is_internal(*j));
+        let departing = departing.map(|&(j, value)| Left::beside(j, Leading { order: 1, value }));
+        next.left.extend(departing);
         let entries = before.entries().iter().zip(next.mode.entries()).enumerate();
         let changed = entries.filter(|(_, (before, after))| before != after);
         let changed: Vec<usize> = changed.map(|(j, _)| j).collect();
         if !changed.is_empty() {
             self.record(before, next.mode.clone(), &changed, rule.name())?;
         }
-        self.begin(next)
+        self.begin(next, &Multiple::default())
     }
 
     /// Finds the mode of the initial state and starts the motion.
@@ -517,8 +451,8 @@ impl<'a> Integrator<'a> {
         if !self.actions.list.is_empty() {
             return self.start_with_actions();
         }
-        match self.decide(Cause::Start)?.decided {
-            Ok(next) => self.begin(next),
+        match self.decide(Cause::Start, &mut Reached::default())?.decided {
+            Ok(next) => self.begin(next, &Multiple::default()),
             Err(stop) => Ok(Some(stop)),
         }
     }
