@@ -59,7 +59,6 @@ lint: $(ENV_STAMP) ## formatting, clippy, ruff, structure, map; changes nothing
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(PY) scripts/check_structure.py
-	$(PY) scripts/check_map.py
 
 types: $(BUILD_STAMP) ## type check (strict) and comparison of the stub with the extension
 	$(BIN)/mypy
