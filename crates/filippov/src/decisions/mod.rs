@@ -14,6 +14,7 @@ mod contact;
 mod decide;
 mod departures;
 mod event;
+mod first_order;
 mod germ;
 mod germs;
 mod leave_by_rule;

@@ -12,6 +12,7 @@ mod relay_at;
 mod resolution;
 mod resolve;
 mod stick;
+mod surface;
 
 pub use crate::cube::{
     all_relay_modes, enclose_root, has_one_mode_only, is_p_matrix, is_scaling_stable, is_stable,
@@ -24,7 +25,7 @@ pub use crate::cube::{
 pub use crate::error::Undecided;
 pub use crate::motion::{first_nonzero, normal_component, Leading, TwoFold, TwoFoldMotion};
 pub use crate::patience::Patience;
-pub use codim1::{decide, Arrival, Decision};
+pub use codim1::decide;
 pub use hidden::{
     admissible, admissible_within, limit as limit_of_hidden_dynamics, Admissible,
     Outcome as HiddenOutcome,
@@ -33,3 +34,4 @@ pub use incoming::{ExitKind, Incoming};
 pub use relay_at::relay_at;
 pub use resolution::{Continuation, Resolution};
 pub use resolve::{resolve, resolve_within};
+pub use surface::{Arrival, Decision};

@@ -1,7 +1,7 @@
 //! Some guards have a power series along a step; it bounds them and locates their zeros.
 
 use super::curve::Curve;
-use super::guard::AtZero;
+use super::sought::AtZero;
 use super::StepSearch;
 use crate::error::FieldError;
 use crate::event::filter::may_vanish_between;

@@ -6,6 +6,7 @@ mod curve;
 mod detector;
 mod guard;
 mod multiple_zero;
+mod sought;
 mod step;
 mod user;
 

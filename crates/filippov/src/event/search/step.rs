@@ -5,7 +5,7 @@ use smallvec::smallvec;
 use super::bounds::BoundedCurve;
 use super::detector::Detector;
 use super::detector::CLEAR_OF_NOISE;
-use super::guard::{Search, Sought};
+use super::sought::{Search, Sought};
 use super::StepSearch;
 use crate::error::FieldError;
 use crate::event::certificate::{prove, Proof};

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::observer::Return;
+use super::returns::Return;
 use crate::tolerances::{COMING_TOGETHER, LEAST_AGREEMENTS};
 
 /// The test: returns number k and k - q agree, `q` times in a row (at least [`LEAST_AGREEMENTS`] times), and those

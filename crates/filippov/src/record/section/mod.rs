@@ -4,12 +4,13 @@
 
 mod cycle;
 mod observer;
+mod returns;
 #[cfg(test)]
 mod tests;
 
 pub use cycle::Cycle;
 pub(crate) use observer::Observer;
-pub use observer::{Return, Returns};
+pub use returns::{Return, Returns};
 
 use crate::event::UserFunction;
 use crate::switch::Kind;
