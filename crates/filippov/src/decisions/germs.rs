@@ -241,7 +241,7 @@ fn drop_other_names(
     viable.sort_by_key(|viable| (viable.is_pressed, viable.next.mode != *meeting.mode));
     let mut velocities: Vec<Vec<f64>> = Vec::with_capacity(viable.len());
     for Viable { next, .. } in viable.iter() {
-        velocities.push(at.velocity(notes, &next.mode, next.multipliers())?);
+        velocities.push(at.velocity_from(notes, &next.mode, next.start.as_deref())?);
     }
     let corners = at.corners(notes, meeting.surfaces, meeting.mode)?;
     let size = corners.size();

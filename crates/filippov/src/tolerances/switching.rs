@@ -215,6 +215,10 @@ pub const VANISHING_MULTIPLIER: f64 = 1e-9;
 /// Functions above this are not looked at for being zero all along a step: rounding of states up to thousands is below.
 pub const NEARLY_ZERO: f64 = 1e-10;
 
+/// Time, in units of 1 plus its size, after a start at which the equations of the multipliers vanish: how clear their root is
+/// there stands for the start. Components are clear of [`TANGENT_TO_ALL`], and little else has changed.
+pub const JUST_AFTER: f64 = 1e-6;
+
 /// Distance, in units of 1 plus the size of a component, at which two surfaces are compared ...
 pub const BESIDE: f64 = 1e-3;
 
