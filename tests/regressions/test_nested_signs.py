@@ -158,3 +158,16 @@ def test_sliding_ends_where_its_surface_bends_into_the_place_of_another(method: 
     assert (last.kind, str(last.mode_after)) == ("exit_sliding", "---")
     assert last.t == pytest.approx(1.0, abs=1e-12)
     np.testing.assert_allclose(sol.y[:, -1], [0.0, -1.84], rtol=0, atol=1e-9)
+
+
+def test_a_function_that_vanishes_on_one_side_of_what_is_slid_on() -> None:
+    """On the left of x = 0 the second function is y, which falls: sliding on x = 0 does not keep its sign."""
+
+    def f(t: float, x: Any) -> Any:
+        s = np.sign(x[0])
+        k = np.sign(x[1] + 3.0 + 3.0 * s)
+        return [-2.5 * s + 3.0 * k - 2.0 * s * k, -x[1] + 0.5 * s - 3.0 * k - 4.0 * s * k]
+
+    sol = fl.solve_ivp(f, (0.0, 0.25), [0.0, 0.0])
+    assert sol.success, sol.message
+    assert [str(mode) for mode in sol.segments.mode] == ["--"]

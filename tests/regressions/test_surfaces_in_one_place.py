@@ -34,3 +34,17 @@ def test_the_solution_as_a_function_is_on_both_to_rounding(one: Any, other: Any,
     # On the circle both signs are zero on the average, and the motion is the rotation.
     angle = np.unwrap(np.arctan2(states[1], states[0]))
     np.testing.assert_allclose(angle - angle[0], times - times[0], rtol=0, atol=1e-4)
+
+
+@pytest.mark.parametrize("factor", [1.0, -1.0])
+def test_a_start_where_all_fields_are_tangent_to_both(factor: float) -> None:
+    """With s1 = -s0 the field is -2 y s0: sliding begins at y = 0, where the normal components are zero."""
+
+    def f(t: float, x: Any) -> Any:
+        s0, s1 = np.sign(x[0]), np.sign(-factor * (2.0 * x[0] + 8.0 * x[0] * x[1]))
+        return [-s0 + factor * s1 * (-1.0 + 2.0 * x[1]), 1.0]
+
+    sol = fl.solve_ivp(f, (0.0, 1.0), [0.0, 0.0])
+    assert sol.success, sol.message
+    assert [str(mode) for mode in sol.segments.mode] == ["00"]
+    np.testing.assert_allclose(sol.y[:, -1], [0.0, 1.0], rtol=0, atol=1e-12)

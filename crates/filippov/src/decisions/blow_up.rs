@@ -14,7 +14,7 @@
 
 use super::point::{Notes, Point};
 use super::rule::Meeting;
-use crate::cube::{stable_roots_with_border, Matrix, NormalFields};
+use crate::cube::{is_scaling_stable, Matrix, NormalFields};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::{product_weights, MeetingFields};
@@ -49,6 +49,22 @@ struct Row {
     gradient: Vec<f64>,
 }
 
+impl Row {
+    fn mean(&self, other: &Row) -> Row {
+        let pairs = self.gradient.iter().zip(&other.gradient);
+        Row {
+            value: 0.5 * (self.value + other.value),
+            time: 0.5 * (self.time + other.time),
+            gradient: pairs.map(|(a, b)| 0.5 * (a + b)).collect(),
+        }
+    }
+
+    /// A bound of the component, divided by time or not, along velocities up to `fastest`.
+    fn size(&self, fastest: f64) -> f64 {
+        self.value.abs() + self.time.abs() + norm(&self.gradient) * fastest
+    }
+}
+
 /// All ways in which sliding in `mode`, on the surfaces of the meeting whose entry is 0, can begin.
 pub(super) fn beginnings(
     at: &Point,
@@ -72,11 +88,7 @@ pub(super) fn beginnings(
         let Ok(divided) = around.divided(&multipliers) else {
             continue;
         };
-        let roots = stable_roots_with_border(&divided, at.patience);
-        if roots
-            .iter()
-            .any(|root| distance(root, &multipliers) <= AT_SIDE)
-        {
+        if around.is_stable(&divided.jacobian(&multipliers)) {
             let rates = around.rates(&multipliers);
             found.push(Beginning { multipliers, rates });
         }
@@ -119,13 +131,47 @@ impl Around {
             }
             patterns.push(rows);
         }
-        Ok(Some(Around {
+        let mut around = Around {
             slid,
             fields,
             patterns,
             n_states: at.x.len(),
             is_silent: is_silent.to_vec(),
-        }))
+        };
+        around.tie();
+        Ok(Some(around))
+    }
+
+    /// Fills in the rows of regions that do not exist, as [`MeetingFields`] does.
+    fn tie(&mut self) {
+        let n_patterns = self.patterns.len();
+        for tie in self.fields.ties() {
+            let follower = self.slid[tie.follower];
+            let fastest = (0..n_patterns).map(|pattern| norm(self.fields.field(pattern)));
+            let fastest = fastest.fold(1.0, f64::max);
+            let sizes = self
+                .patterns
+                .iter()
+                .map(|rows| rows[follower].size(fastest));
+            let size = sizes.fold(0.0, f64::max);
+            for pattern in (0..n_patterns).filter(|pattern| !tie.holds(*pattern)) {
+                let (one, other) = (pattern ^ 1 << tie.leader, pattern ^ 1 << tie.follower);
+                let pairs = self.patterns[one].iter().zip(&self.patterns[other]);
+                let mut rows: Vec<Row> = pairs.map(|(one, other)| one.mean(other)).collect();
+                let push = [2.0, -2.0][pattern >> tie.follower & 1] * size;
+                rows[follower].value += push;
+                rows[follower].time += push;
+                self.patterns[pattern] = rows;
+            }
+        }
+    }
+
+    /// Does the hidden dynamics with this matrix come to its root? Equations that vanish at the point are slower than the others.
+    fn is_stable(&self, jacobian: &Matrix) -> bool {
+        let fast = (0..self.slid.len()).filter(|&i| !self.is_silent[self.slid[i]]);
+        let fast: Vec<usize> = fast.collect();
+        (fast.is_empty() || is_scaling_stable(&jacobian.principal(&fast)))
+            && is_scaling_stable(jacobian)
     }
 
     fn velocity(&self, weights: &[f64]) -> Vec<f64> {
@@ -207,6 +253,10 @@ impl Around {
         }
         None
     }
+}
+
+fn norm(v: &[f64]) -> f64 {
+    dot(v, v).sqrt()
 }
 
 /// Where Newton's method starts.

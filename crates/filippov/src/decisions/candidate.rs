@@ -39,8 +39,8 @@ pub(super) enum Verdict {
     Viable(Viable),
     /// This guard begins negative.
     Fails(Guard),
-    /// Derivatives at the point do not decide.
-    Open,
+    /// Derivatives at the point do not decide about this motion.
+    Open(Next),
     /// Nor would a trial: the mode has no field at the point.
     Untold,
 }
@@ -71,7 +71,7 @@ impl Outset {
     fn verdict(self) -> Verdict {
         match (self.failing, self.is_open) {
             (Some(guard), _) => Verdict::Fails(guard),
-            (None, true) => Verdict::Open,
+            (None, true) => Verdict::Open(self.viable.next),
             (None, false) => Verdict::Viable(self.viable),
         }
     }
@@ -103,7 +103,7 @@ impl Candidate<'_> {
         if self.entries.sliding_set().any(|i| is_silent[i]) {
             return match self.entries.sliding() {
                 Some(place) => Ok(match self.at_two_fold(at, place)? {
-                    Verdict::Open => Verdict::Untold,
+                    Verdict::Open(_) => Verdict::Untold,
                     verdict => verdict,
                 }),
                 None => self.blown_up(at, notes, &is_silent),
@@ -111,7 +111,7 @@ impl Candidate<'_> {
         }
         let face = self.fields.restrict(self.entries.entries());
         if is_undetermined(&face) {
-            return Ok(Verdict::Open);
+            return Ok(Verdict::Open(self.outset(&[]).viable.next));
         }
         let roots = stable_roots_with_border(&face, at.patience).into_iter();
         self.first_viable(roots.map(|lambda| self.with_multipliers(at, &lambda)))
@@ -141,7 +141,7 @@ impl Candidate<'_> {
         for outset in outsets {
             match (outset?.verdict(), &found) {
                 (Verdict::Viable(viable), _) => return Ok(Verdict::Viable(viable)),
-                (Verdict::Fails(_), Verdict::Open) => {}
+                (Verdict::Fails(_), Verdict::Open(_)) => {}
                 (verdict, _) => found = verdict,
             }
         }

@@ -15,7 +15,7 @@ pub(super) enum Consistency {
     Agrees {
         /// With the signs that other functions have in it.
         mode: Mode,
-        /// Which surfaces of the meeting the point lies on in it.
+        /// Which surfaces of the meeting the point lies on in it, on some side of what it slides on.
         vanishing: Vec<bool>,
     },
     /// This function is on the other side than the mode says, or not zero where the mode slides on it.
@@ -33,10 +33,11 @@ pub(super) fn consistency(
 ) -> Result<Consistency, FieldError> {
     let surfaces = meeting.surfaces;
     let mut mode = meeting.on_all(entries);
-    let mut vanishing = vec![true; surfaces.len()];
     if !at.system.has_nested_signs() {
+        let vanishing = vec![true; surfaces.len()];
         return Ok(Consistency::Agrees { mode, vanishing });
     }
+    let mut vanishing = vec![false; surfaces.len()];
     let known = Known::of(at, notes, meeting)?;
     let slid: Vec<usize> = mode
         .sliding_set()
@@ -50,12 +51,10 @@ pub(super) fn consistency(
         } = known.let_others_jump(at, notes, meeting, region)?;
         for (i, (&j, entry)) in surfaces.iter().zip(entries.entries()).enumerate() {
             if known.is_zero(at, j, h[j], &region)? {
-                continue;
-            }
-            if h[j] * f64::from(*entry) <= 0.0 {
+                vanishing[i] = true;
+            } else if h[j] * f64::from(*entry) <= 0.0 {
                 return Ok(Consistency::Contradicts(j));
             }
-            vanishing[i] = false;
         }
         let first = first.get_or_insert_with(|| region.clone());
         let pairs = first.entries().iter().zip(region.entries()).enumerate();

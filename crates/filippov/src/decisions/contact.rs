@@ -108,12 +108,16 @@ fn begin(
     meeting: &[usize],
 ) -> Result<Trial, FieldError> {
     let (mut x, mut velocity) = (at.x.to_vec(), vec![0.0; at.x.len()]);
-    let mut field = at.field_of(mode, &[]);
+    let mut field = at.field_of(mode, None);
     field.eval(at.t, &mut x, &mut velocity)?;
     notes.n_field_evaluations += field.n_evaluations();
-    // What has just been located as zero is not known better than that.
+    // What has just been located as zero is not known better than that, unless other surfaces have another side now.
     let located = at.arrival.functions();
-    let is_located = |j| located.iter().any(|guard| guard.surface_held() == Some(j));
+    let (before, after) = (at.arrival.mode.entries(), mode.entries());
+    let is_located = |j| {
+        located.iter().any(|guard| guard.surface_held() == Some(j))
+            && meeting.iter().all(|&k| k == j || before[k] == after[k])
+    };
     // A surface that is reached tangentially is located to the square root of rounding.
     let rounding = match located {
         [] => NO_FORCE,
@@ -167,5 +171,6 @@ fn begin(
         return Ok(Trial::Leaves(left));
     }
     let all: Vec<usize> = contacts.iter().chain(meeting).copied().collect();
-    try_mode(at, notes, mode, &all, rounding)
+    let next = Next::new(mode.clone(), Lefts::new());
+    try_mode(at, notes, &next, &all, rounding)
 }

@@ -209,7 +209,7 @@ fn drop_other_names(
     viable.sort_by_key(|viable| (viable.is_pressed, viable.next.mode != *meeting.mode));
     let mut velocities: Vec<Vec<f64>> = Vec::with_capacity(viable.len());
     for Viable { next, .. } in viable.iter() {
-        velocities.push(at.velocity(notes, &next.mode, next.multipliers())?);
+        velocities.push(at.velocity_from(notes, &next.mode, next.start.as_deref())?);
     }
     let around = meeting.surroundings(at, notes)?;
     let size = around.map_or(0.0, |around| around.corners.size());

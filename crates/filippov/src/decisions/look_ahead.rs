@@ -3,40 +3,55 @@
 //! So it is where two surfaces touch one another: seen from the point they are one, and a moment later they are two, in an
 //! order that decides.
 
-use super::point::{Left, Lefts, Notes, Point};
+use super::point::{Left, Lefts, Next, Notes, Point};
 use crate::error::FieldError;
-use crate::mode::Mode;
-use crate::motion::Leading;
-use crate::motion::{ModeField, SmoothField};
+use crate::motion::{Guard, Leading, ModeField, SmoothField};
 use crate::system::dot;
-use crate::tolerances::{LONGER_TRIAL, MAX_LIE_ORDER, MOST_LENGTHENINGS, SURFACE_NOISE};
+use crate::tolerances::{AT_SIDE, LONGER_TRIAL, MAX_LIE_ORDER, MOST_LENGTHENINGS, SURFACE_NOISE};
 
-/// Follows a motion in this mode for a moment, and longer until it is clear of rounding: of `noise` times its way.
+/// Follows a motion for a moment, and longer until it is clear of rounding: of `noise` times its way.
 pub(super) fn try_mode(
     at: &Point,
     notes: &mut Notes,
-    candidate: &Mode,
+    next: &Next,
     meeting: &[usize],
     noise: f64,
 ) -> Result<Trial, FieldError> {
-    let entries = candidate.entries();
+    let entries = next.mode.entries();
     let leaving: Vec<usize> = meeting
         .iter()
         .copied()
         .filter(|&j| entries[j] != 0)
         .collect();
-    let velocity = at.velocity(notes, candidate, &[])?;
+    let velocity = at.velocity_from(notes, &next.mode, next.start.as_deref())?;
+    let ends = ends_reached(next);
     if velocity.iter().any(|v| !v.is_finite()) {
         return Ok(Trial::WithinRounding);
     }
-    let mut moment = at.moment(notes, &candidate.signs(), &velocity)?;
+    let mut moment = at.moment(notes, &next.mode.signs(), &velocity)?;
     for _ in 0..=MOST_LENGTHENINGS {
-        match leaves_within(at, notes, candidate, &leaving, &velocity, (moment, noise))? {
+        match leaves_within(
+            at,
+            notes,
+            next,
+            (&leaving, &ends),
+            &velocity,
+            (moment, noise),
+        )? {
             Trial::WithinRounding => moment *= LONGER_TRIAL,
             trial => return Ok(trial),
         }
     }
     Ok(Trial::WithinRounding)
+}
+
+/// The ends at which multipliers begin, with their places among the exit functions.
+fn ends_reached(next: &Next) -> Vec<(usize, Guard)> {
+    let reserves = next.multipliers().iter().flat_map(|l| [1.0 + l, 1.0 - l]);
+    let guards = next.mode.sliding_set().flat_map(Guard::ends);
+    let ends = guards.zip(reserves).enumerate();
+    let reached = ends.filter(|(_, (_, reserve))| *reserve <= AT_SIDE);
+    reached.map(|(place, (guard, _))| (place, guard)).collect()
 }
 
 /// What becomes of a motion within a short time.
@@ -52,19 +67,19 @@ pub(super) enum Trial {
 fn leaves_within(
     at: &Point,
     notes: &mut Notes,
-    candidate: &Mode,
-    leaving: &[usize],
+    next: &Next,
+    (leaving, ends): (&[usize], &[(usize, Guard)]),
     velocity: &[f64],
     (moment, noise_of_way): (f64, f64),
 ) -> Result<Trial, FieldError> {
     let mut values = [1.0, 0.5].map(|_| vec![0.0; leaving.len()]);
-    let signs = candidate.signs();
+    let signs = next.mode.signs();
     let mut gradient = vec![0.0; at.x.len()];
     let (mut start, mut h) = (vec![0.0; signs.len()], vec![0.0; signs.len()]);
     at.system.surfaces(at.t, at.x, &signs, &mut start)?;
     let mut is_clear = true;
     for (share, values) in [1.0, 0.5].into_iter().zip(&mut values) {
-        let mut field = at.field_of(candidate, &[]);
+        let mut field = at.field_of(&next.mode, next.start.as_deref());
         let (t, mut x) = (at.t + share * moment, at.x.to_vec());
         follow(&mut field, at.t, &mut x, share * moment)?;
         field.project(t, &mut x)?;
@@ -77,6 +92,7 @@ fn leaves_within(
             }
             is_clear &= *exit > noise;
         }
+        values.extend(ends.iter().map(|(place, _)| exits[*place]));
         at.system.surfaces(t, &x, &signs, &mut h)?;
         for (k, &j) in leaving.iter().enumerate() {
             let size = at.system.surface_size(j, t, &x, &signs)?;
@@ -87,7 +103,7 @@ fn leaves_within(
             let way = (dot(&gradient, &gradient) * dot(velocity, velocity)).sqrt() * moment;
             if value.abs() <= SURFACE_NOISE * size + noise_of_way * way + start[j].abs() {
                 is_clear = false;
-            } else if value * f64::from(candidate.entries()[j]) < 0.0 {
+            } else if value * f64::from(next.mode.entries()[j]) < 0.0 {
                 return Ok(Trial::Ends);
             }
         }
@@ -96,14 +112,18 @@ fn leaves_within(
         return Ok(Trial::WithinRounding);
     }
     let [full, half] = values;
-    let pairs = leaving.iter().zip(full.iter().zip(half));
-    let left = pairs.map(|(&j, (full, half))| {
-        let order = (full / half).log2().round();
-        let order = order.clamp(1.0, MAX_LIE_ORDER as f64) as usize;
-        let factorial: f64 = (1..=order).map(|k| k as f64).product();
-        let value = factorial * full / moment.powi(order as i32);
-        Left::beside(j, Leading { order, value })
-    });
+    let guards = leaving.iter().map(|&j| Guard::Surface(j));
+    let guards = guards.chain(ends.iter().map(|(_, guard)| *guard));
+    let left = guards
+        .zip(full.iter().zip(half))
+        .map(|(guard, (full, half))| {
+            let order = (full / half).log2().round();
+            let order = order.clamp(1.0, MAX_LIE_ORDER as f64) as usize;
+            let factorial: f64 = (1..=order).map(|k| k as f64).product();
+            let value = factorial * full / moment.powi(order as i32);
+            let leading = Leading { order, value };
+            Left { guard, leading }
+        });
     Ok(Trial::Leaves(left.collect()))
 }
 

@@ -147,9 +147,8 @@ impl<'p, 'm, 'a> Point<'p, 'm, 'a> {
         Point { t, x, ..*self }
     }
 
-    /// The field of a mode, with the contact of bodies. The multipliers of several surfaces are tracked from these, if they are
-    /// known.
-    pub fn field_of(&self, mode: &Mode, multipliers: &[f64]) -> ModeField<'p> {
+    /// The field of a mode, with the contact of bodies, from a start of which this is known.
+    pub fn field_of(&self, mode: &Mode, start: Option<&Start>) -> ModeField<'p> {
         let sides = self.arrival.sides;
         if let Some(field) = ContactField::new(self.system, self.actions, mode, sides, self.q) {
             return ModeField::Contact(Box::new(field));
@@ -157,7 +156,10 @@ impl<'p, 'm, 'a> Point<'p, 'm, 'a> {
         let mut field = ModeField::of(self.system, self.policy.law, mode);
         if let ModeField::Intersection(field) = &mut field {
             field.set_patience(self.patience);
-            field.begin(multipliers, false);
+            field.begin(start.map_or(&[], |start| &start.multipliers), false);
+            if start.is_some_and(|start| start.is_given) {
+                field.hold_at_start(self.t);
+            }
         }
         field
     }
@@ -169,11 +171,23 @@ impl<'p, 'm, 'a> Point<'p, 'm, 'a> {
         mode: &Mode,
         multipliers: &[f64],
     ) -> Result<Vec<f64>, FieldError> {
+        let mut start = Start::default();
+        start.multipliers.extend(multipliers);
+        self.velocity_from(notes, mode, Some(&start))
+    }
+
+    /// That of a start of which this is known.
+    pub fn velocity_from(
+        &self,
+        notes: &mut Notes,
+        mode: &Mode,
+        start: Option<&Start>,
+    ) -> Result<Vec<f64>, FieldError> {
         let mut velocity = vec![0.0; self.x.len()];
         notes.n_field_evaluations += if mode.codimension() == 0 {
             eval_on_side(self.system, self.t, self.x, &mode.signs(), &mut velocity)?
         } else {
-            let mut field = self.field_of(mode, multipliers);
+            let mut field = self.field_of(mode, start);
             field.eval(self.t, &mut self.x.to_vec(), &mut velocity)?;
             field.n_evaluations()
         };

@@ -4,7 +4,7 @@ use super::candidate::{Candidate, Verdict, Viable};
 use super::coinciding::{parting, Parallels, Touch};
 use super::consistency::{consistency, Consistency};
 use super::look_ahead::{try_mode, Trial};
-use super::point::{Cause, Next, Notes, Point};
+use super::point::{Cause, Lefts, Next, Notes, Point};
 use super::rule::Meeting;
 use super::surroundings::Surroundings;
 
@@ -125,7 +125,7 @@ pub(super) fn survey(
                 }
             }
         } else if is_beside {
-            Verdict::Open
+            Verdict::Open(Next::new(mode.clone(), Lefts::new()))
         } else {
             candidate.verdict(at, notes)?
         };
@@ -133,12 +133,16 @@ pub(super) fn survey(
             Verdict::Viable(viable) => found.viable.push(viable),
             Verdict::Fails(guard) => found.failing.push((mode, guard)),
             Verdict::Untold => found.open.push(mode),
-            Verdict::Open => match try_mode(at, notes, &mode, meeting.surfaces, SURFACE_NOISE)? {
-                Trial::Leaves(left) => found.viable.push(Viable::strictly(Next::new(mode, left))),
-                Trial::Ends => found.failing.push((mode.clone(), candidate.guard())),
-                Trial::WithinRounding if is_beside => {}
-                Trial::WithinRounding => found.open.push(mode),
-            },
+            Verdict::Open(next) => {
+                match try_mode(at, notes, &next, meeting.surfaces, SURFACE_NOISE)? {
+                    Trial::Leaves(left) => {
+                        found.viable.push(Viable::strictly(Next { left, ..next }));
+                    }
+                    Trial::Ends => found.failing.push((mode.clone(), candidate.guard())),
+                    Trial::WithinRounding if is_beside => {}
+                    Trial::WithinRounding => found.open.push(mode),
+                }
+            }
         }
     }
     Ok(Some(found))

@@ -104,7 +104,8 @@ fn solve_two(fields: &NormalFields) -> Option<(Vec<f64>, [f64; 2])> {
     let jacobian = canopy.jacobian(root);
     let sizes = [fields.row_size(0), fields.row_size(1)];
     let stability = -(jacobian[0][0] / sizes[0]).min(jacobian[1][1] / sizes[1]);
-    Some((root.to_vec(), [canopy.discriminant(), stability]))
+    let fold = canopy.discriminant() / (sizes[0] * sizes[1]).powi(2);
+    Some((root.to_vec(), [fold, stability]))
 }
 
 /// More surfaces: Newton's method from the last multipliers; at the start from the only stable root.

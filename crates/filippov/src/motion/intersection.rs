@@ -13,7 +13,7 @@ use crate::options::SlidingRule;
 use crate::patience::Patience;
 use crate::sparse::SparseRows;
 use crate::system::PiecewiseSystem;
-use crate::tolerances::{MOST_MEETING, MOST_TRACKED};
+use crate::tolerances::{JUST_AFTER, MOST_MEETING, MOST_TRACKED};
 
 /// Filippov's field on an intersection of m >= 2 surfaces: the multilinear combination ("canopy") of the
 /// fields around it with the multipliers lambda in [-1, 1]^m that make it tangent to all surfaces,
@@ -237,16 +237,8 @@ impl<'a> IntersectionField<'a> {
     /// Evaluates multipliers and exit functions at (t, x) and writes the field. Where there is no root they are NaN.
     fn solve(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), FieldError> {
         self.is_rootless = false;
-        if let Some((_, lambda)) = self.start.as_ref().filter(|(start, _)| *start == t) {
-            let mut around = MeetingFields::new(self.system, &self.set);
-            self.n_evaluations += around.evaluate(self.system, t, x, &self.signs)?;
-            let mut weights = Vec::new();
-            around.fill_product_weights(lambda, &mut weights);
-            around.combine(&weights, dx);
-            self.lambda.clone_from(lambda);
-            // The root was chosen among those that are stable.
-            self.fill_exits([1.0, 1.0]);
-            return Ok(());
+        if self.start.as_ref().is_some_and(|(start, _)| *start == t) {
+            return self.solve_start(t, x, dx);
         }
         if let Some(law) = &mut self.by_rule {
             let evaluated = (self.system, &self.signs[..]);
@@ -290,6 +282,31 @@ impl<'a> IntersectionField<'a> {
                 dx.fill(f64::NAN);
             }
         }
+        Ok(())
+    }
+
+    /// The same at a start with given multipliers. The ends of their root are those a moment later, so that they are continuous;
+    /// where it has none to that time, it was chosen among those that are stable.
+    fn solve_start(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), FieldError> {
+        let Some((start, lambda)) = self.start.take() else {
+            return Ok(());
+        };
+        let mut around = MeetingFields::new(self.system, &self.set);
+        self.n_evaluations += around.evaluate(self.system, t, x, &self.signs)?;
+        let mut weights = Vec::new();
+        around.fill_product_weights(&lambda, &mut weights);
+        around.combine(&weights, dx);
+        let moment = JUST_AFTER * (1.0 + t.abs());
+        let later: Vec<f64> = x.iter().zip(&*dx).map(|(x, v)| x + moment * v).collect();
+        self.solve(t + moment, &later, &mut vec![0.0; x.len()])?;
+        let ends = match self.exits[..] {
+            [.., fold, stability] if fold > 0.0 && stability > 0.0 => [fold, stability],
+            _ => [1.0, 1.0],
+        };
+        self.is_rootless = false;
+        self.lambda.clone_from(&lambda);
+        self.fill_exits(ends);
+        self.start = Some((start, lambda));
         Ok(())
     }
 

@@ -168,9 +168,12 @@ impl<'s> TwoFold<'s> {
             if is_region {
                 continue;
             }
-            if minus.order.max(plus.order) > 1 {
-                while self.continue_series(&mut lambda)? {}
-            }
+            // Beside it the quotient may lead away from the motion.
+            let wanted = match minus.order.max(plus.order) {
+                ..=1 => 2,
+                _ => usize::MAX,
+            };
+            while lambda.len() < wanted && self.continue_series(&mut lambda)? {}
             let mut series = [0.0; MAX_LIE_ORDER];
             let n_known = lambda.len().min(series.len());
             series[..n_known].copy_from_slice(&lambda[..n_known]);

@@ -201,6 +201,10 @@ pub const DEFINITE_PIVOT: f64 = 1e-10;
 /// square root of the time that is left.
 pub const AT_FOLD: f64 = 1e-2;
 
+/// Time, in units of 1 plus its size, after a start at which the equations of the multipliers vanish: how clear their root is
+/// there stands for the start. Components are clear of [`DOUBTFUL`], and little else has changed.
+pub const JUST_AFTER: f64 = 1e-6;
+
 /// Distance, in units of 1 plus the size of a component, at which two surfaces are compared: its square is far above rounding.
 pub const BESIDE: f64 = 1e-3;
 

@@ -5,7 +5,7 @@ use smallvec::smallvec;
 use super::bounds::BoundedCurve;
 use super::detector::Detector;
 use super::detector::CLEAR_OF_NOISE;
-use super::sought::{Search, Sought};
+use super::sought::{AtZero, Search, Sought};
 use super::StepSearch;
 use crate::error::FieldError;
 use crate::event::certificate::{prove, Proof};
@@ -29,12 +29,36 @@ impl StepSearch<'_, '_> {
         if !self.seek(t1, &mut sought)? {
             return Ok((Event::Shorten(0.5 * dt), sought.longest));
         }
-        let event = match sought.found {
-            Some(found) if self.may_be_multiple(&found) => self.resolve_multiple_zero(found, dt)?,
+        let event = match sought.found.take() {
+            Some(found) if self.may_be_multiple(&found) => {
+                self.resolve_multiple(found, &mut sought)?
+            }
             Some(found) => Event::At(found),
             None => self.wrong_from_the_start()?.map_or(Event::None, Event::At),
         };
         Ok((event, sought.longest))
+    }
+
+    /// Moves a zero that may be a multiple one to its place. Other functions that vanish on the way there belong to the event.
+    fn resolve_multiple(&mut self, found: Found, sought: &mut Sought) -> Result<Event, FieldError> {
+        let (guards, from) = (found.guards.clone(), found.theta);
+        let mut event = match self.resolve_multiple_zero(found, sought.dt)? {
+            Event::At(event) if event.theta > from => event,
+            event => return Ok(event),
+        };
+        let to = (event.theta + self.together(sought.dt)).min(1.0);
+        for index in 0..self.motion.monitored.len() {
+            let m = self.motion.monitored[index];
+            if guards.contains(&m.guard) || m.deflation.is_some() {
+                continue;
+            }
+            if let Search::At(_, kind) = self.search_on(index, (from, to), sought)? {
+                event.guards.push(m.guard);
+                event.touch &= kind == AtZero::Touch;
+                event.is_blurred |= kind != AtZero::Steep;
+            }
+        }
+        Ok(Event::At(event))
     }
 
     /// Searches the step for the first zero; `false` if a shorter step is needed. Guards that are beyond zero at the end come
