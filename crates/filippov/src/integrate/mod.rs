@@ -6,7 +6,6 @@ mod limits;
 mod resting;
 mod solve;
 mod start;
-mod steps;
 mod transition;
 mod user_zeros;
 mod watch;

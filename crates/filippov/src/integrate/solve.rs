@@ -164,7 +164,8 @@ pub fn solve_to_section(
     }
     let events = function.as_slice();
     let mut integrator = Integrator::new(system, t_span, y0, options, events, actions)?;
-    integrator.observe(section);
+    integrator.user_events.is_section = matches!(section.place, Place::Function { .. });
+    integrator.recorder.observe(section, integrator.t);
     Ok(run_to_end(integrator.interruptible(interrupt)))
 }
 
