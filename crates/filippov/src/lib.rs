@@ -40,6 +40,7 @@ mod error_scale;
 pub mod event;
 mod inspect;
 mod integrate;
+mod locate;
 mod mode;
 pub mod motion;
 mod options;

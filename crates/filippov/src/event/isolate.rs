@@ -2,13 +2,11 @@
 
 use super::certificate::{Bounds, Verdict};
 use crate::error::FieldError;
+pub use crate::locate::{is_steep, Bracket, Sampled};
 use crate::tolerances::{
     CANCELLED, FLAT_PIECE, HUGGING, MAX_DEPTH, MOST_OPEN, MOST_SAMPLES, MOST_UNPROVED,
     QUARTIC_REMAINDER,
 };
-
-/// A scalar function of theta.
-pub type Sampled<'a> = &'a mut dyn FnMut(f64) -> Result<f64, FieldError>;
 
 /// The first zero, as far as it is known before it is refined.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,50 +15,6 @@ pub enum Zero {
     Crossing(Bracket),
     /// The function comes within rounding of zero at theta and does not change sign.
     Touch(f64),
-}
-
-/// An interval with one change of sign, from positive to not positive.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bracket {
-    /// Left end.
-    pub lo: f64,
-    /// Right end.
-    pub hi: f64,
-    /// Value at the left end.
-    pub g_lo: f64,
-    /// Value at the right end.
-    pub g_hi: f64,
-    /// Where the interpolating polynomial vanishes.
-    pub guess: f64,
-    /// Its slope there.
-    pub slope: f64,
-}
-
-impl Bracket {
-    /// A zero that is known to be here.
-    fn at(theta: f64, value: f64) -> Self {
-        Bracket {
-            lo: theta,
-            hi: theta,
-            g_lo: value,
-            g_hi: value,
-            guess: theta,
-            slope: f64::NAN,
-        }
-    }
-
-    /// Does the function fall too steeply to turn back within the noise? With the mean slope c of the
-    /// bracket and second derivatives of at most 1e3 times the `scale` of its values, the lowest
-    /// point ahead is c^2 / (2e3 scale) below zero.
-    pub fn is_steep(&self, scale: f64, noise: f64) -> bool {
-        is_steep((self.g_lo - self.g_hi) / (self.hi - self.lo), scale, noise)
-    }
-}
-
-/// Does a function with this slope at its zero not turn back within the noise, if its second derivatives are at most 1e3
-/// times the `scale` of its values?
-pub fn is_steep(slope: f64, scale: f64, noise: f64) -> bool {
-    slope * slope > 2e3 * scale * noise
 }
 
 /// The result of a search, with the number of bisections it took.

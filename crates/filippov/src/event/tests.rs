@@ -2,7 +2,7 @@
 
 use super::filter::may_vanish;
 use super::isolate::{first_zero, Evidence, Zero, PROBES};
-use super::locate::refine;
+use crate::locate::refine;
 use proptest::prelude::*;
 
 fn find(g: impl Fn(f64) -> f64) -> Option<Zero> {

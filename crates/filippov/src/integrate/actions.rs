@@ -73,7 +73,7 @@ impl Integrator<'_> {
             due.dedup();
         }
         if !due.is_empty() {
-            self.recent_dt = 0.0;
+            self.control.forget_steps();
             return self.act(due);
         }
         Ok((self.t >= self.t_end).then_some(Stop::End))

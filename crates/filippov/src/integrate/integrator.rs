@@ -21,22 +21,17 @@ use crate::error_scale::ErrorScale;
 use crate::event::search::Detector;
 use crate::event::search::StepSearch;
 use crate::event::UserEvents;
-use crate::event::{Event, Found, Seen, UserEvent};
+use crate::event::{Event, Found, UserEvent};
 use crate::integrate::progress::Progress;
-use crate::integrate::steps::chatter::ChatterWatch;
-use crate::integrate::steps::pace::Paces;
-use crate::integrate::steps::stiffness::Stiffness;
 use crate::integrate::watch::Watch;
 use crate::mode::Mode;
-use crate::motion::CurrentMotion;
-use crate::motion::{Guard, ModeField, SlidingField, SmoothField};
+use crate::motion::{CurrentMotion, Guard, SmoothField};
 use crate::options::{Method, Options};
 use crate::record::Recorder;
 use crate::record::Solution;
 use crate::stats::Stats;
 use crate::status::{Stop, Warning};
-use crate::stepper::Derivatives;
-use crate::stepper::{Attempt, Controller, Dop853, Midpoint, Rodas5p, StepMethod, Stepper, Taylor};
+use crate::stepper::{stiff_warning, Attempt, StepControl, StepStart, Steppers};
 use crate::system::Actions;
 use crate::system::PiecewiseSystem;
 use crate::tolerances::{EPS, SHORTEST_STEP, SHORTEST_STEP_AT_ZERO};
@@ -61,36 +56,17 @@ pub struct Integrator<'a> {
     pub(super) residuals: Vec<f64>,
     /// Triggers whose action leaves the motion as it is: it goes through them.
     pub(super) passing: Vec<usize>,
-    /// The step that was proposed where the horizon shortened it, else 0.
-    wanted_dt: f64,
     pub(super) x: Vec<f64>,
     pub(super) motion: CurrentMotion<'a>,
-    pub(super) stepper: Stepper,
-    pub(super) controller: Controller,
-    /// Proposed step.
-    pub(super) dt: f64,
-    /// How the last motion went, by mode.
-    pub(super) paces: Paces,
+    pub(super) stepper: Steppers,
+    pub(super) control: StepControl,
     pub(super) detector: Detector,
     pub(super) recorder: Recorder<'a>,
     pub(super) stats: Stats,
     pub(super) warnings: Vec<Warning>,
     /// How many non-unique points were met.
     pub(super) n_choices: usize,
-    /// The last attempt met a point where the field does not exist.
-    pub(super) one_sided: bool,
-    /// Some attempt of this run met such a point.
-    pub(super) meets_edges: bool,
-    pub(super) stiffness: Stiffness,
-    /// How often the step was taken anew to end at an event.
-    pub(super) n_aims: usize,
-    /// Largest recent step of this motion.
-    pub(super) recent_dt: f64,
-    /// Since a jump of the field that no surface declares, if the steps have been short since then.
-    pub(super) chatter: ChatterWatch,
     pub(super) progress: Progress,
-    /// How long a step the series allows that was taken at the start of the motion, until the step.
-    pub(super) series_reach: Option<f64>,
     /// Guards of this mode whose multipliers were held at their ends, with what they may go beyond.
     pub(super) slacks: Vec<(Guard, f64)>,
     pub(super) watch: Watch<'a>,
@@ -111,27 +87,6 @@ impl<'a> Integrator<'a> {
     ) -> Result<Self, Error> {
         crate::integrate::start::check(system, t_span, y0, options, actions)?;
         let n = system.n_states();
-        let uses_series = match options.method {
-            Method::Dopri5 | Method::Dop853 | Method::Midpoint | Method::Rodas5p => false,
-            Method::Taylor => true,
-            Method::Auto => system.is_analytic(),
-        };
-        let operations = |order| Some(system.motion_jets(&[], order)?.operations());
-        let taylor = uses_series.then(|| {
-            let order = Taylor::order_for(options.rtol, operations);
-            let taylor = Taylor::new(n, order);
-            match system.hides_changes() {
-                true => taylor.wary_over(t_span.1 - t_span.0),
-                false => taylor,
-            }
-        });
-        let mut stepper = Stepper::new(n, taylor);
-        match options.method {
-            Method::Rodas5p => stepper.rodas5p = Some(Box::new(Rodas5p::new(n))),
-            Method::Dop853 => stepper.dop853 = Some(Box::new(Dop853::new(n))),
-            Method::Midpoint => stepper.midpoint = Some(Box::new(Midpoint::new(n))),
-            Method::Auto | Method::Dopri5 | Method::Taylor => {}
-        }
         let undecided = Mode::new(vec![1; system.n_surfaces()]);
         Ok(Integrator {
             system,
@@ -144,26 +99,16 @@ impl<'a> Integrator<'a> {
             horizon: t_span.1,
             residuals: Vec::new(),
             passing: Vec::new(),
-            wanted_dt: 0.0,
             x: y0.to_vec(),
             motion: CurrentMotion::new(system, t_span.0, undecided, options.into(), actions),
-            stepper,
-            controller: Controller::default(),
-            dt: f64::NAN,
-            paces: Paces::default(),
+            stepper: Steppers::new(options, system, t_span.1 - t_span.0),
+            control: StepControl::new(),
             detector: Detector::new(n, system.n_surfaces()),
             recorder: Recorder::new(n, options, events),
             stats: Stats::default(),
             warnings: Vec::new(),
             n_choices: 0,
-            one_sided: false,
-            meets_edges: false,
-            stiffness: Stiffness::default(),
-            n_aims: 0,
-            recent_dt: 0.0,
-            chatter: ChatterWatch::default(),
             progress: Progress::default(),
-            series_reach: None,
             slacks: Vec::new(),
             watch: Watch::new(options),
         })
@@ -223,97 +168,49 @@ impl<'a> Integrator<'a> {
         if remaining <= 0.0 {
             return self.reach_horizon();
         }
-        self.expand()?;
-        if !matches!(self.stepper.derivatives, Derivatives::None) {
-            self.linearise()?;
+        let t_end = self.t_end;
+        let (mut at, stepper, control) = self.step_start();
+        if let Some(warning) = control.prepare(&mut at, stepper, t_end)? {
+            self.warnings.push(*warning);
         }
-        let mut dt = self.dt.min(self.options.max_step);
-        dt = self.aim_at_surface(dt);
-        self.wanted_dt = 0.0;
-        if dt >= remaining * 0.99 {
-            if self.horizon < self.t_end {
-                self.wanted_dt = dt;
-            }
-            dt = remaining;
-        }
+        let room = (remaining, self.horizon >= self.t_end);
+        let dt = self.control.next(&self.motion, room, self.options.max_step);
         let shortest = (SHORTEST_STEP * self.t.abs()).max(SHORTEST_STEP_AT_ZERO);
         if dt < shortest && dt < remaining {
             let lost = self.ask(Cause::Start, root_ends::lost_functions)?;
             if let Some(lost) = lost {
-                self.dt = f64::NAN;
-                self.one_sided = false;
+                self.control.forget_proposal();
                 return self.switch(&Found::here(lost));
             }
-            if !self.one_sided {
+            if !self.control.is_one_sided() {
                 return Ok(Some(Stop::StepTooSmall));
             }
-            return match self.arrival_at_edge()? {
+            let arrival = self.step_search().0.arrival_at_edge()?;
+            return match arrival {
                 Some(event) => {
-                    // The steps shrank towards the edge: the next motion takes a guess of its own.
-                    self.dt = f64::NAN;
-                    self.one_sided = false;
+                    self.control.forget_proposal();
                     self.switch(&event)
                 }
                 None => Ok(Some(Stop::NotFinite)),
             };
         }
-        if self.stepper.in_use() == StepMethod::Midpoint {
-            dt = self.keep_to_side(dt)?;
-        }
         let sliding = !self.motion.sliding().is_empty();
-        match self.attempt(dt)? {
+        let (mut at, stepper, _) = self.step_start();
+        let attempt = stepper.attempt(&mut at, dt)?;
+        let dt = self.stepper.interpolant().dt;
+        match attempt {
             Attempt::NotFinite => {
                 self.count_rejection(sliding);
-                self.shorten_to_surface(dt);
+                self.control.shorten_to_surface(dt, &self.motion);
                 Ok(None)
             }
             Attempt::Error(error) if error > 1.0 => {
                 self.count_rejection(sliding);
-                self.dt = dt
-                    * match &self.stepper.taylor {
-                        Some(taylor) if self.stepper.is_taylor() => taylor.reject(error),
-                        _ => self.controller.reject(error),
-                    };
+                self.control.reject(&self.stepper, dt, error);
                 Ok(None)
             }
             Attempt::Error(error) => self.advance(dt, error),
         }
-    }
-
-    fn attempt(&mut self, dt: f64) -> Result<Attempt, FieldError> {
-        self.detector.seen.iter_mut().for_each(Seen::begin);
-        match self.stepper.in_use() {
-            StepMethod::Taylor => self.attempt_series(dt),
-            StepMethod::Rodas5p => self.attempt_implicit(dt),
-            StepMethod::Dopri5 => self.attempt_explicit(dt),
-            StepMethod::Dop853 => self.attempt_dop853(dt),
-            StepMethod::Midpoint => self.attempt_midpoint(dt),
-        }
-    }
-
-    pub(super) fn attempt_explicit(&mut self, dt: f64) -> Result<Attempt, FieldError> {
-        let (t, x, scale) = (self.t, &self.x, &self.scale);
-        let (stepper, seen) = (&mut self.stepper.dopri5, &mut self.detector.seen);
-        match &mut self.motion.field {
-            ModeField::Region(field) => stepper.attempt(field, |_| {}, t, x, dt, scale),
-            ModeField::Sliding(field) => {
-                let observe = |field: &SlidingField| {
-                    let a = field.last();
-                    seen[0].see(a.minus);
-                    seen[1].see(-a.plus);
-                };
-                stepper.attempt(&mut **field, observe, t, x, dt, scale)
-            }
-            field => stepper.attempt(field, self.detector.observer(), t, x, dt, scale),
-        }
-    }
-
-    fn attempt_dop853(&mut self, dt: f64) -> Result<Attempt, FieldError> {
-        let Some(dop853) = &mut self.stepper.dop853 else {
-            return Ok(Attempt::NotFinite);
-        };
-        let (field, observe) = (&mut self.motion.field, self.detector.observer());
-        dop853.attempt(field, observe, self.t, &self.x, dt, &self.scale)
     }
 
     /// Accepts the step, or its part up to the first event.
@@ -330,7 +227,7 @@ impl<'a> Integrator<'a> {
             Event::At(found) => Some(found),
             Event::Shorten(dt) => {
                 self.count_rejection(sliding);
-                self.shorten_step(dt);
+                self.control.shorten(dt);
                 return Ok(None);
             }
         };
@@ -345,16 +242,16 @@ impl<'a> Integrator<'a> {
                     return Ok(Some(stop));
                 }
                 self.count_rejection(sliding);
-                self.shorten_step(0.5 * dt);
+                self.control.shorten(0.5 * dt);
                 return Ok(None);
             }
         }
         let theta = found.as_ref().map_or(1.0, |event| event.theta);
-        let is_implicit = self.stepper.in_use() == StepMethod::Rodas5p;
         let crosses = found
             .as_ref()
             .is_some_and(|event| !event.touch && !event.is_blurred);
-        if is_implicit && crosses && self.aims_again(theta, dt) {
+        let aims = crosses && self.stepper.ends_at_events();
+        if aims && self.control.aims_again(self.t, theta, dt) {
             return Ok(None);
         }
         let t_stop = if theta == 1.0 {
@@ -368,46 +265,51 @@ impl<'a> Integrator<'a> {
         let t_stop = if is_last { last } else { t_stop };
         let Some(zeros) = self.find_user_zeros(theta, t_stop)? else {
             self.count_rejection(sliding);
-            self.shorten_step(0.5 * dt);
+            self.control.shorten(0.5 * dt);
             return Ok(None);
         };
-        self.n_aims = 0;
         self.stats.n_steps += 1;
         self.stats.n_steps_sliding += u64::from(sliding);
-        match self.stepper.in_use() {
-            StepMethod::Dopri5 => {}
-            StepMethod::Taylor => self.stats.n_steps_taylor += 1,
-            StepMethod::Rodas5p => self.stats.n_steps_rodas5p += 1,
-            StepMethod::Dop853 => self.stats.n_steps_dop853 += 1,
-            StepMethod::Midpoint => self.stats.n_steps_midpoint += 1,
-        }
-        self.dt = if self.stepper.is_taylor() {
-            f64::INFINITY
-        } else {
-            (dt * self.controller.accept(error)).max(self.wanted_dt)
+        self.stepper.count(&mut self.stats);
+        self.control.accept(&self.stepper, dt, error);
+        // Towards a fold of the multipliers the field of an intersection bends like a square root, and towards a
+        // two-fold the multiplier is a quotient of small numbers.
+        let may_bend = match self.motion.sliding.len() {
+            0 => false,
+            1 => self.detector.approaches_two_fold(),
+            _ => true,
         };
-        self.note_jump(dt);
-        let stepper = &self.stepper;
-        let chatter = self.chatter.note_step(dt, || stepper.field_jumps());
+        let (step, remains) = ((self.t, dt), self.horizon - self.t);
+        let (warning, chatter) =
+            self.control
+                .look_for_jumps(&self.stepper, step, remains, may_bend);
+        self.warnings.extend(warning.map(|warning| *warning));
         if let Some(stop) = self.record_user_zeros(zeros, theta, t_stop)? {
             return Ok(Some(stop));
         }
-        self.one_sided = longest < dt;
-        self.dt = self.dt.min(longest);
+        self.control.note_edge(longest, dt);
         if self.recorder.keeps_dense() {
-            self.stepper.extend_order4(&self.x);
+            self.stepper.extend_cheaply(&self.x);
         }
-        self.sample(t_stop)?;
+        let (stepper, motion) = (&mut self.stepper, &mut self.motion);
+        self.recorder
+            .sample_step(t_stop, &self.x, stepper, motion)?;
         let Some(event) = found else {
             self.recorder
                 .step(self.stepper.interpolant(), t1, self.stepper.end());
             let zero = self.zero_surface(t1)?;
-            let turns_stiff =
-                self.stiffness.is_due(self.stats.n_steps) && self.look_at_stiffness(dt)?;
+            let (mut at, stepper, control) = self.step_start();
+            let turns_stiff = control.turns_stiff(&mut at, stepper)?;
+            let is_auto = self.options.method == Method::Auto;
+            if turns_stiff && !is_auto {
+                let warning = stiff_warning(self.t, &self.motion.mode, dt);
+                self.warnings.push(warning);
+            }
             self.stepper.accept(&mut self.x);
             self.t = t1;
-            if turns_stiff {
-                self.go_on_implicitly();
+            if turns_stiff && is_auto {
+                let (mut at, stepper, control) = self.step_start();
+                control.go_on_implicitly(&mut at, stepper);
             }
             if self.detector.accept(&mut self.motion.monitored, dt) {
                 self.motion.note_departure();
@@ -432,9 +334,23 @@ impl<'a> Integrator<'a> {
             self.recorder.step(extension, t_stop, &self.x);
         }
         self.t = t_stop;
-        self.recent_dt = 0.0;
-        self.chatter.forget();
+        self.control.switched();
         self.switch(&event)
+    }
+
+    /// The start of the next step, the methods, and the control of the step.
+    pub(super) fn step_start(&mut self) -> (StepStart<'_, 'a>, &mut Steppers, &mut StepControl) {
+        let start = StepStart {
+            system: self.system,
+            options: self.options,
+            scale: &self.scale,
+            t: self.t,
+            x: &self.x,
+            motion: &mut self.motion,
+            seen: &mut self.detector.seen,
+            stats: &mut self.stats,
+        };
+        (start, &mut self.stepper, &mut self.control)
     }
 
     /// The search of the step that was computed; and the user's functions.
@@ -451,7 +367,7 @@ impl<'a> Integrator<'a> {
             slacks: &self.slacks,
             rule: self.options.sliding,
             horizon: self.horizon,
-            one_sided: self.one_sided,
+            one_sided: self.control.is_one_sided(),
         };
         (search, &self.recorder.user_events)
     }
@@ -464,7 +380,7 @@ impl<'a> Integrator<'a> {
     /// Closes the books.
     pub fn finish(mut self, stop: Stop) -> Solution {
         self.stats.n_field_evaluations += self.motion.field.n_evaluations();
-        self.stats.stiff_since = self.stiffness.since;
+        self.stats.stiff_since = self.control.stiff_since();
         self.recorder.finish(
             (self.t, &self.x, self.options),
             self.motion.mode,

@@ -7,7 +7,6 @@ mod progress;
 mod resting;
 mod solve;
 mod start;
-mod steps;
 mod transition;
 mod user_zeros;
 mod watch;

@@ -9,19 +9,17 @@ use crate::decisions::{
     EndOfSliding, Leap, Left, Lefts, Next, Notes, Point, Reached, Rule, Scene,
 };
 use crate::error::FieldError;
-use crate::event::{Found, Multiple, Seen};
+use crate::event::{Found, Multiple};
 use crate::integrate::integrator::Integrator;
-use crate::integrate::steps::pace::excursion;
 use crate::mode::Mode;
-use crate::motion::{Guard, Leading, ModeField, SlidingSet, SmoothField};
+use crate::motion::{Guard, Leading, ModeField, Seen, SlidingSet, SmoothField};
 use crate::patience::Patience;
 use crate::record::decide_and_record;
 use crate::status::{is_named, Stop, WarningCode};
-use crate::stepper::{initial_step, restart_step};
 use crate::switch::Kind;
 use crate::switch::Switch;
 use crate::system::eval_on_side;
-use crate::tolerances::{MOST_SWITCHES_AT_ONE_TIME, SMALLEST_GUESS};
+use crate::tolerances::MOST_SWITCHES_AT_ONE_TIME;
 
 impl<'a> Integrator<'a> {
     /// Asks a question about the current place; counts what the answer cost, and keeps its warnings.
@@ -273,7 +271,7 @@ impl<'a> Integrator<'a> {
         } = next;
         self.stats.n_field_evaluations += self.motion.field.n_evaluations();
         let duration = self.t - self.motion.t_start;
-        self.paces.remember(&self.motion.mode, self.dt, duration);
+        self.control.remember(&self.motion.mode, duration);
         let slid = !self.motion.sliding().is_empty();
         let mut leaps = false;
         if let Some(start) = &mut start {
@@ -297,7 +295,9 @@ impl<'a> Integrator<'a> {
         for zero in zeros.filter_map(|m| m.deflation.as_mut()) {
             zero.is_clean = !slid;
         }
-        self.choose_stepper();
+        let (mut at, stepper, _) = self.step_start();
+        let warning = stepper.begin(&mut at);
+        self.warnings.extend(warning.map(|warning| *warning));
         let mut two_fold = None;
         match &mut self.motion.field {
             ModeField::Intersection(field) => {
@@ -357,14 +357,19 @@ impl<'a> Integrator<'a> {
         self.detector
             .accept_start(&mut self.motion.monitored, multiple);
         self.recorder.user_events.restart(self.t, &self.x)?;
-        self.controller.restart();
-        self.dt = self.first_step(&left)?;
+        let t_end = self.t_end;
+        let (mut at, stepper, control) = self.step_start();
+        let surfaces = left.iter().filter_map(|l| Some((l.surface()?, l.leading)));
+        control.begin(&mut at, stepper, t_end, surfaces)?;
         if let (Some((motion, reach)), ModeField::Sliding(field)) =
             (two_fold, &mut self.motion.field)
         {
             if reach > 0.0 {
-                self.dt = self.dt.min(reach);
-                let until = if reach.is_finite() { reach } else { self.dt };
+                self.control.limit(reach);
+                let until = match reach.is_finite() {
+                    true => reach,
+                    false => self.control.proposal(),
+                };
                 field.begin_at_two_fold(self.t, self.t + until, motion);
             }
         }
@@ -391,7 +396,8 @@ impl<'a> Integrator<'a> {
         end: Vec<f64>,
     ) -> Result<(), FieldError> {
         self.stepper.set_straight(self.t, t - self.t, &self.x, &end);
-        self.sample(t)?;
+        let (stepper, motion) = (&mut self.stepper, &mut self.motion);
+        self.recorder.sample_step(t, &self.x, stepper, motion)?;
         self.recorder.step(self.stepper.interpolant(), t, &end);
         (self.t, self.x) = (t, end);
         Ok(())
@@ -399,8 +405,8 @@ impl<'a> Integrator<'a> {
 
     /// The derivative at the start of the motion, and its exit functions there.
     fn evaluate_start(&mut self) -> Result<(), FieldError> {
-        self.series_reach = None;
-        if self.start_with_series() {
+        let (mut at, stepper, _) = self.step_start();
+        if stepper.start(&mut at) {
             // Known.
         } else if let ModeField::Region(_) = &self.motion.field {
             let (signs, derivative) = (&self.motion.signs, self.stepper.start_derivative_mut());
@@ -409,7 +415,9 @@ impl<'a> Integrator<'a> {
         } else {
             let derivative = self.stepper.start_derivative_mut();
             self.motion.field.eval(self.t, &mut self.x, derivative)?;
-            self.go_without_equations();
+            let (mut at, stepper, _) = self.step_start();
+            let warning = stepper.started(&mut at);
+            self.warnings.extend(warning.map(|warning| *warning));
         }
         let exits = self.motion.field.last_exits();
         self.detector.seen.clear();
@@ -455,36 +463,5 @@ impl<'a> Integrator<'a> {
             Ok(next) => self.begin(next, &Multiple::default()),
             Err(stop) => Ok(Some(stop)),
         }
-    }
-
-    /// The first step of a motion: what the last motion in its mode suggests; else the proposal of the
-    /// motion before, as far as Hairer's guess for this one supports it. No longer than a short
-    /// excursion from the surface.
-    pub(in crate::integrate) fn first_step(&mut self, left: &[Left]) -> Result<f64, FieldError> {
-        let remaining = (self.t_end - self.t).max(f64::MIN_POSITIVE);
-        if let (Some(first), true) = (self.options.first_step, self.dt.is_nan()) {
-            return Ok(first.max(SMALLEST_GUESS).min(remaining));
-        }
-        let longest = remaining.min(self.options.max_step);
-        if self.motion.jets.is_some() {
-            // The series tells.
-            return Ok(longest);
-        }
-        let (t, x, scale, field) = (self.t, &self.x, &self.scale, &mut self.motion.field);
-        let derivative = self.stepper.start_derivative();
-        let mode = &self.motion.mode;
-        let mut dt = match self.paces.first_step(mode, x, derivative, scale) {
-            Some(dt) => dt.min(longest),
-            None if self.dt.is_nan() => initial_step(field, t, x, derivative, scale, longest)?,
-            None => restart_step(field, t, x, derivative, scale, self.dt.min(longest))?,
-        };
-        let place = (self.t, &self.x[..]);
-        for left in left {
-            if let Some(j) = left.surface() {
-                let room = excursion(self.system, place, &self.motion.mode, j, left.leading)?;
-                dt = dt.min(room);
-            }
-        }
-        Ok(dt)
     }
 }

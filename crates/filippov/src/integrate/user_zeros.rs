@@ -55,7 +55,8 @@ impl Integrator<'_> {
             self.stepper.interpolant().at(at, &mut y);
             self.motion.project(t, &mut y)?;
             if let Some(stop) = self.recorder.zero(index, t, &y) {
-                self.sample(t)?;
+                let (stepper, motion) = (&mut self.stepper, &mut self.motion);
+                self.recorder.sample_step(t, &self.x, stepper, motion)?;
                 self.recorder.step(self.stepper.interpolant(), t, &y);
                 self.t = t;
                 self.x = y;

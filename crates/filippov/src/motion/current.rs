@@ -47,8 +47,6 @@ pub(crate) struct CurrentMotion<'a> {
     /// The place of the present mode among them.
     current: usize,
     pub monitored: Vec<Monitored>,
-    /// Its Taylor series, if it is integrated by them.
-    pub jets: Option<Arc<MotionJets>>,
     /// It slides on several surfaces, some of them with static friction above kinetic.
     sticks: bool,
     law: Law<'a>,
@@ -88,7 +86,6 @@ impl<'a> CurrentMotion<'a> {
             known: Vec::with_capacity(MOST_KNOWN),
             current: 0,
             monitored: Vec::new(),
-            jets: None,
             sticks: false,
             law,
             resting: SmallVec::new(),
@@ -174,10 +171,13 @@ impl<'a> CurrentMotion<'a> {
         self.active = SmallVec::from_slice(&self.known[self.current].active);
     }
 
-    /// Takes the Taylor series of the mode; `find` looks for them the first time.
-    pub fn take_jets(&mut self, find: impl FnOnce(&[usize]) -> Option<Arc<MotionJets>>) {
+    /// The Taylor series of the mode; `find` looks for them the first time.
+    pub fn jets(
+        &mut self,
+        find: impl FnOnce(&[usize]) -> Option<Arc<MotionJets>>,
+    ) -> Option<Arc<MotionJets>> {
         let known = &mut self.known[self.current].jets;
-        self.jets = known.get_or_insert_with(|| find(&self.sliding)).clone();
+        known.get_or_insert_with(|| find(&self.sliding)).clone()
     }
 
     fn find_monitored(&mut self, system: &dyn PiecewiseSystem, zeros: &[(Guard, Deflation)]) {
@@ -262,6 +262,11 @@ impl<'a> CurrentMotion<'a> {
     /// Does it slide on several surfaces by another rule than the canopy?
     pub fn slides_by_rule(&self) -> bool {
         matches!(&self.field, ModeField::Intersection(field) if field.rule() != SlidingRule::Canopy)
+    }
+
+    /// Do redundant contacts share a load? Then their equations do not determine the multipliers.
+    pub fn shares_load(&self) -> bool {
+        matches!(&self.field, ModeField::Intersection(field) if field.shares_load())
     }
 
     /// Is the motion in contact at some surface?

@@ -2,15 +2,17 @@
 
 use smallvec::SmallVec;
 
+use crate::error::FieldError;
 use crate::event::{UserEvent, UserEvents, UserZero, TICK};
 use crate::mode::Mode;
+use crate::motion::CurrentMotion;
 use crate::options::{Keep, Options, Stabilization};
 use crate::record::section::{Observer, Place, Section};
 use crate::record::DecisionRecord;
 use crate::record::{Segment, Solution, Step};
 use crate::stats::Stats;
 use crate::status::{Stop, Warning};
-use crate::stepper::Interpolant;
+use crate::stepper::{Interpolant, Steppers};
 use crate::switch::Switch;
 use crate::tolerances::{EPS, LATEST_SWITCHES, SAME_TICK};
 
@@ -93,14 +95,39 @@ impl<'a> Recorder<'a> {
         }
     }
 
+    /// Samples the wanted times of the step from `x` that was just computed, before `t_stop`, where it ends.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn sample_step(
+        &mut self,
+        t_stop: f64,
+        x: &[f64],
+        stepper: &mut Steppers,
+        motion: &mut CurrentMotion,
+    ) -> Result<(), FieldError> {
+        if self.wanted_before(t_stop).is_none() {
+            return Ok(());
+        }
+        stepper.extend_cheaply(x);
+        let mut y = vec![0.0; x.len()];
+        while let Some(t) = self.wanted_before(t_stop) {
+            let step = stepper.interpolant();
+            step.at((t - step.t0) / step.dt, &mut y);
+            motion.project(t, &mut y)?;
+            self.sample(&y);
+        }
+        Ok(())
+    }
+
     /// The next wanted time before `t_stop`, if times are sampled.
-    pub fn wanted_before(&self, t_stop: f64) -> Option<f64> {
+    fn wanted_before(&self, t_stop: f64) -> Option<f64> {
         let t = self.wanted.get(self.next).copied();
         t.filter(|&t| t < t_stop)
     }
 
     /// The state at the next wanted time.
-    pub fn sample(&mut self, y: &[f64]) {
+    fn sample(&mut self, y: &[f64]) {
         let t = self.wanted[self.next];
         self.next += 1;
         self.push(t, y);

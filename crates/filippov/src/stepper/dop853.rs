@@ -2,10 +2,12 @@
 
 use super::coefficients_dop853::{A, D, E3, E5, NODES};
 use super::dopri5::{jumps_between, stiffness_of};
-use super::{Attempt, ErrorScale, Interpolant, Step};
+use super::{Attempt, ErrorScale, Interpolant, Step, StepStart, Stepper};
 use crate::error::FieldError;
 use crate::error_scale::root_mean_square;
-use crate::motion::SmoothField;
+use crate::motion::{observer, SmoothField};
+use crate::stats::Stats;
+use crate::tolerances::STIFF_DOP853;
 
 /// The stages at which an observer is called.
 const OBSERVED: [usize; 5] = [3, 5, 8, 9, 10];
@@ -42,23 +44,12 @@ impl Dop853 {
         }
     }
 
-    /// The derivative at the start of the step, to be replaced.
-    pub fn start_derivative_mut(&mut self) -> &mut [f64] {
-        &mut self.step.start_derivative
-    }
-
-    /// The step that was attempted last.
-    #[inline]
-    pub fn step(&self) -> &Step {
-        &self.step
-    }
-
     /// Attempts a step of length `dt`; `observe` is called with the field after the evaluations at five stages, and last
     /// at the end.
     ///
     /// # Errors
     /// If a function of the user raises.
-    pub fn attempt<F: SmoothField>(
+    pub fn attempt_along<F: SmoothField>(
         &mut self,
         field: &mut F,
         mut observe: impl FnMut(&F),
@@ -157,8 +148,30 @@ impl Dop853 {
         }
     }
 
+    /// The product of the step and the fastest rate of the field, from the two evaluations at the end of the step.
+    pub fn stiffness(&self) -> Option<f64> {
+        let states = [&self.step.end[..], &self.last_stage];
+        stiffness_of(self.step.interpolant.dt, states, [&self.k[12], &self.k[11]])
+    }
+}
+
+impl Stepper for Dop853 {
+    fn step(&self) -> &Step {
+        &self.step
+    }
+
+    fn step_mut(&mut self) -> &mut Step {
+        &mut self.step
+    }
+
+    fn attempt(&mut self, at: &mut StepStart, dt: f64) -> Result<Option<Attempt>, FieldError> {
+        let (field, observe) = (&mut at.motion.field, observer(at.seen));
+        let attempt = self.attempt_along(field, observe, at.t, at.x, dt, at.scale)?;
+        Ok(Some(attempt))
+    }
+
     /// The error of the extension at theta > 1 in units of the tolerance, from above: what its last term does there.
-    pub fn extrapolation_error(&self, theta: f64, scale: &ErrorScale) -> f64 {
+    fn extrapolation_error(&self, theta: f64, scale: &ErrorScale) -> f64 {
         let weight = theta.powi(4) * (1.0 - theta).powi(3);
         // The highest power has the factor -1 of that term.
         let last = &self.step.interpolant.coefficients()[7 * self.step.end.len()..];
@@ -166,20 +179,18 @@ impl Dop853 {
         scale.norm(&change, &self.step.end)
     }
 
-    /// The product of the step and the fastest rate of the field, from the two evaluations at the end of the step.
-    pub fn stiffness(&self) -> Option<f64> {
-        let states = [&self.step.end[..], &self.last_stage];
-        stiffness_of(self.step.interpolant.dt, states, [&self.k[12], &self.k[11]])
+    fn count(&self, stats: &mut Stats) {
+        stats.n_steps_dop853 += 1;
     }
 
     /// Does the field jump within the attempted step?
-    pub fn field_jumps(&self) -> bool {
+    fn field_jumps(&self) -> bool {
         jumps_between(&IN_TIME.map(|stage| &self.k[stage][..]))
     }
 
-    /// Makes the end of the attempted step the start of the next one.
-    pub fn accept(&mut self, y: &mut [f64]) {
-        self.step.accept(y);
+    fn is_limited_by_stability(&mut self, _: &mut StepStart) -> Result<Option<bool>, FieldError> {
+        let product = self.stiffness();
+        Ok(Some(product.is_some_and(|product| product > STIFF_DOP853)))
     }
 }
 

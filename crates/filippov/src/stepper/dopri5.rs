@@ -1,19 +1,10 @@
 //! DOPRI5(4): one step, its error estimate and its continuous extensions.
 
 use super::coefficients_dopri5::{A2, A3, A4, A5, A6, A8, A9, B, C, C8, C9, D, E};
-use super::{ErrorScale, Interpolant, Step};
+use super::{Attempt, ErrorScale, Interpolant, Step, StepStart, Stepper};
 use crate::error::FieldError;
-use crate::motion::SmoothField;
-use crate::tolerances::{JUMP_SHARE, JUMP_SIZE};
-
-/// What came of an attempted step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Attempt {
-    /// The error in units of the tolerance; the step is acceptable up to 1.
-    Error(f64),
-    /// A stage or the end of the step was not finite.
-    NotFinite,
-}
+use crate::motion::{observer, ModeField, SlidingField, SmoothField};
+use crate::tolerances::{JUMP_SHARE, JUMP_SIZE, STIFF_DOPRI5};
 
 /// Number of states where it is not fixed at compile time.
 const ANY: usize = 0;
@@ -50,17 +41,6 @@ impl Dopri5 {
         }
     }
 
-    /// The step that was attempted last.
-    #[inline]
-    pub fn step(&self) -> &Step {
-        &self.step
-    }
-
-    /// The derivative at the start of the step, to be replaced.
-    pub fn start_derivative_mut(&mut self) -> &mut [f64] {
-        &mut self.step.start_derivative
-    }
-
     /// Evaluates the field at the start; needed after every restart, not between steps.
     ///
     /// # Errors
@@ -79,7 +59,7 @@ impl Dopri5 {
     ///
     /// # Errors
     /// If a function of the user raises.
-    pub fn attempt<F: SmoothField>(
+    pub fn attempt_along<F: SmoothField>(
         &mut self,
         field: &mut F,
         observe: impl FnMut(&F),
@@ -97,7 +77,7 @@ impl Dopri5 {
         }
     }
 
-    /// As [`attempt`](Self::attempt) for `N` states: the loops over few states are unrolled.
+    /// As [`attempt_along`](Self::attempt_along) for `N` states: the loops over few states are unrolled.
     fn attempt_sized<const N: usize, F: SmoothField>(
         &mut self,
         field: &mut F,
@@ -292,9 +272,45 @@ impl Dopri5 {
         Ok(&self.step.interpolant)
     }
 
+    /// As [`Stepper::attempt`]; for the field of a region, and of sliding on one surface, without calls by a table.
+    pub(super) fn attempt_by_kind(
+        &mut self,
+        at: &mut StepStart,
+        dt: f64,
+    ) -> Result<Attempt, FieldError> {
+        let (t, x, scale, seen) = (at.t, at.x, at.scale, &mut *at.seen);
+        match &mut at.motion.field {
+            ModeField::Region(field) => self.attempt_along(field, |_| {}, t, x, dt, scale),
+            ModeField::Sliding(field) => {
+                let observe = |field: &SlidingField| {
+                    let a = field.last();
+                    seen[0].see(a.minus);
+                    seen[1].see(-a.plus);
+                };
+                self.attempt_along(&mut **field, observe, t, x, dt, scale)
+            }
+            field => self.attempt_along(field, observer(seen), t, x, dt, scale),
+        }
+    }
+}
+
+impl Stepper for Dopri5 {
+    #[inline]
+    fn step(&self) -> &Step {
+        &self.step
+    }
+
+    fn step_mut(&mut self) -> &mut Step {
+        &mut self.step
+    }
+
+    fn attempt(&mut self, at: &mut StepStart, dt: f64) -> Result<Option<Attempt>, FieldError> {
+        self.attempt_by_kind(at, dt).map(Some)
+    }
+
     /// Distance of the extensions of order 4 and 5 at theta, in units of the tolerance: an estimate of
     /// the error of an extrapolation. Needs the extension of order 5.
-    pub fn extension_defect(&self, theta: f64, scale: &ErrorScale) -> f64 {
+    fn extrapolation_error(&self, theta: f64, scale: &ErrorScale) -> f64 {
         let weight = (theta * (1.0 - theta)).powi(2);
         let rows: Vec<&[f64]> = self
             .step
@@ -308,8 +324,25 @@ impl Dopri5 {
         scale.norm(&defect, &self.step.end)
     }
 
+    fn extends_freely(&self) -> bool {
+        false
+    }
+
+    fn is_extended(&self) -> bool {
+        self.has_order5()
+    }
+
+    fn extend_cheaply(&mut self, y: &[f64]) {
+        self.extend_order4(y);
+    }
+
+    fn extend(&mut self, field: &mut dyn SmoothField, y: &[f64]) -> Result<(), FieldError> {
+        self.extend_order5(field, y)?;
+        Ok(())
+    }
+
     /// Does the field jump within the attempted step?
-    pub fn field_jumps(&self) -> bool {
+    fn field_jumps(&self) -> bool {
         let [k2, k3, k4, k5, _] = &self.k;
         let Step {
             start_derivative,
@@ -319,9 +352,9 @@ impl Dopri5 {
         jumps_between(&[start_derivative, k2, k3, k4, k5, end_derivative])
     }
 
-    /// Makes the end of the attempted step the start of the next one.
-    pub fn accept(&mut self, y: &mut [f64]) {
-        self.step.accept(y);
+    fn is_limited_by_stability(&mut self, _: &mut StepStart) -> Result<Option<bool>, FieldError> {
+        let product = self.stiffness();
+        Ok(Some(product.is_some_and(|product| product > STIFF_DOPRI5)))
     }
 }
 

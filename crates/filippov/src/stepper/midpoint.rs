@@ -1,8 +1,11 @@
 //! The explicit midpoint rule, as Dieci and Lopez use it.
 
-use super::{Attempt, ErrorScale, Interpolant, Step};
+use super::{Attempt, ErrorScale, Interpolant, Step, StepStart, Stepper};
 use crate::error::FieldError;
-use crate::motion::SmoothField;
+use crate::locate::{refine, Bracket};
+use crate::motion::{observer, Guard, ModeField, SmoothField};
+use crate::stats::Stats;
+use crate::tolerances::EPS;
 
 /// The error e counts as e^(5/2) in the control of the step size, which is made for methods of order 5: 1 stays 1, and
 /// steps change as e^(-1/2).
@@ -39,29 +42,12 @@ impl Midpoint {
         }
     }
 
-    /// The step that was attempted last.
-    #[inline]
-    pub fn step(&self) -> &Step {
-        &self.step
-    }
-
-    /// Is the derivative at the start that of the field there?
-    pub fn is_started(&self) -> bool {
-        self.is_started
-    }
-
-    /// The derivative at the start of the step, to be replaced.
-    pub fn start_derivative_mut(&mut self) -> &mut [f64] {
-        self.is_started = true;
-        &mut self.step.start_derivative
-    }
-
     /// Attempts a step of length `dt`; `observe` is called with the field after the evaluation in the middle, and where
     /// the end is evaluated, last there.
     ///
     /// # Errors
     /// If a function of the user raises.
-    pub fn attempt<F: SmoothField>(
+    pub fn attempt_along<F: SmoothField>(
         &mut self,
         (field, evaluates_end): (&mut F, bool),
         mut observe: impl FnMut(&F),
@@ -102,17 +88,102 @@ impl Midpoint {
         })
     }
 
+    /// The step `dt`, or the longest one whose stage in the middle is not beyond a surface that the motion in a region comes to:
+    /// then it lies on the surface, and the end behind it (Dieci, Lopez 2009, theorem 5.2).
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    fn keep_to_side(&mut self, at: &mut StepStart, dt: f64) -> Result<f64, FieldError> {
+        if !self.is_started {
+            let mut x = at.x.to_vec();
+            let derivative = self.start_derivative_mut();
+            at.motion.field.eval(at.t, &mut x, derivative)?;
+        }
+        if !matches!(at.motion.field, ModeField::Region(_)) {
+            return Ok(dt);
+        }
+        let (system, t, x, signs) = (at.system, at.t, at.x, &at.motion.signs);
+        let derivative = &self.step.start_derivative;
+        let mut h = vec![0.0; system.n_surfaces()];
+        let mut stage = x.to_vec();
+        let mut value = |index: usize, dt: f64| -> Result<f64, FieldError> {
+            let points = stage.iter_mut().zip(x.iter().zip(derivative));
+            points.for_each(|(stage, (x, k))| *stage = x + 0.5 * dt * k);
+            system.surfaces(t + 0.5 * dt, &stage, signs, &mut h)?;
+            Ok(h[index])
+        };
+        let mut longest = dt;
+        for m in &at.motion.monitored {
+            let Guard::Surface(j) = m.guard else {
+                continue;
+            };
+            if m.deflation.is_some() || m.value <= 0.0 {
+                continue;
+            }
+            let mut side = |theta: f64| Ok(m.orientation * value(j, theta * longest)?);
+            let end = side(1.0)?;
+            // A function that is not finite there has its surface before.
+            if end >= 0.0 || end.is_nan() {
+                continue;
+            }
+            let bracket = Bracket {
+                lo: 0.0,
+                hi: 1.0,
+                g_lo: m.value,
+                g_hi: end,
+                guess: m.value / (m.value - end),
+                slope: end - m.value,
+            };
+            let mut theta = refine(&mut side, bracket, EPS)?.theta;
+            // Rounding may blur the zero far beyond the rounding of the step: growing strides get out of that.
+            let mut stride = 4.0 * EPS;
+            while side(theta)? < 0.0 && theta > 0.0 {
+                theta *= 1.0 - stride;
+                stride = (2.0 * stride).min(0.5);
+            }
+            longest *= theta;
+        }
+        Ok(longest)
+    }
+}
+
+impl Stepper for Midpoint {
+    fn step(&self) -> &Step {
+        &self.step
+    }
+
+    fn step_mut(&mut self) -> &mut Step {
+        &mut self.step
+    }
+
+    fn attempt(&mut self, at: &mut StepStart, dt: f64) -> Result<Option<Attempt>, FieldError> {
+        let dt = self.keep_to_side(at, dt)?;
+        // On a surface the field is there at the end too, which is projected onto it.
+        let evaluates_end = !matches!(at.motion.field, ModeField::Region(_));
+        let (field, observe) = ((&mut at.motion.field, evaluates_end), observer(at.seen));
+        let attempt = self.attempt_along(field, observe, at.t, at.x, dt, at.scale)?;
+        Ok(Some(attempt))
+    }
+
     /// The error of the extension at theta > 1 in units of the tolerance.
-    pub fn extrapolation_error(&self, theta: f64, scale: &ErrorScale) -> f64 {
+    fn extrapolation_error(&self, theta: f64, scale: &ErrorScale) -> f64 {
         let bend = &self.step.interpolant.coefficients()[2 * self.step.end.len()..];
         let change: Vec<f64> = bend.iter().map(|c| theta * (theta - 1.0) * c).collect();
         scale.norm(&change, &self.step.end)
     }
 
-    /// Makes the end of the attempted step the start of the next one.
-    pub fn accept(&mut self, y: &mut [f64]) {
+    fn start_derivative_mut(&mut self) -> &mut [f64] {
+        self.is_started = true;
+        &mut self.step.start_derivative
+    }
+
+    fn accept(&mut self, y: &mut [f64]) {
         self.step.accept(y);
         self.is_started = self.is_end_evaluated;
+    }
+
+    fn count(&self, stats: &mut Stats) {
+        stats.n_steps_midpoint += 1;
     }
 }
 

@@ -1,32 +1,43 @@
 //! Steppers: advance one smooth field by one step, with an error estimate and a continuous extension.
+//!
+//! [`Stepper`] is what is asked of a method, `Steppers` holds the methods of a run, and `StepControl` chooses the length of
+//! the next step. A new Runge-Kutta pair is a file here and a line in the table of `steppers.rs`. What a method needs of a
+//! run is in `StepStart`; no method knows of events or of the integrator.
 
+mod chatter;
 mod coefficients_dop853;
 mod coefficients_dopri5;
 mod coefficients_rodas5p;
+mod control;
 mod controller;
 mod dense;
 mod dop853;
 mod dopri5;
 mod initial_step;
-mod method;
 mod midpoint;
+mod pace;
 mod rodas5p;
+mod series_steps;
 mod step;
+mod stepper;
+mod steppers;
+mod stiffness;
 mod taylor;
 
 pub use crate::error_scale::ErrorScale;
+pub(crate) use control::{stiff_warning, StepControl};
 pub use controller::Controller;
 pub(crate) use dense::{evaluate, powers_of_nested, shift};
 pub use dense::{Basis, Expansion, Interpolant};
 pub use dop853::Dop853;
-pub use dopri5::{Attempt, Dopri5};
+pub use dopri5::Dopri5;
 pub use initial_step::{initial_step, restart_step, tiny_step};
-pub(crate) use method::Derivatives;
-pub use method::{StepMethod, Stepper};
 pub use midpoint::Midpoint;
 pub use rodas5p::Rodas5p;
 pub use step::Step;
-pub(crate) use taylor::reach;
+pub use stepper::Attempt;
+pub(crate) use stepper::{ExitSeries, StepStart, Stepper};
+pub(crate) use steppers::Steppers;
 pub use taylor::Taylor;
 
 #[cfg(test)]

@@ -1,11 +1,16 @@
 //! Rodas5P: one step for stiff motions, its error estimate and its continuous extension.
 
+use std::sync::Arc;
+
 use super::coefficients_rodas5p::{A, C, EXTENSION, GAMMA, NODES, TIME_SHARES};
-use super::{Attempt, ErrorScale, Interpolant, Step};
+use super::stepper::Ready;
+use super::{Attempt, ErrorScale, Interpolant, Step, StepStart, Stepper};
 use crate::error::FieldError;
-use crate::motion::SmoothField;
+use crate::motion::{observer, ModeField, SmoothField};
 use crate::sparse::SparseSolver;
-use crate::system::Linearisation;
+use crate::stats::Stats;
+use crate::system::{Linearisation, MotionJacobian};
+use crate::tolerances::EPS;
 
 /// The Rosenbrock-Wanner method of order 5(4) with eight stages, L-stable and stiffly accurate,
 ///
@@ -16,6 +21,8 @@ use crate::system::Linearisation;
 ///
 /// Reference: Steinebach, *BIT* 63:27 (2023); Hairer, Wanner, Solving ODEs II (1996), section IV.7.
 pub struct Rodas5p {
+    /// The derivatives of the motion by its expression graph; differences of its field if there are none.
+    jacobian: Option<Arc<MotionJacobian>>,
     linearisation: Linearisation,
     /// The linearisation belongs to the current start.
     is_linearised: bool,
@@ -32,6 +39,7 @@ impl Rodas5p {
     pub fn new(n: usize) -> Self {
         let zeros = || vec![0.0; n];
         Rodas5p {
+            jacobian: None,
             linearisation: Linearisation::dense(0),
             is_linearised: false,
             solver: SparseSolver::for_all_pivots(),
@@ -40,17 +48,6 @@ impl Rodas5p {
             step: Step::new(n, Interpolant::powers(n, 4)),
             defect: zeros(),
         }
-    }
-
-    /// The step that was attempted last.
-    #[inline]
-    pub fn step(&self) -> &Step {
-        &self.step
-    }
-
-    /// Are the derivatives of the field at the start of the step known?
-    pub fn is_linearised(&self) -> bool {
-        self.is_linearised
     }
 
     /// Takes space for the derivatives of the field of a motion that starts.
@@ -69,17 +66,6 @@ impl Rodas5p {
         self.is_linearised
     }
 
-    /// The derivatives of the field at the start of the step.
-    pub fn linearisation(&self) -> &Linearisation {
-        &self.linearisation
-    }
-
-    /// The derivative at the start of the step, to be replaced.
-    pub fn start_derivative_mut(&mut self) -> &mut [f64] {
-        self.is_linearised = false;
-        &mut self.step.start_derivative
-    }
-
     /// Factors the matrix of a step of length `dt`; returns whether it has an inverse.
     pub fn factor(&mut self, dt: f64) -> bool {
         let matrix = self.linearisation.shifted(1.0 / (GAMMA * dt));
@@ -91,7 +77,7 @@ impl Rodas5p {
     ///
     /// # Errors
     /// If a function of the user raises.
-    pub fn attempt<F: SmoothField>(
+    pub fn attempt_along<F: SmoothField>(
         &mut self,
         field: &mut F,
         mut observe: impl FnMut(&F),
@@ -192,18 +178,187 @@ impl Rodas5p {
         }
     }
 
+    /// Takes the motion that starts.
+    pub(super) fn take(&mut self, at: &StepStart) {
+        let by_graph = at.motion.has_canopy_field() && !at.motion.is_drawn_back();
+        let jacobian = by_graph
+            .then(|| at.system.motion_jacobian(at.motion.sliding()))
+            .flatten();
+        self.take_derivatives(jacobian, at.x.len());
+    }
+
+    fn take_derivatives(&mut self, jacobian: Option<Arc<MotionJacobian>>, n: usize) {
+        self.restart(match &jacobian {
+            Some(jacobian) => jacobian.linearisation(),
+            None => Linearisation::dense(n),
+        });
+        self.jacobian = jacobian;
+    }
+
+    /// The signs of the mode, with the signs that stand for the multipliers at the start of the step.
+    fn signs_and_multipliers(at: &mut StepStart) -> Result<Vec<f64>, FieldError> {
+        let mut signs = at.motion.signs.to_vec();
+        if at.motion.sliding.is_empty() {
+            return Ok(signs);
+        }
+        let (mut x, mut rates) = (at.x.to_vec(), vec![0.0; at.x.len()]);
+        at.motion.field.eval(at.t, &mut x, &mut rates)?;
+        let multipliers = at.motion.multipliers();
+        for (k, &j) in at.motion.sliding.iter().enumerate() {
+            let at_signs = &at.motion.signs;
+            let ratio = at.system.stick_ratio(j, at.t, at.x, at_signs);
+            signs[j] = ratio * multipliers.get(k).copied().unwrap_or(f64::NAN);
+        }
+        Ok(signs)
+    }
+
+    /// Derivatives by one difference per state and one in time. Where the field is not there on one side of the
+    /// start the other is taken.
+    fn linearise_by_differences(&mut self, at: &mut StepStart) -> Result<bool, FieldError> {
+        let (t, n) = (at.t, at.x.len());
+        let start = self.step.start_derivative.clone();
+        let mut columns = vec![0.0; n * n];
+        let mut at_rates = vec![0.0; n];
+        let field = &mut at.motion.field;
+        let mut difference = |i: Option<usize>, out: &mut [f64]| -> Result<(), FieldError> {
+            let value = i.map_or(t, |i| at.x[i]);
+            for side in [1.0, -1.0] {
+                // Radau5's choice (Hairer, Wanner 1996, section IV.8).
+                let moved = value + side * (EPS * value.abs().max(1e-5)).sqrt();
+                let mut x = at.x.to_vec();
+                let time = match i {
+                    Some(i) => {
+                        x[i] = moved;
+                        t
+                    }
+                    None => moved,
+                };
+                field.eval(time, &mut x, &mut at_rates)?;
+                for ((out, there), here) in out.iter_mut().zip(&at_rates).zip(&start) {
+                    *out = (there - here) / (moved - value);
+                }
+                if out.iter().all(|v| v.is_finite()) {
+                    break;
+                }
+            }
+            Ok(())
+        };
+        for (i, column) in columns.chunks_exact_mut(n).enumerate() {
+            difference(Some(i), column)?;
+        }
+        let mut in_time = vec![0.0; n];
+        difference(None, &mut in_time)?;
+        Ok(self.linearise(|out| {
+            out.fill(|values, time| {
+                for (place, value) in values.iter_mut().enumerate() {
+                    *value = -columns[place % n * n + place / n];
+                }
+                time.copy_from_slice(&in_time);
+            });
+        }))
+    }
+}
+
+impl Stepper for Rodas5p {
+    fn step(&self) -> &Step {
+        &self.step
+    }
+
+    fn step_mut(&mut self) -> &mut Step {
+        &mut self.step
+    }
+
+    /// `None` if the matrix of the step has no inverse.
+    #[cold]
+    #[inline(never)]
+    fn attempt(&mut self, at: &mut StepStart, dt: f64) -> Result<Option<Attempt>, FieldError> {
+        at.stats.n_factorisations += 1;
+        if !self.factor(dt) {
+            return Ok(None);
+        }
+        let (field, observe) = (&mut at.motion.field, observer(at.seen));
+        let attempt = self.attempt_along(field, observe, at.t, at.x, dt, at.scale)?;
+        let is_beside = self.linearisation.is_exact() && !at.motion.is_straight;
+        if attempt == Attempt::NotFinite && is_beside {
+            // The field may not be there beside a curved surface: at its projection it is.
+            self.take_derivatives(None, at.x.len());
+        }
+        Ok(Some(attempt))
+    }
+
     /// The error of the extension at theta > 1 in units of the tolerance, from above: what its last term does there.
-    pub fn extrapolation_error(&self, theta: f64, scale: &ErrorScale) -> f64 {
+    fn extrapolation_error(&self, theta: f64, scale: &ErrorScale) -> f64 {
         let weight = (1.0 - theta) * theta.powi(3);
         let last = &self.step.interpolant.coefficients()[4 * self.step.end.len()..];
         let change: Vec<f64> = last.iter().map(|c| weight * c).collect();
         scale.norm(&change, &self.step.end)
     }
 
-    /// Makes the end of the attempted step the start of the next one.
-    pub fn accept(&mut self, y: &mut [f64]) {
+    fn begin(&mut self, at: &mut StepStart) -> Ready {
+        if !at.motion.resting.is_empty() {
+            return Ready::NotThisMotion(None);
+        }
+        self.take(at);
+        Ready::ANY
+    }
+
+    /// If redundant contacts share a load their equations do not determine the multipliers: there are no exact derivatives.
+    fn started(&mut self, at: &mut StepStart) -> Ready {
+        if self.jacobian.is_some() && at.motion.shares_load() {
+            self.take_derivatives(None, at.x.len());
+        }
+        Ready::ANY
+    }
+
+    fn start_derivative_mut(&mut self) -> &mut [f64] {
+        self.is_linearised = false;
+        &mut self.step.start_derivative
+    }
+
+    /// Finds the derivatives at the start of the step. If they are not finite DOPRI5 takes the step.
+    #[cold]
+    #[inline(never)]
+    fn prepare(&mut self, at: &mut StepStart) -> Result<Ready, FieldError> {
+        if self.is_linearised {
+            return Ok(Ready::ANY);
+        }
+        let begins_at_two_fold = match &at.motion.field {
+            ModeField::Sliding(field) => field.is_at_two_fold(at.t),
+            _ => false,
+        };
+        if begins_at_two_fold {
+            // The equation of the multiplier is 0 = 0.
+            return Ok(Ready::NotThisStep);
+        }
+        at.stats.n_jacobians += 1;
+        let is_finite = match self.jacobian.clone() {
+            Some(jacobian) => {
+                let signs = Self::signs_and_multipliers(at)?;
+                let (system, t, x) = (at.system, at.t, at.x);
+                self.linearise(|out| system.eval_jacobian(&jacobian, t, x, &signs, out))
+            }
+            None => self.linearise_by_differences(at)?,
+        };
+        Ok(if is_finite {
+            Ready::ANY
+        } else {
+            Ready::NotThisStep
+        })
+    }
+
+    fn accept(&mut self, y: &mut [f64]) {
         self.step.accept(y);
         self.is_linearised = false;
+    }
+
+    fn count(&self, stats: &mut Stats) {
+        stats.n_steps_rodas5p += 1;
+    }
+
+    /// The extension of a stiff motion lies beside the manifold to which the fast components keep; within the tolerance, but
+    /// the direction of the field there says nothing about the motion. The end of a step is on it.
+    fn ends_at_events(&self) -> bool {
+        true
     }
 }
 

@@ -3,6 +3,7 @@
 use smallvec::SmallVec;
 
 use super::controller::{rough_exp2, rough_log2};
+use super::series_steps::MotionSeries;
 use super::{Attempt, ErrorScale, Interpolant, Step};
 use crate::error::FieldError;
 use crate::motion::SmoothField;
@@ -29,7 +30,8 @@ pub struct Taylor {
     rows: Vec<f64>,
     /// The rows belong to the current start.
     is_expanded: bool,
-    step: Step,
+    pub(super) step: Step,
+    pub(super) series: MotionSeries,
     defect: Vec<f64>,
     /// Error of the attempted step in units of the tolerance.
     error: f64,
@@ -64,6 +66,7 @@ impl Taylor {
             rows: Vec::new(),
             is_expanded: false,
             step: Step::new(n, Interpolant::powers(n, order)),
+            series: MotionSeries::default(),
             defect: vec![0.0; n],
             error: 0.0,
             wary: None,
@@ -77,12 +80,6 @@ impl Taylor {
         self.wary = Some(WARY_START * span);
         self.inner = [vec![0.0; self.n], vec![0.0; self.n]];
         self
-    }
-
-    /// The step that was attempted last.
-    #[inline]
-    pub fn step(&self) -> &Step {
-        &self.step
     }
 
     /// The order of the method.
@@ -154,17 +151,11 @@ impl Taylor {
         longest.min(self.wary.unwrap_or(f64::INFINITY))
     }
 
-    /// The derivative at the start of the step, to be replaced.
-    pub fn start_derivative_mut(&mut self) -> &mut [f64] {
-        self.is_expanded = false;
-        &mut self.step.start_derivative
-    }
-
     /// Attempts a step of length `dt` with the coefficients taken last; the field is evaluated at its end.
     ///
     /// # Errors
     /// If a function of the user raises.
-    pub fn attempt(
+    pub fn attempt_along(
         &mut self,
         field: &mut impl SmoothField,
         t: f64,
@@ -319,14 +310,8 @@ impl Taylor {
     }
 
     /// The error of the series at theta > 1 in units of the tolerance.
-    pub fn extrapolation_error(&self, theta: f64) -> f64 {
+    pub fn error_beyond(&self, theta: f64) -> f64 {
         self.error * theta.powi(self.order as i32 + 1)
-    }
-
-    /// Makes the end of the attempted step the start of the next one.
-    pub fn accept(&mut self, y: &mut [f64]) {
-        self.step.accept(y);
-        self.is_expanded = false;
     }
 }
 

@@ -125,7 +125,7 @@ fn local_errors(theta: f64) -> [f64; 2] {
         stepper.restart(&mut Decay, t, &mut y).unwrap();
         let scale = ErrorScale::new(1e-6, &[1e-6], 1);
         let attempt = stepper
-            .attempt(&mut Decay, |_| {}, t, &y, dt, &scale)
+            .attempt_along(&mut Decay, |_| {}, t, &y, dt, &scale)
             .unwrap();
         assert!(matches!(attempt, Attempt::Error(_)));
         let mut out = [0.0];

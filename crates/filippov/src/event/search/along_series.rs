@@ -6,11 +6,11 @@ use super::StepSearch;
 use crate::error::FieldError;
 use crate::event::filter::may_vanish_between;
 use crate::event::isolate::{is_steep, Bracket};
-use crate::event::locate::refine;
 use crate::event::series::Series;
+use crate::locate::refine;
 use crate::motion::Monitored;
 use crate::motion::{Guard, ModeField};
-use crate::stepper::{powers_of_nested, Basis};
+use crate::stepper::{powers_of_nested, Basis, ExitSeries};
 use crate::tolerances::{EPS, SERIES_MARGIN};
 
 /// A guard along a step, as far as it is a polynomial.
@@ -63,10 +63,10 @@ impl StepSearch<'_, '_> {
             self.affine_series(m, rows)?;
             return Ok((Some(Likeness::EXACT), false));
         }
-        if !self.exit_series(m, rows) {
+        let Some(known) = self.exit_series(m, rows) else {
             return Ok((None, false));
-        }
-        let likeness = self.likeness_of_exit(m, &Series::new(rows), value_at_end)?;
+        };
+        let likeness = self.likeness_of_exit(m, known, &Series::new(rows), value_at_end)?;
         Ok((likeness, true))
     }
 
@@ -100,31 +100,22 @@ impl StepSearch<'_, '_> {
         Ok(())
     }
 
-    /// An exit function along the step, as far as its series describes it, into `rows`; `false` if there is none.
-    fn exit_series(&self, m: &Monitored, rows: &mut [f64]) -> bool {
-        let place = m.exit().and_then(|index| {
-            let jets = self.motion.jets.as_ref()?;
-            jets.exit(index)
-        });
-        let (Some(place), Some(taylor)) = (place, &self.stepper.taylor) else {
-            return false;
-        };
-        taylor.column(place, rows);
+    /// An exit function along the step, as far as its series describes it, into `rows`; `None` if there is none.
+    fn exit_series(&self, m: &Monitored, rows: &mut [f64]) -> Option<ExitSeries> {
+        let known = self.stepper.exit_series(m.exit()?, rows)?;
         let own = |slack: &&(Guard, f64)| slack.0 == m.guard;
         rows[0] += self.slacks.iter().find(own).map_or(0.0, |slack| slack.1);
-        true
+        Some(known)
     }
 
     /// How the series of an exit function in this step stands for it; `None` if it may change where no coefficient tells.
     fn likeness_of_exit(
         &mut self,
         m: &Monitored,
+        known: ExitSeries,
         series: &Series,
         value_at_end: f64,
     ) -> Result<Option<Likeness>, FieldError> {
-        let Some(jets) = &self.motion.jets else {
-            return Ok(None);
-        };
         let sticks = |j: &usize| self.system.sticks_at(*j);
         // Where the motion sticks its limits are others than those of the series.
         if !matches!(self.motion.field, ModeField::Sliding(_))
@@ -134,11 +125,11 @@ impl StepSearch<'_, '_> {
         {
             return Ok(None);
         }
-        if jets.has_affine_exits() {
+        if known.is_affine {
             let is_exact = series.leads_between(m.value, value_at_end);
             return Ok(is_exact.then_some(Likeness::EXACT));
         }
-        if !jets.tells_of_exits() {
+        if !known.is_complete {
             return Ok(None);
         }
         let [start, end] = series.ends();
@@ -231,7 +222,7 @@ impl StepSearch<'_, '_> {
     /// May an exit function about which there are no bounds vanish, to judge by its values at the stages?
     pub(super) fn exit_may_vanish(&self, m: &Monitored) -> bool {
         let seen = m.exit().and_then(|place| self.detector.seen.get(place));
-        let is_known = m.deflation.is_none() && !self.stepper.is_taylor();
+        let is_known = m.deflation.is_none() && !self.stepper.is_series();
         seen.is_none_or(|seen| !is_known || may_vanish_between(seen.range))
     }
 }

@@ -4,10 +4,10 @@ use std::cell::RefCell;
 
 use super::bounds::{Piece, RootPiece};
 use crate::error::FieldError;
-use crate::event::{Multiple, Seen};
+use crate::event::Multiple;
 use crate::motion::CurrentMotion;
 use crate::motion::Monitored;
-use crate::motion::{Exits, ModeField};
+use crate::motion::{Exits, Seen};
 use crate::system::PiecewiseSystem;
 use crate::tolerances::{SMALL_JUMP, SURFACE_NOISE};
 
@@ -65,15 +65,6 @@ impl Detector {
         self.margin.clear();
         self.exit_noise = None;
         self.is_probed = false;
-    }
-
-    /// What takes down the exit functions at the stages of a step.
-    pub fn observer(&mut self) -> impl FnMut(&ModeField) + '_ {
-        |field| {
-            for (seen, value) in self.seen.iter_mut().zip(field.last_exits()) {
-                seen.see(*value);
-            }
-        }
     }
 
     /// Is the difference of the normal components at an end of the step so small, compared with `speed`, that the multiplier

@@ -10,10 +10,10 @@ use crate::event::certificate::Proof;
 use crate::event::isolate::{
     first_zero_sampled, is_steep, Bracket, Evidence, Sampled, Zero, PROBES,
 };
-use crate::event::locate::refine;
 use crate::event::proved::{expected_zero_proved, first_zero_proved, Proved};
 use crate::event::series::{FirstZero, Near, Series, NO_TERMS};
 use crate::event::Found;
+use crate::locate::refine;
 use crate::motion::Guard;
 use crate::tolerances::{
     BEYOND_GUESS, BEYOND_TOUCH, EPS, POLE, RESOLVED_DEPTH, SMALL_REST, UNBOUNDED_DEPTH,
@@ -72,7 +72,7 @@ impl StepSearch<'_, '_> {
             self.motion.monitored[index].noise = self.noise_beside(&m)?;
         }
         let mut proof = None;
-        if !self.stepper.has_series() {
+        if !self.stepper.extends_freely() {
             proof = self.filter(index, sought)?;
             if proof.is_none() {
                 return Ok(true);

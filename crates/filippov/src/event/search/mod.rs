@@ -16,7 +16,7 @@ use crate::error_scale::ErrorScale;
 use crate::motion::{CurrentMotion, Guard};
 use crate::options::SlidingRule;
 use crate::stats::Stats;
-use crate::stepper::Stepper;
+use crate::stepper::Steppers;
 use crate::system::PiecewiseSystem;
 
 /// A step that was computed, and is searched before it is accepted.
@@ -27,8 +27,8 @@ pub(crate) struct StepSearch<'s, 'a> {
     pub t: f64,
     pub x: &'s [f64],
     pub motion: &'s mut CurrentMotion<'a>,
-    /// The method that took the step, with its continuous extension.
-    pub stepper: &'s mut Stepper,
+    /// The methods; that in use has the step with its continuous extension.
+    pub stepper: &'s mut Steppers,
     pub detector: &'s mut Detector,
     pub stats: &'s mut Stats,
     /// What guards may go beyond zero.

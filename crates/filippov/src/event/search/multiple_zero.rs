@@ -12,7 +12,6 @@ use crate::error::FieldError;
 use crate::event::{Event, Found};
 use crate::motion::Guard;
 use crate::motion::Monitored;
-use crate::stepper::StepMethod;
 use crate::tolerances::{EPS, EXPLAINED, MAX_LIE_ORDER, MOST_HALVINGS, TOUCH_DEPTH};
 
 /// Which derivative of a switching function vanishes at its multiple zero.
@@ -86,7 +85,7 @@ impl StepSearch<'_, '_> {
         if event.is_blurred {
             return self.motion.sliding.is_empty();
         }
-        if self.stepper.in_use() == StepMethod::Taylor {
+        if self.stepper.is_series() {
             return false;
         }
         let mut values = self.motion.monitored.iter().zip(&self.detector.right);
@@ -260,7 +259,7 @@ impl StepSearch<'_, '_> {
 
     /// How far below zero a function may be at a touch: errors of the step make it so. A series has none where it matters.
     fn depth_of_touches(&mut self, j: usize, theta: f64) -> Result<f64, FieldError> {
-        if self.stepper.in_use() == StepMethod::Taylor {
+        if self.stepper.is_series() {
             return Ok(0.0);
         }
         let mut x = vec![0.0; self.x.len()];

@@ -12,10 +12,9 @@ use crate::event::certificate::{prove, Proof};
 use crate::event::filter::{may_vanish, may_vanish_bent, may_vanish_deflated};
 use crate::event::isolate::PROBES;
 use crate::event::{Event, Found};
-use crate::motion::Monitored;
-use crate::motion::{AffineBounds, ModeField};
+use crate::motion::{AffineBounds, Guard, ModeField, Monitored};
 use crate::options::SlidingRule;
-use crate::tolerances::{EPS, EXTRAPOLATION, MARGIN, ONE_SIDED_AIM, PROOF_DEPTH};
+use crate::tolerances::{ARRIVED, EPS, EXTRAPOLATION, MARGIN, ONE_SIDED_AIM, PROOF_DEPTH};
 
 impl StepSearch<'_, '_> {
     /// The first event of the step that was just computed, and how long the next step may be. Where the field ends beyond
@@ -75,7 +74,7 @@ impl StepSearch<'_, '_> {
             self.extend()?;
         }
         if !self.motion.monitored.iter().all(|m| self.is_polynomial(m)) {
-            self.stepper.extend_order4(self.x);
+            self.stepper.extend_cheaply(self.x);
         }
         self.measure_margin(sought.dt)?;
         if self.motion.sliding.len() > 1 {
@@ -152,6 +151,25 @@ impl StepSearch<'_, '_> {
         Ok(may_vanish.then_some(proof))
     }
 
+    /// The event at the start of the step, if the motion can go no further because its field ends at a surface that it has
+    /// reached to a small part of the tolerance.
+    pub(crate) fn arrival_at_edge(&self) -> Result<Option<Found>, FieldError> {
+        let mut gradient = vec![0.0; self.x.len()];
+        for m in &self.motion.monitored {
+            let Guard::Surface(j) = m.guard else {
+                continue;
+            };
+            let signs = &self.motion.signs;
+            self.system
+                .gradient(j, self.t, self.x, signs, &mut gradient)?;
+            let tolerance = self.scale.along(&gradient, self.x);
+            if m.rate < 0.0 && m.value <= ARRIVED * tolerance {
+                return Ok(Some(Found::here(smallvec![m.guard])));
+            }
+        }
+        Ok(None)
+    }
+
     /// Rounding of a monitored function over the step.
     pub(crate) fn noise_of(&mut self, m: &Monitored) -> Result<f64, FieldError> {
         let step = (self.t, &self.x[..], self.stepper.end());
@@ -205,7 +223,7 @@ impl StepSearch<'_, '_> {
                     continue;
                 }
                 // An extrapolation that is not accurate enough still says how far to go.
-                if self.stepper.extension_defect(theta, &self.scale) > 1.0 {
+                if self.stepper.extrapolation_error(theta, &self.scale) > 1.0 {
                     let gap = ONE_SIDED_AIM * (theta - 1.0) * dt;
                     sought.longest = sought.longest.min(gap);
                 } else {

@@ -6,9 +6,9 @@ use super::StepSearch;
 use crate::error::FieldError;
 use crate::event::certificate::Bound;
 use crate::event::isolate::{first_zero_sampled, Evidence, Zero, PROBES};
-use crate::event::locate::refine;
 use crate::event::tube::Tube;
 use crate::event::{UserEvent, UserEvents, UserFunction};
+use crate::locate::refine;
 use crate::motion::CurrentMotion;
 use crate::stepper::Interpolant;
 use crate::tolerances::{
@@ -73,7 +73,7 @@ impl StepSearch<'_, '_> {
         theta: f64,
         is_extended: bool,
     ) -> Result<Option<Vec<(f64, usize)>>, FieldError> {
-        self.stepper.extend_order4(self.x);
+        self.stepper.extend_cheaply(self.x);
         let found = self.search_user_zeros(events, theta)?;
         if !is_extended && found.as_ref().is_none_or(|zeros| zeros.is_empty()) {
             return Ok(found);
@@ -123,7 +123,7 @@ impl StepSearch<'_, '_> {
             sign: side(value),
         };
         let mut ends = self.sampled_pieces(function, theta);
-        let longest_unknown = match self.stepper.has_series() {
+        let longest_unknown = match self.stepper.extends_freely() {
             true => theta / f64::from(PIECES_OF_SERIES),
             false => theta,
         };
@@ -201,7 +201,7 @@ impl StepSearch<'_, '_> {
     /// bounds is sampled, on a long step in pieces.
     fn sampled_pieces(&self, function: &dyn UserFunction, theta: f64) -> SmallVec<[f64; 16]> {
         let is_sampled = !function.has_bounds();
-        let n = match is_sampled && self.stepper.has_series() {
+        let n = match is_sampled && self.stepper.extends_freely() {
             true => PIECES_OF_SERIES,
             false => 1,
         };

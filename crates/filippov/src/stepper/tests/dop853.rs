@@ -1,7 +1,7 @@
 //! Order conditions of DOP853 and of its continuous extension.
 
 use super::super::coefficients_dop853::{A, D, E3, E5, NODES};
-use super::super::{Attempt, Dop853, ErrorScale};
+use super::super::{Attempt, Dop853, ErrorScale, Stepper};
 use super::trees::{dot, trees};
 use super::Decay;
 use crate::motion::SmoothField;
@@ -81,7 +81,7 @@ fn steps_have_local_order_nine_and_their_extension_eight() {
             .unwrap();
         let scale = ErrorScale::new(1e-2, &[1e-2], 1);
         let attempt = stepper
-            .attempt(&mut Decay, |_| {}, t, &y, dt, &scale)
+            .attempt_along(&mut Decay, |_| {}, t, &y, dt, &scale)
             .unwrap();
         assert!(matches!(attempt, Attempt::Error(error) if error <= 1.0));
         [0.4, 1.0].map(|theta| {

@@ -1,7 +1,7 @@
 //! Order conditions of Rodas5P and of its continuous extension, its stability, and its steps.
 
 use super::super::coefficients_rodas5p::{A, C, EXTENSION, GAMMA, NODES, TIME_SHARES};
-use super::super::{Attempt, ErrorScale, Rodas5p};
+use super::super::{Attempt, ErrorScale, Rodas5p, Stepper};
 use super::trees::{dot, trees};
 use crate::error::FieldError;
 use crate::motion::SmoothField;
@@ -175,7 +175,9 @@ fn step(field: &mut Decay, stepper: &mut Rodas5p, t: f64, y: &[f64], dt: f64) ->
     })));
     assert!(stepper.factor(dt));
     let scale = ErrorScale::new(1e-6, &[1e-6], 1);
-    let attempt = stepper.attempt(field, |_| {}, t, y, dt, &scale).unwrap();
+    let attempt = stepper
+        .attempt_along(field, |_| {}, t, y, dt, &scale)
+        .unwrap();
     assert!(matches!(attempt, Attempt::Error(_)));
     stepper.step().end[0]
 }

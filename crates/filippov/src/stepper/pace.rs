@@ -2,11 +2,11 @@
 
 use rustc_hash::FxHashMap;
 
+use super::tiny_step;
 use crate::error::FieldError;
 use crate::error_scale::ErrorScale;
 use crate::mode::Mode;
 use crate::motion::Leading;
-use crate::stepper::tiny_step;
 use crate::system::PiecewiseSystem;
 use crate::tolerances::{FAMILIAR, MANY, MAX_LIE_ORDER, REACH, SEVERAL};
 
@@ -38,7 +38,7 @@ impl Pace {
 
 /// How the last motions went, by mode.
 #[derive(Default)]
-pub(in crate::integrate) struct Paces(FxHashMap<Mode, Pace>);
+pub(super) struct Paces(FxHashMap<Mode, Pace>);
 
 impl Paces {
     /// Keeps the pace of a motion that ends: the step proposed at its end, and how long it lasted. A motion that ended where
@@ -70,7 +70,7 @@ impl Paces {
 
 /// Predicted time of return of a motion in a region to surface `j` that it leaves tangentially: the zero of
 /// a τ^k/k! + b τ^(k+1)/(k+1)!, with a fifth to spare.
-pub(in crate::integrate) fn excursion(
+pub(super) fn excursion(
     system: &dyn PiecewiseSystem,
     (t, x): (f64, &[f64]),
     mode: &Mode,

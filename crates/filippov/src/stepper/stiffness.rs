@@ -3,7 +3,7 @@
 use crate::tolerances::{NOT_STIFF_SIGNS, STIFF_SIGNS};
 
 /// Accepted steps between two looks, a power of two.
-pub(super) const LOOK_EVERY: u64 = 128;
+const LOOK_EVERY: u64 = 128;
 
 /// What was seen of the steps so far: Hairer's count.
 ///
@@ -13,7 +13,7 @@ pub(super) const LOOK_EVERY: u64 = 128;
 ///
 /// Reference: Hairer, Wanner (1996), section IV.2, "stiffness detection".
 #[derive(Clone, Copy, Debug, Default)]
-pub(in crate::integrate) struct Stiffness {
+pub(super) struct Stiffness {
     signs: u32,
     signs_against: u32,
     /// The time from which on the run counts as stiff.
@@ -28,7 +28,7 @@ impl Stiffness {
     }
 
     /// Counts a step; returns whether the run counts as stiff now.
-    pub(super) fn count(&mut self, is_limited: bool) -> bool {
+    pub fn count(&mut self, is_limited: bool) -> bool {
         if is_limited {
             self.signs_against = 0;
             self.signs += 1;

@@ -14,7 +14,7 @@ struct Chatter {
 
 /// Looks for chatter.
 #[derive(Default)]
-pub(in crate::integrate) struct ChatterWatch(Option<Chatter>);
+pub(super) struct ChatterWatch(Option<Chatter>);
 
 impl ChatterWatch {
     /// A jump was noticed at `t`; the step before it was `pace`.

@@ -1,0 +1,358 @@
+//! How long the next step is.
+
+use super::chatter::ChatterWatch;
+use super::initial_step::{initial_step, restart_step};
+use super::pace::{excursion, Paces};
+use super::stepper::{Ready, StepStart};
+use super::stiffness::Stiffness;
+use super::{Controller, Steppers};
+use crate::error::FieldError;
+use crate::mode::Mode;
+use crate::motion::{CurrentMotion, Leading, ModeField, Monitored};
+use crate::status::{Stop, Warning, WarningCode};
+use crate::tolerances::{AIM_MARGINS, EPS, JUMP_SHRINK, ONE_SIDED_AIM, SMALLEST_GUESS};
+
+/// The control of the step: the proposed length, and what was seen of the steps before.
+pub(crate) struct StepControl {
+    /// Proposed step; NaN if the next motion is to take a guess of its own.
+    dt: f64,
+    /// The step that was proposed if the next known time shortened it, else 0.
+    wanted: f64,
+    controller: Controller,
+    /// How the last motion went, by mode.
+    paces: Paces,
+    /// The last attempt met a point where the field does not exist.
+    one_sided: bool,
+    /// Some attempt of this run met such a point.
+    meets_edges: bool,
+    /// How often the step was taken anew to end at an event.
+    n_aims: usize,
+    /// Largest recent step of this motion.
+    recent: f64,
+    /// Since a jump of the field that no surface declares, if the steps have been short since then.
+    chatter: ChatterWatch,
+    stiffness: Stiffness,
+}
+
+impl StepControl {
+    pub fn new() -> Self {
+        StepControl {
+            dt: f64::NAN,
+            wanted: 0.0,
+            controller: Controller::default(),
+            paces: Paces::default(),
+            one_sided: false,
+            meets_edges: false,
+            n_aims: 0,
+            recent: 0.0,
+            chatter: ChatterWatch::default(),
+            stiffness: Stiffness::default(),
+        }
+    }
+
+    /// Did the last attempt meet a point where the field does not exist?
+    pub fn is_one_sided(&self) -> bool {
+        self.one_sided
+    }
+
+    /// The time from which on the run counts as stiff.
+    pub fn stiff_since(&self) -> Option<f64> {
+        self.stiffness.since
+    }
+
+    /// Keeps the pace of the motion that ends, which lasted this long.
+    pub fn remember(&mut self, mode: &Mode, duration: f64) {
+        self.paces.remember(mode, self.dt, duration);
+    }
+
+    /// A motion starts that lasts at most to `t_end`, and leaves these surfaces with these derivatives.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn begin(
+        &mut self,
+        at: &mut StepStart,
+        steppers: &Steppers,
+        t_end: f64,
+        left: impl Iterator<Item = (usize, Leading)>,
+    ) -> Result<(), FieldError> {
+        self.controller.restart();
+        self.dt = self.first_step(at, steppers, t_end, left)?;
+        Ok(())
+    }
+
+    /// The first step of a motion: what the last motion in its mode suggests; else the proposal of the
+    /// motion before, as far as Hairer's guess for this one supports it. No longer than a short
+    /// excursion from the surface.
+    fn first_step(
+        &self,
+        at: &mut StepStart,
+        steppers: &Steppers,
+        t_end: f64,
+        left: impl Iterator<Item = (usize, Leading)>,
+    ) -> Result<f64, FieldError> {
+        let remaining = (t_end - at.t).max(f64::MIN_POSITIVE);
+        if let (Some(first), true) = (at.options.first_step, self.dt.is_nan()) {
+            return Ok(first.max(SMALLEST_GUESS).min(remaining));
+        }
+        let longest = remaining.min(at.options.max_step);
+        if steppers.is_series() {
+            // The series tells.
+            return Ok(longest);
+        }
+        let (t, x, scale, field) = (at.t, at.x, at.scale, &mut at.motion.field);
+        let derivative = steppers.start_derivative();
+        let mode = &at.motion.mode;
+        let mut dt = match self.paces.first_step(mode, x, derivative, scale) {
+            Some(dt) => dt.min(longest),
+            None if self.dt.is_nan() => initial_step(field, t, x, derivative, scale, longest)?,
+            None => restart_step(field, t, x, derivative, scale, self.dt.min(longest))?,
+        };
+        for (j, leading) in left {
+            dt = dt.min(excursion(at.system, (t, x), mode, j, leading)?);
+        }
+        Ok(dt)
+    }
+
+    /// Makes the proposed step no longer than this.
+    pub fn limit(&mut self, longest: f64) {
+        self.dt = self.dt.min(longest);
+    }
+
+    /// The proposed step.
+    pub fn proposal(&self) -> f64 {
+        self.dt
+    }
+
+    /// The next motion takes a guess of its own: the steps have shrunk towards an edge of the field.
+    pub fn forget_proposal(&mut self) {
+        self.dt = f64::NAN;
+        self.one_sided = false;
+    }
+
+    /// The motion has jumped or switched: its steps before say nothing about those to come.
+    pub fn forget_steps(&mut self) {
+        self.recent = 0.0;
+    }
+
+    /// The motion has switched: steps are short for another reason now.
+    pub fn switched(&mut self) {
+        self.recent = 0.0;
+        self.chatter.forget();
+    }
+
+    /// Prepares the next step. If the method of the motion takes no more steps of it, DOPRI5 starts with a guess of its own,
+    /// and a warning is returned if the user asked for the other one.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    #[inline]
+    pub fn prepare(
+        &mut self,
+        at: &mut StepStart,
+        steppers: &mut Steppers,
+        t_end: f64,
+    ) -> Result<Option<Box<Warning>>, FieldError> {
+        match steppers.prepare(at)? {
+            Ready::UpTo(longest) => self.limit(longest),
+            Ready::NotThisStep => {}
+            Ready::NotThisMotion(warning) => {
+                self.dt = f64::NAN;
+                self.dt = self.first_step(at, steppers, t_end, std::iter::empty())?;
+                return Ok(warning);
+            }
+        }
+        Ok(None)
+    }
+
+    /// The length of the next step, at most `max_step` and the time that `remains` up to the next known time, which is the end
+    /// of the run or not.
+    pub fn next(
+        &mut self,
+        motion: &CurrentMotion,
+        (remains, is_end): (f64, bool),
+        max_step: f64,
+    ) -> f64 {
+        let dt = self.aim_at_surface(self.dt.min(max_step), &motion.monitored);
+        self.wanted = 0.0;
+        if dt < remains * 0.99 {
+            return dt;
+        }
+        if !is_end {
+            self.wanted = dt;
+        }
+        remains
+    }
+
+    /// Where a field was found to end at its surfaces, a step that would pass the next one aims at it
+    /// from the start, close enough for the continuous extension to reach it.
+    fn aim_at_surface(&mut self, dt: f64, monitored: &[Monitored]) -> f64 {
+        if !self.meets_edges || self.one_sided {
+            return dt;
+        }
+        let nearest = nearest_surface(monitored);
+        if nearest > dt {
+            return dt;
+        }
+        self.one_sided = true;
+        ONE_SIDED_AIM * nearest
+    }
+
+    /// After an attempt with an error that is too large.
+    pub fn reject(&mut self, steppers: &Steppers, dt: f64, error: f64) {
+        self.dt = dt * steppers.after_rejection(&mut self.controller, error);
+    }
+
+    /// After a step that was not finite: aims at the surface that the motion approaches, or shortens
+    /// the step if it did so already.
+    pub fn shorten_to_surface(&mut self, dt: f64, motion: &CurrentMotion) {
+        self.controller.not_finite();
+        if let ModeField::Intersection(field) = &motion.field {
+            if field.is_rootless() {
+                // No edge of the field: the multipliers end, or move fast.
+                self.dt = 0.5 * dt;
+                return;
+            }
+        }
+        let aim = ONE_SIDED_AIM * nearest_surface(&motion.monitored);
+        let aims = !self.one_sided && aim < dt;
+        self.dt = if aims { aim } else { 0.5 * dt };
+        self.one_sided = true;
+        self.meets_edges = true;
+    }
+
+    /// After a step whose events could not be decided.
+    pub fn shorten(&mut self, dt: f64) {
+        self.dt = dt;
+        self.one_sided = true;
+        self.controller.not_finite();
+    }
+
+    /// Is the step of length `dt` from `t` to be taken anew, so that it ends just behind the event at `theta`?
+    #[cold]
+    #[inline(never)]
+    pub fn aims_again(&mut self, t: f64, theta: f64, dt: f64) -> bool {
+        let Some(margin) = AIM_MARGINS.get(self.n_aims) else {
+            return false;
+        };
+        let aimed = theta * dt * (1.0 + margin);
+        if aimed >= dt || theta * dt * margin <= EPS * t.abs() {
+            return false;
+        }
+        self.n_aims += 1;
+        self.dt = aimed;
+        true
+    }
+
+    /// After a step with this error was accepted.
+    #[inline]
+    pub fn accept(&mut self, steppers: &Steppers, dt: f64, error: f64) {
+        self.n_aims = 0;
+        let next = steppers.after_acceptance(&mut self.controller, dt, error);
+        self.dt = next.max(self.wanted);
+    }
+
+    /// The field ends beyond the accepted step of length `dt` if the next one may only be as long as `longest`.
+    #[inline]
+    pub fn note_edge(&mut self, longest: f64, dt: f64) {
+        self.one_sided = longest < dt;
+        self.dt = self.dt.min(longest);
+    }
+
+    /// Looks at an accepted step from `t` of length `dt`: a warning if the field jumps over a step far shorter than its
+    /// predecessors and than the time that `remains`; the end of the run if the motion chatters along such jumps. The field
+    /// of some motions bends like a jump.
+    #[inline]
+    pub fn look_for_jumps(
+        &mut self,
+        steppers: &Steppers,
+        (t, dt): (f64, f64),
+        remains: f64,
+        may_bend: bool,
+    ) -> (Option<Box<Warning>>, Option<Stop>) {
+        let is_short = dt < JUMP_SHRINK * self.recent && dt < remains;
+        let mut warning = None;
+        if is_short && !may_bend && !self.meets_edges && steppers.field_jumps() {
+            warning = Some(Box::new(Warning {
+                t: t + dt,
+                code: WarningCode::UndeclaredJump,
+                text: "the right-hand side jumps here and no surface is declared; give its switching function in \
+                       surfaces="
+                    .into(),
+                candidates: Vec::new(),
+                surfaces: Vec::new(),
+                rule: "",
+            }));
+            self.chatter.suspect(t, self.recent);
+            self.recent = 0.0;
+        }
+        self.recent = dt.max(0.98 * self.recent);
+        let stop = self.chatter.note_step(dt, || steppers.field_jumps());
+        (warning, stop)
+    }
+
+    /// Looks for stiffness in an accepted step, the last of so many: does the run count as stiff from now on?
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    #[inline(always)]
+    pub fn turns_stiff(
+        &mut self,
+        at: &mut StepStart,
+        steppers: &mut Steppers,
+    ) -> Result<bool, FieldError> {
+        if self.stiffness.is_due(at.stats.n_steps) {
+            self.look_at_stiffness(at, steppers)
+        } else {
+            Ok(false)
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn look_at_stiffness(
+        &mut self,
+        at: &mut StepStart,
+        steppers: &mut Steppers,
+    ) -> Result<bool, FieldError> {
+        let Some(is_limited) = steppers.is_limited_by_stability(at)? else {
+            return Ok(false);
+        };
+        let turns_stiff = self.stiffness.count(is_limited);
+        if turns_stiff {
+            self.stiffness.since = Some(at.t);
+        }
+        Ok(turns_stiff)
+    }
+
+    /// Leaves the rest of the motion to the method for stiff motions.
+    pub fn go_on_implicitly(&mut self, at: &mut StepStart, steppers: &mut Steppers) {
+        // A Taylor step has no proposal for the next one.
+        self.dt = steppers.interpolant().dt;
+        steppers.go_on_implicitly(at);
+        self.controller.restart();
+    }
+}
+
+/// Predicted time to the next zero of what is monitored.
+fn nearest_surface(monitored: &[Monitored]) -> f64 {
+    let times = monitored.iter().map(Monitored::time_to_zero);
+    times.fold(f64::INFINITY, f64::min)
+}
+
+/// The warning that a motion with steps of length `dt` is stiff.
+#[cold]
+pub(crate) fn stiff_warning(t: f64, mode: &Mode, dt: f64) -> Warning {
+    let text = format!(
+        "the motion in mode ({mode}) is stiff near t = {t:.10}: stability and not accuracy keeps its steps at \
+         {dt:.3e}; method=\"Rodas5P\" takes longer ones"
+    );
+    Warning {
+        t,
+        code: WarningCode::Stiff,
+        surfaces: Vec::new(),
+        text,
+        candidates: Vec::new(),
+        rule: "",
+    }
+}

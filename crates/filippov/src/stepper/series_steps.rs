@@ -1,0 +1,318 @@
+//! Steps by Taylor series: which motions have them, and how long the steps are.
+
+use std::sync::Arc;
+
+use smallvec::SmallVec;
+
+use super::stepper::Ready;
+use super::taylor::reach as reach_of;
+use super::{Attempt, Controller, ErrorScale, ExitSeries, Step, StepStart, Stepper, Taylor};
+use crate::error::FieldError;
+use crate::mode::Signs;
+use crate::motion::{observer, CurrentMotion, ModeField, Seen, SmoothField};
+use crate::options::{Method, Options};
+use crate::stats::Stats;
+use crate::status::{Warning, WarningCode};
+use crate::system::{MotionJets, PiecewiseSystem};
+use crate::tolerances::{EPS, MOST_AUTO_SERIES, STIFF_SERIES, TAYLOR_SHORTEST};
+
+/// The series of the present motion.
+#[derive(Default)]
+pub(super) struct MotionSeries {
+    jets: Option<Arc<MotionJets>>,
+    /// How long a step the series allows that was taken at the start of the motion, until the step.
+    reach: Option<f64>,
+    /// The user was warned that a motion has no series.
+    has_warned: bool,
+}
+
+impl Taylor {
+    /// The method of a run over an interval of length `span`.
+    pub(super) fn of_run(options: &Options, system: &dyn PiecewiseSystem, span: f64) -> Self {
+        let operations = |order| Some(system.motion_jets(&[], order)?.operations());
+        let order = Taylor::order_for(options.rtol, operations);
+        let taylor = Taylor::new(system.n_states(), order);
+        match system.hides_changes() {
+            true => taylor.wary_over(span),
+            false => taylor,
+        }
+    }
+
+    /// Takes the coefficients at the start of a step, under the signs of the motion or under others; returns the length of
+    /// step that they allow.
+    fn expand_motion(&mut self, at: &StepStart, jets: &MotionJets, signs: Option<&[f64]>) -> f64 {
+        let (system, t, x) = (at.system, at.t, at.x);
+        let signs = signs.unwrap_or(&at.motion.signs);
+        let fill = |rows: &mut [f64]| system.eval_jets(jets, t, x, signs, rows);
+        self.expand(jets.width(), x, at.scale, fill)
+    }
+
+    /// The motion has no series: with a warning, once, in a run that was to use them.
+    fn refuse(&mut self, at: &StepStart) -> Ready {
+        if at.options.method != Method::Taylor || self.series.has_warned {
+            return Ready::NotThisMotion(None);
+        }
+        self.series.has_warned = true;
+        let (t, mode) = (at.t, &at.motion.mode);
+        let text = format!(
+            "the motion in mode {mode} from t = {t:.10} has no Taylor series (its field is not analytic there, is \
+             not traced, slides by another rule than the canopy, sticks, shares a load among redundant contacts, is drawn back to its surface, or is in \
+             contact): DOPRI5 integrates it"
+        );
+        Ready::NotThisMotion(Some(Box::new(Warning {
+            t,
+            code: WarningCode::NoSeries,
+            surfaces: Vec::new(),
+            text,
+            candidates: Vec::new(),
+            rule: "",
+        })))
+    }
+
+    /// The length of step that the states allow, or the monitored functions if they allow less.
+    fn limited_by_functions(&self, jets: &MotionJets, options: &Options, allowed: f64) -> f64 {
+        // Not a number stays: `min` would take the other one.
+        if jets.width() > self.step().end.len() && !allowed.is_nan() {
+            match self.longest_for_functions(jets, options, allowed) {
+                longest if longest >= allowed => allowed,
+                longest => longest,
+            }
+        } else {
+            allowed
+        }
+    }
+
+    /// How long a step the series of the monitored functions suggest: until their last terms reach the tolerance of
+    /// their size over the step, `reach` being what the states allow. Their zeros are found on any step, but on
+    /// one of this length with little work.
+    fn longest_for_functions(&self, jets: &MotionJets, options: &Options, reach: f64) -> f64 {
+        let order = self.order();
+        let mut longest = f64::INFINITY;
+        for place in self.step().end.len()..jets.width() {
+            let size = self.function_scale(jets, options, place, reach);
+            let terms = [order - 1, order].map(|k| (self.coefficient(place, k).abs(), k));
+            if terms.iter().any(|(c, _)| c.is_nan()) {
+                return f64::NAN;
+            }
+            longest = longest.min(match terms {
+                [(0.0, _), (0.0, _)] => self.longest_for_polynomial(options, place),
+                _ => reach_of(terms.map(|(c, k)| (c / size, k))),
+            });
+        }
+        longest
+    }
+
+    /// How long a step may be for a function that is a polynomial along it: until the rounding of its largest term reaches
+    /// the tolerance. On a longer step its zeros near the start are lost.
+    fn longest_for_polynomial(&self, options: &Options, place: usize) -> f64 {
+        let atol = options.atol.iter().copied();
+        let value = self.coefficient(place, 0).abs();
+        let tolerance = atol.fold(f64::INFINITY, f64::min) + options.rtol * value;
+        let reach = |k: usize| {
+            let rounding = EPS * self.coefficient(place, k).abs();
+            (tolerance / rounding).powf(1.0 / k as f64)
+        };
+        (2..self.order() - 1)
+            .filter(|&k| self.coefficient(place, k) != 0.0)
+            .map(reach)
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// The tolerance for a function: relative to what it moves through in a step, exit functions to the larger one.
+    fn function_scale(
+        &self,
+        jets: &MotionJets,
+        options: &Options,
+        place: usize,
+        reach: f64,
+    ) -> f64 {
+        let size = |place: usize| {
+            let slope = self.coefficient(place, 1).abs();
+            let moved = if reach.is_finite() {
+                slope * reach
+            } else {
+                slope
+            };
+            self.coefficient(place, 0).abs().max(moved)
+        };
+        // Exit functions come in pairs.
+        let first = jets.exit(0).filter(|&first| first <= place);
+        let size = match first.map(|first| first + (place - first) / 2 * 2) {
+            Some(pair) => size(pair).max(size(pair + 1)),
+            None => size(place),
+        };
+        let atol = options.atol.iter().copied().fold(f64::INFINITY, f64::min);
+        atol + options.rtol * size
+    }
+}
+
+impl Stepper for Taylor {
+    #[inline]
+    fn step(&self) -> &Step {
+        &self.step
+    }
+
+    fn step_mut(&mut self) -> &mut Step {
+        &mut self.step
+    }
+
+    fn attempt(&mut self, at: &mut StepStart, dt: f64) -> Result<Option<Attempt>, FieldError> {
+        let attempt = self.attempt_along(&mut at.motion.field, at.t, at.x, dt, at.scale)?;
+        observer(at.seen)(&at.motion.field);
+        Ok(Some(attempt))
+    }
+
+    fn extrapolation_error(&self, theta: f64, _: &ErrorScale) -> f64 {
+        self.error_beyond(theta)
+    }
+
+    fn begin(&mut self, at: &mut StepStart) -> Ready {
+        (self.series.jets, self.series.reach) = (None, None);
+        let (system, motion, order) = (at.system, &mut *at.motion, self.order());
+        // Whether a surface is left that h = 0 all along was expected of is seen at the ends of steps only.
+        // A series that ends at the surface that is left would be left itself after a step of no length.
+        let starts_clear = || motion.monitored.iter().all(|m| m.deflation.is_none());
+        let may = !motion.is_in_contact()
+            && motion.resting.is_empty()
+            && !motion.is_drawn_back()
+            && !motion.slides_by_rule()
+            && motion.has_bounds()
+            && (system.is_analytic() || starts_clear());
+        if may {
+            let is_auto = at.options.method == Method::Auto;
+            self.series.jets = motion.jets(|sliding| {
+                // Series on many surfaces are long: they are not even made where they are not wanted.
+                if is_auto && sliding.len() > MOST_AUTO_SERIES {
+                    return None;
+                }
+                let jets = system.motion_jets(sliding, order);
+                jets.filter(|jets| !is_auto || jets.is_unrolled())
+            });
+        }
+        match self.series.jets {
+            Some(_) => Ready::ANY,
+            None => self.refuse(at),
+        }
+    }
+
+    /// In a region the derivative is the first coefficient. Sliding starts with its field: next to a two-fold its series is
+    /// not accurate.
+    fn start(&mut self, at: &mut StepStart) -> bool {
+        if !at.motion.sliding.is_empty() {
+            return false;
+        }
+        let Some(jets) = self.series.jets.take() else {
+            return false;
+        };
+        let allowed = self.expand_motion(at, &jets, None);
+        let is_known = !allowed.is_nan();
+        if is_known {
+            self.start_from_series();
+            at.stats.n_field_evaluations += jets.cost();
+            self.series.reach = Some(self.limited_by_functions(&jets, at.options, allowed));
+        } else {
+            self.forget();
+        }
+        self.series.jets = Some(jets);
+        is_known
+    }
+
+    /// If redundant contacts share a load their equations do not determine the multipliers: there are no series.
+    fn started(&mut self, at: &mut StepStart) -> Ready {
+        match at.motion.shares_load() {
+            true => self.refuse(at),
+            false => Ready::ANY,
+        }
+    }
+
+    fn start_derivative_mut(&mut self) -> &mut [f64] {
+        self.forget();
+        &mut self.step.start_derivative
+    }
+
+    fn prepare(&mut self, at: &mut StepStart) -> Result<Ready, FieldError> {
+        let allowed = match self.series.reach.take() {
+            Some(allowed) => allowed,
+            None if self.is_expanded() => return Ok(Ready::ANY),
+            None => {
+                let Some(jets) = self.series.jets.take() else {
+                    return Ok(self.refuse(at));
+                };
+                let signs = multipliers_in(at.motion, at.seen);
+                let allowed = self.expand_motion(at, &jets, signs.as_deref());
+                at.stats.n_field_evaluations += jets.cost();
+                let allowed = self.limited_by_functions(&jets, at.options, allowed);
+                self.series.jets = Some(jets);
+                allowed
+            }
+        };
+        Ok(if allowed > TAYLOR_SHORTEST * EPS * at.t.abs() {
+            Ready::UpTo(allowed)
+        } else {
+            self.refuse(at)
+        })
+    }
+
+    fn accept(&mut self, y: &mut [f64]) {
+        self.step.accept(y);
+        self.forget();
+    }
+
+    fn count(&self, stats: &mut Stats) {
+        stats.n_steps_taylor += 1;
+    }
+
+    /// As long as the next series allows.
+    fn after_acceptance(&self, _: &mut Controller, _: f64, _: f64) -> f64 {
+        f64::INFINITY
+    }
+
+    fn after_rejection(&self, _: &mut Controller, error: f64) -> f64 {
+        self.reject(error)
+    }
+
+    fn is_series(&self) -> bool {
+        true
+    }
+
+    fn exit_series(&self, index: usize, rows: &mut [f64]) -> Option<ExitSeries> {
+        let jets = self.series.jets.as_ref()?;
+        self.column(jets.exit(index)?, rows);
+        Some(ExitSeries {
+            is_affine: jets.has_affine_exits(),
+            is_complete: jets.tells_of_exits(),
+        })
+    }
+
+    /// Is the step far shorter than the motion takes to change? The fastest rate is that between the last two sums of the
+    /// series, whose difference is what grows fastest.
+    fn is_limited_by_stability(&mut self, at: &mut StepStart) -> Result<Option<bool>, FieldError> {
+        let Some(mut beside) = self.slow_end_without_last(at.x, at.scale) else {
+            return Ok(Some(false));
+        };
+        let (dt, end) = (self.step.interpolant.dt, &self.step.end);
+        let apart: SmallVec<[f64; 16]> = beside.iter().zip(end).map(|(a, b)| a - b).collect();
+        let mut rates_beside: SmallVec<[f64; 16]> = SmallVec::from_elem(0.0, beside.len());
+        at.motion
+            .field
+            .eval_unprojected(at.t + dt, &mut beside, &mut rates_beside)?;
+        rates_beside
+            .iter_mut()
+            .zip(&self.step.end_derivative)
+            .for_each(|(a, b)| *a -= b);
+        let rate = at.scale.norm(&rates_beside, end) / at.scale.norm(&apart, end);
+        Ok(Some(rate * dt > STIFF_SERIES))
+    }
+}
+
+/// The signs of sliding on several surfaces, with the multipliers at the start of the step in their places.
+fn multipliers_in(motion: &CurrentMotion, seen: &[Seen]) -> Option<Signs> {
+    let ModeField::Intersection(_) = motion.field else {
+        return None;
+    };
+    let mut signs = motion.signs.clone();
+    for (pair, &j) in seen.chunks_exact(2).zip(motion.sliding()) {
+        signs[j] = 0.5 * (pair[0].start - pair[1].start);
+    }
+    Some(signs)
+}

@@ -1,0 +1,192 @@
+//! What is asked of every method that takes steps.
+
+use super::{Controller, ErrorScale, Step};
+use crate::error::FieldError;
+use crate::motion::{CurrentMotion, Seen, SmoothField};
+use crate::options::Options;
+use crate::stats::Stats;
+use crate::status::Warning;
+use crate::system::PiecewiseSystem;
+
+/// The start of a step: all that a method knows and counts of a run.
+pub(crate) struct StepStart<'r, 'a> {
+    pub system: &'a dyn PiecewiseSystem,
+    pub options: &'a Options,
+    pub scale: &'r ErrorScale,
+    pub t: f64,
+    pub x: &'r [f64],
+    pub motion: &'r mut CurrentMotion<'a>,
+    /// The exit functions of the motion in the step.
+    pub seen: &'r mut [Seen],
+    pub stats: &'r mut Stats,
+}
+
+/// What came of an attempted step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Attempt {
+    /// The error in units of the tolerance; the step is acceptable up to 1.
+    Error(f64),
+    /// A stage or the end of the step was not finite.
+    NotFinite,
+}
+
+/// Whether a method takes the next steps. If it does not, DOPRI5 takes over.
+pub(crate) enum Ready {
+    /// It takes the next step, which may be this long.
+    UpTo(f64),
+    /// It takes the step after the next one.
+    NotThisStep,
+    /// It takes no step of this motion; with a warning if the user asked for this method.
+    NotThisMotion(Option<Box<Warning>>),
+}
+
+impl Ready {
+    /// It takes a step of any length.
+    pub const ANY: Ready = Ready::UpTo(f64::INFINITY);
+}
+
+/// How the series of an exit function stands for the function.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ExitSeries {
+    /// The exit functions are affine in (t, x): along the step they are polynomials, as the states are.
+    pub is_affine: bool,
+    /// The coefficients show all that the exit functions do in a step.
+    pub is_complete: bool,
+}
+
+/// A method that advances one smooth field.
+///
+/// Duties of every implementer:
+///
+/// 1. `step` is the step that was attempted last, or is about to be; `step_mut` is the same one. Its `start_derivative` is
+///    kept through rejected attempts. Its `interpolant` has the time and the length of the attempt, also of a failed one.
+/// 2. `attempt` changes only the step, the memory of the method, the counters, and through the observer
+///    ([`crate::motion::observer`]) what was seen of the exit functions. The observer is called after evaluations within
+///    the step, and last after that at its end. The attempt may be shorter than `dt`.
+/// 3. The error acts as that of a method of order 5: 1 stays 1, and the step changes as error^(-1/5).
+/// 4. `extrapolation_error` is for the accurate extension, which is there when it is called.
+///
+/// Duties with a default, which suits an explicit Runge-Kutta method whose extension is a polynomial in powers of theta
+/// and is computed by `attempt`:
+///
+/// 5. `begin` is called for every motion, before its first derivative is known: the method forgets the motion before.
+///    `start` follows, then, if that returns `false`, `started` after the field was evaluated at the start.
+/// 6. `prepare` is called before every attempt, and evaluates what it needs once per start.
+/// 7. `start_derivative_mut` is called if the start has changed: the method forgets what it prepared there.
+/// 8. `accept` makes the end of the step the start of the next one. `after_acceptance` and `after_rejection` use the
+///    controller unless the method has means of its own.
+/// 9. `extend_cheaply` evaluates nothing. It and `extend` may be called several times for one step.
+/// 10. `field_jumps` and `is_limited_by_stability` are asked of accepted steps only, before `accept`.
+pub(crate) trait Stepper {
+    /// The step that was attempted last, or is about to be.
+    fn step(&self) -> &Step;
+
+    /// The same, to be changed.
+    fn step_mut(&mut self) -> &mut Step;
+
+    /// Attempts a step of length `dt`, or of less if it may not be that long; `None` if the method cannot take this step.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    fn attempt(&mut self, at: &mut StepStart, dt: f64) -> Result<Option<Attempt>, FieldError>;
+
+    /// The error of the accurate extension at theta > 1, in units of the tolerance.
+    fn extrapolation_error(&self, theta: f64, scale: &ErrorScale) -> f64;
+
+    /// A motion starts: does the method integrate it?
+    fn begin(&mut self, _: &mut StepStart) -> Ready {
+        Ready::ANY
+    }
+
+    /// Finds the derivative at the start of the motion without its field; `false` if it does not.
+    fn start(&mut self, _: &mut StepStart) -> bool {
+        false
+    }
+
+    /// The field was evaluated at the start of the motion: does the method integrate it?
+    fn started(&mut self, _: &mut StepStart) -> Ready {
+        Ready::ANY
+    }
+
+    /// The derivative at the start of the step, to be replaced.
+    fn start_derivative_mut(&mut self) -> &mut [f64] {
+        &mut self.step_mut().start_derivative
+    }
+
+    /// Does what has to be done at the start of a step, and says how long the step may be.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    fn prepare(&mut self, _: &mut StepStart) -> Result<Ready, FieldError> {
+        Ok(Ready::ANY)
+    }
+
+    /// Makes the end of the attempted step the start of the next one.
+    fn accept(&mut self, y: &mut [f64]) {
+        self.step_mut().accept(y);
+    }
+
+    /// Counts a step that is accepted.
+    fn count(&self, _: &mut Stats) {}
+
+    /// The next step after one of length `dt` with this error was accepted.
+    fn after_acceptance(&self, controller: &mut Controller, dt: f64, error: f64) -> f64 {
+        dt * controller.accept(error)
+    }
+
+    /// The factor for another attempt after one with this error was rejected.
+    fn after_rejection(&self, controller: &mut Controller, error: f64) -> f64 {
+        controller.reject(error)
+    }
+
+    /// Is the accurate extension there as soon as the step is, as a polynomial in powers of theta?
+    fn extends_freely(&self) -> bool {
+        true
+    }
+
+    /// Is the accurate extension there?
+    fn is_extended(&self) -> bool {
+        true
+    }
+
+    /// Makes an extension available that costs no evaluation.
+    fn extend_cheaply(&mut self, _: &[f64]) {}
+
+    /// Makes the extension as accurate as the step.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    fn extend(&mut self, _: &mut dyn SmoothField, _: &[f64]) -> Result<(), FieldError> {
+        Ok(())
+    }
+
+    /// Is the extension the Taylor series of the motion, exact but for rounding near the start of the step? The series
+    /// limits the length of the step before it is attempted.
+    fn is_series(&self) -> bool {
+        false
+    }
+
+    /// Writes the series of an exit function in powers of theta into `rows`, if the method has one.
+    fn exit_series(&self, _: usize, _: &mut [f64]) -> Option<ExitSeries> {
+        None
+    }
+
+    /// Has a step to end at an event? So it is if the extension is less accurate than the end of the step in fast
+    /// components.
+    fn ends_at_events(&self) -> bool {
+        false
+    }
+
+    /// Does the field jump within the attempted step?
+    fn field_jumps(&self) -> bool {
+        false
+    }
+
+    /// Does stability and not accuracy limit the attempted step, which is accepted? `None` if the method does not notice.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    fn is_limited_by_stability(&mut self, _: &mut StepStart) -> Result<Option<bool>, FieldError> {
+        Ok(None)
+    }
+}
