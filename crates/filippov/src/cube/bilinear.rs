@@ -1,7 +1,7 @@
 //! The two bilinear equations of sliding on two surfaces, and the only root that can be followed.
 
 use super::normal_fields::NormalFields;
-use crate::tolerances::{DOUBLE_ROOT, PROPORTIONAL};
+use crate::tolerances::PROPORTIONAL;
 
 /// The canopy of two surfaces, g_j(x, y) = a_j + b_j x + c_j y + d_j x y.
 ///
@@ -93,7 +93,7 @@ impl Bilinear {
             return None;
         }
         let mut root = eliminated.root(eliminated.delta.sqrt())?;
-        if eliminated.delta > DOUBLE_ROOT {
+        if eliminated.delta > PROPORTIONAL {
             let normalised = Bilinear { rows };
             root.point = normalised.polished(normalised.polished(root.point));
         }

@@ -6,8 +6,8 @@ use super::small_matrix::Matrix;
 use super::stability::is_scaling_stable;
 use crate::patience::Patience;
 use crate::tolerances::{
-    AT_SIDE, BOXES_PER_LOOK, DOUBTFUL, FAR_FROM_THE_CUBE, INJECTIVE, MOST_BOXES, MOST_BOX_WORK,
-    NARROWEST_BOX, NEWTON_DONE, NEWTON_STEPS, SAME_ROOT,
+    AT_SIDE, DOUBTFUL, FAR_FROM_THE_CUBE, INJECTIVE, MOST_BOXES, MOST_MEETING, NEWTON_DONE,
+    NEWTON_STEPS, SAME_ROOT,
 };
 
 /// The roots found in the cube.
@@ -61,8 +61,9 @@ fn search(fields: &NormalFields, patience: Patience) -> Roots {
         high: vec![1.0; m],
         fields: fields.clone(),
     }];
-    for count in 0..MOST_BOXES.min(MOST_BOX_WORK / (m * m * m)) {
-        if count.is_multiple_of(BOXES_PER_LOOK) && patience.is_over() {
+    let few = MOST_MEETING.pow(3);
+    for _ in 0..MOST_BOXES * few / m.pow(3).max(few) {
+        if patience.is_over() {
             break;
         }
         let Some(region) = pending.pop() else {
@@ -71,7 +72,7 @@ fn search(fields: &NormalFields, patience: Patience) -> Roots {
         match region.look(fields) {
             Look::Empty => {}
             Look::Root(root) => roots.add(root),
-            Look::Unclear if region.width() < NARROWEST_BOX => roots.complete = false,
+            Look::Unclear if region.width() < AT_SIDE => roots.complete = false,
             Look::Unclear => pending.extend(region.halves()),
         }
     }

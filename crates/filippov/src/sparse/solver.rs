@@ -3,7 +3,7 @@
 use super::band::BandLu;
 use super::order::{components, Component};
 use super::rows::SparseRows;
-use crate::tolerances::{DEFINITE_PIVOT, NULL_VECTOR_ENTRY, SINGULAR_PIVOT};
+use crate::tolerances::{DEFINITE_PIVOT, NULL_VECTOR_ENTRY, PROPORTIONAL};
 
 /// What couples the unknowns of a system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -111,7 +111,7 @@ impl SparseSolver {
             let threshold = if self.takes_all_pivots {
                 0.0
             } else {
-                self.noise.max(SINGULAR_PIVOT * block.largest as f64)
+                self.noise.max(PROPORTIONAL * block.largest as f64)
             };
             if let Err(null) = factor.factor(threshold) {
                 let scaled = component.unknowns.iter().zip(null);

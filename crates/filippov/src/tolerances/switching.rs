@@ -14,16 +14,13 @@ pub const LARGEST_BY_MINORS: usize = 8;
 /// to the order of the matrix, is 1 up to 1e-7.
 pub const CAYLEY_SQUARINGS: u32 = 26;
 
-/// Two normalised bilinear equations are the same if all coefficients of their eliminants, sums of
-/// products of coefficients of size 1, are rounding errors below this; so is a component of a null vector.
+/// A sum of products of numbers of size 1 is rounding below this, and what is made of them alike: then two normalised
+/// bilinear equations are the same, their two roots are one, a component of a null vector is none, and, times the number of
+/// unknowns, a pivot of a linear system is that of a singular one.
 pub const PROPORTIONAL: f64 = 64.0 * EPS;
 
-/// A discriminant of normalised equations up to this is that of a double root: the multipliers,
-/// known to its square root, are then no better after a Newton step.
-pub const DOUBLE_ROOT: f64 = 1e-14;
-
 /// Events are located to better than this: a multiplier counts as -1 or +1 at an exit within this distance, two multipliers as
-/// one, and a normal component as zero below this fraction of its terms.
+/// one, a root in a box of this width as multiple, and a normal component as zero below this fraction of its terms.
 pub const AT_SIDE: f64 = 1e-6;
 
 /// A sign that decided at an intersection is doubtful if its quantity is smaller than this fraction
@@ -42,29 +39,19 @@ pub const UNSTABLE_START: f64 = 0.1;
 /// Also the allowance for the eigenvalue that vanishes there.
 pub const AFTER_THE_EXIT: f64 = 1e-5;
 
-/// Share of the largest ellipse around a stable root in which a quadratic form surely decreases: so
-/// that rounding does not matter.
-pub const BASIN_SHARE: f64 = 0.9;
-
 /// The ratios of accumulating switches and impacts agree within this part of themselves and of their distance to 1: the
 /// limit is then known to that share of the time until then.
 pub const ACCUMULATION_AGREEMENT: f64 = 0.1;
 
-/// Pieces (corners, strips, steps of a series) that one run of the hidden dynamics may take: some
-/// tenths of a second. Of 830 000 random runs one did not end within, a fold passed at a ratio of
-/// scalings of 27. Of more than six surfaces as many fewer as a piece takes longer.
+/// Pieces that one run of the hidden dynamics may take, with the interval tests in the search for their ends: some tenths of
+/// a second. Of 830 000 random runs one did not end within, a fold passed at a ratio of scalings of 27; motions that stay within
+/// rounding of a border, as where two surfaces are in the same place, need thousands of tests for each piece. Of more than six
+/// surfaces as many fewer as a piece takes longer.
 pub const MOST_PIECES: usize = 100_000;
 
 /// Interval tests in the search for the end of one piece: a zero needs as many as halvings isolate it,
 /// so that this leaves room for dozens of near misses.
 pub const ZERO_SEARCHES: usize = 2000;
-
-/// Interval tests of one run of the hidden dynamics, of which a piece takes a few: motions that stay within rounding of a
-/// border, as where two surfaces are in the same place, need thousands for each.
-pub const MOST_TESTS: usize = 20 * MOST_PIECES;
-
-/// Two zeros nearer together than this fraction of a piece are one touch.
-pub const SHORTEST_PIECE: f64 = 1e-12;
 
 /// Halvings and Newton steps for an event time; Newton's method ends them after a few, halvings alone
 /// after 53 in a bracket of one size.
@@ -80,24 +67,18 @@ pub const CYCLE: f64 = 1e-10;
 /// bounded.
 pub const RETURNS_TO_A_CYCLE: usize = 400;
 
-/// Returns watched at most.
-pub const MOST_RETURNS: usize = 20_000;
-
 /// Beyond this distance, in units of the transition, the strips are negligible and each lap has the
 /// factor gamma.
 pub const FAR_OUT: f64 = 1e5;
 
-/// Components of the hidden dynamics of three and more surfaces rest if they are slower than this
-/// fraction of the field: Newton's method then finds the rest point.
+/// Components of the hidden dynamics that are within the transition rest if they are slower than this fraction of the field:
+/// Newton's method then finds the rest point. Others leave for ever if they are faster: this is above the rounding of the
+/// field, and below the drift after an exit.
 pub const HIDDEN_REST: f64 = 1e-8;
 
 /// Distance within which it must lie. A rest point with an eigenvalue below `HIDDEN_REST` over this
 /// is not told from its neighbours.
 pub const HIDDEN_REST_REACH: f64 = 1e-4;
-
-/// Slowest outward motion, as a fraction of the field, that counts as leaving for ever; above the
-/// rounding of the field, below the drift after an exit.
-pub const HIDDEN_OUTWARDS: f64 = 1e-10;
 
 /// First and last window of time, in units of 1/(size of the field), over which the range of an
 /// oscillation is compared: tens to thousands of oscillations.
@@ -111,25 +92,15 @@ pub const STEADY_CYCLE: f64 = 0.02;
 /// |I - G(middle)^-1 G| below this makes a box hold one root at most, and Newton's method converge in it.
 pub const INJECTIVE: f64 = 0.5;
 
-/// Boxes looked at in the search for all roots in a cube: for three surfaces it ends within a
-/// millisecond, for six it can take seconds.
+/// Boxes looked at in the search for all roots in a cube: for three surfaces it ends within a millisecond, for six it can
+/// take seconds. Of more as many fewer as a box takes longer, by products of matrices.
 pub const MOST_BOXES: usize = 100_000;
-
-/// Multiplications of m x m matrices in that search, m^3 for each: some seconds for many surfaces, where the number of
-/// boxes alone is no bound. Up to six surfaces it is none.
-pub const MOST_BOX_WORK: usize = MOST_BOXES * 6 * 6 * 6;
-
-/// Boxes after which the search looks whether the caller still waits: each takes a microsecond for three surfaces and a
-/// tenth of a millisecond for six.
-pub const BOXES_PER_LOOK: usize = 64;
-
-/// Boxes narrower than this hold a root that is multiple up to rounding.
-pub const NARROWEST_BOX: f64 = 1e-6;
 
 /// Roots nearer together than this are one.
 pub const SAME_ROOT: f64 = 1e-9;
 
-/// Newton's method has converged: the next step would be below rounding.
+/// Newton's method has converged: the next step would be below rounding. Zeros of a polynomial nearer together than this part
+/// of its interval are one touch.
 pub const NEWTON_DONE: f64 = 1e-12;
 
 /// Full Newton steps that a converging iteration can need.
@@ -167,11 +138,6 @@ pub const MOST_ENCLOSED: usize = 3;
 /// The multipliers are sought within these distances of their values at the ends of the step: the larger, the more
 /// they may move; the smaller, the nearer another root may be.
 pub const ROOT_BOXES: [f64; 3] = [0.2, 0.02, 0.002];
-
-/// A linear system whose rows and columns have size 1 is singular if a pivot is below this number times the
-/// number of unknowns: elimination leaves about one rounding error per unknown, amplified by the few
-/// decades that physical coefficients spread over.
-pub const SINGULAR_PIVOT: f64 = 64.0 * EPS;
 
 /// Unknowns with entries below this fraction of the largest have no part in a vector of the null space:
 /// rounding errors of elimination are far below it, genuine shares far above.

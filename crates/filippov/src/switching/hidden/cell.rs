@@ -19,8 +19,6 @@ pub(super) struct Cell {
     terms: Vec<Term>,
     /// Series of the state.
     state: Vec<Series>,
-    /// Intervals that were searched for zeros, in all steps.
-    pub tests: usize,
 }
 
 /// The part of the field with the components of one group.
@@ -64,46 +62,63 @@ impl Cell {
             constant,
             terms,
             state: vec![[0.0; ORDER + 1]; m],
-            tests: 0,
         }
     }
 
     /// Advances `u` by one step at most, to the border of the cell or to u_i = level for the
-    /// watched (i, level), whichever comes first. Returns the time taken.
-    pub fn advance(&mut self, u: &mut [f64], watched: Option<(usize, f64)>) -> (f64, StepEnd) {
+    /// watched (i, level), whichever comes first. Returns the time taken; `tests` counts the intervals that were searched for
+    /// zeros.
+    pub fn advance(
+        &mut self,
+        u: &mut [f64],
+        watched: Option<(usize, f64)>,
+        tests: &mut usize,
+    ) -> (f64, StepEnd) {
         self.expand(u);
         let mut end = self.step();
-        let mut reason = StepEnd::Full;
-        let mut stop: Option<(usize, f64)> = None;
+        let mut stop: Option<(StepEnd, usize, f64)> = None;
         for i in 0..u.len() {
             let borders = if self.sides[i] == 0 {
-                [-1, 1]
+                [-1.0, 1.0]
             } else {
-                [self.sides[i], 0]
+                [f64::from(self.sides[i]); 2]
             };
-            for border in borders.into_iter().filter(|&b| b != 0) {
+            let reach = self.reach(i, end);
+            // A clipped component has one border.
+            let n_borders = if self.sides[i] == 0 { 2 } else { 1 };
+            for &border in &borders[..n_borders] {
                 // Positive within the cell.
-                let inwards = f64::from(if self.sides[i] == 0 { -border } else { border });
-                let distance = self.distance(i, f64::from(border), inwards);
-                if let Some(t) = first_loss(&distance, end, &mut self.tests) {
-                    (end, reason, stop) = (t, StepEnd::Border, Some((i, f64::from(border))));
+                let inwards = if self.sides[i] == 0 { -border } else { border };
+                if inwards * (u[i] - border) > reach {
+                    continue;
+                }
+                let distance = self.distance(i, border, inwards);
+                if let Some(t) = first_loss(&distance, end, tests) {
+                    (end, stop) = (t, Some((StepEnd::Border, i, border)));
                 }
             }
         }
-        if let Some((i, level)) = watched {
-            let away = self.direction(i, level);
-            let distance = self.distance(i, level, away);
-            if let Some(t) = first_loss(&distance, end, &mut self.tests) {
-                (end, reason, stop) = (t, StepEnd::Level, Some((i, level)));
+        if let Some((i, level)) =
+            watched.filter(|&(i, level)| (u[i] - level).abs() <= self.reach(i, end))
+        {
+            let distance = self.distance(i, level, self.direction(i, level));
+            if let Some(t) = first_loss(&distance, end, tests) {
+                (end, stop) = (t, Some((StepEnd::Level, i, level)));
             }
         }
         for (u, series) in u.iter_mut().zip(&self.state) {
             *u = value(series, end);
         }
-        if let Some((i, exactly)) = stop {
+        if let Some((_, i, exactly)) = stop {
             u[i] = exactly;
         }
-        (end, reason)
+        (end, stop.map_or(StepEnd::Full, |stop| stop.0))
+    }
+
+    /// A bound of what component i moves until `end`.
+    fn reach(&self, i: usize, end: f64) -> f64 {
+        let series = self.state[i].iter().skip(1).rev();
+        end * series.fold(0.0, |sum, c| sum * end + c.abs())
     }
 
     /// direction * (u_i - level) over time.

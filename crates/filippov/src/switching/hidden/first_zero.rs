@@ -1,6 +1,6 @@
 //! The first time at which a polynomial becomes negative.
 
-use crate::tolerances::{SHORTEST_PIECE, ZERO_SEARCHES};
+use crate::tolerances::{NEWTON_DONE, ZERO_SEARCHES};
 
 /// The first time in (0, end] at which `p`, not negative at 0, becomes negative. A zero at 0 itself is
 /// divided out.
@@ -18,7 +18,7 @@ pub(super) fn first_loss(p: &[f64], end: f64, tests: &mut usize) -> Option<f64> 
         *tests += 1;
         match look(p, a, b, end) {
             Look::Nothing => {}
-            Look::Zero => return Some(bisect(p, a, b)),
+            Look::Zero => return Some(falling_zero(a, b, |t| (value(p, t), derivative(p, t)))),
             Look::Unclear => {
                 let middle = 0.5 * (a + b);
                 pending.push((middle, b));
@@ -46,7 +46,7 @@ fn look(p: &[f64], a: f64, b: f64, end: f64) -> Look {
         return Look::Nothing;
     }
     let monotone = slope.abs() > bend * half;
-    if monotone || b - a <= SHORTEST_PIECE * end {
+    if monotone || b - a <= NEWTON_DONE * end {
         return if value(p, b) < 0.0 {
             Look::Zero
         } else {
@@ -56,22 +56,16 @@ fn look(p: &[f64], a: f64, b: f64, end: f64) -> Look {
     Look::Unclear
 }
 
-fn bisect(p: &[f64], mut a: f64, mut b: f64) -> f64 {
+/// The zero of a function that falls from `a` to `b`, from its values with their derivatives: Newton's steps that stay
+/// inside, and the middle in the place of others.
+pub(super) fn falling_zero(mut a: f64, mut b: f64, motion: impl Fn(f64) -> (f64, f64)) -> f64 {
     let mut t = 0.5 * (a + b);
     while a < t && t < b {
-        let v = value(p, t);
-        if v < 0.0 {
-            b = t;
-        } else {
-            a = t;
-        }
-        // Newton's step from here if it stays inside, else the middle.
-        let newton = t - v / derivative(p, t);
-        let next = if newton > a && newton < b {
-            newton
-        } else {
-            0.5 * (a + b)
-        };
+        let (value, slope) = motion(t);
+        *(if value < 0.0 { &mut b } else { &mut a }) = t;
+        let newton = t - value / slope;
+        let is_inside = newton > a && newton < b;
+        let next = if is_inside { newton } else { 0.5 * (a + b) };
         if (next - t).abs() <= f64::EPSILON * t {
             return next;
         }

@@ -11,15 +11,12 @@
 //! followed from cell to cell.
 
 mod admissible;
-mod basin;
+mod around;
 mod cell;
-mod certificate;
+mod exact;
 mod first_zero;
-mod line;
-mod plane;
-mod returns;
-mod space;
-mod strip;
+mod motion;
+mod watch;
 
 pub(super) use admissible::attracting;
 pub use admissible::{admissible, admissible_within, Admissible};
@@ -89,10 +86,9 @@ impl Outcome {
 
 /// Follows the hidden dynamics from the state `u` to its limit, with the surfaces scaled by `kappa`.
 ///
-/// One surface has a closed form. For two, the motion is a straight line in the four corners,
-/// exponential in the four strips, and a Taylor series in the square, and each outcome has a proof.
-/// For more surfaces Taylor series are used throughout; the outcomes "region" and "sliding at rest"
-/// are certain, an oscillation is one that was watched for a long time.
+/// It is followed in closed form where one component at most is within the transition, and by Taylor series elsewhere. Of one
+/// and two surfaces each outcome has a proof. For more the outcomes "region" and "sliding at rest" are certain, an
+/// oscillation is one that was watched for a long time.
 ///
 /// # Example
 /// ```
@@ -124,27 +120,7 @@ pub(super) fn limit_within(
         return Outcome::AtRest;
     }
     let unit = scaled.scaled(&vec![1.0 / size; fields.m()]);
-    match fields.m() {
-        1 => line::limit(&unit, u[0]),
-        2 => plane::limit(&unit, [u[0], u[1]], patience),
-        _ => space::limit(&unit, u, patience),
-    }
-}
-
-/// The side of a component: -1, +1, or 0 within the transition. On the border the velocity decides.
-fn side(u: f64, velocity: f64) -> i8 {
-    if u > 1.0 || (u == 1.0 && velocity > 0.0) {
-        1
-    } else if u < -1.0 || (u == -1.0 && velocity < 0.0) {
-        -1
-    } else {
-        0
-    }
-}
-
-/// pi(u).
-fn clipped(u: &[f64]) -> Vec<f64> {
-    u.iter().map(|v| v.clamp(-1.0, 1.0)).collect()
+    motion::limit(&unit, u, patience)
 }
 
 #[cfg(test)]
