@@ -11,7 +11,6 @@ mod incoming;
 mod lap;
 mod lie;
 mod relay;
-mod relay_at;
 mod resolution;
 mod resolve;
 mod shared_load;
@@ -37,13 +36,11 @@ pub use incoming::{ExitKind, Incoming};
 pub use lap::Lap;
 pub use lie::{first_nonzero, normal_component, Leading};
 pub use relay::{
-    all_relay_modes, solve_relay, solve_relay_within, RelayError, RelayProblem, RelaySolution,
-    Uniqueness,
+    solve_relay, solve_relay_within, RelayError, RelayProblem, RelaySolution, Uniqueness,
 };
-pub use relay_at::relay_at;
 pub use resolution::{Continuation, Resolution};
 pub use resolve::{resolve, resolve_within};
-pub use shared_load::{SharedLoad, SharedLoads};
+pub use shared_load::{stay_together, SharedLoad, SharedLoads};
 pub use two_fold_motion::{TwoFold, TwoFoldMotion};
 
 /// The word for what happened, as the field uses it.
