@@ -38,20 +38,18 @@ pub(super) fn decide_by_relay(
     let is_exit = |guard: &Guard| !guard.is_surface();
     let is_late = is_event && at.arrival.functions().iter().any(is_exit);
     let mut found = relay_at(at, notes, meeting, is_late)?;
-    let is_open = |found: &Found| {
-        let solution = &found.solution;
-        !solution.degenerate.is_empty() || !solution.loops.is_empty()
+    let is_open = |(found, _): &(RelaySolution, bool)| {
+        !found.degenerate.is_empty() || !found.loops.is_empty()
     };
     if is_event && !is_late && found.as_ref().is_some_and(is_open) {
         found = relay_at(at, notes, meeting, true)?;
     }
-    let Some(found) = found else {
+    let Some((mut found, may_be_tangent)) = found else {
         return Ok(None);
     };
-    if found.may_be_tangent && is_silent(at, notes, surfaces, mode)? {
+    if may_be_tangent && is_silent(at, notes, surfaces, mode)? {
         return decide_undecided(at, notes, meeting, None).map(Some);
     }
-    let mut found = found.solution;
     let n_sharing = found.loops.iter().map(Vec::len).max().unwrap_or(0);
     if n_sharing > MOST_IN_LOOP {
         return Ok(Some(Err(Stop::Intersection {
@@ -122,21 +120,15 @@ fn let_go(at: &Point, mode: &Mode, meeting: &[usize], found: &mut RelaySolution)
     }
 }
 
-/// A relay problem that was solved.
-struct Found {
-    solution: RelaySolution,
-    /// May all fields around be tangent to a surface? They cross it at a small part of their speed.
-    may_be_tangent: bool,
-}
-
-/// The relay problem of a meeting at the point, or a moment later along the motion that ends. `None` if the field is not
+/// The solution of the relay problem of a meeting at the point, or a moment later along the motion that ends, and whether all
+/// fields around may be tangent to a surface: they cross it at a small part of their speed. `None` if the field is not
 /// affine in the signs, or if no solution was found.
 fn relay_at(
     at: &Point,
     notes: &mut Notes,
     meeting: &Meeting,
     is_late: bool,
-) -> Result<Option<Found>, FieldError> {
+) -> Result<Option<(RelaySolution, bool)>, FieldError> {
     let affine = at.system.affine_signs();
     let parts = affine.and_then(|affine| Some((affine, affine.affine_parts(meeting.surfaces)?)));
     let Some((affine, mut parts)) = parts else {
@@ -171,8 +163,5 @@ fn relay_at(
         let size = problem.nu[i].abs() + sum(&problem.n, i);
         size <= AT_SIDE * (parts.time_rates[i].abs() + sum(gradients, i)) * speed
     });
-    Ok(Some(Found {
-        solution,
-        may_be_tangent,
-    }))
+    Ok(Some((solution, may_be_tangent)))
 }

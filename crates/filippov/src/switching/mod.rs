@@ -35,12 +35,10 @@ pub use hidden::{
 pub use incoming::{ExitKind, Incoming};
 pub use lap::Lap;
 pub use lie::{first_nonzero, normal_component, Leading};
-pub use relay::{
-    solve_relay, solve_relay_within, RelayError, RelayProblem, RelaySolution, Uniqueness,
-};
+pub use relay::{solve_relay, solve_relay_within, RelayError, RelayProblem, RelaySolution};
 pub use resolution::{Continuation, Resolution};
 pub use resolve::{resolve, resolve_within};
-pub use shared_load::{stay_together, SharedLoad, SharedLoads};
+pub use shared_load::{stay_together, SharedLoad, SharedLoads, Uniqueness};
 pub use two_fold_motion::{TwoFold, TwoFoldMotion};
 
 /// The word for what happened, as the field uses it.

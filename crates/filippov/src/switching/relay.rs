@@ -21,8 +21,7 @@
 //! References: Cottle, Pang, Stone (1992); Júdice, Pires, *A block principal pivoting algorithm* (1994);
 //! Guglielmi, Hairer (2022); `docs/theory/switching.md`.
 
-use super::shared_load::{has_one_motion, idle, largest, negative, SharedLoads};
-use crate::cube::is_p_matrix;
+use super::shared_load::{idle, largest, uniqueness, SharedLoads, Uniqueness};
 use crate::patience::Patience;
 use crate::sparse::{Singular, SparseRows, SparseSolver};
 use crate::tolerances::{DEFINITE_PIVOT, EPS, LARGEST_BY_MINORS};
@@ -46,17 +45,6 @@ pub struct RelayProblem {
     pub n: SparseRows,
     /// Rates below this fraction of the sum of their terms count as zero: `PiecewiseSystem::lie_tolerance(1)`.
     pub noise: f64,
-}
-
-/// Is the solution of a relay problem the only one?
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Uniqueness {
-    /// It is.
-    Certain,
-    /// There are others with the same rates, and so the same motion: redundant contacts share their load.
-    OfMotion,
-    /// Not known.
-    Unknown,
 }
 
 /// A solution of (R).
@@ -142,15 +130,6 @@ pub fn solve_relay_within(
     Ok(solution)
 }
 
-/// What N says for every nu.
-fn uniqueness(normal: &SparseRows) -> Uniqueness {
-    match is_p_matrix(&negative(normal)) {
-        Some(true) => Uniqueness::Certain,
-        _ if has_one_motion(normal) => Uniqueness::OfMotion,
-        _ => Uniqueness::Unknown,
-    }
-}
-
 /// Modes with their signs and rates: the equations of (R) without the inequalities.
 struct State {
     modes: Vec<i8>,
@@ -197,7 +176,7 @@ impl<'a> Pivots<'a> {
         let damping: Vec<f64> = (0..m).map(damp).collect();
         Pivots {
             nu: problem.nu.clone(),
-            n: problem.n.less_diagonal(&damping),
+            n: problem.n.clone(),
             problem,
             is_idle,
             uniqueness,
@@ -211,6 +190,7 @@ impl<'a> Pivots<'a> {
     /// Solves with N - diag(d), then repeatedly with nu + d s for the s before, until d (s - s before) is rounding.
     fn proximal(&mut self, before: &[i8]) -> Option<State> {
         let m = before.len();
+        self.n = self.problem.n.less_diagonal(&self.damping);
         let mut center = vec![0.0; m];
         let places = before.iter().zip(&self.is_idle);
         let mut modes: Vec<i8> = places
@@ -274,44 +254,28 @@ impl<'a> Pivots<'a> {
         }
     }
 
-    /// Where nothing else makes the solution of a few surfaces unique: the only one among all modes, of which none with
-    /// singular N may hold others.
+    /// Where nothing else makes the solution of a few surfaces unique: the only one among their 3^m modes, if N is not
+    /// singular in any, which might hold others.
     fn only_state(&mut self) -> Option<State> {
-        if self.uniqueness != Uniqueness::Unknown || self.nu.len() > LARGEST_BY_MINORS {
+        let m = self.nu.len();
+        if self.uniqueness != Uniqueness::Unknown || m > LARGEST_BY_MINORS {
             return None;
         }
-        let (mut all, has_others) = self.all_states();
-        let is_only = all.len() == 1 && !has_others;
-        if is_only {
-            self.uniqueness = Uniqueness::Certain;
-        }
-        all.pop().filter(|_| is_only)
-    }
-
-    /// All solutions among the 3^m modes, without damping; also whether there may be others: a mode was singular, or was
-    /// not tried.
-    fn all_states(&mut self) -> (Vec<State>, bool) {
-        let damped = std::mem::replace(&mut self.n, self.problem.n.clone());
-        let m = self.nu.len();
-        let (mut found, mut has_others) = (Vec::new(), false);
+        let mut only = None;
         for pattern in 0..3_usize.pow(m as u32) {
             let digit = |i: usize| (pattern / 3_usize.pow(i as u32) % 3) as i8 - 1;
             let modes: Vec<i8> = (0..m).map(digit).collect();
             if (0..m).any(|i| self.is_idle[i] && modes[i] == 0) {
                 continue;
             }
-            match self.state(&modes) {
-                Err(_) => has_others = true,
-                Ok(state) if !(0..m).any(|i| self.is_wrong(&state, i)) => found.push(state),
-                Ok(_) => {}
-            }
-            has_others |= self.patience.is_over();
-            if has_others {
-                break;
+            let state = self.state(&modes).ok()?;
+            let fits = !(0..m).any(|i| self.is_wrong(&state, i));
+            if self.patience.is_over() || fits && only.replace(state).is_some() {
+                return None;
             }
         }
-        self.n = damped;
-        (found, has_others)
+        self.uniqueness = Uniqueness::Certain;
+        only
     }
 
     /// Signs and rates for given modes: N_FF s_F = -(nu_F + N_FJ s_J) for the sliding surfaces F.
@@ -364,33 +328,28 @@ impl<'a> Pivots<'a> {
         for (i, &mode) in modes.iter().enumerate() {
             let rate = self.problem.nu[i] + self.problem.n.dot(i, &signs);
             let rounding = self.problem.rounding(&signs, i);
-            let wrong = if mode == 0 {
-                rate.abs()
-            } else {
-                -f64::from(mode) * rate
+            let (wrong, is_at_end) = match f64::from(mode) {
+                0.0 => (
+                    rate.abs(),
+                    signs[i].abs() >= 1.0 - self.problem.slack(rounding, i),
+                ),
+                side => (-side * rate, rate.abs() <= rounding),
             };
             if wrong > SOLVED * rounding {
                 return None;
             }
-            let is_at_end = match mode {
-                0 => signs[i].abs() >= 1.0 - self.problem.slack(rounding, i),
-                _ => rate.abs() <= rounding,
-            };
             if is_at_end {
                 degenerate.push(i);
             }
             rates[i] = if mode == 0 { 0.0 } else { rate };
         }
         let is_open = degenerate.iter().any(|&i| self.is_idle[i]);
+        let known = (!is_open).then_some(self.uniqueness);
         Some(RelaySolution {
             modes,
             signs,
             rates,
-            uniqueness: if is_open {
-                Uniqueness::Unknown
-            } else {
-                self.uniqueness
-            },
+            uniqueness: known.unwrap_or(Uniqueness::Unknown),
             degenerate,
             loops: Vec::new(),
             n_pivots: self.n_pivots,

@@ -134,16 +134,33 @@ pub(super) fn largest(matrix: &SparseRows, i: usize) -> f64 {
     matrix.row(i).fold(0.0, |size, (_, v)| size.max(v.abs()))
 }
 
-pub(super) fn negative(matrix: &SparseRows) -> SparseRows {
+fn negative(matrix: &SparseRows) -> SparseRows {
     matrix.with_columns_scaled(&vec![-1.0; matrix.n_columns()])
 }
 
-/// Is the motion that solves a relay problem with this N the only one, though its signs may not be? So it is if -N is a
-/// P-matrix, or becomes symmetric and semidefinite by a scaling of the columns, in each component.
-pub fn has_one_motion(normal: &SparseRows) -> bool {
-    coupled_blocks(normal).into_iter().all(|(_, block)| {
-        is_p_matrix(&negative(&block)) == Some(true) || friction_scale(&block).is_some()
-    })
+/// Is the solution of a relay problem the only one?
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Uniqueness {
+    /// It is.
+    Certain,
+    /// There are others with the same rates, and so the same motion: redundant contacts share their load.
+    OfMotion,
+    /// Not known.
+    Unknown,
+}
+
+/// What N says of the solutions for every nu: one if -N is a P-matrix, one motion if it is so in some components, and becomes
+/// symmetric and semidefinite by a scaling of the columns in the others.
+pub(super) fn uniqueness(normal: &SparseRows) -> Uniqueness {
+    let is_p = |block: &SparseRows| is_p_matrix(&negative(block)) == Some(true);
+    if is_p(normal) {
+        return Uniqueness::Certain;
+    }
+    let mut blocks = coupled_blocks(normal).into_iter();
+    match blocks.all(|(_, block)| is_p(&block) || friction_scale(&block).is_some()) {
+        true => Uniqueness::OfMotion,
+        false => Uniqueness::Unknown,
+    }
 }
 
 /// The scaling of columns that makes -N of one component symmetric and semidefinite: 1 / D.

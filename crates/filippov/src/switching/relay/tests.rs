@@ -23,12 +23,22 @@ fn solved(nu: &[f64], rows: &[Vec<f64>], before: &[i8]) -> RelaySolution {
     solve_relay(nu, &SparseRows::from_dense(rows), before).expect("solvable")
 }
 
+/// The solutions of (R) among all 3^m modes, and whether there may be more of them in between: a mode with singular N may
+/// hold a continuum.
 fn all_relay_modes(problem: &RelayProblem) -> (Vec<Vec<i8>>, bool) {
-    let (all, has_others) = Pivots::new(problem, Patience::endless()).all_states();
-    (
-        all.into_iter().map(|state| state.modes).collect(),
-        has_others,
-    )
+    let m = problem.nu.len();
+    let mut pivots = Pivots::new(problem, Patience::endless());
+    let (mut found, mut has_singular) = (Vec::new(), false);
+    for pattern in 0..3_usize.pow(m as u32) {
+        let digit = |i: usize| (pattern / 3_usize.pow(i as u32) % 3) as i8 - 1;
+        let modes: Vec<i8> = (0..m).map(digit).collect();
+        match pivots.state(&modes) {
+            Err(_) => has_singular = true,
+            Ok(state) if !(0..m).any(|i| pivots.is_wrong(&state, i)) => found.push(modes),
+            Ok(_) => {}
+        }
+    }
+    (found, has_singular)
 }
 
 /// The largest violation of (R), relative to the rates.
