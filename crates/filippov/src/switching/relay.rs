@@ -144,10 +144,9 @@ struct Pivots<'a> {
     /// Surfaces whose signs have no effect, as those of kinks: they follow their rates.
     is_idle: Vec<bool>,
     uniqueness: Uniqueness,
-    /// d, and nu and N with it.
-    damping: Vec<f64>,
+    /// nu, and N where it is damped, with d.
     nu: Vec<f64>,
-    n: SparseRows,
+    damped: Option<SparseRows>,
     solver: SparseSolver,
     n_pivots: usize,
     patience: Patience<'a>,
@@ -163,47 +162,48 @@ impl<'a> Pivots<'a> {
             .map(|&is_idle| f64::from(u8::from(!is_idle)))
             .collect();
         let problem = RelayProblem {
+            nu: problem.nu.clone(),
             n: problem.n.with_columns_scaled(&acts),
-            ..problem.clone()
+            noise: problem.noise,
         };
         let acting: Vec<usize> = (0..m).filter(|&i| !is_idle[i]).collect();
         let uniqueness = uniqueness(&problem.n.principal(&acting));
-        let damp = |i| match (uniqueness, largest(&problem.n, i)) {
-            (Uniqueness::Certain, _) => 0.0,
-            (_, size) if size > 0.0 => DEFINITE_PIVOT.sqrt() * size,
-            _ => 1.0,
-        };
-        let damping: Vec<f64> = (0..m).map(damp).collect();
         Pivots {
             nu: problem.nu.clone(),
-            n: problem.n.clone(),
+            damped: None,
             problem,
             is_idle,
             uniqueness,
-            damping,
             solver: SparseSolver::default(),
             n_pivots: 0,
             patience,
         }
     }
 
-    /// Solves with N - diag(d), then repeatedly with nu + d s for the s before, until d (s - s before) is rounding.
+    /// The solution from these modes. Where it is not certain to be the only one with N - diag(d), then repeatedly with
+    /// nu + d s for the s before, until d (s - s before) is rounding.
     fn proximal(&mut self, before: &[i8]) -> Option<State> {
-        let m = before.len();
-        self.n = self.problem.n.less_diagonal(&self.damping);
-        let mut center = vec![0.0; m];
         let places = before.iter().zip(&self.is_idle);
         let mut modes: Vec<i8> = places
             .map(|(&mode, &is_idle)| if is_idle && mode == 0 { 1 } else { mode })
             .collect();
+        if self.uniqueness == Uniqueness::Certain {
+            return self.pivot(modes);
+        }
+        let damp = |i| match largest(&self.problem.n, i) {
+            0.0 => 1.0,
+            size => DEFINITE_PIVOT.sqrt() * size,
+        };
+        let damping: Vec<f64> = (0..modes.len()).map(damp).collect();
+        self.damped = Some(self.problem.n.less_diagonal(&damping));
+        let mut center = vec![0.0; modes.len()];
         for _ in 0..MOST_PROXIMAL {
-            for i in 0..m {
-                self.nu[i] = self.problem.nu[i] + self.damping[i] * center[i];
-            }
+            let terms = self.problem.nu.iter().zip(damping.iter().zip(&center));
+            self.nu = terms.map(|(nu, (d, s))| nu + d * s).collect();
             let state = self.pivot(modes)?;
-            let is_done = (0..m).all(|i| {
-                let residual = self.damping[i] * (state.signs[i] - center[i]).abs();
-                residual == 0.0 || residual <= self.problem.rounding(&state.signs, i)
+            let terms = damping.iter().zip(state.signs.iter().zip(&center));
+            let is_done = terms.enumerate().all(|(i, (d, (sign, before)))| {
+                d * (sign - before).abs() <= self.problem.rounding(&state.signs, i)
             });
             if is_done {
                 return Some(state);
@@ -240,11 +240,15 @@ impl<'a> Pivots<'a> {
         None
     }
 
+    fn n(&self) -> &SparseRows {
+        self.damped.as_ref().unwrap_or(&self.problem.n)
+    }
+
     /// The mode of an entry in a wrong state. A jump from one side to the other is allowed only where many states
     /// change, or if the sign has no effect: one at a time, such jumps might repeat.
     fn better(&self, state: &State, i: usize, may_jump: bool) -> i8 {
         let side = |value: f64| if value > 0.0 { 1 } else { -1 };
-        let reach = 2.0 * self.n.diagonal(i).abs();
+        let reach = 2.0 * self.n().diagonal(i).abs();
         match state.modes[i] {
             0 => side(state.signs[i]),
             _ if self.is_idle[i] || may_jump && state.rates[i].abs() > reach => {
@@ -285,17 +289,18 @@ impl<'a> Pivots<'a> {
         let sliding: Vec<usize> = (0..m).filter(|&i| modes[i] == 0).collect();
         let mut unknown: Vec<f64> = sliding
             .iter()
-            .map(|&i| -self.nu[i] - self.n.dot(i, &signs))
+            .map(|&i| -self.nu[i] - self.n().dot(i, &signs))
             .collect();
         self.n_pivots += 1;
-        self.solver.factor(&self.n.principal(&sliding))?;
+        let equations = self.n().principal(&sliding);
+        self.solver.factor(&equations)?;
         self.solver.solve(&mut unknown);
         for (&i, &sign) in sliding.iter().zip(&unknown) {
             signs[i] = sign;
         }
         let rate = |i: usize| match modes[i] {
             0 => 0.0,
-            _ => self.nu[i] + self.n.dot(i, &signs),
+            _ => self.nu[i] + self.n().dot(i, &signs),
         };
         Ok(State {
             rates: (0..m).map(rate).collect(),
