@@ -55,6 +55,7 @@ mod switch;
 pub mod switching;
 mod system;
 mod tolerances;
+mod vectors;
 
 pub use clock::{Clock, ManualClock};
 pub use error::{Error, FieldError};

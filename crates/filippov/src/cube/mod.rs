@@ -25,16 +25,12 @@ pub use normal_fields::{NormalFields, SignGroup};
 pub use p_matrix::is_p_matrix;
 pub(crate) use p_matrix::symmetrising_scale;
 pub use redundant::least_multipliers;
-pub use relay::{
-    all_relay_modes, solve_relay, solve_relay_within, RelayError, RelayProblem, RelaySolution,
-    Uniqueness,
-};
+pub use relay::{solve_relay, solve_relay_within, RelayError, RelayProblem, RelaySolution};
 pub use roots::{
     is_undetermined, multiplier_rates, newton, roots_in_cube, stable_roots,
     stable_roots_with_border, stable_roots_within, Roots,
 };
-pub(crate) use shared_load::stay_together;
-pub use shared_load::{SharedLoad, SharedLoads};
+pub use shared_load::{stay_together, SharedLoad, SharedLoads, Uniqueness};
 pub(crate) use small_matrix::invert;
 pub use small_matrix::{Matrix, Vector};
 pub use stability::{

@@ -9,27 +9,22 @@
 //! Where v_i is not 0 the surface is left to that side, where it is 0 the motion slides with lambda_i = s_i. A
 //! solution always exists; it is the only one for all nu if and only if -N is a P-matrix (friction).
 //!
-//! The algorithm, with one sparse linear system per step:
+//! The method, with one sparse linear system per step:
 //!
-//! 1. The semismooth Newton method on u -> nu + N clip(u) - (u - clip(u)): every surface in a wrong state changes
-//!    it at once. When the number of wrong states stops decreasing, only the one of least index changes,
-//!    until it is lower again. For P-matrices this is finite, and from the mode before it takes a few steps.
-//! 2. N singular on the sliding surfaces, as with redundant contacts: the same for N - diag(d) with a small d,
-//!    and its result improved by proximal steps. Of the solutions, which then differ in s but not
-//!    in v if -N is monotone, this finds the one with small s.
-//! 3. Up to `MOST_ENUMERATED` surfaces all 3^m modes are tried; beyond, the problem is left undecided.
+//! 1. Principal pivoting: every surface in a wrong state changes it at once. When the number of wrong states stops
+//!    decreasing, only the one of least index changes, until the number is lower again. For P-matrices this is finite, and
+//!    from the mode before it takes a few steps.
+//! 2. If -N is not a P-matrix, as with redundant contacts, the pivots solve the problem of N - diag(d) with a small d, and
+//!    proximal steps take d away from the result: nu becomes nu + d s with the s before. Of the solutions, which then
+//!    differ in s but not in v if -N is monotone, this finds the one with small s.
 //!
 //! References: Cottle, Pang, Stone (1992); Júdice, Pires, *A block principal pivoting algorithm* (1994);
 //! Guglielmi, Hairer (2022); `docs/theory/switching.md`.
 
-use super::shared_load::{has_one_motion, let_stick};
-use crate::cube::is_p_matrix;
+use super::shared_load::{idle, largest, uniqueness, SharedLoads, Uniqueness};
 use crate::patience::Patience;
 use crate::sparse::{Singular, SparseRows, SparseSolver};
-use crate::tolerances::{EPS, PIVOTS_PER_LOOK, RELAY_DAMPING};
-
-/// Largest number of surfaces for which all modes are tried.
-pub const MOST_ENUMERATED: usize = 8;
+use crate::tolerances::{DEFINITE_PIVOT, EPS, LARGEST_BY_MINORS};
 
 /// Steps without fewer wrong states before single changes.
 const MOST_IDLE: usize = 4;
@@ -39,7 +34,7 @@ const MOST_PROXIMAL: usize = 30;
 
 /// Rates of a solution that are to be 0 may be this many times what rounding alone would leave: the solution of the
 /// linear system, and the last proximal step, add theirs.
-pub(super) const SOLVED: f64 = 8.0;
+const SOLVED: f64 = 8.0;
 
 /// The data of (R), one entry or row per surface.
 #[derive(Clone, Debug)]
@@ -50,19 +45,6 @@ pub struct RelayProblem {
     pub n: SparseRows,
     /// Rates below this fraction of the sum of their terms count as zero: `PiecewiseSystem::lie_tolerance(1)`.
     pub noise: f64,
-}
-
-/// Is the solution of a relay problem the only one?
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Uniqueness {
-    /// It is.
-    Certain,
-    /// There are others with the same rates, and so the same motion: redundant contacts share their load.
-    OfMotion,
-    /// There are others.
-    Several,
-    /// Not known.
-    Unknown,
 }
 
 /// A solution of (R).
@@ -79,10 +61,8 @@ pub struct RelaySolution {
     /// Entries with v_i = 0 and |s_i| = 1 within rounding: `modes` has one of the two possibilities, and
     /// derivatives along the motion decide.
     pub degenerate: Vec<usize>,
-    /// May all fields around be tangent to a surface? They cross it at a small part of their speed.
-    pub may_be_tangent: bool,
-    /// How many contacts at most share one load because they are redundant.
-    pub n_sharing: usize,
+    /// The contacts that share their loads because some are redundant, a list for each load.
+    pub loops: Vec<Vec<usize>>,
     /// Linear systems solved.
     pub n_pivots: usize,
     /// Multiplications and divisions in them.
@@ -138,197 +118,119 @@ pub fn solve_relay_within(
     if !problem.n.is_finite() || !problem.nu.iter().all(|v| v.is_finite()) {
         return Err(RelayError::NotFinite);
     }
-    let leaders = problem.leaders();
-    let start: Vec<i8> = leaders.iter().map(|&i| before[i]).collect();
-    let solved = problem.restricted(&leaders).solve(&start, patience)?;
-    let mut solution = problem.completed(&leaders, &solved, before);
-    let is_follower = |i: &usize| leaders.binary_search(i).is_err();
-    if solution.degenerate.iter().any(is_follower) {
-        solution.uniqueness = Uniqueness::Unknown;
-    }
+    let mut pivots = Pivots::new(problem, patience);
+    let state = pivots.only_state().or_else(|| pivots.proximal(before));
+    let found = state.and_then(|state| pivots.solution(state));
+    let mut solution = found.ok_or(RelayError::Undecided {
+        n_surfaces: before.len(),
+    })?;
     if solution.uniqueness == Uniqueness::OfMotion {
-        let_stick(problem, &mut solution);
+        solution.let_stick(problem);
     }
     Ok(solution)
 }
 
-/// All solutions of (R) for up to `MOST_ENUMERATED` surfaces, and whether there may be more of them in between:
-/// a mode with singular N may hold a continuum.
-pub fn all_relay_modes(problem: &RelayProblem) -> (Vec<Vec<i8>>, bool) {
-    let (found, has_singular) = problem.enumerate(Patience::endless());
-    let modes = found.into_iter().map(|state| state.modes);
-    (modes.collect(), has_singular)
-}
-
 /// Modes with their signs and rates: the equations of (R) without the inequalities.
-#[derive(Clone, Debug)]
 struct State {
     modes: Vec<i8>,
     signs: Vec<f64>,
     rates: Vec<f64>,
 }
 
-struct Solved {
-    modes: Vec<i8>,
-    signs: Vec<f64>,
-    uniqueness: Uniqueness,
-    n_pivots: usize,
-    n_operations: usize,
-}
-
-/// The linear systems of one problem, counted.
+/// The pivots of one problem.
 struct Pivots<'a> {
+    /// The problem without the effects of idle surfaces, which are rounding.
+    problem: RelayProblem,
+    /// Surfaces whose signs have no effect, as those of kinks: they follow their rates.
+    is_idle: Vec<bool>,
+    uniqueness: Uniqueness,
+    /// nu, and N where it is damped, with d.
+    nu: Vec<f64>,
+    damped: Option<SparseRows>,
     solver: SparseSolver,
     n_pivots: usize,
     patience: Patience<'a>,
 }
 
 impl<'a> Pivots<'a> {
-    fn within(patience: Patience<'a>) -> Self {
+    fn new(problem: &RelayProblem, patience: Patience<'a>) -> Self {
+        let m = problem.nu.len();
+        let ones = vec![1.0; m];
+        let is_idle = idle(&problem.n, |i| problem.rounding(&ones, i));
+        let acts: Vec<f64> = is_idle
+            .iter()
+            .map(|&is_idle| f64::from(u8::from(!is_idle)))
+            .collect();
+        let problem = RelayProblem {
+            nu: problem.nu.clone(),
+            n: problem.n.with_columns_scaled(&acts),
+            noise: problem.noise,
+        };
+        let acting: Vec<usize> = (0..m).filter(|&i| !is_idle[i]).collect();
+        let uniqueness = uniqueness(&problem.n.principal(&acting));
         Pivots {
+            nu: problem.nu.clone(),
+            damped: None,
+            problem,
+            is_idle,
+            uniqueness,
             solver: SparseSolver::default(),
             n_pivots: 0,
             patience,
         }
     }
 
-    /// Has the caller waited long enough? Asked after every system, and looked at after some.
-    fn are_over(&self) -> bool {
-        self.n_pivots.is_multiple_of(PIVOTS_PER_LOOK) && self.patience.is_over()
-    }
-}
-
-impl RelayProblem {
-    /// The surfaces whose sign has any effect. The others, kinks, follow: their sign is that of their rate.
-    fn leaders(&self) -> Vec<usize> {
-        let m = self.nu.len();
-        let mut has_effect = vec![false; m];
-        let ones = vec![1.0; m];
-        for i in 0..m {
-            let noise = self.rounding(&ones, i);
-            for (j, value) in self.n.row(i) {
-                has_effect[j] |= value.abs() > noise;
-            }
+    /// The solution from these modes. Where it is not certain to be the only one with N - diag(d), then repeatedly with
+    /// nu + d s for the s before, until d (s - s before) is rounding.
+    fn proximal(&mut self, before: &[i8]) -> Option<State> {
+        let places = before.iter().zip(&self.is_idle);
+        let mut modes: Vec<i8> = places
+            .map(|(&mode, &is_idle)| if is_idle && mode == 0 { 1 } else { mode })
+            .collect();
+        if self.uniqueness == Uniqueness::Certain {
+            return self.pivot(modes);
         }
-        (0..m).filter(|&j| has_effect[j]).collect()
-    }
-
-    /// The problem of some surfaces, in increasing order, without the others.
-    fn restricted(&self, kept: &[usize]) -> Self {
-        RelayProblem {
-            nu: kept.iter().map(|&i| self.nu[i]).collect(),
-            n: self.n.principal(kept),
-            noise: self.noise,
-        }
-    }
-
-    /// The whole solution from that of the leaders.
-    fn completed(&self, leaders: &[usize], solved: &Solved, before: &[i8]) -> RelaySolution {
-        let m = self.nu.len();
-        let mut modes = before.to_vec();
-        let mut leading = vec![0.0; m];
-        for (place, &i) in leaders.iter().enumerate() {
-            modes[i] = solved.modes[place];
-            leading[i] = solved.signs[place].clamp(-1.0, 1.0);
-        }
-        let mut signs = leading.clone();
-        let mut rates = vec![0.0; m];
-        let mut degenerate = Vec::new();
-        for i in 0..m {
-            let rate = self.nu[i] + self.n.dot(i, &leading);
-            let rounding = self.rounding(&leading, i);
-            let is_zero = rate.abs() <= rounding;
-            if leaders.binary_search(&i).is_err() && !is_zero {
-                modes[i] = if rate > 0.0 { 1 } else { -1 };
-                signs[i] = f64::from(modes[i]);
-            } else if leaders.binary_search(&i).is_err()
-                || modes[i] != 0 && is_zero
-                || modes[i] == 0 && signs[i].abs() >= 1.0 - self.slack(rounding, i)
-            {
-                degenerate.push(i);
-            }
-            rates[i] = if modes[i] == 0 { 0.0 } else { rate };
-        }
-        RelaySolution {
-            modes,
-            signs,
-            rates,
-            uniqueness: solved.uniqueness,
-            degenerate,
-            may_be_tangent: false,
-            n_sharing: 0,
-            n_pivots: solved.n_pivots,
-            n_operations: solved.n_operations,
-        }
-    }
-
-    fn solve(&self, start: &[i8], patience: Patience) -> Result<Solved, RelayError> {
-        let mut pivots = Pivots::within(patience);
-        let is_p = is_p_matrix(&negative(&self.n)) == Some(true);
-        let mut state = self.pivot(start, &mut pivots);
-        // A surface that is left at rate 0 may share what it carries with others.
-        if !state
-            .as_ref()
-            .is_some_and(|state| is_p || self.is_strict(state))
-        {
-            let shared = self.proximal(start, &mut pivots);
-            state = shared.filter(|shared| self.is_solution(shared)).or(state);
-        }
-        let mut state = state.filter(|state| self.is_solution(state));
-        let mut uniqueness = match is_p {
-            true => Uniqueness::Certain,
-            false if has_one_motion(&self.n) => Uniqueness::OfMotion,
-            false => Uniqueness::Unknown,
+        let damp = |i| match largest(&self.problem.n, i) {
+            0.0 => 1.0,
+            size => DEFINITE_PIVOT.sqrt() * size,
         };
-        if uniqueness == Uniqueness::Unknown && self.nu.len() <= MOST_ENUMERATED {
-            let (all, has_singular) = self.enumerate(patience);
-            uniqueness = match (all.len(), has_singular) {
-                (2.., _) => Uniqueness::Several,
-                (1, false) => Uniqueness::Certain,
-                _ => Uniqueness::Unknown,
-            };
-            state = state.or_else(|| all.into_iter().next());
+        let damping: Vec<f64> = (0..modes.len()).map(damp).collect();
+        self.damped = Some(self.problem.n.less_diagonal(&damping));
+        let mut center = vec![0.0; modes.len()];
+        for _ in 0..MOST_PROXIMAL {
+            let terms = self.problem.nu.iter().zip(damping.iter().zip(&center));
+            self.nu = terms.map(|(nu, (d, s))| nu + d * s).collect();
+            let state = self.pivot(modes)?;
+            let terms = damping.iter().zip(state.signs.iter().zip(&center));
+            let is_done = terms.enumerate().all(|(i, (d, (sign, before)))| {
+                d * (sign - before).abs() <= self.problem.rounding(&state.signs, i)
+            });
+            if is_done {
+                return Some(state);
+            }
+            (center, modes) = (state.signs, state.modes);
         }
-        let state = state.ok_or(RelayError::Undecided {
-            n_surfaces: self.nu.len(),
-        })?;
-        Ok(Solved {
-            modes: state.modes,
-            signs: state.signs,
-            uniqueness,
-            n_pivots: pivots.n_pivots,
-            n_operations: pivots.solver.n_operations(),
-        })
-    }
-
-    /// Are the rates of all surfaces that are left different from 0?
-    fn is_strict(&self, state: &State) -> bool {
-        let modes = state.modes.iter().enumerate();
-        let mut left = modes.filter(|entry| *entry.1 != 0).map(|entry| entry.0);
-        left.all(|i| state.rates[i].abs() > self.rounding(&state.signs, i))
+        None
     }
 
     /// Principal pivoting: many states at a time while that helps, else one.
-    fn pivot(&self, start: &[i8], pivots: &mut Pivots) -> Option<State> {
-        let mut modes = start.to_vec();
-        let mut fewest = usize::MAX;
-        let mut idle = 0;
-        for _ in 0..100 + 10 * modes.len() {
-            let state = self.state(&modes, pivots).ok()?;
+    fn pivot(&mut self, mut modes: Vec<i8>) -> Option<State> {
+        let (mut fewest, mut idle) = (usize::MAX, 0);
+        for step in 0..100 + 10 * modes.len() {
+            if step > 0 && self.patience.is_over() {
+                return None;
+            }
+            let state = self.state(&modes).ok()?;
             let wrong: Vec<usize> = (0..modes.len())
                 .filter(|&i| self.is_wrong(&state, i))
                 .collect();
             if wrong.is_empty() {
                 return Some(state);
             }
-            if pivots.are_over() {
-                return None;
-            }
-            if wrong.len() < fewest {
-                (fewest, idle) = (wrong.len(), 0);
-            } else {
-                idle += 1;
-            }
+            (fewest, idle) = match wrong.len() < fewest {
+                true => (wrong.len(), 0),
+                false => (fewest, idle + 1),
+            };
             let many = idle < MOST_IDLE;
             let changed = if many { &wrong[..] } else { &wrong[..1] };
             for &i in changed {
@@ -338,42 +240,67 @@ impl RelayProblem {
         None
     }
 
+    fn n(&self) -> &SparseRows {
+        self.damped.as_ref().unwrap_or(&self.problem.n)
+    }
+
     /// The mode of an entry in a wrong state. A jump from one side to the other is allowed only where many states
-    /// change: one at a time, such jumps might repeat.
+    /// change, or if the sign has no effect: one at a time, such jumps might repeat.
     fn better(&self, state: &State, i: usize, may_jump: bool) -> i8 {
         let side = |value: f64| if value > 0.0 { 1 } else { -1 };
-        if state.modes[i] == 0 {
-            return side(state.signs[i]);
-        }
-        let reach = 2.0 * self.n.diagonal(i).abs();
-        if may_jump && state.rates[i].abs() > reach {
-            side(state.rates[i])
-        } else {
-            0
+        let reach = 2.0 * self.n().diagonal(i).abs();
+        match state.modes[i] {
+            0 => side(state.signs[i]),
+            _ if self.is_idle[i] || may_jump && state.rates[i].abs() > reach => {
+                side(state.rates[i])
+            }
+            _ => 0,
         }
     }
 
+    /// Where nothing else makes the solution of a few surfaces unique: the only one among their 3^m modes, if N is not
+    /// singular in any, which might hold others.
+    fn only_state(&mut self) -> Option<State> {
+        let m = self.nu.len();
+        if self.uniqueness != Uniqueness::Unknown || m > LARGEST_BY_MINORS {
+            return None;
+        }
+        let mut only = None;
+        for pattern in 0..3_usize.pow(m as u32) {
+            let digit = |i: usize| (pattern / 3_usize.pow(i as u32) % 3) as i8 - 1;
+            let modes: Vec<i8> = (0..m).map(digit).collect();
+            if (0..m).any(|i| self.is_idle[i] && modes[i] == 0) {
+                continue;
+            }
+            let state = self.state(&modes).ok()?;
+            let fits = !(0..m).any(|i| self.is_wrong(&state, i));
+            if self.patience.is_over() || fits && only.replace(state).is_some() {
+                return None;
+            }
+        }
+        self.uniqueness = Uniqueness::Certain;
+        only
+    }
+
     /// Signs and rates for given modes: N_FF s_F = -(nu_F + N_FJ s_J) for the sliding surfaces F.
-    fn state(&self, modes: &[i8], pivots: &mut Pivots) -> Result<State, Singular> {
+    fn state(&mut self, modes: &[i8]) -> Result<State, Singular> {
         let m = modes.len();
         let mut signs: Vec<f64> = modes.iter().map(|&mode| f64::from(mode)).collect();
         let sliding: Vec<usize> = (0..m).filter(|&i| modes[i] == 0).collect();
         let mut unknown: Vec<f64> = sliding
             .iter()
-            .map(|&i| -self.nu[i] - self.n.dot(i, &signs))
+            .map(|&i| -self.nu[i] - self.n().dot(i, &signs))
             .collect();
-        pivots.n_pivots += 1;
-        pivots.solver.factor(&self.n.principal(&sliding))?;
-        pivots.solver.solve(&mut unknown);
+        self.n_pivots += 1;
+        let equations = self.n().principal(&sliding);
+        self.solver.factor(&equations)?;
+        self.solver.solve(&mut unknown);
         for (&i, &sign) in sliding.iter().zip(&unknown) {
             signs[i] = sign;
         }
-        let rate = |i: usize| {
-            if modes[i] == 0 {
-                0.0
-            } else {
-                self.nu[i] + self.n.dot(i, &signs)
-            }
+        let rate = |i: usize| match modes[i] {
+            0 => 0.0,
+            _ => self.nu[i] + self.n().dot(i, &signs),
         };
         Ok(State {
             rates: (0..m).map(rate).collect(),
@@ -382,8 +309,63 @@ impl RelayProblem {
         })
     }
 
+    fn is_wrong(&self, state: &State, i: usize) -> bool {
+        let rounding = self.problem.rounding(&state.signs, i);
+        match state.modes[i] {
+            0 => {
+                let fits = state.signs[i].abs() <= 1.0 + self.problem.slack(rounding, i);
+                !fits
+            }
+            mode => f64::from(mode) * state.rates[i] < -rounding,
+        }
+    }
+
+    /// The solution with the modes and signs of a state; `None` if the rates without damping, which are computed also
+    /// where the motion slides, do not satisfy (R).
+    fn solution(&self, state: State) -> Option<RelaySolution> {
+        let State {
+            modes, mut signs, ..
+        } = state;
+        signs
+            .iter_mut()
+            .for_each(|sign| *sign = sign.clamp(-1.0, 1.0));
+        let (mut rates, mut degenerate) = (vec![0.0; modes.len()], Vec::new());
+        for (i, &mode) in modes.iter().enumerate() {
+            let rate = self.problem.nu[i] + self.problem.n.dot(i, &signs);
+            let rounding = self.problem.rounding(&signs, i);
+            let (wrong, is_at_end) = match f64::from(mode) {
+                0.0 => (
+                    rate.abs(),
+                    signs[i].abs() >= 1.0 - self.problem.slack(rounding, i),
+                ),
+                side => (-side * rate, rate.abs() <= rounding),
+            };
+            if wrong > SOLVED * rounding {
+                return None;
+            }
+            if is_at_end {
+                degenerate.push(i);
+            }
+            rates[i] = if mode == 0 { 0.0 } else { rate };
+        }
+        let is_open = degenerate.iter().any(|&i| self.is_idle[i]);
+        let known = (!is_open).then_some(self.uniqueness);
+        Some(RelaySolution {
+            modes,
+            signs,
+            rates,
+            uniqueness: known.unwrap_or(Uniqueness::Unknown),
+            degenerate,
+            loops: Vec::new(),
+            n_pivots: self.n_pivots,
+            n_operations: self.solver.n_operations(),
+        })
+    }
+}
+
+impl RelayProblem {
     /// A rate below this is rounding: of the rates at the signs, and of signs of size 1.
-    pub(super) fn rounding(&self, signs: &[f64], i: usize) -> f64 {
+    fn rounding(&self, signs: &[f64], i: usize) -> f64 {
         let of_signs: f64 = self.n.row(i).map(|(_, value)| value.abs()).sum();
         self.noise * (self.nu[i].abs() + self.n.magnitude(i, signs)) + EPS * of_signs
     }
@@ -391,118 +373,35 @@ impl RelayProblem {
     /// How much of a sign is rounding, if the rates are known up to `rounding`.
     fn slack(&self, rounding: f64, i: usize) -> f64 {
         let size = largest(&self.n, i);
-        self.noise + if size > 0.0 { rounding / size } else { 0.0 }
+        self.noise + if size > 0.0 { rounding / size } else { 1.0 }
     }
+}
 
-    fn is_wrong(&self, state: &State, i: usize) -> bool {
-        let rounding = self.rounding(&state.signs, i);
-        if state.modes[i] == 0 {
-            let fits = state.signs[i].abs() <= 1.0 + self.slack(rounding, i);
-            !fits
-        } else {
-            f64::from(state.modes[i]) * state.rates[i] < -rounding
-        }
-    }
-
-    /// Do signs and modes satisfy (R), with sliding rates computed and not assumed to be 0?
-    fn is_solution(&self, state: &State) -> bool {
-        let signs: Vec<f64> = state
-            .signs
-            .iter()
-            .map(|sign| sign.clamp(-1.0, 1.0))
-            .collect();
-        (0..signs.len()).all(|i| {
-            let rate = self.nu[i] + self.n.dot(i, &signs);
-            let rounding = SOLVED * self.rounding(&signs, i);
-            match state.modes[i] {
-                0 => rate.abs() <= rounding,
-                mode => f64::from(mode) * rate >= -rounding,
-            }
-        })
-    }
-
-    /// Solves with N - diag(d), then repeatedly with nu + d s for the s before, until d (s - s before) is rounding.
-    fn proximal(&self, start: &[i8], pivots: &mut Pivots) -> Option<State> {
-        let m = self.nu.len();
-        let damping: Vec<f64> = (0..m)
-            .map(|i| RELAY_DAMPING * largest(&self.n, i))
-            .collect();
-        let mut damped = RelayProblem {
-            nu: self.nu.clone(),
-            n: with_diagonal(&self.n, &damping),
-            noise: self.noise,
+impl RelaySolution {
+    /// Makes a solution whose motion alone is unique one of modes: what does not slip sticks, though its sign may be -1 or
+    /// +1. Where the strength of all contacts of a loop is just used up, the entries stay degenerate.
+    fn let_stick(&mut self, problem: &RelayProblem) {
+        let rate = |i: usize| problem.nu[i] + problem.n.dot(i, &self.signs);
+        let sticks = |&i: &usize| {
+            let rounding = SOLVED * problem.rounding(&self.signs, i);
+            self.modes[i] == 0 || rate(i).abs() <= rounding
         };
-        let mut center = vec![0.0; m];
-        let mut modes = start.to_vec();
-        for _ in 0..MOST_PROXIMAL {
-            for i in 0..m {
-                damped.nu[i] = self.nu[i] + damping[i] * center[i];
+        let sticking: Vec<usize> = (0..problem.nu.len()).filter(sticks).collect();
+        let here: Vec<f64> = sticking.iter().map(|&i| self.signs[i]).collect();
+        let rates: Vec<f64> = sticking.iter().map(|&i| rate(i)).collect();
+        let Some(mut loads) = SharedLoads::new(&problem.n.principal(&sticking)) else {
+            return;
+        };
+        let all = |places: &[usize]| places.iter().map(|&place| sticking[place]).collect();
+        self.loops = loads.loops().map(all).collect();
+        let reserves = loads.at(&rates, &here).map(|shared| shared.reserves);
+        for (&i, reserve) in sticking.iter().zip(reserves.unwrap_or_default()) {
+            if reserve.is_some_and(|reserve| reserve > DEFINITE_PIVOT.sqrt()) {
+                (self.modes[i], self.rates[i]) = (0, 0.0);
+                self.degenerate.retain(|&degenerate| degenerate != i);
             }
-            let state = damped.pivot(&modes, pivots)?;
-            let is_done = (0..m).all(|i| {
-                let residual = damping[i] * (state.signs[i] - center[i]).abs();
-                residual <= self.rounding(&state.signs, i)
-            });
-            if is_done {
-                return Some(state);
-            }
-            center.clone_from(&state.signs);
-            modes = state.modes;
         }
-        None
     }
-
-    /// All solutions by trying every mode; also whether there may be others: a mode was singular, or was not tried.
-    fn enumerate(&self, patience: Patience) -> (Vec<State>, bool) {
-        let m = self.nu.len();
-        let mut pivots = Pivots::within(patience);
-        let (mut found, mut has_singular) = (Vec::new(), false);
-        if m > MOST_ENUMERATED {
-            return (found, true);
-        }
-        for pattern in 0..3_usize.pow(m as u32) {
-            let digit = |i: usize| (pattern / 3_usize.pow(i as u32) % 3) as i8 - 1;
-            let modes: Vec<i8> = (0..m).map(digit).collect();
-            match self.state(&modes, &mut pivots) {
-                Err(_) => has_singular = true,
-                Ok(state) if !(0..m).any(|i| self.is_wrong(&state, i)) => found.push(state),
-                Ok(_) => {}
-            }
-            if pivots.are_over() {
-                return (found, true);
-            }
-        }
-        (found, has_singular)
-    }
-}
-
-/// The largest entry of a row.
-pub(super) fn largest(matrix: &SparseRows, i: usize) -> f64 {
-    matrix.row(i).fold(0.0, |size, (_, v)| size.max(v.abs()))
-}
-
-pub(super) fn negative(matrix: &SparseRows) -> SparseRows {
-    let mut result = matrix.clone();
-    result
-        .values_mut()
-        .iter_mut()
-        .for_each(|value| *value = -*value);
-    result
-}
-
-/// The matrix less a diagonal.
-pub(super) fn with_diagonal(matrix: &SparseRows, less: &[f64]) -> SparseRows {
-    let mut result = SparseRows::new(matrix.n_columns());
-    for (i, less) in less.iter().enumerate() {
-        let mut entries: Vec<(usize, f64)> = matrix.row(i).collect();
-        match entries.iter_mut().find(|entry| entry.0 == i) {
-            Some(entry) => entry.1 -= less,
-            None => entries.push((i, -less)),
-        }
-        entries.sort_unstable_by_key(|entry| entry.0);
-        result.push_row(entries);
-    }
-    result
 }
 
 #[cfg(test)]

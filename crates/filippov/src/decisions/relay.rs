@@ -7,96 +7,74 @@ use super::germs::decide_undecided;
 use super::point::{Decided, Left, Lefts, Next, Notes, Point};
 use super::rule::{How, Meeting};
 use super::surroundings::Surroundings;
-use crate::cube::{RelaySolution, Uniqueness};
-use crate::error::FieldError;
-use crate::error::Undecided;
+use crate::cube::{solve_relay_within, stay_together, RelayProblem, RelaySolution, Uniqueness};
+use crate::error::{FieldError, Undecided};
 use crate::mode::Mode;
 use crate::motion::{Guard, SmoothField};
+use crate::sparse::SparseRows;
 use crate::status::Stop;
-use crate::switching::relay_at;
+use crate::system::dot;
 use crate::tolerances::{AT_SIDE, MOST_IN_LOOP, MOST_MEETING};
 
 /// What follows where the surfaces of `meeting` vanish, if the field is affine in their signs and the relay
 /// problem has certainly one solution; for many surfaces also if that is not known, with a warning. `None`
 /// otherwise.
 ///
-/// Several surfaces may be reached and left at one instant. Where first-order data leave both open, as they do at the
-/// exit of a multiplier, they are taken a moment later along the motion that ends.
+/// Several surfaces may be reached and left at one instant. The problem is posed a moment later along the motion that ends
+/// where that matters: at the exit of a multiplier, where rates are zero whose multipliers are at their ends, and where
+/// contacts share a load, as surfaces may be parallel at a point only.
 pub(super) fn decide_by_relay(
     at: &Point,
     notes: &mut Notes,
     meeting: &Meeting,
 ) -> Result<Option<Decided>, FieldError> {
-    let (question, is_event, mode, meeting) = (
-        meeting,
-        matches!(meeting.how, How::Event(_)),
-        meeting.mode,
-        meeting.surfaces,
-    );
+    let (mode, surfaces) = (meeting.mode, meeting.surfaces);
+    let is_event = matches!(meeting.how, How::Event(_));
     // From a start on two surfaces the motion may also spiral outwards: their trees know. Between parallel ones it cannot.
-    if !is_event && meeting.len() == 2 && !have_parallels(at, meeting, mode)? {
+    if !is_event && surfaces.len() == 2 && !have_parallels(at, surfaces, mode)? {
         return Ok(None);
     }
     let is_exit = |guard: &Guard| !guard.is_surface();
-    let exits = is_event && at.arrival.functions().iter().any(is_exit);
-    let mut found = solve_relay_at(at, notes, mode, meeting, exits)?;
-    let is_degenerate = |found: &Option<RelaySolution>| {
-        found
-            .as_ref()
-            .is_some_and(|found| !found.degenerate.is_empty())
+    let is_late = is_event && at.arrival.functions().iter().any(is_exit);
+    let mut found = relay_at(at, notes, meeting, is_late)?;
+    let is_open = |(found, _): &(RelaySolution, bool)| {
+        !found.degenerate.is_empty() || !found.loops.is_empty()
     };
-    if is_degenerate(&found) && is_event && !exits {
-        found = solve_relay_at(at, notes, mode, meeting, true)?;
+    if is_event && !is_late && found.as_ref().is_some_and(is_open) {
+        found = relay_at(at, notes, meeting, true)?;
     }
-    let Some(mut found) = found else {
+    let Some((mut found, may_be_tangent)) = found else {
         return Ok(None);
     };
     let is_silent = |around: &Surroundings| around.has_silent(at);
-    if found.may_be_tangent && question.surroundings(at, notes)?.is_ok_and(is_silent) {
-        return decide_undecided(at, notes, question, None).map(Some);
+    if may_be_tangent && meeting.surroundings(at, notes)?.is_ok_and(is_silent) {
+        return decide_undecided(at, notes, meeting, None).map(Some);
     }
-    if found.n_sharing > MOST_IN_LOOP {
+    let n_sharing = found.loops.iter().map(Vec::len).max().unwrap_or(0);
+    if n_sharing > MOST_IN_LOOP {
         return Ok(Some(Err(Stop::Intersection {
-            surfaces: meeting.to_vec(),
+            surfaces: surfaces.to_vec(),
             failing: Vec::new(),
-            reason: Undecided::TooRedundant { n: found.n_sharing },
+            reason: Undecided::TooRedundant { n: n_sharing },
         })));
     }
-    if !found.degenerate.is_empty() {
-        if !is_event {
-            return Ok(None);
-        }
-        let_go(at, mode, meeting, &mut found);
-    }
-    let is_certain = match found.uniqueness {
-        Uniqueness::Certain => true,
-        // Surfaces may be parallel at a point only: those that stay together are so along the motion.
-        Uniqueness::OfMotion if found.n_sharing > 0 && is_event => {
-            let later = solve_relay_at(at, notes, mode, meeting, true)?;
-            later.is_some_and(|later| {
-                (later.uniqueness, &later.modes) == (found.uniqueness, &found.modes)
-            })
-        }
-        other => other == Uniqueness::OfMotion,
-    };
-    if !is_certain && meeting.len() <= MOST_MEETING {
+    let is_certain = found.uniqueness != Uniqueness::Unknown;
+    let is_few = surfaces.len() <= MOST_MEETING;
+    if !is_certain && is_few || !is_event && !found.degenerate.is_empty() {
         return Ok(None);
     }
-    let mut after = mode.clone();
-    let (mut multipliers, entries) = (Vec::new(), found.modes.iter().zip(&found.signs));
-    for (&j, (&entry, &sign)) in meeting.iter().zip(entries) {
-        after.set(j, entry);
-        if entry == 0 {
-            multipliers.push(sign);
-        }
-    }
+    let_go(at, mode, surfaces, &mut found);
+    let mut after = meeting.on_all(&Mode::new(found.modes.clone()));
     if !is_certain {
-        match choose(at, notes, meeting, after.clone(), vec![after.clone()]) {
+        match choose(at, notes, surfaces, after.clone(), vec![after.clone()]) {
             Ok(chosen) => after = chosen,
             Err(stop) => return Ok(Some(Err(stop))),
         }
     }
-    let left = departures_caught(at, notes, &mut after, meeting, &multipliers)?;
+    let signs = found.signs.iter().zip(&found.modes);
+    let sliding = signs.filter(|(_, &mode)| mode == 0);
+    let multipliers: Vec<f64> = sliding.map(|(&sign, _)| sign).collect();
+    let left = departures_caught(at, notes, &mut after, surfaces, &multipliers)?;
     Ok(Some(Ok(Next::new(after, left))))
 }
 
@@ -131,41 +109,59 @@ fn departures_caught(
 fn let_go(at: &Point, mode: &Mode, meeting: &[usize], found: &mut RelaySolution) {
     let multipliers = at.arrival.multipliers();
     for &k in &found.degenerate {
-        let j = meeting[k];
-        let before = mode.entries()[j];
+        let (j, end) = (meeting[k], found.signs[k]);
         let position = at.arrival.sliding.binary_search(&j);
-        let lambda = position.ok().and_then(|at| multipliers.get(at));
-        let is_at_end = lambda.is_some_and(|l| (l - found.signs[k]).abs() <= AT_SIDE);
-        found.modes[k] = match before {
-            0 if is_at_end => {
-                if found.signs[k] < 0.0 {
-                    -1
-                } else {
-                    1
-                }
-            }
+        let lambda = position.ok().and_then(|place| multipliers.get(place));
+        let is_at_end = lambda.is_some_and(|lambda| (lambda - end).abs() <= AT_SIDE);
+        found.modes[k] = match mode.entries()[j] {
+            0 if is_at_end => end.signum() as i8,
             other => other,
         };
     }
 }
 
-/// The relay problem at the current point, or a moment later.
-fn solve_relay_at(
+/// The solution of the relay problem of a meeting at the point, or a moment later along the motion that ends, and whether all
+/// fields around may be tangent to a surface: they cross it at a small part of their speed. `None` if the field is not
+/// affine in the signs, or if no solution was found.
+fn relay_at(
     at: &Point,
     notes: &mut Notes,
-    mode: &Mode,
-    meeting: &[usize],
-    later: bool,
-) -> Result<Option<RelaySolution>, FieldError> {
-    let (mut t, mut x) = (at.t, at.x.to_vec());
-    if later {
+    meeting: &Meeting,
+    is_late: bool,
+) -> Result<Option<(RelaySolution, bool)>, FieldError> {
+    let affine = at.system.affine_signs();
+    let parts = affine.and_then(|affine| Some((affine, affine.affine_parts(meeting.surfaces)?)));
+    let Some((affine, mut parts)) = parts else {
+        return Ok(None);
+    };
+    let (mut t, mut x, signs) = (at.t, at.x.to_vec(), meeting.mode.signs());
+    if is_late {
         let mut velocity = vec![0.0; x.len()];
         let mut field = at.arrival.field.borrow_mut();
         field.eval(t, &mut x, &mut velocity)?;
-        let dt = at.moment(notes, &mode.signs(), &velocity)?;
+        let dt = at.moment(notes, &signs, &velocity)?;
         (t, x) = (t + dt, at.moved(t, &x).along(&velocity, dt));
     }
-    let (found, evaluations) = relay_at(at.system, (t, &x), mode, meeting, at.patience)?;
-    notes.n_field_evaluations += evaluations;
-    Ok(found)
+    notes.n_field_evaluations += parts.evaluate(affine, t, &x, &signs)?;
+    let entries = meeting.mode.entries();
+    let before: Vec<i8> = meeting.surfaces.iter().map(|&j| entries[j]).collect();
+    let (gradients, noise) = (&parts.gradients, at.system.lie_tolerance(1));
+    let problem = RelayProblem {
+        nu: parts.nu(),
+        n: parts.normal().clone(),
+        noise,
+    };
+    let Ok(mut solution) = solve_relay_within(&problem, &before, at.patience) else {
+        return Ok(None);
+    };
+    if !stay_together(&problem.n, gradients, &solution.loops) {
+        solution.uniqueness = Uniqueness::Unknown;
+    }
+    let speed = 1.0 + dot(&parts.field, &parts.field).sqrt();
+    let sum = |rows: &SparseRows, i: usize| rows.row(i).map(|(_, v)| v.abs()).sum::<f64>();
+    let may_be_tangent = (0..before.len()).any(|i| {
+        let size = problem.nu[i].abs() + sum(&problem.n, i);
+        size <= AT_SIDE * (parts.time_rates[i].abs() + sum(gradients, i)) * speed
+    });
+    Ok(Some((solution, may_be_tangent)))
 }

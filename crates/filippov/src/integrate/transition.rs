@@ -1,30 +1,32 @@
 //! From a located event, a limit or a start to the next motion: the decision is asked for, recorded and carried out.
 
-use smallvec::SmallVec;
-
+use crate::action::Instant;
+use crate::decisions::limits::{
+    limit_here, limit_of_switches, limits_of_impacts, passed_beside, Limit, Passed,
+};
 use crate::decisions::{
-    decide, differs_between_sides, end_of_sliding, landing,
-    limits::{limit_here, limit_of_switches},
-    refusal, resting, root_ends, warn_against_direction, warn_oscillation, Cause, Decision,
-    EndOfSliding, Leap, Left, Lefts, Next, Notes, Point, Reached, Rule, Scene,
+    add_vanishing_surfaces, decide, differs_between_sides, end_of_sliding, goes_through, landing,
+    located_surfaces, refusal, resting, root_ends, sides, triggers_reached, warn_against_direction,
+    warn_oscillation, warn_unknown_side, warn_zero_surface, Cause, Decision, EndOfSliding, Leap,
+    Left, Lefts, Next, Notes, Point, Reached, Rule, Scene, Sides, Values,
 };
 use crate::error::FieldError;
 use crate::event::{Found, Multiple};
 use crate::integrate::integrator::Integrator;
 use crate::mode::Mode;
-use crate::motion::{Guard, Leading, ModeField, Seen, SlidingSet, SmoothField};
+use crate::motion::{Guard, Leading, ModeField, Projector, Seen, SlidingSet, SmoothField};
 use crate::patience::Patience;
 use crate::record::decide_and_record;
 use crate::status::{is_named, Stop, WarningCode};
-use crate::switch::Kind;
-use crate::switch::Switch;
+use crate::switch::{Kind, Switch};
 use crate::system::eval_on_side;
-use crate::tolerances::MOST_SWITCHES_AT_ONE_TIME;
+use crate::tolerances::{DOUBTFUL, MOST_SWITCHES_AT_ONE_TIME};
+use smallvec::SmallVec;
 
 impl<'a> Integrator<'a> {
     /// Asks a question about the current place; counts what the answer cost, and keeps its warnings.
     #[inline]
-    pub(in crate::integrate) fn ask<R>(
+    pub(super) fn ask<R>(
         &mut self,
         cause: Cause,
         question: impl FnOnce(&Point<'_, '_, 'a>, &mut Notes) -> Result<R, FieldError>,
@@ -56,7 +58,7 @@ impl<'a> Integrator<'a> {
 
     /// Counts what questions cost, and keeps their warnings.
     #[inline]
-    pub(in crate::integrate) fn take_notes(&mut self, notes: Notes) {
+    pub(super) fn take_notes(&mut self, notes: Notes) {
         self.stats.n_field_evaluations += notes.n_field_evaluations;
         self.stats.n_surface_evaluations += notes.n_surface_evaluations;
         self.n_choices = notes.n_choices;
@@ -75,7 +77,7 @@ impl<'a> Integrator<'a> {
 
     /// Decides which motion follows at the current place. After an event, `reached` becomes what vanishes there.
     #[inline]
-    pub(in crate::integrate) fn decide(
+    pub(super) fn decide(
         &mut self,
         cause: Cause,
         reached: &mut Reached,
@@ -98,10 +100,7 @@ impl<'a> Integrator<'a> {
     }
 
     /// Decides what follows the event and starts it.
-    pub(in crate::integrate) fn switch(
-        &mut self,
-        event: &Found,
-    ) -> Result<Option<Stop>, FieldError> {
+    pub(super) fn switch(&mut self, event: &Found) -> Result<Option<Stop>, FieldError> {
         self.stats.n_switches += 1;
         if self.progress.n_switches_at(self.t) > MOST_SWITCHES_AT_ONE_TIME {
             return self.leave_without_progress(event);
@@ -220,7 +219,7 @@ impl<'a> Integrator<'a> {
     }
 
     /// Records a switch between two modes that leaves the state as it is.
-    pub(in crate::integrate) fn record(
+    pub(super) fn record(
         &mut self,
         before: Mode,
         after: Mode,
@@ -259,7 +258,7 @@ impl<'a> Integrator<'a> {
     }
 
     /// Starts a motion at the current point; what it leaves may have a multiple zero.
-    pub(in crate::integrate) fn begin(
+    pub(super) fn begin(
         &mut self,
         next: Next,
         multiple: &Multiple,
@@ -390,11 +389,7 @@ impl<'a> Integrator<'a> {
     }
 
     /// Records a straight line to a later point: the motion in between has more switches than can be listed.
-    pub(in crate::integrate) fn move_straight(
-        &mut self,
-        t: f64,
-        end: Vec<f64>,
-    ) -> Result<(), FieldError> {
+    pub(super) fn move_straight(&mut self, t: f64, end: Vec<f64>) -> Result<(), FieldError> {
         self.stepper.set_straight(self.t, t - self.t, &self.x, &end);
         let (stepper, motion) = (&mut self.stepper, &mut self.motion);
         self.recorder.sample_step(t, &self.x, stepper, motion)?;
@@ -428,7 +423,7 @@ impl<'a> Integrator<'a> {
 
     /// Decides the mode anew at the current point, records what changes, and goes on. The motion leaves the surfaces
     /// `departing` of laws at these rates.
-    pub(in crate::integrate) fn go_on_from_here(
+    pub(super) fn go_on_from_here(
         &mut self,
         departing: &[(usize, f64)],
     ) -> Result<Option<Stop>, FieldError> {
@@ -454,7 +449,7 @@ impl<'a> Integrator<'a> {
     }
 
     /// Finds the mode of the initial state and starts the motion.
-    pub(in crate::integrate) fn start(&mut self) -> Result<Option<Stop>, FieldError> {
+    pub(super) fn start(&mut self) -> Result<Option<Stop>, FieldError> {
         self.recorder.start(self.t, &self.x);
         if !self.actions.list.is_empty() {
             return self.start_with_actions();
@@ -463,5 +458,330 @@ impl<'a> Integrator<'a> {
             Ok(next) => self.begin(next, &Multiple::default()),
             Err(stop) => Ok(Some(stop)),
         }
+    }
+
+    /// A start with actions: those of this time, and those whose surface the motion leads through from here.
+    #[cold]
+    pub(super) fn start_with_actions(&mut self) -> Result<Option<Stop>, FieldError> {
+        self.system.set_discrete(&self.motion.discrete);
+        let Some(Sides {
+            mut mode,
+            on_surface,
+        }) = self.ask(Cause::Start, |at, notes| sides(at, notes, None))?
+        else {
+            return Ok(Some(Stop::NotFinite));
+        };
+        let mut due = self.timetable.take(self.actions, self.t);
+        self.horizon = self.timetable.horizon(self.actions, self.t, self.t_end);
+        for j in 0..on_surface.len() {
+            if !on_surface[j] || !self.motion.triggers(self.system).is_only_trigger(j) {
+                continue;
+            }
+            let side = self.motion.triggers(self.system).side(j, None);
+            mode.set(j, side);
+            self.ask(Cause::Start, |at, notes| {
+                warn_unknown_side(at, notes, j, &mode)
+            })?;
+            let through = self.ask(Cause::Anew(&mode), |at, notes| {
+                goes_through(at, notes, j, side, &mode, &on_surface)
+            })?;
+            if through {
+                due.extend(self.actions.triggered_at(j, side));
+            }
+        }
+        if due.is_empty() {
+            return match self.decide(Cause::Start, &mut Reached::default())?.decided {
+                Ok(next) => self.begin(next, &Multiple::default()),
+                Err(stop) => Ok(Some(stop)),
+            };
+        }
+        self.motion.restart(self.system, self.t, mode, &[]);
+        due.sort_unstable();
+        due.dedup();
+        self.act(due)
+    }
+
+    /// The end of the span, or a known time of actions.
+    #[cold]
+    pub(super) fn reach_horizon(&mut self) -> Result<Option<Stop>, FieldError> {
+        let mut due = self.timetable.take(self.actions, self.t);
+        self.horizon = self.timetable.horizon(self.actions, self.t, self.t_end);
+        if !self.actions.list.is_empty() {
+            let (h, reached) = self.ask(Cause::Start, |at, notes| {
+                let h = at.surface_values(notes, at.arrival.signs)?;
+                let reached = triggers_reached(at, &h)?;
+                Ok((h, reached))
+            })?;
+            self.residuals = self.motion.residuals(&h, &reached);
+            for j in reached {
+                due.extend(self.actions.triggered_at(j, self.motion.mode.entries()[j]));
+            }
+            due.sort_unstable();
+            due.dedup();
+        }
+        if !due.is_empty() {
+            self.control.forget_steps();
+            return self.act(due);
+        }
+        Ok((self.t >= self.t_end).then_some(Stop::End))
+    }
+
+    /// Does what an event triggers; `None` if that is nothing and the decision is an ordinary one.
+    pub(super) fn act_at_event(
+        &mut self,
+        event: &Found,
+        h: &Values,
+    ) -> Result<Option<Option<Stop>>, FieldError> {
+        if event.touch {
+            return Ok(None);
+        }
+        let mode = self.motion.mode.clone();
+        let (surfaces, rates) = self.ask(Cause::Anew(&mode), |at, _| {
+            let mut surfaces = located_surfaces(&event.guards);
+            add_vanishing_surfaces(at, &mut surfaces, h)?;
+            Ok((surfaces, at.rates_here()?))
+        })?;
+        let located = |j: usize| event.guards.contains(&Guard::Surface(j));
+        let entries = self.motion.mode.entries();
+        let reached = surfaces.iter().copied().filter(|&j| {
+            let approaches = rates[j] * f64::from(entries[j]) < 0.0;
+            // Rounding may show a zero where the motion leaves.
+            let is_tangent = located(j) && rates[j] == 0.0;
+            entries[j] != 0 && (approaches || is_tangent)
+        });
+        let mut due: Vec<usize> = Vec::new();
+        for j in reached {
+            due.extend(self.actions.triggered_at(j, entries[j]));
+        }
+        if !due.is_empty() {
+            if self.t >= self.horizon {
+                due.extend(self.timetable.take(self.actions, self.t));
+                self.horizon = self.timetable.horizon(self.actions, self.t, self.t_end);
+            }
+            due.sort_unstable();
+            due.dedup();
+            self.residuals = self.motion.residuals(h, &surfaces);
+            return self.act(due).map(Some);
+        }
+        let departs = |j: &&usize| {
+            rates[**j] * f64::from(entries[**j]) > 0.0
+                && self.motion.triggers(self.system).is_only_trigger(**j)
+        };
+        let departing: Vec<(usize, f64)> = surfaces
+            .iter()
+            .filter(departs)
+            .map(|&j| (j, rates[j]))
+            .collect();
+        if !departing.is_empty() {
+            self.residuals = self.motion.residuals(h, &surfaces);
+            return self.go_on_from_here(&departing).map(Some);
+        }
+        if !self.motion.is_in_contact() && surfaces.len() > 1 {
+            self.residuals = self.motion.residuals(h, &surfaces);
+        }
+        Ok(None)
+    }
+
+    /// Does these actions and those that they trigger, and goes on with the motion that follows.
+    pub(super) fn act(&mut self, due: Vec<usize>) -> Result<Option<Stop>, FieldError> {
+        if let Some(stop) = self.recorder.zeros_before_jump(self.t, &self.x) {
+            return Ok(Some(stop));
+        }
+        let before = self.motion.mode.clone();
+        let first = self.recorder.switches().len();
+        let arrived = self.x.clone();
+        let stopped = self.do_actions(due)?;
+        self.recorder.set_jump(first, &arrived, &self.x);
+        if stopped.is_some() {
+            return Ok(stopped);
+        }
+        let decided = self
+            .decide(Cause::Anew(&before), &mut Reached::default())?
+            .decided;
+        let next = match decided {
+            Ok(next) => next,
+            Err(stop) => return Ok(Some(stop)),
+        };
+        self.residuals.clear();
+        self.passing.clear();
+        self.recorder.set_last_mode(first, &next.mode);
+        let limits = self.ask(Cause::Start, |at, _| {
+            limits_of_impacts(at, first, &next.mode)
+        })?;
+        let mut limits = limits.into_iter().flatten();
+        if let Some(rest) = limits.find(|limit| limit.t <= self.horizon) {
+            return self.jump_to(rest, next.mode);
+        }
+        let t = self.t;
+        let stop = self.begin(next, &Multiple::default())?;
+        if self.t == t {
+            // Contact that begins with a speed below the tolerance takes that away.
+            self.recorder.jump(t, &self.x);
+            self.recorder.set_jump(first, &arrived, &self.x);
+        }
+        Ok(stop)
+    }
+
+    /// Does these actions and those that they trigger; why the run ends with them, if it does.
+    fn do_actions(&mut self, due: Vec<usize>) -> Result<Option<Stop>, FieldError> {
+        let mut notes = Notes {
+            n_choices: self.n_choices,
+            ..Notes::default()
+        };
+        let (watch, t) = (&self.watch, self.t);
+        let is_over = || watch.stop().is_some() || watch.is_over(watch.now(), t);
+        let mut instant = Instant {
+            system: self.system,
+            actions: self.actions,
+            scale: &self.scale,
+            policy: self.options.into(),
+            t,
+            x: &mut self.x,
+            motion: &mut self.motion,
+            residuals: &self.residuals,
+            velocity: self.stepper.start_derivative(),
+            switches: self.recorder.switches(),
+            patience: Patience::until(&is_over),
+            notes: &mut notes,
+            done: Vec::new(),
+            passing: Vec::new(),
+        };
+        let stopped = instant.act(due);
+        let Instant { done, passing, .. } = instant;
+        self.passing = passing;
+        self.stats.n_switches += done.len() as u64;
+        done.into_iter()
+            .for_each(|switch| self.recorder.switch(switch));
+        self.recorder.jump(t, &self.x);
+        self.take_notes(notes);
+        stopped
+    }
+
+    /// Moves to the limit and goes on from there.
+    pub(super) fn jump_to(
+        &mut self,
+        limit: Limit,
+        before: Mode,
+    ) -> Result<Option<Stop>, FieldError> {
+        let Limit {
+            t,
+            x,
+            surfaces,
+            is_rest,
+        } = limit;
+        if x.iter().any(|v| !v.is_finite()) {
+            return Ok(Some(Stop::NotFinite));
+        }
+        let discrete = &self.motion.discrete;
+        self.recorder
+            .begin_segment(self.t, &before, SmallVec::new(), discrete);
+        self.motion.mode = before.clone();
+        let y_before = x.clone().into();
+        if t > self.t || !is_rest {
+            self.move_straight(t, x)?;
+        } else {
+            self.x = x;
+            self.recorder.jump(self.t, &self.x);
+        }
+        self.stats.n_switches += 1;
+        let passed = match surfaces[..] {
+            [surface] if is_rest => self.ask(Cause::Start, |at, notes| {
+                passed_beside(at, notes, &before, surface)
+            })?,
+            _ => None,
+        };
+        let switch = |after: &Mode, rule| Switch {
+            t,
+            y_before,
+            y_after: SmallVec::new(),
+            kind: Kind::Accumulation,
+            surfaces: SmallVec::from_slice(&surfaces),
+            mode_before: before.clone(),
+            mode_after: after.clone(),
+            note: String::new(),
+            rule,
+        };
+        if let Some(Passed { triggers, x, h }) = passed {
+            self.x = x;
+            self.recorder.jump(self.t, &self.x);
+            self.motion
+                .restart(self.system, self.t, before.clone(), &[]);
+            let met: Vec<usize> = triggers.iter().chain(&surfaces).copied().collect();
+            self.residuals = self.motion.residuals(&h, &met);
+            let due = triggers.iter().flat_map(|&k| {
+                let side = before.entries()[k];
+                self.actions.triggered_at(k, side)
+            });
+            let due = due.collect();
+            let y_after = SmallVec::from_slice(&self.x);
+            let switch = switch(&before, "");
+            self.recorder.switch(Switch { y_after, ..switch });
+            return self.act(due);
+        }
+        let cause = match is_rest {
+            true => Cause::Anew(&before),
+            false => Cause::Limit(&surfaces),
+        };
+        let Decision { rule, decided } = self.decide(cause, &mut Reached::default())?;
+        // Where nothing is decided the run ends at the limit, having come there all the same.
+        let after = decided.as_ref().map_or(&before, |next| &next.mode);
+        let y_after = SmallVec::from_slice(&self.x);
+        let switch = switch(after, rule.name());
+        self.recorder.switch(Switch { y_after, ..switch });
+        match decided {
+            Ok(next) => self.begin(next, &Multiple::default()),
+            Err(stop) => Ok(Some(stop)),
+        }
+    }
+
+    /// A surface whose function was zero all along the step just made, up to rounding, and about which nothing was said: a
+    /// function that becomes zero without a sign in it, as one that is called may do, or a rest that is reached.
+    pub(super) fn zero_surface(&mut self, t1: f64) -> Result<Option<usize>, FieldError> {
+        for index in 0..self.motion.monitored.len() {
+            let m = self.motion.monitored[index];
+            let (end, _) = self.detector.right[index];
+            let Guard::Surface(j) = m.guard else {
+                continue;
+            };
+            // Few functions come this far; the sizes in the noise are not computed for the others.
+            if m.deflation.is_some() || m.value.abs().max(end.abs()) > DOUBTFUL {
+                continue;
+            }
+            let noise = self.step_search().0.noise_of(&m)?;
+            if m.value.abs().max(end.abs()) > noise {
+                continue;
+            }
+            let signs = self.motion.signs.clone();
+            self.stepper.interpolant().at(0.5, &mut self.detector.x);
+            let (middle, h) = (0.5 * (self.t + t1), &mut self.detector.h);
+            self.system.surfaces(middle, &self.detector.x, &signs, h)?;
+            if h[j].abs() <= noise
+                && !is_named(&self.warnings, j)
+                && !self.motion.settled.contains(&j)
+            {
+                return Ok(Some(j));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Goes on where h_j has become zero: along the surface, if the fields hold the motion there, as where it has come to rest
+    /// by a root of the distance. Beside the surface it would follow what the root makes of rounding.
+    pub(super) fn settle_on(&mut self, j: usize) -> Result<Option<Stop>, FieldError> {
+        let signs = self.motion.signs.clone();
+        let mut projector = Projector::new(self.x.len(), signs.len());
+        projector.project(self.system, j, self.t, &mut self.x, &signs)?;
+        let stop = self.go_on_from_here(&[])?;
+        if !self.motion.sliding().contains(&j) {
+            if !self.motion.resting.contains(&j) {
+                self.motion.settled.push(j);
+            }
+            let mode = self.motion.mode.clone();
+            self.ask(Cause::Start, |at, notes| {
+                warn_zero_surface(at, notes, j, &mode);
+                Ok(())
+            })?;
+        }
+        Ok(stop)
     }
 }

@@ -154,6 +154,18 @@ impl SparseRows {
         scaled
     }
 
+    /// A square matrix less a diagonal.
+    #[must_use]
+    pub fn less_diagonal(&self, less: &[f64]) -> SparseRows {
+        let mut result = SparseRows::new(self.n_columns);
+        for (i, less) in less.iter().enumerate() {
+            let before = self.row(i).filter(|&(j, _)| j < i);
+            let own = [(i, self.diagonal(i) - less)];
+            result.push_row(before.chain(own).chain(self.row(i).filter(|&(j, _)| j > i)));
+        }
+        result
+    }
+
     /// Are all values finite?
     pub fn is_finite(&self) -> bool {
         self.values.iter().all(|value| value.is_finite())

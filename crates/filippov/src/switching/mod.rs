@@ -8,19 +8,18 @@ mod codim1;
 mod exits;
 mod hidden;
 mod incoming;
-mod relay_at;
 mod resolution;
 mod resolve;
 mod stick;
 mod surface;
 
 pub use crate::cube::{
-    all_relay_modes, enclose_root, has_one_mode_only, is_p_matrix, is_scaling_stable, is_stable,
-    is_stable_for, is_undetermined, least_multipliers, merged_root, multiplier_rates, newton,
-    roots_in_cube, scaling_margin, solve_relay, solve_relay_within, stability_margins,
-    stable_roots, stable_roots_with_border, stable_roots_within, Bilinear, EnclosedRoot,
-    IntervalVector, Lap, Matrix, MergedRoot, NormalFields, RelayError, RelayProblem, RelaySolution,
-    Root, RootBounds, Roots, SharedLoad, SharedLoads, SignGroup, Uniqueness, Vector,
+    enclose_root, has_one_mode_only, is_p_matrix, is_scaling_stable, is_stable, is_stable_for,
+    is_undetermined, least_multipliers, merged_root, multiplier_rates, newton, roots_in_cube,
+    scaling_margin, solve_relay, solve_relay_within, stability_margins, stable_roots,
+    stable_roots_with_border, stable_roots_within, Bilinear, EnclosedRoot, IntervalVector, Lap,
+    Matrix, MergedRoot, NormalFields, RelayError, RelayProblem, RelaySolution, Root, RootBounds,
+    Roots, SharedLoad, SharedLoads, SignGroup, Uniqueness, Vector,
 };
 pub use crate::error::Undecided;
 pub use crate::motion::{first_nonzero, normal_component, Leading, TwoFold, TwoFoldMotion};
@@ -31,7 +30,6 @@ pub use hidden::{
     Outcome as HiddenOutcome,
 };
 pub use incoming::{ExitKind, Incoming};
-pub use relay_at::relay_at;
 pub use resolution::{Continuation, Resolution};
 pub use resolve::{resolve, resolve_within};
 pub use surface::{Arrival, Decision};

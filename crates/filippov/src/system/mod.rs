@@ -26,6 +26,7 @@ mod sections;
 mod tiered;
 mod traced;
 
+pub(crate) use crate::vectors::{dot, dot_magnitude};
 pub use action::{Action, ActionMap, Actions, Trigger};
 pub(crate) use activity::surfaces_that_matter;
 pub use affine::{AffineParts, AffineSigns, SingularSliding};
@@ -401,14 +402,4 @@ pub trait PiecewiseSystem: Sync {
     fn surface_name(&self, j: usize) -> String {
         format!("h{j}")
     }
-}
-
-/// Inner product.
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-/// Sum of the magnitudes of the terms of an inner product.
-pub(crate) fn dot_magnitude(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a * b).abs()).sum()
 }

@@ -143,24 +143,16 @@ pub const ROOT_BOXES: [f64; 3] = [0.2, 0.02, 0.002];
 /// rounding errors of elimination are far below it, genuine shares far above.
 pub const NULL_VECTOR_ENTRY: f64 = 1e-6;
 
-/// Share of a row that is taken off the diagonal of a singular relay problem. Proximal steps then converge by
-/// about this factor each; the damped matrix has half of the digits left.
-pub const RELAY_DAMPING: f64 = 1e-6;
-
-/// Linear systems of a relay problem after which its solution looks whether the caller still waits: more than a decision
-/// from the mode before usually needs. Each takes a millisecond for some thousand surfaces.
-pub const PIVOTS_PER_LOOK: usize = 8;
-
 /// Most contacts that close loops with one another, as those of seven bodies in a row: up to 1716 facets are looked at in
 /// each evaluation.
 pub const MOST_IN_LOOP: usize = 13;
 
-/// A contact is redundant if this share of its strength or less is left where the others are taken out: rounding of
-/// the elimination is far below it, and multipliers found from less than this would have lost most of their digits.
-pub const REDUNDANT_PIVOT: f64 = 1e-11;
-
 /// A matrix with diagonal 1 counts as definite, or as one with positive minors, if all pivots exceed this: what is
-/// claimed of it (that a mode is the only one) has to be clear of rounding.
+/// claimed of it (that a mode is the only one) has to be clear of rounding. A contact is redundant if this share of its row
+/// or less is left beside the others.
+///
+/// The root of it, where as many digits are kept as are lost, is the share of a row that is taken off the diagonal of a
+/// relay problem that is not definite, and how well the multipliers of redundant contacts have to satisfy their equations.
 pub const DEFINITE_PIVOT: f64 = 1e-10;
 
 /// Where steps shrink to nothing because multipliers end, their determinant is below this: it falls like the

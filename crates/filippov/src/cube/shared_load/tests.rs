@@ -4,6 +4,10 @@ fn share_load(normal: &SparseRows, rates: &[f64], here: &[f64]) -> Option<Shared
     SharedLoads::new(normal)?.at(rates, here)
 }
 
+fn has_one_motion(normal: &SparseRows) -> bool {
+    uniqueness(normal) != Uniqueness::Unknown
+}
+
 /// Two bodies of mass 1 that rub on the ground with strengths a and b, and on each other with c.
 fn two_bodies([a, b, c]: [f64; 3]) -> SparseRows {
     SparseRows::from_dense(&[vec![-a, 0.0, -c], vec![0.0, -b, c], vec![-a, b, -2.0 * c]])
