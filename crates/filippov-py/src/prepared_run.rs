@@ -5,8 +5,8 @@ use std::sync::Arc;
 use filippov::action::{Action, ActionMap, Actions, Trigger};
 use filippov::section::Section;
 use filippov::{
-    replay_decision, solve_to_section, solve_with_actions, DecisionOutcome, DecisionPoint, Error,
-    FieldError, Kind, LawAction, Mode, Options, Solution, TracedMap, UserEvent, UserFunction,
+    replay_decision, DecisionOutcome, DecisionPoint, Error, FieldError, Kind, LawAction, Mode,
+    Options, Problem, Solution, TracedMap, UserEvent, UserFunction,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -106,15 +106,11 @@ impl PreparedRun {
         });
         let events: Vec<UserEvent> = events.collect();
         let actions = self.actions();
-        solve_with_actions(
-            &*self.core,
-            t_span,
-            &self.y0,
-            options,
-            &events,
-            &actions,
-            interrupt,
-        )
+        Problem::new(&*self.core, t_span, &self.y0)
+            .options(options)
+            .events(&events)
+            .actions(&actions)
+            .solve_interruptible(interrupt)
     }
 
     /// Runs from section to section; the events are those of the section.
@@ -126,15 +122,10 @@ impl PreparedRun {
         interrupt: &mut dyn FnMut(f64) -> bool,
     ) -> Result<Solution, Error> {
         let completed = self.complete(options);
-        solve_to_section(
-            &*self.core,
-            t_span,
-            &self.y0,
-            completed.as_ref().unwrap_or(options),
-            section,
-            &self.actions(),
-            interrupt,
-        )
+        Problem::new(&*self.core, t_span, &self.y0)
+            .options(completed.as_ref().unwrap_or(options))
+            .actions(&self.actions())
+            .solve_to_section(section, interrupt)
     }
 
     /// Repeats the decision at a point of such a run.

@@ -4,7 +4,7 @@
 
 #![allow(clippy::print_stdout)]
 
-use filippov::{solve, ClosureSystem, Options};
+use filippov::{ClosureSystem, Options, Problem};
 
 fn main() -> Result<(), filippov::Error> {
     // y'' = -y + sin(t/3) - 0.4 sign(y'); s[0] is the sign of the switching function h[0] = y'.
@@ -18,7 +18,9 @@ fn main() -> Result<(), filippov::Error> {
         |_t, x, h| h[0] = x[1],
     );
     let options = Options::default();
-    let solution = solve(&oscillator, (0.0, 60.0), &[1.0, 2.0], &options, &[])?;
+    let solution = Problem::new(&oscillator, (0.0, 60.0), &[1.0, 2.0])
+        .options(&options)
+        .solve()?;
     for switch in &solution.switches {
         let (kind, mode) = (switch.kind.name(), &switch.mode_after);
         println!("{:.6}  {kind}  ({mode})", switch.t);

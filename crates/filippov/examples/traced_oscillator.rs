@@ -3,7 +3,7 @@
 //! `cargo run --release --example traced_oscillator -- 100 1e-6 DOPRI5 slip`: repetitions, tolerance, method
 //! (Taylor unless given), and `slip` for the piece before the first switch alone.
 
-use filippov::{solve, Method, Options, TracedSystem};
+use filippov::{Method, Options, Problem, TracedSystem};
 use filippov_expr::{Backend, Graph, Names, UnaryOp};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -48,7 +48,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let mut steps = 0;
     for _ in 0..repeats {
-        steps += solve(&system, (0.0, t_end), &[1.0, 2.0], &options, &[])?
+        steps += Problem::new(&system, (0.0, t_end), &[1.0, 2.0])
+            .options(&options)
+            .solve()?
             .stats
             .n_steps;
     }

@@ -8,7 +8,7 @@
 //! # Example: a mass on a spring with dry friction
 //!
 //! ```
-//! use filippov::{solve, ClosureSystem, Kind, Options};
+//! use filippov::{ClosureSystem, Kind, Options, Problem};
 //!
 //! // y'' = -y + sin(t/3) - 0.4 sign(y'), the oscillator of Piiroinen and Kuznetsov (2008).
 //! let oscillator = ClosureSystem::new(
@@ -22,13 +22,56 @@
 //! );
 //! let options = Options { rtol: 1e-9, atol: vec![1e-9], ..Options::default() };
 //! let t_end = 60.0 * std::f64::consts::PI;
-//! let solution = solve(&oscillator, (0.0, t_end), &[1.0, 2.0], &options, &[])?;
+//! let problem = Problem::new(&oscillator, (0.0, t_end), &[1.0, 2.0]).options(&options);
+//! let solution = problem.solve()?;
 //!
 //! assert!(solution.stop.is_success());
 //! assert_eq!(solution.switches.len(), 42);
 //! let sticks = solution.switches.iter().filter(|s| s.kind == Kind::EnterSliding).count();
 //! assert_eq!(sticks, 20);
 //! # Ok::<(), filippov::Error>(())
+//! ```
+//!
+//! # Example: a traced system
+//!
+//! A system given by expressions has exact derivatives, bounds and Taylor series. Here x' = -sign(x - 1/2) + u with a parameter u.
+//!
+//! ```
+//! use filippov::{Problem, TracedSystem};
+//! use filippov_expr::{Backend, BinaryOp, Graph, Names};
+//!
+//! let mut g = Graph::new();
+//! let (x, half) = (g.state(0), g.constant(0.5));
+//! let h = g.binary(BinaryOp::Sub, x, half)?;
+//! let sign = g.sign(h)?;
+//! let u = g.parameter(0);
+//! let rate = g.binary(BinaryOp::Sub, u, sign)?;
+//! let relay = TracedSystem::new(g, vec![rate], vec![0.3], Names::default(), Backend::Auto)?;
+//! let solution = Problem::new(&relay, (0.0, 2.0), &[0.0]).solve()?;
+//!
+//! // It rises with 1.3, reaches the surface at t = 0.5 / 1.3, and slides.
+//! assert!((solution.switches[0].t - 0.5 / 1.3).abs() < 1e-15);
+//! assert_eq!(solution.mode.entries(), [0]);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Example: step by step
+//!
+//! ```
+//! use filippov::{ClosureSystem, Integrator, Problem};
+//!
+//! let falls = ClosureSystem::new(1, 1, |_, _, s, dx| dx[0] = -s[0], |_, x, h| h[0] = x[0]);
+//! let mut integrator = Integrator::new(Problem::new(&falls, (0.0, 3.0), &[1.0]))?;
+//! let stop = loop {
+//!     if let Some(stop) = integrator.step()? {
+//!         break stop;
+//!     }
+//!     println!("{:.3} {:?} {}", integrator.t(), integrator.x(), integrator.mode());
+//! };
+//! assert_eq!(integrator.mode().entries(), [0]);
+//! let solution = integrator.finish(stop);
+//! assert_eq!(solution.switches.len(), 1);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 pub mod action;
@@ -65,7 +108,7 @@ pub use inspect::{
     Classification, HiddenDynamics, HiddenRoot, Inspection, IntersectionValue, NotFinitePlace,
     PointKind,
 };
-pub use integrate::{solve, solve_interruptible, solve_to_section, solve_with_actions, Integrator};
+pub use integrate::{Integrator, Problem};
 pub use mode::{Mode, Signs};
 pub use options::{Keep, Method, NonUnique, Options, SlidingRule, Stabilization};
 pub use record::{

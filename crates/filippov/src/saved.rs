@@ -10,7 +10,7 @@ use filippov_expr::{Backend, ExprError};
 
 use crate::error::{Error, FieldError};
 use crate::event::UserEvent;
-use crate::integrate::solve_with_actions;
+use crate::integrate::Problem;
 use crate::options::Options;
 use crate::record::Solution;
 use crate::switch::Kind;
@@ -314,7 +314,7 @@ impl RunnableSystem {
     /// Solves an initial value problem, with the actions and the laws.
     ///
     /// # Errors
-    /// As [`crate::solve`], and those of [`RunnableSystem::at`].
+    /// As [`Problem::solve`], and those of [`RunnableSystem::at`].
     pub fn solve(
         &self,
         t_span: (f64, f64),
@@ -352,9 +352,8 @@ impl RunnableSystem {
             list: given.chain(laws).collect(),
             discrete,
         };
-        solve_with_actions(&system, t_span, y0, options, events, &actions, &mut |_| {
-            false
-        })
+        let problem = Problem::new(&system, t_span, y0).options(options);
+        problem.events(events).actions(&actions).solve()
     }
 }
 

@@ -2,9 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 use filippov::action::{Action, ActionMap, Actions, Clock, Trigger};
-use filippov::{
-    solve_with_actions, ClosureSystem, Kind, Options, PiecewiseSystem, Side, Solution, Stop,
-};
+use filippov::{ClosureSystem, Kind, Options, PiecewiseSystem, Problem, Side, Solution, Stop};
 
 fn options() -> Options {
     Options {
@@ -44,8 +42,12 @@ fn run(system: &dyn PiecewiseSystem, t_end: f64, y0: &[f64], list: Vec<Action>) 
         list,
         discrete: Vec::new(),
     };
-    let never = &mut |_: f64| false;
-    solve_with_actions(system, (0.0, t_end), y0, &options(), &[], &actions, never).unwrap()
+    let problem = Problem::new(system, (0.0, t_end), y0);
+    problem
+        .options(&options())
+        .actions(&actions)
+        .solve()
+        .unwrap()
 }
 
 /// The height of the ball over a table at `amplitude sin(frequency t)`.

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 use allocation_counter::measure;
-use filippov::{solve, Keep, Method, Options, PiecewiseSystem, TracedSystem};
+use filippov::{Keep, Method, Options, PiecewiseSystem, Problem, TracedSystem};
 use filippov_expr::{Backend, Graph, Names, NodeId, UnaryOp};
 
 /// y'' = -y + sin(t / 3) - F sign(y') for each of `d` oscillators, each pulled by half the one before.
@@ -38,7 +38,10 @@ fn per_half(system: &dyn PiecewiseSystem, y0: &[f64], method: Method) -> i64 {
             ..Options::default()
         };
         let run = || {
-            let solution = solve(system, (0.0, t_end), y0, &options, &[]).unwrap();
+            let solution = Problem::new(system, (0.0, t_end), y0)
+                .options(&options)
+                .solve()
+                .unwrap();
             assert!(solution.stats.n_steps as f64 >= t_end * 9.9e3);
             assert_eq!(solution.stats.n_switches, 0);
         };
@@ -83,7 +86,10 @@ fn a_run_that_keeps_its_last_state_allocates_nothing_per_switch() {
             let span = (0.0, periods * 6.0 * std::f64::consts::PI);
             let mut n_switches = 0;
             let total = measure(|| {
-                let solution = solve(&system, span, &[1.0, 2.0], &options, &[]).unwrap();
+                let solution = Problem::new(&system, span, &[1.0, 2.0])
+                    .options(&options)
+                    .solve()
+                    .unwrap();
                 n_switches = solution.stats.n_switches;
             });
             (total.count_total as f64, total.bytes_max, n_switches as f64)

@@ -1,13 +1,15 @@
 //! Choices at points where the solution is not unique, from Rust.
 
 use filippov::{
-    solve, ClosureSystem, Error, Mode, NonUnique, Options, Solution, Stop, WarningCode,
+    ClosureSystem, Error, Mode, NonUnique, Options, Problem, Solution, Stop, WarningCode,
 };
 
 /// x' = sign(x) from x = 0.
 fn from_rest(options: &Options) -> Result<Solution, Error> {
     let away = ClosureSystem::new(1, 1, |_t, _x, s, dx| dx[0] = s[0], |_t, x, h| h[0] = x[0]);
-    solve(&away, (0.0, 1.0), &[0.0], options, &[])
+    Problem::new(&away, (0.0, 1.0), &[0.0])
+        .options(options)
+        .solve()
 }
 
 fn choosing(entries: &[i8]) -> Options {

@@ -1,7 +1,7 @@
 //! Starts where two surfaces meet in three dimensions and most normal components vanish.
 #![allow(clippy::unwrap_used, missing_docs)]
 
-use filippov::{solve, Options, TracedSystem};
+use filippov::{Options, Problem, TracedSystem};
 use filippov_expr::{Backend, Graph, Names, NodeId};
 
 /// Numbers from a linear congruence.
@@ -75,7 +75,10 @@ fn undecided(zero: u64, products: bool) -> usize {
             max_steps: 2000,
             ..Options::default()
         };
-        let run = solve(&system, (0.0, 1e-3), &[0.0; 3], &options, &[]).unwrap();
+        let run = Problem::new(&system, (0.0, 1e-3), &[0.0; 3])
+            .options(&options)
+            .solve()
+            .unwrap();
         n_undecided += usize::from(!run.stop.is_success());
     }
     n_undecided
@@ -111,7 +114,9 @@ fn a_repelling_mode_is_not_taken() {
     let (rate, down) = (g.neg(product), g.constant(-1.0));
     let system =
         TracedSystem::new(g, vec![rate, down], vec![], Names::default(), Backend::Auto).unwrap();
-    let run = solve(&system, (0.0, 1.0), &[0.0; 2], &Options::default(), &[]).unwrap();
+    let run = Problem::new(&system, (0.0, 1.0), &[0.0; 2])
+        .solve()
+        .unwrap();
     assert!(run.stop.is_success(), "{:?}", run.stop);
     let end = run.y.last().unwrap();
     assert!((end - -1.0).abs() < 1e-12);

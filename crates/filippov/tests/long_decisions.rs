@@ -10,8 +10,7 @@ use std::time::Duration;
 
 use filippov::action::{Action, Actions, Trigger};
 use filippov::{
-    solve, solve_interruptible, solve_with_actions, Clock, ClosureSystem, Kind, ManualClock,
-    Options, PiecewiseSystem, Solution, Stop,
+    Clock, ClosureSystem, Kind, ManualClock, Options, PiecewiseSystem, Problem, Solution, Stop,
 };
 
 /// Numbers between -1 and 1 without any relation to one another.
@@ -32,7 +31,10 @@ fn options(clock: &Arc<ManualClock>) -> Options {
 fn ends_after_100_looks(system: &dyn PiecewiseSystem) {
     let clock = Arc::new(ManualClock::new(Duration::from_millis(1)));
     let y0 = vec![0.0; system.n_states()];
-    let solution = solve(system, (0.0, 1.0), &y0, &options(&clock), &[]).unwrap();
+    let solution = Problem::new(system, (0.0, 1.0), &y0)
+        .options(&options(&clock))
+        .solve()
+        .unwrap();
     assert!(
         matches!(solution.stop, Stop::MaxWallTime),
         "{:?}",
@@ -102,7 +104,9 @@ fn the_caller_interrupts_a_decision() {
     };
     let y0 = [0.0; 6];
     let system = coupled(6);
-    let run = solve_interruptible(&system, (0.0, 1.0), &y0, &options, &[], &mut interrupt);
+    let run = Problem::new(&system, (0.0, 1.0), &y0)
+        .options(&options)
+        .solve_interruptible(&mut interrupt);
     assert!(matches!(run.unwrap().stop, Stop::Interrupted));
     assert_eq!(asked, 30);
 }
@@ -148,8 +152,11 @@ fn evaluations_within(
         max_steps: 0,
         ..options(&clock)
     };
-    let (y0, never) = (vec![0.0; n], &mut |_: f64| false);
-    let run = solve_with_actions(&system, (0.0, 1.0), &y0, &options, &[], actions, never);
+    let y0 = vec![0.0; n];
+    let run = Problem::new(&system, (0.0, 1.0), &y0)
+        .options(&options)
+        .actions(actions)
+        .solve();
     let Solution { stop, t, .. } = run.unwrap();
     assert_eq!(t, [0.0]);
     assert_eq!(

@@ -1,7 +1,7 @@
 //! Convergence of order 5, within 0.3, for systems given by closures.
 #![allow(clippy::unwrap_used)]
 
-use filippov::{solve, ClosureSystem, Kind, Options, PiecewiseSystem, Side, Solution};
+use filippov::{ClosureSystem, Kind, Options, PiecewiseSystem, Problem, Side, Solution};
 
 const T_END: f64 = 5.0;
 const START: [f64; 3] = [1.6, 0.5, 2.5];
@@ -33,7 +33,10 @@ fn exact(system: &dyn PiecewiseSystem) -> Solution {
         atol: vec![1e-14],
         ..Options::default()
     };
-    solve(system, (0.0, T_END), &START, &options, &[]).unwrap()
+    Problem::new(system, (0.0, T_END), &START)
+        .options(&options)
+        .solve()
+        .unwrap()
 }
 
 /// The tolerance is too loose to shorten the steps.
@@ -45,7 +48,10 @@ fn stepped(system: &dyn PiecewiseSystem, dt: f64) -> Solution {
         max_step: dt,
         ..Options::default()
     };
-    solve(system, (0.0, T_END), &START, &options, &[]).unwrap()
+    Problem::new(system, (0.0, T_END), &START)
+        .options(&options)
+        .solve()
+        .unwrap()
 }
 
 fn state(system: &dyn PiecewiseSystem, solution: &Solution, t: f64) -> [f64; 3] {

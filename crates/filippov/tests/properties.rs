@@ -1,7 +1,7 @@
 //! What every solution fulfils, for random planar relays with a curved switching function.
 #![allow(clippy::unwrap_used)]
 
-use filippov::{solve, ClosureSystem, Mode, Options, PiecewiseSystem, Side, Solution, Stop};
+use filippov::{ClosureSystem, Mode, Options, PiecewiseSystem, Problem, Side, Solution, Stop};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 
@@ -63,7 +63,10 @@ fn run(system: &dyn PiecewiseSystem, relay: &Relay) -> Solution {
         max_events: 1000,
         ..Options::default()
     };
-    solve(system, (0.0, T_END), &relay.start, &options, &[]).unwrap()
+    Problem::new(system, (0.0, T_END), &relay.start)
+        .options(&options)
+        .solve()
+        .unwrap()
 }
 
 fn at(system: &dyn PiecewiseSystem, solution: &Solution, t: f64, side: Side) -> ([f64; 2], Mode) {
@@ -246,7 +249,10 @@ fn output_times_change_nothing() {
             dense_output: false,
             ..Options::default()
         };
-        let sampled = solve(&system, (0.0, T_END), &relay.start, &options, &[]).unwrap();
+        let sampled = Problem::new(&system, (0.0, T_END), &relay.start)
+            .options(&options)
+            .solve()
+            .unwrap();
         prop_assert_eq!(&plain.switches, &sampled.switches);
         for (i, &t) in sampled.t.iter().enumerate() {
             let (y, _) = at(&system, &plain, t, Side::Right);

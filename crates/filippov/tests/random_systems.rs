@@ -3,7 +3,7 @@
 //! `RANDOM_SYSTEMS` is how many times more cases to try than usual.
 #![allow(clippy::unwrap_used)]
 
-use filippov::{solve, ClosureSystem, Mode, Options, PiecewiseSystem, Side, Solution, Stop};
+use filippov::{ClosureSystem, Mode, Options, PiecewiseSystem, Problem, Side, Solution, Stop};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 
@@ -103,7 +103,10 @@ fn run(system: &dyn PiecewiseSystem, random: &Random) -> Solution {
         max_steps: 20_000,
         ..Options::default()
     };
-    solve(system, (0.0, T_END), &random.start, &options, &[]).unwrap()
+    Problem::new(system, (0.0, T_END), &random.start)
+        .options(&options)
+        .solve()
+        .unwrap()
 }
 
 fn at(system: &dyn PiecewiseSystem, solution: &Solution, t: f64, side: Side) -> (Vec<f64>, Mode) {

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use filippov::{solve, Clock, ClosureSystem, ManualClock, Method, Options, Solution, Stop};
+use filippov::{Clock, ClosureSystem, ManualClock, Method, Options, Problem, Solution, Stop};
 
 /// The harmonic oscillator for a long time, with a limit of 0.1 s; each evaluation of its field takes `per_evaluation`.
 fn limited(clock: &Arc<ManualClock>, per_evaluation: Duration) -> Solution {
@@ -25,7 +25,10 @@ fn limited(clock: &Arc<ManualClock>, per_evaluation: Duration) -> Solution {
         clock: Clock::Manual(Arc::clone(clock)),
         ..Options::default()
     };
-    let solution = solve(&oscillator, (0.0, 1e9), &[1.0, 0.0], &options, &[]).unwrap();
+    let solution = Problem::new(&oscillator, (0.0, 1e9), &[1.0, 0.0])
+        .options(&options)
+        .solve()
+        .unwrap();
     assert!(matches!(solution.stop, Stop::MaxWallTime));
     solution
 }

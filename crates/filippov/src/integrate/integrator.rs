@@ -19,7 +19,8 @@ use crate::decisions::{differs_between_sides, has_left_resting, root_ends, Cause
 use crate::error::{Error, FieldError};
 use crate::error_scale::ErrorScale;
 use crate::event::search::{Detector, StepSearch};
-use crate::event::{Event, Found, UserEvent, UserEvents, TICK};
+use crate::event::{Event, Found, UserEvents, TICK};
+use crate::integrate::problem::Problem;
 use crate::integrate::progress::Progress;
 use crate::integrate::watch::Watch;
 use crate::mode::Mode;
@@ -31,11 +32,6 @@ use crate::status::{Stop, Warning};
 use crate::stepper::{stiff_warning, Attempt, StepControl, StepStart, Steppers};
 use crate::system::{Actions, PiecewiseSystem};
 use crate::tolerances::{EPS, SHORTEST_STEP, SHORTEST_STEP_AT_ZERO};
-
-/// Most steps between two looks at the clock and at the caller's wish to stop.
-const LONGEST_POLL: u64 = 64;
-/// Seconds between two looks from which on they come at every step, for slow functions.
-const SLOW_POLL: f64 = 0.002;
 
 /// An integration in progress.
 pub struct Integrator<'a> {
@@ -69,19 +65,20 @@ pub struct Integrator<'a> {
 }
 
 impl<'a> Integrator<'a> {
-    /// Checks the arguments and places the start in its mode on the first call of [`step`](Self::step).
+    /// Checks the arguments.
     ///
     /// # Errors
-    /// If an argument is out of range.
-    pub fn new(
-        system: &'a dyn PiecewiseSystem,
-        t_span: (f64, f64),
-        y0: &[f64],
-        options: &'a Options,
-        events: &'a [UserEvent<'a>],
-        actions: &'a Actions<'a>,
-    ) -> Result<Self, Error> {
-        crate::integrate::start::check(system, t_span, y0, options, actions)?;
+    /// If one is out of range.
+    pub fn new(problem: Problem<'a>) -> Result<Self, Error> {
+        let Problem {
+            system,
+            t_span,
+            y0,
+            options,
+            events,
+            actions,
+        } = problem;
+        crate::integrate::start::check(&problem)?;
         let n = system.n_states();
         let undecided = Mode::new(vec![1; system.n_surfaces()]);
         Ok(Integrator {
@@ -118,48 +115,59 @@ impl<'a> Integrator<'a> {
         self
     }
 
-    /// Runs to the end.
-    ///
-    /// # Errors
-    /// If a function of the user raises.
-    pub fn run(&mut self) -> Result<Stop, FieldError> {
-        let (mut polled, mut interval, mut next_poll) = (self.watch.start(), 1, 0);
-        if let Some(stop) = self.start()? {
-            return Ok(stop);
-        }
-        loop {
-            let attempts = self.stats.n_steps + self.stats.n_rejected;
-            if attempts >= self.options.max_steps {
-                return Ok(Stop::MaxSteps);
-            }
-            if self.stats.n_switches >= self.options.max_events {
-                return Ok(Stop::MaxEvents);
-            }
-            if attempts >= next_poll {
-                let now = self.watch.now();
-                let is_slow = (now - polled).as_secs_f64() > SLOW_POLL;
-                interval = if is_slow {
-                    1
-                } else {
-                    (2 * interval).min(LONGEST_POLL)
-                };
-                (polled, next_poll) = (now, attempts + interval);
-                self.watch.is_over(now, self.t);
-            }
-            if let Some(stop) = self.watch.stop() {
-                return Ok(stop);
-            }
-            if let Some(stop) = self.step()?.or_else(|| self.recorder.stop_at_section()) {
-                return Ok(stop);
-            }
-        }
+    /// The time reached.
+    pub fn t(&self) -> f64 {
+        self.t
     }
 
-    /// Attempts one step: accepts it up to its end or to the first event, or shortens the next.
+    /// The state there.
+    pub fn x(&self) -> &[f64] {
+        &self.x
+    }
+
+    /// The mode of the motion from there.
+    pub fn mode(&self) -> &Mode {
+        &self.motion.mode
+    }
+
+    /// Runs to the end.
+    pub fn solve(mut self) -> Solution {
+        let stop = loop {
+            match self.step() {
+                Ok(None) => {}
+                Ok(Some(stop)) => break stop,
+                Err(raised) => break Stop::FieldRaised(raised),
+            }
+        };
+        self.finish(stop)
+    }
+
+    /// Goes on: at first the mode of the start is found; then it is one step, accepted up to its end or to the first event, or
+    /// rejected. Why the run ends, if it does.
     ///
     /// # Errors
     /// If a function of the user raises.
     pub fn step(&mut self) -> Result<Option<Stop>, FieldError> {
+        if !self.watch.is_started() {
+            self.watch.start();
+            return self.start();
+        }
+        let attempts = self.stats.n_steps + self.stats.n_rejected;
+        if attempts >= self.options.max_steps {
+            return Ok(Some(Stop::MaxSteps));
+        }
+        if self.stats.n_switches >= self.options.max_events {
+            return Ok(Some(Stop::MaxEvents));
+        }
+        self.watch.look(attempts, self.t);
+        if let Some(stop) = self.watch.stop() {
+            return Ok(Some(stop));
+        }
+        let stopped = self.attempt_step()?;
+        Ok(stopped.or_else(|| self.recorder.stop_at_section()))
+    }
+
+    fn attempt_step(&mut self) -> Result<Option<Stop>, FieldError> {
         let remaining = self.horizon - self.t;
         if remaining <= 0.0 {
             return self.reach_horizon();

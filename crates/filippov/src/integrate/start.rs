@@ -1,18 +1,19 @@
-//! Where a run starts: arguments checked, the mode of the initial state found.
+//! Where a run starts: arguments checked.
 
 use crate::error::Error;
-use crate::options::Options;
-use crate::system::PiecewiseSystem;
-use crate::system::{Actions, Trigger};
+use crate::integrate::problem::Problem;
+use crate::system::Trigger;
 
 /// Checks the arguments of a run.
-pub(super) fn check(
-    system: &dyn PiecewiseSystem,
-    (t0, t1): (f64, f64),
-    y0: &[f64],
-    options: &Options,
-    actions: &Actions,
-) -> Result<(), Error> {
+pub(super) fn check(problem: &Problem) -> Result<(), Error> {
+    let Problem {
+        system,
+        t_span: (t0, t1),
+        y0,
+        options,
+        actions,
+        ..
+    } = *problem;
     let n = system.n_states();
     if y0.len() != n {
         return Err(Error::WrongLength {

@@ -9,6 +9,11 @@ use crate::status::Stop;
 /// What the caller is asked every now and then, with the time reached: should the run end?
 pub(super) type Interrupt<'a> = &'a mut (dyn FnMut(f64) -> bool + 'a);
 
+/// Most steps between two looks at the clock and at the caller's wish to stop.
+const LONGEST_POLL: u64 = 64;
+/// Seconds between two looks from which on they come at every step, for slow functions.
+const SLOW_POLL: f64 = 0.002;
+
 /// Which limit was reached.
 #[derive(Clone, Copy)]
 enum Over {
@@ -22,6 +27,10 @@ pub(super) struct Watch<'a> {
     started: Cell<Option<Instant>>,
     interrupt: RefCell<Option<Interrupt<'a>>>,
     over: Cell<Option<Over>>,
+    /// When it looked last, after how many steps it looks again, and at which attempt.
+    looked: Option<Instant>,
+    interval: u64,
+    next: u64,
 }
 
 impl<'a> Watch<'a> {
@@ -31,6 +40,9 @@ impl<'a> Watch<'a> {
             started: Cell::new(None),
             interrupt: RefCell::new(None),
             over: Cell::new(None),
+            looked: None,
+            interval: 1,
+            next: 0,
         }
     }
 
@@ -45,10 +57,30 @@ impl<'a> Watch<'a> {
     }
 
     /// The run starts now.
-    pub fn start(&self) -> Instant {
+    pub fn start(&mut self) {
         let now = self.now();
         self.started.set(Some(now));
-        now
+        self.looked = Some(now);
+    }
+
+    /// Has the run started?
+    pub fn is_started(&self) -> bool {
+        self.started.get().is_some()
+    }
+
+    /// Looks now and then, after so many attempts at a step: the seldomer the faster they are.
+    pub fn look(&mut self, attempts: u64, t: f64) {
+        if attempts < self.next {
+            return;
+        }
+        let now = self.now();
+        let is_slow = |looked: Instant| (now - looked).as_secs_f64() > SLOW_POLL;
+        self.interval = match self.looked.is_some_and(is_slow) {
+            true => 1,
+            false => (2 * self.interval).min(LONGEST_POLL),
+        };
+        (self.looked, self.next) = (Some(now), attempts + self.interval);
+        self.is_over(now, t);
     }
 
     /// Has a limit been reached, now or before? `t` is the time that the run has reached.

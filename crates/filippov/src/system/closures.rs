@@ -9,7 +9,7 @@ use crate::tolerances::EPS;
 /// # Example
 ///
 /// ```
-/// use filippov::{solve, ClosureSystem, Options};
+/// use filippov::{ClosureSystem, Problem};
 /// // x' = 0.3 - sign(x): reaches x = 0 at t = 1/0.7 and stays there with lambda = 0.3.
 /// let system = ClosureSystem::new(
 ///     1,
@@ -17,7 +17,7 @@ use crate::tolerances::EPS;
 ///     |_t, _x, s, dx| dx[0] = 0.3 - s[0],
 ///     |_t, x, h| h[0] = x[0],
 /// );
-/// let solution = solve(&system, (0.0, 10.0), &[1.0], &Options::default(), &[])?;
+/// let solution = Problem::new(&system, (0.0, 10.0), &[1.0]).solve()?;
 /// assert_eq!(solution.switches.len(), 1);
 /// assert!((solution.switches[0].t - 1.0 / 0.7).abs() < 1e-12);
 /// # Ok::<(), filippov::Error>(())

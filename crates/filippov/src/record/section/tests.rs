@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 
 use super::{Cycle, Place, Return, Returns, Section};
 use crate::switch::Kind;
-use crate::system::{Actions, Clock};
-use crate::{solve_to_section, ClosureSystem, Options, PiecewiseSystem, Solution, Stop};
+use crate::system::Clock;
+use crate::{ClosureSystem, Options, PiecewiseSystem, Problem, Solution, Stop};
 
 /// x'' = -x, a circle.
 fn circle() -> impl PiecewiseSystem {
@@ -46,9 +46,10 @@ fn run(system: &dyn PiecewiseSystem, y0: &[f64], section: &Section) -> (Solution
         atol: vec![1e-11],
         ..Options::default()
     };
-    let none = Actions::none();
     let span = (0.0, 1e3);
-    let mut solution = solve_to_section(system, span, y0, &options, section, &none, &mut |_| false)
+    let mut solution = Problem::new(system, span, y0)
+        .options(&options)
+        .solve_to_section(section, &mut |_| false)
         .expect("the arguments are in range");
     let returns = solution.returns.take().expect("there is a section");
     (solution, returns)
