@@ -215,6 +215,10 @@ pub const VANISHING_MULTIPLIER: f64 = 1e-9;
 /// Functions above this are not looked at for being zero all along a step: rounding of states up to thousands is below.
 pub const NEARLY_ZERO: f64 = 1e-10;
 
+/// Time, in units of 1 plus its size, for which multipliers are held after a located start at which their equations vanish: then
+/// they have changed by as much as rounding of the state changes the quotients, by about the root of rounding.
+pub const HELD_AFTER: f64 = 1e-8;
+
 /// Time, in units of 1 plus its size, after a start at which the equations of the multipliers vanish: how clear their root is
 /// there stands for the start. Components are clear of [`TANGENT_TO_ALL`], and little else has changed.
 pub const JUST_AFTER: f64 = 1e-6;

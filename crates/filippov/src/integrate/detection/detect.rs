@@ -7,7 +7,7 @@ use crate::event::certificate::{prove, Proof};
 use crate::event::filter::{may_vanish, may_vanish_bent, may_vanish_deflated};
 use crate::event::isolate::PROBES;
 use crate::event::{Event, Found, Monitored};
-use crate::field::{AffineBounds, ModeField};
+use crate::field::{AffineBounds, Guard, ModeField};
 use crate::integrate::detection::bounds::BoundedCurve;
 use crate::integrate::detection::detector::Detector;
 use crate::integrate::detection::detector::CLEAR_OF_NOISE;
@@ -42,11 +42,16 @@ impl Integrator<'_> {
         Ok((event, sought.longest))
     }
 
-    /// Moves a zero that may be a multiple one to its place. Other functions that vanish on the way there belong to the event.
+    /// Moves a zero that may be a multiple one to its place. Other functions that vanish on the way there belong to the event,
+    /// unless it is an action, which looks at them itself.
     fn resolve_multiple(&mut self, found: Found, sought: &mut Sought) -> Result<Event, FieldError> {
         let (guards, from) = (found.guards.clone(), found.theta);
+        let triggers = self.triggers();
+        let acts =
+            |guard: &Guard| matches!(guard, Guard::Surface(j) if triggers.is_only_trigger(*j));
+        let is_action = guards.iter().any(acts);
         let mut event = match self.resolve_multiple_zero(found, sought.dt)? {
-            Event::At(event) if event.theta > from => event,
+            Event::At(event) if event.theta > from && !is_action => event,
             event => return Ok(event),
         };
         let to = (event.theta + self.together(sought.dt)).min(1.0);
