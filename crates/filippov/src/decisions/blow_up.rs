@@ -14,7 +14,7 @@
 
 use super::point::{Notes, Point};
 use super::rule::Meeting;
-use crate::cube::{is_scaling_stable, Matrix, NormalFields};
+use crate::cube::{scaling_margin, Matrix, NormalFields};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::{product_weights, MeetingFields};
@@ -57,11 +57,6 @@ impl Row {
             time: 0.5 * (self.time + other.time),
             gradient: pairs.map(|(a, b)| 0.5 * (a + b)).collect(),
         }
-    }
-
-    /// A bound of the component, divided by time or not, along velocities up to `fastest`.
-    fn size(&self, fastest: f64) -> f64 {
-        self.value.abs() + self.time.abs() + norm(&self.gradient) * fastest
     }
 }
 
@@ -147,13 +142,7 @@ impl Around {
         let n_patterns = self.patterns.len();
         for tie in self.fields.ties() {
             let follower = self.slid[tie.follower];
-            let fastest = (0..n_patterns).map(|pattern| norm(self.fields.field(pattern)));
-            let fastest = fastest.fold(1.0, f64::max);
-            let sizes = self
-                .patterns
-                .iter()
-                .map(|rows| rows[follower].size(fastest));
-            let size = sizes.fold(0.0, f64::max);
+            let size = self.size(follower);
             for pattern in (0..n_patterns).filter(|pattern| !tie.holds(*pattern)) {
                 let (one, other) = (pattern ^ 1 << tie.leader, pattern ^ 1 << tie.follower);
                 let pairs = self.patterns[one].iter().zip(&self.patterns[other]);
@@ -166,12 +155,24 @@ impl Around {
         }
     }
 
-    /// Does the hidden dynamics with this matrix come to its root? Equations that vanish at the point are slower than the others.
+    /// Does the hidden dynamics with this matrix come to its root, clearly? Equations that vanish at the point are slower than the
+    /// others.
     fn is_stable(&self, jacobian: &Matrix) -> bool {
+        let units: Vec<f64> = self.slid.iter().map(|&i| 1.0 / self.size(i)).collect();
+        let scaled = jacobian.with_rows_scaled(&units);
         let fast = (0..self.slid.len()).filter(|&i| !self.is_silent[self.slid[i]]);
         let fast: Vec<usize> = fast.collect();
-        (fast.is_empty() || is_scaling_stable(&jacobian.principal(&fast)))
-            && is_scaling_stable(jacobian)
+        let is_clear = |matrix: &Matrix| scaling_margin(matrix) > TANGENT;
+        (fast.is_empty() || is_clear(&scaled.principal(&fast))) && is_clear(&scaled)
+    }
+
+    /// A bound of the components normal to surface i of the meeting, divided by time or not.
+    fn size(&self, i: usize) -> f64 {
+        let speeds = (0..self.patterns.len()).map(|pattern| norm(self.fields.field(pattern)));
+        let fastest = speeds.fold(1.0, f64::max);
+        let size = |row: &Row| row.value.abs() + row.time.abs() + norm(&row.gradient) * fastest;
+        let sizes = self.patterns.iter().map(|rows| size(&rows[i]));
+        sizes.fold(0.0, f64::max)
     }
 
     fn velocity(&self, weights: &[f64]) -> Vec<f64> {

@@ -334,7 +334,8 @@ impl Candidate<'_> {
         let beginnings = beginnings(at, notes, self.meeting, self.mode, is_silent)?;
         self.first_viable(beginnings.into_iter().map(|beginning| {
             let mut outset = self.outset(&beginning.multipliers);
-            outset.viable.next.start_mut().is_given = true;
+            let start = outset.viable.next.start_mut();
+            (start.is_given, start.is_located) = (true, matches!(self.meeting.how, How::Event(_)));
             let (lambda, rates) = (&beginning.multipliers, &beginning.rates);
             outset.is_open = lambda.iter().any(|l| 1.0 - l.abs() <= AT_SIDE);
             let largest = rates

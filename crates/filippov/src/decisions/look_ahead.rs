@@ -45,9 +45,11 @@ pub(super) fn try_mode(
     Ok(Trial::WithinRounding)
 }
 
-/// The ends at which multipliers begin, with their places among the exit functions.
+/// The ends at which given multipliers begin, with their places among the exit functions.
 fn ends_reached(next: &Next) -> Vec<(usize, Guard)> {
-    let reserves = next.multipliers().iter().flat_map(|l| [1.0 + l, 1.0 - l]);
+    let given = next.start.iter().filter(|start| start.is_given);
+    let multipliers = given.flat_map(|start| &start.multipliers);
+    let reserves = multipliers.flat_map(|l| [1.0 + l, 1.0 - l]);
     let guards = next.mode.sliding_set().flat_map(Guard::ends);
     let ends = guards.zip(reserves).enumerate();
     let reached = ends.filter(|(_, (_, reserve))| *reserve <= AT_SIDE);
@@ -87,7 +89,8 @@ fn leaves_within(
         notes.n_field_evaluations += field.n_evaluations();
         for (i, exit) in exits.iter().enumerate() {
             let noise = field.noise_of_exit(i);
-            if exit.is_nan() || *exit <= -noise {
+            let is_held = ends.iter().any(|(place, _)| *place == i);
+            if exit.is_nan() || *exit < -noise || (*exit == -noise && !is_held) {
                 return Ok(Trial::Ends);
             }
             is_clear &= *exit > noise;

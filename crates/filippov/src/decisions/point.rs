@@ -157,8 +157,8 @@ impl<'p, 'm, 'a> Point<'p, 'm, 'a> {
         if let ModeField::Intersection(field) = &mut field {
             field.set_patience(self.patience);
             field.begin(start.map_or(&[], |start| &start.multipliers), false);
-            if start.is_some_and(|start| start.is_given) {
-                field.hold_at_start(self.t);
+            if let Some(start) = start.filter(|start| start.is_given) {
+                field.hold_at_start(self.t, start.is_located);
             }
         }
         field
@@ -378,6 +378,8 @@ pub(crate) struct Start {
     pub oscillates: bool,
     /// Do the equations of the multipliers vanish at the start, so that these hold there?
     pub is_given: bool,
+    /// Is the start an event, whose place is known to rounding only?
+    pub is_located: bool,
     /// On one surface, the motion that slides from a two-fold.
     pub two_fold: Option<TwoFoldMotion>,
     /// The motion begins with the laps of an outward spiral.

@@ -303,8 +303,8 @@ impl<'a> Integrator<'a> {
                 let start = start.as_deref();
                 let multipliers = start.map_or(&[][..], |start| &start.multipliers);
                 field.begin(multipliers, start.is_some_and(|start| start.oscillates));
-                if start.is_some_and(|start| start.is_given) {
-                    field.hold_at_start(self.t);
+                if let Some(start) = start.filter(|start| start.is_given) {
+                    field.hold_at_start(self.t, start.is_located);
                 }
                 for &(guard, slack) in &self.slacks {
                     field.set_slack(guard, slack);

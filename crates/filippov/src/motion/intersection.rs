@@ -13,7 +13,7 @@ use crate::options::SlidingRule;
 use crate::patience::Patience;
 use crate::sparse::SparseRows;
 use crate::system::PiecewiseSystem;
-use crate::tolerances::{JUST_AFTER, MOST_MEETING, MOST_TRACKED};
+use crate::tolerances::{HELD_AFTER, JUST_AFTER, MOST_MEETING, MOST_TRACKED};
 
 /// Filippov's field on an intersection of m >= 2 surfaces: the multilinear combination ("canopy") of the
 /// fields around it with the multipliers lambda in [-1, 1]^m that make it tangent to all surfaces,
@@ -40,8 +40,8 @@ pub struct IntersectionField<'a> {
     /// Those that were found lately, with their times: from the nearest ones the next are tracked.
     tracked: Vec<(f64, Vec<f64>)>,
     exits: Vec<f64>,
-    /// The time of a start at which the equations vanish, and the multipliers there.
-    start: Option<(f64, Vec<f64>)>,
+    /// The times from and to which given multipliers hold: the equations vanish at the start.
+    start: Option<([f64; 2], Vec<f64>)>,
     is_rootless: bool,
     /// How far multipliers may go beyond their ends, by exit function.
     slack: Vec<f64>,
@@ -151,9 +151,15 @@ impl<'a> IntersectionField<'a> {
         }
     }
 
-    /// The equations vanish at the start of the motion: its multipliers there are those that it begins with.
-    pub fn hold_at_start(&mut self, t: f64) {
-        self.start = self.tracked.first().map(|(_, lambda)| (t, lambda.clone()));
+    /// The equations vanish at the start of the motion: its multipliers there are those that it begins with. Beside a located
+    /// start quotients are lost in rounding for a while.
+    pub fn hold_at_start(&mut self, t: f64, is_located: bool) {
+        let until = match is_located {
+            true => t + HELD_AFTER * (1.0 + t.abs()),
+            false => t,
+        };
+        let first = self.tracked.first();
+        self.start = first.map(|(_, lambda)| ([t, until], lambda.clone()));
     }
 
     /// Lets the multiplier of a guard go beyond its end by this much.
@@ -237,7 +243,8 @@ impl<'a> IntersectionField<'a> {
     /// Evaluates multipliers and exit functions at (t, x) and writes the field. Where there is no root they are NaN.
     fn solve(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), FieldError> {
         self.is_rootless = false;
-        if self.start.as_ref().is_some_and(|(start, _)| *start == t) {
+        let is_held = |[from, until]: [f64; 2]| (from..=until).contains(&t);
+        if self.start.as_ref().is_some_and(|(held, _)| is_held(*held)) {
             return self.solve_start(t, x, dx);
         }
         if let Some(law) = &mut self.by_rule {
@@ -285,10 +292,10 @@ impl<'a> IntersectionField<'a> {
         Ok(())
     }
 
-    /// The same at a start with given multipliers. The ends of their root are those a moment later, so that they are continuous;
+    /// The same at a start with given multipliers, and while quotients are lost in rounding. The ends of their root are those a moment later, so that they are continuous;
     /// where it has none to that time, it was chosen among those that are stable.
     fn solve_start(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), FieldError> {
-        let Some((start, lambda)) = self.start.take() else {
+        let Some((held, lambda)) = self.start.take() else {
             return Ok(());
         };
         let mut around = MeetingFields::new(self.system, &self.set);
@@ -306,7 +313,7 @@ impl<'a> IntersectionField<'a> {
         self.is_rootless = false;
         self.lambda.clone_from(&lambda);
         self.fill_exits(ends);
-        self.start = Some((start, lambda));
+        self.start = Some((held, lambda));
         Ok(())
     }
 

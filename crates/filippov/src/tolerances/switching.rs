@@ -159,6 +159,10 @@ pub const DEFINITE_PIVOT: f64 = 1e-10;
 /// square root of the time that is left.
 pub const AT_FOLD: f64 = 1e-2;
 
+/// Time, in units of 1 plus its size, for which multipliers are held after a located start at which their equations vanish: then
+/// they have changed by as much as rounding of the state changes the quotients, by about the root of rounding.
+pub const HELD_AFTER: f64 = 1e-8;
+
 /// Time, in units of 1 plus its size, after a start at which the equations of the multipliers vanish: how clear their root is
 /// there stands for the start. Components are clear of [`DOUBTFUL`], and little else has changed.
 pub const JUST_AFTER: f64 = 1e-6;

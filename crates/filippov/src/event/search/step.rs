@@ -38,11 +38,16 @@ impl StepSearch<'_, '_> {
         Ok((event, sought.longest))
     }
 
-    /// Moves a zero that may be a multiple one to its place. Other functions that vanish on the way there belong to the event.
+    /// Moves a zero that may be a multiple one to its place. Other functions that vanish on the way there belong to the event,
+    /// unless it is an action, which looks at them itself.
     fn resolve_multiple(&mut self, found: Found, sought: &mut Sought) -> Result<Event, FieldError> {
         let (guards, from) = (found.guards.clone(), found.theta);
+        let triggers = self.triggers();
+        let acts =
+            |guard: &Guard| matches!(guard, Guard::Surface(j) if triggers.is_only_trigger(*j));
+        let is_action = guards.iter().any(acts);
         let mut event = match self.resolve_multiple_zero(found, sought.dt)? {
-            Event::At(event) if event.theta > from => event,
+            Event::At(event) if event.theta > from && !is_action => event,
             event => return Ok(event),
         };
         let to = (event.theta + self.together(sought.dt)).min(1.0);
