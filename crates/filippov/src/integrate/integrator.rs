@@ -25,11 +25,11 @@ use crate::integrate::progress::Progress;
 use crate::integrate::watch::Watch;
 use crate::mode::Mode;
 use crate::motion::{CurrentMotion, Guard, SmoothField};
-use crate::options::{Method, Options};
+use crate::options::Options;
 use crate::record::{Recorder, Solution};
 use crate::stats::Stats;
 use crate::status::{Stop, Warning};
-use crate::stepper::{stiff_warning, Attempt, StepControl, StepStart, Steppers};
+use crate::stepper::{Attempt, StepControl, StepStart, Steppers, Stiff};
 use crate::system::{Actions, PiecewiseSystem};
 use crate::tolerances::{EPS, SHORTEST_STEP, SHORTEST_STEP_AT_ZERO};
 
@@ -287,7 +287,9 @@ impl<'a> Integrator<'a> {
         let (warning, chatter) =
             self.control
                 .look_for_jumps(&self.stepper, step, remains, may_bend);
-        self.warnings.extend(warning.map(|warning| *warning));
+        if let Some(warning) = warning {
+            self.warnings.push(*warning);
+        }
         if let Some(stop) = self.record_user_zeros(zeros, theta, t_stop)? {
             return Ok(Some(stop));
         }
@@ -303,15 +305,12 @@ impl<'a> Integrator<'a> {
                 .step(self.stepper.interpolant(), t1, self.stepper.end());
             let zero = self.zero_surface(t1)?;
             let (mut at, stepper, control) = self.step_start();
-            let turns_stiff = control.turns_stiff(&mut at, stepper)?;
-            let is_auto = self.options.method == Method::Auto;
-            if turns_stiff && !is_auto {
-                let warning = stiff_warning(self.t, &self.motion.mode, dt);
-                self.warnings.push(warning);
-            }
+            let stiffness = control.look_for_stiffness(&mut at, stepper)?;
             self.stepper.accept(&mut self.x);
             self.t = t1;
-            if turns_stiff && is_auto {
+            if let Stiff::Warning(warning) = stiffness {
+                self.warnings.push(*warning);
+            } else if let Stiff::GoOnImplicitly = stiffness {
                 let (mut at, stepper, control) = self.step_start();
                 control.go_on_implicitly(&mut at, stepper);
             }

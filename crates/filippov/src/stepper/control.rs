@@ -4,11 +4,12 @@ use super::chatter::ChatterWatch;
 use super::initial_step::{initial_step, restart_step};
 use super::pace::{excursion, Paces};
 use super::stepper::{Ready, StepStart};
-use super::stiffness::Stiffness;
+use super::stiffness::{Stiff, Stiffness};
 use super::{Controller, Steppers};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::{CurrentMotion, Leading, ModeField, Monitored};
+use crate::options::Method;
 use crate::status::{Stop, Warning, WarningCode};
 use crate::tolerances::{AIM_MARGINS, EPS, JUMP_SHRINK, ONE_SIDED_AIM, SMALLEST_GUESS};
 
@@ -291,38 +292,53 @@ impl StepControl {
         (warning, stop)
     }
 
-    /// Looks for stiffness in an accepted step, the last of so many: does the run count as stiff from now on?
+    /// Looks for stiffness in an accepted step, the last of so many.
     ///
     /// # Errors
     /// If a function of the user raises.
     #[inline(always)]
-    pub fn turns_stiff(
+    pub fn look_for_stiffness(
         &mut self,
         at: &mut StepStart,
         steppers: &mut Steppers,
-    ) -> Result<bool, FieldError> {
+    ) -> Result<Stiff, FieldError> {
         if self.stiffness.is_due(at.stats.n_steps) {
-            self.look_at_stiffness(at, steppers)
+            self.look_at_step(at, steppers)
         } else {
-            Ok(false)
+            Ok(Stiff::Nothing)
         }
     }
 
     #[cold]
     #[inline(never)]
-    fn look_at_stiffness(
+    fn look_at_step(
         &mut self,
         at: &mut StepStart,
         steppers: &mut Steppers,
-    ) -> Result<bool, FieldError> {
+    ) -> Result<Stiff, FieldError> {
         let Some(is_limited) = steppers.is_limited_by_stability(at)? else {
-            return Ok(false);
+            return Ok(Stiff::Nothing);
         };
-        let turns_stiff = self.stiffness.count(is_limited);
-        if turns_stiff {
-            self.stiffness.since = Some(at.t);
+        if !self.stiffness.count(is_limited) {
+            return Ok(Stiff::Nothing);
         }
-        Ok(turns_stiff)
+        self.stiffness.since = Some(at.t);
+        if at.options.method == Method::Auto {
+            return Ok(Stiff::GoOnImplicitly);
+        }
+        let (t, mode, dt) = (at.t, &at.motion.mode, steppers.interpolant().dt);
+        let text = format!(
+            "the motion in mode ({mode}) is stiff near t = {t:.10}: stability and not accuracy keeps its steps at \
+             {dt:.3e}; method=\"Rodas5P\" takes longer ones"
+        );
+        Ok(Stiff::Warning(Box::new(Warning {
+            t,
+            code: WarningCode::Stiff,
+            surfaces: Vec::new(),
+            text,
+            candidates: Vec::new(),
+            rule: "",
+        })))
     }
 
     /// Leaves the rest of the motion to the method for stiff motions.
@@ -338,21 +354,4 @@ impl StepControl {
 fn nearest_surface(monitored: &[Monitored]) -> f64 {
     let times = monitored.iter().map(Monitored::time_to_zero);
     times.fold(f64::INFINITY, f64::min)
-}
-
-/// The warning that a motion with steps of length `dt` is stiff.
-#[cold]
-pub(crate) fn stiff_warning(t: f64, mode: &Mode, dt: f64) -> Warning {
-    let text = format!(
-        "the motion in mode ({mode}) is stiff near t = {t:.10}: stability and not accuracy keeps its steps at \
-         {dt:.3e}; method=\"Rodas5P\" takes longer ones"
-    );
-    Warning {
-        t,
-        code: WarningCode::Stiff,
-        surfaces: Vec::new(),
-        text,
-        candidates: Vec::new(),
-        rule: "",
-    }
 }

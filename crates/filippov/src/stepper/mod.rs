@@ -25,7 +25,7 @@ mod stiffness;
 mod taylor;
 
 pub use crate::error_scale::ErrorScale;
-pub(crate) use control::{stiff_warning, StepControl};
+pub(crate) use control::StepControl;
 pub use controller::Controller;
 pub(crate) use dense::{evaluate, powers_of_nested, shift};
 pub use dense::{Basis, Expansion, Interpolant};
@@ -38,6 +38,7 @@ pub use step::Step;
 pub use stepper::Attempt;
 pub(crate) use stepper::{ExitSeries, StepStart, Stepper};
 pub(crate) use steppers::Steppers;
+pub(crate) use stiffness::Stiff;
 pub use taylor::Taylor;
 
 #[cfg(test)]

@@ -1,9 +1,20 @@
 //! What was seen of the stiffness of a run.
 
+use crate::status::Warning;
 use crate::tolerances::{NOT_STIFF_SIGNS, STIFF_SIGNS};
 
 /// Accepted steps between two looks, a power of two.
 const LOOK_EVERY: u64 = 128;
+
+/// What follows from the stiffness of a run.
+pub(crate) enum Stiff {
+    /// Nothing: it is not known to be stiff, or has been for long.
+    Nothing,
+    /// It is stiff from now on, and the method goes on.
+    Warning(Box<Warning>),
+    /// It is stiff from now on: the rest is left to the method for stiff motions.
+    GoOnImplicitly,
+}
 
 /// What was seen of the steps so far: Hairer's count.
 ///

@@ -42,7 +42,7 @@ impl StepSearch<'_, '_> {
     /// unless it is an action, which looks at them itself.
     fn resolve_multiple(&mut self, found: Found, sought: &mut Sought) -> Result<Event, FieldError> {
         let (guards, from) = (found.guards.clone(), found.theta);
-        let triggers = self.triggers();
+        let triggers = self.motion.triggers(self.system);
         let acts =
             |guard: &Guard| matches!(guard, Guard::Surface(j) if triggers.is_only_trigger(*j));
         let is_action = guards.iter().any(acts);
