@@ -9,7 +9,6 @@ mod enclosed_root;
 mod fold;
 mod normal_fields;
 mod p_matrix;
-mod redundant;
 mod roots;
 mod small_matrix;
 mod stability;
@@ -20,9 +19,8 @@ pub use fold::{merged_root, MergedRoot};
 pub use normal_fields::{NormalFields, SignGroup};
 pub use p_matrix::is_p_matrix;
 pub(crate) use p_matrix::symmetrising_scale;
-pub use redundant::least_multipliers;
 pub use roots::{
-    is_undetermined, multiplier_rates, newton, roots_in_cube, stable_roots,
+    is_undetermined, least_multipliers, multiplier_rates, newton, roots_in_cube, stable_roots,
     stable_roots_with_border, stable_roots_within, Roots,
 };
 pub(crate) use small_matrix::invert;
