@@ -93,13 +93,8 @@ fn krawczyk(
     let jacobian: IntervalVector = places
         .map(|(j, p)| interpolate(differences(&row(j), p), guess, Some(p)))
         .collect();
-    let mut approximate = Matrix::zeros(m);
-    for j in 0..m {
-        for p in 0..m {
-            approximate[(j, p)] = 0.5 * (jacobian[j * m + p].lo + jacobian[j * m + p].hi);
-        }
-    }
-    let inverse = approximate.inverse()?;
+    let middle_of = |l: &Interval| 0.5 * (l.lo + l.hi);
+    let inverse = Matrix::of(m, |j, p| middle_of(&jacobian[j * m + p])).inverse()?;
     let g: IntervalVector = (0..m).map(|j| interpolate(row(j), &middle, None)).collect();
     let mut multipliers = IntervalVector::with_capacity(m);
     for i in 0..m {

@@ -10,7 +10,6 @@ mod fold;
 mod lap;
 mod normal_fields;
 mod p_matrix;
-mod redundant;
 mod relay;
 mod roots;
 mod shared_load;
@@ -24,10 +23,9 @@ pub use lap::Lap;
 pub use normal_fields::{NormalFields, SignGroup};
 pub use p_matrix::is_p_matrix;
 pub(crate) use p_matrix::symmetrising_scale;
-pub use redundant::least_multipliers;
 pub use relay::{solve_relay, solve_relay_within, RelayError, RelayProblem, RelaySolution};
 pub use roots::{
-    is_undetermined, multiplier_rates, newton, roots_in_cube, stable_roots,
+    is_undetermined, least_multipliers, multiplier_rates, newton, roots_in_cube, stable_roots,
     stable_roots_with_border, stable_roots_within, Roots,
 };
 pub use shared_load::{stay_together, SharedLoad, SharedLoads, Uniqueness};

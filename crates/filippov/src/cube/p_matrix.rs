@@ -4,6 +4,7 @@
 //!
 //! Reference: Cottle, Pang, Stone, *The Linear Complementarity Problem* (1992), section 3.3.
 
+use super::small_matrix::Matrix;
 use crate::sparse::{coupled_blocks, is_positive_definite, SparseRows, SparseSolver};
 use crate::tolerances::DEFINITE_PIVOT;
 
@@ -39,10 +40,10 @@ fn decide_block(block: &SparseRows) -> Option<bool> {
     if m > MOST_MINORS {
         return None;
     }
-    let mut dense = vec![vec![0.0; m]; m];
-    for (i, row) in dense.iter_mut().enumerate() {
+    let mut dense = Matrix::zeros(m);
+    for i in 0..m {
         for (j, value) in block.row(i) {
-            row[j] = value / (block.diagonal(i) * block.diagonal(j)).sqrt();
+            dense[(i, j)] = value / (block.diagonal(i) * block.diagonal(j)).sqrt();
         }
     }
     Some(has_positive_minors(&dense))
@@ -106,27 +107,15 @@ pub(crate) fn symmetrising_scale(block: &SparseRows) -> Option<Vec<f64>> {
 
 /// By the first pivot: A is a P-matrix if a_11 > 0, and A without the first unknown and the Schur complement of
 /// a_11 both are (Tsatsomeros, Li 2000).
-fn has_positive_minors(a: &[Vec<f64>]) -> bool {
-    let Some(first) = a.first() else {
+fn has_positive_minors(a: &Matrix) -> bool {
+    if a.n() == 0 {
         return true;
-    };
-    let pivot = first[0];
-    let is_positive = pivot > DEFINITE_PIVOT;
-    if !is_positive {
-        return false;
     }
-    let rest: Vec<Vec<f64>> = a[1..].iter().map(|row| row[1..].to_vec()).collect();
-    let complement: Vec<Vec<f64>> = a[1..]
-        .iter()
-        .map(|row| {
-            let factor = row[0] / pivot;
-            let entries = row[1..].iter().zip(&first[1..]);
-            entries
-                .map(|(value, above)| value - factor * above)
-                .collect()
-        })
-        .collect();
-    has_positive_minors(&rest) && has_positive_minors(&complement)
+    let is_positive = a[(0, 0)] > DEFINITE_PIVOT;
+    let rest = Matrix::of(a.n() - 1, |i, j| a[(i + 1, j + 1)]);
+    let taken = |i: usize, j: usize| a[(i + 1, 0)] / a[(0, 0)] * a[(0, j + 1)];
+    let complement = || Matrix::of(rest.n(), |i, j| rest[(i, j)] - taken(i, j));
+    is_positive && has_positive_minors(&rest) && has_positive_minors(&complement())
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use super::bilinear::Bilinear;
 use super::normal_fields::{NormalFields, SignGroup};
-use super::small_matrix::Matrix;
+use super::small_matrix::{Matrix, Vector};
 use super::stability::is_scaling_stable;
 use crate::patience::Patience;
 use crate::tolerances::{
@@ -34,20 +34,24 @@ pub fn roots_in_cube(fields: &NormalFields) -> Roots {
 
 /// As [`roots_in_cube`]; those found until then when the caller has waited long enough.
 fn roots_within(fields: &NormalFields, patience: Patience) -> Roots {
-    if let Some(eliminated) = Eliminated::of(fields) {
-        let inner = search(&eliminated.rest, patience);
-        let complete = inner.complete;
-        let points = inner.points.iter();
-        let mut roots = Roots {
-            points: Vec::new(),
-            complete,
-        };
-        for point in points.filter_map(|point| newton(fields, &eliminated.complete(point))) {
-            roots.add(point);
-        }
-        return roots;
+    let Some(eliminated) = Eliminated::of(fields) else {
+        return search(fields, patience);
+    };
+    let inner = search(&eliminated.rest, patience);
+    let mut roots = Roots {
+        points: Vec::new(),
+        complete: inner.complete,
+    };
+    for point in inner.points {
+        // One step is exact for the multipliers that were eliminated.
+        let mut start = vec![0.0; fields.m()];
+        let kept = eliminated.left.iter().zip(point);
+        kept.for_each(|(&i, value)| start[i] = value);
+        newton(fields, &start)
+            .into_iter()
+            .for_each(|root| roots.add(root));
     }
-    search(fields, patience)
+    roots
 }
 
 fn search(fields: &NormalFields, patience: Patience) -> Roots {
@@ -137,19 +141,48 @@ pub fn is_undetermined(fields: &NormalFields) -> bool {
 /// Newton's method from `start`, with full steps: for tracking a root from the last one.
 /// `None` if it does not converge.
 pub fn newton(fields: &NormalFields, start: &[f64]) -> Option<Vec<f64>> {
+    iterate(start, |lambda| {
+        fields.jacobian(lambda).solve(&fields.interpolate(lambda))
+    })
+}
+
+/// The multipliers of least norm that make the fields tangent to the surfaces `rows`; `None` if there are none
+/// in the cube.
+///
+/// On an intersection like x = x' = 0 of x'' = -a sign(x) - b sign(x') all fields are tangent to the surface x = 0,
+/// whatever the multipliers; the other equation determines a line of them, and the motion does not depend on
+/// which is taken. Gauss-Newton steps from 0, lambda <- lambda - G^T (G G^T)^-1 g.
+///
+/// Reference: A. Levant, Sliding order and sliding accuracy in sliding mode control, *Int. J. Control* 58 (1993).
+pub fn least_multipliers(fields: &NormalFields, rows: &[usize]) -> Option<Vec<f64>> {
+    let m = fields.m();
+    let root = iterate(&vec![0.0; m], |lambda| {
+        let (g, jacobian) = (fields.interpolate(lambda), fields.jacobian(lambda));
+        let product =
+            |i: usize, j: usize| (0..m).map(|k| jacobian[(i, k)] * jacobian[(j, k)]).sum();
+        let gram = Matrix::of(rows.len(), |a, b| product(rows[a], rows[b]));
+        let residual: Vector = rows.iter().map(|&i| g[i]).collect();
+        let shares = gram.solve(&residual)?;
+        let terms = |k: usize| rows.iter().zip(&shares).map(move |(&i, s)| (i, k, s));
+        let step = |k: usize| terms(k).map(|(i, k, s)| jacobian[(i, k)] * s).sum();
+        Some((0..m).map(step).collect())
+    })?;
+    root.iter().all(|l| l.abs() < 1.0).then_some(root)
+}
+
+/// Takes the steps off `start` until they are below rounding; `None` if they do not become so.
+fn iterate(start: &[f64], step: impl Fn(&[f64]) -> Option<Vector>) -> Option<Vec<f64>> {
     let mut lambda = start.to_vec();
     for _ in 0..NEWTON_STEPS {
-        let step = fields
-            .jacobian(&lambda)
-            .solve(&fields.interpolate(&lambda))?;
-        let length = step.iter().fold(0.0_f64, |m, d| m.max(d.abs()));
-        for (value, d) in lambda.iter_mut().zip(&step) {
-            *value -= d;
-        }
-        if length <= NEWTON_DONE {
+        let step = step(&lambda)?;
+        lambda
+            .iter_mut()
+            .zip(&step)
+            .for_each(|(value, d)| *value -= d);
+        if step.iter().all(|d| d.abs() <= NEWTON_DONE) {
             return Some(lambda);
         }
-        if lambda.iter().any(|v| v.abs() > FAR_FROM_THE_CUBE) {
+        if !lambda.iter().all(|v| v.abs() <= FAR_FROM_THE_CUBE) {
             return None;
         }
     }
@@ -204,7 +237,7 @@ impl SearchBox {
             return Look::Unclear;
         }
         // The only root of the box, if there is one, is within |step|/(1 - spread) of the middle.
-        let step = newton_step(&inverse, &self.fields.interpolate(&middle));
+        let step = inverse.apply(&self.fields.interpolate(&middle));
         let reach = step.iter().fold(0.0_f64, |m, d| m.max(d.abs()));
         if reach * (1.0 - SAME_ROOT) > 1.0 + spread {
             return Look::Empty;
@@ -242,7 +275,7 @@ impl SearchBox {
         let mut deviation = Matrix::zeros(m);
         for p in 0..m {
             for column in self.fields.columns(p) {
-                for (i, product) in newton_step(inverse, &column).into_iter().enumerate() {
+                for (i, product) in inverse.apply(&column).into_iter().enumerate() {
                     let unit = if i == p { 1.0 } else { 0.0 };
                     deviation[(i, p)] = deviation[(i, p)].max((unit - product).abs());
                 }
@@ -253,42 +286,38 @@ impl SearchBox {
     }
 
     /// Both halves across the longest edge.
-    fn halves(self) -> [SearchBox; 2] {
+    fn halves(&self) -> [SearchBox; 2] {
         let lengths = || (0..self.low.len()).map(|i| self.high[i] - self.low[i]);
         let longest = lengths().fold(0.0, f64::max);
         let axis = lengths().position(|l| l == longest).unwrap_or(0);
         let middle = 0.5 * (self.low[axis] + self.high[axis]);
-        let mut lower_end = self.high.clone();
-        lower_end[axis] = middle;
-        let mut upper_start = self.low.clone();
-        upper_start[axis] = middle;
+        let part = |half: [f64; 2], low: f64, high: f64| {
+            let mut part = SearchBox {
+                low: self.low.clone(),
+                high: self.high.clone(),
+                fields: self.fields.on_range(axis, half),
+            };
+            (part.low[axis], part.high[axis]) = (low, high);
+            part
+        };
         [
-            SearchBox {
-                fields: self.fields.on_range(axis, [-1.0, 0.0]),
-                low: self.low,
-                high: lower_end,
-            },
-            SearchBox {
-                fields: self.fields.on_range(axis, [0.0, 1.0]),
-                low: upper_start,
-                high: self.high,
-            },
+            part([-1.0, 0.0], self.low[axis], middle),
+            part([0.0, 1.0], middle, self.high[axis]),
         ]
     }
 }
 
 /// The equations without the multipliers a of groups of one: with g = c + N lambda_a + phi(the others) and rows a and
 /// r, lambda_a = -N_aa^-1 (c + phi)_a leaves (c + phi)_r - N_ra N_aa^-1 (c + phi)_a = 0.
-struct Eliminated<'a> {
-    whole: &'a NormalFields,
+struct Eliminated {
     /// The surfaces of the multipliers that are left.
     left: Vec<usize>,
     rest: NormalFields,
 }
 
-impl<'a> Eliminated<'a> {
+impl Eliminated {
     /// `None` if there are no such groups, or nothing else, or N_aa is singular.
-    fn of(whole: &'a NormalFields) -> Option<Self> {
+    fn of(whole: &NormalFields) -> Option<Self> {
         let m = whole.m();
         let is_alone = |i: usize| {
             let mut groups = whole.groups().iter();
@@ -300,20 +329,13 @@ impl<'a> Eliminated<'a> {
         }
         let jacobian = whole.jacobian(&vec![0.0; m]);
         let inverse = jacobian.principal(&alone).inverse()?;
-        // N_ra N_aa^-1.
-        let factor = |r: usize, column: usize| -> f64 {
-            let terms = alone.iter().enumerate();
-            terms
-                .map(|(k, &a)| jacobian[(r, a)] * inverse[(k, column)])
-                .sum()
-        };
         let reduce = |values: &[f64]| -> Vec<f64> {
-            let row = |&r: &usize| {
-                let terms = alone.iter().enumerate();
-                let taken: f64 = terms.map(|(k, &a)| factor(r, k) * values[a]).sum();
-                values[r] - taken
+            let shares = inverse.apply(&alone.iter().map(|&a| values[a]).collect::<Vector>());
+            let taken = |r: usize| -> f64 {
+                let terms = alone.iter().zip(&shares);
+                terms.map(|(&a, share)| jacobian[(r, a)] * share).sum()
             };
-            left.iter().map(row).collect()
+            left.iter().map(|&r| values[r] - taken(r)).collect()
         };
         // What the groups of one contribute at their multipliers 0.
         let mut constant = vec![0.0; left.len()];
@@ -322,10 +344,8 @@ impl<'a> Eliminated<'a> {
             if let [_] = group.members[..] {
                 let pairs = group.at(0, m).iter().zip(group.at(1, m));
                 let middle: Vec<f64> = pairs.map(|(a, b)| 0.5 * (a + b)).collect();
-                constant
-                    .iter_mut()
-                    .zip(reduce(&middle))
-                    .for_each(|(c, v)| *c += v);
+                let shares = constant.iter_mut().zip(reduce(&middle));
+                shares.for_each(|(c, v)| *c += v);
                 continue;
             }
             let place = |i: &usize| left.binary_search(i).ok();
@@ -336,22 +356,8 @@ impl<'a> Eliminated<'a> {
         }
         let rest = NormalFields::of_groups(left.len(), groups).ok()?;
         let rest = rest.shifted(&constant);
-        Some(Eliminated { whole, left, rest })
+        Some(Eliminated { left, rest })
     }
-
-    /// All multipliers, from those that are left: one step of Newton's method is exact.
-    fn complete(&self, point: &[f64]) -> Vec<f64> {
-        let mut lambda = vec![0.0; self.whole.m()];
-        for (&i, &value) in self.left.iter().zip(point) {
-            lambda[i] = value;
-        }
-        lambda
-    }
-}
-
-fn newton_step(inverse: &Matrix, g: &[f64]) -> Vec<f64> {
-    let row = |i: usize| (0..g.len()).map(|j| inverse[(i, j)] * g[j]).sum();
-    (0..g.len()).map(row).collect()
 }
 
 fn largest_distance(a: &[f64], b: &[f64]) -> f64 {

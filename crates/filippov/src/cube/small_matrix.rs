@@ -25,6 +25,13 @@ impl Matrix {
         }
     }
 
+    /// The matrix with these entries by row and column.
+    pub fn of(n: usize, entry: impl Fn(usize, usize) -> f64) -> Self {
+        let rows = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
+        let entries = rows.map(|(i, j)| entry(i, j)).collect();
+        Matrix { n, entries }
+    }
+
     /// Number of rows.
     pub fn n(&self) -> usize {
         self.n
@@ -32,13 +39,7 @@ impl Matrix {
 
     /// The rows and columns with these indices.
     pub fn principal(&self, indices: &[usize]) -> Matrix {
-        let mut part = Matrix::zeros(indices.len());
-        for (r, &i) in indices.iter().enumerate() {
-            for (c, &j) in indices.iter().enumerate() {
-                part[(r, c)] = self[(i, j)];
-            }
-        }
-        part
+        Matrix::of(indices.len(), |r, c| self[(indices[r], indices[c])])
     }
 
     /// The determinant; 1 for a matrix without rows.
@@ -90,25 +91,20 @@ impl Matrix {
 
     /// The product with another matrix of the same size.
     pub fn times(&self, other: &Matrix) -> Matrix {
-        let mut product = Matrix::zeros(self.n);
-        for i in 0..self.n {
-            for j in 0..self.n {
-                product[(i, j)] = (0..self.n).map(|k| self[(i, k)] * other[(k, j)]).sum();
-            }
-        }
-        product
+        let entry = |i: usize, j: usize| (0..self.n).map(|k| self[(i, k)] * other[(k, j)]).sum();
+        Matrix::of(self.n, entry)
+    }
+
+    /// The product with a vector.
+    pub fn apply(&self, v: &[f64]) -> Vector {
+        let row = |i: usize| (0..self.n).map(|j| self[(i, j)] * v[j]).sum();
+        (0..self.n).map(row).collect()
     }
 
     /// The matrix with rows and columns exchanged.
     #[must_use]
     pub fn transposed(&self) -> Matrix {
-        let mut transposed = Matrix::zeros(self.n);
-        for i in 0..self.n {
-            for j in 0..self.n {
-                transposed[(i, j)] = self[(j, i)];
-            }
-        }
-        transposed
+        Matrix::of(self.n, |i, j| self[(j, i)])
     }
 
     /// The largest magnitude of its entries.
@@ -119,21 +115,17 @@ impl Matrix {
     /// The matrix with each row multiplied by a factor.
     #[must_use]
     pub fn with_rows_scaled(&self, factors: &[f64]) -> Matrix {
-        let mut scaled = self.clone();
-        for (row, factor) in scaled.entries.chunks_exact_mut(self.n.max(1)).zip(factors) {
-            row.iter_mut().for_each(|v| *v *= factor);
-        }
-        scaled
+        Matrix::of(self.n, |i, j| self[(i, j)] * factors[i])
     }
 
     /// The sets of indices each of which acts on all others of its set, directly or through others: by rows and
     /// columns sorted into these sets the matrix is block triangular. An entry that is rounding of its row does not act.
     pub fn strong_parts(&self) -> Vec<Vec<usize>> {
         let n = self.n;
-        let mut acts = Vec::with_capacity(n * n);
+        let mut acts = SmallVec::<[bool; 16]>::with_capacity(n * n);
         for row in self.entries.chunks_exact(n) {
             let size = row.iter().fold(0.0_f64, |size, v| size.max(v.abs()));
-            acts.extend(row.iter().map(|v| v.abs() > PROPORTIONAL * size));
+            acts.extend(row.iter().map(|v: &f64| v.abs() > PROPORTIONAL * size));
         }
         for k in 0..n {
             for i in (0..n).filter(|&i| i != k) {
@@ -178,16 +170,12 @@ impl Matrix {
     /// eigenvalues reaches the imaginary axis; 1 for fewer than two rows.
     pub fn last_hurwitz_determinant(&self) -> f64 {
         let a = self.characteristic_polynomial();
-        let size = self.n.saturating_sub(1);
-        let mut hurwitz = Matrix::zeros(size);
-        for i in 0..size {
-            for j in 0..size {
-                // Entry (i, j) is coefficient 2 (j + 1) - (i + 1).
-                let index = (2 * j + 1).checked_sub(i);
-                hurwitz[(i, j)] = index.and_then(|k| a.get(k)).copied().unwrap_or(0.0);
-            }
-        }
-        hurwitz.determinant()
+        // Entry (i, j) is coefficient 2 (j + 1) - (i + 1).
+        let entry = |i: usize, j: usize| {
+            let index = (2 * j + 1).checked_sub(i);
+            index.and_then(|k| a.get(k)).copied().unwrap_or(0.0)
+        };
+        Matrix::of(self.n.saturating_sub(1), entry).determinant()
     }
 
     /// Coefficients of det(z - A), highest power first.

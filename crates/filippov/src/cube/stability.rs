@@ -15,28 +15,26 @@ use crate::tolerances::{CAYLEY_SQUARINGS, LARGEST_BY_MINORS};
 /// (-1)^order (Fisher, Fuller 1958). Sufficient; necessary for m <= 2, and nearly so for m = 3. A part of more
 /// than [`LARGEST_BY_MINORS`] surfaces counts as stable if it is for equal scalings.
 pub fn is_scaling_stable(jacobian: &Matrix) -> bool {
-    let parts = jacobian.strong_parts();
-    parts.iter().all(|part| {
-        let block = jacobian.principal(part);
-        if part.len() > LARGEST_BY_MINORS {
-            decay(&block) > 0.0
-        } else {
-            chain_margin(&block) > 0.0
-        }
+    blocks(jacobian).all(|block| match block.n() > LARGEST_BY_MINORS {
+        true => decay(&block) > 0.0,
+        false => chain_margin(&block) > 0.0,
     })
 }
 
 /// A continuous function that is positive where [`is_scaling_stable`] finds a chain: the smallest minor of the best
 /// chain, with its sign changed for odd orders; 1 for more than [`LARGEST_BY_MINORS`] surfaces.
 pub fn scaling_margin(jacobian: &Matrix) -> f64 {
-    let margins = jacobian.strong_parts().into_iter().map(|part| {
-        if part.len() > LARGEST_BY_MINORS {
-            1.0
-        } else {
-            chain_margin(&jacobian.principal(&part))
-        }
+    let margins = blocks(jacobian).map(|block| match block.n() > LARGEST_BY_MINORS {
+        true => 1.0,
+        false => chain_margin(&block),
     });
     margins.fold(1.0, f64::min)
+}
+
+/// The strongly coupled parts of a matrix.
+fn blocks(matrix: &Matrix) -> impl Iterator<Item = Matrix> + '_ {
+    let parts = matrix.strong_parts().into_iter();
+    parts.map(|part| matrix.principal(&part))
 }
 
 fn chain_margin(jacobian: &Matrix) -> f64 {
@@ -60,13 +58,9 @@ pub fn is_stable_for(jacobian: &Matrix, kappa: &[f64]) -> bool {
 
 /// Do all eigenvalues have negative real parts?
 pub fn is_stable(matrix: &Matrix) -> bool {
-    matrix.strong_parts().iter().all(|part| {
-        let block = matrix.principal(part);
-        if part.len() > LARGEST_BY_MINORS {
-            decay(&block) > 0.0
-        } else {
-            block.is_hurwitz()
-        }
+    blocks(matrix).all(|block| match block.n() > LARGEST_BY_MINORS {
+        true => decay(&block) > 0.0,
+        false => block.is_hurwitz(),
     })
 }
 
@@ -78,21 +72,15 @@ pub fn is_stable(matrix: &Matrix) -> bool {
 /// then each is the smallest among the strongly coupled parts, and for a part of two surfaces the second is
 /// -min(G11, G22), so that it is stable for some scaling.
 pub fn stability_margins(scaled: &Matrix, in_parts: bool) -> [f64; 2] {
-    let parts = if in_parts {
-        scaled.strong_parts()
-    } else {
-        vec![(0..scaled.n()).collect()]
+    let parts = match in_parts {
+        true => blocks(scaled).collect(),
+        false => vec![scaled.clone()],
     };
     let mut margins = [f64::INFINITY; 2];
-    for part in parts {
-        let block = scaled.principal(&part);
-        let sign = if part.len().is_multiple_of(2) {
-            1.0
-        } else {
-            -1.0
-        };
+    for block in parts {
+        let sign = (-1.0_f64).powi(block.n() as i32);
         let fold = sign * block.determinant();
-        let stability = match part.len() {
+        let stability = match block.n() {
             // Of two surfaces no scaling is preferred, as where they meet alone.
             2 => -block[(0, 0)].min(block[(1, 1)]),
             n if n > LARGEST_BY_MINORS => decay(&block),

@@ -47,15 +47,12 @@ pub(in crate::switching) fn attracting(
     patience: Patience,
 ) -> Option<(Vec<Admissible>, f64)> {
     let m = fields.m();
-    let parts = match m {
-        1 | 2 => vec![(0..m).collect()],
-        _ => independent_parts(fields),
-    };
+    if m <= 2 {
+        return Some(attracting_together(fields, patience));
+    }
+    let parts = independent_parts(fields);
     if parts.iter().any(|part| part.len() > MOST_MEETING) {
         return None;
-    }
-    if let [_] = parts[..] {
-        return Some(attracting_together(fields, patience));
     }
     let mut whole = vec![(vec![0; m], vec![0.0; m])];
     let mut margin = f64::INFINITY;

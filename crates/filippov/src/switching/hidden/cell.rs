@@ -78,29 +78,20 @@ impl Cell {
         let mut end = self.step();
         let mut stop: Option<(StepEnd, usize, f64)> = None;
         for i in 0..u.len() {
-            let borders = if self.sides[i] == 0 {
-                [-1.0, 1.0]
-            } else {
-                [f64::from(self.sides[i]); 2]
+            // Each border with the direction into the cell.
+            let borders: &[(f64, f64)] = match self.sides[i] {
+                0 => &[(-1.0, 1.0), (1.0, -1.0)],
+                side if side > 0 => &[(1.0, 1.0)],
+                _ => &[(-1.0, -1.0)],
             };
-            let reach = self.reach(i, end);
-            // A clipped component has one border.
-            let n_borders = if self.sides[i] == 0 { 2 } else { 1 };
-            for &border in &borders[..n_borders] {
-                // Positive within the cell.
-                let inwards = if self.sides[i] == 0 { -border } else { border };
-                if inwards * (u[i] - border) > reach {
-                    continue;
-                }
+            for &(border, inwards) in borders {
                 let distance = self.distance(i, border, inwards);
                 if let Some(t) = first_loss(&distance, end, tests) {
                     (end, stop) = (t, Some((StepEnd::Border, i, border)));
                 }
             }
         }
-        if let Some((i, level)) =
-            watched.filter(|&(i, level)| (u[i] - level).abs() <= self.reach(i, end))
-        {
+        if let Some((i, level)) = watched {
             let distance = self.distance(i, level, self.direction(i, level));
             if let Some(t) = first_loss(&distance, end, tests) {
                 (end, stop) = (t, Some((StepEnd::Level, i, level)));
@@ -113,12 +104,6 @@ impl Cell {
             u[i] = exactly;
         }
         (end, stop.map_or(StepEnd::Full, |stop| stop.0))
-    }
-
-    /// A bound of what component i moves until `end`.
-    fn reach(&self, i: usize, end: f64) -> f64 {
-        let series = self.state[i].iter().skip(1).rev();
-        end * series.fold(0.0, |sum, c| sum * end + c.abs())
     }
 
     /// direction * (u_i - level) over time.

@@ -1,7 +1,7 @@
 //! Hidden dynamics where one component at most is within the transition, in closed form.
 
 use super::first_zero::falling_zero;
-use crate::cube::NormalFields;
+use crate::cube::{NormalFields, Vector};
 
 /// The component within the transition: s' = alpha + beta s. Without one all velocities are constant, and these are 0.
 #[derive(Clone, Copy, Debug, Default)]
@@ -28,22 +28,13 @@ pub(super) fn pass(
     watched: Option<(usize, f64)>,
 ) -> Option<f64> {
     let free = sides.iter().position(|&side| side == 0);
-    let mut lambda: Vec<f64> = sides.iter().map(|&side| f64::from(side)).collect();
-    let middle = fields.interpolate(&lambda);
-    let (mut inner, mut slopes) = (Inner::default(), None);
+    let centre: Vector = sides.iter().map(|&side| f64::from(side)).collect();
+    let (middle, mut slopes) = (fields.interpolate(&centre), Vector::new());
+    let mut inner = Inner::default();
     if let Some(i) = free {
-        let column = fields.derivative(&lambda, i);
-        (inner.s, inner.alpha, inner.beta) = (u[i], middle[i], column[i]);
-        slopes = Some(column);
+        slopes = fields.derivative(&centre, i);
+        (inner.s, inner.alpha, inner.beta) = (u[i], middle[i], slopes[i]);
     }
-    let outer = |i: usize| {
-        let side = f64::from(sides[i]);
-        Outer {
-            w: side * u[i] - 1.0,
-            p: side * middle[i],
-            q: slopes.as_ref().map_or(0.0, |q| side * q[i]),
-        }
-    };
     let velocity = inner.velocity();
     let mut border = 1.0_f64.copysign(velocity);
     if let Some((_, level)) = watched.filter(|watched| free == Some(watched.0)) {
@@ -51,32 +42,39 @@ pub(super) fn pass(
         border = if is_ahead { level } else { border };
     }
     let end = inner.time_to(border);
-    let limit = match (end.is_finite(), velocity == 0.0) {
-        (true, _) => border,
-        (false, true) => inner.s,
-        (false, false) => -inner.alpha / inner.beta,
+    let limit = if end.is_finite() {
+        border
+    } else if velocity == 0.0 {
+        inner.s
+    } else {
+        -inner.alpha / inner.beta
     };
-    let clipped = || (0..u.len()).filter(|&i| sides[i] != 0);
-    let times = clipped().map(|i| (outer(i).time_to_zero(&inner, end, limit), i));
+    let clipped = (0..u.len()).filter(|&i| sides[i] != 0);
+    let outer = |i: usize, u: f64| Outer {
+        w: centre[i] * u - 1.0,
+        p: centre[i] * middle[i],
+        q: slopes.get(i).map_or(0.0, |slope| centre[i] * slope),
+    };
+    let times = clipped
+        .clone()
+        .map(|i| (outer(i, u[i]).time_to_zero(&inner, end, limit), i));
     let first = times.min_by(|a, b| a.0.total_cmp(&b.0));
     let first = first.filter(|first| first.0.is_finite() && first.0 <= end);
     let time = first.map_or(end, |first| first.0);
-    for i in clipped() {
-        let w = match time.is_finite() {
-            true => outer(i).at(&inner, time).max(0.0),
-            false => outer(i).w,
-        };
-        lambda[i] *= if first.is_some_and(|first| first.1 == i) {
-            1.0
-        } else {
-            1.0 + w
-        };
-    }
     if let Some(i) = free {
-        lambda[i] = first.map_or(limit, |_| inner.at(time));
+        u[i] = first.map_or(limit, |_| inner.at(time));
     }
-    u.copy_from_slice(&lambda);
-    time.is_finite().then_some(time)
+    if time == f64::INFINITY {
+        return None;
+    }
+    for i in clipped {
+        let w = match first.is_some_and(|first| first.1 == i) {
+            true => 0.0,
+            false => outer(i, u[i]).at(&inner, time).max(0.0),
+        };
+        u[i] = centre[i] * (1.0 + w);
+    }
+    Some(time)
 }
 
 impl Inner {

@@ -8,6 +8,11 @@ use crate::tolerances::{NEWTON_DONE, ZERO_SEARCHES};
 /// Intervals are excluded, or found to be monotone, by a bound of the derivative, and halved
 /// otherwise: no pair of zeros is lost, except one nearer together than rounding. `tests` counts them.
 pub(super) fn first_loss(p: &[f64], end: f64, tests: &mut usize) -> Option<f64> {
+    // Most motions do not come near.
+    let change = p[1..].iter().rev().fold(0.0, |sum, c| sum * end + c.abs()) * end;
+    if p[0] > change {
+        return None;
+    }
     let p = if p[0] > 0.0 { p } else { &p[1..] };
     if p[0] < 0.0 {
         return Some(0.0);
@@ -16,44 +21,30 @@ pub(super) fn first_loss(p: &[f64], end: f64, tests: &mut usize) -> Option<f64> 
     for _ in 0..ZERO_SEARCHES {
         let (a, b) = pending.pop()?;
         *tests += 1;
-        match look(p, a, b, end) {
-            Look::Nothing => {}
-            Look::Zero => return Some(falling_zero(a, b, |t| (value(p, t), derivative(p, t)))),
-            Look::Unclear => {
+        match has_zero(p, a, b, end) {
+            Some(false) => {}
+            Some(true) => return Some(falling_zero(a, b, |t| (value(p, t), derivative(p, t)))),
+            None => {
                 let middle = 0.5 * (a + b);
-                pending.push((middle, b));
-                pending.push((a, middle));
+                pending.extend([(middle, b), (a, middle)]);
             }
         }
     }
     None
 }
 
-enum Look {
-    Nothing,
-    Zero,
-    Unclear,
-}
-
-/// p(a) >= 0 is known. The derivative at the middle and a bound of the second one settle most
-/// intervals.
-fn look(p: &[f64], a: f64, b: f64, end: f64) -> Look {
+/// Does p become negative in [a, b]? Known is p(a) >= 0; the derivative at the middle and a bound of the second one
+/// settle most intervals.
+fn has_zero(p: &[f64], a: f64, b: f64, end: f64) -> Option<bool> {
     let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
     let slope = derivative(p, middle);
     let bend = bound_of_second_derivative(p, b);
     let lowest = value(p, middle) - slope.abs() * half - 0.5 * bend * half * half;
     if lowest > 0.0 {
-        return Look::Nothing;
+        return Some(false);
     }
-    let monotone = slope.abs() > bend * half;
-    if monotone || b - a <= NEWTON_DONE * end {
-        return if value(p, b) < 0.0 {
-            Look::Zero
-        } else {
-            Look::Nothing
-        };
-    }
-    Look::Unclear
+    let is_monotone = slope.abs() > bend * half;
+    (is_monotone || b - a <= NEWTON_DONE * end).then(|| value(p, b) < 0.0)
 }
 
 /// The zero of a function that falls from `a` to `b`, from its values with their derivatives: Newton's steps that stay

@@ -94,14 +94,13 @@ fn for_ever(fields: &NormalFields, sides: &[i8], u: &[f64]) -> Outcome {
     let holds = sides.len() == 2 || inner.is_none_or(attracts);
     let is_at_rest = velocity.iter().all(|&v| v == 0.0);
     match inner {
-        Some(i)
-            if holds && (sides.len() == 1 || !is_at_rest) && !(0..sides.len()).any(comes_back) =>
-        {
+        _ if (0..sides.len()).any(comes_back) => Outcome::Unknown,
+        Some(i) if holds && (sides.len() == 1 || !is_at_rest) => {
             sliding(sides.to_vec(), vec![u[i]])
         }
         _ if is_at_rest => Outcome::AtRest,
-        None if !(0..sides.len()).any(comes_back) => Outcome::Region(Mode::new(sides.to_vec())),
-        _ => Outcome::Unknown,
+        None => Outcome::Region(Mode::new(sides.to_vec())),
+        Some(_) => Outcome::Unknown,
     }
 }
 
