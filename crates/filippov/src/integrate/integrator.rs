@@ -20,7 +20,7 @@ use crate::error::{Error, FieldError};
 use crate::error_scale::ErrorScale;
 use crate::event::search::{Detector, StepSearch};
 use crate::event::{Event, Found, UserEvents, TICK};
-use crate::integrate::problem::Problem;
+use crate::integrate::problem::{check, Problem};
 use crate::integrate::progress::Progress;
 use crate::integrate::watch::Watch;
 use crate::mode::Mode;
@@ -78,7 +78,7 @@ impl<'a> Integrator<'a> {
             events,
             actions,
         } = problem;
-        crate::integrate::start::check(&problem)?;
+        check(&problem)?;
         let n = system.n_states();
         let undecided = Mode::new(vec![1; system.n_surfaces()]);
         Ok(Integrator {

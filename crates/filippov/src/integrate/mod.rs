@@ -3,7 +3,7 @@
 mod integrator;
 mod problem;
 mod progress;
-mod start;
+mod solve;
 mod transition;
 mod watch;
 

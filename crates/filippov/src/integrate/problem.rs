@@ -2,14 +2,10 @@
 
 use std::sync::LazyLock;
 
-use super::Integrator;
 use crate::error::Error;
 use crate::event::UserEvent;
 use crate::options::Options;
-use crate::record::section::{Place, Section};
-use crate::record::Solution;
-use crate::status::Stop;
-use crate::system::{Actions, PiecewiseSystem};
+use crate::system::{Actions, PiecewiseSystem, Trigger};
 
 static DEFAULTS: LazyLock<Options> = LazyLock::new(Options::default);
 static NO_ACTIONS: Actions = Actions::none();
@@ -84,90 +80,98 @@ impl<'a> Problem<'a> {
     pub fn actions(self, actions: &'a Actions<'a>) -> Self {
         Problem { actions, ..self }
     }
+}
 
-    /// Integrates to the end.
-    ///
-    /// # Errors
-    /// If an argument is out of range. A failure during the run is no error: the solution up to there
-    /// comes back with its [`Stop`].
-    pub fn solve(self) -> Result<Solution, Error> {
-        self.solve_interruptible(&mut |_| false)
+/// Checks the arguments of a run.
+pub(super) fn check(problem: &Problem) -> Result<(), Error> {
+    let Problem {
+        system,
+        t_span: (t0, t1),
+        y0,
+        options,
+        actions,
+        ..
+    } = *problem;
+    let n = system.n_states();
+    if y0.len() != n {
+        return Err(Error::WrongLength {
+            name: "y0",
+            found: y0.len(),
+            expected: n,
+        });
     }
-
-    /// As [`solve`](Self::solve); `interrupt` is asked every few steps, and during long decisions, with the time reached, and the
-    /// run stops where it says `true`.
-    ///
-    /// # Errors
-    /// As [`solve`](Self::solve).
-    pub fn solve_interruptible(
-        self,
-        interrupt: &mut dyn FnMut(f64) -> bool,
-    ) -> Result<Solution, Error> {
-        let mut solution = Integrator::new(self)?.interruptible(interrupt).solve();
-        let wanted = self.options.t_eval.as_ref();
-        let resampled = wanted
-            .filter(|_| solution.is_dense())
-            .map(|times| solution.resample(self.system, times));
-        if let Some(Err(raised)) = resampled {
-            solution.stop = Stop::FieldRaised(raised);
+    if options.atol.len() != 1 && options.atol.len() != n {
+        return Err(Error::WrongLength {
+            name: "atol",
+            found: options.atol.len(),
+            expected: n,
+        });
+    }
+    let require = |name, value: f64, holds: bool, requirement| {
+        if holds {
+            Ok(())
+        } else {
+            Err(Error::OutOfRange {
+                name,
+                value,
+                requirement,
+            })
         }
-        Ok(solution)
+    };
+    require("t_span[0]", t0, t0.is_finite(), "must be finite")?;
+    require(
+        "t_span[1]",
+        t1,
+        t1.is_finite() && t1 >= t0,
+        "must be finite and not before t_span[0]",
+    )?;
+    for &y in y0 {
+        require("y0", y, y.is_finite(), "must be finite")?;
     }
-
-    /// Integrates until a section was met as often as it asks for, its returns are periodic, or the end of the span;
-    /// [`Solution::returns`](crate::Solution::returns) are the returns. The function of the section takes the place of the events.
-    ///
-    /// # Example
-    ///
-    /// The forced oscillator with dry friction, once per period of the forcing (Piiroinen and Kuznetsov 2008, Fig. 4).
-    ///
-    /// ```
-    /// use filippov::action::Clock;
-    /// use filippov::section::{Place, Section};
-    /// use filippov::{ClosureSystem, Problem};
-    ///
-    /// let oscillator = ClosureSystem::new(
-    ///     2,
-    ///     1,
-    ///     |t, x, s, dx| (dx[0], dx[1]) = (x[1], -x[0] + (t / 3.0).sin() - 0.4 * s[0]),
-    ///     |_t, x, h| h[0] = x[1],
-    /// );
-    /// let clock = Clock { period: 6.0 * std::f64::consts::PI, phase: 0.0 };
-    /// let section = Section { place: Place::Ticks(clock), transient: 20, most: 2, cycle: None };
-    /// let problem = Problem::new(&oscillator, (0.0, 1e3), &[1.0, 2.0]);
-    /// let solution = problem.solve_to_section(&section, &mut |_| false)?;
-    /// let returns = solution.returns.expect("there is a section");
-    /// assert_eq!((returns.count, returns.kept.len()), (22, 2));
-    /// assert!((returns.kept[1].y[1] - 0.3570302433858536).abs() < 1e-5);
-    /// # Ok::<(), filippov::Error>(())
-    /// ```
-    ///
-    /// # Errors
-    /// As [`solve`](Self::solve).
-    pub fn solve_to_section(
-        self,
-        section: &Section,
-        interrupt: &mut dyn FnMut(f64) -> bool,
-    ) -> Result<Solution, Error> {
-        let function = match section.place {
-            Place::Function {
-                function,
-                direction,
-            } => Some(UserEvent {
-                function,
-                direction,
-                terminal: 0,
-            }),
-            _ => None,
-        };
-        if let Place::Ticks(clock) = section.place {
-            clock.check("period of the section", "offset of the section")?;
+    for &a in &options.atol {
+        require("atol", a, a >= 0.0 && a.is_finite(), "must not be negative")?;
+    }
+    require(
+        "rtol",
+        options.rtol,
+        options.rtol > 0.0 && options.rtol.is_finite(),
+        "must be positive",
+    )?;
+    require(
+        "max_step",
+        options.max_step,
+        options.max_step > 0.0,
+        "must be positive",
+    )?;
+    if let Some(factor) = options.stabilization.restoring() {
+        require(
+            "stabilization",
+            factor,
+            factor > 0.0 && factor.is_finite(),
+            "must be positive",
+        )?;
+    }
+    for action in &actions.list {
+        if let Trigger::Clock { clock, .. } = action.trigger {
+            clock.check("period", "phase")?;
         }
-        let mut integrator = Integrator::new(Problem {
-            events: function.as_slice(),
-            ..self
-        })?;
-        integrator.recorder.observe(section, self.t_span.0);
-        Ok(integrator.interruptible(interrupt).solve())
+        if let Trigger::Surface { index, .. } = action.trigger {
+            if index >= system.n_surfaces() {
+                return Err(Error::OutOfRange {
+                    name: "actions",
+                    value: index as f64,
+                    requirement: "must be the index of a surface",
+                });
+            }
+        }
     }
+    if let Some(first) = options.first_step {
+        require(
+            "first_step",
+            first,
+            first > 0.0 && first.is_finite(),
+            "must be positive",
+        )?;
+    }
+    Ok(())
 }
