@@ -18,7 +18,7 @@ use super::lie::Leading;
 use crate::error::FieldError;
 use crate::mode::Signs;
 use crate::system::{LieValue, PiecewiseSystem};
-use crate::tolerances::{DOUBTFUL, MAX_LIE_ORDER, MOST_HALVINGS, TANGENT};
+use crate::tolerances::{AT_SIDE, DOUBTFUL, MAX_LIE_ORDER, MOST_HALVINGS, TANGENT};
 
 /// A sliding motion through a two-fold. It starts there if it attracts. If it repels it is a solution too, but one that may
 /// leave to either side at any time.
@@ -168,12 +168,9 @@ impl<'s> TwoFold<'s> {
             if is_region {
                 continue;
             }
-            // Beside it the quotient may lead away from the motion.
-            let wanted = match minus.order.max(plus.order) {
-                ..=1 => 2,
-                _ => usize::MAX,
-            };
-            while lambda.len() < wanted && self.continue_series(&mut lambda)? {}
+            if minus.order.max(plus.order) > 1 || self.neighbours_leave(lambda[0])? {
+                while self.continue_series(&mut lambda)? {}
+            }
             let mut series = [0.0; MAX_LIE_ORDER];
             let n_known = lambda.len().min(series.len());
             series[..n_known].copy_from_slice(&lambda[..n_known]);
@@ -186,6 +183,16 @@ impl<'s> TwoFold<'s> {
             });
         }
         Ok(found)
+    }
+
+    /// Do motions with other multipliers near this one move away from it? Then the quotient does not keep to it: with U its value
+    /// along a motion of constant multiplier, t dlambda/dt = U - lambda.
+    fn neighbours_leave(&mut self, lambda: f64) -> Result<bool, FieldError> {
+        let Some(length) = self.first_length()? else {
+            return Ok(false);
+        };
+        let of = |lambda: f64| self.own.coefficient(EMPTY, length, &[lambda]).value;
+        Ok(of(lambda + AT_SIDE) > of(lambda - AT_SIDE))
     }
 
     /// The first derivative of h_i that does not vanish along a motion; order 0 if none is known.
