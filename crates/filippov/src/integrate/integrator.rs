@@ -172,10 +172,12 @@ impl<'a> Integrator<'a> {
         if remaining <= 0.0 {
             return self.reach_horizon();
         }
-        let t_end = self.t_end;
-        let (mut at, stepper, control) = self.step_start();
-        if let Some(warning) = control.prepare(&mut at, stepper, t_end)? {
-            self.warnings.push(*warning);
+        if self.stepper.is_to_prepare() {
+            let t_end = self.t_end;
+            let (mut at, stepper, control) = self.step_start();
+            if let Some(warning) = control.prepare(&mut at, stepper, t_end)? {
+                self.warnings.push(*warning);
+            }
         }
         let room = (remaining, self.horizon >= self.t_end);
         let dt = self.control.next(&self.motion, room, self.options.max_step);
@@ -201,6 +203,7 @@ impl<'a> Integrator<'a> {
         let sliding = !self.motion.sliding().is_empty();
         let (mut at, stepper, _) = self.step_start();
         let attempt = stepper.attempt(&mut at, dt)?;
+        // The method may have made it shorter.
         let dt = self.stepper.interpolant().dt;
         match attempt {
             Attempt::NotFinite => {
@@ -284,9 +287,9 @@ impl<'a> Integrator<'a> {
             _ => true,
         };
         let (step, remains) = ((self.t, dt), self.horizon - self.t);
-        let (warning, chatter) =
-            self.control
-                .look_for_jumps(&self.stepper, step, remains, may_bend);
+        let control = &mut self.control;
+        let warning = control.look_for_jump(&self.stepper, step, remains, may_bend);
+        let chatter = control.look_for_chatter(&self.stepper, dt);
         if let Some(warning) = warning {
             self.warnings.push(*warning);
         }
@@ -304,8 +307,11 @@ impl<'a> Integrator<'a> {
             self.recorder
                 .step(self.stepper.interpolant(), t1, self.stepper.end());
             let zero = self.zero_surface(t1)?;
-            let (mut at, stepper, control) = self.step_start();
-            let stiffness = control.look_for_stiffness(&mut at, stepper)?;
+            let mut stiffness = Stiff::Nothing;
+            if self.control.stiffness_is_due(self.stats.n_steps) {
+                let (mut at, stepper, control) = self.step_start();
+                stiffness = control.look_for_stiffness(&mut at, stepper)?;
+            }
             self.stepper.accept(&mut self.x);
             self.t = t1;
             if let Stiff::Warning(warning) = stiffness {
@@ -342,6 +348,7 @@ impl<'a> Integrator<'a> {
     }
 
     /// The start of the next step, the methods, and the control of the step.
+    #[inline(always)]
     pub(super) fn step_start(&mut self) -> (StepStart<'_, 'a>, &mut Steppers, &mut StepControl) {
         let start = StepStart {
             system: self.system,

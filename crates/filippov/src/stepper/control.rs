@@ -70,6 +70,7 @@ impl StepControl {
     ///
     /// # Errors
     /// If a function of the user raises.
+    #[inline(always)]
     pub fn begin(
         &mut self,
         at: &mut StepStart,
@@ -147,7 +148,7 @@ impl StepControl {
     ///
     /// # Errors
     /// If a function of the user raises.
-    #[inline]
+    #[inline(always)]
     pub fn prepare(
         &mut self,
         at: &mut StepStart,
@@ -168,6 +169,7 @@ impl StepControl {
 
     /// The length of the next step, at most `max_step` and the time that `remains` up to the next known time, which is the end
     /// of the run or not.
+    #[inline(always)]
     pub fn next(
         &mut self,
         motion: &CurrentMotion,
@@ -246,7 +248,7 @@ impl StepControl {
     }
 
     /// After a step with this error was accepted.
-    #[inline]
+    #[inline(always)]
     pub fn accept(&mut self, steppers: &Steppers, dt: f64, error: f64) {
         self.n_aims = 0;
         let next = steppers.after_acceptance(&mut self.controller, dt, error);
@@ -254,64 +256,52 @@ impl StepControl {
     }
 
     /// The field ends beyond the accepted step of length `dt` if the next one may only be as long as `longest`.
-    #[inline]
+    #[inline(always)]
     pub fn note_edge(&mut self, longest: f64, dt: f64) {
         self.one_sided = longest < dt;
         self.dt = self.dt.min(longest);
     }
 
-    /// Looks at an accepted step from `t` of length `dt`: a warning if the field jumps over a step far shorter than its
-    /// predecessors and than the time that `remains`; the end of the run if the motion chatters along such jumps. The field
-    /// of some motions bends like a jump.
-    #[inline]
-    pub fn look_for_jumps(
+    /// Looks at an accepted step from `t` of length `dt`: warns if the field jumps over a step far shorter than its
+    /// predecessors and than the time that `remains`. The field of some motions bends like a jump.
+    #[inline(always)]
+    pub fn look_for_jump(
         &mut self,
         steppers: &Steppers,
         (t, dt): (f64, f64),
         remains: f64,
         may_bend: bool,
-    ) -> (Option<Box<Warning>>, Option<Stop>) {
+    ) -> Option<Box<Warning>> {
         let is_short = dt < JUMP_SHRINK * self.recent && dt < remains;
         let mut warning = None;
         if is_short && !may_bend && !self.meets_edges && steppers.field_jumps() {
-            warning = Some(Box::new(Warning {
-                t: t + dt,
-                code: WarningCode::UndeclaredJump,
-                text: "the right-hand side jumps here and no surface is declared; give its switching function in \
-                       surfaces="
-                    .into(),
-                candidates: Vec::new(),
-                surfaces: Vec::new(),
-                rule: "",
-            }));
+            warning = Some(undeclared_jump(t + dt));
             self.chatter.suspect(t, self.recent);
             self.recent = 0.0;
         }
         self.recent = dt.max(0.98 * self.recent);
-        let stop = self.chatter.note_step(dt, || steppers.field_jumps());
-        (warning, stop)
+        warning
     }
 
-    /// Looks for stiffness in an accepted step, the last of so many.
+    /// The end of the run if the motion chatters along jumps of the field, the accepted step being this long.
+    #[inline(always)]
+    pub fn look_for_chatter(&mut self, steppers: &Steppers, dt: f64) -> Option<Stop> {
+        self.chatter.note_step(dt, || steppers.field_jumps())
+    }
+
+    /// Is the step after that many accepted ones to be looked at for stiffness?
+    #[inline(always)]
+    pub fn stiffness_is_due(&self, n_steps: u64) -> bool {
+        self.stiffness.is_due(n_steps)
+    }
+
+    /// Looks for stiffness in an accepted step.
     ///
     /// # Errors
     /// If a function of the user raises.
-    #[inline(always)]
-    pub fn look_for_stiffness(
-        &mut self,
-        at: &mut StepStart,
-        steppers: &mut Steppers,
-    ) -> Result<Stiff, FieldError> {
-        if self.stiffness.is_due(at.stats.n_steps) {
-            self.look_at_step(at, steppers)
-        } else {
-            Ok(Stiff::Nothing)
-        }
-    }
-
     #[cold]
     #[inline(never)]
-    fn look_at_step(
+    pub fn look_for_stiffness(
         &mut self,
         at: &mut StepStart,
         steppers: &mut Steppers,
@@ -348,6 +338,20 @@ impl StepControl {
         steppers.go_on_implicitly(at);
         self.controller.restart();
     }
+}
+
+#[cold]
+fn undeclared_jump(t: f64) -> Box<Warning> {
+    Box::new(Warning {
+        t,
+        code: WarningCode::UndeclaredJump,
+        text: "the right-hand side jumps here and no surface is declared; give its switching function in \
+               surfaces="
+            .into(),
+        candidates: Vec::new(),
+        surfaces: Vec::new(),
+        rule: "",
+    })
 }
 
 /// Predicted time to the next zero of what is monitored.

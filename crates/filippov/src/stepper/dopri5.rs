@@ -273,6 +273,7 @@ impl Dopri5 {
     }
 
     /// As [`Stepper::attempt`]; for the field of a region, and of sliding on one surface, without calls by a table.
+    #[inline(always)]
     pub(super) fn attempt_by_kind(
         &mut self,
         at: &mut StepStart,
@@ -295,7 +296,7 @@ impl Dopri5 {
 }
 
 impl Stepper for Dopri5 {
-    #[inline]
+    #[inline(always)]
     fn step(&self) -> &Step {
         &self.step
     }
@@ -324,14 +325,17 @@ impl Stepper for Dopri5 {
         scale.norm(&defect, &self.step.end)
     }
 
+    #[inline]
     fn extends_freely(&self) -> bool {
         false
     }
 
+    #[inline]
     fn is_extended(&self) -> bool {
         self.has_order5()
     }
 
+    #[inline]
     fn extend_cheaply(&mut self, y: &[f64]) {
         self.extend_order4(y);
     }

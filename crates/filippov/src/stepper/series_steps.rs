@@ -40,6 +40,7 @@ impl Taylor {
 
     /// Takes the coefficients at the start of a step, under the signs of the motion or under others; returns the length of
     /// step that they allow.
+    #[inline(always)]
     fn expand_motion(&mut self, at: &StepStart, jets: &MotionJets, signs: Option<&[f64]>) -> f64 {
         let (system, t, x) = (at.system, at.t, at.x);
         let signs = signs.unwrap_or(&at.motion.signs);
@@ -147,7 +148,7 @@ impl Taylor {
 }
 
 impl Stepper for Taylor {
-    #[inline]
+    #[inline(always)]
     fn step(&self) -> &Step {
         &self.step
     }
@@ -156,6 +157,7 @@ impl Stepper for Taylor {
         &mut self.step
     }
 
+    #[inline(always)]
     fn attempt(&mut self, at: &mut StepStart, dt: f64) -> Result<Option<Attempt>, FieldError> {
         let attempt = self.attempt_along(&mut at.motion.field, at.t, at.x, dt, at.scale)?;
         observer(at.seen)(&at.motion.field);
@@ -166,6 +168,7 @@ impl Stepper for Taylor {
         self.error_beyond(theta)
     }
 
+    #[inline(always)]
     fn begin(&mut self, at: &mut StepStart) -> Ready {
         (self.series.jets, self.series.reach) = (None, None);
         let (system, motion, order) = (at.system, &mut *at.motion, self.order());
@@ -197,6 +200,7 @@ impl Stepper for Taylor {
 
     /// In a region the derivative is the first coefficient. Sliding starts with its field: next to a two-fold its series is
     /// not accurate.
+    #[inline(always)]
     fn start(&mut self, at: &mut StepStart) -> bool {
         if !at.motion.sliding.is_empty() {
             return false;
@@ -230,6 +234,7 @@ impl Stepper for Taylor {
         &mut self.step.start_derivative
     }
 
+    #[inline(always)]
     fn prepare(&mut self, at: &mut StepStart) -> Result<Ready, FieldError> {
         let allowed = match self.series.reach.take() {
             Some(allowed) => allowed,
@@ -253,16 +258,19 @@ impl Stepper for Taylor {
         })
     }
 
+    #[inline(always)]
     fn accept(&mut self, y: &mut [f64]) {
         self.step.accept(y);
         self.forget();
     }
 
+    #[inline(always)]
     fn count(&self, stats: &mut Stats) {
         stats.n_steps_taylor += 1;
     }
 
     /// As long as the next series allows.
+    #[inline(always)]
     fn after_acceptance(&self, _: &mut Controller, _: f64, _: f64) -> f64 {
         f64::INFINITY
     }
@@ -271,10 +279,12 @@ impl Stepper for Taylor {
         self.reject(error)
     }
 
+    #[inline(always)]
     fn is_series(&self) -> bool {
         true
     }
 
+    #[inline(always)]
     fn exit_series(&self, index: usize, rows: &mut [f64]) -> Option<ExitSeries> {
         let jets = self.series.jets.as_ref()?;
         self.column(jets.exit(index)?, rows);

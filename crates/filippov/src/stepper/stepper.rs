@@ -122,34 +122,41 @@ pub(crate) trait Stepper {
     }
 
     /// Makes the end of the attempted step the start of the next one.
+    #[inline]
     fn accept(&mut self, y: &mut [f64]) {
         self.step_mut().accept(y);
     }
 
     /// Counts a step that is accepted.
+    #[inline]
     fn count(&self, _: &mut Stats) {}
 
     /// The next step after one of length `dt` with this error was accepted.
+    #[inline]
     fn after_acceptance(&self, controller: &mut Controller, dt: f64, error: f64) -> f64 {
         dt * controller.accept(error)
     }
 
     /// The factor for another attempt after one with this error was rejected.
+    #[inline]
     fn after_rejection(&self, controller: &mut Controller, error: f64) -> f64 {
         controller.reject(error)
     }
 
     /// Is the accurate extension there as soon as the step is, as a polynomial in powers of theta?
+    #[inline]
     fn extends_freely(&self) -> bool {
         true
     }
 
     /// Is the accurate extension there?
+    #[inline]
     fn is_extended(&self) -> bool {
         true
     }
 
     /// Makes an extension available that costs no evaluation.
+    #[inline]
     fn extend_cheaply(&mut self, _: &[f64]) {}
 
     /// Makes the extension as accurate as the step.
@@ -162,6 +169,7 @@ pub(crate) trait Stepper {
 
     /// Is the extension the Taylor series of the motion, exact but for rounding near the start of the step? The series
     /// limits the length of the step before it is attempted.
+    #[inline]
     fn is_series(&self) -> bool {
         false
     }
@@ -173,6 +181,7 @@ pub(crate) trait Stepper {
 
     /// Has a step to end at an event? So it is if the extension is less accurate than the end of the step in fast
     /// components.
+    #[inline]
     fn ends_at_events(&self) -> bool {
         false
     }

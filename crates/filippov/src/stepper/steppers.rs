@@ -9,32 +9,180 @@ use crate::stats::Stats;
 use crate::status::Warning;
 use crate::system::PiecewiseSystem;
 
-/// What `options.method` stands for: the methods beside DOPRI5, the first one to be asked first. `span` is the length of
-/// the interval of integration.
-fn methods(options: &Options, system: &dyn PiecewiseSystem, span: f64) -> Vec<Box<dyn Stepper>> {
-    let n = system.n_states();
-    match options.method {
-        Method::Dopri5 => vec![],
-        Method::Dop853 => vec![Box::new(Dop853::new(n))],
-        Method::Midpoint => vec![Box::new(Midpoint::new(n))],
-        Method::Rodas5p => vec![Box::new(Rodas5p::new(n))],
-        Method::Taylor => vec![Box::new(Taylor::of_run(options, system, span))],
-        Method::Auto if system.is_analytic() => {
-            vec![Box::new(Taylor::of_run(options, system, span))]
+/// Makes the enumeration of the methods beside DOPRI5 from their table, and what builds the one that a run asks for.
+macro_rules! methods {
+    (|$options:ident, $system:ident, $span:ident| $($name:ident: $asked:pat $(if $may:expr)? => $built:expr,)*) => {
+        /// The method that is asked before DOPRI5.
+        enum Chosen {
+            $($name(Box<$name>)),*
         }
-        Method::Auto => vec![],
-    }
+
+        impl Chosen {
+            /// What `options.method` stands for; `None` is DOPRI5 alone. `span` is the length of the interval of integration.
+            fn of_run(
+                $options: &Options,
+                $system: &dyn PiecewiseSystem,
+                $span: f64,
+            ) -> Option<Self> {
+                match $options.method {
+                    $($asked $(if $may)? => Some(Chosen::$name(Box::new($built))),)*
+                    _ => None,
+                }
+            }
+        }
+
+        // The compiler knows all methods: a step of few states costs little more than these calls.
+        impl Stepper for Chosen {
+            #[inline(always)]
+            fn step(&self) -> &Step {
+                match self { $(Chosen::$name(method) => method.step()),* }
+            }
+
+            #[inline(always)]
+            fn step_mut(&mut self) -> &mut Step {
+                match self { $(Chosen::$name(method) => method.step_mut()),* }
+            }
+
+            #[inline(always)]
+            fn attempt(&mut self, at: &mut StepStart, dt: f64) -> Result<Option<Attempt>, FieldError> {
+                match self { $(Chosen::$name(method) => method.attempt(at, dt)),* }
+            }
+
+            #[inline(always)]
+            fn extrapolation_error(&self, theta: f64, scale: &ErrorScale) -> f64 {
+                match self { $(Chosen::$name(method) => method.extrapolation_error(theta, scale)),* }
+            }
+
+            #[inline(always)]
+            fn begin(&mut self, at: &mut StepStart) -> Ready {
+                match self { $(Chosen::$name(method) => method.begin(at)),* }
+            }
+
+            #[inline(always)]
+            fn start(&mut self, at: &mut StepStart) -> bool {
+                match self { $(Chosen::$name(method) => method.start(at)),* }
+            }
+
+            #[inline(always)]
+            fn started(&mut self, at: &mut StepStart) -> Ready {
+                match self { $(Chosen::$name(method) => method.started(at)),* }
+            }
+
+            #[inline(always)]
+            fn start_derivative_mut(&mut self) -> &mut [f64] {
+                match self { $(Chosen::$name(method) => method.start_derivative_mut()),* }
+            }
+
+            #[inline(always)]
+            fn prepare(&mut self, at: &mut StepStart) -> Result<Ready, FieldError> {
+                match self { $(Chosen::$name(method) => method.prepare(at)),* }
+            }
+
+            #[inline(always)]
+            fn accept(&mut self, y: &mut [f64]) {
+                match self { $(Chosen::$name(method) => method.accept(y)),* }
+            }
+
+            #[inline(always)]
+            fn count(&self, stats: &mut Stats) {
+                match self { $(Chosen::$name(method) => method.count(stats)),* }
+            }
+
+            #[inline(always)]
+            fn after_acceptance(&self, controller: &mut Controller, dt: f64, error: f64) -> f64 {
+                match self { $(Chosen::$name(method) => method.after_acceptance(controller, dt, error)),* }
+            }
+
+            #[inline(always)]
+            fn after_rejection(&self, controller: &mut Controller, error: f64) -> f64 {
+                match self { $(Chosen::$name(method) => method.after_rejection(controller, error)),* }
+            }
+
+            #[inline(always)]
+            fn extends_freely(&self) -> bool {
+                match self { $(Chosen::$name(method) => method.extends_freely()),* }
+            }
+
+            #[inline(always)]
+            fn is_extended(&self) -> bool {
+                match self { $(Chosen::$name(method) => method.is_extended()),* }
+            }
+
+            #[inline(always)]
+            fn extend_cheaply(&mut self, y: &[f64]) {
+                match self { $(Chosen::$name(method) => method.extend_cheaply(y)),* }
+            }
+
+            #[inline(always)]
+            fn extend(&mut self, field: &mut dyn SmoothField, y: &[f64]) -> Result<(), FieldError> {
+                match self { $(Chosen::$name(method) => method.extend(field, y)),* }
+            }
+
+            #[inline(always)]
+            fn is_series(&self) -> bool {
+                match self { $(Chosen::$name(method) => method.is_series()),* }
+            }
+
+            #[inline(always)]
+            fn exit_series(&self, index: usize, rows: &mut [f64]) -> Option<ExitSeries> {
+                match self { $(Chosen::$name(method) => method.exit_series(index, rows)),* }
+            }
+
+            #[inline(always)]
+            fn ends_at_events(&self) -> bool {
+                match self { $(Chosen::$name(method) => method.ends_at_events()),* }
+            }
+
+            #[inline(always)]
+            fn field_jumps(&self) -> bool {
+                match self { $(Chosen::$name(method) => method.field_jumps()),* }
+            }
+
+            #[inline(always)]
+            fn is_limited_by_stability(&mut self, at: &mut StepStart) -> Result<Option<bool>, FieldError> {
+                match self { $(Chosen::$name(method) => method.is_limited_by_stability(at)),* }
+            }
+        }
+    };
+}
+
+/// Does the run use Taylor series?
+fn uses_series(options: &Options, system: &dyn PiecewiseSystem) -> bool {
+    options.method == Method::Taylor || system.is_analytic()
+}
+
+methods! { |options, system, span|
+    Taylor: Method::Taylor | Method::Auto if uses_series(options, system) => Taylor::of_run(options, system, span),
+    Dop853: Method::Dop853 => Dop853::new(system.n_states()),
+    Midpoint: Method::Midpoint => Midpoint::new(system.n_states()),
+    Rodas5p: Method::Rodas5p => Rodas5p::new(system.n_states()),
+}
+
+/// Calls a method of the stepper in use; that of DOPRI5 is known to the compiler.
+macro_rules! of_method_in_use {
+    (mut $self:ident.$name:ident($($argument:expr),*)) => {
+        match &mut $self.chosen {
+            Some(method) if $self.takes_step => method.$name($($argument),*),
+            _ => $self.dopri5.$name($($argument),*),
+        }
+    };
+    ($self:ident.$name:ident($($argument:expr),*)) => {
+        match &$self.chosen {
+            Some(method) if $self.takes_step => method.$name($($argument),*),
+            _ => $self.dopri5.$name($($argument),*),
+        }
+    };
 }
 
 /// The methods of a run. DOPRI5 is always there: it takes over if another method cannot go on.
 pub(crate) struct Steppers {
     dopri5: Dopri5,
-    /// The others, the first one to be asked first.
-    methods: Vec<Box<dyn Stepper>>,
-    /// The one of them that integrates the present motion.
-    of_motion: Option<usize>,
-    /// The one of them that takes the step.
-    in_use: Option<usize>,
+    /// The other one, if the run has one.
+    chosen: Option<Chosen>,
+    /// That one integrates the present motion.
+    takes_motion: bool,
+    /// It takes the step.
+    takes_step: bool,
 }
 
 impl Steppers {
@@ -42,74 +190,49 @@ impl Steppers {
     pub fn new(options: &Options, system: &dyn PiecewiseSystem, span: f64) -> Self {
         Steppers {
             dopri5: Dopri5::new(system.n_states()),
-            methods: methods(options, system, span),
-            of_motion: None,
-            in_use: None,
-        }
-    }
-
-    #[inline(always)]
-    fn current(&self) -> &dyn Stepper {
-        match self.in_use {
-            None => &self.dopri5,
-            Some(k) => &*self.methods[k],
-        }
-    }
-
-    #[inline(always)]
-    fn current_mut(&mut self) -> &mut dyn Stepper {
-        match self.in_use {
-            None => &mut self.dopri5,
-            Some(k) => &mut *self.methods[k],
+            chosen: Chosen::of_run(options, system, span),
+            takes_motion: false,
+            takes_step: false,
         }
     }
 
     /// The step of the method in use.
     #[inline(always)]
     fn step(&self) -> &Step {
-        match self.in_use {
-            None => self.dopri5.step(),
-            Some(k) => self.methods[k].step(),
-        }
+        of_method_in_use!(self.step())
     }
 
-    /// Lets a method take the next step.
-    fn go_on_with(&mut self, method: Option<usize>) {
-        if method == self.in_use {
+    /// Hands the next step to the chosen method or to DOPRI5.
+    #[cold]
+    fn hand_over(&mut self, to_chosen: bool) {
+        if to_chosen == self.takes_step {
             return;
         }
         let start = self.start_derivative().to_vec();
-        self.in_use = method;
+        self.takes_step = to_chosen;
         self.start_derivative_mut().copy_from_slice(&start);
     }
 
-    /// Asks the methods in their order for one that integrates the motion that starts; with a warning if the one that the
-    /// user asked for does not.
+    /// A motion starts: the chosen method takes it if it can; with a warning if the user asked for it and it cannot.
     pub fn begin(&mut self, at: &mut StepStart) -> Option<Box<Warning>> {
-        let mut why = None;
-        self.of_motion = None;
-        for (k, method) in self.methods.iter_mut().enumerate() {
-            match method.begin(at) {
-                Ready::NotThisMotion(warning) => why = warning,
-                Ready::UpTo(_) | Ready::NotThisStep => {
-                    self.of_motion = Some(k);
-                    break;
-                }
-            }
-        }
-        self.in_use = self.of_motion;
-        why
+        let (takes_motion, warning) = match self.chosen.as_mut().map(|method| method.begin(at)) {
+            None => (false, None),
+            Some(Ready::NotThisMotion(warning)) => (false, warning),
+            Some(Ready::UpTo(_) | Ready::NotThisStep) => (true, None),
+        };
+        (self.takes_motion, self.takes_step) = (takes_motion, takes_motion);
+        warning
     }
 
     /// Finds the derivative at the start of the motion without its field; `false` if the method does not.
     pub fn start(&mut self, at: &mut StepStart) -> bool {
-        self.current_mut().start(at)
+        of_method_in_use!(mut self.start(at))
     }
 
     /// The field was evaluated at the start of the motion; with a warning if the method that the user asked for does not
     /// integrate it.
     pub fn started(&mut self, at: &mut StepStart) -> Option<Box<Warning>> {
-        match self.current_mut().started(at) {
+        match of_method_in_use!(mut self.started(at)) {
             Ready::NotThisMotion(warning) => {
                 self.leave_motion();
                 warning
@@ -120,24 +243,32 @@ impl Steppers {
 
     /// Leaves the rest of the motion to DOPRI5.
     fn leave_motion(&mut self) {
-        self.of_motion = None;
-        self.go_on_with(None);
+        self.takes_motion = false;
+        self.hand_over(false);
+    }
+
+    /// Does the method of the motion prepare its steps? DOPRI5 has nothing to prepare.
+    #[inline(always)]
+    pub fn is_to_prepare(&self) -> bool {
+        self.takes_motion
     }
 
     /// Prepares the next step: by the method of the motion if it takes this step, else by DOPRI5.
     ///
     /// # Errors
     /// If a function of the user raises.
-    #[inline]
+    #[inline(always)]
     pub fn prepare(&mut self, at: &mut StepStart) -> Result<Ready, FieldError> {
-        let Some(k) = self.of_motion else {
+        if self.takes_motion && !self.takes_step {
+            self.hand_over(true);
+        }
+        let Some(method) = self.chosen.as_mut().filter(|_| self.takes_motion) else {
             return Ok(Ready::ANY);
         };
-        self.go_on_with(self.of_motion);
-        let ready = self.methods[k].prepare(at)?;
+        let ready = method.prepare(at)?;
         match ready {
             Ready::UpTo(_) => {}
-            Ready::NotThisStep => self.go_on_with(None),
+            Ready::NotThisStep => self.hand_over(false),
             Ready::NotThisMotion(_) => self.leave_motion(),
         }
         Ok(ready)
@@ -147,14 +278,14 @@ impl Steppers {
     ///
     /// # Errors
     /// If a function of the user raises.
-    #[inline]
+    #[inline(always)]
     pub fn attempt(&mut self, at: &mut StepStart, dt: f64) -> Result<Attempt, FieldError> {
         at.seen.iter_mut().for_each(Seen::begin);
-        if let Some(k) = self.in_use {
-            if let Some(attempt) = self.methods[k].attempt(at, dt)? {
+        if let Some(method) = self.chosen.as_mut().filter(|_| self.takes_step) {
+            if let Some(attempt) = method.attempt(at, dt)? {
                 return Ok(attempt);
             }
-            self.go_on_with(None);
+            self.hand_over(false);
         }
         self.dopri5.attempt_by_kind(at, dt)
     }
@@ -162,22 +293,25 @@ impl Steppers {
     /// Makes the end of the attempted step the start of the next one.
     #[inline(always)]
     pub fn accept(&mut self, y: &mut [f64]) {
-        self.current_mut().accept(y);
+        of_method_in_use!(mut self.accept(y))
     }
 
     /// Counts a step that is accepted.
+    #[inline]
     pub fn count(&self, stats: &mut Stats) {
-        self.current().count(stats);
+        of_method_in_use!(self.count(stats))
     }
 
     /// The next step after one of length `dt` with this error was accepted.
+    #[inline]
     pub fn after_acceptance(&self, controller: &mut Controller, dt: f64, error: f64) -> f64 {
-        self.current().after_acceptance(controller, dt, error)
+        of_method_in_use!(self.after_acceptance(controller, dt, error))
     }
 
     /// The factor for another attempt after one with this error was rejected.
+    #[inline]
     pub fn after_rejection(&self, controller: &mut Controller, error: f64) -> f64 {
-        self.current().after_rejection(controller, error)
+        of_method_in_use!(self.after_rejection(controller, error))
     }
 
     /// Does stability and not accuracy limit the attempted step, which is accepted? `None` if that is not known, as for a
@@ -189,22 +323,22 @@ impl Steppers {
         &mut self,
         at: &mut StepStart,
     ) -> Result<Option<bool>, FieldError> {
-        if self.in_use != self.of_motion {
+        if self.takes_step != self.takes_motion {
             return Ok(None);
         }
-        self.current_mut().is_limited_by_stability(at)
+        of_method_in_use!(mut self.is_limited_by_stability(at))
     }
 
-    /// Leaves the rest of the motion to the method for stiff motions, and asks it first from now on.
+    /// Leaves the rest of the motion, and the motions after it, to the method for stiff motions.
     #[cold]
     pub fn go_on_implicitly(&mut self, at: &mut StepStart) {
-        let start = self.start_derivative().to_vec();
         let mut rodas5p = Rodas5p::new(at.x.len());
         rodas5p.take(at);
-        rodas5p.start_derivative_mut().copy_from_slice(&start);
-        self.methods.insert(0, Box::new(rodas5p));
-        self.of_motion = Some(0);
-        self.in_use = Some(0);
+        rodas5p
+            .start_derivative_mut()
+            .copy_from_slice(self.start_derivative());
+        self.chosen = Some(Chosen::Rodas5p(Box::new(rodas5p)));
+        (self.takes_motion, self.takes_step) = (true, true);
     }
 
     /// The derivative at the start of the step.
@@ -215,7 +349,7 @@ impl Steppers {
 
     /// The derivative at the start of the step, to be replaced.
     pub fn start_derivative_mut(&mut self) -> &mut [f64] {
-        self.current_mut().start_derivative_mut()
+        of_method_in_use!(mut self.start_derivative_mut())
     }
 
     /// The end of the attempted step.
@@ -237,56 +371,63 @@ impl Steppers {
     }
 
     /// Is the accurate extension there as soon as the step is, as a polynomial in powers of theta?
+    #[inline]
     pub fn extends_freely(&self) -> bool {
-        self.current().extends_freely()
+        of_method_in_use!(self.extends_freely())
     }
 
     /// Is the extension the Taylor series of the motion?
+    #[inline]
     pub fn is_series(&self) -> bool {
-        self.current().is_series()
+        of_method_in_use!(self.is_series())
     }
 
     /// Writes the series of an exit function in powers of theta into `rows`, if the method has one.
     pub fn exit_series(&self, index: usize, rows: &mut [f64]) -> Option<ExitSeries> {
-        self.current().exit_series(index, rows)
+        of_method_in_use!(self.exit_series(index, rows))
     }
 
     /// Has a step to end at an event?
+    #[inline]
     pub fn ends_at_events(&self) -> bool {
-        self.current().ends_at_events()
+        of_method_in_use!(self.ends_at_events())
     }
 
     /// Makes an extension available that costs no evaluation.
+    #[inline]
     pub fn extend_cheaply(&mut self, y: &[f64]) {
-        self.current_mut().extend_cheaply(y);
+        of_method_in_use!(mut self.extend_cheaply(y))
     }
 
     /// Is the extension as accurate as the step?
+    #[inline]
     pub fn is_extended(&self) -> bool {
-        self.current().is_extended()
+        of_method_in_use!(self.is_extended())
     }
 
     /// Makes the extension as accurate as the step.
     ///
     /// # Errors
     /// If a function of the user raises.
+    #[inline]
     pub fn extend(&mut self, field: &mut dyn SmoothField, y: &[f64]) -> Result<(), FieldError> {
-        self.current_mut().extend(field, y)
+        of_method_in_use!(mut self.extend(field, y))
     }
 
     /// Estimated error of the extension beyond the end of the step, in units of the tolerance.
     pub fn extrapolation_error(&self, theta: f64, scale: &ErrorScale) -> f64 {
-        self.current().extrapolation_error(theta, scale)
+        of_method_in_use!(self.extrapolation_error(theta, scale))
     }
 
     /// Does the field jump within the attempted step?
+    #[inline]
     pub fn field_jumps(&self) -> bool {
-        self.current().field_jumps()
+        of_method_in_use!(self.field_jumps())
     }
 
     /// Makes the continuous extension a straight line: the record of a motion that was not stepped.
     pub fn set_straight(&mut self, t: f64, dt: f64, from: &[f64], to: &[f64]) {
-        self.in_use = None;
+        self.takes_step = false;
         self.dopri5.set_straight(t, dt, from, to);
     }
 }

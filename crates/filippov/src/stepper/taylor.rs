@@ -94,6 +94,7 @@ impl Taylor {
 
     /// Takes the coefficients at the start `y` of a step, rows of `width`, that `fill` writes; returns the length
     /// of step that they allow, NaN if they are not finite.
+    #[inline(always)]
     pub fn expand(
         &mut self,
         width: usize,
