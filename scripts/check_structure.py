@@ -29,7 +29,19 @@ ROOMS = (
     ("system",),
     ("cube",),
     ("sparse",),
-    ("mode", "switch", "options", "error", "error_scale", "locate", "tolerances", "patience", "clock", "stats", "vectors"),
+    (
+        "mode",
+        "switch",
+        "options",
+        "error",
+        "error_scale",
+        "locate",
+        "tolerances",
+        "patience",
+        "clock",
+        "stats",
+        "vectors",
+    ),
 )
 LEVEL = {room: level for level, rooms in enumerate(ROOMS) for room in rooms}
 

@@ -4,6 +4,7 @@ import math
 import pickle
 
 import filippov as fl
+import filippov.numpy as fnp
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -118,7 +119,7 @@ SPELLINGS = {
     "divmod": lambda t, x: divmod(t, 0.5)[1],
     "sawtooth": lambda t, x: 0.5 * fl.sawtooth(t, 0.5),
     "array": lambda t, x: np.mod(np.stack([t, x[0]]), 0.5)[0],
-    "fl": lambda t, x: fl.mod(t, 0.5),
+    "fnp": lambda t, x: fnp.mod(t, 0.5),
 }
 
 

@@ -17,6 +17,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import filippov as fl
+import filippov.numpy as fnp
 import numpy as np
 import pytest
 from filippov import prepare
@@ -116,7 +117,7 @@ def reads_module(t: Any, x: Any) -> Any:
 
 def uses_library(t: Any, x: Any, k: float = math.pi) -> Any:
     dx = np.zeros_like(x)
-    dx[0] = fl.sin(x[1]) * np.linalg.norm(x)
+    dx[0] = fnp.sin(x[1]) * np.linalg.norm(x)
     dx[1] = -math.sqrt(k) * np.clip(x[0], -1.0, 1.0) + sum(v for v in x)
     return dx
 
@@ -317,9 +318,9 @@ def test_functions_of_numpy_and_python_replaced(monkeypatch: pytest.MonkeyPatch)
 
 def test_function_of_the_package_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
     def fun(t: Any, x: Any) -> Any:
-        return [fl.sin(x[1]), -x[0]]
+        return [fnp.sin(x[1]), -x[0]]
 
-    check_change(fun, lambda: monkeypatch.setattr(fl, "sin", lambda v: v))
+    check_change(fun, lambda: monkeypatch.setattr(fnp, "sin", lambda v: v))
 
 
 def test_partial() -> None:

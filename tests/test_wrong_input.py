@@ -327,9 +327,7 @@ def test_errors_are_of_one_family_and_travel() -> None:
         fl.TraceError,
         fl.ModelError,
         fl.ToleranceError,
-        fl.StepSizeError,
         fl.NonUniqueError,
-        fl.IntersectionError,
         fl.InputError,
     ):
         assert issubclass(kind, fl.FilippovError)

@@ -22,52 +22,12 @@ from filippov.errors import (
     FilippovWarning,
     InputError,
     Interrupted,
-    IntersectionError,
     ModelError,
     NonUniqueError,
-    StepSizeError,
     ToleranceError,
     TraceError,
 )
 from filippov.events import Event
-from filippov.functions import (
-    absolute,
-    arccos,
-    arccosh,
-    arcsin,
-    arcsinh,
-    arctan,
-    arctan2,
-    arctanh,
-    cbrt,
-    ceil,
-    clip,
-    copysign,
-    cos,
-    cosh,
-    exp,
-    exp2,
-    expm1,
-    floor,
-    heaviside,
-    hypot,
-    log,
-    log1p,
-    log2,
-    log10,
-    maximum,
-    minimum,
-    mod,
-    rint,
-    sign,
-    sin,
-    sinh,
-    sqrt,
-    square,
-    tan,
-    tanh,
-    where,
-)
 from filippov.laws import Hysteresis, Stick, hysteresis, sawtooth, stick
 from filippov.modes import Mode
 from filippov.resets import Reset
@@ -104,7 +64,6 @@ __all__ = [
     "Hysteresis",
     "InputError",
     "Interrupted",
-    "IntersectionError",
     "Mode",
     "ModelError",
     "NonUniqueError",
@@ -115,7 +74,6 @@ __all__ = [
     "Segment",
     "SegmentTable",
     "Solution",
-    "StepSizeError",
     "Stick",
     "SurfaceParts",
     "Switch",
@@ -124,57 +82,21 @@ __all__ = [
     "Tangency",
     "ToleranceError",
     "TraceError",
-    "absolute",
     "analysis",
-    "arccos",
-    "arccosh",
-    "arcsin",
-    "arcsinh",
-    "arctan",
-    "arctan2",
-    "arctanh",
     "basins",
     "bifurcation_diagram",
-    "cbrt",
-    "ceil",
-    "clip",
-    "copysign",
-    "cos",
-    "cosh",
-    "exp",
-    "exp2",
-    "expm1",
-    "floor",
-    "heaviside",
     "hidden_dynamics",
-    "hypot",
     "hysteresis",
-    "log",
-    "log1p",
-    "log2",
-    "log10",
-    "maximum",
-    "minimum",
-    "mod",
     "open_sweep",
     "plot",
     "poincare",
     "problems",
-    "rint",
     "sawtooth",
-    "sign",
-    "sin",
-    "sinh",
     "solve_ivp",
-    "sqrt",
-    "square",
     "stick",
     "surface_parts",
     "sweep",
     "system",
-    "tan",
-    "tanh",
-    "where",
 ]
 
 _LAZY = ("analysis", "plot", "problems")
@@ -199,7 +121,12 @@ def __getattr__(name: str) -> Any:
         from importlib import import_module
 
         return getattr(import_module(f"{__name__}.{_LAZY_NAMES[name]}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from filippov import numpy as functions
+
+    text = f"module {__name__!r} has no attribute {name!r}"
+    if name in functions.__all__:
+        text += f"; it is in filippov.numpy: `import filippov.numpy as fnp`, and `fnp.{name}`"
+    raise AttributeError(text)
 
 
 def __dir__() -> list[str]:

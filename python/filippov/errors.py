@@ -16,10 +16,8 @@ __all__ = [
     "FilippovWarning",
     "InputError",
     "Interrupted",
-    "IntersectionError",
     "ModelError",
     "NonUniqueError",
-    "StepSizeError",
     "ToleranceError",
     "TraceError",
 ]
@@ -87,10 +85,6 @@ class ToleranceError(InputError):
     """A tolerance is not a positive finite number, or has the wrong shape."""
 
 
-class StepSizeError(FilippovError):
-    """The step became smaller than the spacing of floating-point numbers at that time."""
-
-
 class NonUniqueError(FilippovError):
     """The solution is not unique at a point, and ``nonunique="error"`` was asked for.
 
@@ -99,10 +93,6 @@ class NonUniqueError(FilippovError):
     """
 
     candidates: tuple[tuple[int, ...], ...] = ()
-
-
-class IntersectionError(FilippovError):
-    """The motion at an intersection of surfaces could not be determined."""
 
 
 class FilippovWarning(UserWarning):

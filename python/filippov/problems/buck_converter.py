@@ -13,8 +13,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from filippov.functions import where
 from filippov.laws import sawtooth
+from filippov.numpy import where
 from filippov.problems.problem import Problem
 
 __all__ = ["PERIOD", "PROBLEMS", "rhs"]

@@ -261,7 +261,7 @@ def _remedy(error: Exception, line: UserLine | None) -> str:
     if "has no callable" in reason or "Cannot cast ufunc" in reason:
         return (
             "NumPy does not hand the traced values in np.array([...]) on: put the array together with "
-            "np.stack([...]), row by row for a matrix"
+            "np.stack([...]), row by row for a matrix, or take the function from filippov.numpy"
         )
     if re.search(r"dtype\s*=|asarray\(|np\.array\(|np\.float64\(|astype\(", text):
         return "leave out dtype=float: np.asarray(x) and np.array([...]) keep traced values"

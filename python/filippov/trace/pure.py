@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from filippov import functions
+from filippov import numpy as functions
 
 __all__ = ["PURE", "PureFunction"]
 

@@ -1,8 +1,18 @@
-"""Elementary functions that work on numbers, arrays and traced values alike.
+"""NumPy's elementary functions, which also see traced values inside of arrays and lists.
 
-They are NumPy's functions with one difference: they see traced values inside of ``np.array([...])`` and of
-lists too, where NumPy would compare the elements one by one. In a right-hand side ``np.sin(x)`` and
-``fl.sin(x)`` are the same.
+In a right-hand side ``np.sin(x[0])`` and ``fnp.sin(x[0])`` are the same. The two differ for arrays that the
+right-hand side makes itself. In ``np.where(np.array([x[0] > 0, x[1] > 0]), 1, 0)`` NumPy asks every comparison
+for its truth, and the function is run once for each combination of the answers; ``fnp.where`` keeps the
+comparisons, in one run. ``np.sin(np.array([x[0], 1.0]))`` fails at the plain number; ``fnp.sin`` does not.
+
+Examples
+--------
+>>> import numpy as np, filippov as fl
+>>> import filippov.numpy as fnp
+>>> def relays(t, x):
+...     return -fnp.sign([x[0] - 1, x[1]])
+>>> fl.System(relays, n=2).surfaces
+['x[0] - 1', 'x[1]']
 """
 
 from __future__ import annotations
