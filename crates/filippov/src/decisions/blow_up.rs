@@ -162,8 +162,9 @@ impl Around {
         let scaled = jacobian.with_rows_scaled(&units);
         let fast = (0..self.slid.len()).filter(|&i| !self.is_silent[self.slid[i]]);
         let fast: Vec<usize> = fast.collect();
-        let is_clear = |matrix: &Matrix| scaling_margin(matrix) > TANGENT;
-        (fast.is_empty() || is_clear(&scaled.principal(&fast))) && is_clear(&scaled)
+        // Fast rows that are neutral by themselves are damped by the slow ones.
+        let is_repelled = !fast.is_empty() && scaling_margin(&scaled.principal(&fast)) < -TANGENT;
+        !is_repelled && scaling_margin(&scaled) > TANGENT
     }
 
     /// A bound of the components normal to surface i of the meeting, divided by time or not.
