@@ -316,6 +316,7 @@ impl Stepper for Taylor {
 }
 
 /// The signs of sliding on several surfaces, with the multipliers at the start of the step in their places.
+#[inline(always)]
 fn multipliers_in(motion: &CurrentMotion, seen: &[Seen]) -> Option<Signs> {
     let ModeField::Intersection(_) = motion.field else {
         return None;
