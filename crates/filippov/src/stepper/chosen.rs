@@ -6,6 +6,7 @@ use crate::error::FieldError;
 use crate::motion::SmoothField;
 use crate::options::{Method, Options};
 use crate::stats::Stats;
+use crate::status::Warning;
 use crate::system::PiecewiseSystem;
 
 /// Makes the enumeration of the methods beside DOPRI5 from their table, and what builds the one that a run asks for.
@@ -65,6 +66,10 @@ macro_rules! methods {
             #[inline(always)]
             fn started(&mut self, at: &mut StepStart) -> Ready {
                 match self { $(Chosen::$name(method) => method.started(at)),* }
+            }
+
+            fn refusal(&mut self, at: &StepStart) -> Option<Box<Warning>> {
+                match self { $(Chosen::$name(method) => method.refusal(at)),* }
             }
 
             #[inline(always)]

@@ -158,7 +158,8 @@ impl StepControl {
         match steppers.prepare(at)? {
             Ready::UpTo(longest) => self.limit(longest),
             Ready::NotThisStep => {}
-            Ready::NotThisMotion(warning) => {
+            Ready::NotThisMotion => {
+                let warning = steppers.leave_motion(at);
                 self.dt = f64::NAN;
                 self.dt = self.first_step(at, steppers, t_end, std::iter::empty())?;
                 return Ok(warning);

@@ -66,14 +66,15 @@ impl Steppers {
     }
 
     /// A motion starts: the chosen method takes it if it can; with a warning if the user asked for it and it cannot.
+    #[inline]
     pub fn begin(&mut self, at: &mut StepStart) -> Option<Box<Warning>> {
-        let (takes_motion, warning) = match self.chosen.as_mut().map(|method| method.begin(at)) {
-            None => (false, None),
-            Some(Ready::NotThisMotion(warning)) => (false, warning),
-            Some(Ready::UpTo(_) | Ready::NotThisStep) => (true, None),
-        };
-        (self.takes_motion, self.takes_step) = (takes_motion, takes_motion);
-        warning
+        (self.takes_motion, self.takes_step) = (false, false);
+        let method = self.chosen.as_mut()?;
+        if method.begin(at) == Ready::NotThisMotion {
+            return method.refusal(at);
+        }
+        (self.takes_motion, self.takes_step) = (true, true);
+        None
     }
 
     /// Finds the derivative at the start of the motion without its field; `false` if the method does not.
@@ -85,18 +86,18 @@ impl Steppers {
     /// integrate it.
     pub fn started(&mut self, at: &mut StepStart) -> Option<Box<Warning>> {
         match of_method_in_use!(mut self.started(at)) {
-            Ready::NotThisMotion(warning) => {
-                self.leave_motion();
-                warning
-            }
+            Ready::NotThisMotion => self.leave_motion(at),
             Ready::UpTo(_) | Ready::NotThisStep => None,
         }
     }
 
-    /// Leaves the rest of the motion to DOPRI5.
-    fn leave_motion(&mut self) {
+    /// Leaves the rest of the motion to DOPRI5; with a warning if the user asked for the other method.
+    #[cold]
+    #[inline(never)]
+    pub fn leave_motion(&mut self, at: &StepStart) -> Option<Box<Warning>> {
         self.takes_motion = false;
         self.hand_over(false);
+        self.chosen.as_mut()?.refusal(at)
     }
 
     /// Does the method of the motion prepare its steps? DOPRI5 has nothing to prepare.
@@ -105,7 +106,8 @@ impl Steppers {
         self.takes_motion
     }
 
-    /// Prepares the next step: by the method of the motion if it takes this step, else by DOPRI5.
+    /// Prepares the next step: by the method of the motion if it takes this step, else by DOPRI5. If the method takes no more
+    /// steps of the motion, `leave_motion` has to follow.
     ///
     /// # Errors
     /// If a function of the user raises.
@@ -118,10 +120,8 @@ impl Steppers {
             return Ok(Ready::ANY);
         };
         let ready = method.prepare(at)?;
-        match ready {
-            Ready::UpTo(_) => {}
-            Ready::NotThisStep => self.hand_over(false),
-            Ready::NotThisMotion(_) => self.leave_motion(),
+        if ready == Ready::NotThisStep {
+            self.hand_over(false);
         }
         Ok(ready)
     }
