@@ -279,20 +279,21 @@ impl<'a> Integrator<'a> {
         self.stats.n_steps_sliding += u64::from(sliding);
         self.stepper.count(&mut self.stats);
         self.control.accept(&self.stepper, dt, error);
-        // Towards a fold of the multipliers the field of an intersection bends like a square root, and towards a
-        // two-fold the multiplier is a quotient of small numbers.
-        let may_bend = match self.motion.sliding.len() {
-            0 => false,
-            1 => self.detector.approaches_two_fold(),
-            _ => true,
-        };
-        let (step, remains) = ((self.t, dt), self.horizon - self.t);
-        let control = &mut self.control;
-        let warning = control.look_for_jump(&self.stepper, step, remains, may_bend);
-        let chatter = control.look_for_chatter(&self.stepper, dt);
-        if let Some(warning) = warning {
-            self.warnings.push(*warning);
+        if self.control.is_short(dt, self.horizon - self.t) {
+            // Towards a fold of the multipliers the field of an intersection bends like a square root, and towards a
+            // two-fold the multiplier is a quotient of small numbers.
+            let may_bend = match self.motion.sliding.len() {
+                0 => false,
+                1 => self.detector.approaches_two_fold(),
+                _ => true,
+            };
+            if !may_bend {
+                let warning = self.control.look_for_jump(&self.stepper, (self.t, dt));
+                self.warnings.extend(warning);
+            }
         }
+        self.control.note_length(dt);
+        let chatter = self.control.look_for_chatter(&self.stepper, dt);
         if let Some(stop) = self.record_user_zeros(zeros, theta, t_stop)? {
             return Ok(Some(stop));
         }

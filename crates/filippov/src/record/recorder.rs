@@ -99,6 +99,7 @@ impl<'a> Recorder<'a> {
     ///
     /// # Errors
     /// If a function of the user raises.
+    #[inline(always)]
     pub fn sample_step(
         &mut self,
         t_stop: f64,
@@ -106,9 +107,20 @@ impl<'a> Recorder<'a> {
         stepper: &mut Steppers,
         motion: &mut CurrentMotion,
     ) -> Result<(), FieldError> {
-        if self.wanted_before(t_stop).is_none() {
-            return Ok(());
+        match self.wanted_before(t_stop) {
+            None => Ok(()),
+            Some(_) => self.sample_wanted(t_stop, x, stepper, motion),
         }
+    }
+
+    #[inline(never)]
+    fn sample_wanted(
+        &mut self,
+        t_stop: f64,
+        x: &[f64],
+        stepper: &mut Steppers,
+        motion: &mut CurrentMotion,
+    ) -> Result<(), FieldError> {
         stepper.extend_cheaply(x);
         let mut y = vec![0.0; x.len()];
         while let Some(t) = self.wanted_before(t_stop) {

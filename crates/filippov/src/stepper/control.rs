@@ -158,7 +158,8 @@ impl StepControl {
         match steppers.prepare(at)? {
             Ready::UpTo(longest) => self.limit(longest),
             Ready::NotThisStep => {}
-            Ready::NotThisMotion(warning) => {
+            Ready::NotThisMotion => {
+                let warning = steppers.leave_motion(at);
                 self.dt = f64::NAN;
                 self.dt = self.first_step(at, steppers, t_end, std::iter::empty())?;
                 return Ok(warning);
@@ -262,25 +263,36 @@ impl StepControl {
         self.dt = self.dt.min(longest);
     }
 
-    /// Looks at an accepted step from `t` of length `dt`: warns if the field jumps over a step far shorter than its
-    /// predecessors and than the time that `remains`. The field of some motions bends like a jump.
+    /// Is an accepted step of length `dt` far shorter than its predecessors, and than the time that `remains`?
     #[inline(always)]
-    pub fn look_for_jump(
-        &mut self,
-        steppers: &Steppers,
-        (t, dt): (f64, f64),
-        remains: f64,
-        may_bend: bool,
-    ) -> Option<Box<Warning>> {
-        let is_short = dt < JUMP_SHRINK * self.recent && dt < remains;
-        let mut warning = None;
-        if is_short && !may_bend && !self.meets_edges && steppers.field_jumps() {
-            warning = Some(undeclared_jump(t + dt));
-            self.chatter.suspect(t, self.recent);
-            self.recent = 0.0;
+    pub fn is_short(&self, dt: f64, remains: f64) -> bool {
+        dt < JUMP_SHRINK * self.recent && dt < remains
+    }
+
+    /// Warns if the field jumps over the short step from `t` of length `dt` that was accepted.
+    #[cold]
+    pub fn look_for_jump(&mut self, steppers: &Steppers, (t, dt): (f64, f64)) -> Option<Warning> {
+        if self.meets_edges || !steppers.field_jumps() {
+            return None;
         }
+        self.chatter.suspect(t, self.recent);
+        self.recent = 0.0;
+        Some(Warning {
+            t: t + dt,
+            code: WarningCode::UndeclaredJump,
+            text: "the right-hand side jumps here and no surface is declared; give its switching function in \
+                   surfaces="
+                .into(),
+            candidates: Vec::new(),
+            surfaces: Vec::new(),
+            rule: "",
+        })
+    }
+
+    /// Keeps the length of an accepted step.
+    #[inline(always)]
+    pub fn note_length(&mut self, dt: f64) {
         self.recent = dt.max(0.98 * self.recent);
-        warning
     }
 
     /// The end of the run if the motion chatters along jumps of the field, the accepted step being this long.
@@ -338,20 +350,6 @@ impl StepControl {
         steppers.go_on_implicitly(at);
         self.controller.restart();
     }
-}
-
-#[cold]
-fn undeclared_jump(t: f64) -> Box<Warning> {
-    Box::new(Warning {
-        t,
-        code: WarningCode::UndeclaredJump,
-        text: "the right-hand side jumps here and no surface is declared; give its switching function in \
-               surfaces="
-            .into(),
-        candidates: Vec::new(),
-        surfaces: Vec::new(),
-        rule: "",
-    })
 }
 
 /// Predicted time to the next zero of what is monitored.

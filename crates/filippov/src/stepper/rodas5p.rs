@@ -296,7 +296,7 @@ impl Stepper for Rodas5p {
 
     fn begin(&mut self, at: &mut StepStart) -> Ready {
         if !at.motion.resting.is_empty() {
-            return Ready::NotThisMotion(None);
+            return Ready::NotThisMotion;
         }
         self.take(at);
         Ready::ANY

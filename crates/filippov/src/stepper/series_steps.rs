@@ -48,28 +48,6 @@ impl Taylor {
         self.expand(jets.width(), x, at.scale, fill)
     }
 
-    /// The motion has no series: with a warning, once, in a run that was to use them.
-    fn refuse(&mut self, at: &StepStart) -> Ready {
-        if at.options.method != Method::Taylor || self.series.has_warned {
-            return Ready::NotThisMotion(None);
-        }
-        self.series.has_warned = true;
-        let (t, mode) = (at.t, &at.motion.mode);
-        let text = format!(
-            "the motion in mode {mode} from t = {t:.10} has no Taylor series (its field is not analytic there, is \
-             not traced, slides by another rule than the canopy, sticks, shares a load among redundant contacts, is drawn back to its surface, or is in \
-             contact): DOPRI5 integrates it"
-        );
-        Ready::NotThisMotion(Some(Box::new(Warning {
-            t,
-            code: WarningCode::NoSeries,
-            surfaces: Vec::new(),
-            text,
-            candidates: Vec::new(),
-            rule: "",
-        })))
-    }
-
     /// The length of step that the states allow, or the monitored functions if they allow less.
     fn limited_by_functions(&self, jets: &MotionJets, options: &Options, allowed: f64) -> f64 {
         // Not a number stays: `min` would take the other one.
@@ -194,7 +172,7 @@ impl Stepper for Taylor {
         }
         match self.series.jets {
             Some(_) => Ready::ANY,
-            None => self.refuse(at),
+            None => Ready::NotThisMotion,
         }
     }
 
@@ -224,9 +202,33 @@ impl Stepper for Taylor {
     /// If redundant contacts share a load their equations do not determine the multipliers: there are no series.
     fn started(&mut self, at: &mut StepStart) -> Ready {
         match at.motion.shares_load() {
-            true => self.refuse(at),
+            true => Ready::NotThisMotion,
             false => Ready::ANY,
         }
+    }
+
+    /// Once, in a run that was to use series.
+    #[cold]
+    #[inline(never)]
+    fn refusal(&mut self, at: &StepStart) -> Option<Box<Warning>> {
+        if at.options.method != Method::Taylor || self.series.has_warned {
+            return None;
+        }
+        self.series.has_warned = true;
+        let (t, mode) = (at.t, &at.motion.mode);
+        let text = format!(
+            "the motion in mode {mode} from t = {t:.10} has no Taylor series (its field is not analytic there, is \
+             not traced, slides by another rule than the canopy, sticks, shares a load among redundant contacts, is drawn back to its surface, or is in \
+             contact): DOPRI5 integrates it"
+        );
+        Some(Box::new(Warning {
+            t,
+            code: WarningCode::NoSeries,
+            surfaces: Vec::new(),
+            text,
+            candidates: Vec::new(),
+            rule: "",
+        }))
     }
 
     fn start_derivative_mut(&mut self) -> &mut [f64] {
@@ -241,7 +243,7 @@ impl Stepper for Taylor {
             None if self.is_expanded() => return Ok(Ready::ANY),
             None => {
                 let Some(jets) = self.series.jets.take() else {
-                    return Ok(self.refuse(at));
+                    return Ok(Ready::NotThisMotion);
                 };
                 let signs = multipliers_in(at.motion, at.seen);
                 let allowed = self.expand_motion(at, &jets, signs.as_deref());
@@ -254,7 +256,7 @@ impl Stepper for Taylor {
         Ok(if allowed > TAYLOR_SHORTEST * EPS * at.t.abs() {
             Ready::UpTo(allowed)
         } else {
-            self.refuse(at)
+            Ready::NotThisMotion
         })
     }
 
@@ -316,6 +318,7 @@ impl Stepper for Taylor {
 }
 
 /// The signs of sliding on several surfaces, with the multipliers at the start of the step in their places.
+#[inline(always)]
 fn multipliers_in(motion: &CurrentMotion, seen: &[Seen]) -> Option<Signs> {
     let ModeField::Intersection(_) = motion.field else {
         return None;

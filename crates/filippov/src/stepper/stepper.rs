@@ -31,13 +31,14 @@ pub enum Attempt {
 }
 
 /// Whether a method takes the next steps. If it does not, DOPRI5 takes over.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Ready {
     /// It takes the next step, which may be this long.
     UpTo(f64),
     /// It takes the step after the next one.
     NotThisStep,
-    /// It takes no step of this motion; with a warning if the user asked for this method.
-    NotThisMotion(Option<Box<Warning>>),
+    /// It takes no step of this motion.
+    NotThisMotion,
 }
 
 impl Ready {
@@ -70,7 +71,8 @@ pub(crate) struct ExitSeries {
 /// and is computed by `attempt`:
 ///
 /// 5. `begin` is called for every motion, before its first derivative is known: the method forgets the motion before.
-///    `start` follows, then, if that returns `false`, `started` after the field was evaluated at the start.
+///    `start` follows, then, if that returns `false`, `started` after the field was evaluated at the start. `refusal` is
+///    asked wherever the method does not take the motion.
 /// 6. `prepare` is called before every attempt, and evaluates what it needs once per start.
 /// 7. `start_derivative_mut` is called if the start has changed: the method forgets what it prepared there.
 /// 8. `accept` makes the end of the step the start of the next one. `after_acceptance` and `after_rejection` use the
@@ -106,6 +108,11 @@ pub(crate) trait Stepper {
     /// The field was evaluated at the start of the motion: does the method integrate it?
     fn started(&mut self, _: &mut StepStart) -> Ready {
         Ready::ANY
+    }
+
+    /// The warning that the method does not take this motion, if it is worth one.
+    fn refusal(&mut self, _: &StepStart) -> Option<Box<Warning>> {
+        None
     }
 
     /// The derivative at the start of the step, to be replaced.

@@ -103,7 +103,10 @@ impl Taylor {
         fill: impl FnOnce(&mut [f64]),
     ) -> f64 {
         self.width = width;
-        self.rows.resize((self.order + 1) * width, 0.0);
+        let size = (self.order + 1) * width;
+        if self.rows.len() != size {
+            self.rows.resize(size, 0.0);
+        }
         fill(&mut self.rows);
         self.is_expanded = true;
         self.longest_step(y, scale)

@@ -70,6 +70,7 @@ impl MotionJets {
     }
 
     /// How many evaluations of the field take as many operations.
+    #[inline(always)]
     pub fn cost(&self) -> u64 {
         self.program.program().cost() as u64
     }
