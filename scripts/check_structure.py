@@ -1,6 +1,7 @@
 """Check the structure of the core: imports run downwards, files form no circle, the integrator stays small.
 
-Usage: ``python scripts/check_structure.py``; it prints the figures, lists what does not hold and fails if there is anything.
+Usage: ``python scripts/check_structure.py``; it prints the figures, lists what does not hold and fails if
+there is anything.
 """
 
 from __future__ import annotations

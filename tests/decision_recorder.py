@@ -34,7 +34,6 @@ def recording(take: Decided) -> Iterator[None]:
         filippov.ensemble.solve_many,
         filippov.options.RunOptions,
     )
-    ready = dict(filippov.options._FOR_CORE)
 
     def options_that_keep(given: Dict) -> RunOptions:
         options = RunOptions({**given, "keep_decisions": LOOKED_AT})
@@ -59,15 +58,14 @@ def recording(take: Decided) -> Iterator[None]:
         return runs, raised
 
     filippov.options.RunOptions = options_that_keep  # type: ignore[assignment,misc]
-    filippov.options._FOR_CORE.clear()
+    filippov.options._for_core.cache_clear()
     filippov.solve.run_core = run_one
     filippov.ensemble.solve_many = run_many
     try:
         yield
     finally:
         filippov.options.RunOptions = made  # type: ignore[misc]
-        filippov.options._FOR_CORE.clear()
-        filippov.options._FOR_CORE.update(ready)
+        filippov.options._for_core.cache_clear()
         filippov.solve.run_core, filippov.ensemble.solve_many = solve, solve_many
 
 

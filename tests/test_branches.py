@@ -114,7 +114,9 @@ def test_tree_of_two_points_in_a_row() -> None:
 
 @pytest.mark.filterwarnings("ignore:max_branches:filippov.FilippovWarning")
 def test_bound_is_told() -> None:
-    sol = fl.solve_ivp(away, (0, 1), np.zeros(3), nonunique="branch", max_branches=3)
+    sol = fl.solve_ivp(
+        away, (0, 1), np.zeros(3), nonunique="branch", sliding=fl.SlidingPolicy(max_branches=3)
+    )
     assert sol.branches is not None
     assert len(sol.branches) == 3
     assert not sol.branches.complete

@@ -183,9 +183,9 @@ WRONG: list[tuple[Any, str]] = [
 def test_wrong_scalings_are_refused(kappa: Any, text: str) -> None:
     system = constant({signs: (-signs[0], -signs[1]) for signs in SQUARE})
     for call in (
-        lambda: system.solve((0, 1), [1.0, 1.0, 0.0], kappa=kappa),
-        lambda: system.classify(0.0, [0.0, 0.0, 0.0], kappa=kappa),
-        lambda: fl.hidden_dynamics(system, 0.0, [0.0, 0.0, 0.0], kappa=kappa),
+        lambda: system.solve((0, 1), [1.0, 1.0, 0.0], sliding=fl.SlidingPolicy(kappa=kappa)),
+        lambda: system.classify(0.0, [0.0, 0.0, 0.0], sliding=fl.SlidingPolicy(kappa=kappa)),
+        lambda: fl.hidden_dynamics(system, 0.0, [0.0, 0.0, 0.0], sliding=fl.SlidingPolicy(kappa=kappa)),
     ):
         with pytest.raises(fl.InputError, match=f"^kappa: .*{text}"):
             call()
@@ -193,7 +193,9 @@ def test_wrong_scalings_are_refused(kappa: Any, text: str) -> None:
 
 def test_a_scaling_for_all_surfaces_changes_nothing() -> None:
     system = fl.System(lambda t, x: [0.5 - np.sign(x[0]), -0.2 - np.sign(x[1])], n=2)
-    a, b = (system.solve((0, 5), [1.0, 2.0], kappa=kappa) for kappa in (None, 7.0))
+    policies = [fl.SlidingPolicy(kappa=kappa) for kappa in (None, 7.0)]
+    assert policies[0] == policies[1]
+    a, b = (system.solve((0, 5), [1.0, 2.0], sliding=policy) for policy in policies)
     np.testing.assert_array_equal(a.y, b.y)
 
 
@@ -214,4 +216,4 @@ def test_wrong_points_are_named(arguments: Any, message: str) -> None:
     with pytest.raises(fl.InputError, match=f"^{message}"):
         system.field(*arguments, "0")
     with pytest.raises(fl.InputError, match="kappa: one entry"):
-        system.classify(0.0, [0.0], kappa=[])
+        fl.SlidingPolicy(kappa=[])

@@ -108,7 +108,10 @@ def test_one_state_for_all_and_slices(system: fl.System) -> None:
         ({"y0": [1.0, 0.0], "params": {"F": np.array([1.0j, 1.0])}}, r"params\['F'\]: .* not complex"),
         ({"y0": np.ma.array([[1.0, 0.0]], mask=[[False, True]])}, "y0: has masked entries"),
         ({"y0": [1.0, 0.0], "params": [1, 2]}, "params: a dict"),
-        ({"y0": np.zeros((2, 2)), "kappa": [1.0, 2.0]}, "kappa: one entry per surface"),
+        (
+            {"y0": np.zeros((2, 2)), "sliding": fl.SlidingPolicy(kappa=[1.0, 2.0])},
+            "kappa: one entry per surface",
+        ),
     ],
 )
 def test_wrong_arguments_are_named(system: fl.System, arguments: dict[str, Any], message: str) -> None:

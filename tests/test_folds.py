@@ -107,8 +107,10 @@ def test_where_stability_is_lost_to_a_small_oscillation_sliding_goes_on_with_a_w
 @pytest.mark.parametrize("kappa", [None, (1.0, 1.0, 1.0), (1.0, 4.0, 0.25)])
 def test_stability_is_that_of_the_scaling_asked_for(kappa: tuple[float, ...] | None, method: str) -> None:
     """By the criterion of Routh for kappa G, a2 a1 - a0 = 0."""
-    options = {} if kappa is None else {"kappa": kappa}
-    sol = fl.solve_ivp(hopf, (0.0, 4.0), [0.0, 0.0, 0.0], rtol=1e-9, atol=1e-10, method=method, **options)
+    policy = fl.SlidingPolicy(kappa=kappa)
+    sol = fl.solve_ivp(
+        hopf, (0.0, 4.0), [0.0, 0.0, 0.0], rtol=1e-9, atol=1e-10, method=method, sliding=policy
+    )
     times = np.linspace(0.0, 4.0, 400_001)
     k = np.array(kappa or (1.0, 1.0, 1.0))
     a2, pairs, product = k.sum(), k[0] * k[1] + k[1] * k[2] + k[0] * k[2], k.prod()

@@ -42,7 +42,7 @@ def test_scaling_decides_as_in_the_table() -> None:
             run = system.solve(
                 (0.0, 1e5),
                 [0.0 if k == 0 else float(k) for k in incoming] + [0.0],
-                kappa=entry["kappa"],
+                sliding=fl.SlidingPolicy(kappa=entry["kappa"]),
                 max_events=2,
                 nonunique="regularize",
             )
@@ -143,7 +143,8 @@ def test_picture(dark: bool) -> None:
 
 def test_picture_on_given_axes() -> None:
     figure, ax = pyplot.subplots()
-    assert fl.plot.hidden_dynamics(two_rest_points(), 0.0, [0.0, 0.0, 0.0], kappa=[1.0, 2.0], ax=ax) is ax
+    policy = fl.SlidingPolicy(kappa=[1.0, 2.0])
+    assert fl.plot.hidden_dynamics(two_rest_points(), 0.0, [0.0, 0.0, 0.0], sliding=policy, ax=ax) is ax
     with pytest.raises(TypeError, match=r"^x: "):
         fl.plot.hidden_dynamics(two_rest_points())
     pyplot.close(figure)

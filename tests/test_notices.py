@@ -193,7 +193,8 @@ def test_all_solutions_are_no_surprise_to_the_one_who_asks_for_them():
     sol, found = caught(lambda: fl.solve_ivp(repel, (0, 1), [0.0], nonunique="branch"))
     assert len(sol.branches) == 2
     assert found == []
-    _, found = caught(lambda: fl.solve_ivp(repel, (0, 1), [0.0], nonunique="branch", max_branches=1))
+    one = fl.SlidingPolicy(max_branches=1)
+    _, found = caught(lambda: fl.solve_ivp(repel, (0, 1), [0.0], nonunique="branch", sliding=one))
     assert [warning.message.code for warning in found] == ["max_branches"]
 
 

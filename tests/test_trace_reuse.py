@@ -316,6 +316,50 @@ def test_functions_of_numpy_and_python_replaced(monkeypatch: pytest.MonkeyPatch)
     check_change(fun, lambda: monkeypatch.setitem(globals(), "abs", lambda v: 3.0 * v))
 
 
+def defined(body: str, file: str = "<cell>", line: int = 1) -> Callable[..., Any]:
+    """Return the function of a text, defined anew."""
+    names: dict[str, Any] = {"np": np}
+    text = "\n" * (line - 1) + f"def fun(t, x):\n    return {body}\n"
+    exec(compile(text, file, "exec"), names)
+    fun: Callable[..., Any] = names["fun"]
+    return fun
+
+
+@pytest.mark.parametrize("other", ["[x[1], -3.0 * x[0]]", "[x[1], -2 * x[0]]", "[x[1], --2.0 * x[0]]"])
+def test_a_function_that_is_defined_again(other: str) -> None:
+    body = "[x[1], -2.0 * x[0]]"
+    first, again = fingerprint(defined(body)), fingerprint(defined(body))
+    assert first is not None
+    assert first == again
+    assert fingerprint(defined(other)) != first
+    assert final(defined(body)) == final(defined(body)) == fresh(defined(body))
+    assert final(defined(other)) == fresh(defined(other))
+
+
+@pytest.mark.parametrize(
+    ("one", "other"), [("0.0", "-0.0"), ("1", "1.0"), ("1", "True"), ("(0, 1)", "(False, 1)")]
+)
+def test_constants_that_are_equal_and_not_the_same(one: str, other: str) -> None:
+    bodies = [f"[x[1], {value} or x[0]]" for value in (one, other)]
+    assert fingerprint(defined(bodies[0])) != fingerprint(defined(bodies[1]))
+
+
+def test_the_same_text_elsewhere_is_another_function() -> None:
+    """Messages name file and line."""
+    body = "[x[1], -x[0]]"
+    places = [defined(body), defined(body, file="<other cell>"), defined(body, line=7)]
+    assert len({fingerprint(fun) for fun in places}) == 3
+
+
+def test_a_function_that_is_defined_again_reads_its_own_names() -> None:
+    def reading(k: float) -> Callable[..., Any]:
+        fun = defined("[x[1], -k * x[0]]")
+        fun.__globals__["k"] = k
+        return fun
+
+    assert final(reading(1.0)) == final(reading(1.0)) != final(reading(2.0))
+
+
 def test_function_of_the_package_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
     def fun(t: Any, x: Any) -> Any:
         return [fnp.sin(x[1]), -x[0]]

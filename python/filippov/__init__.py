@@ -31,6 +31,7 @@ from filippov.events import Event
 from filippov.laws import Hysteresis, Stick, hysteresis, sawtooth, stick
 from filippov.modes import Mode
 from filippov.resets import Reset
+from filippov.sliding_policy import SlidingPolicy
 from filippov.solution import DenseSolution, Solution
 from filippov.solve import solve_ivp
 from filippov.switches import RunWarning, Segment, SegmentTable, Switch, SwitchTable
@@ -73,6 +74,7 @@ __all__ = [
     "Section",
     "Segment",
     "SegmentTable",
+    "SlidingPolicy",
     "Solution",
     "Stick",
     "SurfaceParts",

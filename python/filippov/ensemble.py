@@ -17,8 +17,9 @@ from filippov.core_events import CoreEvent, core_events
 from filippov.errors import InputError, Interrupted
 from filippov.events import EventSpec, normalise_events
 from filippov.notices import show_summary
-from filippov.options import OPTIONS, check_options, check_t_span, fit_kappa
+from filippov.options import OPTIONS, check_options, check_t_span
 from filippov.prepare import Prepared
+from filippov.sliding_policy import fit_kappa
 from filippov.solution import Solution
 from filippov.unknown import check_unknown
 
@@ -120,7 +121,7 @@ def run_ensemble(
     table = np.column_stack(list(values.values())) if values else np.empty((len(states), 0))
     groups = _groups(system, t0, states, tuple(values), table, specs or [])
     for group in groups:
-        fit_kappa(checked.kappa, group.prepared.surfaces)
+        fit_kappa(checked.sliding, group.prepared.surfaces)
     runs: list[Run] = []
     raised: BaseException | None = None
     for group in groups:

@@ -167,6 +167,18 @@ def accepted_names(function: Callable[..., Any], names: Any) -> list[str]:
     return [name for name in names if name in possible]
 
 
+def names_argument(function: Callable[..., Any], name: str) -> bool:
+    """Whether `function` has an argument of that name; not whether it takes any, as ``**params``."""
+    try:
+        parameter = inspect.signature(function).parameters.get(name)
+    except (TypeError, ValueError):  # builtins and C functions have no signature
+        return False
+    return parameter is not None and parameter.kind in (
+        parameter.POSITIONAL_OR_KEYWORD,
+        parameter.KEYWORD_ONLY,
+    )
+
+
 def check_scalar_function(g: Callable[[float, Any], Any], t0: float, y0: Any, what: str) -> None:
     """Call `g` once at the start and refuse what is not a single real number."""
     try:

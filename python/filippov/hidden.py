@@ -12,9 +12,10 @@ from filippov._core import hidden_dynamics as hidden_dynamics_in_core
 from filippov.errors import InputError, ModelError
 from filippov.events import Event
 from filippov.modes import Mode
-from filippov.options import check_kappa
+from filippov.sliding_policy import SlidingPolicy, as_policy, kappa_of
 from filippov.solve import solve_ivp
 from filippov.system import System
+from filippov.unknown import refuse_former
 
 __all__ = ["HiddenDynamics", "RestPoint", "hidden_dynamics"]
 
@@ -103,7 +104,7 @@ def hidden_dynamics(
     t: float,
     x: npt.ArrayLike,
     before: Any = None,
-    kappa: Any = None,
+    sliding: str | SlidingPolicy = "canopy",
     atol: float = 1e-9,
     **params: float,
 ) -> HiddenDynamics:
@@ -123,8 +124,9 @@ def hidden_dynamics(
         A state at which two surfaces meet.
     before : Mode, tuple of int, or str, optional
         The mode of the motion that arrives, as in ``switch.mode_before``. Default: a start, from the middle.
-    kappa : float or array_like, shape (n_surfaces,), optional
-        Scaling of the surfaces. Default: 1 for all.
+    sliding : SlidingPolicy, optional
+        Its `kappa` scales the surfaces; by default all are scaled alike. Rules other than ``"canopy"`` are
+        refused: the hidden dynamics is that of the canopy.
     atol : float, optional
         A surface nearer than this counts as met.
     **params : float
@@ -154,14 +156,15 @@ def hidden_dynamics(
     >>> hidden.incoming, hidden.outcome, hidden.mode
     ((0.5, -1.0), 'sliding', Mode('00'))
     """
-    point = system.classify(t, x, atol=atol, kappa=kappa, **params)
+    refuse_former(params, hidden_dynamics, system.params)
+    point = system.classify(t, x, atol=atol, sliding=sliding, **params)
     if len(point.surfaces) != 2:
         raise ModelError(
             f"two surfaces are needed, here {len(point.surfaces)} meet: {', '.join(point.names) or 'none'}",
             t=t,
             state=x,
         )
-    scaling = check_kappa(kappa)
+    scaling = kappa_of(as_policy(sliding))
     own = tuple(scaling[j] for j in point.surfaces) if scaling else (1.0, 1.0)
     came_from = None
     if before is not None:

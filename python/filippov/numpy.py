@@ -1,9 +1,10 @@
 """NumPy's elementary functions, which also see traced values inside of arrays and lists.
 
 In a right-hand side ``np.sin(x[0])`` and ``fnp.sin(x[0])`` are the same. The two differ for arrays that the
-right-hand side makes itself. In ``np.where(np.array([x[0] > 0, x[1] > 0]), 1, 0)`` NumPy asks every comparison
-for its truth, and the function is run once for each combination of the answers; ``fnp.where`` keeps the
-comparisons, in one run. ``np.sin(np.array([x[0], 1.0]))`` fails at the plain number; ``fnp.sin`` does not.
+right-hand side makes itself. In ``np.where(np.array([x[0] > 0, x[1] > 0]), 1, 0)`` NumPy asks every
+comparison for its truth, and the function is run once for each combination of the answers; ``fnp.where``
+keeps the comparisons, in one run. ``np.sin(np.array([x[0], 1.0]))`` fails at the plain number; ``fnp.sin``
+does not.
 
 Examples
 --------

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +15,8 @@ from filippov._core import ManualClock, RunOptions
 from filippov.arrays import real_array, refuse_masked
 from filippov.errors import InputError, ToleranceError
 from filippov.progress import Report, print_progress
+from filippov.scalars import count, positive, real
+from filippov.sliding_policy import SlidingPolicy, as_policy
 from filippov.unknown import did_you_mean
 
 __all__ = ["Options", "check_options", "check_t_span", "check_y0"]
@@ -23,12 +26,9 @@ Array = npt.NDArray[np.float64]
 _NAMED_METHODS = ("auto", "DOPRI5", "Taylor", "DOP853", "Rodas5P", "Midpoint")
 _METHODS = {"RK45": "DOPRI5", **{name: name for name in _NAMED_METHODS}}
 _STIFF_METHODS = ("Radau", "BDF", "LSODA")
-# name -> (available values, values that are planned)
 _POLICIES = {
-    "sliding": (("canopy", "moments", "dieci-lopez", "minimum-norm"), ()),
-    "nonunique": (("regularize", "error", "branch"), ()),
-    "zeno": (("accumulate",), ()),
-    "keep": (("steps", "switches", "last"), ()),
+    "nonunique": ("regularize", "error", "branch"),
+    "keep": ("steps", "switches", "last"),
 }
 _SMALLEST_RTOL = float(100 * np.finfo(float).eps)
 
@@ -45,22 +45,33 @@ class Options(NamedTuple):
     max_events: int
     max_wall_time: float | None
     clock: ManualClock | None
-    sliding: str
+    sliding: SlidingPolicy
     nonunique: str
-    stabilization: float | None
-    kappa: tuple[float, ...]
     t_eval: Array | None
     dense_output: bool
     keep: str
     progress: Report | None
-    max_branches: int
+
+    def by_name(self) -> dict[str, Any]:
+        """Return the options by name, those of the policy of sliding among them."""
+        return {**self._asdict(), **self.sliding.for_core()}
 
     def for_core(self, choices: Sequence[tuple[int, ...]] = ()) -> RunOptions:
         """Return the options as the core takes them; `choices` are modes to take at non-unique points."""
-        known = _FOR_CORE.get(id(self))
-        if known is not None and not choices:
-            return known
-        return RunOptions({**self._asdict(), "choices": choices})
+        if choices or not self._is_plain():
+            return RunOptions({**self.by_name(), "choices": choices})
+        return _for_core(self)
+
+    def _is_plain(self) -> bool:
+        """Whether all options are numbers and texts, so that equal options mean the same."""
+        has_own = self.t_eval is not None or self.progress is not None or self.clock is not None
+        return not has_own and type(self.atol) is float
+
+
+@lru_cache(maxsize=64)
+def _for_core(options: Options) -> RunOptions:
+    """Return plain options as the core takes them, made once for all that are equal."""
+    return RunOptions({**options.by_name(), "choices": ()})
 
 
 # The defaults of `solve_ivp`, checked: a call that changes none of them needs no further check.
@@ -74,26 +85,21 @@ _DEFAULT_OPTIONS = Options(
     max_events=10**7,
     max_wall_time=None,
     clock=None,
-    sliding="canopy",
+    sliding=SlidingPolicy(),
     nonunique="regularize",
-    stabilization=None,
-    kappa=(),
     t_eval=None,
     dense_output=True,
     keep="steps",
     progress=None,
-    max_branches=64,
 )
-# What the core takes of options that are kept, by identity.
-_FOR_CORE = {id(_DEFAULT_OPTIONS): RunOptions(_DEFAULT_OPTIONS._asdict())}
 # Options whose checks depend on nothing but their values: calls that repeat them are not checked again.
 _REPEATABLE = frozenset(
     (
         *("method", "rtol", "atol", "max_step", "max_steps", "max_events", "max_wall_time"),
-        *("sliding", "nonunique", "keep", "dense_output", "stabilization"),
+        *("sliding", "nonunique", "keep", "dense_output"),
     )
 )
-_PLAIN = frozenset({str, float, int, bool})
+_PLAIN = frozenset({str, float, int, bool, SlidingPolicy})
 _KNOWN: dict[tuple[Any, ...] | None, Options] = {}
 _MOST_KNOWN = 64
 
@@ -138,7 +144,6 @@ def check_options(given: Mapping[str, Any], t_span: tuple[float, float], n: int)
     options = _DEFAULT_OPTIONS._replace(**checked)
     if key is not None and len(_KNOWN) < _MOST_KNOWN:
         _KNOWN[key] = options
-        _FOR_CORE[id(options)] = RunOptions({**options._asdict(), "choices": ()})
     return options
 
 
@@ -169,7 +174,7 @@ def check_t_span(t_span: Any) -> tuple[float, float]:
         if type(t0) in (float, int) and type(t1) in (float, int) and math.isfinite(t0) and math.isfinite(t1):
             return float(t0), float(t1)
     try:
-        ends = [_real(end) for end in t_span]
+        ends = [real(end) for end in t_span]
     except (TypeError, ValueError):
         ends = []
     if len(ends) != 2 or not all(math.isfinite(end) for end in ends):
@@ -238,7 +243,7 @@ def check_params(params: Any) -> dict[str, float]:
         if not isinstance(name, str) or not name.isidentifier():
             raise InputError(f"params: {name!r} is not a name")
         try:
-            checked[name] = _real(value)
+            checked[name] = real(value)
         except (TypeError, ValueError):
             raise InputError(f"params: {name!r} must be a real number, not {value!r}") from None
         if not math.isfinite(checked[name]):
@@ -247,63 +252,17 @@ def check_params(params: Any) -> dict[str, float]:
 
 
 def _check_policy(name: str, value: Any) -> str:
-    available, planned = _POLICIES[name]
+    available = _POLICIES[name]
     if isinstance(value, str) and value in available:
         return value
     use = " or ".join(f'"{choice}"' for choice in available)
-    if isinstance(value, str) and value in planned:
-        raise InputError(f'{name}: "{value}" is not available yet; use {use}')
     raise InputError(f"{name}: unknown value {value!r}; use {use}")
-
-
-def _check_stabilization(value: Any) -> float | None:
-    """Return the factor of the term that draws sliding motions back; None for projection."""
-    if isinstance(value, str):
-        if value == "projection":
-            return None
-        hint = did_you_mean(value, ["projection"])
-        raise InputError(
-            f'stabilization: unknown value {value!r}{hint}; use "projection" or a positive number'
-        )
-    return _positive("stabilization", value)
-
-
-def check_kappa(kappa: Any) -> tuple[float, ...]:
-    """Return the scaling of the surfaces: positive numbers, one for all, or one per surface; ``None`` is 1.
-
-    Raises
-    ------
-    InputError
-        If it is something else. How many surfaces there are is known only to `fit_kappa`.
-    """
-    if kappa is None:
-        return ()
-    try:
-        single = np.ndim(kappa) == 0
-        values = (_real(kappa),) if single else tuple(_real(value) for value in kappa)
-    except (TypeError, ValueError):
-        raise InputError(f"kappa: a positive number, or one per surface, is needed, not {kappa!r}") from None
-    if not values:
-        raise InputError("kappa: one entry per surface is needed, it is empty")
-    if not all(0.0 < value < math.inf for value in values):
-        raise InputError(f"kappa: must be positive and finite, it is {kappa!r}")
-    # One number for all surfaces: only the ratios matter.
-    return () if single else values
-
-
-def fit_kappa(kappa: tuple[float, ...], surfaces: Sequence[str]) -> None:
-    """Refuse a scaling that has not one entry per surface."""
-    if kappa and len(kappa) != len(surfaces):
-        names = f" ({', '.join(surfaces)})" if surfaces else ""
-        raise InputError(
-            f"kappa: one entry per surface is needed: {len(surfaces)}{names}, it has {len(kappa)}"
-        )
 
 
 def check_time(t: Any) -> float:
     """Return a finite time."""
     try:
-        value = _real(t)
+        value = real(t)
     except (TypeError, ValueError):
         value = math.nan
     if not math.isfinite(value):
@@ -314,7 +273,7 @@ def check_time(t: Any) -> float:
 def check_distance(atol: Any) -> float:
     """Return a distance that is not negative."""
     try:
-        value = _real(atol)
+        value = real(atol)
     except (TypeError, ValueError):
         value = math.nan
     if not 0.0 <= value < math.inf:
@@ -328,7 +287,7 @@ def _check_rtol(rtol: Any) -> float:
     if np.ndim(rtol) != 0:
         raise ToleranceError("rtol: a single number is needed; use atol for a tolerance per component")
     try:
-        value = _real(rtol)
+        value = real(rtol)
     except (TypeError, ValueError):
         value = math.nan
     if not (math.isfinite(value) and value > 0.0):
@@ -364,7 +323,7 @@ def _check_atol(atol: Any, n: int) -> float | Array:
 def _check_first_step(first_step: Any, t_span: tuple[float, float]) -> float | None:
     if first_step is None:
         return None
-    value = _positive("first_step", first_step)
+    value = positive("first_step", first_step)
     length = abs(t_span[1] - t_span[0])
     if value > length > 0.0:
         raise InputError(f"first_step: {value:g} is longer than the interval of integration, {length:g}")
@@ -390,11 +349,11 @@ def _check_t_eval(t_eval: Any, t_span: tuple[float, float]) -> Array | None:
 
 
 def _check_max_step(max_step: Any) -> float:
-    return math.inf if max_step is None else _positive("max_step", max_step, infinite=True)
+    return math.inf if max_step is None else positive("max_step", max_step, infinite=True)
 
 
 def _check_max_wall_time(max_wall_time: Any) -> float | None:
-    return None if max_wall_time is None else _positive("max_wall_time", max_wall_time)
+    return None if max_wall_time is None else positive("max_wall_time", max_wall_time)
 
 
 def _check_progress(progress: Any, t_span: tuple[float, float]) -> Report | None:
@@ -407,58 +366,20 @@ def _check_progress(progress: Any, t_span: tuple[float, float]) -> Report | None
     raise InputError("progress: True, False, or a function of the time reached, is needed")
 
 
-def _count(name: str, value: Any) -> int:
-    try:
-        number = _real(value)
-    except (TypeError, ValueError):
-        number = math.nan
-    if not (math.isfinite(number) and number > 0 and number == int(number)):
-        raise InputError(f"{name}: a positive whole number is needed, not {value!r}")
-    return int(number)
-
-
-def _positive(name: str, value: Any, infinite: bool = False) -> float:
-    try:
-        number = _real(value)
-    except (TypeError, ValueError):
-        number = math.nan
-    if not number > 0.0 or (math.isinf(number) and not infinite):
-        raise InputError(f"{name}: a positive number is needed, not {value!r}")
-    return number
-
-
-def _real(value: Any) -> float:
-    """Convert a real number; text, truth values and complex numbers are refused with TypeError."""
-    if type(value) in (float, int):
-        return float(value)
-    if (
-        isinstance(value, (str, bytes, bool, np.bool_, complex))
-        or np.iscomplexobj(value)
-        or np.ma.is_masked(value)
-        or np.ndim(value) != 0
-    ):
-        raise TypeError
-    return float(value)
-
-
 # The check of each option, given its value, the interval of integration and the number of states.
 _CHECKS: dict[str, Callable[[Any, tuple[float, float], int], Any]] = {
-    "sliding": lambda value, t_span, n: _check_policy("sliding", value),
+    "sliding": lambda value, t_span, n: as_policy(value),
     "nonunique": lambda value, t_span, n: _check_policy("nonunique", value),
-    "stabilization": lambda value, t_span, n: _check_stabilization(value),
-    "kappa": lambda value, t_span, n: check_kappa(value),
-    "zeno": lambda value, t_span, n: _check_policy("zeno", value),
     "keep": lambda value, t_span, n: _check_policy("keep", value),
     "method": lambda value, t_span, n: check_method(value),
     "rtol": lambda value, t_span, n: _check_rtol(value),
     "atol": lambda value, t_span, n: _check_atol(value, n),
     "first_step": lambda value, t_span, n: _check_first_step(value, t_span),
     "max_step": lambda value, t_span, n: _check_max_step(value),
-    "max_steps": lambda value, t_span, n: _count("max_steps", value),
-    "max_events": lambda value, t_span, n: _count("max_events", value),
+    "max_steps": lambda value, t_span, n: count("max_steps", value),
+    "max_events": lambda value, t_span, n: count("max_events", value),
     "max_wall_time": lambda value, t_span, n: _check_max_wall_time(value),
     "clock": lambda value, t_span, n: value,  # for tests of `max_wall_time`; no argument of `solve_ivp`
-    "max_branches": lambda value, t_span, n: _count("max_branches", value),
     "t_eval": lambda value, t_span, n: _check_t_eval(value, t_span),
     "dense_output": lambda value, t_span, n: bool(value),
     "progress": lambda value, t_span, n: _check_progress(value, t_span),

@@ -12,9 +12,11 @@ import numpy.typing as npt
 from filippov.classification import Classification, classify
 from filippov.errors import InputError
 from filippov.modes import Mode
-from filippov.options import check_distance, check_kappa, check_time, check_y0, fit_kappa
+from filippov.options import check_distance, check_time, check_y0
 from filippov.prepare import Prepared, parameter_vector
 from filippov.sliding import sliding_field
+from filippov.sliding_policy import SlidingPolicy, canopy_of, fit_kappa, kappa_of
+from filippov.unknown import refuse_former
 
 __all__ = ["Points"]
 
@@ -83,7 +85,7 @@ class Points(ABC):
         before: Any = None,
         *,
         atol: float = 0.0,
-        kappa: Any = None,
+        sliding: str | SlidingPolicy = "canopy",
         **params: float,
     ) -> Classification:
         """Return what happens at a point: which surfaces vanish there, and which motion follows.
@@ -101,8 +103,9 @@ class Points(ABC):
             there.
         atol : float, optional
             A surface nearer than this counts as met; by default only one that vanishes to rounding.
-        kappa : float or array_like, shape (n_surfaces,), optional
-            Scaling of the surfaces, as for `solve_ivp`.
+        sliding : SlidingPolicy, optional
+            Its `kappa` scales the surfaces. Which mode follows does not depend on the rule of sliding; the
+            multipliers are those of the ``"canopy"``, and other rules are refused.
         **params : float
             Parameter values other than the defaults.
 
@@ -129,12 +132,13 @@ class Points(ABC):
         Mode('00')
         """
         t, state = check_time(t), check_y0(x, "x")
+        policy, reach = canopy_of(sliding), check_distance(atol)
+        refuse_former(params, self.classify, self.parameter_values(None))
         values = self.parameter_values(params)
         prepared = self.prepare(len(state), float(t), state, values)
-        scaling, reach = check_kappa(kappa), check_distance(atol)
-        fit_kappa(scaling, prepared.surfaces)
+        fit_kappa(policy, prepared.surfaces)
         entries = None if before is None else _check_mode("before", before, prepared)
-        return classify(prepared, float(t), state, parameter_vector(values), reach, scaling, entries)
+        return classify(prepared, float(t), state, parameter_vector(values), reach, kappa_of(policy), entries)
 
 
 def _check_mode(name: str, mode: Any, prepared: Prepared) -> Mode:

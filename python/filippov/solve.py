@@ -25,11 +25,11 @@ from filippov.options import (
     check_options,
     check_t_span,
     check_y0,
-    fit_kappa,
     repeatable_key,
 )
 from filippov.prepare import Prepared, parameter_vector
 from filippov.progress import Report
+from filippov.sliding_policy import SlidingPolicy, fit_kappa
 from filippov.solution import AnyRun, Solution
 from filippov.start import StandingRun
 from filippov.system import System
@@ -57,13 +57,9 @@ def solve_ivp(
     atol: npt.ArrayLike = 1e-9,
     first_step: float | None = None,
     max_step: float = np.inf,
-    sliding: str = "canopy",
+    sliding: str | SlidingPolicy = "canopy",
     nonunique: str = "regularize",
-    stabilization: str | float = "projection",
-    kappa: npt.ArrayLike | None = None,
-    zeno: str = "accumulate",
     keep: str = "steps",
-    max_branches: int = 64,
     max_events: int = 10**7,
     max_steps: int = 10**8,
     max_wall_time: float | None = None,
@@ -120,35 +116,19 @@ def solve_ivp(
         Length of the first step. Default: chosen by the method.
     max_step : float, optional
         Longest step allowed. Default: no limit.
-    sliding : {"canopy", "moments", "minimum-norm", "dieci-lopez"}, optional
-        Which combination of the 2**m fields slides where m >= 2 surfaces meet; on one it is Filippov's.
-        ``"canopy"``, the default: products of one multiplier per surface, the limit of regularised systems.
-        ``"moments"``: two surfaces only; the weights change smoothly into those of sliding on one surface.
-        ``"minimum-norm"``: the tangent combination whose weights have the least norm.
-        ``"dieci-lopez"``: projected fields; all of them have to point towards the intersection.
-        For fields that are affine in the signs (friction, relays) the first three agree. Where a rule does
-        not apply the run stops and says so.
+    sliding : str or SlidingPolicy, optional
+        Which combination of the 2**m fields slides where m >= 2 surfaces meet: ``"canopy"`` (default),
+        ``"moments"``, ``"minimum-norm"`` or ``"dieci-lopez"``; on one surface it is Filippov's. A
+        `SlidingPolicy` has the rule, the scaling `kappa` of the surfaces, what keeps sliding motions on their
+        surfaces (`stabilization`), and the largest number of branches (`max_branches`).
     nonunique : {"regularize", "error", "branch"}, optional
         What to do where the solution is not unique: follow the limit of the regularised system and note the
         alternatives in `warnings`; raise `NonUniqueError`; or follow all alternatives: the solution returned
         is that of ``"regularize"``, and its `branches` are all of them, see `Branches`.
-    stabilization : {"projection"} or float, optional
-        What keeps sliding motions on their surfaces. ``"projection"``, the default: stages, steps and points
-        in between are projected, so that `h` is zero to rounding. A positive number ``C``: nothing is
-        projected, and the sliding field gets the term ``-C h grad(h)`` of Piiroinen and Kuznetsov, which
-        draws the motion back; `h` is then of the size of the tolerance, and a large ``C`` is stiff.
-    kappa : float or array_like, shape (n_surfaces,), optional
-        Where surfaces meet and the Filippov solution is not unique, the limit of the regularised system
-        ``sign h_j -> clip(kappa_j h_j / eps, -1, 1)`` decides: positive numbers that scale the surfaces, in
-        the order of ``system.surfaces``. Only their ratios matter. Default: 1 for all.
-    zeno : {"accumulate"}, optional
-        What to do where switches accumulate: go on from the limit point.
     keep : {"steps", "switches", "last"}, optional
         What is kept: every step; the switches and the segments between them (`t` are their times and the
         ends); or the last state only, so that the memory of a run does not grow with its length. Zeros of
         `events` and the times in `t_eval` are kept in any case. ``sol.sol`` is there with ``"steps"`` only.
-    max_branches : int, optional
-        Largest number of solutions with ``nonunique="branch"``; a warning tells if there are more.
     max_events, max_steps : int, optional
         Largest numbers of switches and of steps.
     max_wall_time : float, optional
@@ -211,11 +191,7 @@ def solve_ivp(
         "max_step": max_step,
         "sliding": sliding,
         "nonunique": nonunique,
-        "stabilization": stabilization,
-        "kappa": kappa,
-        "zeno": zeno,
         "keep": keep,
-        "max_branches": max_branches,
         "max_events": max_events,
         "max_steps": max_steps,
         "max_wall_time": max_wall_time,
@@ -323,7 +299,7 @@ def _solve(
     specs = normalise_events(events)
     system, values = _as_system(fun, n, constants, params, surfaces, resets)
     prepared = system.prepare(n, t0, state, values)
-    fit_kappa(options.kappa, prepared.surfaces)
+    fit_kappa(options.sliding, prepared.surfaces)
     functions = [(f"the event {spec.name!r}", spec.g) for spec in specs or []]
     if t1 < t0:
         prepared, specs = _backward(system, prepared, specs, state, values, t0)
@@ -337,7 +313,7 @@ def _solve(
 
     solution = follow(())
     if options.nonunique == "branch":
-        _add_branches(solution, follow, options.max_branches)
+        _add_branches(solution, follow, options.sliding.max_branches)
     return solution
 
 

@@ -12,7 +12,7 @@ from filippov._core import Run
 from filippov.backward import reversed_source
 from filippov.caution import warn_user
 from filippov.errors import InputError, ModelError
-from filippov.events import accepted_names, function_name
+from filippov.events import accepted_names, function_name, names_argument
 from filippov.forms import Source, base_source, check_surfaces, fields_source, relay_source
 from filippov.options import (
     check_args,
@@ -402,7 +402,7 @@ class System(Points, Saving):
     def _how_to_declare(self, name: str) -> str:
         """Return how an argument of the function becomes a parameter; empty if it has none of that name."""
         fun = None if self._source is None else self._source.fun
-        if not callable(fun) or name not in accepted_names(fun, [name]):
+        if not callable(fun) or not names_argument(fun, name):
             return ""
         return (
             f"; {name} is an argument of the function that was not declared: give fl.System(fun, "

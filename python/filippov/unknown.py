@@ -7,15 +7,24 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-__all__ = ["check_unknown", "did_you_mean"]
+__all__ = ["check_unknown", "did_you_mean", "refuse_former"]
 
 _SCIPY_ONLY = ("jac", "jac_sparsity", "lband", "uband", "min_step")
+# Keywords of earlier versions, and what to write now.
+_FORMER = {
+    **{
+        name: f"write sliding=fl.SlidingPolicy({name}=...)"
+        for name in ("kappa", "stabilization", "max_branches")
+    },
+    "zeno": "leave it out, a run always goes on from the limit point of an accumulation",
+}
 
 
 def check_unknown(
     unknown: Mapping[str, Any], function: Callable[..., Any], parameters: Iterable[str] = ()
 ) -> None:
     """Refuse unknown keywords with a suggestion; a system takes `parameters` too. SciPy's own are ignored."""
+    refuse_former(unknown, function, parameters)
     for name in unknown:
         if name == "vectorized":  # SciPy's promise that columns may be handed over; no change of the result
             continue
@@ -26,6 +35,19 @@ def check_unknown(
             what = f"{function.__name__}() got an unexpected keyword argument {name!r}"
             raise TypeError(f"{what}{hint}{of_system}")
         warnings.warn(f"{name}: has no effect with an explicit method", UserWarning, stacklevel=3)
+
+
+def refuse_former(names: Iterable[str], function: Callable[..., Any], parameters: Iterable[str] = ()) -> None:
+    """Refuse keywords of earlier versions with the present spelling; a system may have such `parameters`.
+
+    Raises
+    ------
+    TypeError
+        If there is one.
+    """
+    for name in names:
+        if name in _FORMER and name not in parameters:
+            raise TypeError(f"{function.__name__}() has no argument {name!r} any more: {_FORMER[name]}")
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

@@ -68,7 +68,7 @@ class _Reader:
 
     def __init__(self) -> None:
         self._digest = sha256()
-        self._numbers: dict[int, int] = {}
+        self._numbers: dict[Any, int] = {}
         self._kept: list[Any] = []  # so that no identity is used twice
 
     def digest(self) -> str:
@@ -200,7 +200,7 @@ class _Reader:
 
     def _is_new(self, value: Any) -> bool:
         """Whether an object is met for the first time; it has a number, so that two names of it show."""
-        key = hash(value) if type(value) is tuple else id(value)
+        key = value if type(value) is tuple else id(value)
         known = self._numbers.get(key)
         self._add(len(self._numbers) if known is None else known)
         if known is None:
@@ -278,21 +278,28 @@ def _global_name(value: Any) -> str | None:
     return f"{package} {module} {name}" if found is value else None
 
 
-@functools.lru_cache(maxsize=1024)
 def _package_of(module: str) -> str | None:
-    """Return name and version of the package of a module; None if it is not an installed one."""
+    """Return name and version of the package of a module; None if it is not an installed one.
+
+    They are those of the modules that are imported now: a package may be imported later, or anew.
+    """
     spec: Any = getattr(sys.modules.get(module), "__spec__", None)
-    if module == "__main__" or spec is None:
+    if module == "__main__" or spec is None or spec.origin is None:
         return None
     top = module.partition(".")[0]
-    if spec.origin not in ("built-in", "frozen"):
-        if spec.origin is None:
-            return None
-        file = Path(spec.origin)
-        is_installed = top == "filippov" or {"site-packages", "dist-packages"}.intersection(file.parts)
-        if not is_installed and not any(file.is_relative_to(folder) for folder in _STANDARD):
-            return None
+    if top != "filippov" and not _is_of_a_package(spec.origin):
+        return None
     return f"{top} {getattr(sys.modules.get(top), '__version__', '')}"
+
+
+@functools.lru_cache(maxsize=1024)
+def _is_of_a_package(origin: str) -> bool:
+    """Whether the origin of a module is a file of an installed package, or Python itself."""
+    if origin in ("built-in", "frozen"):
+        return True
+    file = Path(origin)
+    is_installed = not {"site-packages", "dist-packages"}.isdisjoint(file.parts)
+    return is_installed or any(file.is_relative_to(folder) for folder in _STANDARD)
 
 
 _STANDARD = tuple({sysconfig.get_path("stdlib"), sysconfig.get_path("platstdlib")})

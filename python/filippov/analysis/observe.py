@@ -13,7 +13,7 @@ from filippov.analysis.points import Observation
 from filippov.analysis.sections import Phase, as_section
 from filippov.errors import InputError
 from filippov.options import Options, check_options, check_t_span
-from filippov.unknown import did_you_mean
+from filippov.unknown import did_you_mean, refuse_former
 
 if TYPE_CHECKING:
     from filippov.system import System
@@ -28,7 +28,6 @@ _OWN = {
     "args": "they belong to the System",
     "surfaces": "they belong to the System",
     "resets": "they belong to the System",
-    "max_branches": "branches are not followed here",
 }
 _LONGEST = 1e300
 
@@ -79,7 +78,7 @@ def check_keywords(given: Iterable[str], system: Any, *functions: Callable[..., 
     TypeError
         If there is no option of that name; the message has the nearest one.
     """
-    known = {*Options._fields, "zeno"}.difference(_OWN)
+    known = set(Options._fields).difference(_OWN)
     for function in functions:
         known |= {
             name for name, one in signature(function).parameters.items() if one.kind is not one.VAR_KEYWORD
@@ -91,6 +90,7 @@ def check_keywords(given: Iterable[str], system: Any, *functions: Callable[..., 
         what = f"{functions[0].__name__}() got an unexpected keyword argument {name!r}"
         if name in parameters:
             raise TypeError(f"{what}; it is a parameter of the system: params={{{name!r}: ...}}")
+        refuse_former([name], functions[0])
         raise TypeError(f"{what}{did_you_mean(name, known)}")
 
 

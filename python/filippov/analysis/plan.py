@@ -311,7 +311,7 @@ def plan_of(
     if observed is not None:
         state, values = grid.first()
         place = observed.section.place(prepared, grid.states, t0, state, values)
-    shown = {name: value for name, value in options._asdict().items() if name not in _NOT_SHOWN}
+    shown = {name: value for name, value in options.by_name().items() if name not in _NOT_SHOWN}
     attributes: dict[str, Any] = {
         "Conventions": "CF-1.11",
         "states": as_json(grid.states),

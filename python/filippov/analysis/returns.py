@@ -17,7 +17,7 @@ from filippov.analysis.sections import clocks_of
 from filippov.errors import InputError, Interrupted
 from filippov.modes import Mode
 from filippov.notices import show_summary
-from filippov.options import fit_kappa
+from filippov.sliding_policy import fit_kappa
 
 if TYPE_CHECKING:
     from filippov.system import System
@@ -151,7 +151,7 @@ def poincare(
     )
     state, values = grid.first()
     prepared = prepare_for(system, span[0], state, values)
-    fit_kappa(checked.kappa, prepared.surfaces)
+    fit_kappa(checked.sliding, prepared.surfaces)
     own = observed.section
     place = own.place(prepared, grid.states, span[0], state, values)
     clocks = clocks_of(own, grid.names, p_rows)

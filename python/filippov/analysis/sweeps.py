@@ -18,7 +18,7 @@ from filippov.analysis.schedule import Progress, as_executor, run_pieces
 from filippov.ensemble import check_threads
 from filippov.errors import InputError, Interrupted
 from filippov.notices import show_summary
-from filippov.options import fit_kappa
+from filippov.sliding_policy import fit_kappa
 
 if TYPE_CHECKING:
     from filippov.system import System
@@ -164,7 +164,7 @@ def sweep(
             modulo=modulo,
         )
     prepared = prepare_for(system, span[0], *grid.first())
-    fit_kappa(checked.kappa, prepared.surfaces)
+    fit_kappa(checked.sliding, prepared.surfaces)
     plan = plan_of(system, grid, prepared, observed, checked, span, last is not None, units or {})
     found = run_plan(plan, store, executor, threads, chunk_size, part, progress)
     if found is not None:

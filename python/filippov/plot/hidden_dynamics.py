@@ -10,6 +10,7 @@ import numpy.typing as npt
 from filippov.hidden import HiddenDynamics
 from filippov.hidden import hidden_dynamics as hidden_dynamics_at
 from filippov.plot.style import SLIDING_WIDTH, SMOOTH_WIDTH, Theme, new_axes, palette, theme
+from filippov.sliding_policy import SlidingPolicy
 from filippov.system import System
 
 __all__ = ["hidden_dynamics"]
@@ -25,7 +26,7 @@ def hidden_dynamics(
     t: float = 0.0,
     x: npt.ArrayLike | None = None,
     before: Any = None,
-    kappa: Any = None,
+    sliding: str | SlidingPolicy = "canopy",
     atol: float = 1e-9,
     ax: Any = None,
     dark: bool | None = None,
@@ -41,7 +42,7 @@ def hidden_dynamics(
     ----------
     system : System or HiddenDynamics
         The system; or what `filippov.hidden_dynamics` returned, then nothing else of the point is needed.
-    t, x, before, kappa, atol, **params
+    t, x, before, sliding, atol, **params
         The point and the motion before, as for `filippov.hidden_dynamics`.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure by default.
@@ -74,7 +75,7 @@ def hidden_dynamics(
     elif x is None:
         raise TypeError("x: the state at which two surfaces meet is needed")
     else:
-        hidden = hidden_dynamics_at(system, t, x, before, kappa, atol, **params)
+        hidden = hidden_dynamics_at(system, t, x, before, sliding, atol, **params)
     ax = new_axes(ax, (4.6, 4.6), dark)
     chosen = theme(dark)
     first, second, motion = palette(dark)[:3]

@@ -56,14 +56,14 @@ class _Unknown(Exception):
 class _Names:
     """The names that a code object looks up, those of the functions inside of it included.
 
-    It stands for the code in a fingerprint: there is one for each code object, and it keeps it alive.
+    It stands for the code in a fingerprint. There is one for all equal code of a file: a function that is
+    defined again, as by a cell of a notebook that is run again, is the same.
     """
 
-    __slots__ = ("code", "is_opaque", "names")
+    __slots__ = ("is_opaque", "names")
 
     def __init__(self, code: CodeType) -> None:
         codes = list(_with_inner(code))
-        self.code = code
         self.names = tuple(dict.fromkeys(name for each in codes for name in each.co_names))
         self.is_opaque = any(map(_leads_out, codes)) or any(
             name in _OPAQUE_NAMES or name.startswith("__") for name in self.names
@@ -89,7 +89,7 @@ def _leads_out(code: CodeType) -> bool:
     return False
 
 
-_NAMES: dict[int, _Names] = {}
+_NAMES: dict[tuple[str, CodeType], _Names] = {}
 # Modules of which a missing name may be supplied by a function: these two only import submodules.
 _LAZY_MODULES = ("numpy", "filippov")
 
@@ -322,9 +322,10 @@ class _Reader:
 
 
 def _names_of(code: CodeType) -> _Names:
-    known = _NAMES.get(id(code))
-    if known is None or known.code is not code:
+    key = (code.co_filename, code)
+    known = _NAMES.get(key)
+    if known is None:
         if len(_NAMES) > 1000:
             _NAMES.clear()
-        known = _NAMES[id(code)] = _Names(code)
+        known = _NAMES[key] = _Names(code)
     return known
