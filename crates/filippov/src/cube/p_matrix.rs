@@ -34,7 +34,7 @@ fn decide_block(block: &SparseRows) -> Option<bool> {
     if (0..m).any(|i| block.diagonal(i) <= 0.0) {
         return Some(false);
     }
-    if is_h_matrix(block) || is_diagonally_stable(block) {
+    if m == 1 || is_h_matrix(block) || is_diagonally_stable(block) {
         return Some(true);
     }
     if m > MOST_MINORS {
