@@ -1,6 +1,6 @@
 //! The methods that a run may use beside DOPRI5: the table at the end of this file has a line for each.
 
-use super::stepper::{Attempt, ExitSeries, Ready, StepStart, Stepper};
+use super::duties::{Attempt, ExitSeries, Ready, StepStart, Stepper};
 use super::{Controller, Dop853, ErrorScale, Midpoint, Rodas5p, Step, Taylor};
 use crate::error::FieldError;
 use crate::motion::SmoothField;

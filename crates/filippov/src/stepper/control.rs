@@ -1,9 +1,9 @@
 //! How long the next step is.
 
 use super::chatter::ChatterWatch;
+use super::duties::{Ready, StepStart};
 use super::initial_step::{initial_step, restart_step};
 use super::pace::{excursion, Paces};
-use super::stepper::{Ready, StepStart};
 use super::stiffness::{Stiff, Stiffness};
 use super::{Controller, Steppers};
 use crate::error::FieldError;

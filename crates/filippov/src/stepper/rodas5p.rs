@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::coefficients_rodas5p::{A, C, EXTENSION, GAMMA, NODES, TIME_SHARES};
-use super::stepper::Ready;
+use super::duties::Ready;
 use super::{Attempt, ErrorScale, Interpolant, Step, StepStart, Stepper};
 use crate::error::FieldError;
 use crate::motion::{observer, ModeField, SmoothField};

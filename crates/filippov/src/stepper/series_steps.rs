@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use smallvec::SmallVec;
 
-use super::stepper::Ready;
+use super::duties::Ready;
 use super::taylor::reach as reach_of;
 use super::{Attempt, Controller, ErrorScale, ExitSeries, Step, StepStart, Stepper, Taylor};
 use crate::error::FieldError;

@@ -1,7 +1,7 @@
 //! The methods of a run, and which of them takes the current step.
 
 use super::chosen::Chosen;
-use super::stepper::{Attempt, ExitSeries, Ready, StepStart, Stepper};
+use super::duties::{Attempt, ExitSeries, Ready, StepStart, Stepper};
 use super::{Controller, Dopri5, ErrorScale, Interpolant, Rodas5p, Step};
 use crate::error::FieldError;
 use crate::motion::{Seen, SmoothField};

@@ -85,7 +85,7 @@ impl StepSearch<'_, '_> {
     /// An affine switching function along the step, positive inside of the mode, into `rows`.
     pub(super) fn affine_series(&self, m: &Monitored, rows: &mut [f64]) -> Result<(), FieldError> {
         let extension = self.stepper.interpolant();
-        let (point, signs) = ((self.t, &self.x[..]), &self.motion.signs);
+        let (point, signs) = ((self.t, self.x), &self.motion.signs);
         let ht =
             self.system
                 .gradient_products(m.place, point, signs, extension.coefficients(), rows)?;

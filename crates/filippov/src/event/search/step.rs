@@ -69,7 +69,7 @@ impl StepSearch<'_, '_> {
     /// first: the others need not be looked at after the first zero.
     fn seek(&mut self, t1: f64, sought: &mut Sought) -> Result<bool, FieldError> {
         let end = (t1, self.stepper.end(), self.stepper.end_derivative());
-        self.detector.measure(self.system, &self.motion, end)?;
+        self.detector.measure(self.system, self.motion, end)?;
         self.stats.n_surface_evaluations += 1;
         if self.detector.right.iter().any(|(value, _)| value.is_nan()) {
             return Ok(false);
@@ -177,8 +177,8 @@ impl StepSearch<'_, '_> {
 
     /// Rounding of a monitored function over the step.
     pub(crate) fn noise_of(&mut self, m: &Monitored) -> Result<f64, FieldError> {
-        let step = (self.t, &self.x[..], self.stepper.end());
-        self.detector.noise(self.system, &self.motion, m, step)
+        let step = (self.t, self.x, self.stepper.end());
+        self.detector.noise(self.system, self.motion, m, step)
     }
 
     /// The same, or what blurred the zero that is divided out.
@@ -228,7 +228,7 @@ impl StepSearch<'_, '_> {
                     continue;
                 }
                 // An extrapolation that is not accurate enough still says how far to go.
-                if self.stepper.extrapolation_error(theta, &self.scale) > 1.0 {
+                if self.stepper.extrapolation_error(theta, self.scale) > 1.0 {
                     let gap = ONE_SIDED_AIM * (theta - 1.0) * dt;
                     sought.longest = sought.longest.min(gap);
                 } else {
