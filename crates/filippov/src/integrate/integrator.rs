@@ -350,6 +350,7 @@ impl<'a> Integrator<'a> {
 
     /// The start of the next step, the methods, and the control of the step.
     #[inline(always)]
+    #[inline(always)]
     pub(super) fn step_start(&mut self) -> (StepStart<'_, 'a>, &mut Steppers, &mut StepControl) {
         let start = StepStart {
             system: self.system,
@@ -365,6 +366,7 @@ impl<'a> Integrator<'a> {
     }
 
     /// The search of the step that was computed; and the user's functions.
+    #[inline(always)]
     pub(super) fn step_search(&mut self) -> (StepSearch<'_, 'a>, &UserEvents<'a>) {
         let search = StepSearch {
             system: self.system,

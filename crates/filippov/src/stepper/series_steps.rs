@@ -1,7 +1,5 @@
 //! Steps by Taylor series: which motions have them, and how long the steps are.
 
-use std::sync::Arc;
-
 use smallvec::SmallVec;
 
 use super::duties::Ready;
@@ -15,16 +13,6 @@ use crate::stats::Stats;
 use crate::status::{Warning, WarningCode};
 use crate::system::{MotionJets, PiecewiseSystem};
 use crate::tolerances::{EPS, MOST_AUTO_SERIES, STIFF_SERIES, TAYLOR_SHORTEST};
-
-/// The series of the present motion.
-#[derive(Default)]
-pub(super) struct MotionSeries {
-    jets: Option<Arc<MotionJets>>,
-    /// How long a step the series allows that was taken at the start of the motion, until the step.
-    reach: Option<f64>,
-    /// The user was warned that a motion has no series.
-    has_warned: bool,
-}
 
 impl Taylor {
     /// The method of a run over an interval of length `span`.

@@ -1,16 +1,28 @@
 //! The Taylor method: the coefficients of the motion are the step, its continuous extension and its error.
 
+use std::sync::Arc;
+
 use smallvec::SmallVec;
 
 use super::controller::{rough_exp2, rough_log2};
-use super::series_steps::MotionSeries;
 use super::{Attempt, ErrorScale, Interpolant, Step};
 use crate::error::FieldError;
 use crate::motion::SmoothField;
+use crate::system::MotionJets;
 use crate::tolerances::{
     TAYLOR_DEAR, TAYLOR_LARGEST_ORDER, TAYLOR_NOISE, TAYLOR_ORDER_CHEAP, TAYLOR_ORDER_DEAR,
     TAYLOR_SHARE, TAYLOR_SLOW, WARY_GROWTH, WARY_POINTS, WARY_START,
 };
+
+/// The series of the present motion.
+#[derive(Default)]
+pub(super) struct MotionSeries {
+    pub(super) jets: Option<Arc<MotionJets>>,
+    /// How long a step the series allows that was taken at the start of the motion, until the step.
+    pub(super) reach: Option<f64>,
+    /// The user was warned that a motion has no series.
+    pub(super) has_warned: bool,
+}
 
 /// A Taylor step of variable length.
 ///
