@@ -98,7 +98,7 @@ pub(crate) fn end_of_sliding(
     (may_lose, approaches): (bool, bool),
     horizon: f64,
 ) -> Result<EndOfSliding, FieldError> {
-    if !may_lose && !approaches || !vanishing_surfaces(at, notes)?.surfaces.is_empty() {
+    if !vanishing_surfaces(at, notes)?.surfaces.is_empty() {
         return Ok(EndOfSliding::Exit);
     }
     if may_lose {

@@ -350,7 +350,6 @@ impl<'a> Integrator<'a> {
 
     /// The start of the next step, the methods, and the control of the step.
     #[inline(always)]
-    #[inline(always)]
     pub(super) fn step_start(&mut self) -> (StepStart<'_, 'a>, &mut Steppers, &mut StepControl) {
         let start = StepStart {
             system: self.system,

@@ -125,14 +125,15 @@ impl<'a> Integrator<'a> {
         if let (&[j], true) = (self.motion.sliding(), n_ends > 0) {
             let speed = self.stepper.end_derivative().iter();
             let speed = speed.fold(0.0_f64, |most, v| most.max(v.abs()));
-            let signs = (
-                self.detector.may_lose_multiplier(speed, self.options.rtol),
-                n_ends > 1 || self.detector.approaches_two_fold(),
-            );
+            let may_lose = self.detector.may_lose_multiplier(speed, self.options.rtol);
+            let approaches = n_ends > 1 || self.detector.approaches_two_fold();
             let horizon = self.horizon;
-            let end = self.ask(cause(false), |at, notes| {
-                end_of_sliding(at, notes, j, signs, horizon)
-            })?;
+            let end = match may_lose || approaches {
+                false => EndOfSliding::Exit,
+                true => self.ask(cause(false), |at, notes| {
+                    end_of_sliding(at, notes, j, (may_lose, approaches), horizon)
+                })?,
+            };
             match end {
                 EndOfSliding::Exit => {}
                 EndOfSliding::DoubleZero((t, x)) => {
@@ -193,7 +194,11 @@ impl<'a> Integrator<'a> {
         }
         self.record(before, next.mode.clone(), &concerned, rule.name())?;
         if !matches!(rule, Rule::Touch | Rule::Contact | Rule::Triggers) {
-            let limit = self.ask(Cause::Start, |at, _| limit_of_switches(at))?;
+            // One surface meets no other.
+            let limit = match self.system.n_surfaces() {
+                0 | 1 => None,
+                _ => self.ask(Cause::Start, |at, _| limit_of_switches(at))?,
+            };
             if let Some(limit) = limit.filter(|limit| limit.t <= self.horizon) {
                 return self.jump_to(limit, next.mode);
             }
