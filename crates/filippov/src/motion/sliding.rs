@@ -2,8 +2,8 @@
 
 use smallvec::{smallvec, SmallVec};
 
+use super::duties::Exits;
 use super::guard::Guards;
-use super::motion::Exits;
 use super::{Guard, Motion, Projector, SmoothField};
 use crate::error::FieldError;
 use crate::mode::Signs;
