@@ -68,7 +68,8 @@ pub enum Error {
 ///
 /// The payload is whatever the caller's language has for an exception; it is handed back in
 /// [`crate::Stop::FieldRaised`] unchanged.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
+#[error("a function of the system could not be evaluated")]
 pub struct FieldError(pub Box<dyn Any + Send>);
 
 impl FieldError {

@@ -34,19 +34,18 @@
 //!
 //! # Example: a traced system
 //!
-//! A system given by expressions has exact derivatives, bounds and Taylor series. Here x' = -sign(x - 1/2) + u with a parameter u.
+//! A system given by expressions has exact derivatives, bounds and Taylor series. Here x' = 0.3 - sign(x - 1/2).
 //!
 //! ```
 //! use filippov::{Problem, TracedSystem};
-//! use filippov_expr::{Backend, BinaryOp, Graph, Names};
+//! use filippov_expr::{Backend, Graph, Names};
 //!
 //! let mut g = Graph::new();
-//! let (x, half) = (g.state(0), g.constant(0.5));
-//! let h = g.binary(BinaryOp::Sub, x, half)?;
-//! let sign = g.sign(h)?;
-//! let u = g.parameter(0);
-//! let rate = g.binary(BinaryOp::Sub, u, sign)?;
-//! let relay = TracedSystem::new(g, vec![rate], vec![0.3], Names::default(), Backend::Auto)?;
+//! let (x, half, drive) = (g.state(0), g.constant(0.5), g.constant(0.3));
+//! let h = g.sub(x, half);
+//! let sign = g.sign(h);
+//! let rate = g.sub(drive, sign);
+//! let relay = TracedSystem::new(g, vec![rate], vec![], Names::default(), Backend::Auto)?;
 //! let solution = Problem::new(&relay, (0.0, 2.0), &[0.0]).solve()?;
 //!
 //! // It rises with 1.3, reaches the surface at t = 0.5 / 1.3, and slides.
