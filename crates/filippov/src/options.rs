@@ -92,7 +92,7 @@ pub enum Method {
     Rodas5p,
 }
 
-/// Options of [`crate::solve`].
+/// Options of [`crate::Problem::solve`].
 #[derive(Clone, Debug)]
 pub struct Options {
     /// How motions are integrated.

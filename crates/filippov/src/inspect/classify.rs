@@ -109,7 +109,7 @@ pub struct Inspection<'a> {
 }
 
 /// Says what happens at a point: which surfaces vanish there, and in which modes a motion can follow. The decision is that of
-/// a run ([`crate::solve`]) that starts there or, with [`Inspection::before`], arrives there in a mode.
+/// a run ([`crate::Problem::solve`]) that starts there or, with [`Inspection::before`], arrives there in a mode.
 ///
 /// A surface vanishes if |h| is below the rounding of the terms that it is made of; it matters if the field depends on its
 /// sign. `None` if the field or a switching function is not finite.

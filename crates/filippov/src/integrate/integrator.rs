@@ -160,13 +160,16 @@ impl<'a> Integrator<'a> {
             return Ok(Some(Stop::MaxEvents));
         }
         self.watch.look(attempts, self.t);
-        if let Some(stop) = self.watch.stop() {
-            return Ok(Some(stop));
+        if self.watch.has_ended() {
+            return Ok(self.watch.stop());
         }
-        let stopped = self.attempt_step()?;
-        Ok(stopped.or_else(|| self.recorder.stop_at_section()))
+        match self.attempt_step() {
+            Ok(None) => Ok(self.recorder.stop_at_section()),
+            ended => ended,
+        }
     }
 
+    #[inline(always)]
     fn attempt_step(&mut self) -> Result<Option<Stop>, FieldError> {
         let remaining = self.horizon - self.t;
         if remaining <= 0.0 {

@@ -57,13 +57,13 @@ impl<'a> Integrator<'a> {
     }
 
     /// Counts what questions cost, and keeps their warnings.
-    #[inline]
+    #[inline(always)]
     pub(super) fn take_notes(&mut self, notes: Notes) {
         self.stats.n_field_evaluations += notes.n_field_evaluations;
         self.stats.n_surface_evaluations += notes.n_surface_evaluations;
         self.n_choices = notes.n_choices;
         // What an interrupted decision warns of need not hold.
-        if notes.warnings.is_empty() || self.watch.stop().is_some() {
+        if notes.warnings.is_empty() || self.watch.has_ended() {
             return;
         }
         for warning in notes.warnings {
@@ -93,8 +93,8 @@ impl<'a> Integrator<'a> {
         } else {
             self.ask(cause, |at, notes| decide(at, notes, reached))?
         };
-        if let Some(stop) = self.watch.stop() {
-            decision.decided = Err(stop);
+        if self.watch.has_ended() {
+            decision.decided = self.watch.stop().map_or(decision.decided, Err);
         }
         Ok(decision)
     }

@@ -69,10 +69,15 @@ impl<'a> Watch<'a> {
     }
 
     /// Looks now and then, after so many attempts at a step: the seldomer the faster they are.
+    #[inline(always)]
     pub fn look(&mut self, attempts: u64, t: f64) {
-        if attempts < self.next {
-            return;
+        if attempts >= self.next {
+            self.look_now(attempts, t);
         }
+    }
+
+    #[cold]
+    fn look_now(&mut self, attempts: u64, t: f64) {
         let now = self.now();
         let is_slow = |looked: Instant| (now - looked).as_secs_f64() > SLOW_POLL;
         self.interval = match self.looked.is_some_and(is_slow) {
@@ -101,6 +106,12 @@ impl<'a> Watch<'a> {
                 self.over.set(Some(Over::Interrupted));
             }
         }
+        self.over.get().is_some()
+    }
+
+    /// Was a limit reached when it looked?
+    #[inline(always)]
+    pub fn has_ended(&self) -> bool {
         self.over.get().is_some()
     }
 
