@@ -20,10 +20,7 @@ def count(name: str, value: Any) -> int:
     InputError
         If `value` is none.
     """
-    try:
-        number = real(value)
-    except (TypeError, ValueError):
-        number = math.nan
+    number = _real_or_nan(value)
     if not (math.isfinite(number) and number > 0 and number == int(number)):
         raise InputError(f"{name}: a positive whole number is needed, not {value!r}")
     return int(number)
@@ -37,13 +34,18 @@ def positive(name: str, value: Any, infinite: bool = False) -> float:
     InputError
         If `value` is none.
     """
-    try:
-        number = real(value)
-    except (TypeError, ValueError):
-        number = math.nan
+    number = _real_or_nan(value)
     if not number > 0.0 or (math.isinf(number) and not infinite):
         raise InputError(f"{name}: a positive number is needed, not {value!r}")
     return number
+
+
+def _real_or_nan(value: Any) -> float:
+    """Return a real number; NaN for what is none."""
+    try:
+        return real(value)
+    except (TypeError, ValueError):
+        return math.nan
 
 
 def real(value: Any) -> float:

@@ -40,8 +40,8 @@ impl ErrorScale {
         self.atol[i] + self.rtol * if b < a { a } else { b }
     }
 
-    /// The size of component `i` at `y`: its magnitude, or where that is small the one below which the absolute
-    /// tolerance governs its error. Infinite where nothing tells it.
+    /// The size of component `i` at `y` is its magnitude. Where the magnitude is small, the size is the value below which the
+    /// absolute tolerance governs the error. The size is infinite if the component is zero and has no absolute tolerance.
     pub fn size(&self, i: usize, y: f64) -> f64 {
         self.of(i, y, y) / self.rtol
     }

@@ -143,8 +143,8 @@ impl<'a> Instant<'_, 'a> {
         let Some(Sides { mode, on_surface }) = sides else {
             return Ok(None);
         };
-        let goes_on = on_surface[j] && self.goes_through(j, side, &mode, &on_surface)?;
-        Ok(Some((j, goes_on)))
+        let passes = on_surface[j] && self.goes_through(j, side, &mode, &on_surface)?;
+        Ok(Some((j, passes)))
     }
 
     /// Does the motion lead from this side through a surface that the point lies on?

@@ -141,7 +141,7 @@ struct State {
 struct Pivots<'a> {
     /// The problem without the effects of idle surfaces, which are rounding.
     problem: RelayProblem,
-    /// Surfaces whose signs have no effect, as those of kinks: they follow their rates.
+    /// The signs of these surfaces have no effect, for instance those of kinks. Each sign follows the rate of its surface.
     is_idle: Vec<bool>,
     uniqueness: Uniqueness,
     /// nu, and N where it is damped, with d.

@@ -1,4 +1,4 @@
-//! Redundant contacts, as where friction closes a loop: multipliers that share the load.
+//! Redundant contacts share a load: their multipliers are not determined one by one. Friction that closes a loop makes some.
 //!
 //! Two bodies that rub on the ground and on each other have three contacts and two velocities. At rest the equations
 //! N s = -nu of their multipliers s then have many solutions or none, and those in [-1, 1] all give the same motion:
@@ -42,7 +42,7 @@ pub struct SharedLoads {
     regular: Vec<usize>,
     solver: SparseSolver,
     loops: Vec<Loop>,
-    /// Surfaces whose signs have no effect, as kinks: they are in the place of others that are slid on.
+    /// These surfaces have signs without effect, for instance kinks. They lie in the place of others that the motion slides on.
     idle: Vec<usize>,
 }
 

@@ -1,5 +1,5 @@
-//! Surfaces whose functions are zero all along a motion: those that neither field leaves, and those in the place of the one
-//! slid on.
+//! Some surfaces have functions that are zero all along a motion: neither field leaves such a surface, or it lies in the place
+//! of the one that the motion slides on. This file finds them and warns of them.
 
 use super::point::{Left, Notes, Point};
 use crate::error::FieldError;

@@ -7,6 +7,7 @@ use super::event::vanishing_surfaces;
 use super::point::{Notes, Point};
 
 use crate::error::FieldError;
+use crate::mode::Mode;
 use crate::motion::{shares_of_rows, ModeField, SmoothField};
 use crate::motion::{Leading, TwoFold, TwoFoldMotion};
 use crate::system::{dot, dot_magnitude};
@@ -85,8 +86,8 @@ pub(crate) enum EndOfSliding {
     Exit,
     /// The motion has come to a two-fold, which is here.
     TwoFold(Place),
-    /// The difference of the normal components has a double zero, and the motion goes on from here.
-    DoubleZero(Place),
+    /// The difference of the normal components has a double zero, and the motion goes on from here, in this mode.
+    DoubleZero(Place, Mode),
 }
 
 /// What the end of sliding on surface `j` is, if no other surface vanishes. The steps before say whether it may be a double
@@ -98,13 +99,14 @@ pub(crate) fn end_of_sliding(
     (may_lose, approaches): (bool, bool),
     horizon: f64,
 ) -> Result<EndOfSliding, FieldError> {
-    if !vanishing_surfaces(at, notes)?.surfaces.is_empty() {
+    let reached = vanishing_surfaces(at, notes)?;
+    if !reached.surfaces.is_empty() {
         return Ok(EndOfSliding::Exit);
     }
     if may_lose {
         let beyond = beyond_double_zero(at, notes, j)?;
         if let Some(place) = beyond.filter(|(t, _)| *t <= horizon) {
-            return Ok(EndOfSliding::DoubleZero(place));
+            return Ok(EndOfSliding::DoubleZero(place, reached.before));
         }
     }
     Ok(match approaches {

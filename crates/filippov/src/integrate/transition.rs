@@ -136,8 +136,7 @@ impl<'a> Integrator<'a> {
             };
             match end {
                 EndOfSliding::Exit => {}
-                EndOfSliding::DoubleZero((t, x)) => {
-                    let mode = self.motion.mode.clone();
+                EndOfSliding::DoubleZero((t, x), mode) => {
                     self.move_straight(t, x)?;
                     self.record(mode.clone(), mode.clone(), &[], Rule::OneSurface.name())?;
                     return self.begin(Next::new(mode, Lefts::new()), &Multiple::default());
@@ -770,8 +769,8 @@ impl<'a> Integrator<'a> {
         Ok(None)
     }
 
-    /// Goes on where h_j has become zero: along the surface, if the fields hold the motion there, as where it has come to rest
-    /// by a root of the distance. Beside the surface it would follow what the root makes of rounding.
+    /// Goes on from a point at which h_j has become zero. If the fields hold the motion on the surface, it stays there: a field
+    /// with a root of the distance brings it to rest so. Beside the surface the motion would follow the root of rounding.
     pub(super) fn settle_on(&mut self, j: usize) -> Result<Option<Stop>, FieldError> {
         let signs = self.motion.signs.clone();
         let mut projector = Projector::new(self.x.len(), signs.len());

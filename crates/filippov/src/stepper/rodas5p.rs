@@ -355,8 +355,8 @@ impl Stepper for Rodas5p {
         stats.n_steps_rodas5p += 1;
     }
 
-    /// The extension of a stiff motion lies beside the manifold to which the fast components keep; within the tolerance, but
-    /// the direction of the field there says nothing about the motion. The end of a step is on it.
+    /// The fast components of a stiff motion keep to a manifold. The extension lies beside it, within the tolerance, and there the
+    /// field points in a direction that the motion does not have. The end of a step lies on the manifold.
     fn ends_at_events(&self) -> bool {
         true
     }
