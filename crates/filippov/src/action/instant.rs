@@ -13,37 +13,27 @@
 use smallvec::{smallvec, SmallVec};
 
 use crate::decisions::{
-    goes_through, pushed_back, sides, Cause, Notes, Point, Policy, Scene, Sides, Values,
+    goes_through, pushed_back, sides, Cause, Notes, Point, Scene, Sides, Values,
 };
 use crate::error::FieldError;
-use crate::error_scale::ErrorScale;
 use crate::mode::Mode;
-use crate::motion::CurrentMotion;
+use crate::motion::Run;
 use crate::patience::Patience;
 use crate::status::Stop;
 use crate::switch::Switch;
-use crate::system::{Actions, PiecewiseSystem, Trigger};
+use crate::system::Trigger;
 use crate::tolerances::{MOST_ACTIONS_AT_ONE_TIME, PENETRATION, SURFACE_NOISE};
 
 /// An instant in which actions are done: the place and the motion that ends there.
 pub(crate) struct Instant<'i, 'a> {
-    pub system: &'a dyn PiecewiseSystem,
-    pub actions: &'a Actions<'a>,
-    pub scale: &'i ErrorScale,
-    pub policy: Policy<'a>,
-    pub t: f64,
-    /// The state, which the actions change, as they change the discrete states of the motion.
-    pub x: &'i mut Vec<f64>,
-    pub motion: &'i mut CurrentMotion<'a>,
-    pub residuals: &'i [f64],
+    /// The run. The actions change its state, and the discrete states of its motion.
+    pub run: &'i mut Run<'a>,
     pub velocity: &'i [f64],
     pub switches: &'i [Switch],
     pub patience: Patience<'i>,
     pub notes: &'i mut Notes,
     /// What was done, also where the instant ends the run.
     pub done: Vec<Switch>,
-    /// Triggers that the motion goes on through after their actions.
-    pub passing: Vec<usize>,
 }
 
 /// The surfaces in one instant, as far as they trigger actions.
@@ -57,19 +47,20 @@ struct Approach {
 impl<'a> Instant<'_, 'a> {
     /// Does these actions and those that they trigger; why the run ends with them, if it does.
     pub fn act(&mut self, mut due: Vec<usize>) -> Result<Option<Stop>, FieldError> {
-        let before = self.motion.mode.clone();
+        let before = self.run.motion.mode.clone();
         let mut approach = Approach {
             side: self.free_sides(&before),
             passes: vec![false; before.entries().len()],
         };
         let mut count = 0;
+        self.run.passing.clear();
         self.push_back(&before)?;
         let start = self.surface_values(&before)?;
         while !due.is_empty() {
             for &index in &due {
                 count += 1;
                 if count > MOST_ACTIONS_AT_ONE_TIME {
-                    let names = due.iter().map(|&k| self.actions.list[k].name.clone());
+                    let names = due.iter().map(|&k| self.run.actions.list[k].name.clone());
                     return Ok(Some(Stop::ActionsDoNotEnd {
                         actions: names.collect(),
                     }));
@@ -91,7 +82,7 @@ impl<'a> Instant<'_, 'a> {
             return Ok(Some(Stop::Contact { surfaces: vec![j] }));
         }
         let passing = approach.passes.iter().enumerate();
-        self.passing = passing.filter(|(_, p)| **p).map(|(j, _)| j).collect();
+        self.run.passing = passing.filter(|(_, p)| **p).map(|(j, _)| j).collect();
         Ok(None)
     }
 
@@ -101,15 +92,7 @@ impl<'a> Instant<'_, 'a> {
         question: impl FnOnce(&Point<'_, '_, 'a>, &mut Notes) -> R,
     ) -> R {
         let scene = Scene {
-            system: self.system,
-            actions: self.actions,
-            scale: self.scale,
-            policy: self.policy,
-            t: self.t,
-            x: self.x,
-            motion: self.motion,
-            residuals: self.residuals,
-            passing: &[],
+            run: self.run,
             velocity: self.velocity,
             switches: self.switches,
             patience: self.patience,
@@ -118,9 +101,10 @@ impl<'a> Instant<'_, 'a> {
     }
 
     fn surface_values(&mut self, mode: &Mode) -> Result<Values, FieldError> {
-        let mut h: Values = smallvec![0.0; self.system.n_surfaces()];
-        self.system
-            .surfaces(self.t, self.x, &mode.signs(), &mut h)?;
+        let mut h: Values = smallvec![0.0; self.run.system.n_surfaces()];
+        self.run
+            .system
+            .surfaces(self.run.t, &self.run.x, &mode.signs(), &mut h)?;
         self.notes.n_surface_evaluations += 1;
         Ok(h)
     }
@@ -132,7 +116,7 @@ impl<'a> Instant<'_, 'a> {
         before: &Mode,
         approach: &Approach,
     ) -> Result<Option<(usize, bool)>, FieldError> {
-        let Trigger::Surface { index: j, .. } = self.actions.list[index].trigger else {
+        let Trigger::Surface { index: j, .. } = self.run.actions.list[index].trigger else {
             return Ok(None);
         };
         let side = approach.side[j];
@@ -163,7 +147,7 @@ impl<'a> Instant<'_, 'a> {
     /// Moves the state back onto the triggers that it slipped through.
     fn push_back(&mut self, memory: &Mode) -> Result<(), FieldError> {
         if let Some(x) = self.ask(memory, |at, notes| pushed_back(at, notes, memory))? {
-            *self.x = x;
+            self.run.x = x;
         }
         Ok(())
     }
@@ -178,20 +162,30 @@ impl<'a> Instant<'_, 'a> {
     ) -> Result<Option<usize>, FieldError> {
         let h = self.surface_values(before)?;
         let is_solid = |j: &usize| {
-            self.motion.triggers(self.system).is_only_trigger(*j)
-                && !self.motion.triggers(self.system).is_internal(*j)
+            self.run
+                .motion
+                .triggers(self.run.system)
+                .is_only_trigger(*j)
+                && !self.run.motion.triggers(self.run.system).is_internal(*j)
         };
         for j in (0..h.len()).filter(|j| is_solid(j) && !approach.passes[*j]) {
-            let side = self.motion.triggers(self.system).side(j, Some(before));
+            let side = self
+                .run
+                .motion
+                .triggers(self.run.system)
+                .side(j, Some(before));
             let came_from = before.entries()[j] == side || before.entries()[j] == 0;
             let is_beyond = h[j] * f64::from(side) < 0.0 && came_from;
             let has_jumped = (h[j] - start[j]).abs() > PENETRATION * h[j].abs();
             if !is_beyond || has_jumped {
                 continue;
             }
-            let known = self.residuals.get(j).copied().unwrap_or(0.0);
+            let known = self.run.residuals.get(j).copied().unwrap_or(0.0);
             let signs = before.signs();
-            let size = self.system.surface_size(j, self.t, self.x, &signs)?;
+            let size = self
+                .run
+                .system
+                .surface_size(j, self.run.t, &self.run.x, &signs)?;
             if h[j].abs() > (SURFACE_NOISE * size).max(known.min(PENETRATION * size)) {
                 return Ok(Some(j));
             }
@@ -201,22 +195,22 @@ impl<'a> Instant<'_, 'a> {
 
     /// Does one action and takes it down.
     fn do_action(&mut self, index: usize, before: &Mode) -> Result<Option<Stop>, FieldError> {
-        let action = &self.actions.list[index];
-        let y_before = SmallVec::from_slice(self.x);
-        let (mut x, mut q) = (self.x.clone(), self.motion.discrete.clone());
-        let signs = &self.motion.signs;
-        action.map.apply(self.t, &mut x, signs, &mut q)?;
-        (*self.x, self.motion.discrete) = (x, q);
-        self.system.set_discrete(&self.motion.discrete);
+        let action = &self.run.actions.list[index];
+        let y_before = SmallVec::from_slice(&self.run.x);
+        let (mut x, mut q) = (self.run.x.clone(), self.run.motion.discrete.clone());
+        let signs = &self.run.motion.signs;
+        action.map.apply(self.run.t, &mut x, signs, &mut q)?;
+        (self.run.x, self.run.motion.discrete) = (x, q);
+        self.run.system.set_discrete(&self.run.motion.discrete);
         if let Some(kind) = action.kind {
             let surfaces = match action.trigger {
                 Trigger::Surface { index, .. } => vec![index],
                 _ => Vec::new(),
             };
             self.done.push(Switch {
-                t: self.t,
+                t: self.run.t,
                 y_before,
-                y_after: SmallVec::from_slice(self.x),
+                y_after: SmallVec::from_slice(&self.run.x),
                 kind,
                 surfaces: surfaces.into(),
                 mode_before: before.clone(),
@@ -225,7 +219,7 @@ impl<'a> Instant<'_, 'a> {
                 rule: "",
             });
         }
-        let is_finite = self.x.iter().all(|v| v.is_finite());
+        let is_finite = self.run.x.iter().all(|v| v.is_finite());
         Ok((!is_finite).then(|| Stop::ActionNotFinite {
             action: action.name.clone(),
         }))
@@ -237,12 +231,12 @@ impl<'a> Instant<'_, 'a> {
         done: &[usize],
         approach: &mut Approach,
     ) -> Result<Vec<usize>, FieldError> {
-        let before = self.motion.mode.clone();
+        let before = self.run.motion.mode.clone();
         let sides = self.ask(&before, |at, notes| sides(at, notes, Some(&before)))?;
         let Some(Sides { mode, on_surface }) = sides else {
             return Ok(Vec::new());
         };
-        let actions = self.actions;
+        let actions = self.run.actions;
         let mut due = Vec::new();
         for j in 0..on_surface.len() {
             let side = approach.side[j];
@@ -252,14 +246,14 @@ impl<'a> Instant<'_, 'a> {
             let was_done = actions
                 .triggered_at(j, side)
                 .any(|index| done.contains(&index));
-            if self.motion.triggers(self.system).follows_law(j) && !on_surface[j] {
+            if self.run.motion.triggers(self.run.system).follows_law(j) && !on_surface[j] {
                 // Whatever led there in this instant, also after its own change: in the end the law holds.
                 if mode.entries()[j] < 0 {
                     due.extend(actions.triggered_at(j, 1));
                 }
                 continue;
             }
-            if was_done && self.motion.triggers(self.system).is_internal(j) {
+            if was_done && self.run.motion.triggers(self.run.system).is_internal(j) {
                 continue;
             }
             if !on_surface[j] {
@@ -286,8 +280,8 @@ impl<'a> Instant<'_, 'a> {
     fn free_sides(&self, mode: &Mode) -> Vec<i8> {
         let mut sides = mode.entries().to_vec();
         for (j, side) in sides.iter_mut().enumerate() {
-            if *side == 0 && self.motion.triggers(self.system).is_only_trigger(j) {
-                *side = self.motion.triggers(self.system).side(j, None);
+            if *side == 0 && self.run.motion.triggers(self.run.system).is_only_trigger(j) {
+                *side = self.run.motion.triggers(self.run.system).side(j, None);
             }
         }
         sides

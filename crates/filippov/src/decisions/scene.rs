@@ -2,29 +2,14 @@
 
 use std::cell::RefCell;
 
-use smallvec::SmallVec;
-
-use super::point::{Arrival, Cause, Notes, Point, Policy};
-use crate::error_scale::ErrorScale;
-use crate::motion::{CurrentMotion, Deflation, Guard};
+use super::point::{Arrival, Cause, Notes, Point};
+use crate::motion::Run;
 use crate::patience::Patience;
 use crate::switch::Switch;
-use crate::system::{Actions, PiecewiseSystem};
 
 /// The place that a motion has come to, and what is known of the run there.
 pub(crate) struct Scene<'s, 'a> {
-    pub system: &'a dyn PiecewiseSystem,
-    pub actions: &'a Actions<'a>,
-    pub scale: &'s ErrorScale,
-    pub policy: Policy<'a>,
-    pub t: f64,
-    pub x: &'s [f64],
-    /// The motion that comes there.
-    pub motion: &'s mut CurrentMotion<'a>,
-    /// How far the point lies off each surface by rounding; empty: not at all.
-    pub residuals: &'s [f64],
-    /// Triggers whose action leaves the motion as it is: it crosses them.
-    pub passing: &'s [usize],
+    pub run: &'s mut Run<'a>,
     /// The velocity of the motion a little before.
     pub velocity: &'s [f64],
     /// The last switches of the run.
@@ -41,15 +26,8 @@ impl<'a> Scene<'_, 'a> {
         notes: &mut Notes,
         question: impl FnOnce(&Point<'_, '_, 'a>, &mut Notes) -> R,
     ) -> R {
-        let mut departing = SmallVec::new();
-        for monitored in &self.motion.monitored {
-            if let (Guard::Surface(j), Some(Deflation { order: 2.., .. })) =
-                (monitored.guard, monitored.deflation)
-            {
-                departing.push(j);
-            }
-        }
-        let motion = self.motion;
+        let run = self.run;
+        let motion = &mut run.motion;
         let arrival = Arrival {
             cause,
             mode: &motion.mode,
@@ -58,22 +36,22 @@ impl<'a> Scene<'_, 'a> {
             sides: &motion.sides,
             active: &motion.active,
             resting: &motion.resting,
-            departing,
+            departing: motion.departing().collect(),
             switches: self.switches,
-            residuals: self.residuals,
-            passing: self.passing,
+            residuals: &run.residuals,
+            passing: &run.passing,
             velocity: self.velocity,
             field: RefCell::new(&mut motion.field),
         };
         let at = Point {
-            system: self.system,
-            actions: self.actions,
-            scale: self.scale,
-            t: self.t,
-            x: self.x,
+            system: run.system,
+            actions: run.actions,
+            scale: &run.scale,
+            t: run.t,
+            x: &run.x,
             q: &motion.discrete,
             arrival: &arrival,
-            policy: self.policy,
+            policy: run.options.into(),
             patience: self.patience,
         };
         question(&at, notes)

@@ -17,44 +17,29 @@
 use crate::action::Timetable;
 use crate::decisions::{differs_between_sides, has_left_resting, root_ends, Cause};
 use crate::error::{Error, FieldError};
-use crate::error_scale::ErrorScale;
 use crate::event::search::{Detector, StepSearch};
 use crate::event::{Event, Found, UserEvents, TICK};
 use crate::integrate::problem::{check, Problem};
 use crate::integrate::progress::Progress;
 use crate::integrate::watch::Watch;
 use crate::mode::Mode;
-use crate::motion::{CurrentMotion, Guard, SmoothField};
-use crate::options::Options;
+use crate::motion::{Guard, Run, SmoothField};
 use crate::record::{Recorder, Solution};
-use crate::stats::Stats;
 use crate::status::{Stop, Warning};
-use crate::stepper::{Attempt, StepControl, StepStart, Steppers, Stiff};
-use crate::system::{Actions, PiecewiseSystem};
+use crate::stepper::{Attempt, StepControl, Steppers, Stiff};
 use crate::tolerances::{EPS, SHORTEST_STEP, SHORTEST_STEP_AT_ZERO};
 
 /// An integration in progress.
 pub struct Integrator<'a> {
-    pub(super) system: &'a dyn PiecewiseSystem,
-    pub(super) options: &'a Options,
-    pub(super) scale: ErrorScale,
-    pub(super) t: f64,
+    pub(super) run: Run<'a>,
     pub(super) t_end: f64,
-    pub(super) actions: &'a Actions<'a>,
     pub(super) timetable: Timetable,
     /// The next known time of an action, or the end: no step goes beyond it.
     pub(super) horizon: f64,
-    /// How far the point of an event lies off the surfaces that vanish there, by rounding; else empty.
-    pub(super) residuals: Vec<f64>,
-    /// Triggers whose action leaves the motion as it is: it goes through them.
-    pub(super) passing: Vec<usize>,
-    pub(super) x: Vec<f64>,
-    pub(super) motion: CurrentMotion<'a>,
     pub(super) stepper: Steppers,
     pub(super) control: StepControl,
     pub(super) detector: Detector,
     pub(super) recorder: Recorder<'a>,
-    pub(super) stats: Stats,
     pub(super) warnings: Vec<Warning>,
     /// How many non-unique points were met.
     pub(super) n_choices: usize,
@@ -80,25 +65,15 @@ impl<'a> Integrator<'a> {
         } = problem;
         check(&problem)?;
         let n = system.n_states();
-        let undecided = Mode::new(vec![1; system.n_surfaces()]);
         Ok(Integrator {
-            system,
-            options,
-            scale: ErrorScale::new(options.rtol, &options.atol, n),
-            t: t_span.0,
+            run: Run::new(system, options, actions, (t_span.0, y0)),
             t_end: t_span.1,
-            actions,
             timetable: Timetable::new(actions, t_span.0),
             horizon: t_span.1,
-            residuals: Vec::new(),
-            passing: Vec::new(),
-            x: y0.to_vec(),
-            motion: CurrentMotion::new(system, t_span.0, undecided, options.into(), actions),
             stepper: Steppers::new(options, system, t_span.1 - t_span.0),
             control: StepControl::new(),
             detector: Detector::new(n, system.n_surfaces()),
             recorder: Recorder::new(n, options, events),
-            stats: Stats::default(),
             warnings: Vec::new(),
             n_choices: 0,
             progress: Progress::default(),
@@ -117,17 +92,17 @@ impl<'a> Integrator<'a> {
 
     /// The time reached.
     pub fn t(&self) -> f64 {
-        self.t
+        self.run.t
     }
 
     /// The state there.
     pub fn x(&self) -> &[f64] {
-        &self.x
+        &self.run.x
     }
 
     /// The mode of the motion from there.
     pub fn mode(&self) -> &Mode {
-        &self.motion.mode
+        &self.run.motion.mode
     }
 
     /// Runs to the end.
@@ -152,14 +127,14 @@ impl<'a> Integrator<'a> {
             self.watch.start();
             return self.start();
         }
-        let attempts = self.stats.n_steps + self.stats.n_rejected;
-        if attempts >= self.options.max_steps {
+        let attempts = self.run.stats.n_steps + self.run.stats.n_rejected;
+        if attempts >= self.run.options.max_steps {
             return Ok(Some(Stop::MaxSteps));
         }
-        if self.stats.n_switches >= self.options.max_events {
+        if self.run.stats.n_switches >= self.run.options.max_events {
             return Ok(Some(Stop::MaxEvents));
         }
-        self.watch.look(attempts, self.t);
+        self.watch.look(attempts, self.run.t);
         if self.watch.has_ended() {
             return Ok(self.watch.stop());
         }
@@ -171,20 +146,21 @@ impl<'a> Integrator<'a> {
 
     #[inline(always)]
     fn attempt_step(&mut self) -> Result<Option<Stop>, FieldError> {
-        let remaining = self.horizon - self.t;
+        let remaining = self.horizon - self.run.t;
         if remaining <= 0.0 {
             return self.reach_horizon();
         }
         if self.stepper.is_to_prepare() {
-            let t_end = self.t_end;
-            let (mut at, stepper, control) = self.step_start();
-            if let Some(warning) = control.prepare(&mut at, stepper, t_end)? {
+            let (run, stepper) = (&mut self.run, &mut self.stepper);
+            if let Some(warning) = self.control.prepare(run, stepper, self.t_end)? {
                 self.warnings.push(*warning);
             }
         }
         let room = (remaining, self.horizon >= self.t_end);
-        let dt = self.control.next(&self.motion, room, self.options.max_step);
-        let shortest = (SHORTEST_STEP * self.t.abs()).max(SHORTEST_STEP_AT_ZERO);
+        let dt = self
+            .control
+            .next(&self.run.motion, room, self.run.options.max_step);
+        let shortest = (SHORTEST_STEP * self.run.t.abs()).max(SHORTEST_STEP_AT_ZERO);
         if dt < shortest && dt < remaining {
             let lost = self.ask(Cause::Start, root_ends::lost_functions)?;
             if let Some(lost) = lost {
@@ -203,15 +179,14 @@ impl<'a> Integrator<'a> {
                 None => Ok(Some(Stop::NotFinite)),
             };
         }
-        let sliding = !self.motion.sliding().is_empty();
-        let (mut at, stepper, _) = self.step_start();
-        let attempt = stepper.attempt(&mut at, dt)?;
+        let sliding = !self.run.motion.sliding().is_empty();
+        let attempt = self.stepper.attempt(&mut self.run, dt)?;
         // The method may have made it shorter.
         let dt = self.stepper.interpolant().dt;
         match attempt {
             Attempt::NotFinite => {
                 self.count_rejection(sliding);
-                self.control.shorten_to_surface(dt, &self.motion);
+                self.control.shorten_to_surface(dt, &self.run.motion);
                 Ok(None)
             }
             Attempt::Error(error) if error > 1.0 => {
@@ -225,11 +200,11 @@ impl<'a> Integrator<'a> {
 
     /// Accepts the step, or its part up to the first event.
     fn advance(&mut self, dt: f64, error: f64) -> Result<Option<Stop>, FieldError> {
-        let sliding = !self.motion.sliding().is_empty();
-        let t1 = if dt == self.horizon - self.t {
+        let sliding = !self.run.motion.sliding().is_empty();
+        let t1 = if dt == self.horizon - self.run.t {
             self.horizon
         } else {
-            self.t + dt
+            self.run.t + dt
         };
         let (event, longest) = self.step_search().0.first_event(t1, dt)?;
         let found = match event {
@@ -241,14 +216,15 @@ impl<'a> Integrator<'a> {
                 return Ok(None);
             }
         };
-        if sliding && self.system.has_nested_signs() {
+        if sliding && self.run.system.has_nested_signs() {
             let (mut end, mut t) = (self.stepper.end().to_vec(), t1);
             if let Some(event) = &found {
                 self.stepper.interpolant().at(event.theta, &mut end);
-                t = self.t + event.theta * dt;
+                t = self.run.t + event.theta * dt;
             }
-            if let Some(stop) = differs_between_sides(self.system, (t, &end), &self.motion)? {
-                if dt < SHORTEST_STEP * self.t.abs().max(1.0) / EPS.sqrt() {
+            if let Some(stop) = differs_between_sides(self.run.system, (t, &end), &self.run.motion)?
+            {
+                if dt < SHORTEST_STEP * self.run.t.abs().max(1.0) / EPS.sqrt() {
                     return Ok(Some(stop));
                 }
                 self.count_rejection(sliding);
@@ -261,13 +237,13 @@ impl<'a> Integrator<'a> {
             .as_ref()
             .is_some_and(|event| !event.touch && !event.is_blurred);
         let aims = crosses && self.stepper.ends_at_events();
-        if aims && self.control.aims_again(self.t, theta, dt) {
+        if aims && self.control.aims_again(self.run.t, theta, dt) {
             return Ok(None);
         }
         let t_stop = if theta == 1.0 {
             t1
         } else {
-            self.t + theta * dt
+            self.run.t + theta * dt
         };
         // A switch at the end of the span, or at a known time, is there, and not a rounding before.
         let last = self.horizon;
@@ -278,20 +254,20 @@ impl<'a> Integrator<'a> {
             self.control.shorten(0.5 * dt);
             return Ok(None);
         };
-        self.stats.n_steps += 1;
-        self.stats.n_steps_sliding += u64::from(sliding);
-        self.stepper.count(&mut self.stats);
+        self.run.stats.n_steps += 1;
+        self.run.stats.n_steps_sliding += u64::from(sliding);
+        self.stepper.count(&mut self.run.stats);
         self.control.accept(&self.stepper, dt, error);
-        if self.control.is_short(dt, self.horizon - self.t) {
+        if self.control.is_short(dt, self.horizon - self.run.t) {
             // Towards a fold of the multipliers the field of an intersection bends like a square root, and towards a
             // two-fold the multiplier is a quotient of small numbers.
-            let may_bend = match self.motion.sliding.len() {
+            let may_bend = match self.run.motion.sliding.len() {
                 0 => false,
-                1 => self.detector.approaches_two_fold(),
+                1 => self.run.approaches_two_fold(),
                 _ => true,
             };
             if !may_bend {
-                let warning = self.control.look_for_jump(&self.stepper, (self.t, dt));
+                let warning = self.control.look_for_jump(&self.stepper, (self.run.t, dt));
                 self.warnings.extend(warning);
             }
         }
@@ -302,32 +278,32 @@ impl<'a> Integrator<'a> {
         }
         self.control.note_edge(longest, dt);
         if self.recorder.keeps_dense() {
-            self.stepper.extend_cheaply(&self.x);
+            self.stepper.extend_cheaply(&self.run.x);
         }
-        let (stepper, motion) = (&mut self.stepper, &mut self.motion);
+        let (stepper, motion) = (&mut self.stepper, &mut self.run.motion);
         self.recorder
-            .sample_step(t_stop, &self.x, stepper, motion)?;
+            .sample_step(t_stop, &self.run.x, stepper, motion)?;
         let Some(event) = found else {
             self.recorder
                 .step(self.stepper.interpolant(), t1, self.stepper.end());
             let zero = self.zero_surface(t1)?;
             let mut stiffness = Stiff::Nothing;
-            if self.control.stiffness_is_due(self.stats.n_steps) {
-                let (mut at, stepper, control) = self.step_start();
-                stiffness = control.look_for_stiffness(&mut at, stepper)?;
+            if self.control.stiffness_is_due(self.run.stats.n_steps) {
+                let (run, stepper) = (&mut self.run, &mut self.stepper);
+                stiffness = self.control.look_for_stiffness(run, stepper)?;
             }
-            self.stepper.accept(&mut self.x);
-            self.t = t1;
+            self.stepper.accept(&mut self.run.x);
+            self.run.t = t1;
             if let Stiff::Warning(warning) = stiffness {
                 self.warnings.push(*warning);
             } else if let Stiff::GoOnImplicitly = stiffness {
-                let (mut at, stepper, control) = self.step_start();
-                control.go_on_implicitly(&mut at, stepper);
+                let (run, stepper) = (&mut self.run, &mut self.stepper);
+                self.control.go_on_implicitly(run, stepper);
             }
-            if self.detector.accept(&mut self.motion.monitored, dt) {
-                self.motion.note_departure();
+            if self.detector.accept(&mut self.run, dt) {
+                self.run.motion.note_departure();
             }
-            if !self.motion.resting.is_empty() && self.ask(Cause::Start, has_left_resting)? {
+            if !self.run.motion.resting.is_empty() && self.ask(Cause::Start, has_left_resting)? {
                 return self.go_on_from_here(&[]);
             }
             if let Some(j) = zero {
@@ -335,52 +311,30 @@ impl<'a> Integrator<'a> {
             }
             return Ok(chatter);
         };
-        self.stepper.interpolant().at(theta, &mut self.x);
-        self.motion.project(t_stop, &mut self.x)?;
+        self.stepper.interpolant().at(theta, &mut self.run.x);
+        self.run.motion.project(t_stop, &mut self.run.x)?;
         let extension = self.stepper.interpolant();
-        if self.motion.is_in_contact() && theta > 0.0 {
+        if self.run.motion.is_in_contact() && theta > 0.0 {
             // Contact has taken velocities from the state, which no surface tells of later.
             let mut extension = extension.clone();
-            extension.lead_to(theta, &self.x);
-            self.recorder.step(&extension, t_stop, &self.x);
+            extension.lead_to(theta, &self.run.x);
+            self.recorder.step(&extension, t_stop, &self.run.x);
         } else {
-            self.recorder.step(extension, t_stop, &self.x);
+            self.recorder.step(extension, t_stop, &self.run.x);
         }
-        self.t = t_stop;
+        self.run.t = t_stop;
         self.control.switched();
         self.switch(&event)
-    }
-
-    /// The start of the next step, the methods, and the control of the step.
-    #[inline(always)]
-    pub(super) fn step_start(&mut self) -> (StepStart<'_, 'a>, &mut Steppers, &mut StepControl) {
-        let start = StepStart {
-            system: self.system,
-            options: self.options,
-            scale: &self.scale,
-            t: self.t,
-            x: &self.x,
-            motion: &mut self.motion,
-            seen: &mut self.detector.seen,
-            stats: &mut self.stats,
-        };
-        (start, &mut self.stepper, &mut self.control)
     }
 
     /// The search of the step that was computed; and the user's functions.
     #[inline(always)]
     pub(super) fn step_search(&mut self) -> (StepSearch<'_, 'a>, &UserEvents<'a>) {
         let search = StepSearch {
-            system: self.system,
-            scale: &self.scale,
-            t: self.t,
-            x: &self.x,
-            motion: &mut self.motion,
+            run: &mut self.run,
             stepper: &mut self.stepper,
             detector: &mut self.detector,
-            stats: &mut self.stats,
             slacks: &self.slacks,
-            rule: self.options.sliding,
             horizon: self.horizon,
             one_sided: self.control.is_one_sided(),
         };
@@ -388,19 +342,19 @@ impl<'a> Integrator<'a> {
     }
 
     fn count_rejection(&mut self, sliding: bool) {
-        self.stats.n_rejected += 1;
-        self.stats.n_rejected_sliding += u64::from(sliding);
+        self.run.stats.n_rejected += 1;
+        self.run.stats.n_rejected_sliding += u64::from(sliding);
     }
 
     /// Closes the books.
     pub fn finish(mut self, stop: Stop) -> Solution {
-        self.stats.n_field_evaluations += self.motion.field.n_evaluations();
-        self.stats.stiff_since = self.control.stiff_since();
+        self.run.stats.n_field_evaluations += self.run.motion.field.n_evaluations();
+        self.run.stats.stiff_since = self.control.stiff_since();
         self.recorder.finish(
-            (self.t, &self.x, self.options),
-            self.motion.mode,
+            (self.run.t, &self.run.x, self.run.options),
+            self.run.motion.mode,
             stop,
-            self.stats,
+            self.run.stats,
             self.warnings,
         )
     }
@@ -450,15 +404,15 @@ impl<'a> Integrator<'a> {
                 _ if at == theta => t_stop,
                 _ => (t0 + at * dt).min(t_stop),
             };
-            let mut y = vec![0.0; self.x.len()];
+            let mut y = vec![0.0; self.run.x.len()];
             self.stepper.interpolant().at(at, &mut y);
-            self.motion.project(t, &mut y)?;
+            self.run.motion.project(t, &mut y)?;
             if let Some(stop) = self.recorder.zero(index, t, &y) {
-                let (stepper, motion) = (&mut self.stepper, &mut self.motion);
-                self.recorder.sample_step(t, &self.x, stepper, motion)?;
+                let (stepper, motion) = (&mut self.stepper, &mut self.run.motion);
+                self.recorder.sample_step(t, &self.run.x, stepper, motion)?;
                 self.recorder.step(self.stepper.interpolant(), t, &y);
-                self.t = t;
-                self.x = y;
+                self.run.t = t;
+                self.run.x = y;
                 return Ok(Some(stop));
             }
         }

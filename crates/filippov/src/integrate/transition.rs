@@ -31,18 +31,10 @@ impl<'a> Integrator<'a> {
         cause: Cause,
         question: impl FnOnce(&Point<'_, '_, 'a>, &mut Notes) -> Result<R, FieldError>,
     ) -> Result<R, FieldError> {
-        let (watch, t) = (&self.watch, self.t);
+        let (watch, t) = (&self.watch, self.run.t);
         let is_over = || watch.stop().is_some() || watch.is_over(watch.now(), t);
         let scene = Scene {
-            system: self.system,
-            actions: self.actions,
-            scale: &self.scale,
-            policy: self.options.into(),
-            t,
-            x: &self.x,
-            motion: &mut self.motion,
-            residuals: &self.residuals,
-            passing: &self.passing,
+            run: &mut self.run,
             velocity: self.stepper.start_derivative(),
             switches: self.recorder.switches(),
             patience: Patience::until(&is_over),
@@ -59,8 +51,8 @@ impl<'a> Integrator<'a> {
     /// Counts what questions cost, and keeps their warnings.
     #[inline(always)]
     pub(super) fn take_notes(&mut self, notes: Notes) {
-        self.stats.n_field_evaluations += notes.n_field_evaluations;
-        self.stats.n_surface_evaluations += notes.n_surface_evaluations;
+        self.run.stats.n_field_evaluations += notes.n_field_evaluations;
+        self.run.stats.n_surface_evaluations += notes.n_surface_evaluations;
         self.n_choices = notes.n_choices;
         // What an interrupted decision warns of need not hold.
         if notes.warnings.is_empty() || self.watch.has_ended() {
@@ -82,7 +74,7 @@ impl<'a> Integrator<'a> {
         cause: Cause,
         reached: &mut Reached,
     ) -> Result<Decision, FieldError> {
-        let mut decision = if self.recorder.decisions.len() < self.options.keep_decisions {
+        let mut decision = if self.recorder.decisions.len() < self.run.options.keep_decisions {
             let kept = self.ask(cause, |at, notes| decide_and_record(at, notes, reached));
             let (decision, record) = kept?;
             // One that was interrupted depends on the time it had.
@@ -101,11 +93,11 @@ impl<'a> Integrator<'a> {
 
     /// Decides what follows the event and starts it.
     pub(super) fn switch(&mut self, event: &Found) -> Result<Option<Stop>, FieldError> {
-        self.stats.n_switches += 1;
-        if self.progress.n_switches_at(self.t) > MOST_SWITCHES_AT_ONE_TIME {
+        self.run.stats.n_switches += 1;
+        if self.progress.n_switches_at(self.run.t) > MOST_SWITCHES_AT_ONE_TIME {
             return self.leave_without_progress(event);
         }
-        if !self.actions.list.is_empty() {
+        if !self.run.actions.list.is_empty() {
             let h = self.ask(Cause::Start, |at, notes| {
                 at.surface_values(notes, at.arrival.signs)
             })?;
@@ -122,11 +114,11 @@ impl<'a> Integrator<'a> {
             vanishing: event.multiple.vanishing,
             at_two_fold,
         };
-        if let (&[j], true) = (self.motion.sliding(), n_ends > 0) {
+        if let (&[j], true) = (self.run.motion.sliding(), n_ends > 0) {
             let speed = self.stepper.end_derivative().iter();
             let speed = speed.fold(0.0_f64, |most, v| most.max(v.abs()));
-            let may_lose = self.detector.may_lose_multiplier(speed, self.options.rtol);
-            let approaches = n_ends > 1 || self.detector.approaches_two_fold();
+            let may_lose = self.run.may_lose_multiplier(speed);
+            let approaches = n_ends > 1 || self.run.approaches_two_fold();
             let horizon = self.horizon;
             let end = match may_lose || approaches {
                 false => EndOfSliding::Exit,
@@ -143,7 +135,7 @@ impl<'a> Integrator<'a> {
                 }
                 EndOfSliding::TwoFold((t, x)) => {
                     at_two_fold = true;
-                    if t > self.t && t <= self.horizon {
+                    if t > self.run.t && t <= self.horizon {
                         self.move_straight(t, x)?;
                     }
                 }
@@ -152,7 +144,7 @@ impl<'a> Integrator<'a> {
         let mut reached = Reached::default();
         let Decision { decided, rule } = self.decide(cause(at_two_fold), &mut reached)?;
         let Reached { surfaces, before } = reached;
-        self.residuals.clear();
+        self.run.residuals.clear();
         let mut next = match decided {
             Ok(next) => next,
             Err(stop) => return Ok(Some(stop)),
@@ -169,8 +161,8 @@ impl<'a> Integrator<'a> {
                 }
             }
             _ => {
-                if !self.motion.sliding.is_empty() {
-                    concerned.extend(self.motion.sliding.iter().copied());
+                if !self.run.motion.sliding.is_empty() {
+                    concerned.extend(self.run.motion.sliding.iter().copied());
                     concerned.sort_unstable();
                     concerned.dedup();
                 }
@@ -178,9 +170,9 @@ impl<'a> Integrator<'a> {
                     concerned.retain(|j| is_changed(j));
                 }
                 // Stability is lost, and the motion stays all the same: it oscillates around the root from now on.
-                let sliding = self.motion.sliding().iter().copied();
+                let sliding = self.run.motion.sliding().iter().copied();
                 let slides_on = next.mode.sliding_set().eq(sliding);
-                let field = &self.motion.field;
+                let field = &self.run.motion.field;
                 if slides_on && root_ends::loses_stability(field, &event.guards) {
                     next.start_mut().oscillates = true;
                 }
@@ -194,7 +186,7 @@ impl<'a> Integrator<'a> {
         self.record(before, next.mode.clone(), &concerned, rule.name())?;
         if !matches!(rule, Rule::Touch | Rule::Contact | Rule::Triggers) {
             // One surface meets no other.
-            let limit = match self.system.n_surfaces() {
+            let limit = match self.run.system.n_surfaces() {
                 0 | 1 => None,
                 _ => self.ask(Cause::Start, |at, _| limit_of_switches(at))?,
             };
@@ -207,9 +199,9 @@ impl<'a> Integrator<'a> {
 
     /// After too many switches without any progress of time: goes on from their limit, or ends the run.
     fn leave_without_progress(&mut self, event: &Found) -> Result<Option<Stop>, FieldError> {
-        let mut surfaces = self.recorder.surfaces_switched_at(self.t);
+        let mut surfaces = self.recorder.surfaces_switched_at(self.run.t);
         if let Some(limit) = self.ask(Cause::Start, |at, _| limit_here(at, &surfaces))? {
-            let mode = self.motion.mode.clone();
+            let mode = self.run.motion.mode.clone();
             return self.jump_to(limit, mode);
         }
         if surfaces.is_empty() {
@@ -231,26 +223,26 @@ impl<'a> Integrator<'a> {
         rule: &'static str,
     ) -> Result<(), FieldError> {
         let kind = Kind::between(&before, &after);
-        if kind == Kind::Crossing && !self.actions.list.is_empty() {
+        if kind == Kind::Crossing && !self.run.actions.list.is_empty() {
             let crossed = |j: &usize| {
                 let side = before.entries()[*j];
                 side != 0 && after.entries()[*j] == -side
             };
             for j in surfaces.iter().copied().filter(crossed) {
-                let is_known = self.motion.passed.contains(&j);
+                let is_known = self.run.motion.passed.contains(&j);
                 if !is_known
                     && self.ask(Cause::Anew(&before), |at, notes| {
                         warn_against_direction(at, notes, j, &before)
                     })?
                 {
-                    self.motion.passed.push(j);
+                    self.run.motion.passed.push(j);
                 }
             }
         }
         self.recorder.switch(Switch {
-            t: self.t,
-            y_before: SmallVec::from_slice(&self.x),
-            y_after: SmallVec::from_slice(&self.x),
+            t: self.run.t,
+            y_before: SmallVec::from_slice(&self.run.x),
+            y_after: SmallVec::from_slice(&self.run.x),
             kind,
             surfaces: SmallVec::from_slice(surfaces),
             mode_before: before,
@@ -272,43 +264,41 @@ impl<'a> Integrator<'a> {
             mut left,
             mut start,
         } = next;
-        self.stats.n_field_evaluations += self.motion.field.n_evaluations();
-        let duration = self.t - self.motion.t_start;
-        self.control.remember(&self.motion.mode, duration);
-        let slid = !self.motion.sliding().is_empty();
+        self.run.stats.n_field_evaluations += self.run.motion.field.n_evaluations();
+        self.control.remember(&self.run, &self.stepper);
+        let slid = !self.run.motion.sliding().is_empty();
         let mut leaps = false;
         if let Some(start) = &mut start {
             if let Some(x) = start.moved.take() {
-                self.x = x;
+                self.run.x = x;
             }
             if let Some(leap) = &start.leap {
                 leaps = true;
                 left = self.make_leap(leap)?;
             }
         }
-        self.motion.resting = match left.iter().all(|left| left.leading.order > 0) {
+        self.run.motion.resting = match left.iter().all(|left| left.leading.order > 0) {
             true => SlidingSet::new(),
             false => self.ask(Cause::Start, |at, notes| resting(at, notes, &mode, &left))?,
         };
-        let t = self.t;
+        let t = self.run.t;
         let zeros = left.iter().filter_map(|left| left.deflation(t));
         let zeros: SmallVec<[_; 2]> = zeros.collect();
-        self.motion.restart(self.system, t, mode, &zeros);
-        let zeros = self.motion.monitored.iter_mut();
+        self.run.motion.restart(self.run.system, t, mode, &zeros);
+        let zeros = self.run.motion.monitored.iter_mut();
         for zero in zeros.filter_map(|m| m.deflation.as_mut()) {
             zero.is_clean = !slid;
         }
-        let (mut at, stepper, _) = self.step_start();
-        let warning = stepper.begin(&mut at);
+        let warning = self.stepper.begin(&mut self.run);
         self.warnings.extend(warning.map(|warning| *warning));
         let mut two_fold = None;
-        match &mut self.motion.field {
+        match &mut self.run.motion.field {
             ModeField::Intersection(field) => {
                 let start = start.as_deref();
                 let multipliers = start.map_or(&[][..], |start| &start.multipliers);
                 field.begin(multipliers, start.is_some_and(|start| start.oscillates));
                 if let Some(start) = start.filter(|start| start.is_given) {
-                    field.hold_at_start(self.t, start.is_located);
+                    field.hold_at_start(self.run.t, start.is_located);
                 }
                 for &(guard, slack) in &self.slacks {
                     field.set_slack(guard, slack);
@@ -316,37 +306,37 @@ impl<'a> Integrator<'a> {
             }
             ModeField::Sliding(field) => {
                 if let Some(motion) = start.and_then(|start| start.two_fold) {
-                    let reach = motion.reach(self.options.rtol);
+                    let reach = motion.reach(self.run.options.rtol);
                     two_fold = Some((motion, reach));
-                    field.begin_at_two_fold(self.t, self.t, motion);
+                    field.begin_at_two_fold(self.run.t, self.run.t, motion);
                 }
             }
             _ => {}
         }
-        self.motion.project(self.t, &mut self.x)?;
         self.evaluate_start()?;
-        if self.motion.sliding.len() > 1 {
+        if self.run.motion.sliding.len() > 1 {
             self.ask(Cause::Start, |at, notes| {
                 warn_oscillation(at, notes);
                 Ok(())
             })?;
         }
         if !leaps {
-            let multipliers = self.motion.multipliers();
+            let multipliers = self.run.motion.multipliers();
             self.recorder.begin_segment(
-                self.t,
-                &self.motion.mode,
+                self.run.t,
+                &self.run.motion.mode,
                 multipliers,
-                &self.motion.discrete,
+                &self.run.motion.discrete,
             );
         }
-        if self.motion.sliding.len() > 1 {
-            if let Some(stop) = refusal(&self.motion.field, &self.motion.sliding) {
+        if self.run.motion.sliding.len() > 1 {
+            if let Some(stop) = refusal(&self.run.motion.field, &self.run.motion.sliding) {
                 return Ok(Some(stop));
             }
         }
-        if self.system.has_nested_signs() {
-            if let Some(stop) = differs_between_sides(self.system, (self.t, &self.x), &self.motion)?
+        if self.run.system.has_nested_signs() {
+            if let Some(stop) =
+                differs_between_sides(self.run.system, (self.run.t, &self.run.x), &self.run.motion)?
             {
                 return Ok(Some(stop));
             }
@@ -355,17 +345,16 @@ impl<'a> Integrator<'a> {
         if derivative.iter().any(|v| !v.is_finite()) {
             return Ok(Some(Stop::NotFinite));
         }
-        let start = (self.t, &self.x[..], derivative);
-        self.detector.measure(self.system, &self.motion, start)?;
+        let start = (self.run.t, &self.run.x[..], derivative);
+        self.detector.measure(&self.run, start)?;
         self.detector
-            .accept_start(&mut self.motion.monitored, multiple);
-        self.recorder.user_events.restart(self.t, &self.x)?;
-        let t_end = self.t_end;
-        let (mut at, stepper, control) = self.step_start();
+            .accept_start(&mut self.run.motion.monitored, multiple);
+        self.recorder.user_events.restart(self.run.t, &self.run.x)?;
         let surfaces = left.iter().filter_map(|l| Some((l.surface()?, l.leading)));
-        control.begin(&mut at, stepper, t_end, surfaces)?;
+        self.control
+            .begin(&mut self.run, &self.stepper, self.t_end, surfaces)?;
         if let (Some((motion, reach)), ModeField::Sliding(field)) =
-            (two_fold, &mut self.motion.field)
+            (two_fold, &mut self.run.motion.field)
         {
             if reach > 0.0 {
                 self.control.limit(reach);
@@ -373,7 +362,7 @@ impl<'a> Integrator<'a> {
                     true => reach,
                     false => self.control.proposal(),
                 };
-                field.begin_at_two_fold(self.t, self.t + until, motion);
+                field.begin_at_two_fold(self.run.t, self.run.t + until, motion);
             }
         }
         Ok(None)
@@ -381,47 +370,49 @@ impl<'a> Integrator<'a> {
 
     /// Begins the segment of a motion that starts with a leap, and makes that; what the motion leaves at its end.
     fn make_leap(&mut self, leap: &Leap) -> Result<Lefts, FieldError> {
-        let room = self.horizon - self.t;
+        let room = self.horizon - self.run.t;
         let landing = self.ask(Cause::Start, |at, notes| landing(leap, at, notes, room))?;
         let region = leap.region.clone();
-        self.motion.restart(self.system, self.t, region, &[]);
-        let discrete = &self.motion.discrete;
+        self.run
+            .motion
+            .restart(self.run.system, self.run.t, region, &[]);
+        let discrete = &self.run.motion.discrete;
         self.recorder
-            .begin_segment(self.t, &leap.region, SmallVec::new(), discrete);
+            .begin_segment(self.run.t, &leap.region, SmallVec::new(), discrete);
         self.move_straight(landing.t, landing.x)?;
         Ok(landing.left)
     }
 
     /// Records a straight line to a later point: the motion in between has more switches than can be listed.
     pub(super) fn move_straight(&mut self, t: f64, end: Vec<f64>) -> Result<(), FieldError> {
-        self.stepper.set_straight(self.t, t - self.t, &self.x, &end);
-        let (stepper, motion) = (&mut self.stepper, &mut self.motion);
-        self.recorder.sample_step(t, &self.x, stepper, motion)?;
+        self.stepper
+            .set_straight(self.run.t, t - self.run.t, &self.run.x, &end);
+        let (stepper, motion) = (&mut self.stepper, &mut self.run.motion);
+        self.recorder.sample_step(t, &self.run.x, stepper, motion)?;
         self.recorder.step(self.stepper.interpolant(), t, &end);
-        (self.t, self.x) = (t, end);
+        (self.run.t, self.run.x) = (t, end);
         Ok(())
     }
 
-    /// The derivative at the start of the motion, and its exit functions there.
+    /// The derivative at the start of the motion, and its exit functions there. The state moves onto the surfaces slid on.
     fn evaluate_start(&mut self) -> Result<(), FieldError> {
-        let (mut at, stepper, _) = self.step_start();
-        if stepper.start(&mut at) {
+        let run = &mut self.run;
+        if self.stepper.start(run) {
             // Known.
-        } else if let ModeField::Region(_) = &self.motion.field {
-            let (signs, derivative) = (&self.motion.signs, self.stepper.start_derivative_mut());
-            self.stats.n_field_evaluations +=
-                eval_on_side(self.system, self.t, &self.x, signs, derivative)?;
+        } else if let ModeField::Region(_) = &run.motion.field {
+            let (signs, derivative) = (&run.motion.signs, self.stepper.start_derivative_mut());
+            run.stats.n_field_evaluations +=
+                eval_on_side(run.system, run.t, &run.x, signs, derivative)?;
         } else {
             let derivative = self.stepper.start_derivative_mut();
-            self.motion.field.eval(self.t, &mut self.x, derivative)?;
-            let (mut at, stepper, _) = self.step_start();
-            let warning = stepper.started(&mut at);
+            run.motion.field.eval(run.t, &mut run.x, derivative)?;
+            let warning = self.stepper.started(run);
             self.warnings.extend(warning.map(|warning| *warning));
         }
-        let exits = self.motion.field.last_exits();
-        self.detector.seen.clear();
+        let exits = run.motion.field.last_exits();
+        run.seen.clear();
         let seen = exits.iter().map(|&exit| Seen::at_start(exit));
-        self.detector.seen.extend(seen);
+        run.seen.extend(seen);
         Ok(())
     }
 
@@ -431,15 +422,15 @@ impl<'a> Integrator<'a> {
         &mut self,
         departing: &[(usize, f64)],
     ) -> Result<Option<Stop>, FieldError> {
-        let before = self.motion.mode.clone();
+        let before = self.run.motion.mode.clone();
         let Decision { rule, decided } =
             self.decide(Cause::Anew(&before), &mut Reached::default())?;
-        self.residuals.clear();
+        self.run.residuals.clear();
         let mut next = match decided {
             Ok(next) => next,
             Err(stop) => return Ok(Some(stop)),
         };
-        let triggers = self.motion.triggers(self.system);
+        let triggers = self.run.motion.triggers(self.run.system);
         let departing = departing.iter().filter(|(j, _)| triggers.is_internal(*j));
         let departing = departing.map(|&(j, value)| Left::beside(j, Leading { order: 1, value }));
         next.left.extend(departing);
@@ -454,8 +445,8 @@ impl<'a> Integrator<'a> {
 
     /// Finds the mode of the initial state and starts the motion.
     pub(super) fn start(&mut self) -> Result<Option<Stop>, FieldError> {
-        self.recorder.start(self.t, &self.x);
-        if !self.actions.list.is_empty() {
+        self.recorder.start(self.run.t, &self.run.x);
+        if !self.run.actions.list.is_empty() {
             return self.start_with_actions();
         }
         match self.decide(Cause::Start, &mut Reached::default())?.decided {
@@ -467,7 +458,7 @@ impl<'a> Integrator<'a> {
     /// A start with actions: those of this time, and those whose surface the motion leads through from here.
     #[cold]
     pub(super) fn start_with_actions(&mut self) -> Result<Option<Stop>, FieldError> {
-        self.system.set_discrete(&self.motion.discrete);
+        self.run.system.set_discrete(&self.run.motion.discrete);
         let Some(Sides {
             mut mode,
             on_surface,
@@ -475,13 +466,15 @@ impl<'a> Integrator<'a> {
         else {
             return Ok(Some(Stop::NotFinite));
         };
-        let mut due = self.timetable.take(self.actions, self.t);
-        self.horizon = self.timetable.horizon(self.actions, self.t, self.t_end);
+        let mut due = self.timetable.take(self.run.actions, self.run.t);
+        self.horizon = self
+            .timetable
+            .horizon(self.run.actions, self.run.t, self.t_end);
         for j in 0..on_surface.len() {
-            if !on_surface[j] || !self.motion.triggers(self.system).is_only_trigger(j) {
+            if !on_surface[j] || !self.run.motion.triggers(self.run.system).is_only_trigger(j) {
                 continue;
             }
-            let side = self.motion.triggers(self.system).side(j, None);
+            let side = self.run.motion.triggers(self.run.system).side(j, None);
             mode.set(j, side);
             self.ask(Cause::Start, |at, notes| {
                 warn_unknown_side(at, notes, j, &mode)
@@ -490,7 +483,7 @@ impl<'a> Integrator<'a> {
                 goes_through(at, notes, j, side, &mode, &on_surface)
             })?;
             if through {
-                due.extend(self.actions.triggered_at(j, side));
+                due.extend(self.run.actions.triggered_at(j, side));
             }
         }
         if due.is_empty() {
@@ -499,7 +492,9 @@ impl<'a> Integrator<'a> {
                 Err(stop) => Ok(Some(stop)),
             };
         }
-        self.motion.restart(self.system, self.t, mode, &[]);
+        self.run
+            .motion
+            .restart(self.run.system, self.run.t, mode, &[]);
         due.sort_unstable();
         due.dedup();
         self.act(due)
@@ -508,17 +503,23 @@ impl<'a> Integrator<'a> {
     /// The end of the span, or a known time of actions.
     #[cold]
     pub(super) fn reach_horizon(&mut self) -> Result<Option<Stop>, FieldError> {
-        let mut due = self.timetable.take(self.actions, self.t);
-        self.horizon = self.timetable.horizon(self.actions, self.t, self.t_end);
-        if !self.actions.list.is_empty() {
+        let mut due = self.timetable.take(self.run.actions, self.run.t);
+        self.horizon = self
+            .timetable
+            .horizon(self.run.actions, self.run.t, self.t_end);
+        if !self.run.actions.list.is_empty() {
             let (h, reached) = self.ask(Cause::Start, |at, notes| {
                 let h = at.surface_values(notes, at.arrival.signs)?;
                 let reached = triggers_reached(at, &h)?;
                 Ok((h, reached))
             })?;
-            self.residuals = self.motion.residuals(&h, &reached);
+            self.run.residuals = self.run.motion.residuals(&h, &reached);
             for j in reached {
-                due.extend(self.actions.triggered_at(j, self.motion.mode.entries()[j]));
+                due.extend(
+                    self.run
+                        .actions
+                        .triggered_at(j, self.run.motion.mode.entries()[j]),
+                );
             }
             due.sort_unstable();
             due.dedup();
@@ -527,7 +528,7 @@ impl<'a> Integrator<'a> {
             self.control.forget_steps();
             return self.act(due);
         }
-        Ok((self.t >= self.t_end).then_some(Stop::End))
+        Ok((self.run.t >= self.t_end).then_some(Stop::End))
     }
 
     /// Does what an event triggers; `None` if that is nothing and the decision is an ordinary one.
@@ -539,14 +540,14 @@ impl<'a> Integrator<'a> {
         if event.touch {
             return Ok(None);
         }
-        let mode = self.motion.mode.clone();
+        let mode = self.run.motion.mode.clone();
         let (surfaces, rates) = self.ask(Cause::Anew(&mode), |at, _| {
             let mut surfaces = located_surfaces(&event.guards);
             add_vanishing_surfaces(at, &mut surfaces, h)?;
             Ok((surfaces, at.rates_here()?))
         })?;
         let located = |j: usize| event.guards.contains(&Guard::Surface(j));
-        let entries = self.motion.mode.entries();
+        let entries = self.run.motion.mode.entries();
         let reached = surfaces.iter().copied().filter(|&j| {
             let approaches = rates[j] * f64::from(entries[j]) < 0.0;
             // Rounding may show a zero where the motion leaves.
@@ -555,21 +556,27 @@ impl<'a> Integrator<'a> {
         });
         let mut due: Vec<usize> = Vec::new();
         for j in reached {
-            due.extend(self.actions.triggered_at(j, entries[j]));
+            due.extend(self.run.actions.triggered_at(j, entries[j]));
         }
         if !due.is_empty() {
-            if self.t >= self.horizon {
-                due.extend(self.timetable.take(self.actions, self.t));
-                self.horizon = self.timetable.horizon(self.actions, self.t, self.t_end);
+            if self.run.t >= self.horizon {
+                due.extend(self.timetable.take(self.run.actions, self.run.t));
+                self.horizon = self
+                    .timetable
+                    .horizon(self.run.actions, self.run.t, self.t_end);
             }
             due.sort_unstable();
             due.dedup();
-            self.residuals = self.motion.residuals(h, &surfaces);
+            self.run.residuals = self.run.motion.residuals(h, &surfaces);
             return self.act(due).map(Some);
         }
         let departs = |j: &&usize| {
             rates[**j] * f64::from(entries[**j]) > 0.0
-                && self.motion.triggers(self.system).is_only_trigger(**j)
+                && self
+                    .run
+                    .motion
+                    .triggers(self.run.system)
+                    .is_only_trigger(**j)
         };
         let departing: Vec<(usize, f64)> = surfaces
             .iter()
@@ -577,25 +584,25 @@ impl<'a> Integrator<'a> {
             .map(|&j| (j, rates[j]))
             .collect();
         if !departing.is_empty() {
-            self.residuals = self.motion.residuals(h, &surfaces);
+            self.run.residuals = self.run.motion.residuals(h, &surfaces);
             return self.go_on_from_here(&departing).map(Some);
         }
-        if !self.motion.is_in_contact() && surfaces.len() > 1 {
-            self.residuals = self.motion.residuals(h, &surfaces);
+        if !self.run.motion.is_in_contact() && surfaces.len() > 1 {
+            self.run.residuals = self.run.motion.residuals(h, &surfaces);
         }
         Ok(None)
     }
 
     /// Does these actions and those that they trigger, and goes on with the motion that follows.
     pub(super) fn act(&mut self, due: Vec<usize>) -> Result<Option<Stop>, FieldError> {
-        if let Some(stop) = self.recorder.zeros_before_jump(self.t, &self.x) {
+        if let Some(stop) = self.recorder.zeros_before_jump(self.run.t, &self.run.x) {
             return Ok(Some(stop));
         }
-        let before = self.motion.mode.clone();
+        let before = self.run.motion.mode.clone();
         let first = self.recorder.switches().len();
-        let arrived = self.x.clone();
+        let arrived = self.run.x.clone();
         let stopped = self.do_actions(due)?;
-        self.recorder.set_jump(first, &arrived, &self.x);
+        self.recorder.set_jump(first, &arrived, &self.run.x);
         if stopped.is_some() {
             return Ok(stopped);
         }
@@ -606,8 +613,8 @@ impl<'a> Integrator<'a> {
             Ok(next) => next,
             Err(stop) => return Ok(Some(stop)),
         };
-        self.residuals.clear();
-        self.passing.clear();
+        self.run.residuals.clear();
+        self.run.passing.clear();
         self.recorder.set_last_mode(first, &next.mode);
         let limits = self.ask(Cause::Start, |at, _| {
             limits_of_impacts(at, first, &next.mode)
@@ -616,12 +623,12 @@ impl<'a> Integrator<'a> {
         if let Some(rest) = limits.find(|limit| limit.t <= self.horizon) {
             return self.jump_to(rest, next.mode);
         }
-        let t = self.t;
+        let t = self.run.t;
         let stop = self.begin(next, &Multiple::default())?;
-        if self.t == t {
+        if self.run.t == t {
             // Contact that begins with a speed below the tolerance takes that away.
-            self.recorder.jump(t, &self.x);
-            self.recorder.set_jump(first, &arrived, &self.x);
+            self.recorder.jump(t, &self.run.x);
+            self.recorder.set_jump(first, &arrived, &self.run.x);
         }
         Ok(stop)
     }
@@ -632,31 +639,22 @@ impl<'a> Integrator<'a> {
             n_choices: self.n_choices,
             ..Notes::default()
         };
-        let (watch, t) = (&self.watch, self.t);
+        let (watch, t) = (&self.watch, self.run.t);
         let is_over = || watch.stop().is_some() || watch.is_over(watch.now(), t);
         let mut instant = Instant {
-            system: self.system,
-            actions: self.actions,
-            scale: &self.scale,
-            policy: self.options.into(),
-            t,
-            x: &mut self.x,
-            motion: &mut self.motion,
-            residuals: &self.residuals,
+            run: &mut self.run,
             velocity: self.stepper.start_derivative(),
             switches: self.recorder.switches(),
             patience: Patience::until(&is_over),
             notes: &mut notes,
             done: Vec::new(),
-            passing: Vec::new(),
         };
         let stopped = instant.act(due);
-        let Instant { done, passing, .. } = instant;
-        self.passing = passing;
-        self.stats.n_switches += done.len() as u64;
+        let done = instant.done;
+        self.run.stats.n_switches += done.len() as u64;
         done.into_iter()
             .for_each(|switch| self.recorder.switch(switch));
-        self.recorder.jump(t, &self.x);
+        self.recorder.jump(t, &self.run.x);
         self.take_notes(notes);
         stopped
     }
@@ -676,18 +674,18 @@ impl<'a> Integrator<'a> {
         if x.iter().any(|v| !v.is_finite()) {
             return Ok(Some(Stop::NotFinite));
         }
-        let discrete = &self.motion.discrete;
+        let discrete = &self.run.motion.discrete;
         self.recorder
-            .begin_segment(self.t, &before, SmallVec::new(), discrete);
-        self.motion.mode = before.clone();
+            .begin_segment(self.run.t, &before, SmallVec::new(), discrete);
+        self.run.motion.mode = before.clone();
         let y_before = x.clone().into();
-        if t > self.t || !is_rest {
+        if t > self.run.t || !is_rest {
             self.move_straight(t, x)?;
         } else {
-            self.x = x;
-            self.recorder.jump(self.t, &self.x);
+            self.run.x = x;
+            self.recorder.jump(self.run.t, &self.run.x);
         }
-        self.stats.n_switches += 1;
+        self.run.stats.n_switches += 1;
         let passed = match surfaces[..] {
             [surface] if is_rest => self.ask(Cause::Start, |at, notes| {
                 passed_beside(at, notes, &before, surface)
@@ -706,18 +704,19 @@ impl<'a> Integrator<'a> {
             rule,
         };
         if let Some(Passed { triggers, x, h }) = passed {
-            self.x = x;
-            self.recorder.jump(self.t, &self.x);
-            self.motion
-                .restart(self.system, self.t, before.clone(), &[]);
+            self.run.x = x;
+            self.recorder.jump(self.run.t, &self.run.x);
+            self.run
+                .motion
+                .restart(self.run.system, self.run.t, before.clone(), &[]);
             let met: Vec<usize> = triggers.iter().chain(&surfaces).copied().collect();
-            self.residuals = self.motion.residuals(&h, &met);
+            self.run.residuals = self.run.motion.residuals(&h, &met);
             let due = triggers.iter().flat_map(|&k| {
                 let side = before.entries()[k];
-                self.actions.triggered_at(k, side)
+                self.run.actions.triggered_at(k, side)
             });
             let due = due.collect();
-            let y_after = SmallVec::from_slice(&self.x);
+            let y_after = SmallVec::from_slice(&self.run.x);
             let switch = switch(&before, "");
             self.recorder.switch(Switch { y_after, ..switch });
             return self.act(due);
@@ -729,7 +728,7 @@ impl<'a> Integrator<'a> {
         let Decision { rule, decided } = self.decide(cause, &mut Reached::default())?;
         // Where nothing is decided the run ends at the limit, having come there all the same.
         let after = decided.as_ref().map_or(&before, |next| &next.mode);
-        let y_after = SmallVec::from_slice(&self.x);
+        let y_after = SmallVec::from_slice(&self.run.x);
         let switch = switch(after, rule.name());
         self.recorder.switch(Switch { y_after, ..switch });
         match decided {
@@ -741,8 +740,8 @@ impl<'a> Integrator<'a> {
     /// A surface whose function was zero all along the step just made, up to rounding, and about which nothing was said: a
     /// function that becomes zero without a sign in it, as one that is called may do, or a rest that is reached.
     pub(super) fn zero_surface(&mut self, t1: f64) -> Result<Option<usize>, FieldError> {
-        for index in 0..self.motion.monitored.len() {
-            let m = self.motion.monitored[index];
+        for index in 0..self.run.motion.monitored.len() {
+            let m = self.run.motion.monitored[index];
             let (end, _) = self.detector.right[index];
             let Guard::Surface(j) = m.guard else {
                 continue;
@@ -755,13 +754,15 @@ impl<'a> Integrator<'a> {
             if m.value.abs().max(end.abs()) > noise {
                 continue;
             }
-            let signs = self.motion.signs.clone();
+            let signs = self.run.motion.signs.clone();
             self.stepper.interpolant().at(0.5, &mut self.detector.x);
-            let (middle, h) = (0.5 * (self.t + t1), &mut self.detector.h);
-            self.system.surfaces(middle, &self.detector.x, &signs, h)?;
+            let (middle, h) = (0.5 * (self.run.t + t1), &mut self.detector.h);
+            self.run
+                .system
+                .surfaces(middle, &self.detector.x, &signs, h)?;
             if h[j].abs() <= noise
                 && !is_named(&self.warnings, j)
-                && !self.motion.settled.contains(&j)
+                && !self.run.motion.settled.contains(&j)
             {
                 return Ok(Some(j));
             }
@@ -772,15 +773,15 @@ impl<'a> Integrator<'a> {
     /// Goes on from a point at which h_j has become zero. If the fields hold the motion on the surface, it stays there: a field
     /// with a root of the distance brings it to rest so. Beside the surface the motion would follow the root of rounding.
     pub(super) fn settle_on(&mut self, j: usize) -> Result<Option<Stop>, FieldError> {
-        let signs = self.motion.signs.clone();
-        let mut projector = Projector::new(self.x.len(), signs.len());
-        projector.project(self.system, j, self.t, &mut self.x, &signs)?;
+        let signs = self.run.motion.signs.clone();
+        let mut projector = Projector::new(self.run.x.len(), signs.len());
+        projector.project(self.run.system, j, self.run.t, &mut self.run.x, &signs)?;
         let stop = self.go_on_from_here(&[])?;
-        if !self.motion.sliding().contains(&j) {
-            if !self.motion.resting.contains(&j) {
-                self.motion.settled.push(j);
+        if !self.run.motion.sliding().contains(&j) {
+            if !self.run.motion.resting.contains(&j) {
+                self.run.motion.settled.push(j);
             }
-            let mode = self.motion.mode.clone();
+            let mode = self.run.motion.mode.clone();
             self.ask(Cause::Start, |at, notes| {
                 warn_zero_surface(at, notes, j, &mode);
                 Ok(())

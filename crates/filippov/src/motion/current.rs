@@ -229,12 +229,18 @@ impl<'a> CurrentMotion<'a> {
             .extend(exits.map(|(place, guard)| monitor(guard, place, 1.0, false)));
     }
 
+    /// The surfaces that it still leaves tangentially.
+    pub fn departing(&self) -> impl Iterator<Item = usize> + '_ {
+        let tangent = |m: &&Monitored| m.deflation.is_some_and(|zero| zero.order > 1);
+        self.monitored
+            .iter()
+            .filter(tangent)
+            .filter_map(Monitored::surface)
+    }
+
     /// Tells the field of a region whether the motion still departs from a surface.
     pub fn note_departure(&mut self) {
-        let departing = self
-            .monitored
-            .iter()
-            .any(|m| m.deflation.is_some_and(|d| d.order > 1));
+        let departing = self.departing().next().is_some();
         if let ModeField::Region(field) = &mut self.field {
             field.set_departing(departing);
         }

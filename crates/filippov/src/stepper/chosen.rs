@@ -1,9 +1,9 @@
 //! The methods that a run may use beside DOPRI5: the table at the end of this file has a line for each.
 
-use super::duties::{Attempt, ExitSeries, Ready, StepStart, Stepper};
+use super::duties::{Attempt, ExitSeries, Ready, Stepper};
 use super::{Controller, Dop853, ErrorScale, Midpoint, Rodas5p, Step, Taylor};
 use crate::error::FieldError;
-use crate::motion::SmoothField;
+use crate::motion::{Run, SmoothField};
 use crate::options::{Method, Options};
 use crate::stats::Stats;
 use crate::status::Warning;
@@ -44,7 +44,7 @@ macro_rules! methods {
             }
 
             #[inline(always)]
-            fn attempt(&mut self, at: &mut StepStart, dt: f64) -> Result<Option<Attempt>, FieldError> {
+            fn attempt(&mut self, at: &mut Run, dt: f64) -> Result<Option<Attempt>, FieldError> {
                 match self { $(Chosen::$name(method) => method.attempt(at, dt)),* }
             }
 
@@ -54,21 +54,21 @@ macro_rules! methods {
             }
 
             #[inline(always)]
-            fn begin(&mut self, at: &mut StepStart) -> Ready {
+            fn begin(&mut self, at: &mut Run) -> Ready {
                 match self { $(Chosen::$name(method) => method.begin(at)),* }
             }
 
             #[inline(always)]
-            fn start(&mut self, at: &mut StepStart) -> bool {
+            fn start(&mut self, at: &mut Run) -> bool {
                 match self { $(Chosen::$name(method) => method.start(at)),* }
             }
 
             #[inline(always)]
-            fn started(&mut self, at: &mut StepStart) -> Ready {
+            fn started(&mut self, at: &mut Run) -> Ready {
                 match self { $(Chosen::$name(method) => method.started(at)),* }
             }
 
-            fn refusal(&mut self, at: &StepStart) -> Option<Box<Warning>> {
+            fn refusal(&mut self, at: &Run) -> Option<Box<Warning>> {
                 match self { $(Chosen::$name(method) => method.refusal(at)),* }
             }
 
@@ -78,7 +78,7 @@ macro_rules! methods {
             }
 
             #[inline(always)]
-            fn prepare(&mut self, at: &mut StepStart) -> Result<Ready, FieldError> {
+            fn prepare(&mut self, at: &mut Run) -> Result<Ready, FieldError> {
                 match self { $(Chosen::$name(method) => method.prepare(at)),* }
             }
 
@@ -143,7 +143,7 @@ macro_rules! methods {
             }
 
             #[inline(always)]
-            fn is_limited_by_stability(&mut self, at: &mut StepStart) -> Result<Option<bool>, FieldError> {
+            fn is_limited_by_stability(&mut self, at: &mut Run) -> Result<Option<bool>, FieldError> {
                 match self { $(Chosen::$name(method) => method.is_limited_by_stability(at)),* }
             }
         }

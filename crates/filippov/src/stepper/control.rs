@@ -1,14 +1,13 @@
 //! How long the next step is.
 
 use super::chatter::ChatterWatch;
-use super::duties::{Ready, StepStart};
+use super::duties::Ready;
 use super::initial_step::{initial_step, restart_step};
 use super::pace::{excursion, Paces};
 use super::stiffness::{Stiff, Stiffness};
 use super::{Controller, Steppers};
 use crate::error::FieldError;
-use crate::mode::Mode;
-use crate::motion::{CurrentMotion, Leading, ModeField, Monitored};
+use crate::motion::{CurrentMotion, Leading, ModeField, Monitored, Run};
 use crate::options::Method;
 use crate::status::{Stop, Warning, WarningCode};
 use crate::tolerances::{AIM_MARGINS, EPS, JUMP_SHRINK, ONE_SIDED_AIM, SMALLEST_GUESS};
@@ -61,9 +60,12 @@ impl StepControl {
         self.stiffness.since
     }
 
-    /// Keeps the pace of the motion that ends, which lasted this long.
-    pub fn remember(&mut self, mode: &Mode, duration: f64) {
-        self.paces.remember(mode, self.dt, duration);
+    /// Keeps the pace of the motion that ends here, unless a series tells its steps.
+    pub fn remember(&mut self, run: &Run, steppers: &Steppers) {
+        if !steppers.is_series() {
+            let duration = run.t - run.motion.t_start;
+            self.paces.remember(&run.motion.mode, self.dt, duration);
+        }
     }
 
     /// A motion starts that lasts at most to `t_end`, and leaves these surfaces with these derivatives.
@@ -73,7 +75,7 @@ impl StepControl {
     #[inline(always)]
     pub fn begin(
         &mut self,
-        at: &mut StepStart,
+        at: &mut Run,
         steppers: &Steppers,
         t_end: f64,
         left: impl Iterator<Item = (usize, Leading)>,
@@ -88,7 +90,7 @@ impl StepControl {
     /// excursion from the surface.
     fn first_step(
         &self,
-        at: &mut StepStart,
+        at: &mut Run,
         steppers: &Steppers,
         t_end: f64,
         left: impl Iterator<Item = (usize, Leading)>,
@@ -102,7 +104,7 @@ impl StepControl {
             // The series tells.
             return Ok(longest);
         }
-        let (t, x, scale, field) = (at.t, at.x, at.scale, &mut at.motion.field);
+        let (t, x, scale, field) = (at.t, &at.x, &at.scale, &mut at.motion.field);
         let derivative = steppers.start_derivative();
         let mode = &at.motion.mode;
         let mut dt = match self.paces.first_step(mode, x, derivative, scale) {
@@ -151,7 +153,7 @@ impl StepControl {
     #[inline(always)]
     pub fn prepare(
         &mut self,
-        at: &mut StepStart,
+        at: &mut Run,
         steppers: &mut Steppers,
         t_end: f64,
     ) -> Result<Option<Box<Warning>>, FieldError> {
@@ -315,7 +317,7 @@ impl StepControl {
     #[inline(never)]
     pub fn look_for_stiffness(
         &mut self,
-        at: &mut StepStart,
+        at: &mut Run,
         steppers: &mut Steppers,
     ) -> Result<Stiff, FieldError> {
         let Some(is_limited) = steppers.is_limited_by_stability(at)? else {
@@ -344,7 +346,7 @@ impl StepControl {
     }
 
     /// Leaves the rest of the motion to the method for stiff motions.
-    pub fn go_on_implicitly(&mut self, at: &mut StepStart, steppers: &mut Steppers) {
+    pub fn go_on_implicitly(&mut self, at: &mut Run, steppers: &mut Steppers) {
         // A Taylor step has no proposal for the next one.
         self.dt = steppers.interpolant().dt;
         steppers.go_on_implicitly(at);

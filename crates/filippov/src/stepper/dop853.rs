@@ -2,10 +2,10 @@
 
 use super::coefficients_dop853::{A, D, E3, E5, NODES};
 use super::dopri5::{jumps_between, stiffness_of};
-use super::{Attempt, ErrorScale, Interpolant, Step, StepStart, Stepper};
+use super::{Attempt, ErrorScale, Interpolant, Step, Stepper};
 use crate::error::FieldError;
 use crate::error_scale::root_mean_square;
-use crate::motion::{observer, SmoothField};
+use crate::motion::{observer, Run, SmoothField};
 use crate::stats::Stats;
 use crate::tolerances::STIFF_DOP853;
 
@@ -164,9 +164,9 @@ impl Stepper for Dop853 {
         &mut self.step
     }
 
-    fn attempt(&mut self, at: &mut StepStart, dt: f64) -> Result<Option<Attempt>, FieldError> {
-        let (field, observe) = (&mut at.motion.field, observer(at.seen));
-        let attempt = self.attempt_along(field, observe, at.t, at.x, dt, at.scale)?;
+    fn attempt(&mut self, at: &mut Run, dt: f64) -> Result<Option<Attempt>, FieldError> {
+        let (field, observe) = (&mut at.motion.field, observer(&mut at.seen));
+        let attempt = self.attempt_along(field, observe, at.t, &at.x, dt, &at.scale)?;
         Ok(Some(attempt))
     }
 
@@ -188,7 +188,7 @@ impl Stepper for Dop853 {
         jumps_between(&IN_TIME.map(|stage| &self.k[stage][..]))
     }
 
-    fn is_limited_by_stability(&mut self, _: &mut StepStart) -> Result<Option<bool>, FieldError> {
+    fn is_limited_by_stability(&mut self, _: &mut Run) -> Result<Option<bool>, FieldError> {
         let product = self.stiffness();
         Ok(Some(product.is_some_and(|product| product > STIFF_DOP853)))
     }

@@ -1,9 +1,9 @@
 //! DOPRI5(4): one step, its error estimate and its continuous extensions.
 
 use super::coefficients_dopri5::{A2, A3, A4, A5, A6, A8, A9, B, C, C8, C9, D, E};
-use super::{Attempt, ErrorScale, Interpolant, Step, StepStart, Stepper};
+use super::{Attempt, ErrorScale, Interpolant, Step, Stepper};
 use crate::error::FieldError;
-use crate::motion::{observer, ModeField, SlidingField, SmoothField};
+use crate::motion::{observer, ModeField, Run, SlidingField, SmoothField};
 use crate::tolerances::{JUMP_SHARE, JUMP_SIZE, STIFF_DOPRI5};
 
 /// Number of states where it is not fixed at compile time.
@@ -28,17 +28,24 @@ pub struct Dopri5 {
 }
 
 impl Dopri5 {
-    /// A stepper for n states.
+    /// A stepper for n states. Space for its stages is made at its first attempt: a run whose steps another method takes
+    /// needs none.
     pub fn new(n: usize) -> Self {
-        let zeros = || vec![0.0; n];
         Dopri5 {
-            k: std::array::from_fn(|_| zeros()),
-            extra: [zeros(), zeros()],
-            stage: zeros(),
             step: Step::new(n, Interpolant::empty(n)),
-            free_quartic: zeros(),
+            k: Default::default(),
+            extra: Default::default(),
+            stage: Vec::new(),
+            free_quartic: Vec::new(),
             extended: None,
         }
+    }
+
+    #[cold]
+    fn make_room(&mut self, n: usize) {
+        let stages = self.k.iter_mut().chain(&mut self.extra);
+        let rows = stages.chain([&mut self.stage, &mut self.free_quartic]);
+        rows.for_each(|row| *row = vec![0.0; n]);
     }
 
     /// Evaluates the field at the start; needed after every restart, not between steps.
@@ -68,6 +75,9 @@ impl Dopri5 {
         dt: f64,
         scale: &ErrorScale,
     ) -> Result<Attempt, FieldError> {
+        if self.stage.is_empty() {
+            self.make_room(y.len());
+        }
         match y.len() {
             1 => self.attempt_sized::<1, F>(field, observe, t, y, dt, scale),
             2 => self.attempt_sized::<2, F>(field, observe, t, y, dt, scale),
@@ -274,12 +284,8 @@ impl Dopri5 {
 
     /// As [`Stepper::attempt`]; for the field of a region, and of sliding on one surface, without calls by a table.
     #[inline(always)]
-    pub(super) fn attempt_by_kind(
-        &mut self,
-        at: &mut StepStart,
-        dt: f64,
-    ) -> Result<Attempt, FieldError> {
-        let (t, x, scale, seen) = (at.t, at.x, at.scale, &mut *at.seen);
+    pub(super) fn attempt_by_kind(&mut self, at: &mut Run, dt: f64) -> Result<Attempt, FieldError> {
+        let (t, x, scale, seen) = (at.t, &at.x, &at.scale, &mut at.seen);
         match &mut at.motion.field {
             ModeField::Region(field) => self.attempt_along(field, |_| {}, t, x, dt, scale),
             ModeField::Sliding(field) => {
@@ -305,7 +311,7 @@ impl Stepper for Dopri5 {
         &mut self.step
     }
 
-    fn attempt(&mut self, at: &mut StepStart, dt: f64) -> Result<Option<Attempt>, FieldError> {
+    fn attempt(&mut self, at: &mut Run, dt: f64) -> Result<Option<Attempt>, FieldError> {
         self.attempt_by_kind(at, dt).map(Some)
     }
 
@@ -356,7 +362,7 @@ impl Stepper for Dopri5 {
         jumps_between(&[start_derivative, k2, k3, k4, k5, end_derivative])
     }
 
-    fn is_limited_by_stability(&mut self, _: &mut StepStart) -> Result<Option<bool>, FieldError> {
+    fn is_limited_by_stability(&mut self, _: &mut Run) -> Result<Option<bool>, FieldError> {
         let product = self.stiffness();
         Ok(Some(product.is_some_and(|product| product > STIFF_DOPRI5)))
     }

@@ -2,24 +2,9 @@
 
 use super::{Controller, ErrorScale, Step};
 use crate::error::FieldError;
-use crate::motion::{CurrentMotion, Seen, SmoothField};
-use crate::options::Options;
+use crate::motion::{Run, SmoothField};
 use crate::stats::Stats;
 use crate::status::Warning;
-use crate::system::PiecewiseSystem;
-
-/// The start of a step: all that a method knows and counts of a run.
-pub(crate) struct StepStart<'r, 'a> {
-    pub system: &'a dyn PiecewiseSystem,
-    pub options: &'a Options,
-    pub scale: &'r ErrorScale,
-    pub t: f64,
-    pub x: &'r [f64],
-    pub motion: &'r mut CurrentMotion<'a>,
-    /// The exit functions of the motion in the step.
-    pub seen: &'r mut [Seen],
-    pub stats: &'r mut Stats,
-}
 
 /// What came of an attempted step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,28 +75,28 @@ pub(crate) trait Stepper {
     ///
     /// # Errors
     /// If a function of the user raises.
-    fn attempt(&mut self, at: &mut StepStart, dt: f64) -> Result<Option<Attempt>, FieldError>;
+    fn attempt(&mut self, at: &mut Run, dt: f64) -> Result<Option<Attempt>, FieldError>;
 
     /// The error of the accurate extension at theta > 1, in units of the tolerance.
     fn extrapolation_error(&self, theta: f64, scale: &ErrorScale) -> f64;
 
     /// A motion starts: does the method integrate it?
-    fn begin(&mut self, _: &mut StepStart) -> Ready {
+    fn begin(&mut self, _: &mut Run) -> Ready {
         Ready::ANY
     }
 
     /// Finds the derivative at the start of the motion without its field; `false` if it does not.
-    fn start(&mut self, _: &mut StepStart) -> bool {
+    fn start(&mut self, _: &mut Run) -> bool {
         false
     }
 
     /// The field was evaluated at the start of the motion: does the method integrate it?
-    fn started(&mut self, _: &mut StepStart) -> Ready {
+    fn started(&mut self, _: &mut Run) -> Ready {
         Ready::ANY
     }
 
     /// The warning that the method does not take this motion, if it is worth one.
-    fn refusal(&mut self, _: &StepStart) -> Option<Box<Warning>> {
+    fn refusal(&mut self, _: &Run) -> Option<Box<Warning>> {
         None
     }
 
@@ -124,7 +109,7 @@ pub(crate) trait Stepper {
     ///
     /// # Errors
     /// If a function of the user raises.
-    fn prepare(&mut self, _: &mut StepStart) -> Result<Ready, FieldError> {
+    fn prepare(&mut self, _: &mut Run) -> Result<Ready, FieldError> {
         Ok(Ready::ANY)
     }
 
@@ -202,7 +187,7 @@ pub(crate) trait Stepper {
     ///
     /// # Errors
     /// If a function of the user raises.
-    fn is_limited_by_stability(&mut self, _: &mut StepStart) -> Result<Option<bool>, FieldError> {
+    fn is_limited_by_stability(&mut self, _: &mut Run) -> Result<Option<bool>, FieldError> {
         Ok(None)
     }
 }

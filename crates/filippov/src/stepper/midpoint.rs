@@ -1,9 +1,9 @@
 //! The explicit midpoint rule, as Dieci and Lopez use it.
 
-use super::{Attempt, ErrorScale, Interpolant, Step, StepStart, Stepper};
+use super::{Attempt, ErrorScale, Interpolant, Step, Stepper};
 use crate::error::FieldError;
 use crate::locate::{refine, Bracket};
-use crate::motion::{observer, Guard, ModeField, SmoothField};
+use crate::motion::{observer, Guard, ModeField, Run, SmoothField};
 use crate::stats::Stats;
 use crate::tolerances::EPS;
 
@@ -93,7 +93,7 @@ impl Midpoint {
     ///
     /// # Errors
     /// If a function of the user raises.
-    fn keep_to_side(&mut self, at: &mut StepStart, dt: f64) -> Result<f64, FieldError> {
+    fn keep_to_side(&mut self, at: &mut Run, dt: f64) -> Result<f64, FieldError> {
         if !self.is_started {
             let mut x = at.x.to_vec();
             let derivative = self.start_derivative_mut();
@@ -102,7 +102,7 @@ impl Midpoint {
         if !matches!(at.motion.field, ModeField::Region(_)) {
             return Ok(dt);
         }
-        let (system, t, x, signs) = (at.system, at.t, at.x, &at.motion.signs);
+        let (system, t, x, signs) = (at.system, at.t, &at.x, &at.motion.signs);
         let derivative = &self.step.start_derivative;
         let mut h = vec![0.0; system.n_surfaces()];
         let mut stage = x.to_vec();
@@ -156,12 +156,15 @@ impl Stepper for Midpoint {
         &mut self.step
     }
 
-    fn attempt(&mut self, at: &mut StepStart, dt: f64) -> Result<Option<Attempt>, FieldError> {
+    fn attempt(&mut self, at: &mut Run, dt: f64) -> Result<Option<Attempt>, FieldError> {
         let dt = self.keep_to_side(at, dt)?;
         // On a surface the field is there at the end too, which is projected onto it.
         let evaluates_end = !matches!(at.motion.field, ModeField::Region(_));
-        let (field, observe) = ((&mut at.motion.field, evaluates_end), observer(at.seen));
-        let attempt = self.attempt_along(field, observe, at.t, at.x, dt, at.scale)?;
+        let (field, observe) = (
+            (&mut at.motion.field, evaluates_end),
+            observer(&mut at.seen),
+        );
+        let attempt = self.attempt_along(field, observe, at.t, &at.x, dt, &at.scale)?;
         Ok(Some(attempt))
     }
 

@@ -2,7 +2,7 @@
 //!
 //! [`Stepper`] is what is asked of a method, `Steppers` holds the methods of a run, and `StepControl` chooses the length of
 //! the next step. A new Runge-Kutta pair is a file here and a line in the table of `chosen.rs`. What a method needs of a
-//! run is in `StepStart`; no method knows of events or of the integrator.
+//! run is in `Run`; no method knows of events or of the integrator.
 
 mod chatter;
 mod chosen;
@@ -33,7 +33,7 @@ pub use dense::{Basis, Expansion, Interpolant};
 pub use dop853::Dop853;
 pub use dopri5::Dopri5;
 pub use duties::Attempt;
-pub(crate) use duties::{ExitSeries, StepStart, Stepper};
+pub(crate) use duties::{ExitSeries, Stepper};
 pub use initial_step::{initial_step, restart_step, tiny_step};
 pub use midpoint::Midpoint;
 pub use rodas5p::Rodas5p;

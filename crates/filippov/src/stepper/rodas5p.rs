@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use super::coefficients_rodas5p::{A, C, EXTENSION, GAMMA, NODES, TIME_SHARES};
 use super::duties::Ready;
-use super::{Attempt, ErrorScale, Interpolant, Step, StepStart, Stepper};
+use super::{Attempt, ErrorScale, Interpolant, Step, Stepper};
 use crate::error::FieldError;
-use crate::motion::{observer, ModeField, SmoothField};
+use crate::motion::{observer, ModeField, Run, SmoothField};
 use crate::sparse::SparseSolver;
 use crate::stats::Stats;
 use crate::system::{Linearisation, MotionJacobian};
@@ -179,7 +179,7 @@ impl Rodas5p {
     }
 
     /// Takes the motion that starts.
-    pub(super) fn take(&mut self, at: &StepStart) {
+    pub(super) fn take(&mut self, at: &Run) {
         let by_graph = at.motion.has_canopy_field() && !at.motion.is_drawn_back();
         let jacobian = by_graph
             .then(|| at.system.motion_jacobian(at.motion.sliding()))
@@ -196,7 +196,7 @@ impl Rodas5p {
     }
 
     /// The signs of the mode, with the signs that stand for the multipliers at the start of the step.
-    fn signs_and_multipliers(at: &mut StepStart) -> Result<Vec<f64>, FieldError> {
+    fn signs_and_multipliers(at: &mut Run) -> Result<Vec<f64>, FieldError> {
         let mut signs = at.motion.signs.to_vec();
         if at.motion.sliding.is_empty() {
             return Ok(signs);
@@ -206,7 +206,7 @@ impl Rodas5p {
         let multipliers = at.motion.multipliers();
         for (k, &j) in at.motion.sliding.iter().enumerate() {
             let at_signs = &at.motion.signs;
-            let ratio = at.system.stick_ratio(j, at.t, at.x, at_signs);
+            let ratio = at.system.stick_ratio(j, at.t, &at.x, at_signs);
             signs[j] = ratio * multipliers.get(k).copied().unwrap_or(f64::NAN);
         }
         Ok(signs)
@@ -214,7 +214,7 @@ impl Rodas5p {
 
     /// Derivatives by one difference per state and one in time. Where the field is not there on one side of the
     /// start the other is taken.
-    fn linearise_by_differences(&mut self, at: &mut StepStart) -> Result<bool, FieldError> {
+    fn linearise_by_differences(&mut self, at: &mut Run) -> Result<bool, FieldError> {
         let (t, n) = (at.t, at.x.len());
         let start = self.step.start_derivative.clone();
         let mut columns = vec![0.0; n * n];
@@ -271,13 +271,13 @@ impl Stepper for Rodas5p {
     /// `None` if the matrix of the step has no inverse.
     #[cold]
     #[inline(never)]
-    fn attempt(&mut self, at: &mut StepStart, dt: f64) -> Result<Option<Attempt>, FieldError> {
+    fn attempt(&mut self, at: &mut Run, dt: f64) -> Result<Option<Attempt>, FieldError> {
         at.stats.n_factorisations += 1;
         if !self.factor(dt) {
             return Ok(None);
         }
-        let (field, observe) = (&mut at.motion.field, observer(at.seen));
-        let attempt = self.attempt_along(field, observe, at.t, at.x, dt, at.scale)?;
+        let (field, observe) = (&mut at.motion.field, observer(&mut at.seen));
+        let attempt = self.attempt_along(field, observe, at.t, &at.x, dt, &at.scale)?;
         let is_beside = self.linearisation.is_exact() && !at.motion.is_straight;
         if attempt == Attempt::NotFinite && is_beside {
             // The field may not be there beside a curved surface: at its projection it is.
@@ -294,7 +294,7 @@ impl Stepper for Rodas5p {
         scale.norm(&change, &self.step.end)
     }
 
-    fn begin(&mut self, at: &mut StepStart) -> Ready {
+    fn begin(&mut self, at: &mut Run) -> Ready {
         if !at.motion.resting.is_empty() {
             return Ready::NotThisMotion;
         }
@@ -303,7 +303,7 @@ impl Stepper for Rodas5p {
     }
 
     /// If redundant contacts share a load their equations do not determine the multipliers: there are no exact derivatives.
-    fn started(&mut self, at: &mut StepStart) -> Ready {
+    fn started(&mut self, at: &mut Run) -> Ready {
         if self.jacobian.is_some() && at.motion.shares_load() {
             self.take_derivatives(None, at.x.len());
         }
@@ -318,7 +318,7 @@ impl Stepper for Rodas5p {
     /// Finds the derivatives at the start of the step. If they are not finite DOPRI5 takes the step.
     #[cold]
     #[inline(never)]
-    fn prepare(&mut self, at: &mut StepStart) -> Result<Ready, FieldError> {
+    fn prepare(&mut self, at: &mut Run) -> Result<Ready, FieldError> {
         if self.is_linearised {
             return Ok(Ready::ANY);
         }
@@ -334,7 +334,7 @@ impl Stepper for Rodas5p {
         let is_finite = match self.jacobian.clone() {
             Some(jacobian) => {
                 let signs = Self::signs_and_multipliers(at)?;
-                let (system, t, x) = (at.system, at.t, at.x);
+                let (system, t, x) = (at.system, at.t, &at.x);
                 self.linearise(|out| system.eval_jacobian(&jacobian, t, x, &signs, out))
             }
             None => self.linearise_by_differences(at)?,

@@ -4,10 +4,10 @@ use smallvec::SmallVec;
 
 use super::duties::Ready;
 use super::taylor::reach as reach_of;
-use super::{Attempt, Controller, ErrorScale, ExitSeries, Step, StepStart, Stepper, Taylor};
+use super::{Attempt, Controller, ErrorScale, ExitSeries, Step, Stepper, Taylor};
 use crate::error::FieldError;
 use crate::mode::Signs;
-use crate::motion::{observer, CurrentMotion, ModeField, Seen, SmoothField};
+use crate::motion::{observer, CurrentMotion, ModeField, Run, Seen, SmoothField};
 use crate::options::{Method, Options};
 use crate::stats::Stats;
 use crate::status::{Warning, WarningCode};
@@ -29,11 +29,11 @@ impl Taylor {
     /// Takes the coefficients at the start of a step, under the signs of the motion or under others; returns the length of
     /// step that they allow.
     #[inline(always)]
-    fn expand_motion(&mut self, at: &StepStart, jets: &MotionJets, signs: Option<&[f64]>) -> f64 {
-        let (system, t, x) = (at.system, at.t, at.x);
+    fn expand_motion(&mut self, at: &Run, jets: &MotionJets, signs: Option<&[f64]>) -> f64 {
+        let (system, t, x) = (at.system, at.t, &at.x);
         let signs = signs.unwrap_or(&at.motion.signs);
         let fill = |rows: &mut [f64]| system.eval_jets(jets, t, x, signs, rows);
-        self.expand(jets.width(), x, at.scale, fill)
+        self.expand(jets.width(), x, &at.scale, fill)
     }
 
     /// The length of step that the states allow, or the monitored functions if they allow less.
@@ -124,9 +124,9 @@ impl Stepper for Taylor {
     }
 
     #[inline(always)]
-    fn attempt(&mut self, at: &mut StepStart, dt: f64) -> Result<Option<Attempt>, FieldError> {
-        let attempt = self.attempt_along(&mut at.motion.field, at.t, at.x, dt, at.scale)?;
-        observer(at.seen)(&at.motion.field);
+    fn attempt(&mut self, at: &mut Run, dt: f64) -> Result<Option<Attempt>, FieldError> {
+        let attempt = self.attempt_along(&mut at.motion.field, at.t, &at.x, dt, &at.scale)?;
+        observer(&mut at.seen)(&at.motion.field);
         Ok(Some(attempt))
     }
 
@@ -135,9 +135,9 @@ impl Stepper for Taylor {
     }
 
     #[inline(always)]
-    fn begin(&mut self, at: &mut StepStart) -> Ready {
+    fn begin(&mut self, at: &mut Run) -> Ready {
         (self.series.jets, self.series.reach) = (None, None);
-        let (system, motion, order) = (at.system, &mut *at.motion, self.order());
+        let (system, motion, order) = (at.system, &mut at.motion, self.order());
         // Whether a surface is left that h = 0 all along was expected of is seen at the ends of steps only.
         // A series that ends at the surface that is left would be left itself after a step of no length.
         let starts_clear = || motion.monitored.iter().all(|m| m.deflation.is_none());
@@ -167,7 +167,7 @@ impl Stepper for Taylor {
     /// In a region the derivative is the first coefficient. Sliding starts with its field: next to a two-fold its series is
     /// not accurate.
     #[inline(always)]
-    fn start(&mut self, at: &mut StepStart) -> bool {
+    fn start(&mut self, at: &mut Run) -> bool {
         if !at.motion.sliding.is_empty() {
             return false;
         }
@@ -188,7 +188,7 @@ impl Stepper for Taylor {
     }
 
     /// If redundant contacts share a load their equations do not determine the multipliers: there are no series.
-    fn started(&mut self, at: &mut StepStart) -> Ready {
+    fn started(&mut self, at: &mut Run) -> Ready {
         match at.motion.shares_load() {
             true => Ready::NotThisMotion,
             false => Ready::ANY,
@@ -198,7 +198,7 @@ impl Stepper for Taylor {
     /// Once, in a run that was to use series.
     #[cold]
     #[inline(never)]
-    fn refusal(&mut self, at: &StepStart) -> Option<Box<Warning>> {
+    fn refusal(&mut self, at: &Run) -> Option<Box<Warning>> {
         if at.options.method != Method::Taylor || self.series.has_warned {
             return None;
         }
@@ -225,7 +225,7 @@ impl Stepper for Taylor {
     }
 
     #[inline(always)]
-    fn prepare(&mut self, at: &mut StepStart) -> Result<Ready, FieldError> {
+    fn prepare(&mut self, at: &mut Run) -> Result<Ready, FieldError> {
         let allowed = match self.series.reach.take() {
             Some(allowed) => allowed,
             None if self.is_expanded() => return Ok(Ready::ANY),
@@ -233,7 +233,7 @@ impl Stepper for Taylor {
                 let Some(jets) = self.series.jets.take() else {
                     return Ok(Ready::NotThisMotion);
                 };
-                let signs = multipliers_in(at.motion, at.seen);
+                let signs = multipliers_in(&at.motion, &at.seen);
                 let allowed = self.expand_motion(at, &jets, signs.as_deref());
                 at.stats.n_field_evaluations += jets.cost();
                 let allowed = self.limited_by_functions(&jets, at.options, allowed);
@@ -286,8 +286,8 @@ impl Stepper for Taylor {
 
     /// Is the step far shorter than the motion takes to change? The fastest rate is that between the last two sums of the
     /// series, whose difference is what grows fastest.
-    fn is_limited_by_stability(&mut self, at: &mut StepStart) -> Result<Option<bool>, FieldError> {
-        let Some(mut beside) = self.slow_end_without_last(at.x, at.scale) else {
+    fn is_limited_by_stability(&mut self, at: &mut Run) -> Result<Option<bool>, FieldError> {
+        let Some(mut beside) = self.slow_end_without_last(&at.x, &at.scale) else {
             return Ok(Some(false));
         };
         let (dt, end) = (self.step.interpolant.dt, &self.step.end);

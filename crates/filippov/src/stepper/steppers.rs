@@ -1,10 +1,10 @@
 //! The methods of a run, and which of them takes the current step.
 
 use super::chosen::Chosen;
-use super::duties::{Attempt, ExitSeries, Ready, StepStart, Stepper};
+use super::duties::{Attempt, ExitSeries, Ready, Stepper};
 use super::{Controller, Dopri5, ErrorScale, Interpolant, Rodas5p, Step};
 use crate::error::FieldError;
-use crate::motion::{Seen, SmoothField};
+use crate::motion::{Run, Seen, SmoothField};
 use crate::options::Options;
 use crate::stats::Stats;
 use crate::status::Warning;
@@ -67,7 +67,7 @@ impl Steppers {
 
     /// A motion starts: the chosen method takes it if it can; with a warning if the user asked for it and it cannot.
     #[inline]
-    pub fn begin(&mut self, at: &mut StepStart) -> Option<Box<Warning>> {
+    pub fn begin(&mut self, at: &mut Run) -> Option<Box<Warning>> {
         (self.takes_motion, self.takes_step) = (false, false);
         let method = self.chosen.as_mut()?;
         if method.begin(at) == Ready::NotThisMotion {
@@ -78,13 +78,13 @@ impl Steppers {
     }
 
     /// Finds the derivative at the start of the motion without its field; `false` if the method does not.
-    pub fn start(&mut self, at: &mut StepStart) -> bool {
+    pub fn start(&mut self, at: &mut Run) -> bool {
         of_method_in_use!(mut self.start(at))
     }
 
     /// The field was evaluated at the start of the motion; with a warning if the method that the user asked for does not
     /// integrate it.
-    pub fn started(&mut self, at: &mut StepStart) -> Option<Box<Warning>> {
+    pub fn started(&mut self, at: &mut Run) -> Option<Box<Warning>> {
         match of_method_in_use!(mut self.started(at)) {
             Ready::NotThisMotion => self.leave_motion(at),
             Ready::UpTo(_) | Ready::NotThisStep => None,
@@ -94,7 +94,7 @@ impl Steppers {
     /// Leaves the rest of the motion to DOPRI5; with a warning if the user asked for the other method.
     #[cold]
     #[inline(never)]
-    pub fn leave_motion(&mut self, at: &StepStart) -> Option<Box<Warning>> {
+    pub fn leave_motion(&mut self, at: &Run) -> Option<Box<Warning>> {
         self.takes_motion = false;
         self.hand_over(false);
         self.chosen.as_mut()?.refusal(at)
@@ -112,7 +112,7 @@ impl Steppers {
     /// # Errors
     /// If a function of the user raises.
     #[inline(always)]
-    pub fn prepare(&mut self, at: &mut StepStart) -> Result<Ready, FieldError> {
+    pub fn prepare(&mut self, at: &mut Run) -> Result<Ready, FieldError> {
         if self.takes_motion && !self.takes_step {
             self.hand_over(true);
         }
@@ -131,7 +131,7 @@ impl Steppers {
     /// # Errors
     /// If a function of the user raises.
     #[inline(always)]
-    pub fn attempt(&mut self, at: &mut StepStart, dt: f64) -> Result<Attempt, FieldError> {
+    pub fn attempt(&mut self, at: &mut Run, dt: f64) -> Result<Attempt, FieldError> {
         at.seen.iter_mut().for_each(Seen::begin);
         if let Some(method) = self.chosen.as_mut().filter(|_| self.takes_step) {
             if let Some(attempt) = method.attempt(at, dt)? {
@@ -171,10 +171,7 @@ impl Steppers {
     ///
     /// # Errors
     /// If a function of the user raises.
-    pub fn is_limited_by_stability(
-        &mut self,
-        at: &mut StepStart,
-    ) -> Result<Option<bool>, FieldError> {
+    pub fn is_limited_by_stability(&mut self, at: &mut Run) -> Result<Option<bool>, FieldError> {
         if self.takes_step != self.takes_motion {
             return Ok(None);
         }
@@ -183,7 +180,7 @@ impl Steppers {
 
     /// Leaves the rest of the motion, and the motions after it, to the method for stiff motions.
     #[cold]
-    pub fn go_on_implicitly(&mut self, at: &mut StepStart) {
+    pub fn go_on_implicitly(&mut self, at: &mut Run) {
         let mut rodas5p = Rodas5p::new(at.x.len());
         rodas5p.take(at);
         rodas5p

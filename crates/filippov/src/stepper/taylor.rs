@@ -34,15 +34,15 @@ pub(super) struct MotionSeries {
 /// Reference: Jorba, Zou, *A software package for the numerical integration of ODEs by means of high-order
 /// Taylor methods*, Exp. Math. 14 (2005).
 pub struct Taylor {
+    pub(super) step: Step,
     n: usize,
     order: usize,
     /// Entries of a row: the states, then functions of them.
     width: usize,
-    /// Coefficients in powers of time at the start of the step, (order + 1) rows.
+    /// Coefficients in powers of time at the start of the step, (order + 1) rows; what follows is of other motions.
     rows: Vec<f64>,
     /// The rows belong to the current start.
     is_expanded: bool,
-    pub(super) step: Step,
     pub(super) series: MotionSeries,
     defect: Vec<f64>,
     /// Error of the attempted step in units of the tolerance.
@@ -116,10 +116,10 @@ impl Taylor {
     ) -> f64 {
         self.width = width;
         let size = (self.order + 1) * width;
-        if self.rows.len() != size {
+        if self.rows.len() < size {
             self.rows.resize(size, 0.0);
         }
-        fill(&mut self.rows);
+        fill(&mut self.rows[..size]);
         self.is_expanded = true;
         self.longest_step(y, scale)
     }
@@ -156,7 +156,8 @@ impl Taylor {
 
     fn longest_step(&self, y: &[f64], scale: &ErrorScale) -> f64 {
         // A coefficient that is not finite makes all of higher order so.
-        if self.rows[self.order * self.width..]
+        let last = self.order * self.width;
+        if self.rows[last..last + self.width]
             .iter()
             .any(|c| !c.is_finite())
         {

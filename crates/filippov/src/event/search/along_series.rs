@@ -44,12 +44,12 @@ impl Likeness {
 impl StepSearch<'_, '_> {
     /// Is a guard a polynomial along the step?
     pub(super) fn is_polynomial(&self, m: &Monitored) -> bool {
-        m.affine && self.motion.is_straight && m.guard.is_surface()
+        m.affine && self.run.motion.is_straight && m.guard.is_surface()
     }
 
     /// Coefficients of the step.
     pub(super) fn n_rows(&self) -> usize {
-        self.stepper.interpolant().coefficients().len() / self.x.len()
+        self.stepper.interpolant().coefficients().len() / self.run.x.len()
     }
 
     /// The series of a guard in this step, into `rows`: how it stands for the guard, if it does, and whether there is one.
@@ -75,7 +75,7 @@ impl StepSearch<'_, '_> {
         let series = Series::new(rows);
         match m.deflation {
             None => Polynomial::Powers(series),
-            Some(zero) if zero.t == self.t => {
+            Some(zero) if zero.t == self.run.t => {
                 Polynomial::Quotient(series.divided(zero.order as usize))
             }
             Some(_) => Polynomial::Deflated(series),
@@ -85,10 +85,14 @@ impl StepSearch<'_, '_> {
     /// An affine switching function along the step, positive inside of the mode, into `rows`.
     pub(super) fn affine_series(&self, m: &Monitored, rows: &mut [f64]) -> Result<(), FieldError> {
         let extension = self.stepper.interpolant();
-        let (point, signs) = ((self.t, self.x), &self.motion.signs);
-        let ht =
-            self.system
-                .gradient_products(m.place, point, signs, extension.coefficients(), rows)?;
+        let (point, signs) = ((self.run.t, &self.run.x[..]), &self.run.motion.signs);
+        let ht = self.run.system.gradient_products(
+            m.place,
+            point,
+            signs,
+            extension.coefficients(),
+            rows,
+        )?;
         if m.orientation < 0.0 {
             rows.iter_mut().for_each(|row| *row = -*row);
         }
@@ -116,12 +120,12 @@ impl StepSearch<'_, '_> {
         series: &Series,
         value_at_end: f64,
     ) -> Result<Option<Likeness>, FieldError> {
-        let sticks = |j: &usize| self.system.sticks_at(*j);
+        let sticks = |j: &usize| self.run.system.sticks_at(*j);
         // Where the motion sticks its limits are others than those of the series.
-        if !matches!(self.motion.field, ModeField::Sliding(_))
+        if !matches!(self.run.motion.field, ModeField::Sliding(_))
             || m.deflation.is_some()
-            || !self.motion.is_straight
-            || self.motion.sliding().iter().any(sticks)
+            || !self.run.motion.is_straight
+            || self.run.motion.sliding().iter().any(sticks)
         {
             return Ok(None);
         }
@@ -150,15 +154,15 @@ impl StepSearch<'_, '_> {
     /// A guard within the step, in the sense of the mode.
     fn value_along(&mut self, m: &Monitored, theta: f64) -> Result<f64, FieldError> {
         let mut curve = Curve {
-            system: self.system,
-            field: &mut self.motion.field,
-            signs: &self.motion.signs,
+            system: self.run.system,
+            field: &mut self.run.motion.field,
+            signs: &self.run.motion.signs,
             interpolant: self.stepper.interpolant(),
-            is_straight: self.motion.is_straight,
+            is_straight: self.run.motion.is_straight,
             h: &mut self.detector.h,
             x: &mut self.detector.x,
             exits: &mut self.detector.exits,
-            n_evaluations: &mut self.stats.n_surface_evaluations,
+            n_evaluations: &mut self.run.stats.n_surface_evaluations,
         };
         curve.value(m, theta)
     }
@@ -172,9 +176,9 @@ impl StepSearch<'_, '_> {
         likeness: Likeness,
         (lo, hi, guess, rest): (f64, f64, f64, f64),
     ) -> Result<Option<(f64, AtZero)>, FieldError> {
-        let m = self.motion.monitored[index];
+        let m = self.run.motion.monitored[index];
         let noise = self.noise_of(&m)?;
-        self.motion.monitored[index].noise = noise;
+        self.run.motion.monitored[index].noise = noise;
         let doubt = noise.max(likeness.margin);
         let g_lo = series.value(lo);
         let g_hi = match hi {
@@ -187,7 +191,7 @@ impl StepSearch<'_, '_> {
             return Ok(None);
         }
         let (dt, n_rows) = (self.stepper.interpolant().dt, self.n_rows() as f64);
-        let width = 0.5 * EPS * (self.t.abs() / dt).max(1.0);
+        let width = 0.5 * EPS * (self.run.t.abs() / dt).max(1.0);
         let (mut theta, mut slope) = series.only_zero((lo, hi), guess, width);
         if rest > 0.0 && !series.is_single(slope, rest) {
             return Ok(None);
@@ -221,7 +225,7 @@ impl StepSearch<'_, '_> {
 
     /// May an exit function about which there are no bounds vanish, to judge by its values at the stages?
     pub(super) fn exit_may_vanish(&self, m: &Monitored) -> bool {
-        let seen = m.exit().and_then(|place| self.detector.seen.get(place));
+        let seen = m.exit().and_then(|place| self.run.seen.get(place));
         let is_known = m.deflation.is_none() && !self.stepper.is_series();
         seen.is_none_or(|seen| !is_known || may_vanish_between(seen.range))
     }

@@ -5,19 +5,14 @@ use std::cell::RefCell;
 use super::bounds::{Piece, RootPiece};
 use crate::error::FieldError;
 use crate::event::Multiple;
-use crate::motion::CurrentMotion;
-use crate::motion::Monitored;
-use crate::motion::{Exits, Seen};
-use crate::system::PiecewiseSystem;
-use crate::tolerances::{SMALL_JUMP, SURFACE_NOISE};
+use crate::motion::{Exits, Monitored, Run};
+use crate::tolerances::SURFACE_NOISE;
 
 /// A function is clear of a zero that was divided out beyond this multiple of its rounding.
 pub(super) const CLEAR_OF_NOISE: f64 = 1e3;
 
 /// Scratch space of the event stage, and values of what is monitored.
 pub(crate) struct Detector {
-    /// The exit functions of the motion in the step.
-    pub seen: Vec<Seen>,
     /// Exit functions computed in the search of this step, by theta.
     pub exits: Vec<(f64, Exits)>,
     pub h: Vec<f64>,
@@ -42,10 +37,9 @@ pub(crate) struct Detector {
 impl Detector {
     pub fn new(n: usize, d: usize) -> Self {
         Detector {
-            seen: Vec::new(),
             exits: Vec::new(),
             h: vec![0.0; d],
-            probed: [vec![0.0; d], vec![0.0; d]],
+            probed: Default::default(),
             is_probed: false,
             rate: vec![0.0; d],
             x: vec![0.0; n],
@@ -67,31 +61,13 @@ impl Detector {
         self.is_probed = false;
     }
 
-    /// Is the difference of the normal components at an end of the step so small, compared with `speed`, that the multiplier
-    /// may be lost? Far from it nothing else has to be looked at.
-    pub fn may_lose_multiplier(&self, speed: f64, rtol: f64) -> bool {
-        let [minus, plus, ..] = self.seen.as_slice() else {
-            return false;
-        };
-        let least = (minus.start + plus.start).min(minus.end + plus.end);
-        least <= (SMALL_JUMP * rtol).min(1.0) * speed
-    }
-
-    /// Does the share of f+ change fast in the step just made, towards a two-fold? Asked while the motion slides on one surface.
-    pub fn approaches_two_fold(&self) -> bool {
-        let [minus, plus, ..] = self.seen.as_slice() else {
-            return false;
-        };
-        minus.end + plus.end < 0.99 * (minus.start + plus.start)
-    }
-
     /// Values and rates of the monitored functions at (t, x) with velocity `v`, into `right`.
     pub fn measure(
         &mut self,
-        system: &dyn PiecewiseSystem,
-        motion: &CurrentMotion,
+        run: &Run,
         (t, x, v): (f64, &[f64], &[f64]),
     ) -> Result<(), FieldError> {
+        let (system, motion) = (run.system, &run.motion);
         let with_surfaces = motion.monitored.iter().any(|m| m.guard.is_surface());
         if with_surfaces {
             system.surface_rates(t, x, &motion.signs, v, &mut self.h, &mut self.rate)?;
@@ -100,7 +76,7 @@ impl Detector {
         for m in &motion.monitored {
             self.right.push(match m.surface() {
                 Some(j) => (m.orientation * self.h[j], m.orientation * self.rate[j]),
-                None => (self.seen[m.place].end, f64::NAN),
+                None => (run.seen[m.place].end, f64::NAN),
             });
         }
         Ok(())
@@ -108,9 +84,10 @@ impl Detector {
 
     /// Makes the values at the end of the step those at the start of the next one. Returns whether a
     /// surface that the motion departed from is now clear.
-    pub fn accept(&mut self, monitored: &mut [Monitored], dt: f64) -> bool {
+    pub fn accept(&mut self, run: &mut Run, dt: f64) -> bool {
+        run.seen.iter_mut().for_each(|seen| seen.start = seen.end);
         let mut cleared = false;
-        for (m, &(value, rate)) in monitored.iter_mut().zip(&self.right) {
+        for (m, &(value, rate)) in run.motion.monitored.iter_mut().zip(&self.right) {
             m.curvature = (rate - m.rate) / dt;
             (m.value, m.rate) = (value, rate);
             // A zero that rounding still blurs stays divided out.
@@ -118,9 +95,6 @@ impl Detector {
                 m.deflation = None;
                 cleared = true;
             }
-        }
-        for seen in &mut self.seen {
-            seen.start = seen.end;
         }
         cleared
     }
@@ -143,21 +117,20 @@ impl Detector {
     /// Rounding of a monitored function over the step.
     pub(super) fn noise(
         &mut self,
-        system: &dyn PiecewiseSystem,
-        motion: &CurrentMotion,
+        run: &Run,
         m: &Monitored,
-        (t, start, end): (f64, &[f64], &[f64]),
+        end: &[f64],
     ) -> Result<f64, FieldError> {
         let Some(j) = m.surface() else {
-            let seen = &self.seen;
+            let seen = &run.seen;
             let noise = *self.exit_noise.get_or_insert_with(|| {
                 4.0 * SURFACE_NOISE * seen.iter().fold(0.0_f64, |m, seen| m.max(seen.size()))
             });
             return Ok(noise);
         };
-        let size = system
-            .surface_size(j, t, end, &motion.signs)?
-            .max(system.surface_size(j, t, start, &motion.signs)?);
+        let signs = &run.motion.signs;
+        let size = |x| run.system.surface_size(j, run.t, x, signs);
+        let size = size(end)?.max(size(&run.x)?);
         Ok(SURFACE_NOISE * size)
     }
 }

@@ -67,9 +67,9 @@ impl Piece {
 impl StepSearch<'_, '_> {
     /// Searches the step for a zero of one guard that comes first; `false` if a shorter step is needed.
     pub(super) fn search(&mut self, index: usize, sought: &mut Sought) -> Result<bool, FieldError> {
-        if self.motion.monitored[index].deflation.is_some() {
-            let m = self.motion.monitored[index];
-            self.motion.monitored[index].noise = self.noise_beside(&m)?;
+        if self.run.motion.monitored[index].deflation.is_some() {
+            let m = self.run.motion.monitored[index];
+            self.run.motion.monitored[index].noise = self.noise_beside(&m)?;
         }
         let mut proof = None;
         if !self.stepper.extends_freely() {
@@ -87,7 +87,10 @@ impl StepSearch<'_, '_> {
     /// Keeps what a search found; `false` if it needs a shorter step.
     pub(super) fn keep(&self, index: usize, zero: Search, sought: &mut Sought) -> bool {
         if let Search::At(theta, kind) = zero {
-            let (guard, together) = (self.motion.monitored[index].guard, self.together(sought.dt));
+            let (guard, together) = (
+                self.run.motion.monitored[index].guard,
+                self.together(sought.dt),
+            );
             sought.keep(guard, (theta, kind), together);
         }
         !matches!(zero, Search::Unsure)
@@ -101,7 +104,7 @@ impl StepSearch<'_, '_> {
         proof: Option<Proof>,
         sought: &mut Sought,
     ) -> Result<(Search, f64), FieldError> {
-        let m = self.motion.monitored[index];
+        let m = self.run.motion.monitored[index];
         let (value, _) = self.detector.right[index];
         let reach = sought.reach;
         let mut buffer = NO_TERMS;
@@ -161,7 +164,7 @@ impl StepSearch<'_, '_> {
         proof: Option<Proof>,
         sought: &mut Sought,
     ) -> Result<(Search, f64), FieldError> {
-        let m = self.motion.monitored[index];
+        let m = self.run.motion.monitored[index];
         // Beyond zero at the end: there is a zero, whether there are bounds or not.
         let proof = match proof {
             Some(proof) => proof,
@@ -169,7 +172,7 @@ impl StepSearch<'_, '_> {
             None => self.prove_clear(index, value_at_end, sought.reach),
         };
         if proof == Proof::Silent && !self.exit_may_vanish(&m) {
-            sought.dismissed |= self.motion.ends_root(&m);
+            sought.dismissed |= self.run.motion.ends_root(&m);
             return Ok((Search::Nothing, sought.reach));
         }
         if proof == Proof::Clear {
@@ -211,7 +214,7 @@ impl StepSearch<'_, '_> {
         piece: (f64, f64),
         sought: &mut Sought,
     ) -> Result<Search, FieldError> {
-        let m = self.motion.monitored[index];
+        let m = self.run.motion.monitored[index];
         let mut buffer = NO_TERMS;
         let rows = &mut buffer[..self.n_rows()];
         let mut polynomial = Polynomial::None;
@@ -230,36 +233,41 @@ impl StepSearch<'_, '_> {
         (from, to): (f64, f64),
         sought: &mut Sought,
     ) -> Result<Search, FieldError> {
-        let m = self.motion.monitored[index];
+        let m = self.run.motion.monitored[index];
         let noise = self.noise_beside(&m)?;
-        self.motion.monitored[index].noise = noise;
-        let ends_root = self.motion.ends_root(&m);
-        let by_multipliers = !self.motion.slides_by_rule() && self.motion.has_bounds();
+        self.run.motion.monitored[index].noise = noise;
+        let ends_root = self.run.motion.ends_root(&m);
+        let by_multipliers = !self.run.motion.slides_by_rule() && self.run.motion.has_bounds();
         let interpolant = self.stepper.interpolant();
         let bounds = BoundedCurve {
-            system: self.system,
+            system: self.run.system,
             interpolant,
-            signs: &self.motion.signs,
-            sliding: &self.motion.sliding,
+            signs: &self.run.motion.signs,
+            sliding: &self.run.motion.sliding,
             margin: &self.detector.margin,
-            seen: &self.detector.seen,
-            affine: self.motion.affine_bounds.as_ref().and_then(Option::as_ref),
+            seen: &self.run.seen,
+            affine: self
+                .run
+                .motion
+                .affine_bounds
+                .as_ref()
+                .and_then(Option::as_ref),
             by_multipliers,
             known_exits: &self.detector.enclosed_exits,
             known_roots: &self.detector.enclosed_roots,
         };
         let mut curve = Curve {
-            system: self.system,
-            field: &mut self.motion.field,
-            signs: &self.motion.signs,
+            system: self.run.system,
+            field: &mut self.run.motion.field,
+            signs: &self.run.motion.signs,
             interpolant,
-            is_straight: self.motion.is_straight,
+            is_straight: self.run.motion.is_straight,
             h: &mut self.detector.h,
             x: &mut self.detector.x,
             exits: &mut self.detector.exits,
-            n_evaluations: &mut self.stats.n_surface_evaluations,
+            n_evaluations: &mut self.run.stats.n_surface_evaluations,
         };
-        let (t, dt) = (self.t, sought.dt);
+        let (t, dt) = (self.run.t, sought.dt);
         let mut g = |theta: f64| {
             let value = match polynomial {
                 Polynomial::Quotient(series) => return Ok(series.value(theta)),
@@ -369,14 +377,18 @@ impl StepSearch<'_, '_> {
             Some(found) if sought.dismissed && ends_sliding(found) => found.theta,
             _ => return Ok(true),
         };
-        let n_sides = 2 * self.motion.sliding.len();
+        let n_sides = 2 * self.run.motion.sliding.len();
         let mut before = None;
         let mut gap = 0.5 * theta;
         while before.is_none() && gap > self.together(sought.dt) {
             let at = theta - gap;
             self.stepper.interpolant().at(at, &mut self.detector.x);
             let x = &mut self.detector.x;
-            let exits = self.motion.field.exits(self.t + at * sought.dt, x)?;
+            let exits = self
+                .run
+                .motion
+                .field
+                .exits(self.run.t + at * sought.dt, x)?;
             let is_beyond = exits.iter().take(n_sides).any(|&exit| exit <= 0.0);
             before = is_beyond.then_some(at);
             gap *= 0.25;
@@ -384,8 +396,8 @@ impl StepSearch<'_, '_> {
         let Some(before) = before else {
             return Ok(true);
         };
-        for index in 0..self.motion.monitored.len() {
-            let guard = self.motion.monitored[index].guard;
+        for index in 0..self.run.motion.monitored.len() {
+            let guard = self.run.motion.monitored[index].guard;
             if matches!(guard, Guard::Multiplier { .. } | Guard::Force(_)) {
                 let zero = self.search_on(index, (0.0, before), sought)?;
                 if !self.keep(index, zero, sought) {

@@ -83,12 +83,12 @@ impl StepSearch<'_, '_> {
         }
         // Rounding of forces that balance blurs functions of a sliding motion for long: there is no zero to be moved to.
         if event.is_blurred {
-            return self.motion.sliding.is_empty();
+            return self.run.motion.sliding.is_empty();
         }
         if self.stepper.is_series() {
             return false;
         }
-        let mut values = self.motion.monitored.iter().zip(&self.detector.right);
+        let mut values = self.run.motion.monitored.iter().zip(&self.detector.right);
         values.any(|(m, (value, _))| m.guard == event.guards[0] && *value > 0.0)
     }
 
@@ -104,7 +104,7 @@ impl StepSearch<'_, '_> {
         let &[guard @ Guard::Surface(j)] = event.guards.as_slice() else {
             return Ok(Event::At(event));
         };
-        let monitored = &self.motion.monitored;
+        let monitored = &self.run.motion.monitored;
         let Some(m) = monitored.iter().find(|m| m.guard == guard) else {
             return Ok(Event::At(event));
         };
@@ -116,7 +116,7 @@ impl StepSearch<'_, '_> {
         let noise = self.noise_of(&m)?;
         let depth = noise.max(self.depth_of_touches(j, theta)?);
         // Up to where it is clear of zero on both sides.
-        let least = 4.0 * EPS * (1.0 + self.t.abs() / dt);
+        let least = 4.0 * EPS * (1.0 + self.run.t.abs() / dt);
         let (mut before, mut behind, mut width) = (theta, theta, least);
         let mut right = 0.0;
         while behind < 1.0 && right <= noise && right >= -depth {
@@ -182,11 +182,11 @@ impl StepSearch<'_, '_> {
         m: &Monitored,
         blur: &Blur,
     ) -> Result<Option<(usize, f64)>, FieldError> {
-        if !self.motion.sliding.is_empty() || blur.size() == 0.0 {
+        if !self.run.motion.sliding.is_empty() || blur.size() == 0.0 {
             return Ok(None);
         }
-        let highest = self.system.max_lie_order().min(MAX_LIE_ORDER);
-        let side = self.motion.mode.entries()[m.surface().unwrap_or(0)];
+        let highest = self.run.system.max_lie_order().min(MAX_LIE_ORDER);
+        let side = self.run.motion.mode.entries()[m.surface().unwrap_or(0)];
         for order in 1..=highest {
             let is_odd = order % 2 == 1;
             // Positive before, the function tells by its value behind whether its sign changes.
@@ -225,7 +225,7 @@ impl StepSearch<'_, '_> {
         if found.is_some() || blur.left.1 > 0.0 && blur.right.1 != 0.0 {
             return Ok(found);
         }
-        let side = self.motion.mode.entries()[m.surface().unwrap_or(0)];
+        let side = self.run.motion.mode.entries()[m.surface().unwrap_or(0)];
         let end = if blur.right.1 == 0.0 { ends.1 } else { ends.0 };
         let value = self.lie_along(m, (order - 1, side), end)?;
         let slope = self.lie_along(m, (order, side), end)? * blur.dt;
@@ -244,7 +244,7 @@ impl StepSearch<'_, '_> {
         zero: f64,
     ) -> Result<[usize; 2], FieldError> {
         let mut counts = [order - 1; 2];
-        let own = self.motion.mode.entries()[m.surface().unwrap_or(0)];
+        let own = self.run.motion.mode.entries()[m.surface().unwrap_or(0)];
         let other = usize::from(own < 0);
         let last = self.lie_along(m, (order, own), zero)? * blur.power(order);
         for k in 1..order {
@@ -262,13 +262,14 @@ impl StepSearch<'_, '_> {
         if self.stepper.is_series() {
             return Ok(0.0);
         }
-        let mut x = vec![0.0; self.x.len()];
+        let mut x = vec![0.0; self.run.x.len()];
         let mut gradient = x.clone();
         self.stepper.interpolant().at(theta, &mut x);
-        let t = self.t + theta * self.stepper.interpolant().dt;
-        self.system
-            .gradient(j, t, &x, &self.motion.signs, &mut gradient)?;
-        let tolerance = self.scale.along(&gradient, &x);
+        let t = self.run.t + theta * self.stepper.interpolant().dt;
+        self.run
+            .system
+            .gradient(j, t, &x, &self.run.motion.signs, &mut gradient)?;
+        let tolerance = self.run.scale.along(&gradient, &x);
         Ok(TOUCH_DEPTH * tolerance)
     }
 
@@ -277,20 +278,21 @@ impl StepSearch<'_, '_> {
         let Some(j) = m.surface() else {
             return Ok((f64::NAN, f64::NAN));
         };
-        let (mut x, mut velocity) = (vec![0.0; self.x.len()], vec![0.0; self.x.len()]);
+        let (mut x, mut velocity) = (vec![0.0; self.run.x.len()], vec![0.0; self.run.x.len()]);
         let extension = self.stepper.interpolant();
         extension.at(theta, &mut x);
         extension.derivative(theta, &mut velocity);
-        let t = self.t + theta * extension.dt;
-        if !self.motion.is_straight {
-            self.motion.project(t, &mut x)?;
+        let t = self.run.t + theta * extension.dt;
+        if !self.run.motion.is_straight {
+            self.run.motion.project(t, &mut x)?;
         }
-        let n = self.system.n_surfaces();
+        let n = self.run.system.n_surfaces();
         let (mut h, mut rates) = (vec![0.0; n], vec![0.0; n]);
-        let signs = &self.motion.signs;
-        self.system
+        let signs = &self.run.motion.signs;
+        self.run
+            .system
             .surface_rates(t, &x, signs, &velocity, &mut h, &mut rates)?;
-        self.stats.n_surface_evaluations += 1;
+        self.run.stats.n_surface_evaluations += 1;
         Ok((m.orientation * h[j], m.orientation * rates[j]))
     }
 
@@ -304,14 +306,15 @@ impl StepSearch<'_, '_> {
         let Some(j) = m.surface() else {
             return Ok(f64::NAN);
         };
-        let mut x = vec![0.0; self.x.len()];
+        let mut x = vec![0.0; self.run.x.len()];
         let extension = self.stepper.interpolant();
         extension.at(theta, &mut x);
-        let t = self.t + theta * extension.dt;
-        let mut signs = self.motion.signs.clone();
+        let t = self.run.t + theta * extension.dt;
+        let mut signs = self.run.motion.signs.clone();
         signs[j] = f64::from(side);
         let word = [side; MAX_LIE_ORDER];
         let lie = self
+            .run
             .system
             .lie_derivative(j, j, &word[..order], t, &x, &signs)?;
         Ok(m.orientation * lie.value)
@@ -325,7 +328,7 @@ impl StepSearch<'_, '_> {
         (mut lo, mut hi): (f64, f64),
         width: f64,
     ) -> Result<Option<f64>, FieldError> {
-        let side = self.motion.mode.entries()[m.surface().unwrap_or(0)];
+        let side = self.run.motion.mode.entries()[m.surface().unwrap_or(0)];
         let mut at = |theta: f64| match which {
             Derivative::Rate => Ok(self.along(m, theta)?.1),
             Derivative::Lie(order) => self.lie_along(m, (order, side), theta),

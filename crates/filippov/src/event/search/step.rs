@@ -22,7 +22,7 @@ impl StepSearch<'_, '_> {
     pub(crate) fn first_event(&mut self, t1: f64, dt: f64) -> Result<(Event, f64), FieldError> {
         let mut sought = Sought::new(dt);
         self.detector.forget_step();
-        if self.motion.monitored.is_empty() {
+        if self.run.motion.monitored.is_empty() {
             return Ok((Event::None, sought.longest));
         }
         if !self.seek(t1, &mut sought)? {
@@ -42,7 +42,7 @@ impl StepSearch<'_, '_> {
     /// unless it is an action, which looks at them itself.
     fn resolve_multiple(&mut self, found: Found, sought: &mut Sought) -> Result<Event, FieldError> {
         let (guards, from) = (found.guards.clone(), found.theta);
-        let triggers = self.motion.triggers(self.system);
+        let triggers = self.run.motion.triggers(self.run.system);
         let acts =
             |guard: &Guard| matches!(guard, Guard::Surface(j) if triggers.is_only_trigger(*j));
         let is_action = guards.iter().any(acts);
@@ -51,8 +51,8 @@ impl StepSearch<'_, '_> {
             event => return Ok(event),
         };
         let to = (event.theta + self.together(sought.dt)).min(1.0);
-        for index in 0..self.motion.monitored.len() {
-            let m = self.motion.monitored[index];
+        for index in 0..self.run.motion.monitored.len() {
+            let m = self.run.motion.monitored[index];
             if guards.contains(&m.guard) || m.deflation.is_some() {
                 continue;
             }
@@ -69,8 +69,8 @@ impl StepSearch<'_, '_> {
     /// first: the others need not be looked at after the first zero.
     fn seek(&mut self, t1: f64, sought: &mut Sought) -> Result<bool, FieldError> {
         let end = (t1, self.stepper.end(), self.stepper.end_derivative());
-        self.detector.measure(self.system, self.motion, end)?;
-        self.stats.n_surface_evaluations += 1;
+        self.detector.measure(self.run, end)?;
+        self.run.stats.n_surface_evaluations += 1;
         if self.detector.right.iter().any(|(value, _)| value.is_nan()) {
             return Ok(false);
         }
@@ -78,15 +78,21 @@ impl StepSearch<'_, '_> {
             // There will be a search: the extension that it needs serves the filter too.
             self.extend()?;
         }
-        if !self.motion.monitored.iter().all(|m| self.is_polynomial(m)) {
-            self.stepper.extend_cheaply(self.x);
+        if !self
+            .run
+            .motion
+            .monitored
+            .iter()
+            .all(|m| self.is_polynomial(m))
+        {
+            self.stepper.extend_cheaply(&self.run.x);
         }
         self.measure_margin(sought.dt)?;
-        if self.motion.sliding.len() > 1 {
+        if self.run.motion.sliding.len() > 1 {
             self.prepare_bounds();
         }
         for is_beyond in [true, false] {
-            for index in 0..self.motion.monitored.len() {
+            for index in 0..self.run.motion.monitored.len() {
                 let (value, _) = self.detector.right[index];
                 if (value <= 0.0) == is_beyond && !self.search(index, sought)? {
                     return Ok(false);
@@ -105,8 +111,8 @@ impl StepSearch<'_, '_> {
     /// A surface that the motion was to leave to one side and is on the other side of, without a zero in between: rounding
     /// decided on the side, and it is decided anew.
     fn wrong_from_the_start(&mut self) -> Result<Option<Found>, FieldError> {
-        for index in 0..self.motion.monitored.len() {
-            let m = &self.motion.monitored[index];
+        for index in 0..self.run.motion.monitored.len() {
+            let m = &self.run.motion.monitored[index];
             let (value, _) = self.detector.right[index];
             if value >= 0.0 || m.deflation.is_none() || !m.guard.is_surface() {
                 continue;
@@ -126,7 +132,7 @@ impl StepSearch<'_, '_> {
         index: usize,
         sought: &mut Sought,
     ) -> Result<Option<Proof>, FieldError> {
-        let m = self.motion.monitored[index];
+        let m = self.run.motion.monitored[index];
         let (dt, (value, rate)) = (sought.dt, self.detector.right[index]);
         let proof = match m.affine && m.guard.is_surface() {
             true => Proof::Silent,
@@ -145,29 +151,30 @@ impl StepSearch<'_, '_> {
                 // A multiple zero stays within rounding for long: the end has to be clear of it.
                 let is_clear = zero.order == 1
                     || zero.order == 2
-                        && value > CLEAR_OF_NOISE * self.motion.monitored[index].noise;
+                        && value > CLEAR_OF_NOISE * self.run.motion.monitored[index].noise;
                 let leading = zero.leading * dt.powi(zero.order);
-                let is_known = m.affine && zero.t == self.t && is_clear;
+                let is_known = m.affine && zero.t == self.run.t && is_clear;
                 !is_known || may_vanish_deflated(leading, zero.order, value, rate * dt)
             }
             (None, _) => self.exit_may_vanish(&m),
         };
-        sought.dismissed |= !may_vanish && proof == Proof::Silent && self.motion.ends_root(&m);
+        sought.dismissed |= !may_vanish && proof == Proof::Silent && self.run.motion.ends_root(&m);
         Ok(may_vanish.then_some(proof))
     }
 
     /// The event at the start of the step, if the motion can go no further because its field ends at a surface that it has
     /// reached to a small part of the tolerance.
     pub(crate) fn arrival_at_edge(&self) -> Result<Option<Found>, FieldError> {
-        let mut gradient = vec![0.0; self.x.len()];
-        for m in &self.motion.monitored {
+        let mut gradient = vec![0.0; self.run.x.len()];
+        for m in &self.run.motion.monitored {
             let Guard::Surface(j) = m.guard else {
                 continue;
             };
-            let signs = &self.motion.signs;
-            self.system
-                .gradient(j, self.t, self.x, signs, &mut gradient)?;
-            let tolerance = self.scale.along(&gradient, self.x);
+            let signs = &self.run.motion.signs;
+            self.run
+                .system
+                .gradient(j, self.run.t, &self.run.x, signs, &mut gradient)?;
+            let tolerance = self.run.scale.along(&gradient, &self.run.x);
             if m.rate < 0.0 && m.value <= ARRIVED * tolerance {
                 return Ok(Some(Found::here(smallvec![m.guard])));
             }
@@ -177,8 +184,7 @@ impl StepSearch<'_, '_> {
 
     /// Rounding of a monitored function over the step.
     pub(crate) fn noise_of(&mut self, m: &Monitored) -> Result<f64, FieldError> {
-        let step = (self.t, self.x, self.stepper.end());
-        self.detector.noise(self.system, self.motion, m, step)
+        self.detector.noise(self.run, m, self.stepper.end())
     }
 
     /// The same, or what blurred the zero that is divided out.
@@ -194,10 +200,12 @@ impl StepSearch<'_, '_> {
         }
         for (theta, h) in PROBES.into_iter().zip(&mut self.detector.probed) {
             self.stepper.interpolant().at(theta, &mut self.detector.x);
-            let t = self.t + theta * dt;
-            self.system
-                .surfaces(t, &self.detector.x, &self.motion.signs, h)?;
-            self.stats.n_surface_evaluations += 1;
+            h.resize(self.detector.h.len(), 0.0);
+            let run = &mut *self.run;
+            let t = run.t + theta * dt;
+            run.system
+                .surfaces(t, &self.detector.x, &run.motion.signs, h)?;
+            run.stats.n_surface_evaluations += 1;
         }
         Ok(())
     }
@@ -207,16 +215,17 @@ impl StepSearch<'_, '_> {
         if self.stepper.is_extended() {
             return Ok(());
         }
-        self.stats.n_extensions += 1;
+        self.run.stats.n_extensions += 1;
         self.detector.enclosed_exits.get_mut().clear();
         self.detector.enclosed_roots.get_mut().clear();
-        self.stepper.extend(&mut self.motion.field, self.x)?;
+        self.stepper
+            .extend(&mut self.run.motion.field, &self.run.x)?;
         Ok(())
     }
 
     /// One-sided fields: the surface just beyond the end of the step, within reach of the continuous extension.
     fn seek_beyond(&mut self, sought: &mut Sought) -> Result<(), FieldError> {
-        for index in 0..self.motion.monitored.len() {
+        for index in 0..self.run.motion.monitored.len() {
             let (dt, (value, rate)) = (sought.dt, self.detector.right[index]);
             let near = rate < 0.0 && value < -rate * dt * 1.5 * (EXTRAPOLATION - 1.0);
             if near {
@@ -224,11 +233,11 @@ impl StepSearch<'_, '_> {
                 // What lies beyond the end of the step may not exist; that is no reason to shorten it.
                 let zero = self.search_on(index, (1.0, EXTRAPOLATION), sought)?;
                 let Search::At(theta, _) = zero else { continue };
-                if self.t + theta * dt > self.horizon {
+                if self.run.t + theta * dt > self.horizon {
                     continue;
                 }
                 // An extrapolation that is not accurate enough still says how far to go.
-                if self.stepper.extrapolation_error(theta, self.scale) > 1.0 {
+                if self.stepper.extrapolation_error(theta, &self.run.scale) > 1.0 {
                     let gap = ONE_SIDED_AIM * (theta - 1.0) * dt;
                     sought.longest = sought.longest.min(gap);
                 } else {
@@ -241,21 +250,21 @@ impl StepSearch<'_, '_> {
 
     /// Zeros that are closer than this, in steps, are one event.
     pub(crate) fn together(&self, dt: f64) -> f64 {
-        4.0 * EPS * (1.0 + self.t.abs() / dt)
+        4.0 * EPS * (1.0 + self.run.t.abs() / dt)
     }
 
     /// What bounds over the step up to `reach` prove about a function.
     pub(crate) fn prove_clear(&self, index: usize, value_at_end: f64, reach: f64) -> Proof {
-        let m = self.motion.monitored[index];
+        let m = self.run.motion.monitored[index];
         let curve = BoundedCurve {
-            system: self.system,
+            system: self.run.system,
             interpolant: self.stepper.interpolant(),
-            signs: &self.motion.signs,
-            sliding: self.motion.sliding(),
+            signs: &self.run.motion.signs,
+            sliding: self.run.motion.sliding(),
             margin: &self.detector.margin,
-            seen: &self.detector.seen,
-            affine: self.motion.affine_bounds(),
-            by_multipliers: !self.motion.slides_by_rule() && self.motion.has_bounds(),
+            seen: &self.run.seen,
+            affine: self.run.motion.affine_bounds(),
+            by_multipliers: !self.run.motion.slides_by_rule() && self.run.motion.has_bounds(),
             known_exits: &self.detector.enclosed_exits,
             known_roots: &self.detector.enclosed_roots,
         };
@@ -276,10 +285,10 @@ impl StepSearch<'_, '_> {
 
     /// Prepares the bounds of many multipliers, once per motion.
     pub(crate) fn prepare_bounds(&mut self) {
-        let motion = &mut self.motion;
+        let motion = &mut self.run.motion;
         if !motion.has_bounds()
             || motion.affine_bounds.is_some()
-            || self.rule != SlidingRule::Canopy
+            || self.run.options.sliding != SlidingRule::Canopy
         {
             return;
         }
@@ -291,7 +300,7 @@ impl StepSearch<'_, '_> {
     /// How far the motion lies beside the continuous extension, from the probes of the step.
     pub(crate) fn measure_margin(&mut self, dt: f64) -> Result<(), FieldError> {
         let Detector { margin, x, .. } = &mut self.detector;
-        if self.motion.is_straight {
+        if self.run.motion.is_straight {
             return Ok(());
         }
         margin.resize(x.len(), 0.0);
@@ -299,7 +308,9 @@ impl StepSearch<'_, '_> {
         for theta in PROBES {
             self.stepper.interpolant().at(theta, x);
             moved.copy_from_slice(x);
-            self.motion.project(self.t + theta * dt, &mut moved)?;
+            self.run
+                .motion
+                .project(self.run.t + theta * dt, &mut moved)?;
             for ((margin, x), moved) in margin.iter_mut().zip(&*x).zip(&moved) {
                 *margin = margin.max(MARGIN * (moved - x).abs());
             }

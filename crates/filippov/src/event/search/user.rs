@@ -22,7 +22,12 @@ impl StepSearch<'_, '_> {
         function: &dyn UserFunction,
         theta: f64,
     ) -> Result<f64, FieldError> {
-        value_along(function, self.stepper.interpolant(), self.motion, theta)
+        value_along(
+            function,
+            self.stepper.interpolant(),
+            &mut self.run.motion,
+            theta,
+        )
     }
 }
 
@@ -73,12 +78,13 @@ impl StepSearch<'_, '_> {
         theta: f64,
         is_extended: bool,
     ) -> Result<Option<Vec<(f64, usize)>>, FieldError> {
-        self.stepper.extend_cheaply(self.x);
+        self.stepper.extend_cheaply(&self.run.x);
         let found = self.search_user_zeros(events, theta)?;
         if !is_extended && found.as_ref().is_none_or(|zeros| zeros.is_empty()) {
             return Ok(found);
         }
-        self.stepper.extend(&mut self.motion.field, self.x)?;
+        self.stepper
+            .extend(&mut self.run.motion.field, &self.run.x)?;
         self.search_user_zeros(events, theta)
     }
 
@@ -232,7 +238,7 @@ impl StepSearch<'_, '_> {
         is_last: bool,
     ) -> Result<Outcome, FieldError> {
         let limit = (to - from) * 1e-7;
-        let (interpolant, motion) = (self.stepper.interpolant(), &mut self.motion);
+        let (interpolant, motion) = (self.stepper.interpolant(), &mut self.run.motion);
         let (t0, dt) = (interpolant.t0, interpolant.dt);
         let mut g = |at: f64| {
             if !divided {
