@@ -75,7 +75,7 @@ impl StepSearch<'_, '_> {
     /// May the zero that was found be a multiple one? Rounding blurs it, or the function is back above zero at the end of
     /// the step.
     pub(crate) fn may_be_multiple(&self, event: &Found) -> bool {
-        let [Guard::Surface(_)] = event.guards[..] else {
+        let Some(first @ Guard::Surface(_)) = event.guards.first() else {
             return false;
         };
         if event.theta > 1.0 {
@@ -89,19 +89,48 @@ impl StepSearch<'_, '_> {
             return false;
         }
         let mut values = self.run.motion.monitored.iter().zip(&self.detector.right);
-        values.any(|(m, (value, _))| m.guard == event.guards[0] && *value > 0.0)
+        values.any(|(m, (value, _))| m.guard == *first && *value > 0.0)
     }
 
-    /// Looks at what lies around a zero of one surface that may be a multiple one, and moves it there. A zero behind the end of
-    /// the step is left to the next one.
+    /// Looks at what lies around a zero that may be a multiple one, and moves it there: that of one surface, or of several
+    /// that vanish there too. A zero behind the end of the step is left to the next one.
     #[cold]
     #[inline(never)]
     pub(crate) fn resolve_multiple_zero(
         &mut self,
-        mut event: Found,
+        event: Found,
         dt: f64,
     ) -> Result<Event, FieldError> {
-        let &[guard @ Guard::Surface(j)] = event.guards.as_slice() else {
+        let resolved = self.resolve_zero_of_first(event.clone(), dt)?;
+        let [_, others @ ..] = &event.guards[..] else {
+            return Ok(resolved);
+        };
+        let theta = match &resolved {
+            Event::At(moved) => moved.theta,
+            _ => return Ok(Event::At(event)),
+        };
+        for guard in others {
+            if !self.vanishes(*guard, theta)? {
+                return Ok(Event::At(event));
+            }
+        }
+        Ok(resolved)
+    }
+
+    /// Does a switching function vanish at theta, up to rounding?
+    fn vanishes(&mut self, guard: Guard, theta: f64) -> Result<bool, FieldError> {
+        let mut monitored = self.run.motion.monitored.iter();
+        let Some(m) = monitored
+            .find(|m| m.guard == guard && guard.is_surface())
+            .copied()
+        else {
+            return Ok(false);
+        };
+        Ok(self.along(&m, theta)?.0.abs() <= self.noise_of(&m)?)
+    }
+
+    fn resolve_zero_of_first(&mut self, mut event: Found, dt: f64) -> Result<Event, FieldError> {
+        let Some(&guard @ Guard::Surface(j)) = event.guards.first() else {
             return Ok(Event::At(event));
         };
         let monitored = &self.run.motion.monitored;
@@ -237,23 +266,30 @@ impl StepSearch<'_, '_> {
 
     /// How many derivatives of the function vanish at its zero of this order, along the field of either side.
     fn vanishing(
-        &mut self,
+        &self,
         m: &Monitored,
         blur: &Blur,
         order: usize,
         zero: f64,
     ) -> Result<[usize; 2], FieldError> {
-        let mut counts = [order - 1; 2];
         let own = self.run.motion.mode.entries()[m.surface().unwrap_or(0)];
-        let other = usize::from(own < 0);
-        let last = self.lie_along(m, (order, own), zero)? * blur.power(order);
-        for k in 1..order {
-            let term = self.lie_along(m, (k, -own), zero)? * blur.power(k);
-            if term.abs() > last.abs() {
-                counts[other] = k - 1;
-                break;
-            }
+        let highest = self.run.system.max_lie_order().min(MAX_LIE_ORDER);
+        let term = |k: usize, side: i8| -> Result<f64, FieldError> {
+            Ok((self.lie_along(m, (k, side), zero)? * blur.power(k)).abs())
+        };
+        let last = term(order, own)?;
+        let mut n_vanishing = 0;
+        while n_vanishing + 1 < order && term(n_vanishing + 1, -own)? <= last {
+            n_vanishing += 1;
         }
+        // The other side may be flatter: a term below the one behind it is due to the place of the zero.
+        while (order - 1..highest - 1).contains(&n_vanishing)
+            && term(n_vanishing + 1, -own)? < term(n_vanishing + 2, -own)?
+        {
+            n_vanishing += 1;
+        }
+        let mut counts = [order - 1; 2];
+        counts[usize::from(own < 0)] = n_vanishing;
         Ok(counts)
     }
 
