@@ -102,15 +102,12 @@ impl StepSearch<'_, '_> {
         dt: f64,
     ) -> Result<Event, FieldError> {
         let resolved = self.resolve_zero_of_first(event.clone(), dt)?;
-        let [_, others @ ..] = &event.guards[..] else {
-            return Ok(resolved);
-        };
-        let theta = match &resolved {
-            Event::At(moved) => moved.theta,
-            _ => return Ok(Event::At(event)),
-        };
-        for guard in others {
-            if !self.vanishes(*guard, theta)? {
+        for guard in &event.guards[1..] {
+            let goes_along = match &resolved {
+                Event::At(moved) => self.vanishes(*guard, moved.theta)?,
+                _ => false,
+            };
+            if !goes_along {
                 return Ok(Event::At(event));
             }
         }
