@@ -1,10 +1,20 @@
 //! The dry-friction oscillator as a traced expression, run many times: for profilers.
 //!
 //! `cargo run --release --example traced_oscillator -- 100 1e-6 DOPRI5 slip`: repetitions, tolerance, method
-//! (Taylor unless given), and `slip` for the piece before the first switch alone.
+//! (Taylor unless given), and `slip` for the piece before the first switch alone, or `observed` for a run whose instants
+//! are handed to an observer.
 
-use filippov::{Method, Options, Problem, TracedSystem};
+use filippov::{InstantRecord, Integrator, Method, Observer, Options, Problem, TracedSystem};
 use filippov_expr::{Backend, Graph, Names, UnaryOp};
+
+/// Counts instants.
+struct Count(usize);
+
+impl Observer for Count {
+    fn instant(&mut self, _: &InstantRecord) {
+        self.0 += 1;
+    }
+}
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
@@ -14,7 +24,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         Some("DOPRI5") => Method::Dopri5,
         _ => Method::Taylor,
     };
-    let slips_only = arguments.next().as_deref() == Some("slip");
+    let kind = arguments.next();
+    let slips_only = kind.as_deref() == Some("slip");
+    let is_observed = kind.as_deref() == Some("observed");
 
     let mut g = Graph::new();
     let (t, y, v) = (g.time(), g.state(0), g.state(1));
@@ -48,11 +60,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let mut steps = 0;
     for _ in 0..repeats {
-        steps += Problem::new(&system, (0.0, t_end), &[1.0, 2.0])
-            .options(&options)
-            .solve()?
-            .stats
-            .n_steps;
+        let problem = Problem::new(&system, (0.0, t_end), &[1.0, 2.0]).options(&options);
+        let mut count = Count(0);
+        let solution = match is_observed {
+            true => Integrator::new(problem)?.observed_by(&mut count).solve(),
+            false => problem.solve()?,
+        };
+        assert_eq!(count.0 > 0, is_observed);
+        steps += solution.stats.n_steps;
     }
     assert!(steps > 0);
     Ok(())

@@ -21,7 +21,7 @@ use crate::motion::Run;
 use crate::patience::Patience;
 use crate::status::Stop;
 use crate::switch::Switch;
-use crate::system::Trigger;
+use crate::system::{ActionMap, Trigger};
 use crate::tolerances::{MOST_ACTIONS_AT_ONE_TIME, PENETRATION, SURFACE_NOISE};
 
 /// An instant in which actions are done: the place and the motion that ends there.
@@ -34,6 +34,8 @@ pub(crate) struct Instant<'i, 'a> {
     pub notes: &'i mut Notes,
     /// What was done, also where the instant ends the run.
     pub done: Vec<Switch>,
+    /// The derivative of all maps so far by the state before, in rows, if it is wanted.
+    pub derivative: Option<Vec<f64>>,
 }
 
 /// The surfaces in one instant, as far as they trigger actions.
@@ -199,6 +201,10 @@ impl<'a> Instant<'_, 'a> {
         let y_before = SmallVec::from_slice(&self.run.x);
         let (mut x, mut q) = (self.run.x.clone(), self.run.motion.discrete.clone());
         let signs = &self.run.motion.signs;
+        if let Some(derivative) = &mut self.derivative {
+            let place = (self.run.t, &self.run.x[..]);
+            apply_derivative(action.map, place, signs, &q, derivative)?;
+        }
         action.map.apply(self.run.t, &mut x, signs, &mut q)?;
         (self.run.x, self.run.motion.discrete) = (x, q);
         self.run.system.set_discrete(&self.run.motion.discrete);
@@ -286,4 +292,30 @@ impl<'a> Instant<'_, 'a> {
         }
         sides
     }
+}
+
+/// The derivative of a map that leaves all states as they are, in rows.
+pub(crate) fn identity(n: usize) -> Vec<f64> {
+    let mut rows = vec![0.0; n * n];
+    rows.iter_mut().step_by(n + 1).for_each(|one| *one = 1.0);
+    rows
+}
+
+/// Multiplies the rows by the derivative of a map by the state.
+fn apply_derivative(
+    map: &dyn ActionMap,
+    (t, x): (f64, &[f64]),
+    signs: &[f64],
+    q: &[f64],
+    rows: &mut [f64],
+) -> Result<(), FieldError> {
+    let n = x.len();
+    let mut change = vec![0.0; n];
+    for k in 0..n {
+        let column: Vec<f64> = rows[k..].iter().step_by(n).copied().collect();
+        map.impulse(t, x, &column, signs, q, &mut change)?;
+        let entries = rows[k..].iter_mut().step_by(n);
+        entries.zip(&change).for_each(|(entry, c)| *entry += c);
+    }
+    Ok(())
 }

@@ -3,7 +3,7 @@
 mod instant;
 mod timetable;
 
-pub(crate) use instant::Instant;
+pub(crate) use instant::{identity, Instant};
 pub(crate) use timetable::Timetable;
 
 pub use crate::system::{Action, ActionMap, Actions, Clock, Trigger};

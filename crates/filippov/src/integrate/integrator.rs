@@ -24,7 +24,7 @@ use crate::integrate::progress::Progress;
 use crate::integrate::watch::Watch;
 use crate::mode::Mode;
 use crate::motion::{Guard, Run, SmoothField};
-use crate::record::{Recorder, Solution};
+use crate::record::{Observed, Observer, Recorder, Solution};
 use crate::status::{Stop, Warning};
 use crate::stepper::{Attempt, StepControl, Steppers, Stiff};
 use crate::tolerances::{EPS, SHORTEST_STEP, SHORTEST_STEP_AT_ZERO};
@@ -87,6 +87,52 @@ impl<'a> Integrator<'a> {
     #[must_use]
     pub fn interruptible(mut self, interrupt: &'a mut (dyn FnMut(f64) -> bool + 'a)) -> Self {
         self.watch.ask(interrupt);
+        self
+    }
+
+    /// Hands every accepted step and every instant to an observer.
+    ///
+    /// # Example
+    ///
+    /// The saltation matrix of an instant without a jump of the state is I + (F+ - F-) dg / (dg . F-): here that of a
+    /// sign that is crossed at speed 1, across which the other component changes its velocity from -1 to 1.
+    ///
+    /// ```
+    /// use filippov::{ClosureSystem, InstantRecord, Integrator, Observer, Problem};
+    ///
+    /// struct Saltation(Vec<f64>);
+    ///
+    /// impl Observer for Saltation {
+    ///     fn instant(&mut self, instant: &InstantRecord) {
+    ///         let ([before, after], g) = (instant.field, instant.gradient);
+    ///         let pairs = g.state.iter().zip(before);
+    ///         let rate = g.time + pairs.map(|(g, f)| g * f).sum::<f64>();
+    ///         for (i, (after, before)) in after.iter().zip(before).enumerate() {
+    ///             for (j, g) in g.state.iter().enumerate() {
+    ///                 let unit = if i == j { 1.0 } else { 0.0 };
+    ///                 self.0.push(unit + (after - before) * g / rate);
+    ///             }
+    ///         }
+    ///     }
+    /// }
+    ///
+    /// let system = ClosureSystem::new(
+    ///     2,
+    ///     1,
+    ///     |_, _, s, dx| (dx[0], dx[1]) = (1.0, s[0]),
+    ///     |_, x, h| h[0] = x[0] - 0.5,
+    /// );
+    /// let problem = Problem::new(&system, (0.0, 1.0), &[0.0, 0.0]);
+    /// let mut saltation = Saltation(Vec::new());
+    /// Integrator::new(problem)?.observed_by(&mut saltation).solve();
+    /// for (entry, exact) in saltation.0.iter().zip([1.0, 0.0, 2.0, 1.0]) {
+    ///     assert!((entry - exact).abs() < 1e-9);
+    /// }
+    /// # Ok::<(), filippov::Error>(())
+    /// ```
+    #[must_use]
+    pub fn observed_by(mut self, observer: &'a mut dyn Observer) -> Self {
+        self.recorder.observed = Some(Observed::by(observer));
         self
     }
 
@@ -366,8 +412,8 @@ impl<'a> Integrator<'a> {
         theta: f64,
         t_stop: f64,
     ) -> Result<Option<Vec<(f64, usize)>>, FieldError> {
-        let observer = self.recorder.observer.as_ref();
-        let has_ticks = observer.is_some_and(|observer| observer.has_tick_up_to(t_stop));
+        let visits = self.recorder.visits.as_ref();
+        let has_ticks = visits.is_some_and(|visits| visits.has_tick_up_to(t_stop));
         if self.recorder.user_events.events.is_empty() && !has_ticks {
             return Ok(Some(Vec::new()));
         }
@@ -395,10 +441,10 @@ impl<'a> Integrator<'a> {
         }
         let (t0, dt) = (self.stepper.interpolant().t0, self.stepper.interpolant().dt);
         for (at, index) in zeros {
-            let t = match &mut self.recorder.observer {
-                Some(observer) if index == TICK => {
-                    let tick = observer.next_tick().unwrap_or(t_stop);
-                    observer.pass_tick();
+            let t = match &mut self.recorder.visits {
+                Some(visits) if index == TICK => {
+                    let tick = visits.next_tick().unwrap_or(t_stop);
+                    visits.pass_tick();
                     tick.min(t_stop)
                 }
                 _ if at == theta => t_stop,

@@ -1,6 +1,6 @@
 //! From a located event, a limit or a start to the next motion: the decision is asked for, recorded and carried out.
 
-use crate::action::Instant;
+use crate::action::{identity, Instant};
 use crate::decisions::limits::{
     limit_here, limit_of_switches, limits_of_impacts, passed_beside, Limit, Passed,
 };
@@ -94,6 +94,9 @@ impl<'a> Integrator<'a> {
     /// Decides what follows the event and starts it.
     pub(super) fn switch(&mut self, event: &Found) -> Result<Option<Stop>, FieldError> {
         self.run.stats.n_switches += 1;
+        if self.recorder.observed.is_some() {
+            self.recorder.leave(&mut self.run, &event.guards)?;
+        }
         if self.progress.n_switches_at(self.run.t) > MOST_SWITCHES_AT_ONE_TIME {
             return self.leave_without_progress(event);
         }
@@ -365,6 +368,9 @@ impl<'a> Integrator<'a> {
                 field.begin_at_two_fold(self.run.t, self.run.t + until, motion);
             }
         }
+        if let Some(observed) = &mut self.recorder.observed {
+            observed.arrive(&self.run, self.stepper.start_derivative());
+        }
         Ok(None)
     }
 
@@ -422,6 +428,7 @@ impl<'a> Integrator<'a> {
         &mut self,
         departing: &[(usize, f64)],
     ) -> Result<Option<Stop>, FieldError> {
+        self.recorder.leave(&mut self.run, &[])?;
         let before = self.run.motion.mode.clone();
         let Decision { rule, decided } =
             self.decide(Cause::Anew(&before), &mut Reached::default())?;
@@ -525,6 +532,7 @@ impl<'a> Integrator<'a> {
             due.dedup();
         }
         if !due.is_empty() {
+            self.recorder.leave(&mut self.run, &[])?;
             self.control.forget_steps();
             return self.act(due);
         }
@@ -639,7 +647,7 @@ impl<'a> Integrator<'a> {
             n_choices: self.n_choices,
             ..Notes::default()
         };
-        let (watch, t) = (&self.watch, self.run.t);
+        let (watch, t, n) = (&self.watch, self.run.t, self.run.x.len());
         let is_over = || watch.stop().is_some() || watch.is_over(watch.now(), t);
         let mut instant = Instant {
             run: &mut self.run,
@@ -648,9 +656,15 @@ impl<'a> Integrator<'a> {
             patience: Patience::until(&is_over),
             notes: &mut notes,
             done: Vec::new(),
+            derivative: self.recorder.observed.is_some().then(|| identity(n)),
         };
         let stopped = instant.act(due);
-        let done = instant.done;
+        let Instant {
+            done, derivative, ..
+        } = instant;
+        if let Some(observed) = &mut self.recorder.observed {
+            observed.act(derivative);
+        }
         self.run.stats.n_switches += done.len() as u64;
         done.into_iter()
             .for_each(|switch| self.recorder.switch(switch));

@@ -5,11 +5,10 @@ use smallvec::SmallVec;
 use crate::error::FieldError;
 use crate::event::{UserEvent, UserEvents, UserZero, TICK};
 use crate::mode::Mode;
-use crate::motion::CurrentMotion;
+use crate::motion::{CurrentMotion, Guard, Run};
 use crate::options::{Keep, Options, Stabilization};
-use crate::record::section::{Observer, Place, Section};
-use crate::record::DecisionRecord;
-use crate::record::{Segment, Solution, Step};
+use crate::record::section::{Place, Section, Visits};
+use crate::record::{DecisionRecord, Observed, ObservedStep, Segment, Solution, Step};
 use crate::stats::Stats;
 use crate::status::{Stop, Warning};
 use crate::stepper::{Interpolant, Steppers};
@@ -39,9 +38,11 @@ pub(crate) struct Recorder<'a> {
     wanted: Vec<f64>,
     next: usize,
     is_sampled: bool,
-    /// Watches the section, if there is one.
     pub user_events: UserEvents<'a>,
-    pub observer: Option<Observer>,
+    /// Those to the section, if there is one.
+    pub visits: Option<Visits>,
+    /// Is handed every step and every instant, if there is one.
+    pub observed: Option<Observed<'a>>,
     /// The decisions, if they are wanted.
     pub decisions: Vec<DecisionRecord>,
 }
@@ -68,7 +69,8 @@ impl<'a> Recorder<'a> {
             wanted: wanted.unwrap_or_default(),
             next: 0,
             user_events: UserEvents::new(events),
-            observer: None,
+            visits: None,
+            observed: None,
             decisions: Vec::new(),
         }
     }
@@ -178,8 +180,8 @@ impl<'a> Recorder<'a> {
         multipliers: SmallVec<[f64; 2]>,
         discrete: &[f64],
     ) {
-        if let Some(observer) = &mut self.observer {
-            observer.begin(t, mode);
+        if let Some(visits) = &mut self.visits {
+            visits.begin(t, mode);
         }
         let step = self.steps.len();
         self.close_segment(t);
@@ -210,6 +212,9 @@ impl<'a> Recorder<'a> {
         if t_stop <= t0 {
             return;
         }
+        if self.observed.is_some() {
+            self.show_step(interpolant, t_stop, y);
+        }
         if self.keep_dense {
             let (from, coefficients) = (self.coefficients.len(), interpolant.coefficients());
             if from == 0 {
@@ -233,21 +238,42 @@ impl<'a> Recorder<'a> {
         }
     }
 
+    /// A motion ends where these guards vanish, or at a known time: the observer is told, if there is one.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    #[cold]
+    #[inline(never)]
+    pub fn leave(&mut self, run: &mut Run, guards: &[Guard]) -> Result<(), FieldError> {
+        match &mut self.observed {
+            Some(observed) => observed.leave(run, guards),
+            None => Ok(()),
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn show_step(&mut self, interpolant: &Interpolant, t_stop: f64, y: &[f64]) {
+        if let (Some(observed), Some(segment)) = (&mut self.observed, self.segments.last()) {
+            observed.step(&ObservedStep::new(&segment.mode, (t_stop, y), interpolant));
+        }
+    }
+
     /// Watches the run at a section; its function, if it has one, is the only one of the user's events.
     pub fn observe(&mut self, section: &Section, t_start: f64) {
         self.user_events.is_section = matches!(section.place, Place::Function { .. });
-        self.observer = Some(Observer::new(section, t_start));
+        self.visits = Some(Visits::new(section, t_start));
     }
 
     /// Why the run ends because of its section, if it does.
     pub fn stop_at_section(&self) -> Option<Stop> {
-        self.observer.as_ref()?.stop()
+        self.visits.as_ref()?.stop()
     }
 
     /// The ticks of the section's clock in a step up to `theta`, where the time is `t_stop`.
     pub fn ticks(&self, step: &Interpolant, theta: f64, t_stop: f64) -> Vec<(f64, usize)> {
         let latest = t_stop + SAME_TICK * t_stop.abs();
-        let tick = |k| self.observer.as_ref()?.tick_after(k);
+        let tick = |k| self.visits.as_ref()?.tick_after(k);
         let times = (0..).map_while(tick).take_while(|&t| t <= latest);
         let place = |t: f64| match t >= t_stop {
             true => theta,
@@ -263,9 +289,9 @@ impl<'a> Recorder<'a> {
             events.last[index] = t;
         }
         if index == TICK || events.is_section {
-            let observer = self.observer.as_mut()?;
-            observer.returned(t, y);
-            return observer.stop();
+            let visits = self.visits.as_mut()?;
+            visits.returned(t, y);
+            return visits.stop();
         }
         events.zeros[index].push(UserZero { t, y: y.to_vec() });
         let terminal = events.events[index].terminal;
@@ -295,8 +321,8 @@ impl<'a> Recorder<'a> {
     }
 
     pub fn switch(&mut self, switch: Switch) {
-        if let Some(observer) = &mut self.observer {
-            observer.switched(&switch);
+        if let Some(visits) = &mut self.visits {
+            visits.switched(&switch);
         }
         self.switches.push(switch);
     }
@@ -371,7 +397,7 @@ impl<'a> Recorder<'a> {
             warnings,
             steps: self.steps,
             coefficients: self.coefficients,
-            returns: self.observer.map(Observer::into_returns),
+            returns: self.visits.map(Visits::into_returns),
             decisions: self.decisions,
             y0: self.y0,
             y_last: x.to_vec(),

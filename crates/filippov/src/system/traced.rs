@@ -6,6 +6,8 @@ mod rounding;
 
 use std::sync::Arc;
 
+use smallvec::SmallVec;
+
 use filippov_expr::{Backend, Enclosure, ExprError, Graph, Motion, Names, NodeId};
 
 use super::compiled::Model;
@@ -460,7 +462,7 @@ impl PiecewiseSystem for TracedSystem {
         gradient: &mut [f64],
     ) -> Result<RatePartials, FieldError> {
         let program = self.model.rate_gradient(j);
-        let mut out = vec![0.0; program.n_outputs()];
+        let mut out = SmallVec::<[f64; 16]>::from_elem(0.0, program.n_outputs());
         self.with_values(|p| program.eval(t, x, signs, p, &[], &mut out));
         gradient.copy_from_slice(&out[3..]);
         Ok(RatePartials {

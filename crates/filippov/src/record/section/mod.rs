@@ -3,14 +3,14 @@
 //! A run that is observed at a section keeps its returns and nothing else: its memory does not grow with its length.
 
 mod cycle;
-mod observer;
 mod returns;
 #[cfg(test)]
 mod tests;
+mod visits;
 
 pub use cycle::Cycle;
-pub(crate) use observer::Observer;
 pub use returns::{Return, Returns};
+pub(crate) use visits::Visits;
 
 use crate::event::UserFunction;
 use crate::switch::Kind;

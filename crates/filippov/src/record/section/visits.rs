@@ -13,7 +13,7 @@ use crate::system::Clock;
 use crate::tolerances::SAME_TICK;
 
 /// Watches a run; the recorder tells it what happens.
-pub(crate) struct Observer {
+pub(crate) struct Visits {
     surface: Option<(usize, i8, Option<Kind>)>,
     /// The clock and its next tick.
     clock: Option<(Clock, f64)>,
@@ -36,7 +36,7 @@ pub(crate) struct Observer {
     is_periodic: bool,
 }
 
-impl Observer {
+impl Visits {
     pub fn new(section: &Section, t_start: f64) -> Self {
         let surface = match section.place {
             Place::Surface {
@@ -51,7 +51,7 @@ impl Observer {
             _ => None,
         };
         let longest = section.cycle.as_ref().map_or(0, |cycle| cycle.longest);
-        Observer {
+        Visits {
             surface,
             clock,
             transient: section.transient,

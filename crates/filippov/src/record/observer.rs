@@ -1,0 +1,232 @@
+//! What an observer of a run is handed: accepted steps, and instants.
+//!
+//! Derivatives of a run are a pass over these (`docs/theory/`, P. C. Mueller, *Chaos, Solitons & Fractals* 5 (1995) 1671):
+//! with the gradient dg of the guard g that fixed the time of an instant, the fields F- and F+ before and after, and the
+//! derivative DR of the map, the derivative of what follows by what was before is S = DR + (F+ - DR F-) dg / (dg . F-).
+
+use smallvec::SmallVec;
+
+use crate::error::FieldError;
+use crate::mode::{Mode, Signs};
+use crate::motion::{Guard, Run, SmoothField};
+use crate::stepper::Interpolant;
+use crate::tolerances::EPS;
+
+/// An accepted step, or its part before an event.
+#[derive(Clone, Copy, Debug)]
+pub struct ObservedStep<'s> {
+    /// The mode.
+    pub mode: &'s Mode,
+    /// The time at its end.
+    pub t_end: f64,
+    /// The state at its end.
+    pub x_end: &'s [f64],
+    extension: &'s Interpolant,
+}
+
+impl<'s> ObservedStep<'s> {
+    pub(crate) fn new(
+        mode: &'s Mode,
+        (t_end, x_end): (f64, &'s [f64]),
+        extension: &'s Interpolant,
+    ) -> Self {
+        ObservedStep {
+            mode,
+            t_end,
+            x_end,
+            extension,
+        }
+    }
+
+    /// The time at its start.
+    pub fn t_start(&self) -> f64 {
+        self.extension.t0
+    }
+
+    /// Writes the state at a time in the step, by the continuous extension.
+    pub fn at(&self, t: f64, x: &mut [f64]) {
+        let step = self.extension;
+        step.at((t - step.t0) / step.dt, x);
+    }
+}
+
+/// The gradient of a function of (t, x).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Gradient {
+    /// Its derivative by time.
+    pub time: f64,
+    /// Its derivatives by the states.
+    pub state: Vec<f64>,
+}
+
+/// An instant in which a motion ends and another one starts. Pairs are before and after.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub struct InstantRecord<'i> {
+    /// The time; the two differ where the limit of infinitely many switches is jumped to.
+    pub t: [f64; 2],
+    /// The state.
+    pub x: [&'i [f64]; 2],
+    /// The discrete states.
+    pub discrete: [&'i [f64]; 2],
+    /// The mode.
+    pub mode: [&'i Mode; 2],
+    /// The velocity of the motion.
+    pub field: [&'i [f64]; 2],
+    /// The guards of the motion before that vanish, the one that fixed the time first; none at a known time.
+    pub guards: &'i [Guard],
+    /// The gradient of the first of them in the sense of the guard, which is positive before; by time alone at a known time.
+    pub gradient: &'i Gradient,
+    /// The derivative of the map of the actions by x, in rows; none where nothing was done.
+    pub map: Option<&'i [f64]>,
+}
+
+/// What watches a run.
+pub trait Observer {
+    /// A step was accepted.
+    fn step(&mut self, step: &ObservedStep) {
+        let _ = step;
+    }
+
+    /// A motion ended, and another one has started.
+    fn instant(&mut self, instant: &InstantRecord);
+}
+
+/// An observer, with what is known of the motion that ended last.
+pub(crate) struct Observed<'a> {
+    observer: &'a mut dyn Observer,
+    /// An instant goes on.
+    has_ended: bool,
+    t: f64,
+    x: Vec<f64>,
+    discrete: Vec<f64>,
+    mode: Mode,
+    field: Vec<f64>,
+    guards: SmallVec<[Guard; 2]>,
+    gradient: Gradient,
+    map: Option<Vec<f64>>,
+}
+
+impl<'a> Observed<'a> {
+    pub fn by(observer: &'a mut dyn Observer) -> Self {
+        Observed {
+            observer,
+            has_ended: false,
+            t: f64::NAN,
+            x: Vec::new(),
+            discrete: Vec::new(),
+            mode: Mode::default(),
+            field: Vec::new(),
+            guards: SmallVec::new(),
+            gradient: Gradient::default(),
+            map: None,
+        }
+    }
+
+    /// A step was accepted.
+    pub fn step(&mut self, step: &ObservedStep) {
+        self.observer.step(step);
+    }
+
+    /// A motion ends where these guards vanish, or at a known time.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    #[cold]
+    #[inline(never)]
+    pub fn leave(&mut self, run: &mut Run, guards: &[Guard]) -> Result<(), FieldError> {
+        if std::mem::replace(&mut self.has_ended, true) {
+            return Ok(());
+        }
+        self.t = run.t;
+        self.x.clone_from(&run.x);
+        self.discrete.clone_from(&run.motion.discrete);
+        self.mode = run.motion.mode.clone();
+        self.guards = SmallVec::from_slice(guards);
+        self.map = None;
+        let n = run.x.len();
+        self.field.resize(n, 0.0);
+        self.gradient.state.resize(n, 0.0);
+        // The end of a motion lies on the surfaces slid on.
+        let field = &mut run.motion.field;
+        field.eval_unprojected(run.t, &mut run.x, &mut self.field)?;
+        let gradient = &mut self.gradient.state;
+        self.gradient.time = match guards.first() {
+            Some(&guard) => gradient_of(run, guard, gradient)?,
+            None => {
+                gradient.fill(0.0);
+                1.0
+            }
+        };
+        Ok(())
+    }
+
+    /// Actions with this derivative were done.
+    pub fn act(&mut self, derivative: Option<Vec<f64>>) {
+        self.map = derivative.or(self.map.take());
+    }
+
+    /// The next motion has started with this velocity.
+    #[cold]
+    #[inline(never)]
+    pub fn arrive(&mut self, run: &Run, velocity: &[f64]) {
+        if !std::mem::take(&mut self.has_ended) {
+            return;
+        }
+        self.observer.instant(&InstantRecord {
+            t: [self.t, run.t],
+            x: [&self.x, &run.x],
+            discrete: [&self.discrete, &run.motion.discrete],
+            mode: [&self.mode, &run.motion.mode],
+            field: [&self.field, velocity],
+            guards: &self.guards,
+            gradient: &self.gradient,
+            map: self.map.as_deref(),
+        });
+    }
+}
+
+/// The gradient of a guard of the motion at its end: writes its derivatives by the states, and returns that by time. Beside the
+/// surfaces slid on a guard is that of the natural extension of the field, which moves no point onto them.
+fn gradient_of(run: &mut Run, guard: Guard, state: &mut [f64]) -> Result<f64, FieldError> {
+    let (system, t, x, signs) = (run.system, run.t, &run.x, &run.motion.signs);
+    let (sense, time) = match (guard, run.motion.sliding()) {
+        (Guard::Surface(j), _) => (signs[j], system.gradient(j, t, x, signs, state)?),
+        // The normal component of f-, or minus that of f+.
+        (Guard::Multiplier { surface: j, end }, [_]) if !system.sticks_at(j) => {
+            let mut side = Signs::from_slice(signs);
+            side[j] = f64::from(end);
+            let rate = system.rate_gradient(j, t, x, &side, state)?;
+            (-f64::from(end), rate.time)
+        }
+        _ => return gradient_by_differences(run, guard, state),
+    };
+    state.iter_mut().for_each(|entry| *entry *= sense);
+    Ok(sense * time)
+}
+
+/// The same by central differences.
+fn gradient_by_differences(
+    run: &mut Run,
+    guard: Guard,
+    state: &mut [f64],
+) -> Result<f64, FieldError> {
+    let (t, mut x, field) = (run.t, run.x.clone(), &mut run.motion.field);
+    let place = field.guards().iter().position(|g| *g == guard);
+    let mut value = |t: f64, x: &mut [f64]| -> Result<f64, FieldError> {
+        let exits = field.exits_at(t, x)?;
+        Ok(place.map_or(f64::NAN, |place| exits[place]))
+    };
+    let reach = |v: f64| EPS.cbrt() * (1.0 + v.abs());
+    for (i, entry) in state.iter_mut().enumerate() {
+        let (centre, d) = (x[i], reach(x[i]));
+        x[i] = centre + d;
+        let above = value(t, &mut x)?;
+        x[i] = centre - d;
+        let below = value(t, &mut x)?;
+        x[i] = centre;
+        *entry = (above - below) / (2.0 * d);
+    }
+    let d = reach(t);
+    Ok((value(t + d, &mut x)? - value(t - d, &mut x)?) / (2.0 * d))
+}
