@@ -66,11 +66,17 @@ impl Kind {
     /// The kind that leads from one mode to another.
     pub fn between(before: &Mode, after: &Mode) -> Kind {
         use std::cmp::Ordering::{Equal, Greater, Less};
-        match after.codimension().cmp(&before.codimension()) {
-            _ if before == after => Kind::Grazing,
+        let (mut is_same, mut ended, mut begun) = (true, 0, 0);
+        for (before, after) in before.entries().iter().zip(after.entries()) {
+            is_same &= before == after;
+            ended += usize::from(*before == 0 && *after != 0);
+            begun += usize::from(*before != 0 && *after == 0);
+        }
+        match begun.cmp(&ended) {
+            _ if is_same => Kind::Grazing,
             Greater => Kind::EnterSliding,
             Less => Kind::ExitSliding,
-            Equal if before.sliding_set().eq(after.sliding_set()) => Kind::Crossing,
+            Equal if begun == 0 => Kind::Crossing,
             Equal => Kind::SwitchSliding,
         }
     }

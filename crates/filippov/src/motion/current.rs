@@ -109,38 +109,49 @@ impl<'a> CurrentMotion<'a> {
         mode: Mode,
         zeros: &[(Guard, Deflation)],
     ) {
-        let (signs, sliding): (_, SlidingSet) = (mode.signs(), mode.sliding_set().collect());
+        if !self.settled.is_empty() && self.mode != mode {
+            self.settled.clear();
+        }
         if !self.actions.list.is_empty() {
             let known = self.sides.iter_mut().zip(mode.entries());
             known
                 .filter(|(_, &entry)| entry != 0)
                 .for_each(|(side, &entry)| *side = entry);
         }
-        let contact = if self.actions.list.is_empty() || sliding.is_empty() {
-            None
-        } else {
-            ContactField::new(system, self.actions, &mode, &self.sides, &self.discrete)
-        };
-        if let Some(contact) = contact {
-            self.replace_field(ModeField::Contact(Box::new(contact)));
-        } else if !self.field.restart(&sliding, &signs) {
-            let known = self
-                .idle
-                .iter_mut()
-                .position(|f| f.restart(&sliding, &signs));
-            let field = match known {
-                Some(index) => self.idle.swap_remove(index),
-                None => ModeField::new(system, self.law, &sliding, &signs),
-            };
-            self.replace_field(field);
+        self.sliding.clear();
+        for (j, &entry) in mode.entries().iter().enumerate() {
+            if entry == 0 {
+                self.sliding.push(j);
+            }
         }
-        if !self.settled.is_empty() && self.mode != mode {
-            self.settled.clear();
-        }
+        self.signs = mode.signs();
+        self.mode = mode;
+        self.t_start = t_start;
         self.affine_bounds = None;
-        self.is_straight = sliding.iter().all(|&j| system.is_affine(j));
-        (self.mode, self.t_start, self.signs, self.sliding) = (mode, t_start, signs, sliding);
+        self.is_straight = self.sliding.iter().all(|&j| system.is_affine(j));
+        self.restart_field(system);
         self.find_monitored(system, zeros);
+    }
+
+    /// Makes the field that of the mode.
+    #[inline(always)]
+    fn restart_field(&mut self, system: &'a dyn PiecewiseSystem) {
+        let (sliding, signs) = (&self.sliding, &self.signs);
+        if !self.actions.list.is_empty() && !sliding.is_empty() {
+            let (mode, sides, q) = (&self.mode, &self.sides, &self.discrete);
+            if let Some(contact) = ContactField::new(system, self.actions, mode, sides, q) {
+                return self.replace_field(ModeField::Contact(Box::new(contact)));
+            }
+        }
+        if self.field.restart(sliding, signs) {
+            return;
+        }
+        let mut idle = self.idle.iter_mut();
+        let field = match idle.position(|field| field.restart(sliding, signs)) {
+            Some(index) => self.idle.swap_remove(index),
+            None => ModeField::new(system, self.law, sliding, signs),
+        };
+        self.replace_field(field);
     }
 
     /// Takes another field and keeps the one before, if it can be used again.
