@@ -1,4 +1,4 @@
-"""Arrays of real numbers, as arguments: complex and masked ones are refused by name."""
+"""Convert arguments to real arrays; complex numbers or masked entries raise an error with the argument's name."""
 
 from __future__ import annotations
 

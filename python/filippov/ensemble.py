@@ -204,7 +204,7 @@ def _known(options: Mapping[str, Any], system: System) -> dict[str, Any]:
 
     for name in ("fun", "surfaces", "args", "resets"):
         if options.get(name) is not None:
-            raise InputError(f"{name}: belongs to the System; give it to that")
+            raise InputError(f"{name}: belongs to the System; pass it to fl.System, not to the ensemble")
     for name in ("nonunique", "progress"):
         if options.get(name) in ("branch", True) or callable(options.get(name)):
             raise InputError(f"{name}: {options[name]!r} is not for an ensemble")

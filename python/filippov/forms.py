@@ -175,11 +175,11 @@ def check_surfaces(surfaces: Any) -> tuple[Surface, ...]:
     if surfaces is None:
         return ()
     if not callable(surfaces) and not isinstance(surfaces, Iterable):
-        raise InputError(f"surfaces: functions h(t, y) are needed, not {type(surfaces).__name__}")
+        raise InputError(f"surfaces: functions h(t, x) are needed, not {type(surfaces).__name__}")
     functions = (surfaces,) if callable(surfaces) else tuple(surfaces)
     for j, surface in enumerate(functions):
         if not callable(surface):
-            raise InputError(f"surfaces: entry {j} is not a function h(t, y) but {type(surface).__name__}")
+            raise InputError(f"surfaces: entry {j} is not a function h(t, x) but {type(surface).__name__}")
     return functions
 
 

@@ -10,7 +10,7 @@ __all__ = ["Report", "print_progress"]
 
 
 class Report:
-    """A function of the time reached that keeps what it raised: the core knows only that it raised.
+    """A progress function that keeps its exception; the core learns only that there was one.
 
     Parameters
     ----------

@@ -98,7 +98,7 @@ class Reset:
         if sum(given is not None for given in (h, times, period)) != 1:
             raise InputError("resets: one of h, times and period says when the reset happens")
         if h is not None and not callable(h):
-            raise InputError(f"resets: h is a function h(t, y), not {type(h).__name__}")
+            raise InputError(f"resets: h is a function h(t, x), not {type(h).__name__}")
         self.h = h
         self.map = map
         self.direction = check_direction(direction, "resets")

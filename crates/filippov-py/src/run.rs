@@ -3,8 +3,8 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use filippov::{
-    as_multiplier, not_finite, state_text, Mode, PiecewiseSystem, Segment, Side, Solution, Stats,
-    Stop,
+    as_multiplier, not_finite, state_text, Method, Mode, PiecewiseSystem, Segment, Side, Solution,
+    Stats, Stop,
 };
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
@@ -320,10 +320,10 @@ impl Run {
         let stats = self.solution().stats;
         let dict = PyDict::new(py);
         dict.set_item("method", methods(&stats))?;
-        dict.set_item("n_steps_taylor", stats.n_steps_taylor)?;
-        dict.set_item("n_steps_dop853", stats.n_steps_dop853)?;
-        dict.set_item("n_steps_midpoint", stats.n_steps_midpoint)?;
-        dict.set_item("n_steps_rodas5p", stats.n_steps_rodas5p)?;
+        for method in Method::ALL.into_iter().filter(|m| *m != Method::Auto) {
+            let key = format!("n_steps_{}", method.name().to_lowercase());
+            dict.set_item(key, stats.n_steps_of(method))?;
+        }
         if let Some(since) = stats.stiff_since {
             dict.set_item("stiff_since", since)?;
         }
@@ -428,20 +428,12 @@ impl Run {
 
 /// The methods that took steps, the first of which the run preferred.
 fn methods(stats: &Stats) -> String {
-    let others = [
-        ("Rodas5P", stats.n_steps_rodas5p),
-        ("Taylor", stats.n_steps_taylor),
-        ("DOP853", stats.n_steps_dop853),
-        ("Midpoint", stats.n_steps_midpoint),
-    ];
-    let explicit = stats.n_steps - others.iter().map(|(_, count)| count).sum::<u64>();
-    let mut names: Vec<&str> = others
+    let mut names: Vec<&str> = Method::ALL
         .into_iter()
-        .filter_map(|(name, count)| (count > 0).then_some(name))
+        .rev()
+        .filter(|method| stats.n_steps_of(*method) > 0)
+        .map(Method::name)
         .collect();
-    if explicit > 0 {
-        names.push("DOPRI5");
-    }
     if names.is_empty() {
         names.push("none");
     }

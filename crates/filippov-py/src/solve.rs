@@ -177,17 +177,10 @@ fn read_options(given: &Bound<'_, PyDict>) -> PyResult<(Options, Option<Py<PyAny
 }
 
 fn method(name: &str) -> PyResult<Method> {
-    match name {
-        "auto" => Ok(Method::Auto),
-        "DOPRI5" => Ok(Method::Dopri5),
-        "Taylor" => Ok(Method::Taylor),
-        "DOP853" => Ok(Method::Dop853),
-        "Midpoint" => Ok(Method::Midpoint),
-        "Rodas5P" => Ok(Method::Rodas5p),
-        _ => Err(PyValueError::new_err(format!(
-            "method: unknown method {name:?}"
-        ))),
-    }
+    Method::ALL
+        .into_iter()
+        .find(|method| method.name() == name)
+        .ok_or_else(|| PyValueError::new_err(format!("method: unknown method {name:?}")))
 }
 
 fn keep(name: &str) -> PyResult<Keep> {

@@ -222,7 +222,10 @@ impl TracedSystem {
         sticking: Vec<(usize, u32)>,
     ) -> PyResult<Self> {
         if field.len() != n_states {
-            let text = format!("{} expressions for {n_states} states", field.len());
+            let text = format!(
+                "field: {n_states} expressions are needed, one per state, not {}",
+                field.len()
+            );
             return Err(PyValueError::new_err(text));
         }
         let graph = builder.borrow(py).graph().clone();

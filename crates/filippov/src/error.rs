@@ -101,7 +101,8 @@ pub enum Undecided {
     },
     /// Too many redundant contacts share one load.
     #[error(
-        "{n} contacts close loops with one another and share one load; at most {MOST_IN_LOOP} may"
+        "{n} contacts close loops with one another and share one load; at most {MOST_IN_LOOP} may do so: \
+                 remove contacts, or replace the sign by a smooth function in some of them"
     )]
     TooRedundant {
         /// How many.

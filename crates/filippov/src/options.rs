@@ -92,6 +92,30 @@ pub enum Method {
     Rodas5p,
 }
 
+impl Method {
+    /// All of them, as they are declared.
+    pub const ALL: [Method; 6] = [
+        Method::Auto,
+        Method::Dopri5,
+        Method::Taylor,
+        Method::Dop853,
+        Method::Midpoint,
+        Method::Rodas5p,
+    ];
+
+    /// The name that users write.
+    pub fn name(self) -> &'static str {
+        match self {
+            Method::Auto => "auto",
+            Method::Dopri5 => "DOPRI5",
+            Method::Taylor => "Taylor",
+            Method::Dop853 => "DOP853",
+            Method::Midpoint => "Midpoint",
+            Method::Rodas5p => "Rodas5P",
+        }
+    }
+}
+
 /// Options of [`crate::Problem::solve`].
 #[derive(Clone, Debug)]
 pub struct Options {

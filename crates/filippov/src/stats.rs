@@ -1,5 +1,7 @@
 //! Counters of a run.
 
+use crate::options::Method;
+
 /// What a run cost.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Stats {
@@ -10,14 +12,8 @@ pub struct Stats {
     pub n_surface_evaluations: u64,
     /// Accepted steps.
     pub n_steps: u64,
-    /// Accepted steps by Taylor series.
-    pub n_steps_taylor: u64,
-    /// Accepted steps by the Runge-Kutta method of order 8.
-    pub n_steps_dop853: u64,
-    /// Accepted steps by the midpoint rule.
-    pub n_steps_midpoint: u64,
-    /// Accepted steps by the method for stiff motions.
-    pub n_steps_rodas5p: u64,
+    /// Accepted steps by each method, in the order of [`Method::ALL`].
+    pub n_steps_by: [u64; Method::ALL.len()],
     /// The time from which on an explicit method found the run stiff.
     pub stiff_since: Option<f64>,
     /// Evaluations of the derivatives of the field.
@@ -34,4 +30,11 @@ pub struct Stats {
     pub n_extensions: u64,
     /// Switches.
     pub n_switches: u64,
+}
+
+impl Stats {
+    /// Accepted steps that this method took.
+    pub fn n_steps_of(&self, method: Method) -> u64 {
+        self.n_steps_by[method as usize]
+    }
 }

@@ -175,7 +175,10 @@ def poincare(
         partial = _dataset(cut.partial, grid.states, prepared.surfaces, units or {}, given)
         raise Interrupted(partial.attrs["message"], partial=partial) from None
     found = _dataset(table, grid.states, prepared.surfaces, units or {}, given)
-    where = "the attributes n_warnings and warnings name them, and solve_ivp shows them in words"
+    where = (
+        "the attributes n_warnings and warnings of the result have their number and codes; "
+        "a run with solve_ivp gives their messages"
+    )
     show_summary(kinds_of(table["warnings"]), 1, "runs", where, found)
     return found
 

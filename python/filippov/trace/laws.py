@@ -20,6 +20,21 @@ __all__ = ["Laws"]
 _BETWEEN = 1e-6
 
 
+class _Kind(NamedTuple):
+    """What the discrete state of a kind of law is, and whether it depends on the past beside the point."""
+
+    values: str
+    remembers: bool
+
+
+_KINDS = {
+    "held": _Kind("whole", remembers=False),
+    "clock": _Kind("whole", remembers=False),
+    "level": _Kind("whole", remembers=False),
+    "hysteresis": _Kind("side", remembers=True),
+}
+
+
 class _Law(NamedTuple):
     kind: str
     nodes: tuple[int, ...]
@@ -86,12 +101,12 @@ class Laws:
 
     def discrete(self) -> list[str]:
         """Return what each discrete state is: a "whole" number, or a "side", -1 or +1."""
-        return ["side" if law.kind == "hysteresis" else "whole" for law in self._known]
+        return [_KINDS[law.kind].values for law in self._known]
 
     @property
     def remembers(self) -> bool:
         """Whether what a law returns depends on the past, and not on the point alone."""
-        return bool(self.sticking) or any(law.kind == "hysteresis" for law in self._known)
+        return bool(self.sticking) or any(_KINDS[law.kind].remembers for law in self._known)
 
     def is_held(self, tracer: Tracer, node: int) -> bool:
         """Whether an expression contains discrete states and is constant between their changes."""

@@ -79,7 +79,8 @@ pub(super) fn decide_undecided(
         }),
         Err(found) => Err(Stop::Intersection {
             surfaces: meeting.surfaces.to_vec(),
-            reason: reason.unwrap_or(match found.open.is_empty() {
+            // Where no mode could be looked at, nothing is known to fail.
+            reason: reason.unwrap_or(match found.open.is_empty() && !found.failing.is_empty() {
                 true => Undecided::NoneViable,
                 false => Undecided::NoOutcome,
             }),

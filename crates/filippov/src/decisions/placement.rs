@@ -20,7 +20,8 @@ pub(crate) struct Sides {
     pub on_surface: Vec<bool>,
 }
 
-/// The motion from a place: at the start of a run, after actions, and where an event was none. `memory` is the mode before.
+/// Decides which motion starts at the current point, without the functions of an event: for example at the start of a run,
+/// or after an action. If the point lies on a surface, `memory` (usually the previous mode) gives its side there.
 pub(crate) fn place(
     at: &Point,
     notes: &mut Notes,

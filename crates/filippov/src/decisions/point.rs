@@ -388,8 +388,8 @@ pub(crate) struct Start {
     pub moved: Option<Vec<f64>>,
 }
 
-/// The laps of an outward spiral up to a small distance: too many to be listed, and one straight line in the record. One
-/// member of a one-parameter family.
+/// The first laps of an outward spiral, up to a small distance from the intersection. There are infinitely many: the record
+/// has one straight line for all. The spiral is one member of a one-parameter family of solutions.
 ///
 /// Reference: Guglielmi, Hairer (2022), formula (6.5).
 #[derive(Clone, Debug)]

@@ -68,7 +68,7 @@ pub(super) fn place_on(
     surfaces: &[usize],
     memory: Option<&Mode>,
 ) -> Result<(Rule, Decided), FieldError> {
-    // Of several continuations that which stays on its side.
+    // If one surface has several continuations, prefer the one on the side of the previous mode.
     let entry = match (surfaces, memory) {
         (&[j], Some(memory)) => memory.entries()[j],
         _ => 0,

@@ -77,7 +77,7 @@ impl<'a> Integrator<'a> {
         let mut decision = if self.recorder.decisions.len() < self.run.options.keep_decisions {
             let kept = self.ask(cause, |at, notes| decide_and_record(at, notes, reached));
             let (decision, record) = kept?;
-            // One that was interrupted depends on the time it had.
+            // An interrupted decision depends on the computing time it was given: it is not recorded.
             if self.watch.stop().is_none() {
                 self.recorder.decisions.push(record);
             }

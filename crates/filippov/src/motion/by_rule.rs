@@ -11,8 +11,9 @@ use crate::system::PiecewiseSystem;
 
 /// The combination of the 2^m fields that a rule chooses, with lambda_j = sum over k of w_k k_j.
 ///
-/// Its exit functions are not those of the multipliers: per surface and side, that a motion there begins to leave
-/// the intersection; then that a premise of the rule fails; then that the fields begin to wind outwards.
+/// Its exit functions differ from those of the canopy. Two per surface, for the sides -1 and +1, measure how clearly the
+/// motions on that side approach the intersection. The next one measures the premise of the rule. The last one, for two
+/// surfaces, is 1 - gamma, which is negative if the fields wind outwards. A function without such a condition is 1.
 pub struct RuleLaw {
     rule: SlidingRule,
     fields: MeetingFields,

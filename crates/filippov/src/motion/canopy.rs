@@ -80,7 +80,8 @@ impl Canopy {
         let fields = self.fields.normal_fields().ok()?;
         let telling = self.telling();
         let (lambda, ends) = if telling.len() < fields.m() {
-            // Sliding of higher order: some equations hold for all multipliers, and only their ends end it.
+            // Sliding of higher order: some equations hold for all multipliers. The exit functions of the root are 1 here,
+            // so that only those of the multipliers can vanish.
             (least_multipliers(&fields, &telling)?, [1.0, 1.0])
         } else if fields.m() == 2 {
             solve_two(&fields)?

@@ -292,8 +292,9 @@ impl<'a> IntersectionField<'a> {
         Ok(())
     }
 
-    /// The same at a start with given multipliers, and while quotients are lost in rounding. The ends of their root are those a moment later, so that they are continuous;
-    /// where it has none to that time, it was chosen among those that are stable.
+    /// Does what [`solve`](Self::solve) does, at a start with given multipliers and for as long as rounding spoils the quotients
+    /// there. The two exit functions of the root are evaluated a moment later, so that they are continuous. If they are not both
+    /// positive there, they are set to 1: the given root was chosen among the stable ones.
     fn solve_start(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), FieldError> {
         let Some((held, lambda)) = self.start.take() else {
             return Ok(());

@@ -5,7 +5,6 @@ use super::{Controller, Dop853, ErrorScale, Midpoint, Rodas5p, Step, Taylor};
 use crate::error::FieldError;
 use crate::motion::{Run, SmoothField};
 use crate::options::{Method, Options};
-use crate::stats::Stats;
 use crate::status::Warning;
 use crate::system::PiecewiseSystem;
 
@@ -28,6 +27,11 @@ macro_rules! methods {
                     $($asked $(if $may)? => Some(Chosen::$name(Box::new($built))),)*
                     Method::Auto | Method::Taylor | Method::Dopri5 => None,
                 }
+            }
+
+            /// Which one it is.
+            pub fn method(&self) -> Method {
+                match self { $(Chosen::$name(_) => Method::$name),* }
             }
         }
 
@@ -85,11 +89,6 @@ macro_rules! methods {
             #[inline(always)]
             fn accept(&mut self, y: &mut [f64]) {
                 match self { $(Chosen::$name(method) => method.accept(y)),* }
-            }
-
-            #[inline(always)]
-            fn count(&self, stats: &mut Stats) {
-                match self { $(Chosen::$name(method) => method.count(stats)),* }
             }
 
             #[inline(always)]

@@ -6,7 +6,6 @@ use super::{Attempt, ErrorScale, Interpolant, Step, Stepper};
 use crate::error::FieldError;
 use crate::error_scale::root_mean_square;
 use crate::motion::{observer, Run, SmoothField};
-use crate::stats::Stats;
 use crate::tolerances::STIFF_DOP853;
 
 /// The stages at which an observer is called.
@@ -177,10 +176,6 @@ impl Stepper for Dop853 {
         let last = &self.step.interpolant.coefficients()[7 * self.step.end.len()..];
         let change: Vec<f64> = last.iter().map(|c| weight * c).collect();
         scale.norm(&change, &self.step.end)
-    }
-
-    fn count(&self, stats: &mut Stats) {
-        stats.n_steps_dop853 += 1;
     }
 
     /// Does the field jump within the attempted step?

@@ -3,7 +3,6 @@
 use super::{Controller, ErrorScale, Step};
 use crate::error::FieldError;
 use crate::motion::{Run, SmoothField};
-use crate::stats::Stats;
 use crate::status::Warning;
 
 /// What came of an attempted step.
@@ -118,10 +117,6 @@ pub(crate) trait Stepper {
     fn accept(&mut self, y: &mut [f64]) {
         self.step_mut().accept(y);
     }
-
-    /// Counts a step that is accepted.
-    #[inline]
-    fn count(&self, _: &mut Stats) {}
 
     /// The next step after one of length `dt` with this error was accepted.
     #[inline]

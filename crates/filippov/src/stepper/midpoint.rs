@@ -4,7 +4,6 @@ use super::{Attempt, ErrorScale, Interpolant, Step, Stepper};
 use crate::error::FieldError;
 use crate::locate::{refine, Bracket};
 use crate::motion::{observer, Guard, ModeField, Run, SmoothField};
-use crate::stats::Stats;
 use crate::tolerances::EPS;
 
 /// The error e counts as e^(5/2) in the control of the step size, which is made for methods of order 5: 1 stays 1, and
@@ -183,10 +182,6 @@ impl Stepper for Midpoint {
     fn accept(&mut self, y: &mut [f64]) {
         self.step.accept(y);
         self.is_started = self.is_end_evaluated;
-    }
-
-    fn count(&self, stats: &mut Stats) {
-        stats.n_steps_midpoint += 1;
     }
 }
 

@@ -8,7 +8,6 @@ use super::{Attempt, ErrorScale, Interpolant, Step, Stepper};
 use crate::error::FieldError;
 use crate::motion::{observer, ModeField, Run, SmoothField};
 use crate::sparse::SparseSolver;
-use crate::stats::Stats;
 use crate::system::{Linearisation, MotionJacobian};
 use crate::tolerances::EPS;
 
@@ -349,10 +348,6 @@ impl Stepper for Rodas5p {
     fn accept(&mut self, y: &mut [f64]) {
         self.step.accept(y);
         self.is_linearised = false;
-    }
-
-    fn count(&self, stats: &mut Stats) {
-        stats.n_steps_rodas5p += 1;
     }
 
     /// The fast components of a stiff motion keep to a manifold. The extension lies beside it, within the tolerance, and there the

@@ -9,7 +9,6 @@ use crate::error::FieldError;
 use crate::mode::Signs;
 use crate::motion::{observer, CurrentMotion, ModeField, Run, Seen, SmoothField};
 use crate::options::{Method, Options};
-use crate::stats::Stats;
 use crate::status::{Warning, WarningCode};
 use crate::system::{MotionJets, PiecewiseSystem};
 use crate::tolerances::{EPS, MOST_AUTO_SERIES, STIFF_SERIES, TAYLOR_SHORTEST};
@@ -252,11 +251,6 @@ impl Stepper for Taylor {
     fn accept(&mut self, y: &mut [f64]) {
         self.step.accept(y);
         self.forget();
-    }
-
-    #[inline(always)]
-    fn count(&self, stats: &mut Stats) {
-        stats.n_steps_taylor += 1;
     }
 
     /// As long as the next series allows.

@@ -28,8 +28,9 @@ pub(super) struct MotionSeries {
 ///
 /// With coefficients up to order N in units of the tolerance, |c_k|, the step is as long as the last two
 /// allow: |c_k| dt^k <= 1/10 for k = N - 1 and N. The first term left out is smaller by the ratio of the step to the
-/// radius of convergence. That the series describes the motion is then checked at the end of the step, where
-/// its derivative has to be the field; where the field may change though no coefficient tells, in between too.
+/// radius of convergence. At the end of the step the
+/// derivative of the series is compared with the field. If the field may change without an effect on the coefficients
+/// ([`wary_over`](Self::wary_over)), it is also compared at some points within the step.
 ///
 /// Reference: Jorba, Zou, *A software package for the numerical integration of ODEs by means of high-order
 /// Taylor methods*, Exp. Math. 14 (2005).

@@ -173,8 +173,8 @@ pub const BESIDE: f64 = 1e-3;
 /// Surfaces that touch part in one direction if two places beside the point show the same to this, far above [`BESIDE`].
 pub const ONE_DIRECTION: f64 = 1e-2;
 
-/// Sliding has come to a two-fold where both normal components vanish within this multiple of the tolerance: then errors
-/// of some steps make up the multiplier.
+/// Sliding may have reached a two-fold or a double zero if the difference of the normal components is at most this multiple
+/// of the tolerance. The multiplier, a quotient with this denominator, then consists mostly of the errors of some steps.
 pub const AT_TWO_FOLD: f64 = 10.0;
 
 /// A multiplier is not lost where the difference is above this multiple of the tolerance, relative to the speed: gradients of

@@ -290,7 +290,8 @@ impl StepSearch<'_, '_> {
         Ok(counts)
     }
 
-    /// How far below zero a function may be at a touch: errors of the step make it so. A series has none where it matters.
+    /// Returns how far the error of the step may move a switching function below zero at a touch. For a series step this
+    /// error is neglected: the result is 0.
     fn depth_of_touches(&mut self, j: usize, theta: f64) -> Result<f64, FieldError> {
         if self.stepper.is_series() {
             return Ok(0.0);

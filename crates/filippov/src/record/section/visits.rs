@@ -97,7 +97,7 @@ impl Visits {
     /// A piece of constant mode begins.
     pub fn begin(&mut self, t: f64, mode: &Mode) {
         self.pass_time(t);
-        // A piece without duration is no piece.
+        // A piece of zero duration is dropped: the next mode takes its place.
         match self.modes.last_mut() {
             Some(last) if t <= self.since => *last = mode.clone(),
             _ => self.modes.push(mode.clone()),

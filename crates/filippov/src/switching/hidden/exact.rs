@@ -144,7 +144,7 @@ impl Outer {
         } else if end.is_finite() {
             end
         } else {
-            // Well beyond the zero: w - w(0) - last t is at most this part of the bend.
+            // A time well after the zero of w, because |w(t) - w(0) - last t| <= |bend / beta^2|.
             2.0 * (self.w + (bend / (inner.beta * inner.beta)).abs()) / -last
         };
         if !high.is_finite() || self.at(inner, high) > 0.0 {
