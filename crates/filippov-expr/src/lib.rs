@@ -37,6 +37,8 @@
 //! `print`, `serial`, [`program`] (native code by Cranelift, or a portable interpreter), [`enclosure`]
 //! (rigorous bounds along pieces of motions) and [`jet`] (Taylor coefficients of motions).
 
+#![warn(unnameable_types)]
+
 pub mod blend;
 pub mod container;
 pub mod derivative;

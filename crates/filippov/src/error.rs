@@ -6,6 +6,7 @@ use crate::tolerances::MOST_IN_LOOP;
 
 /// Why a run could not be started.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// A vector has the wrong length.
     #[error("{name} has length {found}, but the system has {expected} states")]
@@ -81,6 +82,7 @@ impl FieldError {
 
 /// Why there is no decision: one variant per cause.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum Undecided {
     /// The caller has waited long enough.
     #[error("the decision was interrupted")]

@@ -73,6 +73,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+#![warn(unnameable_types)]
+
 pub mod action;
 mod clock;
 pub mod cube;
@@ -121,6 +123,6 @@ pub use status::{Stop, Warning, WarningCode};
 pub use switch::{Kind, Switch};
 pub use system::{
     AffineParts, AffineSigns, BothSides, ClosureSystem, Definition, Law, LawAction, LawMap, Laws,
-    LieValue, MotionJacobian, PiecewiseSystem, Rules, SingularSliding, TracedMap, TracedSystem,
-    Word,
+    LieValue, Linearisation, MotionJacobian, MotionJets, PiecewiseSystem, RatePartials, Rules,
+    SingularSliding, TracedMap, TracedSystem, Word,
 };

@@ -5,6 +5,7 @@ use crate::mode::Mode;
 
 /// What happens at a point where several continuations are Filippov solutions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum NonUnique {
     /// Keep to the continuation chosen by regularisation (the motion that arrived goes on) and
     /// list the others in the warnings.
@@ -16,6 +17,7 @@ pub enum NonUnique {
 /// Which combination of the 2^m fields slides where m >= 2 surfaces meet. On one surface all are Filippov's, and
 /// for fields that are affine in the signs all but [`SlidingRule::DieciLopez`] give the same field.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum SlidingRule {
     /// Products of one multiplier per surface: the limit of regularised systems.
     #[default]
@@ -43,6 +45,7 @@ impl SlidingRule {
 
 /// What is kept of a run. Zeros of the user's events are kept in any case.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Keep {
     /// Every step, and with [`Options::dense_output`] the continuous extensions.
     #[default]
@@ -55,6 +58,7 @@ pub enum Keep {
 
 /// What keeps a sliding motion on its surfaces.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub enum Stabilization {
     /// Stages, ends of steps and points of the continuous extension are projected.
     #[default]
@@ -76,6 +80,7 @@ impl Stabilization {
 
 /// How a motion is integrated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Method {
     /// Taylor series where the system has them and they pay; else DOPRI5.
     #[default]

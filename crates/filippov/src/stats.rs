@@ -4,6 +4,7 @@ use crate::options::Method;
 
 /// What a run cost.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Stats {
     /// Evaluations of the right-hand side; one of the sliding field counts two, the coefficients of a Taylor step
     /// count as many as take the same number of operations.

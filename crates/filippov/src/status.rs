@@ -11,6 +11,7 @@ use crate::tolerances::CHATTER_STEPS;
 
 /// Why a run ended. Whatever the reason, the solution up to that time is kept.
 #[derive(Debug)]
+#[non_exhaustive]
 pub enum Stop {
     /// The end of the time span was reached.
     End,
@@ -258,6 +259,7 @@ impl Stop {
 
 /// The kinds of warning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum WarningCode {
     /// Several continuations exist; one was chosen.
     NonUnique,
@@ -312,6 +314,7 @@ impl WarningCode {
 
 /// A warning of a run.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Warning {
     /// Its time.
     pub t: f64,

@@ -6,6 +6,7 @@ use crate::mode::Mode;
 
 /// A switch: the end of one motion and the start of the next. Few states are kept without allocation.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Switch {
     /// Its time.
     pub t: f64,
@@ -29,6 +30,7 @@ pub struct Switch {
 
 /// The word for what happened, as the field uses it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Kind {
     /// From one region to the next, or across a further surface while sliding.
     Crossing,

@@ -69,6 +69,7 @@ impl PointKind {
 
 /// What happens at a point.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Classification {
     /// Which kind of point it is.
     pub kind: PointKind,

@@ -24,6 +24,7 @@ pub enum Guard {
 
 /// What ends the root of the multipliers of m >= 2 surfaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum RootEnd {
     /// Two roots meet: (-1)^m det G, for two surfaces the discriminant. For a rule other than the canopy: a
     /// premise of the rule fails.

@@ -24,7 +24,7 @@ mod two_fold_motion;
 pub mod weights;
 
 pub use affine::AffineLaw;
-pub use affine_bounds::AffineBounds;
+pub use affine_bounds::{AffineBounds, EnclosedMultipliers};
 pub(crate) use by_mode::{Law, ModeField, SlidingSet};
 pub use by_rule::RuleLaw;
 pub use canopy::Canopy;
@@ -44,7 +44,8 @@ pub(crate) use run::Run;
 pub(crate) use seen::observer;
 pub use seen::Seen;
 pub use sliding::{NormalComponents, SlidingField};
-pub(crate) use ties::{are_parallel, beside_on, in_the_place_of, normal, parallel, sense_of, Tie};
+pub use ties::Tie;
+pub(crate) use ties::{are_parallel, beside_on, in_the_place_of, normal, parallel, sense_of};
 pub(crate) use triggers::Triggers;
 pub use two_fold_motion::{TwoFold, TwoFoldMotion};
 pub(crate) use weights::product_weights;

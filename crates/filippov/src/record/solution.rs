@@ -18,6 +18,7 @@ use crate::tolerances::{AT_SIDE, TANGENT};
 
 /// A piece of constant mode.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Segment {
     /// Start.
     pub t_start: f64,
@@ -55,6 +56,7 @@ pub enum Side {
 
 /// What a run computed.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Solution {
     /// Number of states.
     pub n_states: usize,
