@@ -120,6 +120,6 @@ pub use status::{Stop, Warning, WarningCode};
 pub use switch::{Kind, Switch};
 pub use system::{
     AffineParts, AffineSigns, BothSides, ClosureSystem, Definition, Law, LawAction, LawMap, Laws,
-    LieValue, MotionJacobian, PiecewiseSystem, Rules, SingularSliding, TracedMap, TracedSystem,
-    Word,
+    LieValue, MotionJacobian, PiecewiseSystem, Place, Rules, Setting, SingularSliding, TracedMap,
+    TracedSystem, Word,
 };

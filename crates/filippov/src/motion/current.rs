@@ -11,7 +11,7 @@ use crate::error::FieldError;
 use crate::mode::{Mode, Signs};
 use crate::options::SlidingRule;
 use crate::system::Actions;
-use crate::system::{MotionJets, PiecewiseSystem};
+use crate::system::{MotionJets, PiecewiseSystem, Setting};
 
 /// Modes that are remembered: in a run that meets more of them, what follows from a mode is found anew now and then.
 const MOST_KNOWN: usize = 8;
@@ -75,10 +75,11 @@ impl<'a> CurrentMotion<'a> {
         actions: &'a Actions<'a>,
     ) -> Self {
         let (signs, sliding): (_, SlidingSet) = (mode.signs(), mode.sliding_set().collect());
+        let setting = Setting::new(&signs, &actions.discrete);
         let mut motion = CurrentMotion {
             t_start,
             active: SmallVec::new(),
-            field: ModeField::new(system, law, &sliding, &signs),
+            field: ModeField::new(system, law, &sliding, setting),
             affine_bounds: None,
             is_straight: sliding.iter().all(|&j| system.is_affine(j)),
             sliding,
@@ -121,16 +122,18 @@ impl<'a> CurrentMotion<'a> {
         } else {
             ContactField::new(system, self.actions, &mode, &self.sides, &self.discrete)
         };
+        self.signs = signs;
+        let setting = Setting::new(&self.signs, &self.discrete);
         if let Some(contact) = contact {
             self.replace_field(ModeField::Contact(Box::new(contact)));
-        } else if !self.field.restart(&sliding, &signs) {
+        } else if !self.field.restart(&sliding, setting) {
             let known = self
                 .idle
                 .iter_mut()
-                .position(|f| f.restart(&sliding, &signs));
+                .position(|f| f.restart(&sliding, setting));
             let field = match known {
                 Some(index) => self.idle.swap_remove(index),
-                None => ModeField::new(system, self.law, &sliding, &signs),
+                None => ModeField::new(system, self.law, &sliding, setting),
             };
             self.replace_field(field);
         }
@@ -139,8 +142,19 @@ impl<'a> CurrentMotion<'a> {
         }
         self.affine_bounds = None;
         self.is_straight = sliding.iter().all(|&j| system.is_affine(j));
-        (self.mode, self.t_start, self.signs, self.sliding) = (mode, t_start, signs, sliding);
+        (self.mode, self.t_start, self.sliding) = (mode, t_start, sliding);
         self.find_monitored(system, zeros);
+    }
+
+    /// The signs handed to the field, and the discrete states.
+    pub fn setting(&self) -> Setting<'_> {
+        Setting::new(&self.signs, &self.discrete)
+    }
+
+    /// An action has changed the discrete states.
+    pub fn set_discrete(&mut self, q: Vec<f64>) {
+        self.field.set_discrete(&q);
+        self.discrete = q;
     }
 
     /// Takes another field and keeps the one before, if it can be used again.
