@@ -376,7 +376,7 @@ def test_wrong_initial_states_are_named(friction: fl.System) -> None:
         with pytest.raises(fl.InputError, match=rf"^{message}"):
             fl.sweep(friction, (0, 1), y0, {"omega": [1.0]})
     clash = fl.System(lambda t, x, y: [-x[0]], n=1, params={"y": 1.0}, states=["y"])
-    with pytest.raises(fl.InputError, match=r"^states: 'y'"):
+    with pytest.raises(fl.InputError, match=r"^params, states: the name 'y'"):
         fl.sweep(clash, (0, 1), [1.0], {"y": [1.0]})
 
 

@@ -47,18 +47,18 @@ macro_rules! callable_system {
 
             fn field<'py>(&self, py: Python<'py>, t: f64, x: Array<'py>, signs: Array<'py>, p: Array<'py>) -> PyResult<Output<'py>> {
                 let _ = p;
-                field_of(py, &*self.system, t, &x, &signs)
+                field_of(py, (&*self.system, &[]), t, &x, &signs)
             }
 
             fn surface_values<'py>(&self, py: Python<'py>, t: f64, x: Array<'py>, signs: Array<'py>, p: Array<'py>) -> PyResult<Output<'py>> {
                 let _ = p;
-                surface_values_of(py, &*self.system, t, &x, &signs)
+                surface_values_of(py, (&*self.system, &[]), t, &x, &signs)
             }
 
             #[allow(clippy::too_many_arguments)]
             fn sliding_field<'py>(&self, py: Python<'py>, t: f64, x: Array<'py>, signs: Array<'py>, p: Array<'py>, surface: usize) -> PyResult<(Output<'py>, f64, f64)> {
                 let _ = p;
-                sliding_field_of(py, &*self.system, t, &x, &signs, surface)
+                sliding_field_of(py, (&*self.system, &[]), t, &x, &signs, surface)
             }
 
             fn active(&self, signs: Array<'_>) -> PyResult<Vec<bool>> {

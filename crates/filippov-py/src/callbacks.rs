@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use filippov::action::ActionMap;
-use filippov::{FieldError, PiecewiseSystem, TracedSystem, UserFunction};
+use filippov::{FieldError, PiecewiseSystem, Place, TracedSystem, UserFunction};
 use filippov_expr::{
     Backend, Enclosure, EnclosureProgram, ExprError, Graph, Motion, NodeId, Program,
 };
@@ -56,7 +56,8 @@ impl PiecewiseSystem for Opaque {
         self.surfaces.functions.len()
     }
 
-    fn field(&self, t: f64, x: &[f64], signs: &[f64], dx: &mut [f64]) -> Result<(), FieldError> {
+    fn field(&self, place: &Place<'_>, dx: &mut [f64]) -> Result<(), FieldError> {
+        let &Place { t, x, signs, .. } = place;
         Python::attach(|py| {
             for (j, sign) in signs.iter().enumerate().take(self.surfaces.n_switching) {
                 if self.surfaces.value(py, j, t, x)? * sign <= 0.0 {
@@ -70,8 +71,8 @@ impl PiecewiseSystem for Opaque {
         .map_err(|e: PyErr| FieldError::new(e))
     }
 
-    fn surfaces(&self, t: f64, x: &[f64], _signs: &[f64], h: &mut [f64]) -> Result<(), FieldError> {
-        self.surfaces.write(t, x, h)
+    fn surfaces(&self, place: &Place<'_>, h: &mut [f64]) -> Result<(), FieldError> {
+        self.surfaces.write(place.t, place.x, h)
     }
 
     fn switches_at(&self, j: usize) -> bool {
@@ -99,7 +100,8 @@ impl PiecewiseSystem for Signed {
         self.surfaces.functions.len()
     }
 
-    fn field(&self, t: f64, x: &[f64], signs: &[f64], dx: &mut [f64]) -> Result<(), FieldError> {
+    fn field(&self, place: &Place<'_>, dx: &mut [f64]) -> Result<(), FieldError> {
+        let &Place { t, x, signs, .. } = place;
         Python::attach(|py| {
             let arguments = (
                 t,
@@ -111,8 +113,8 @@ impl PiecewiseSystem for Signed {
         .map_err(|e: PyErr| FieldError::new(e))
     }
 
-    fn surfaces(&self, t: f64, x: &[f64], _signs: &[f64], h: &mut [f64]) -> Result<(), FieldError> {
-        self.surfaces.write(t, x, h)
+    fn surfaces(&self, place: &Place<'_>, h: &mut [f64]) -> Result<(), FieldError> {
+        self.surfaces.write(place.t, place.x, h)
     }
 
     fn switches_at(&self, j: usize) -> bool {
@@ -141,7 +143,7 @@ impl ActionMap for CalledMap {
 pub struct CalledEvent(pub Py<PyAny>);
 
 impl UserFunction for CalledEvent {
-    fn value(&self, t: f64, x: &[f64]) -> Result<f64, FieldError> {
+    fn value(&self, t: f64, x: &[f64], _: &[f64]) -> Result<f64, FieldError> {
         Python::attach(|py| read_scalar(&self.0.bind(py).call1((t, PyArray1::from_slice(py, x)))?))
             .map_err(|e: PyErr| FieldError::new(e))
     }
@@ -166,16 +168,16 @@ impl EventExpression {
 /// as events, so no signs are needed.
 pub struct CompiledEvent {
     pub expression: Arc<EventExpression>,
-    /// Knows the parameters, and the discrete states of the run.
+    /// Knows the parameters.
     pub system: Arc<TracedSystem>,
 }
 
 impl UserFunction for CompiledEvent {
-    fn value(&self, t: f64, x: &[f64]) -> Result<f64, FieldError> {
+    fn value(&self, t: f64, x: &[f64], q: &[f64]) -> Result<f64, FieldError> {
         let mut out = [0.0];
         let program = &self.expression.program;
         self.system
-            .with_values(|p| program.eval(t, x, &[], p, &[], &mut out));
+            .with_values(q, |p| program.eval(t, x, &[], p, &[], &mut out));
         Ok(out[0])
     }
 
@@ -183,11 +185,11 @@ impl UserFunction for CompiledEvent {
         true
     }
 
-    fn enclose(&self, motion: &dyn Motion) -> Option<Enclosure> {
+    fn enclose(&self, motion: &dyn Motion, q: &[f64]) -> Option<Enclosure> {
         let mut out = [Enclosure::UNKNOWN];
         let program = &self.expression.enclosing;
         self.system
-            .with_values(|p| program.eval(motion, &[], p, &mut out));
+            .with_values(q, |p| program.eval(motion, &[], p, &mut out));
         Some(out[0])
     }
 }

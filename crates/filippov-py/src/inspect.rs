@@ -25,13 +25,13 @@ pub fn intersection_field<'py>(
     near: Vec<f64>,
 ) -> PyResult<Option<FieldAndMultipliers<'py>>> {
     let x = x.as_slice()?;
-    let core = core_of(system, p.as_slice()?, t, x)?;
+    let (core, q) = core_of(system, p.as_slice()?, t, x)?;
     let mut mode = mode;
     if x.len() != core.n_states() || mode.len() != n_visible_of(system, &*core) {
         return Err(PyValueError::new_err("x or mode has a wrong length"));
     }
     mode.resize(core.n_surfaces(), 1);
-    let value = filippov::intersection_field(&*core, t, x, &Mode::new(mode), &near);
+    let value = filippov::intersection_field(&*core, (t, x), &q, &Mode::new(mode), &near);
     let value = value.map_err(raised)?;
     Ok(value.map(|value| (PyArray1::from_vec(py, value.dx), value.multipliers)))
 }
@@ -50,7 +50,7 @@ pub fn classify<'py>(
 ) -> PyResult<Option<Bound<'py, PyDict>>> {
     let (reach, kappa, before) = how;
     let x = x.as_slice()?;
-    let core = core_of(system, p.as_slice()?, t, x)?;
+    let (core, q) = core_of(system, p.as_slice()?, t, x)?;
     let n_visible = n_visible_of(system, &*core);
     if x.len() != core.n_states() {
         return Err(PyValueError::new_err("x has a wrong length"));
@@ -65,8 +65,14 @@ pub fn classify<'py>(
         entries.resize(core.n_surfaces(), 1);
         Mode::new(entries)
     });
+    let how = Inspection {
+        reach,
+        kappa: &kappa,
+        before: before.as_ref(),
+        q: &q,
+    };
     if let Some(mode) = &before {
-        if let Some(j) = filippov::contradicts(&*core, t, x, mode, reach).map_err(raised)? {
+        if let Some(j) = filippov::contradicts(&*core, t, x, how).map_err(raised)? {
             let (name, entry) = (
                 core.surface_name(j),
                 ["-", "0", "+"][(mode.entries()[j] + 1) as usize],
@@ -76,11 +82,6 @@ pub fn classify<'py>(
             )));
         }
     }
-    let how = Inspection {
-        reach,
-        kappa: &kappa,
-        before: before.as_ref(),
-    };
     let point = filippov::classify(&*core, t, x, how).map_err(raised)?;
     point.map(|point| as_dict(py, point, n_visible)).transpose()
 }

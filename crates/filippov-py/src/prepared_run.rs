@@ -57,7 +57,7 @@ impl PreparedRun {
                 compiled = Some(Arc::clone(&own));
                 own as CoreSystem
             }
-            None => core_of(system, &p, t0, &y0)?,
+            None => core_of(system, &p, t0, &y0)?.0,
         };
         let mut functions = Vec::with_capacity(events.len());
         for (g, direction, terminal, _name) in events {

@@ -160,7 +160,7 @@ pub fn message_of(system: &dyn PiecewiseSystem, solution: &Solution, n_visible: 
     let name = |j| system.surface_name(j);
     let message = solution.stop.message(t, &mode, name);
     match &solution.stop {
-        Stop::NotFinite => match not_finite(system, t, x, &solution.mode) {
+        Stop::NotFinite => match not_finite(system, t, x, &solution.discrete, &solution.mode) {
             Some(place) => format!("{message} {}", place.text(name)),
             None => message,
         },
@@ -304,7 +304,8 @@ impl Run {
             return None;
         }
         let end = solution.last_state();
-        let place = not_finite(&*self.system, solution.t_last, end, &solution.mode)?;
+        let (t, q) = (solution.t_last, &solution.discrete);
+        let place = not_finite(&*self.system, t, end, q, &solution.mode)?;
         Some((place.t, PyArray1::from_vec(py, place.x)))
     }
 

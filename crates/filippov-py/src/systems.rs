@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use filippov::motion::{SlidingField, SmoothField};
-use filippov::{Definition, Error, FieldError, Laws, PiecewiseSystem, Rules};
+use filippov::{Definition, Error, FieldError, Laws, PiecewiseSystem, Rules, Setting};
 use filippov_expr::{Backend, Names};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
@@ -34,17 +34,23 @@ pub fn refused(error: Error) -> PyErr {
 /// A system of the core that can be run by threads.
 pub type CoreSystem = Arc<dyn PiecewiseSystem + Send + Sync>;
 
-/// The system of the core behind a Python object, with these parameter values and its discrete states as at a start
+/// The system of the core behind a Python object, with these parameter values, and its discrete states at a start
 /// at (t, x).
-pub fn core_of(system: &Bound<'_, PyAny>, p: &[f64], t: f64, x: &[f64]) -> PyResult<CoreSystem> {
+pub fn core_of(
+    system: &Bound<'_, PyAny>,
+    p: &[f64],
+    t: f64,
+    x: &[f64],
+) -> PyResult<(CoreSystem, Vec<f64>)> {
     if let Ok(traced) = system.cast::<TracedSystem>() {
-        return Ok(Arc::new(traced.get().at(p, t, x)?));
+        let (system, q) = traced.get().at(p, t, x)?;
+        return Ok((Arc::new(system), q));
     }
     if let Ok(opaque) = system.cast::<OpaqueSystem>() {
-        return Ok(Arc::clone(&opaque.get().system) as _);
+        return Ok((Arc::clone(&opaque.get().system) as _, Vec::new()));
     }
     if let Ok(signed) = system.cast::<SignedSystem>() {
-        return Ok(Arc::clone(&signed.get().system) as _);
+        return Ok((Arc::clone(&signed.get().system) as _, Vec::new()));
     }
     Err(PyTypeError::new_err(
         "system: a TracedSystem, OpaqueSystem or SignedSystem is needed",
@@ -61,21 +67,22 @@ pub fn n_visible_of(system: &Bound<'_, PyAny>, core: &dyn PiecewiseSystem) -> us
 
 pub fn field_of<'py>(
     py: Python<'py>,
-    system: &dyn PiecewiseSystem,
+    (system, q): (&dyn PiecewiseSystem, &[f64]),
     t: f64,
     x: &Array<'py>,
     signs: &Array<'py>,
 ) -> PyResult<Output<'py>> {
     let (x, signs) = checked(system, x, signs)?;
     let mut dx = vec![0.0; system.n_states()];
-    system.field(t, x, signs, &mut dx).map_err(raised)?;
+    let place = Setting::new(signs, q).at(t, x);
+    system.field(&place, &mut dx).map_err(raised)?;
     Ok(PyArray1::from_vec(py, dx))
 }
 
 /// The sliding field on one surface, and the normal components of both sides.
 pub fn sliding_field_of<'py>(
     py: Python<'py>,
-    system: &dyn PiecewiseSystem,
+    (system, q): (&dyn PiecewiseSystem, &[f64]),
     t: f64,
     x: &Array<'py>,
     signs: &Array<'py>,
@@ -85,7 +92,7 @@ pub fn sliding_field_of<'py>(
     if surface >= signs.len() {
         return Err(PyValueError::new_err(format!("no surface {surface}")));
     }
-    let mut field = SlidingField::new(system, surface, signs);
+    let mut field = SlidingField::new(system, surface, Setting::new(signs, q));
     let mut dx = vec![0.0; x.len()];
     field.eval(t, &mut x.to_vec(), &mut dx).map_err(raised)?;
     let a = field.last();
@@ -94,14 +101,15 @@ pub fn sliding_field_of<'py>(
 
 pub fn surface_values_of<'py>(
     py: Python<'py>,
-    system: &dyn PiecewiseSystem,
+    (system, q): (&dyn PiecewiseSystem, &[f64]),
     t: f64,
     x: &Array<'py>,
     signs: &Array<'py>,
 ) -> PyResult<Output<'py>> {
     let (x, signs) = checked(system, x, signs)?;
     let mut h = vec![0.0; system.n_surfaces()];
-    system.surfaces(t, x, signs, &mut h).map_err(raised)?;
+    let place = Setting::new(signs, q).at(t, x);
+    system.surfaces(&place, &mut h).map_err(raised)?;
     Ok(PyArray1::from_vec(py, h))
 }
 
@@ -176,13 +184,14 @@ impl TracedSystem {
         self.system.with_parameters(p.to_vec())
     }
 
-    /// The system with these parameter values, its discrete states as at a start at (t, x).
-    pub fn at(&self, p: &[f64], t: f64, x: &[f64]) -> PyResult<filippov::TracedSystem> {
+    /// The system with these parameter values, and its discrete states at a start at (t, x).
+    pub fn at(&self, p: &[f64], t: f64, x: &[f64]) -> PyResult<(filippov::TracedSystem, Vec<f64>)> {
         let system = self.with(p);
-        if x.len() == system.n_states() {
-            self.laws.start(&system, t, x).map_err(raised)?;
-        }
-        Ok(system)
+        let q = match x.len() == system.n_states() {
+            true => self.laws.start(&system, t, x).map_err(raised)?,
+            false => Vec::new(),
+        };
+        Ok((system, q))
     }
 
     /// The names of the discrete states.
@@ -285,8 +294,8 @@ impl TracedSystem {
         signs: Array<'py>,
         p: Array<'py>,
     ) -> PyResult<Output<'py>> {
-        let system = self.at(p.as_slice()?, t, x.as_slice()?)?;
-        field_of(py, &system, t, &x, &self.all_signs(py, &signs)?)
+        let (system, q) = self.at(p.as_slice()?, t, x.as_slice()?)?;
+        field_of(py, (&system, &q), t, &x, &self.all_signs(py, &signs)?)
     }
 
     fn surface_values<'py>(
@@ -297,8 +306,8 @@ impl TracedSystem {
         signs: Array<'py>,
         p: Array<'py>,
     ) -> PyResult<Output<'py>> {
-        let system = self.at(p.as_slice()?, t, x.as_slice()?)?;
-        let all = surface_values_of(py, &system, t, &x, &self.all_signs(py, &signs)?)?;
+        let (system, q) = self.at(p.as_slice()?, t, x.as_slice()?)?;
+        let all = surface_values_of(py, (&system, &q), t, &x, &self.all_signs(py, &signs)?)?;
         let visible = all.readonly().as_slice()?[..self.n_visible()].to_vec();
         Ok(PyArray1::from_vec(py, visible))
     }
@@ -313,8 +322,15 @@ impl TracedSystem {
         p: Array<'py>,
         surface: usize,
     ) -> PyResult<(Output<'py>, f64, f64)> {
-        let system = self.at(p.as_slice()?, t, x.as_slice()?)?;
-        sliding_field_of(py, &system, t, &x, &self.all_signs(py, &signs)?, surface)
+        let (system, q) = self.at(p.as_slice()?, t, x.as_slice()?)?;
+        sliding_field_of(
+            py,
+            (&system, &q),
+            t,
+            &x,
+            &self.all_signs(py, &signs)?,
+            surface,
+        )
     }
 
     fn active(&self, signs: Array<'_>) -> PyResult<Vec<bool>> {

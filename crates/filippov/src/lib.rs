@@ -123,6 +123,6 @@ pub use status::{Stop, Warning, WarningCode};
 pub use switch::{Kind, Switch};
 pub use system::{
     AffineParts, AffineSigns, BothSides, ClosureSystem, Definition, Law, LawAction, LawMap, Laws,
-    LieValue, Linearisation, MotionJacobian, MotionJets, PiecewiseSystem, RatePartials, Rules,
-    SingularSliding, TracedMap, TracedSystem, Word,
+    LieValue, Linearisation, MotionJacobian, MotionJets, PiecewiseSystem, Place, RatePartials,
+    Rules, Setting, SingularSliding, TracedMap, TracedSystem, Word,
 };

@@ -266,13 +266,12 @@ pub struct RunnableSystem {
 }
 
 impl RunnableSystem {
-    /// The system with the default values of its parameters. Its discrete states are not set yet:
-    /// [`RunnableSystem::at`] does that.
+    /// The system with the default values of its parameters.
     pub fn system(&self) -> &TracedSystem {
         &self.system
     }
 
-    /// The system with these values of its parameters, and its discrete states, as at a start at (t, x).
+    /// The system with these values of its parameters, and its discrete states at a start at (t, x).
     ///
     /// # Errors
     /// [`Error::WrongLength`] if there are not as many values as parameters, or states.

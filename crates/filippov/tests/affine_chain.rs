@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use filippov::switching::{solve_relay, RelayProblem, Uniqueness};
-use filippov::{PiecewiseSystem, TracedSystem};
+use filippov::{PiecewiseSystem, Place, TracedSystem};
 use filippov_expr::{Backend, Graph, Names, NodeId};
 
 const STIFFNESS: f64 = 5.0;
@@ -39,7 +39,9 @@ fn released(system: &TracedSystem, x: &[f64]) -> (Vec<i8>, Vec<f64>) {
     let surfaces: Vec<usize> = (0..d).collect();
     let state: Vec<f64> = x.iter().copied().chain(vec![0.0; d]).collect();
     let mut parts = affine.affine_parts(&surfaces).unwrap();
-    parts.evaluate(affine, 0.0, &state, &vec![0.0; d]).unwrap();
+    parts
+        .evaluate(affine, &Place::new(0.0, &state, &vec![0.0; d]))
+        .unwrap();
     let problem = RelayProblem {
         nu: parts.nu(),
         n: parts.normal().clone(),
@@ -92,10 +94,14 @@ fn while_some_masses_stick_the_rest_moves_as_with_their_signs() {
         .collect();
     let mut parts = affine.affine_parts(&stuck).unwrap();
     let mut sliding = vec![0.0; 2 * d];
-    parts.evaluate(affine, 0.0, &state, &signs).unwrap();
+    parts
+        .evaluate(affine, &Place::new(0.0, &state, &signs))
+        .unwrap();
     parts.slide(&mut sliding).unwrap();
     let mut region = vec![0.0; 2 * d];
-    system.field(0.0, &state, &signs, &mut region).unwrap();
+    system
+        .field(&Place::new(0.0, &state, &signs), &mut region)
+        .unwrap();
     for mass in 0..d {
         match stuck.iter().position(|&j| j == mass) {
             Some(row) => {

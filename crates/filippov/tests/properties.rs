@@ -1,7 +1,9 @@
 //! What every solution fulfils, for random planar relays with a curved switching function.
 #![allow(clippy::unwrap_used)]
 
-use filippov::{ClosureSystem, Mode, Options, PiecewiseSystem, Problem, Side, Solution, Stop};
+use filippov::{
+    ClosureSystem, Mode, Options, PiecewiseSystem, Place, Problem, Side, Solution, Stop,
+};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 
@@ -180,8 +182,10 @@ fn the_slope_is_the_field_of_the_mode() {
                 None => f64::from(mode.entries()[0]),
             };
             let (mut plus, mut minus) = ([0.0; 2], [0.0; 2]);
-            system.field(t, &y, &[1.0], &mut plus).unwrap();
-            system.field(t, &y, &[-1.0], &mut minus).unwrap();
+            system.field(&Place::new(t, &y, &[1.0]), &mut plus).unwrap();
+            system
+                .field(&Place::new(t, &y, &[-1.0]), &mut minus)
+                .unwrap();
             for i in 0..2 {
                 let field = 0.5 * (1.0 + lam) * plus[i] + 0.5 * (1.0 - lam) * minus[i];
                 let slope = (after[i] - before[i]) / (2.0 * d);

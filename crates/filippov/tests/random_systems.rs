@@ -3,7 +3,9 @@
 //! `RANDOM_SYSTEMS` is how many times more cases to try than usual.
 #![allow(clippy::unwrap_used)]
 
-use filippov::{ClosureSystem, Mode, Options, PiecewiseSystem, Problem, Side, Solution, Stop};
+use filippov::{
+    ClosureSystem, Mode, Options, PiecewiseSystem, Place, Problem, Side, Solution, Stop,
+};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 
@@ -238,7 +240,9 @@ fn the_slope_in_a_region_is_its_field() {
             let (after, _) = at(&system, &solution, t + d, Side::Right);
             let (before, _) = at(&system, &solution, t - d, Side::Right);
             let mut field = vec![0.0; random.n];
-            system.field(t, &y, &mode.signs(), &mut field).unwrap();
+            system
+                .field(&Place::new(t, &y, &mode.signs()), &mut field)
+                .unwrap();
             for i in 0..random.n {
                 let slope = (after[i] - before[i]) / (2.0 * d);
                 // The error of the extension over d, and d^2/6 times a third derivative.

@@ -10,7 +10,7 @@ use filippov::switching::{
     is_stable, limit_of_hidden_dynamics, resolve, roots_in_cube, stability_margins, HiddenOutcome,
     Incoming, Matrix, NormalFields, SignGroup, Undecided,
 };
-use filippov::{PiecewiseSystem, TracedSystem};
+use filippov::{PiecewiseSystem, Place, Setting, TracedSystem};
 use filippov_expr::{Backend, Graph, Names, NodeId};
 use random_fields::Random;
 
@@ -48,7 +48,8 @@ fn sliding_on_all_masses_of_a_chain_costs_the_sum_over_the_groups() {
         let groups = system.sign_groups(&set);
         assert_eq!(groups.len(), d - 1);
         assert!(groups.contains(&vec![4, 5]));
-        let mut field = IntersectionField::new(&system, &set, &vec![1.0; d], &[]);
+        let mut field =
+            IntersectionField::new(&system, &set, Setting::of_signs(&vec![1.0; d]), &[]);
         let x: Vec<f64> = (0..d).map(|i| 0.1 * (i as f64).sin()).collect();
         let mut state: Vec<f64> = x.iter().copied().chain(vec![0.0; d]).collect();
         let mut dx = vec![0.0; 2 * d];
@@ -82,7 +83,8 @@ fn only_groups_of_the_sliding_surfaces_count() {
     let mut state = vec![0.0; 24];
     state[5 + 12] = 0.3;
     let signs = vec![1.0; 12];
-    assert_eq!(fields.evaluate(&system, 0.0, &state, &signs).unwrap(), 5);
+    let place = Place::new(0.0, &state, &signs);
+    assert_eq!(fields.evaluate(&system, &place).unwrap(), 5);
 }
 
 /// A random sum over groups, and the same with all patterns.

@@ -7,7 +7,7 @@
 mod switching_rows;
 
 use filippov::switching::{decide, Arrival, Decision};
-use filippov::{ClosureSystem, PiecewiseSystem, TracedSystem};
+use filippov::{ClosureSystem, PiecewiseSystem, Place, TracedSystem};
 use filippov_expr::{Backend, Graph, Names, NodeId};
 
 use switching_rows::{rows, Row, FIRST_ORDER, RESTING, TANGENCIES};
@@ -65,7 +65,7 @@ fn with_closures<T>(minus: &[f64], plus: &[f64], use_it: impl Fn(&dyn PiecewiseS
 }
 
 fn decide_at_origin(system: &dyn PiecewiseSystem, arrival: Arrival) -> Decision {
-    decide(system, 0, arrival, 0.0, &[0.0], &[1.0]).unwrap()
+    decide(system, 0, arrival, &Place::new(0.0, &[0.0], &[1.0])).unwrap()
 }
 
 fn check((label, minus, plus, arrival, entry, candidates): &Row, system: &dyn PiecewiseSystem) {

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 use filippov::switching::{decide, Arrival, Decision};
-use filippov::ClosureSystem;
+use filippov::{ClosureSystem, Place};
 
 use Arrival::{Region, Start};
 
@@ -22,7 +22,7 @@ fn two_fold(p: f64, q: f64, r: f64, s: f64, arrival: Arrival) -> Decision {
         },
         |_t, x, h| h[0] = x[0],
     );
-    decide(&system, 0, arrival, 0.0, &[0.0; 3], &[1.0]).unwrap()
+    decide(&system, 0, arrival, &Place::new(0.0, &[0.0; 3], &[1.0])).unwrap()
 }
 
 #[test]

@@ -104,9 +104,9 @@ impl<'a> Instant<'_, 'a> {
 
     fn surface_values(&mut self, mode: &Mode) -> Result<Values, FieldError> {
         let mut h: Values = smallvec![0.0; self.run.system.n_surfaces()];
-        self.run
-            .system
-            .surfaces(self.run.t, &self.run.x, &mode.signs(), &mut h)?;
+        let (run, signs) = (&self.run, mode.signs());
+        let place = run.motion.setting().with_signs(&signs).at(run.t, &run.x);
+        run.system.surfaces(&place, &mut h)?;
         self.notes.n_surface_evaluations += 1;
         Ok(h)
     }
@@ -184,10 +184,9 @@ impl<'a> Instant<'_, 'a> {
             }
             let known = self.run.residuals.get(j).copied().unwrap_or(0.0);
             let signs = before.signs();
-            let size = self
-                .run
-                .system
-                .surface_size(j, self.run.t, &self.run.x, &signs)?;
+            let setting = self.run.motion.setting().with_signs(&signs);
+            let place = setting.at(self.run.t, &self.run.x);
+            let size = self.run.system.surface_size(j, &place)?;
             if h[j].abs() > (SURFACE_NOISE * size).max(known.min(PENETRATION * size)) {
                 return Ok(Some(j));
             }
@@ -206,8 +205,8 @@ impl<'a> Instant<'_, 'a> {
             apply_derivative(action.map, place, signs, &q, derivative)?;
         }
         action.map.apply(self.run.t, &mut x, signs, &mut q)?;
-        (self.run.x, self.run.motion.discrete) = (x, q);
-        self.run.system.set_discrete(&self.run.motion.discrete);
+        self.run.x = x;
+        self.run.motion.set_discrete(q);
         if let Some(kind) = action.kind {
             let surfaces = match action.trigger {
                 Trigger::Surface { index, .. } => vec![index],

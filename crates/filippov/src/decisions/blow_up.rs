@@ -105,7 +105,7 @@ impl Around {
             .collect();
         let surfaces: Vec<usize> = slid.iter().map(|&i| meeting.surfaces[i]).collect();
         let mut fields = MeetingFields::of_all_patterns(at.system, &surfaces);
-        notes.n_field_evaluations += fields.evaluate(at.system, at.t, at.x, &mode.signs())?;
+        notes.n_field_evaluations += fields.evaluate(at.system, &at.place(&mode.signs()))?;
         let mut patterns = Vec::with_capacity(1 << slid.len());
         for pattern in 0..1_usize << slid.len() {
             if at.patience.is_over() {
@@ -117,7 +117,7 @@ impl Around {
                 let mut gradient = vec![0.0; at.x.len()];
                 let rate = at
                     .system
-                    .rate_gradient(j, at.t, at.x, &signs, &mut gradient)?;
+                    .rate_gradient(j, &at.place(&signs), &mut gradient)?;
                 rows.push(Row {
                     value: rate.rate,
                     time: rate.time,

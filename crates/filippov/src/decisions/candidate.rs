@@ -206,7 +206,7 @@ impl Candidate<'_> {
                 None => Germ::Unknown,
             };
             if lambda.is_empty() && germ == Germ::Unknown {
-                let leading = first_nonzero(at.system, j, side, 1, at.t, at.x, &mode.signs())?;
+                let leading = first_nonzero(at.system, j, side, 1, &at.place(&mode.signs()))?;
                 germ = Germ::of(leading, Germ::Zero);
             }
             if germ != Germ::Zero {
@@ -242,9 +242,9 @@ impl Candidate<'_> {
     fn components_in_region(&self, at: &Point) -> Result<Vec<f64>, FieldError> {
         let (mut field, mut normal) = (vec![0.0; at.x.len()], vec![0.0; at.x.len()]);
         let signs = self.mode.signs();
-        eval_on_side(at.system, at.t, at.x, &signs, &mut field)?;
+        eval_on_side(at.system, &at.place(&signs), &mut field)?;
         let components = self.meeting.surfaces.iter().map(|&j| {
-            let of_time = at.system.gradient(j, at.t, at.x, &signs, &mut normal)?;
+            let of_time = at.system.gradient(j, &at.place(&signs), &mut normal)?;
             Ok(of_time + dot(&normal, &field))
         });
         components.collect()
@@ -304,7 +304,8 @@ impl Candidate<'_> {
     /// Sliding on one surface to which both fields are tangent.
     fn at_two_fold(&self, at: &Point, place: usize) -> Result<Verdict, FieldError> {
         let slid = self.meeting.surfaces[place];
-        let mut two_fold = TwoFold::new(at.system, slid, 1, (at.t, at.x), &self.mode.signs());
+        let signs = self.mode.signs();
+        let mut two_fold = TwoFold::new(at.system, slid, 1, at.place(&signs));
         if matches!(self.meeting.how, How::Event(_)) {
             two_fold = two_fold.located();
         }

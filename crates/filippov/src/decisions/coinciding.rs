@@ -25,12 +25,11 @@ pub(super) struct Parallels {
 impl Parallels {
     /// Looks at all pairs.
     pub fn of(at: &Point, meeting: &[usize], mode: &Mode) -> Result<Self, FieldError> {
-        let (place, signs, n) = ((at.t, at.x), mode.signs(), at.x.len() + 1);
+        let (signs, n) = (mode.signs(), at.x.len() + 1);
+        let place = at.place(&signs);
         let mut normals = vec![0.0; n * meeting.len()];
         for (&j, row) in meeting.iter().zip(normals.chunks_exact_mut(n)) {
-            row[n - 1] = at
-                .system
-                .gradient(j, at.t, at.x, &signs, &mut row[..n - 1])?;
+            row[n - 1] = at.system.gradient(j, &place, &mut row[..n - 1])?;
         }
         let row = |i: usize| &normals[i * n..(i + 1) * n];
         let squares: Values = (0..meeting.len()).map(|i| dot(row(i), row(i))).collect();
@@ -43,7 +42,7 @@ impl Parallels {
                 continue;
             }
             let (j, others) = (meeting[i], [meeting[k]]);
-            if !in_the_place_of(at.system, place, j, &others, &signs)?.is_empty() {
+            if !in_the_place_of(at.system, &place, j, &others)?.is_empty() {
                 found.coincide = true;
             } else if has_normal(k) {
                 let ratio = dot(one, other) / squares[i];
@@ -68,7 +67,7 @@ pub(super) fn have_parallels(
     let signs = mode.signs();
     let rows = meeting
         .iter()
-        .map(|&j| normal(at.system, (at.t, at.x), j, &signs));
+        .map(|&j| normal(at.system, &at.place(&signs), j));
     let rows: Vec<Vec<f64>> = rows.collect::<Result<_, _>>()?;
     let pairs = (0..rows.len()).flat_map(|j| (0..j).map(move |k| (j, k)));
     let mut pairs = pairs.map(|(j, k)| parallel(&rows[j], &rows[k]));
@@ -83,16 +82,16 @@ pub(super) fn parting(
     mode: &Mode,
 ) -> Result<Option<(Vec<f64>, bool)>, FieldError> {
     let signs = mode.signs();
-    let [one, other] = [j, k].map(|j| normal(at.system, (at.t, at.x), j, &signs));
+    let [one, other] = [j, k].map(|j| normal(at.system, &at.place(&signs), j));
     let (one, other) = (one?, other?);
     let square = dot(&one, &one);
     let ratio = dot(&one, &other) / square;
     let mut found: Vec<Vec<f64>> = Vec::new();
     for side in [-1.0, 1.0] {
-        let (t, x) = beside_on(at.system, (at.t, at.x), j, &signs, side)?;
+        let (t, x) = beside_on(at.system, &at.place(&signs), j, side)?;
         let (near, far) = (
-            normal(at.system, (t, &x), j, &signs)?,
-            normal(at.system, (t, &x), k, &signs)?,
+            normal(at.system, &at.place_at(t, &x, &signs), j)?,
+            normal(at.system, &at.place_at(t, &x, &signs), k)?,
         );
         let pairs = far.iter().zip(&near);
         let mut row: Vec<f64> = pairs.map(|(far, near)| far - ratio * near).collect();

@@ -6,7 +6,7 @@ use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::CurrentMotion;
 use crate::status::Stop;
-use crate::system::PiecewiseSystem;
+use crate::system::{PiecewiseSystem, Setting};
 use crate::tolerances::{BETWEEN_SIDES, EPS, MOST_MEETING, SURFACE_NOISE};
 
 /// What the switching functions at a point say of a mode.
@@ -104,7 +104,7 @@ impl Known {
     }
 
     fn noise(&self, at: &Point, j: usize, h: f64, region: &Mode) -> Result<f64, FieldError> {
-        let size = at.system.surface_size(j, at.t, at.x, &region.signs())?;
+        let size = at.system.surface_size(j, &at.place(&region.signs()))?;
         Ok(SURFACE_NOISE * (size + self.h[j].abs() + h.abs()) + self.residual)
     }
 
@@ -199,8 +199,8 @@ pub(super) fn bends(at: &Point, meeting: &Meeting) -> Result<bool, FieldError> {
     for &k in meeting.surfaces {
         let [minus, plus] = [-1, 1].map(|side| meeting.mode.with(k, side).signs());
         for &j in meeting.surfaces.iter().filter(|&&j| j != k) {
-            let rate = at.system.gradient(j, at.t, at.x, &minus, &mut near)?;
-            let other = at.system.gradient(j, at.t, at.x, &plus, &mut far)?;
+            let rate = at.system.gradient(j, &at.place(&minus), &mut near)?;
+            let other = at.system.gradient(j, &at.place(&plus), &mut far)?;
             if near != far || rate != other {
                 return Ok(true);
             }
@@ -226,10 +226,11 @@ pub(crate) fn differs_between_sides(
     for pattern in 0..1_usize << sliding.len() {
         let side = mode.on_sides(sliding, pattern);
         let signs = side.signs();
-        system.surfaces(t, x, &signs, &mut h)?;
+        let place = Setting::new(&signs, &motion.discrete).at(t, x);
+        system.surfaces(&place, &mut h)?;
         for k in (0..h.len()).filter(|k| !sliding.contains(k) && is_checked(*k)) {
             let beyond = -h[k] * f64::from(side.entries()[k]);
-            let size = system.surface_size(k, t, x, &signs)?;
+            let size = system.surface_size(k, &place)?;
             if beyond > BETWEEN_SIDES * (1.0 + size) {
                 return Ok(Some(Stop::SlidesAcrossJump {
                     surfaces: sliding.to_vec(),

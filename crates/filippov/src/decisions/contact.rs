@@ -148,9 +148,15 @@ fn begin(
         let (order, of_time) = match contacts.contains(&j) {
             true => (
                 2,
-                at.system.rate_gradient(j, at.t, &x, &signs, &mut row)?.time,
+                at.system
+                    .rate_gradient(j, &at.place_at(at.t, &x, &signs), &mut row)?
+                    .time,
             ),
-            false => (1, at.system.gradient(j, at.t, &x, &signs, &mut row)?),
+            false => (
+                1,
+                at.system
+                    .gradient(j, &at.place_at(at.t, &x, &signs), &mut row)?,
+            ),
         };
         let value = of_time + dot(&row, &velocity);
         let size = of_time.abs() + (dot(&row, &row) * dot(&velocity, &velocity)).sqrt();
@@ -158,7 +164,7 @@ fn begin(
         let is_tangent = value.abs() <= rounding * size;
         let has_series = is_tangent && mode.codimension() == 0;
         if has_series {
-            leading = first_nonzero(at.system, j, entry, order, at.t, &x, &signs)?;
+            leading = first_nonzero(at.system, j, entry, order, &at.place_at(at.t, &x, &signs))?;
         }
         if leading.order == 0 || (is_tangent || is_located(j)) && !has_series {
             is_clear = false;

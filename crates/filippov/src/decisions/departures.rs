@@ -38,7 +38,7 @@ pub(crate) fn departures(
             Leading { order: 1, value }
         } else if after.codimension() == 0 {
             let side = after.entries()[j];
-            first_nonzero(at.system, j, side, 1, at.t, at.x, &signs)?
+            first_nonzero(at.system, j, side, 1, &at.place(&signs))?
         } else {
             // The normal component vanishes at the exit of a multiplier: its rate along the new motion.
             let dt = at.moment(notes, &signs, &velocity)?;
@@ -65,7 +65,7 @@ fn component_sizes(
     let affine = at.system.affine_signs();
     let parts = affine.and_then(|affine| Some((affine, affine.affine_parts(surfaces)?)));
     if let Some((affine, mut parts)) = parts {
-        notes.n_field_evaluations += parts.evaluate(affine, at.t, at.x, &mode.signs())?;
+        notes.n_field_evaluations += parts.evaluate(affine, &at.place(&mode.signs()))?;
         let spread = |row| parts.normal().row(row).map(|(_, n)| n.abs()).sum::<f64>();
         let rows = parts.nu().into_iter().enumerate();
         return Ok(rows.map(|(row, nu)| nu.abs() + spread(row)).collect());

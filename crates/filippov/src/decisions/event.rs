@@ -80,7 +80,7 @@ pub(crate) fn add_vanishing_surfaces(
         if !arrival.active[j] || slides || surfaces.contains(&j) {
             continue;
         }
-        let size = at.system.surface_size(j, at.t, at.x, arrival.signs)?;
+        let size = at.system.surface_size(j, &at.place(arrival.signs))?;
         // A surface that is being left tangentially stays near for long; one that was crossed at this very instant belongs
         // to the event.
         if h.abs() <= SURFACE_NOISE * size && !arrival.departing.contains(&j) {
@@ -156,7 +156,7 @@ pub(super) fn touch(
     for &j in meeting.fresh {
         let side = mode.entries()[j];
         let known = vanishing[usize::from(side > 0)].max(1);
-        let leading = first_nonzero(at.system, j, side, known, at.t, at.x, &signs)?;
+        let leading = first_nonzero(at.system, j, side, known, &at.place(&signs))?;
         if leading.sign() == side {
             left.push(Left::beside(j, leading));
         }
@@ -173,17 +173,17 @@ fn goes_on_beyond(
     vanishing: [usize; 2],
 ) -> Result<Option<Leading>, FieldError> {
     let (beyond, signs) = (-mode.entries()[j], mode.signs());
-    let along = normal_component(at.system, j, j, beyond, at.t, at.x, &signs)?;
+    let along = normal_component(at.system, j, j, beyond, &at.place(&signs))?;
     let mut field = vec![0.0; at.x.len()];
     let mut gradient = field.clone();
     let other = mode.with(j, beyond).signs();
-    eval_on_side(at.system, at.t, at.x, &other, &mut field)?;
-    at.system.gradient(j, at.t, at.x, &signs, &mut gradient)?;
+    eval_on_side(at.system, &at.place(&other), &mut field)?;
+    at.system.gradient(j, &at.place(&signs), &mut gradient)?;
     let size = (dot(&field, &field) * dot(&gradient, &gradient)).sqrt();
     // A touch is located to the square root of rounding: a component of that size vanishes.
     let vanishing =
         vanishing[usize::from(beyond > 0)].max(usize::from(along.value.abs() <= AT_SIDE * size));
-    let leading = first_nonzero(at.system, j, beyond, vanishing, at.t, at.x, &signs)?;
+    let leading = first_nonzero(at.system, j, beyond, vanishing, &at.place(&signs))?;
     let goes_on = leading.sign() == beyond || leading.order == 0;
     Ok(goes_on.then_some(leading))
 }

@@ -54,7 +54,7 @@ impl MotionSeries {
         }
         let (n, width) = (at.x.len(), jets.width());
         let mut rows = vec![0.0; (jets.order() + 1) * width];
-        at.system.eval_jets(&jets, at.t, at.x, &signs, &mut rows);
+        at.system.eval_jets(&jets, &at.place(&signs), &mut rows);
         let sizes: Vec<f64> = (0..n).map(|i| at.scale.size(i, at.x[i])).collect();
         let of = |i: usize, k: usize| (rows[k * width + i] / sizes[i]).abs();
         let speed = (0..n).map(|i| of(i, 1)).fold(0.0, f64::max);
@@ -80,7 +80,7 @@ impl MotionSeries {
         let mut gradient = vec![0.0; self.n];
         let rate = at
             .system
-            .gradient(j, at.t, at.x, &self.signs, &mut gradient)?;
+            .gradient(j, &at.place(&self.signs), &mut gradient)?;
         let width = self.jets.width();
         // A state at rest is known to rounding only, which moves at the pace of the fields around it.
         let size = |k: usize| {

@@ -106,15 +106,15 @@ pub(crate) fn limits_of_impacts(
     }
     let signs = after.signs();
     let mut row = vec![0.0; at.x.len()];
-    let rate = at.system.rate_gradient(j, at.t, at.x, &signs, &mut row)?;
+    let rate = at.system.rate_gradient(j, &at.place(&signs), &mut row)?;
     let falls = at
         .system
-        .lie_derivative(j, j, &[side, side], at.t, at.x, &signs)?;
+        .lie_derivative(j, j, &[side, side], &at.place(&signs))?;
     if falls.value * f64::from(side) >= 0.0 {
         return Ok([None, None]);
     }
     let height = 0.5 * rate.rate * rate.rate / falls.value.abs();
-    let size = at.system.surface_size(j, at.t, at.x, &signs)?;
+    let size = at.system.surface_size(j, &at.place(&signs))?;
     let is_unresolved = height <= UNRESOLVED_FLIGHT * SURFACE_NOISE * size;
     let distance = rate.rate.abs() / dot(&row, &row).sqrt();
     if !is_unresolved && distance >= reach(at.scale, at.x) {
@@ -151,15 +151,24 @@ pub(crate) fn limits_of_impacts(
 fn project(at: &Point, limit: &mut Limit) -> Result<(), FieldError> {
     let mut projector = Projector::new(limit.x.len(), at.system.n_surfaces());
     let signs = at.arrival.signs;
-    projector.project_onto(at.system, &limit.surfaces, limit.t, &mut limit.x, signs)
+    projector.project_onto(
+        at.system,
+        &limit.surfaces,
+        limit.t,
+        &mut limit.x,
+        at.setting(signs),
+    )
 }
 
 /// Do the surfaces meet at the limit? Three lines in a plane need not.
 fn is_on_all(at: &Point, limit: &Limit) -> Result<bool, FieldError> {
     let (signs, mut h) = (at.arrival.signs, vec![0.0; at.system.n_surfaces()]);
-    at.system.surfaces(limit.t, &limit.x, signs, &mut h)?;
+    at.system
+        .surfaces(&at.place_at(limit.t, &limit.x, signs), &mut h)?;
     for &j in &limit.surfaces {
-        let size = at.system.surface_size(j, limit.t, &limit.x, signs)?;
+        let size = at
+            .system
+            .surface_size(j, &at.place_at(limit.t, &limit.x, signs))?;
         if h[j].abs() > SURFACE_NOISE * size {
             return Ok(false);
         }
@@ -238,7 +247,13 @@ fn stays_tangent(
     let mut ahead = at.along(&velocity, moment);
     let t = at.t + moment;
     let mut projector = Projector::new(ahead.len(), at.system.n_surfaces());
-    projector.project_onto(at.system, meeting, t, &mut ahead, &after.signs())?;
+    projector.project_onto(
+        at.system,
+        meeting,
+        t,
+        &mut ahead,
+        at.setting(&after.signs()),
+    )?;
     let later = at.moved(t, &ahead).corners(notes, meeting, &after)?;
     Ok(later.telling() == telling)
 }
@@ -249,11 +264,14 @@ fn distance(at: &Point, meeting: &[usize], switch: &Switch) -> Result<f64, Field
     let mut h = vec![0.0; at.system.n_surfaces()];
     let mut gradient = vec![0.0; n];
     at.system
-        .surfaces(switch.t, &switch.y_after, &signs, &mut h)?;
+        .surfaces(&at.place_at(switch.t, &switch.y_after, &signs), &mut h)?;
     let mut square = 0.0;
     for &j in meeting {
-        at.system
-            .gradient(j, switch.t, &switch.y_after, &signs, &mut gradient)?;
+        at.system.gradient(
+            j,
+            &at.place_at(switch.t, &switch.y_after, &signs),
+            &mut gradient,
+        )?;
         square += h[j] * h[j] / dot(&gradient, &gradient);
     }
     Ok(square.sqrt())
@@ -290,7 +308,7 @@ pub(crate) fn passed_beside(
     let met: Vec<usize> = passed.iter().copied().chain([surface]).collect();
     let mut x = at.x.to_vec();
     let mut projector = Projector::new(x.len(), at.system.n_surfaces());
-    projector.project_onto(at.system, &met, at.t, &mut x, &signs)?;
+    projector.project_onto(at.system, &met, at.t, &mut x, at.setting(&signs))?;
     let h = at.moved(at.t, &x).surface_values(notes, &signs)?;
     Ok(Some(Passed {
         triggers: passed,

@@ -78,7 +78,8 @@ fn leaves_within(
     let signs = next.mode.signs();
     let mut gradient = vec![0.0; at.x.len()];
     let (mut start, mut h) = (vec![0.0; signs.len()], vec![0.0; signs.len()]);
-    at.system.surfaces(at.t, at.x, &signs, &mut start)?;
+    at.system
+        .surfaces(&at.place_at(at.t, at.x, &signs), &mut start)?;
     let mut is_clear = true;
     for (share, values) in [1.0, 0.5].into_iter().zip(&mut values) {
         let mut field = at.field_of(&next.mode, next.start.as_deref());
@@ -96,13 +97,13 @@ fn leaves_within(
             is_clear &= *exit > noise;
         }
         values.extend(ends.iter().map(|(place, _)| exits[*place]));
-        at.system.surfaces(t, &x, &signs, &mut h)?;
+        at.system.surfaces(&at.place_at(t, &x, &signs), &mut h)?;
         for (k, &j) in leaving.iter().enumerate() {
-            let size = at.system.surface_size(j, t, &x, &signs)?;
+            let size = at.system.surface_size(j, &at.place_at(t, &x, &signs))?;
             // The point is on the surface, but for a residual; fields that balance along the surface do so to rounding.
             let value = h[j] - start[j];
             values[k] = value;
-            at.system.gradient(j, at.t, at.x, &signs, &mut gradient)?;
+            at.system.gradient(j, &at.place(&signs), &mut gradient)?;
             let way = (dot(&gradient, &gradient) * dot(velocity, velocity)).sqrt() * moment;
             if value.abs() <= SURFACE_NOISE * size + noise_of_way * way + start[j].abs() {
                 is_clear = false;

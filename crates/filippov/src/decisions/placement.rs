@@ -59,7 +59,7 @@ fn take_sides(
         let signs = next.mode.signs();
         for j in inactive {
             let side = next.mode.entries()[j];
-            let leading = first_nonzero(at.system, j, side, 0, at.t, at.x, &signs)?;
+            let leading = first_nonzero(at.system, j, side, 0, &at.place(&signs))?;
             if leading.order > 0 {
                 next.mode.set(j, leading.sign());
             }
@@ -87,7 +87,7 @@ pub(crate) fn sides(
             return Ok(None);
         }
         for j in 0..d {
-            let size = at.system.surface_size(j, at.t, at.x, &signs)?;
+            let size = at.system.surface_size(j, &at.place(&signs))?;
             let residual = at.arrival.residuals.get(j).copied().unwrap_or(0.0);
             let noise = (SURFACE_NOISE * size).max(2.0 * residual);
             on_surface[j] = h[j].abs() <= noise;
@@ -130,7 +130,7 @@ fn slipped_through(
         return Ok(None);
     }
     let mut gradient = vec![0.0; at.x.len()];
-    at.system.gradient(j, at.t, at.x, signs, &mut gradient)?;
+    at.system.gradient(j, &at.place(signs), &mut gradient)?;
     let tolerance = at.scale.along(&gradient, at.x);
     let is_near = h.abs() <= SLIPPED * tolerance;
     Ok((is_near && leaves_point_alone(at, j, signs)?).then_some(side))
@@ -144,9 +144,11 @@ pub(super) fn leaves_point_alone(at: &Point, j: usize, signs: &[f64]) -> Result<
     let (mut moved, mut q) = (at.x.to_vec(), at.q.to_vec());
     action.map.apply(at.t, &mut moved, signs, &mut q)?;
     let mut h = [(); 2].map(|()| vec![0.0; signs.len()]);
-    at.system.surfaces(at.t, at.x, signs, &mut h[0])?;
-    at.system.surfaces(at.t, &moved, signs, &mut h[1])?;
-    let size = at.system.surface_size(j, at.t, at.x, signs)?;
+    at.system
+        .surfaces(&at.place_at(at.t, at.x, signs), &mut h[0])?;
+    at.system
+        .surfaces(&at.place_at(at.t, &moved, signs), &mut h[1])?;
+    let size = at.system.surface_size(j, &at.place(signs))?;
     Ok((h[0][j] - h[1][j]).abs() <= SURFACE_NOISE * size)
 }
 
@@ -169,7 +171,7 @@ pub(crate) fn pushed_back(
     }
     let mut x = at.x.to_vec();
     let mut projector = Projector::new(x.len(), at.system.n_surfaces());
-    projector.project_onto(at.system, &beyond, at.t, &mut x, &signs)?;
+    projector.project_onto(at.system, &beyond, at.t, &mut x, at.setting(&signs))?;
     Ok(Some(x))
 }
 
@@ -283,14 +285,14 @@ fn leading_along(
             }
         }
     }
-    first_nonzero(at.system, j, side, 0, at.t, at.x, &after.signs())
+    first_nonzero(at.system, j, side, 0, &at.place(&after.signs()))
 }
 
 /// Is this speed at surface j below the tolerance?
 pub(super) fn is_slow(at: &Point, j: usize, speed: f64, mode: &Mode) -> Result<bool, FieldError> {
     let mut row = vec![0.0; at.x.len()];
     at.system
-        .rate_gradient(j, at.t, at.x, &mode.signs(), &mut row)?;
+        .rate_gradient(j, &at.place(&mode.signs()), &mut row)?;
     let tolerance = at.scale.along(&row, at.x);
     Ok(speed.abs() <= SLOW * tolerance)
 }
@@ -324,7 +326,7 @@ pub(crate) fn triggers_reached(at: &Point, h: &[f64]) -> Result<Vec<usize>, Fiel
     let rates = at.rates_here()?;
     let mut reached = Vec::new();
     for j in (0..h.len()).filter(|&j| at.actions.at_surface(j).is_some()) {
-        let size = at.system.surface_size(j, at.t, at.x, at.arrival.signs)?;
+        let size = at.system.surface_size(j, &at.place(at.arrival.signs))?;
         let approaches = rates[j] * f64::from(at.arrival.mode.entries()[j]) < 0.0;
         if approaches && h[j].abs() <= SURFACE_NOISE * size {
             reached.push(j);

@@ -18,7 +18,7 @@ use crate::switch::Switch;
 use crate::switching::Decision;
 use crate::system::eval_on_side;
 use crate::system::Actions;
-use crate::system::{dot, dot_magnitude, PiecewiseSystem};
+use crate::system::{dot, dot_magnitude, PiecewiseSystem, Place, Setting};
 use crate::tolerances::{MOMENT, MOST_SHORTENINGS, NO_PROGRESS, TOO_LARGE_A_CHANGE};
 
 /// One value per surface; few are kept without allocation.
@@ -139,6 +139,30 @@ impl<'p, 'm, 'a> Point<'p, 'm, 'a> {
         }
     }
 
+    /// These signs, with the discrete states.
+    pub fn setting<'s>(&self, signs: &'s [f64]) -> Setting<'s>
+    where
+        'p: 's,
+    {
+        Setting { signs, q: self.q }
+    }
+
+    /// The argument of a function of the system at this point.
+    pub fn place<'s>(&self, signs: &'s [f64]) -> Place<'s>
+    where
+        'p: 's,
+    {
+        self.setting(signs).at(self.t, self.x)
+    }
+
+    /// The same at another point.
+    pub fn place_at<'s>(&self, t: f64, x: &'s [f64], signs: &'s [f64]) -> Place<'s>
+    where
+        'p: 's,
+    {
+        self.setting(signs).at(t, x)
+    }
+
     /// The same question at another place.
     pub fn moved<'q>(&self, t: f64, x: &'q [f64]) -> Point<'q, 'm, 'a>
     where
@@ -153,7 +177,7 @@ impl<'p, 'm, 'a> Point<'p, 'm, 'a> {
         if let Some(field) = ContactField::new(self.system, self.actions, mode, sides, self.q) {
             return ModeField::Contact(Box::new(field));
         }
-        let mut field = ModeField::of(self.system, self.policy.law, mode);
+        let mut field = ModeField::of(self.system, self.policy.law, mode, self.q);
         if let ModeField::Intersection(field) = &mut field {
             field.set_patience(self.patience);
             field.begin(start.map_or(&[], |start| &start.multipliers), false);
@@ -185,7 +209,7 @@ impl<'p, 'm, 'a> Point<'p, 'm, 'a> {
     ) -> Result<Vec<f64>, FieldError> {
         let mut velocity = vec![0.0; self.x.len()];
         notes.n_field_evaluations += if mode.codimension() == 0 {
-            eval_on_side(self.system, self.t, self.x, &mode.signs(), &mut velocity)?
+            eval_on_side(self.system, &self.place(&mode.signs()), &mut velocity)?
         } else {
             let mut field = self.field_of(mode, start);
             field.eval(self.t, &mut self.x.to_vec(), &mut velocity)?;
@@ -206,7 +230,7 @@ impl<'p, 'm, 'a> Point<'p, 'm, 'a> {
             .eval(self.t, &mut x, &mut velocity)?;
         let signs = &self.arrival.signs;
         self.system
-            .surface_rates(self.t, self.x, signs, &velocity, &mut h, &mut rates)?;
+            .surface_rates(&self.place(signs), &velocity, &mut h, &mut rates)?;
         Ok(rates)
     }
 
@@ -224,9 +248,7 @@ impl<'p, 'm, 'a> Point<'p, 'm, 'a> {
         velocity: &[f64],
     ) -> Result<(f64, f64), FieldError> {
         let mut gradient = vec![0.0; velocity.len()];
-        let of_time = self
-            .system
-            .gradient(j, self.t, self.x, signs, &mut gradient)?;
+        let of_time = self.system.gradient(j, &self.place(signs), &mut gradient)?;
         let size = of_time.abs() + dot_magnitude(&gradient, velocity);
         Ok((of_time + dot(&gradient, velocity), size))
     }
@@ -251,13 +273,14 @@ impl<'p, 'm, 'a> Point<'p, 'm, 'a> {
         };
         let mut moment = MOMENT / speed(velocity).max(1.0);
         let mut now = vec![0.0; self.x.len()];
-        eval_on_side(self.system, self.t, self.x, signs, &mut now)?;
+        eval_on_side(self.system, &self.place(signs), &mut now)?;
         let (mut then, mut ahead) = (now.clone(), now.clone());
         let size = speed(&now);
         for _ in 0..MOST_SHORTENINGS {
             let pairs = ahead.iter_mut().zip(self.x.iter().zip(velocity));
             pairs.for_each(|(ahead, (x, v))| *ahead = x + moment * v);
-            eval_on_side(self.system, self.t + moment, &ahead, signs, &mut then)?;
+            let later = self.place_at(self.t + moment, &ahead, signs);
+            eval_on_side(self.system, &later, &mut then)?;
             notes.n_field_evaluations += 1;
             then.iter_mut()
                 .zip(&now)
@@ -281,7 +304,7 @@ impl<'p, 'm, 'a> Point<'p, 'm, 'a> {
     /// Values of all switching functions.
     pub fn surface_values(&self, notes: &mut Notes, signs: &[f64]) -> Result<Values, FieldError> {
         let mut h: Values = smallvec![0.0; self.system.n_surfaces()];
-        self.system.surfaces(self.t, self.x, signs, &mut h)?;
+        self.system.surfaces(&self.place(signs), &mut h)?;
         notes.n_surface_evaluations += 1;
         Ok(h)
     }
@@ -294,8 +317,7 @@ impl<'p, 'm, 'a> Point<'p, 'm, 'a> {
         mode: &Mode,
     ) -> Result<MeetingFields, FieldError> {
         let mut corners = MeetingFields::new(self.system, meeting);
-        notes.n_field_evaluations +=
-            corners.evaluate(self.system, self.t, self.x, &mode.signs())?;
+        notes.n_field_evaluations += corners.evaluate(self.system, &self.place(&mode.signs()))?;
         Ok(corners)
     }
 }

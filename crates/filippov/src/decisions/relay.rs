@@ -142,7 +142,7 @@ fn relay_at(
         let dt = at.moment(notes, &signs, &velocity)?;
         (t, x) = (t + dt, at.moved(t, &x).along(&velocity, dt));
     }
-    notes.n_field_evaluations += parts.evaluate(affine, t, &x, &signs)?;
+    notes.n_field_evaluations += parts.evaluate(affine, &at.place_at(t, &x, &signs))?;
     let entries = meeting.mode.entries();
     let before: Vec<i8> = meeting.surfaces.iter().map(|&j| entries[j]).collect();
     let (gradients, noise) = (&parts.gradients, at.system.lie_tolerance(1));

@@ -19,7 +19,7 @@ pub(crate) fn resting(
     let resting: SlidingSet = resting.filter_map(Left::surface).collect();
     for &j in &resting {
         let beyond = -mode.entries()[j];
-        let leading = first_nonzero(at.system, j, beyond, 0, at.t, at.x, &mode.signs())?;
+        let leading = first_nonzero(at.system, j, beyond, 0, &at.place(&mode.signs()))?;
         if leading.order == 0 {
             warn_zero_surface(at, notes, j, mode);
         }
@@ -55,7 +55,7 @@ pub(crate) fn has_left_resting(at: &Point, notes: &mut Notes) -> Result<bool, Fi
     let h = at.surface_values(notes, signs)?;
     let mut gradient = vec![0.0; at.x.len()];
     for &j in at.arrival.resting {
-        at.system.gradient(j, at.t, at.x, signs, &mut gradient)?;
+        at.system.gradient(j, &at.place(signs), &mut gradient)?;
         let tolerance = at.scale.along(&gradient, at.x);
         // Bodies that touch have to be held apart at once.
         let factor = match at.triggers().is_only_trigger(j) {

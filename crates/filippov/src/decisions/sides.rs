@@ -43,12 +43,14 @@ fn would_turn_back(at: &Point, j: usize, mode: &Mode) -> Result<bool, FieldError
     let (mut x, mut q) = (at.x.to_vec(), at.q.to_vec());
     action.map.apply(at.t, &mut x, &signs, &mut q)?;
     let mut h = vec![0.0; signs.len()];
-    at.system.surfaces(at.t, &x, &signs, &mut h)?;
+    at.system.surfaces(&at.place_at(at.t, &x, &signs), &mut h)?;
     if !leaves_point_alone(at, j, &signs)? {
         return Ok(h[j] * f64::from(side) > 0.0);
     }
     let mut row = vec![0.0; x.len()];
-    let rate = at.system.rate_gradient(j, at.t, &x, &signs, &mut row)?;
+    let rate = at
+        .system
+        .rate_gradient(j, &at.place_at(at.t, &x, &signs), &mut row)?;
     Ok(rate.rate * f64::from(side) > 0.0)
 }
 
@@ -65,7 +67,7 @@ pub(crate) fn warn_unknown_side(
         return Ok(());
     }
     let side = mode.entries()[j];
-    let leading = first_nonzero(at.system, j, side, 0, at.t, at.x, &mode.signs())?;
+    let leading = first_nonzero(at.system, j, side, 0, &at.place(&mode.signs()))?;
     let leads_off =
         leading.order == 1 && leading.sign() == side && !is_slow(at, j, leading.value, mode)?;
     if !leads_off {

@@ -63,7 +63,7 @@ pub(crate) fn landing(
     let t = at.t + share * leap.duration;
     let signs = leap.region.signs();
     let mut projector = Projector::new(x.len(), at.system.n_surfaces());
-    projector.project(at.system, leap.border, t, &mut x, &signs)?;
+    projector.project(at.system, leap.border, t, &mut x, at.setting(&signs))?;
     let left = departures(&at.moved(t, &x), notes, &leap.region, &[leap.border], &[])?;
     Ok(Landing { t, x, left })
 }

@@ -39,7 +39,7 @@ impl Surroundings {
                 let signs = mode.with(j, side).signs();
                 let partials = at
                     .system
-                    .rate_gradient(j, at.t, at.x, &signs, &mut gradient)?;
+                    .rate_gradient(j, &at.place(&signs), &mut gradient)?;
                 let parts = gradient.iter().zip(at.x).enumerate();
                 let size: f64 = parts
                     .map(|(i, (g, x))| g.abs() * at.scale.size(i, *x))

@@ -37,7 +37,9 @@ impl Components {
         for (k, side) in [-1, 1].into_iter().enumerate() {
             let signs = at.arrival.mode.with(j, side).signs();
             let row = &mut rows[k];
-            let partials = at.system.rate_gradient(j, t, x, &signs, &mut row[..n])?;
+            let partials = at
+                .system
+                .rate_gradient(j, &at.place_at(t, x, &signs), &mut row[..n])?;
             (values[k], row[n]) = (partials.rate, partials.time);
         }
         let size = |row: &[f64]| dot_magnitude(&row[..n], x) + (row[n] * t).abs();
@@ -174,7 +176,7 @@ pub(super) fn beyond_double_zero(
         return Ok(None);
     }
     // The motion along which the components stay nearest to zero.
-    let motions = TwoFold::new(at.system, j, 1, (at.t, at.x), at.arrival.signs).motions()?;
+    let motions = TwoFold::new(at.system, j, 1, at.place(at.arrival.signs)).motions()?;
     let rate = |first: Leading| match first.order {
         1 => first.value.abs(),
         _ => 0.0,
@@ -222,9 +224,11 @@ fn settle_on_zeros(
     let mut h = vec![0.0; at.system.n_surfaces()];
     for _ in 0..NEWTON_STEPS {
         let components = Components::of(at, j, (t, &x))?;
-        at.system.surfaces(t, &x, signs, &mut h)?;
+        at.system.surfaces(&at.place_at(t, &x, signs), &mut h)?;
         let (mut values, mut rows) = (vec![h[j]], vec![0.0; n + 1]);
-        rows[n] = at.system.gradient(j, t, &x, signs, &mut rows[..n])?;
+        rows[n] = at
+            .system
+            .gradient(j, &at.place_at(t, &x, signs), &mut rows[..n])?;
         for share in shares {
             let (value, row) = components.mixture([1.0 - share, *share]);
             values.push(value);

@@ -57,13 +57,13 @@ impl Found {
     }
 }
 
-/// A scalar function of a user, g(t, x).
+/// A scalar function of a user, g(t, x), which may read the discrete states q.
 pub trait UserFunction {
     /// The value of g.
     ///
     /// # Errors
     /// If the function raises.
-    fn value(&self, t: f64, x: &[f64]) -> Result<f64, FieldError>;
+    fn value(&self, t: f64, x: &[f64], q: &[f64]) -> Result<f64, FieldError>;
 
     /// Does [`enclose`](Self::enclose) give bounds? Then steps may be long: no zero in them is lost.
     fn has_bounds(&self) -> bool {
@@ -72,14 +72,14 @@ pub trait UserFunction {
 
     /// Rigorous bounds of g and of its rate along a piece of motion; `None` if there are none, and zeros
     /// are then found by sampling.
-    fn enclose(&self, motion: &dyn Motion) -> Option<Enclosure> {
-        let _ = motion;
+    fn enclose(&self, motion: &dyn Motion, q: &[f64]) -> Option<Enclosure> {
+        let _ = (motion, q);
         None
     }
 }
 
 impl<F: Fn(f64, &[f64]) -> f64> UserFunction for F {
-    fn value(&self, t: f64, x: &[f64]) -> Result<f64, FieldError> {
+    fn value(&self, t: f64, x: &[f64], _: &[f64]) -> Result<f64, FieldError> {
         Ok(self(t, x))
     }
 }

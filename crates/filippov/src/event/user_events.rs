@@ -46,9 +46,9 @@ impl<'a> UserEvents<'a> {
     }
 
     /// Evaluates the functions at the start of a motion.
-    pub fn restart(&mut self, t: f64, x: &[f64]) -> Result<(), FieldError> {
+    pub fn restart(&mut self, t: f64, x: &[f64], q: &[f64]) -> Result<(), FieldError> {
         for (event, left) in self.events.iter().zip(&mut self.left) {
-            *left = event.function.value(t, x)?;
+            *left = event.function.value(t, x, q)?;
         }
         Ok(())
     }

@@ -18,7 +18,7 @@ use crate::status::Stop;
 use crate::switching::{decide as decide_at_surface, Arrival as SurfaceArrival};
 use crate::system::eval_on_side;
 use crate::system::Actions;
-use crate::system::{dot, surfaces_that_matter, PiecewiseSystem};
+use crate::system::{dot, surfaces_that_matter, PiecewiseSystem, Place, Setting};
 use crate::tolerances::{AT_SIDE, MOST_MEETING, SURFACE_NOISE};
 
 /// The kinds of point.
@@ -107,6 +107,8 @@ pub struct Inspection<'a> {
     pub kappa: &'a [f64],
     /// The mode of the motion that arrives at the point; `None` for a start.
     pub before: Option<&'a Mode>,
+    /// The discrete states; empty if the system has none.
+    pub q: &'a [f64],
 }
 
 /// Says what happens at a point: which surfaces vanish there, and in which modes a motion can follow. The decision is that of
@@ -145,11 +147,12 @@ pub fn classify(
     let (signs, sliding): (_, Vec<usize>) = (mode.signs(), mode.sliding_set().collect());
     let mut active = vec![false; signs.len()];
     system.active(&signs, &sliding, &mut active);
-    let residuals = residuals_within(system, t, x, how.reach, &signs)?;
-    let mut field = ModeField::of(system, law, mode);
+    let place = Setting::new(&signs, how.q).at(t, x);
+    let residuals = residuals_within(system, &place, how.reach)?;
+    let mut field = ModeField::of(system, law, mode, how.q);
     let mut velocity = vec![0.0; x.len()];
     let functions = match how.before {
-        Some(_) => vanishing_functions(system, (t, x), mode, &mut field, &residuals)?,
+        Some(_) => vanishing_functions(system, &place, mode, &mut field, &residuals)?,
         None => SmallVec::new(),
     };
     field.eval(t, &mut x.to_vec(), &mut velocity)?;
@@ -182,7 +185,7 @@ pub fn classify(
         scale: &scale,
         t,
         x,
-        q: &[],
+        q: how.q,
         arrival,
         policy,
         patience: Patience::endless(),
@@ -214,15 +217,16 @@ pub fn classify(
             (surfaces, reached.before.clone(), decision)
         }
     };
-    let Some(components) = components_around(system, (t, x), &around, &surfaces)? else {
+    let around_signs = around.signs();
+    let around = place.with_signs(&around_signs);
+    let Some(components) = components_around(system, &around, &surfaces)? else {
         return Ok(None);
     };
-    let mut found = describe(system, (t, x), law, decision, notes)?;
+    let mut found = describe(system, &place, law, decision, notes)?;
     found.kind = match *surfaces {
         [] => PointKind::Region,
         [j] => {
-            let start = SurfaceArrival::Start;
-            let sides = decide_at_surface(system, j, start, t, x, &around.signs())?;
+            let sides = decide_at_surface(system, j, SurfaceArrival::Start, &around)?;
             found.leading = Some([sides.minus, sides.plus]);
             PointKind::of(sides.minus, sides.plus)
         }
@@ -232,8 +236,8 @@ pub fn classify(
     Ok(Some(found))
 }
 
-/// The first surface whose entry in a mode contradicts the place: the mode slides on it and the place is not on it, or the
-/// place is on its other side. `reach` is that of an [`Inspection`].
+/// The first surface whose entry in the mode [`Inspection::before`] contradicts the place: the mode slides on it and the place
+/// is not on it, or the place is on its other side.
 ///
 /// # Errors
 /// If a function of the user raises.
@@ -241,17 +245,20 @@ pub fn contradicts(
     system: &dyn PiecewiseSystem,
     t: f64,
     x: &[f64],
-    mode: &Mode,
-    reach: f64,
+    how: Inspection,
 ) -> Result<Option<usize>, FieldError> {
+    let Some(mode) = how.before else {
+        return Ok(None);
+    };
     let (signs, sliding): (_, Vec<usize>) = (mode.signs(), mode.sliding_set().collect());
     let mut active = vec![false; signs.len()];
     system.active(&signs, &sliding, &mut active);
     let mut h = vec![0.0; signs.len()];
-    system.surfaces(t, x, &signs, &mut h)?;
-    let residuals = residuals_within(system, t, x, reach, &signs)?;
+    let place = Setting::new(&signs, how.q).at(t, x);
+    system.surfaces(&place, &mut h)?;
+    let residuals = residuals_within(system, &place, how.reach)?;
     for (j, &entry) in mode.entries().iter().enumerate() {
-        let noise = SURFACE_NOISE * system.surface_size(j, t, x, &signs)?;
+        let noise = SURFACE_NOISE * system.surface_size(j, &place)?;
         let reach = residuals.get(j).map_or(0.0, |residual| 2.0 * residual);
         let is_beyond = match entry {
             0 => h[j].abs() > noise.max(reach),
@@ -267,13 +274,12 @@ pub fn contradicts(
 /// The normal components of all fields around a place, if they are few; `None` if one is not finite.
 fn components_around(
     system: &dyn PiecewiseSystem,
-    (t, x): (f64, &[f64]),
-    mode: &Mode,
+    place: &Place<'_>,
     surfaces: &[usize],
 ) -> Result<Option<Vec<f64>>, FieldError> {
     if surfaces.is_empty() {
-        let mut field = vec![0.0; x.len()];
-        eval_on_side(system, t, x, &mode.signs(), &mut field)?;
+        let mut field = vec![0.0; place.x.len()];
+        eval_on_side(system, place, &mut field)?;
         let is_finite = field.iter().all(|v| v.is_finite());
         return Ok(is_finite.then(Vec::new));
     }
@@ -281,7 +287,7 @@ fn components_around(
         return Ok(Some(Vec::new()));
     }
     let mut corners = MeetingFields::new(system, surfaces);
-    corners.evaluate(system, t, x, &mode.signs())?;
+    corners.evaluate(system, place)?;
     let fields = corners.normal_fields();
     Ok(fields.ok().map(|fields| fields.values().into_owned()))
 }
@@ -290,17 +296,15 @@ fn components_around(
 /// twice as much.
 fn residuals_within(
     system: &dyn PiecewiseSystem,
-    t: f64,
-    x: &[f64],
+    place: &Place<'_>,
     reach: f64,
-    signs: &[f64],
 ) -> Result<Vec<f64>, FieldError> {
     if reach == 0.0 {
         return Ok(Vec::new());
     }
-    let mut gradient = vec![0.0; x.len()];
-    let residuals = (0..signs.len()).map(|j| {
-        system.gradient(j, t, x, signs, &mut gradient)?;
+    let mut gradient = vec![0.0; place.x.len()];
+    let residuals = (0..place.signs.len()).map(|j| {
+        system.gradient(j, place, &mut gradient)?;
         Ok(0.5 * reach * dot(&gradient, &gradient).sqrt())
     });
     residuals.collect()
@@ -309,21 +313,20 @@ fn residuals_within(
 /// The functions of a motion in this mode that vanish at a place: switching functions, and exit functions.
 fn vanishing_functions(
     system: &dyn PiecewiseSystem,
-    (t, x): (f64, &[f64]),
+    place: &Place<'_>,
     mode: &Mode,
     field: &mut ModeField,
     residuals: &[f64],
 ) -> Result<SmallVec<[Guard; 4]>, FieldError> {
-    let signs = mode.signs();
-    let mut h = vec![0.0; signs.len()];
-    system.surfaces(t, x, &signs, &mut h)?;
+    let mut h = vec![0.0; place.signs.len()];
+    system.surfaces(place, &mut h)?;
     let mut found = SmallVec::new();
     for (j, residual) in residuals.iter().enumerate() {
         if mode.entries()[j] != 0 && h[j].abs() <= 2.0 * residual {
             found.push(Guard::Surface(j));
         }
     }
-    let exits = field.exits(t, &mut x.to_vec())?;
+    let exits = field.exits(place.t, &mut place.x.to_vec())?;
     let size = exits
         .iter()
         .fold(0.0_f64, |size, exit| size.max(exit.abs()));
@@ -336,7 +339,7 @@ fn vanishing_functions(
 /// A decision in the words of a classification.
 fn describe(
     system: &dyn PiecewiseSystem,
-    (t, x): (f64, &[f64]),
+    place: &Place<'_>,
     law: Law,
     decision: Decision,
     notes: Notes,
@@ -374,8 +377,8 @@ fn describe(
         0 => Vec::new(),
         m if m == next.multipliers().len() => next.multipliers().to_vec(),
         _ => {
-            let mut field = ModeField::of(system, law, &next.mode);
-            field.exits_at(t, &mut x.to_vec())?;
+            let mut field = ModeField::of(system, law, &next.mode, place.q);
+            field.exits_at(place.t, &mut place.x.to_vec())?;
             field.multipliers().into_vec()
         }
     };

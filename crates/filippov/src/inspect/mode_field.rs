@@ -3,7 +3,7 @@
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::{IntersectionField, Motion, SmoothField};
-use crate::system::PiecewiseSystem;
+use crate::system::{PiecewiseSystem, Setting};
 
 /// The sliding field of an intersection at a point.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,7 +14,8 @@ pub struct IntersectionValue {
     pub multipliers: Vec<f64>,
 }
 
-/// The field of a mode with two and more zero entries, at the projection of `x` onto the intersection.
+/// The field of a mode with two and more zero entries, at the projection of `x` onto the intersection, at the discrete
+/// states `q`.
 ///
 /// `near` holds multipliers from which those of the mode are found by Newton's method, where there are
 /// three surfaces and more; if it is empty, they are those of the only stable root. `None` if no multipliers
@@ -25,13 +26,14 @@ pub struct IntersectionValue {
 /// If a function of the user raises.
 pub fn intersection_field(
     system: &dyn PiecewiseSystem,
-    t: f64,
-    x: &[f64],
+    (t, x): (f64, &[f64]),
+    q: &[f64],
     mode: &Mode,
     near: &[f64],
 ) -> Result<Option<IntersectionValue>, FieldError> {
     let set: Vec<usize> = mode.sliding_set().collect();
-    let mut field = IntersectionField::new(system, &set, &mode.signs(), near);
+    let signs = mode.signs();
+    let mut field = IntersectionField::new(system, &set, Setting::new(&signs, q), near);
     let mut dx = vec![0.0; x.len()];
     field.eval(t, &mut x.to_vec(), &mut dx)?;
     let multipliers = field.multipliers().to_vec();

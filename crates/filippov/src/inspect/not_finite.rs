@@ -2,7 +2,7 @@
 
 use crate::mode::Mode;
 use crate::system::eval_on_side;
-use crate::system::PiecewiseSystem;
+use crate::system::{PiecewiseSystem, Setting};
 
 /// Points at which the field is looked at beyond the last time: by the rounding of time, and 16 times further each.
 const LOOKS: i32 = 8;
@@ -42,7 +42,7 @@ pub fn state_text(x: &[f64]) -> String {
     format!("[{}{rest}]", shown.join(", "))
 }
 
-/// What is not finite at the end (t, x) of a run in `mode`, or just after it; `None` if that is not found.
+/// What is not finite at the end (t, x) of a run in `mode` with the discrete states `q`, or just after it; `None` if that is not found.
 ///
 /// A heuristic for messages: the motion is followed for a moment along the tangent, as long as it stays in its
 /// region. Functions of the user that raise there are passed over.
@@ -50,6 +50,7 @@ pub fn not_finite(
     system: &dyn PiecewiseSystem,
     t: f64,
     x: &[f64],
+    q: &[f64],
     mode: &Mode,
 ) -> Option<NotFinitePlace> {
     let upper = mode.signs();
@@ -63,7 +64,8 @@ pub fn not_finite(
     for reach in std::iter::once(0.0).chain(reaches) {
         let there: Vec<f64> = x.iter().zip(&rate).map(|(x, v)| x + reach * v).collect();
         let mut h = vec![0.0; system.n_surfaces()];
-        system.surfaces(t + reach, &there, &upper, &mut h).ok()?;
+        let place = Setting::new(&upper, q).at(t + reach, &there);
+        system.surfaces(&place, &mut h).ok()?;
         let mut found = NotFinitePlace {
             t: t + reach,
             x: there,
@@ -76,7 +78,8 @@ pub fn not_finite(
         }
         for signs in [&upper, &lower] {
             let mut dx = vec![0.0; x.len()];
-            eval_on_side(system, found.t, &found.x, signs, &mut dx).ok()?;
+            let place = Setting::new(signs, q).at(found.t, &found.x);
+            eval_on_side(system, &place, &mut dx).ok()?;
             for entry in bad(&dx) {
                 if found.components.iter().all(|(i, _)| *i != entry.0) {
                     found.components.push(entry);

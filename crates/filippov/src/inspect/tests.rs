@@ -73,7 +73,8 @@ fn kinds_of_points() {
 #[test]
 fn field_of_an_intersection() {
     let (system, mode) = (relays([0.5, 1.0]), Mode::new(vec![0, 0]));
-    let value = intersection_field(&system, 0.0, &[0.0; 3], &mode, &[]).expect("does not raise");
+    let value =
+        intersection_field(&system, (0.0, &[0.0; 3]), &[], &mode, &[]).expect("does not raise");
     let value = value.expect("slides");
     assert_eq!(value.multipliers, [0.25, 0.5]);
     assert_eq!(value.dx, [0.0, 0.0, 1.0 - 0.125]);

@@ -352,7 +352,9 @@ impl<'a> Integrator<'a> {
         self.detector.measure(&self.run, start)?;
         self.detector
             .accept_start(&mut self.run.motion.monitored, multiple);
-        self.recorder.user_events.restart(self.run.t, &self.run.x)?;
+        let run = &self.run;
+        let q = &run.motion.discrete;
+        self.recorder.user_events.restart(run.t, &run.x, q)?;
         let surfaces = left.iter().filter_map(|l| Some((l.surface()?, l.leading)));
         self.control
             .begin(&mut self.run, &self.stepper, self.t_end, surfaces)?;
@@ -406,9 +408,9 @@ impl<'a> Integrator<'a> {
         if self.stepper.start(run) {
             // Known.
         } else if let ModeField::Region(_) = &run.motion.field {
-            let (signs, derivative) = (&run.motion.signs, self.stepper.start_derivative_mut());
-            run.stats.n_field_evaluations +=
-                eval_on_side(run.system, run.t, &run.x, signs, derivative)?;
+            let place = run.motion.setting().at(run.t, &run.x);
+            let derivative = self.stepper.start_derivative_mut();
+            run.stats.n_field_evaluations += eval_on_side(run.system, &place, derivative)?;
         } else {
             let derivative = self.stepper.start_derivative_mut();
             run.motion.field.eval(run.t, &mut run.x, derivative)?;
@@ -465,7 +467,6 @@ impl<'a> Integrator<'a> {
     /// A start with actions: those of this time, and those whose surface the motion leads through from here.
     #[cold]
     pub(super) fn start_with_actions(&mut self) -> Result<Option<Stop>, FieldError> {
-        self.run.system.set_discrete(&self.run.motion.discrete);
         let Some(Sides {
             mut mode,
             on_surface,
@@ -768,12 +769,10 @@ impl<'a> Integrator<'a> {
             if m.value.abs().max(end.abs()) > noise {
                 continue;
             }
-            let signs = self.run.motion.signs.clone();
             self.stepper.interpolant().at(0.5, &mut self.detector.x);
             let (middle, h) = (0.5 * (self.run.t + t1), &mut self.detector.h);
-            self.run
-                .system
-                .surfaces(middle, &self.detector.x, &signs, h)?;
+            let place = self.run.motion.setting().at(middle, &self.detector.x);
+            self.run.system.surfaces(&place, h)?;
             if h[j].abs() <= noise
                 && !is_named(&self.warnings, j)
                 && !self.run.motion.settled.contains(&j)
@@ -787,9 +786,10 @@ impl<'a> Integrator<'a> {
     /// Goes on from a point at which h_j has become zero. If the fields hold the motion on the surface, it stays there: a field
     /// with a root of the distance brings it to rest so. Beside the surface the motion would follow the root of rounding.
     pub(super) fn settle_on(&mut self, j: usize) -> Result<Option<Stop>, FieldError> {
-        let signs = self.run.motion.signs.clone();
-        let mut projector = Projector::new(self.run.x.len(), signs.len());
-        projector.project(self.run.system, j, self.run.t, &mut self.run.x, &signs)?;
+        let run = &mut self.run;
+        let mut projector = Projector::new(run.x.len(), run.motion.signs.len());
+        let setting = run.motion.setting();
+        projector.project(run.system, j, run.t, &mut run.x, setting)?;
         let stop = self.go_on_from_here(&[])?;
         if !self.run.motion.sliding().contains(&j) {
             if !self.run.motion.resting.contains(&j) {

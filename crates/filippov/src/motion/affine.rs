@@ -4,7 +4,7 @@ use super::canopy::root_ends;
 use crate::cube::{solve_relay, Matrix, RelayProblem, SharedLoad, SharedLoads};
 use crate::error::FieldError;
 use crate::sparse::SparseRows;
-use crate::system::{AffineParts, AffineSigns, PiecewiseSystem};
+use crate::system::{AffineParts, AffineSigns, OwnSetting, PiecewiseSystem, Setting};
 use crate::tolerances::{MOST_MEETING, SURFACE_NOISE};
 
 /// Sweeps over all surfaces of a projection; gradients that are orthogonal need one.
@@ -15,7 +15,7 @@ pub struct AffineLaw<'a> {
     system: &'a dyn AffineSigns,
     parts: AffineParts,
     /// The signs of the last evaluation: those of the mode, with the multipliers last found.
-    signs: Vec<f64>,
+    setting: OwnSetting,
     h: Vec<f64>,
     /// The scaling of the surfaces, for the stability of the root of three and more.
     kappa: Vec<f64>,
@@ -34,17 +34,21 @@ pub struct AffineLaw<'a> {
 
 impl<'a> AffineLaw<'a> {
     /// The law for these surfaces; `None` if the field is not affine in their signs.
-    pub fn new(system: &'a dyn PiecewiseSystem, set: &[usize], signs: &[f64]) -> Option<Self> {
+    pub fn new(
+        system: &'a dyn PiecewiseSystem,
+        set: &[usize],
+        setting: Setting<'_>,
+    ) -> Option<Self> {
         let affine = system.affine_signs()?;
-        let mut signs = signs.to_vec();
-        set.iter().for_each(|&j| signs[j] = 0.0);
+        let mut setting = OwnSetting::new(setting);
+        set.iter().for_each(|&j| setting.signs[j] = 0.0);
         let parts = affine.affine_parts(set)?;
         Some(AffineLaw {
             system: affine,
             is_orthogonal: has_disjoint_rows(&parts.gradients),
             parts,
             known_ends: None,
-            signs,
+            setting,
             h: vec![0.0; system.n_surfaces()],
             kappa: vec![1.0; set.len()],
             sizes: None,
@@ -65,13 +69,18 @@ impl<'a> AffineLaw<'a> {
         self.known_ends = None;
     }
 
+    /// Takes over the discrete states that an action left.
+    pub(super) fn set_discrete(&mut self, q: &[f64]) {
+        self.setting.set_discrete(q);
+    }
+
     /// Writes the sliding field at (t, x); NaN, also in the multipliers, where it is not determined. Returns the
     /// number of evaluations of the right-hand side.
     ///
     /// # Errors
     /// If a function of the user raises.
     pub fn eval(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<u64, FieldError> {
-        let evaluations = self.parts.evaluate(self.system, t, x, &self.signs)?;
+        let evaluations = self.parts.evaluate(self.system, &self.setting.at(t, x))?;
         self.shared = None;
         if self.parts.slide(dx).is_ok() {
             self.multipliers.copy_from_slice(self.parts.multipliers());
@@ -80,7 +89,7 @@ impl<'a> AffineLaw<'a> {
         }
         for (&j, &lambda) in self.parts.surfaces().iter().zip(&self.multipliers) {
             // The nearer the evaluation is to the multipliers, the less cancels.
-            self.signs[j] = if lambda.is_finite() { lambda } else { 0.0 };
+            self.setting.signs[j] = if lambda.is_finite() { lambda } else { 0.0 };
         }
         Ok(evaluations)
     }
@@ -89,7 +98,7 @@ impl<'a> AffineLaw<'a> {
     /// field; those of least norm may be outside of [-1, 1] while others are inside.
     fn share(&mut self, dx: &mut [f64]) {
         let surfaces = self.parts.surfaces();
-        let here: Vec<f64> = surfaces.iter().map(|&j| self.signs[j]).collect();
+        let here: Vec<f64> = surfaces.iter().map(|&j| self.setting.signs[j]).collect();
         let normal = self.parts.normal();
         if self
             .loads
@@ -187,7 +196,12 @@ impl<'a> AffineLaw<'a> {
     ///
     /// # Errors
     /// If a function of the user raises.
-    pub fn project(&mut self, t: f64, x: &mut [f64], signs: &[f64]) -> Result<(), FieldError> {
+    pub fn project(
+        &mut self,
+        t: f64,
+        x: &mut [f64],
+        setting: Setting<'_>,
+    ) -> Result<(), FieldError> {
         // The second sweep takes away what rounding left.
         let most = if self.projects_at_once() {
             2
@@ -195,7 +209,7 @@ impl<'a> AffineLaw<'a> {
             MOST_SWEEPS
         };
         for _ in 0..most {
-            self.system.surfaces(t, x, signs, &mut self.h)?;
+            self.system.surfaces(&setting.at(t, x), &mut self.h)?;
             let mut is_near = true;
             let gradients = &self.parts.gradients;
             // Moves of earlier rows change h of later ones: to first order by their common states.

@@ -7,7 +7,7 @@ use filippov_expr::{Interval, Motion};
 use crate::cube::{IntervalVector, Vector};
 use crate::mode::Signs;
 use crate::sparse::{SparseRows, SparseSolver};
-use crate::system::AffineSigns;
+use crate::system::{AffineSigns, Setting};
 
 /// What bounds the multipliers of a mode where gradients and N = grad h B are constant.
 ///
@@ -57,16 +57,16 @@ impl AffineBounds {
         affine: &dyn AffineSigns,
         set: &[usize],
         motion: &dyn Motion,
-        signs: &[f64],
+        setting: Setting<'_>,
         near: &[f64],
     ) -> Option<EnclosedMultipliers> {
-        let mut signs = Signs::from_slice(signs);
+        let mut signs = Signs::from_slice(setting.signs);
         for (&j, &lambda) in set.iter().zip(near) {
             signs[j] = lambda;
         }
         let (mut values, mut rates) = (IntervalVector::new(), IntervalVector::new());
         for &j in set {
-            let enclosure = affine.enclose_rate(j, motion, &signs)?;
+            let enclosure = affine.enclose_rate(j, motion, setting.with_signs(&signs))?;
             values.push(enclosure.value);
             rates.push(enclosure.rate);
         }
@@ -112,7 +112,7 @@ mod tests {
     use filippov_expr::{Backend, Enclosure, Graph, Interval, Motion, Names};
 
     use super::AffineBounds;
-    use crate::system::{AffineSigns, PiecewiseSystem, TracedSystem};
+    use crate::system::{AffineSigns, PiecewiseSystem, Place, Setting, TracedSystem};
 
     /// Three belts that pull at one another: v_i' = sin(t + i) + x_i^2 - sign(v_i) - 0.3 sum of the other signs.
     fn belts() -> TracedSystem {
@@ -166,7 +166,9 @@ mod tests {
 
     fn multipliers(affine: &dyn AffineSigns, t: f64) -> Vec<f64> {
         let mut parts = affine.affine_parts(&[0, 1, 2]).unwrap();
-        parts.evaluate(affine, t, &state(t), &[0.0; 3]).unwrap();
+        parts
+            .evaluate(affine, &Place::new(t, &state(t), &[0.0; 3]))
+            .unwrap();
         assert!(parts.is_settled());
         parts.slide(&mut [0.0; 6]).unwrap();
         parts.multipliers().to_vec()
@@ -177,14 +179,16 @@ mod tests {
         let system = belts();
         let affine = system.affine_signs().unwrap();
         let mut parts = affine.affine_parts(&[0, 1, 2]).unwrap();
-        parts.evaluate(affine, 0.0, &state(0.0), &[0.0; 3]).unwrap();
+        parts
+            .evaluate(affine, &Place::new(0.0, &state(0.0), &[0.0; 3]))
+            .unwrap();
         let bounds = AffineBounds::new(parts.normal()).unwrap();
         let (set, signs) = ([0, 1, 2], [1.0; 3]);
         for (from, to) in [(0.0, 0.4), (0.3, 0.31), (1.0, 1.7)] {
             let near = multipliers(affine, 0.5 * (from + to));
             let motion = Straight(from, to);
             let found = bounds
-                .enclose(affine, &set, &motion, &signs, &near)
+                .enclose(affine, &set, &motion, Setting::of_signs(&signs), &near)
                 .unwrap();
             for k in 0..=20 {
                 let t = from + (to - from) * f64::from(k) / 20.0;

@@ -8,7 +8,7 @@ use super::{ContactField, IntersectionField, Motion, RegionField, SlidingField, 
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::options::{Options, SlidingRule};
-use crate::system::PiecewiseSystem;
+use crate::system::{PiecewiseSystem, Setting};
 
 /// The motion of a mode, whatever its kind.
 pub(crate) enum ModeField<'a> {
@@ -51,10 +51,10 @@ impl Law<'_> {
 pub(crate) type SlidingSet = SmallVec<[usize; 4]>;
 
 impl<'a> ModeField<'a> {
-    /// The field of a mode without contact.
-    pub fn of(system: &'a dyn PiecewiseSystem, law: Law<'a>, mode: &Mode) -> Self {
+    /// The field of a mode without contact, at these discrete states.
+    pub fn of(system: &'a dyn PiecewiseSystem, law: Law<'a>, mode: &Mode, q: &[f64]) -> Self {
         let sliding: SlidingSet = mode.sliding_set().collect();
-        ModeField::new(system, law, &sliding, &mode.signs())
+        ModeField::new(system, law, &sliding, Setting::new(&mode.signs(), q))
     }
 
     /// How far from zero a guard with this index may be by rounding, at the last evaluation, where that is known.
@@ -69,16 +69,16 @@ impl<'a> ModeField<'a> {
         system: &'a dyn PiecewiseSystem,
         law: Law<'a>,
         sliding: &[usize],
-        signs: &[f64],
+        setting: Setting<'_>,
     ) -> Self {
         match *sliding {
-            [] => ModeField::Region(RegionField::new(system, signs)),
+            [] => ModeField::Region(RegionField::new(system, setting)),
             [j] => {
-                let field = SlidingField::new(system, j, signs);
+                let field = SlidingField::new(system, j, setting);
                 ModeField::Sliding(Box::new(field.with_restoring(law.restoring)))
             }
             _ => {
-                let field = IntersectionField::new(system, sliding, signs, &[]);
+                let field = IntersectionField::new(system, sliding, setting, &[]);
                 let field = field.with_rule(law.rule).with_restoring(law.restoring);
                 ModeField::Intersection(Box::new(field.with_scaling(&law.scaling(sliding))))
             }
@@ -86,13 +86,25 @@ impl<'a> ModeField<'a> {
     }
 
     /// Becomes the field of another mode of its kind; `false` if it is of another kind.
-    pub(crate) fn restart(&mut self, sliding: &[usize], signs: &[f64]) -> bool {
+    pub(crate) fn restart(&mut self, sliding: &[usize], setting: Setting<'_>) -> bool {
         match (self, sliding) {
-            (ModeField::Region(field), []) => field.restart(signs),
-            (ModeField::Sliding(field), &[j]) => field.restart(j, signs),
+            (ModeField::Region(field), []) => field.restart(setting),
+            (ModeField::Sliding(field), &[j]) => field.restart(j, setting),
             _ => return false,
         }
         true
+    }
+}
+
+impl ModeField<'_> {
+    /// Takes over the discrete states that an action left.
+    pub(crate) fn set_discrete(&mut self, q: &[f64]) {
+        match self {
+            ModeField::Region(field) => field.set_discrete(q),
+            ModeField::Sliding(field) => field.set_discrete(q),
+            ModeField::Intersection(field) => field.set_discrete(q),
+            ModeField::Contact(field) => field.set_discrete(q),
+        }
     }
 }
 

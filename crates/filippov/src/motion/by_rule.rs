@@ -7,7 +7,7 @@ use crate::cube::NormalFields;
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::options::SlidingRule;
-use crate::system::PiecewiseSystem;
+use crate::system::{PiecewiseSystem, Place};
 
 /// The combination of the 2^m fields that a rule chooses, with lambda_j = sum over k of w_k k_j.
 ///
@@ -45,20 +45,19 @@ impl RuleLaw {
         &self.exits
     }
 
-    /// Finds the multipliers at (t, x) and writes the field; leaves no multipliers where the rule gives none.
+    /// Finds the multipliers at a place and writes the field; leaves no multipliers where the rule gives none.
     /// Returns the number of evaluations of the right-hand side.
     ///
     /// # Errors
     /// If a function of the user raises.
     pub fn eval(
         &mut self,
-        (system, signs): (&dyn PiecewiseSystem, &[f64]),
-        t: f64,
-        x: &[f64],
+        system: &dyn PiecewiseSystem,
+        place: &Place<'_>,
         lambda: &mut Vec<f64>,
         dx: &mut [f64],
     ) -> Result<u64, FieldError> {
-        let evaluations = self.fields.evaluate(system, t, x, signs)?;
+        let evaluations = self.fields.evaluate(system, place)?;
         match self.solve() {
             Some(found) => {
                 *lambda = found;

@@ -8,7 +8,7 @@ use crate::cube::{
 };
 use crate::error::FieldError;
 use crate::patience::Patience;
-use crate::system::PiecewiseSystem;
+use crate::system::{PiecewiseSystem, Place};
 use crate::tolerances::TRACKED_CHANGE;
 
 /// The canopy of the 2^m fields around an intersection, and the root that the motion follows.
@@ -44,11 +44,9 @@ impl Canopy {
     pub fn evaluate(
         &mut self,
         system: &dyn PiecewiseSystem,
-        t: f64,
-        x: &[f64],
-        signs: &[f64],
+        place: &Place<'_>,
     ) -> Result<u64, FieldError> {
-        self.fields.evaluate(system, t, x, signs)
+        self.fields.evaluate(system, place)
     }
 
     /// Are all fields finite that were evaluated last?

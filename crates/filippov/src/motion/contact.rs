@@ -6,9 +6,9 @@ use super::guard::Guards;
 use super::{Guard, Motion, SmoothField};
 use crate::cube::{is_scaling_stable, Matrix};
 use crate::error::FieldError;
-use crate::mode::{Mode, Signs};
+use crate::mode::Mode;
 use crate::system::Actions;
-use crate::system::{dot, eval_on_side, PiecewiseSystem};
+use crate::system::{dot, eval_on_side, OwnSetting, PiecewiseSystem, Setting};
 use crate::tolerances::{DOUBTFUL, NO_FORCE, NO_IMPULSE, SURFACE_NOISE};
 
 /// The field of contact,
@@ -27,8 +27,7 @@ pub struct ContactField<'a> {
     /// The surfaces in contact, each with the side (+1 or -1) on which the body is free.
     contacts: Vec<(usize, f64)>,
     sliding: Vec<usize>,
-    signs: Signs,
-    discrete: Vec<f64>,
+    setting: OwnSetting,
     n_evaluations: u64,
     /// nu, then mu, of the last evaluation.
     multipliers: Vec<f64>,
@@ -69,8 +68,7 @@ impl<'a> ContactField<'a> {
             actions,
             contacts,
             sliding,
-            signs,
-            discrete: discrete.to_vec(),
+            setting: OwnSetting::new(Setting::new(&signs, discrete)),
             n_evaluations: 0,
             multipliers: Vec::new(),
             coupling: Matrix::zeros(0),
@@ -78,6 +76,11 @@ impl<'a> ContactField<'a> {
             ratios: Vec::new(),
             exits: Vec::new(),
         })
+    }
+
+    /// Takes over the discrete states that an action left.
+    pub(super) fn set_discrete(&mut self, q: &[f64]) {
+        self.setting.set_discrete(q);
     }
 
     /// The surfaces in contact.
@@ -123,7 +126,8 @@ impl<'a> ContactField<'a> {
             let mut w = vec![0.0; x.len()];
             if let Some(action) = self.actions.from_side(j, if side < 0.0 { -1 } else { 1 }) {
                 let map = action.map;
-                map.impulse(t, x, row, &self.signs, &self.discrete, &mut w)?;
+                let Setting { signs, q } = self.setting.get();
+                map.impulse(t, x, row, signs, q, &mut w)?;
             }
             let strength = dot(row, &w);
             let size = (dot(row, row) * dot(&w, &w)).sqrt();
@@ -141,15 +145,17 @@ impl<'a> ContactField<'a> {
     /// The field where every surface slid on has the sign -1, and its changes to the other side of each.
     fn sides(&mut self, t: f64, x: &[f64]) -> Result<(Vec<f64>, Vec<Vec<f64>>), FieldError> {
         let n = x.len();
-        let mut signs = self.signs.clone();
+        let mut signs = self.setting.signs.clone();
+        let place = self.setting.at(t, x);
         self.sliding.iter().for_each(|&j| signs[j] = -1.0);
         let mut base = vec![0.0; n];
-        self.n_evaluations += eval_on_side(self.system, t, x, &signs, &mut base)?;
+        self.n_evaluations += eval_on_side(self.system, &place.with_signs(&signs), &mut base)?;
         let mut changes = Vec::with_capacity(self.sliding.len());
         for &j in &self.sliding {
             signs[j] = 1.0;
             let mut change = vec![0.0; n];
-            self.n_evaluations += eval_on_side(self.system, t, x, &signs, &mut change)?;
+            self.n_evaluations +=
+                eval_on_side(self.system, &place.with_signs(&signs), &mut change)?;
             signs[j] = -1.0;
             change.iter_mut().zip(&base).for_each(|(c, b)| *c -= b);
             changes.push(change);
@@ -198,14 +204,16 @@ impl Motion for ContactField<'_> {
             .chain(self.sliding.iter().copied())
             .collect();
         let mut projector = super::Projector::new(x.len(), self.system.n_surfaces());
-        projector.project_onto(self.system, &set, t, x, &self.signs)?;
+        projector.project_onto(self.system, &set, t, x, self.setting.get())?;
         let n = x.len();
         for _ in 0..2 {
             let (mut rows, mut rates) = (Vec::new(), Vec::new());
             let mut is_still = true;
             for &(j, _) in &self.contacts {
                 let mut row = vec![0.0; n];
-                let rate = self.system.rate_gradient(j, t, x, &self.signs, &mut row)?;
+                let rate = self
+                    .system
+                    .rate_gradient(j, &self.setting.at(t, x), &mut row)?;
                 is_still &= rate.rate.abs() <= SURFACE_NOISE * rate.magnitude;
                 rates.push(rate.rate);
                 rows.push(row);
@@ -234,7 +242,9 @@ impl SmoothField for ContactField<'_> {
         self.noise.clear();
         for &(j, _) in &self.contacts {
             let mut row = vec![0.0; n];
-            let rate = self.system.rate_gradient(j, t, x, &self.signs, &mut row)?;
+            let rate = self
+                .system
+                .rate_gradient(j, &self.setting.at(t, x), &mut row)?;
             rates.push(-(rate.time + dot(&row, &base)));
             let size = rate.time.abs() + (dot(&row, &row) * dot(&base, &base)).sqrt();
             self.noise.push(NO_FORCE * size);
@@ -243,14 +253,14 @@ impl SmoothField for ContactField<'_> {
         let mut directions = self.impulses(t, x, &rows)?;
         for &j in &self.sliding {
             let mut row = vec![0.0; n];
-            let time = self.system.gradient(j, t, x, &self.signs, &mut row)?;
+            let time = self.system.gradient(j, &self.setting.at(t, x), &mut row)?;
             rates.push(-(time + dot(&row, &base)));
             rows.push(row);
         }
         directions.extend(changes);
         let ratios = self.sliding.iter();
         self.ratios = ratios
-            .map(|&j| self.system.stick_ratio(j, t, x, &self.signs))
+            .map(|&j| self.system.stick_ratio(j, &self.setting.at(t, x)))
             .collect();
         self.coupling = gram(&rows, &directions);
         self.multipliers = match self.coupling.solve(&rates) {

@@ -11,7 +11,7 @@ use crate::error::FieldError;
 use crate::mode::{Mode, Signs};
 use crate::options::SlidingRule;
 use crate::system::Actions;
-use crate::system::{MotionJets, PiecewiseSystem};
+use crate::system::{MotionJets, PiecewiseSystem, Setting};
 
 /// Modes that are remembered: in a run that meets more of them, what follows from a mode is found anew now and then.
 const MOST_KNOWN: usize = 8;
@@ -75,10 +75,11 @@ impl<'a> CurrentMotion<'a> {
         actions: &'a Actions<'a>,
     ) -> Self {
         let (signs, sliding): (_, SlidingSet) = (mode.signs(), mode.sliding_set().collect());
+        let setting = Setting::new(&signs, &actions.discrete);
         let mut motion = CurrentMotion {
             t_start,
             active: SmallVec::new(),
-            field: ModeField::new(system, law, &sliding, &signs),
+            field: ModeField::new(system, law, &sliding, setting),
             affine_bounds: None,
             is_straight: sliding.iter().all(|&j| system.is_affine(j)),
             sliding,
@@ -136,22 +137,34 @@ impl<'a> CurrentMotion<'a> {
     /// Makes the field that of the mode.
     #[inline(always)]
     fn restart_field(&mut self, system: &'a dyn PiecewiseSystem) {
-        let (sliding, signs) = (&self.sliding, &self.signs);
+        let sliding = &self.sliding;
         if !self.actions.list.is_empty() && !sliding.is_empty() {
             let (mode, sides, q) = (&self.mode, &self.sides, &self.discrete);
             if let Some(contact) = ContactField::new(system, self.actions, mode, sides, q) {
                 return self.replace_field(ModeField::Contact(Box::new(contact)));
             }
         }
-        if self.field.restart(sliding, signs) {
+        let setting = Setting::new(&self.signs, &self.discrete);
+        if self.field.restart(sliding, setting) {
             return;
         }
         let mut idle = self.idle.iter_mut();
-        let field = match idle.position(|field| field.restart(sliding, signs)) {
+        let field = match idle.position(|field| field.restart(sliding, setting)) {
             Some(index) => self.idle.swap_remove(index),
-            None => ModeField::new(system, self.law, sliding, signs),
+            None => ModeField::new(system, self.law, sliding, setting),
         };
         self.replace_field(field);
+    }
+
+    /// The signs handed to the field, and the discrete states.
+    pub fn setting(&self) -> Setting<'_> {
+        Setting::new(&self.signs, &self.discrete)
+    }
+
+    /// An action has changed the discrete states.
+    pub fn set_discrete(&mut self, q: Vec<f64>) {
+        self.field.set_discrete(&q);
+        self.discrete = q;
     }
 
     /// Takes another field and keeps the one before, if it can be used again.

@@ -12,7 +12,7 @@ use crate::mode::Mode;
 use crate::options::SlidingRule;
 use crate::patience::Patience;
 use crate::sparse::SparseRows;
-use crate::system::PiecewiseSystem;
+use crate::system::{OwnSetting, PiecewiseSystem, Setting};
 use crate::tolerances::{HELD_AFTER, JUST_AFTER, MOST_MEETING, MOST_TRACKED};
 
 /// Filippov's field on an intersection of m >= 2 surfaces: the multilinear combination ("canopy") of the
@@ -28,7 +28,7 @@ use crate::tolerances::{HELD_AFTER, JUST_AFTER, MOST_MEETING, MOST_TRACKED};
 pub struct IntersectionField<'a> {
     system: &'a dyn PiecewiseSystem,
     set: Vec<usize>,
-    signs: Vec<f64>,
+    setting: OwnSetting,
     affine: Option<AffineLaw<'a>>,
     canopy: Option<Canopy>,
     /// Another combination of the fields, if that was chosen.
@@ -56,16 +56,16 @@ pub struct IntersectionField<'a> {
 }
 
 impl<'a> IntersectionField<'a> {
-    /// Sliding on the surfaces of `set`, the others with the given signs; the multipliers are tracked from
+    /// Sliding on the surfaces of `set`, the others with the given signs, at these discrete states; the multipliers are tracked from
     /// `lambda`, or found anew if that is empty. If the signs of more than [`MOST_MEETING`] of them multiply one
     /// another there are no multipliers.
     pub fn new(
         system: &'a dyn PiecewiseSystem,
         set: &[usize],
-        signs: &[f64],
+        setting: Setting<'_>,
         lambda: &[f64],
     ) -> Self {
-        let affine = AffineLaw::new(system, set, signs);
+        let affine = AffineLaw::new(system, set, setting);
         // Its space grows as the square of the number of surfaces: where there are many, only what needs it has it.
         let has_canopy = match affine {
             Some(_) => set.len() <= MOST_MEETING,
@@ -77,7 +77,7 @@ impl<'a> IntersectionField<'a> {
         IntersectionField {
             system,
             set: set.to_vec(),
-            signs: signs.to_vec(),
+            setting: OwnSetting::new(setting),
             affine,
             canopy: has_canopy.then(|| Canopy::new(system, set)),
             by_rule: None,
@@ -138,6 +138,14 @@ impl<'a> IntersectionField<'a> {
             canopy.set_scaling(kappa);
         }
         self
+    }
+
+    /// Takes over the discrete states that an action left.
+    pub(super) fn set_discrete(&mut self, q: &[f64]) {
+        self.setting.set_discrete(q);
+        if let Some(law) = &mut self.affine {
+            law.set_discrete(q);
+        }
     }
 
     /// Begins a motion: its multipliers are tracked from these, if there are any. `oscillates` says that the
@@ -248,8 +256,8 @@ impl<'a> IntersectionField<'a> {
             return self.solve_start(t, x, dx);
         }
         if let Some(law) = &mut self.by_rule {
-            let evaluated = (self.system, &self.signs[..]);
-            self.n_evaluations += law.eval(evaluated, t, x, &mut self.lambda, dx)?;
+            let place = self.setting.at(t, x);
+            self.n_evaluations += law.eval(self.system, &place, &mut self.lambda, dx)?;
             self.exits.copy_from_slice(law.exits());
             return Ok(());
         }
@@ -265,7 +273,7 @@ impl<'a> IntersectionField<'a> {
         }
         let found = match &mut self.canopy {
             Some(canopy) => {
-                self.n_evaluations += canopy.evaluate(self.system, t, x, &self.signs)?;
+                self.n_evaluations += canopy.evaluate(self.system, &self.setting.at(t, x))?;
                 canopy.solve(
                     &by_distance(&self.tracked, t),
                     &mut self.oscillates,
@@ -300,7 +308,7 @@ impl<'a> IntersectionField<'a> {
             return Ok(());
         };
         let mut around = MeetingFields::new(self.system, &self.set);
-        self.n_evaluations += around.evaluate(self.system, t, x, &self.signs)?;
+        self.n_evaluations += around.evaluate(self.system, &self.setting.at(t, x))?;
         let mut weights = Vec::new();
         around.fill_product_weights(&lambda, &mut weights);
         around.combine(&weights, dx);
@@ -372,11 +380,13 @@ impl Motion for IntersectionField<'_> {
             Some(law)
                 if self.set.len() > MOST_MEETING || law.is_shared() || law.projects_at_once() =>
             {
-                law.project(t, x, &self.signs)
+                law.project(t, x, self.setting.get())
             }
-            _ => self
-                .projector
-                .project_onto(self.system, &self.set, t, x, &self.signs),
+            _ => {
+                let setting = self.setting.get();
+                self.projector
+                    .project_onto(self.system, &self.set, t, x, setting)
+            }
         }
     }
 }
@@ -388,7 +398,7 @@ impl SmoothField for IntersectionField<'_> {
         if let Some(factor) = self.restoring {
             let term = (&self.set[..], factor);
             self.projector
-                .pull_back(self.system, term, (t, x), &self.signs, dx)?;
+                .pull_back(self.system, term, &self.setting.at(t, x), dx)?;
         }
         Ok(())
     }

@@ -3,7 +3,7 @@
 use crate::error::FieldError;
 use crate::mode::Signs;
 use crate::system::{move_inside, side_offsets};
-use crate::system::{LieValue, PiecewiseSystem};
+use crate::system::{LieValue, PiecewiseSystem, Place};
 use crate::tolerances::{MAX_LIE_ORDER, SIDE_REACH};
 
 /// The first non-vanishing derivative of h along a field: h(t) = value (t - t0)^order / order! + ...
@@ -44,18 +44,17 @@ pub fn first_nonzero(
     j: usize,
     side: i8,
     vanishing: usize,
-    t: f64,
-    x: &[f64],
-    signs: &[f64],
+    place: &Place<'_>,
 ) -> Result<Leading, FieldError> {
-    let mut signs_side = Signs::from_slice(signs);
+    let mut signs_side = Signs::from_slice(place.signs);
     signs_side[j] = f64::from(side);
-    if let Some(leading) = scan(system, j, side, vanishing, t, x, &signs_side)? {
+    let on_side = place.with_signs(&signs_side);
+    if let Some(leading) = scan(system, j, side, vanishing, &on_side)? {
         return Ok(leading);
     }
-    for offset in side_offsets(x) {
-        let inside = move_inside(system, t, x, &signs_side, offset, SIDE_REACH * offset)?;
-        if let Some(leading) = scan(system, j, side, 0, t, &inside, &signs_side)? {
+    for offset in side_offsets(place.x) {
+        let inside = move_inside(system, &on_side, offset, SIDE_REACH * offset)?;
+        if let Some(leading) = scan(system, j, side, 0, &on_side.moved(place.t, &inside))? {
             return Ok(leading);
         }
     }
@@ -73,11 +72,9 @@ pub(crate) fn first_nonzero_of_both(
     system: &dyn PiecewiseSystem,
     j: usize,
     vanishing: [usize; 2],
-    t: f64,
-    x: &[f64],
-    signs: &[f64],
+    place: &Place<'_>,
 ) -> Result<[Leading; 2], FieldError> {
-    let firsts = system.first_lie_derivatives(j, t, x, signs);
+    let firsts = system.first_lie_derivatives(j, place);
     let tolerance = system.lie_tolerance(1);
     let leading = |index: usize, side: i8| match firsts.map(|firsts| firsts[index]) {
         Some(LieValue { value, magnitude })
@@ -87,7 +84,7 @@ pub(crate) fn first_nonzero_of_both(
         {
             Ok(Leading { order: 1, value })
         }
-        _ => first_nonzero(system, j, side, vanishing[index], t, x, signs),
+        _ => first_nonzero(system, j, side, vanishing[index], place),
     };
     Ok([leading(0, -1)?, leading(1, 1)?])
 }
@@ -98,15 +95,12 @@ fn scan(
     j: usize,
     side: i8,
     vanishing: usize,
-    t: f64,
-    x: &[f64],
-    signs: &[f64],
+    place: &Place<'_>,
 ) -> Result<Option<Leading>, FieldError> {
     let highest = system.max_lie_order().min(MAX_LIE_ORDER);
     let word = [side; MAX_LIE_ORDER];
     for order in vanishing + 1..=highest {
-        let LieValue { value, magnitude } =
-            system.lie_derivative(j, j, &word[..order], t, x, signs)?;
+        let LieValue { value, magnitude } = system.lie_derivative(j, j, &word[..order], place)?;
         if !value.is_finite() {
             return Ok(None);
         }
@@ -130,19 +124,18 @@ pub fn normal_component(
     i: usize,
     j: usize,
     side: i8,
-    t: f64,
-    x: &[f64],
-    signs: &[f64],
+    place: &Place<'_>,
 ) -> Result<LieValue, FieldError> {
-    let mut signs_side = Signs::from_slice(signs);
+    let mut signs_side = Signs::from_slice(place.signs);
     signs_side[j] = f64::from(side);
-    let mut lie = system.lie_derivative(i, j, &[side], t, x, &signs_side)?;
-    for offset in side_offsets(x) {
+    let on_side = place.with_signs(&signs_side);
+    let mut lie = system.lie_derivative(i, j, &[side], &on_side)?;
+    for offset in side_offsets(place.x) {
         if lie.value.is_finite() {
             break;
         }
-        let inside = move_inside(system, t, x, &signs_side, offset, SIDE_REACH * offset)?;
-        lie = system.lie_derivative(i, j, &[side], t, &inside, &signs_side)?;
+        let inside = move_inside(system, &on_side, offset, SIDE_REACH * offset)?;
+        lie = system.lie_derivative(i, j, &[side], &on_side.moved(place.t, &inside))?;
     }
     Ok(lie)
 }

@@ -5,7 +5,7 @@ use super::{parallel, sense_of, Tie};
 use crate::cube::{Matrix, NormalFields, SignGroup};
 use crate::error::FieldError;
 use crate::error::Undecided;
-use crate::system::{dot, eval_on_side, PiecewiseSystem};
+use crate::system::{dot, eval_on_side, PiecewiseSystem, Place};
 use crate::tolerances::{DOUBTFUL, MOST_MEETING, TANGENT};
 
 /// The fields around an intersection of m surfaces, and the gradients of the switching functions.
@@ -87,7 +87,7 @@ impl MeetingFields {
         self.groups.len() == 1
     }
 
-    /// Evaluates everything at a point; `signs` holds the sides of the other surfaces. Returns the number
+    /// Evaluates everything at a place, whose signs hold the sides of the other surfaces. Returns the number
     /// of evaluations of the right-hand side.
     ///
     /// # Errors
@@ -95,16 +95,14 @@ impl MeetingFields {
     pub fn evaluate(
         &mut self,
         system: &dyn PiecewiseSystem,
-        t: f64,
-        x: &[f64],
-        signs: &[f64],
+        place: &Place<'_>,
     ) -> Result<u64, FieldError> {
         let (n, m) = (self.n, self.set.len());
         self.signs.clear();
-        self.signs.extend_from_slice(signs);
+        self.signs.extend_from_slice(place.signs);
         for (i, &j) in self.set.iter().enumerate() {
             let gradient = &mut self.gradients[i * n..(i + 1) * n];
-            self.time_derivatives[i] = system.gradient(j, t, x, signs, gradient)?;
+            self.time_derivatives[i] = system.gradient(j, place, gradient)?;
         }
         for &j in &self.set {
             self.signs[j] = -1.0;
@@ -120,7 +118,7 @@ impl MeetingFields {
                         let up = pattern >> bit & 1 == 1;
                         self.signs[self.set[i]] = if up { 1.0 } else { -1.0 };
                     }
-                    evaluations += self.evaluate_row(system, (t, x), row, index > 0)?;
+                    evaluations += self.evaluate_row(system, place, row, index > 0)?;
                 }
                 row += 1;
             }
@@ -134,7 +132,7 @@ impl MeetingFields {
             first = rows.end;
             for (bit, &i) in group.iter().enumerate() {
                 if system.sticks_at(self.set[i]) {
-                    let ratio = system.stick_ratio(self.set[i], t, x, signs);
+                    let ratio = system.stick_ratio(self.set[i], place);
                     let fields = &mut self.fields[rows.start * n..rows.end * n];
                     stretch(fields, 1 << bit, n, ratio);
                     let components = &mut self.components[rows.start * m..rows.end * m];
@@ -143,14 +141,14 @@ impl MeetingFields {
             }
         }
         if self.ties.is_none() {
-            let ties = self.find_ties(system, (t, x), signs)?;
+            let ties = self.find_ties(system, place)?;
             let is_split = !ties.is_empty() && !self.has_all_patterns();
             if is_split {
                 *self = MeetingFields::of_all_patterns(system, &self.set);
             }
             self.ties = Some(ties);
             if is_split {
-                return Ok(evaluations + self.evaluate(system, t, x, signs)?);
+                return Ok(evaluations + self.evaluate(system, place)?);
             }
         }
         self.tie();
@@ -160,8 +158,7 @@ impl MeetingFields {
     fn find_ties(
         &self,
         system: &dyn PiecewiseSystem,
-        place: (f64, &[f64]),
-        signs: &[f64],
+        place: &Place<'_>,
     ) -> Result<Vec<Tie>, FieldError> {
         let mut ties: Vec<Tie> = Vec::new();
         let m = self.set.len();
@@ -174,7 +171,7 @@ impl MeetingFields {
                 continue;
             }
             let pair = [self.set[leader], self.set[follower]];
-            if let Some(sense) = sense_of(system, place, pair, signs)? {
+            if let Some(sense) = sense_of(system, place, pair)? {
                 ties.push(Tie {
                     leader,
                     follower,
@@ -234,7 +231,7 @@ impl MeetingFields {
     fn evaluate_row(
         &mut self,
         system: &dyn PiecewiseSystem,
-        (t, x): (f64, &[f64]),
+        place: &Place<'_>,
         row: usize,
         as_difference: bool,
     ) -> Result<u64, FieldError> {
@@ -242,7 +239,7 @@ impl MeetingFields {
         let (first, rest) = self.fields.split_at_mut(if row == 0 { 0 } else { n });
         let start = row * n - first.len();
         let field = &mut rest[start..start + n];
-        let evaluations = eval_on_side(system, t, x, &self.signs, field)?;
+        let evaluations = eval_on_side(system, &place.with_signs(&self.signs), field)?;
         if as_difference {
             field
                 .iter_mut()

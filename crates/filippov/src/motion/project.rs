@@ -2,7 +2,7 @@
 
 use crate::cube::{Matrix, Vector};
 use crate::error::FieldError;
-use crate::system::{dot, dot_magnitude, PiecewiseSystem};
+use crate::system::{dot, dot_magnitude, PiecewiseSystem, Place, Setting};
 use crate::tolerances::SURFACE_NOISE;
 
 /// Scratch space of the projection.
@@ -35,16 +35,17 @@ impl Projector {
         j: usize,
         t: f64,
         x: &mut [f64],
-        signs: &[f64],
+        setting: Setting<'_>,
     ) -> Result<(), FieldError> {
         let most = if system.is_affine(j) { 1 } else { 4 };
         for _ in 0..most {
-            system.surfaces(t, x, signs, &mut self.h)?;
+            let place = setting.at(t, x);
+            system.surfaces(&place, &mut self.h)?;
             let h = self.h[j];
             if h == 0.0 || !h.is_finite() {
                 break;
             }
-            system.gradient(j, t, x, signs, &mut self.gradient)?;
+            system.gradient(j, &place, &mut self.gradient)?;
             let norm2: f64 = self.gradient.iter().map(|g| g * g).sum();
             let size: f64 = self
                 .gradient
@@ -75,18 +76,19 @@ impl Projector {
         set: &[usize],
         t: f64,
         x: &mut [f64],
-        signs: &[f64],
+        setting: Setting<'_>,
     ) -> Result<(), FieldError> {
         if let &[j] = set {
-            return self.project(system, j, t, x, signs);
+            return self.project(system, j, t, x, setting);
         }
         let n = x.len();
         self.rows.resize(n * set.len(), 0.0);
         for _ in 0..8 {
-            system.surfaces(t, x, signs, &mut self.h)?;
+            let place = setting.at(t, x);
+            system.surfaces(&place, &mut self.h)?;
             let mut is_near = true;
             for (row, &j) in self.rows.chunks_exact_mut(n).zip(set) {
-                system.gradient(j, t, x, signs, row)?;
+                system.gradient(j, &place, row)?;
                 is_near &= self.h[j].abs() <= 0.25 * SURFACE_NOISE * dot_magnitude(row, x);
             }
             if is_near {
@@ -111,13 +113,12 @@ impl Projector {
         &mut self,
         system: &dyn PiecewiseSystem,
         (set, factor): (&[usize], f64),
-        (t, x): (f64, &[f64]),
-        signs: &[f64],
+        place: &Place<'_>,
         dx: &mut [f64],
     ) -> Result<(), FieldError> {
-        system.surfaces(t, x, signs, &mut self.h)?;
+        system.surfaces(place, &mut self.h)?;
         for &j in set {
-            system.gradient(j, t, x, signs, &mut self.gradient)?;
+            system.gradient(j, place, &mut self.gradient)?;
             let pull = factor * self.h[j];
             let components = dx.iter_mut().zip(&self.gradient);
             components.for_each(|(dx, g)| *dx -= pull * g);
@@ -165,16 +166,17 @@ mod tests {
         let names = Names::default();
         let system = TracedSystem::new(g, field, Vec::new(), names, Backend::Auto).unwrap();
         assert_eq!(system.n_surfaces(), 2);
-        let (mut projector, signs) = (Projector::new(2, 2), [1.0, 1.0]);
+        let mut projector = Projector::new(2, 2);
+        let setting = Setting::of_signs(&[1.0, 1.0]);
         let mut h = [0.0; 2];
         for k in 0..50_000 {
             let angle = 1e-4 * f64::from(k);
             let r = 0.8 + 1e-8 * (1e-3 * f64::from(k)).sin();
             let mut x = [r * angle.cos(), r * angle.sin()];
             projector
-                .project_onto(&system, &[0, 1], 0.0, &mut x, &signs)
+                .project_onto(&system, &[0, 1], 0.0, &mut x, setting)
                 .unwrap();
-            system.surfaces(0.0, &x, &signs, &mut h).unwrap();
+            system.surfaces(&setting.at(0.0, &x), &mut h).unwrap();
             assert!(h[0].abs().max(h[1].abs()) < 4e-15, "{h:?} at {angle}");
             assert!((x[1].atan2(x[0]) - angle).sin().abs() < 1e-15);
         }

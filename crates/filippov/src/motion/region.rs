@@ -2,33 +2,37 @@
 
 use super::{Motion, SmoothField};
 use crate::error::FieldError;
-use crate::mode::Signs;
-use crate::system::{move_inside, side_offsets, PiecewiseSystem};
+use crate::system::{move_inside, side_offsets, OwnSetting, PiecewiseSystem, Setting};
 
 /// The smooth field of one region: f(t, x, s) with fixed signs.
 pub struct RegionField<'a> {
     system: &'a dyn PiecewiseSystem,
-    signs: Signs,
+    setting: OwnSetting,
     n_evaluations: u64,
     departing: bool,
 }
 
 impl<'a> RegionField<'a> {
-    /// The field of the region with these signs.
-    pub fn new(system: &'a dyn PiecewiseSystem, signs: &[f64]) -> Self {
+    /// The field of the region with these signs, at these discrete states.
+    pub fn new(system: &'a dyn PiecewiseSystem, setting: Setting<'_>) -> Self {
         RegionField {
             system,
-            signs: Signs::from_slice(signs),
+            setting: OwnSetting::new(setting),
             n_evaluations: 0,
             departing: false,
         }
     }
 
     /// Starts anew in another region.
-    pub fn restart(&mut self, signs: &[f64]) {
-        self.signs.copy_from_slice(signs);
+    pub fn restart(&mut self, setting: Setting<'_>) {
+        self.setting.set(setting);
         self.n_evaluations = 0;
         self.departing = false;
+    }
+
+    /// Takes over the discrete states that an action left.
+    pub(super) fn set_discrete(&mut self, q: &[f64]) {
+        self.setting.set_discrete(q);
     }
 
     /// While the motion departs tangentially from a surface, stages may lie beyond it however short
@@ -41,8 +45,9 @@ impl<'a> RegionField<'a> {
     #[cold]
     fn eval_inside(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), FieldError> {
         for offset in side_offsets(x) {
-            let inside = move_inside(self.system, t, x, &self.signs, offset, f64::INFINITY)?;
-            self.system.field(t, &inside, &self.signs, dx)?;
+            let place = self.setting.at(t, x);
+            let inside = move_inside(self.system, &place, offset, f64::INFINITY)?;
+            self.system.field(&place.moved(t, &inside), dx)?;
             self.n_evaluations += 1;
             if dx.iter().all(|v| v.is_finite()) {
                 break;
@@ -56,7 +61,7 @@ impl SmoothField for RegionField<'_> {
     #[inline(always)]
     fn eval(&mut self, t: f64, x: &mut [f64], dx: &mut [f64]) -> Result<(), FieldError> {
         self.n_evaluations += 1;
-        self.system.field(t, x, &self.signs, dx)?;
+        self.system.field(&self.setting.at(t, x), dx)?;
         if self.departing && dx.iter().any(|v| !v.is_finite()) {
             self.eval_inside(t, x, dx)?;
         }
@@ -77,7 +82,7 @@ mod tests {
 
     use super::RegionField;
     use crate::motion::SmoothField;
-    use crate::system::TracedSystem;
+    use crate::system::{Setting, TracedSystem};
 
     /// x' = 1 + (|x|^2 - 1)^(3/2): it exists only outside of the unit circle.
     fn outside_of_the_circle() -> TracedSystem {
@@ -95,7 +100,7 @@ mod tests {
     #[test]
     fn a_stage_far_behind_a_curved_surface_is_continued_from_the_surface_at_once() {
         let system = outside_of_the_circle();
-        let mut field = RegionField::new(&system, &[1.0]);
+        let mut field = RegionField::new(&system, Setting::of_signs(&[1.0]));
         let (mut x, mut dx) = ([0.7, 0.5], [0.0; 2]);
         field.eval(0.0, &mut x, &mut dx).unwrap();
         assert!(dx[0].is_nan());

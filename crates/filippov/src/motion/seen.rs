@@ -50,6 +50,10 @@ impl Seen {
 /// Takes down the exit functions at the stages of a step.
 pub(crate) fn observer(seen: &mut [Seen]) -> impl FnMut(&ModeField) + '_ {
     |field| {
+        // Nothing is seen in a region.
+        if seen.is_empty() {
+            return;
+        }
         for (seen, value) in seen.iter_mut().zip(field.last_exits()) {
             seen.see(*value);
         }

@@ -6,9 +6,8 @@ use super::duties::Exits;
 use super::guard::Guards;
 use super::{Guard, Motion, Projector, SmoothField};
 use crate::error::FieldError;
-use crate::mode::Signs;
 use crate::motion::TwoFoldMotion;
-use crate::system::{BothSides, PiecewiseSystem};
+use crate::system::{BothSides, OwnSetting, PiecewiseSystem, Setting};
 
 /// The normal components on both sides of the surface slid on.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,7 +46,7 @@ impl NormalComponents {
 pub struct SlidingField<'a> {
     system: &'a dyn PiecewiseSystem,
     surface: usize,
-    signs: Signs,
+    setting: OwnSetting,
     sides: BothSides,
     projector: Projector,
     /// The factor of the term that draws the motion back, in place of the projection.
@@ -76,12 +75,12 @@ impl StartAtTwoFold {
 }
 
 impl<'a> SlidingField<'a> {
-    /// Sliding on surface `j`, the other surfaces with the given signs.
-    pub fn new(system: &'a dyn PiecewiseSystem, j: usize, signs: &[f64]) -> Self {
+    /// Sliding on surface `j`, the other surfaces with the given signs, at these discrete states.
+    pub fn new(system: &'a dyn PiecewiseSystem, j: usize, setting: Setting<'_>) -> Self {
         SlidingField {
             system,
             surface: j,
-            signs: Signs::from_slice(signs),
+            setting: OwnSetting::new(setting),
             sides: BothSides::new(system.n_states(), system.n_surfaces()),
             projector: Projector::new(system.n_states(), system.n_surfaces()),
             restoring: None,
@@ -100,12 +99,17 @@ impl<'a> SlidingField<'a> {
     }
 
     /// Starts anew on another surface.
-    pub fn restart(&mut self, j: usize, signs: &[f64]) {
+    pub fn restart(&mut self, j: usize, setting: Setting<'_>) {
         self.surface = j;
-        self.signs.copy_from_slice(signs);
+        self.setting.set(setting);
         self.sides.restart();
         self.n_evaluations = 0;
         self.two_fold = None;
+    }
+
+    /// Takes over the discrete states that an action left.
+    pub(super) fn set_discrete(&mut self, q: &[f64]) {
+        self.setting.set_discrete(q);
     }
 
     /// Sliding starts at a two-fold, where the share of f+ is a quotient of two zeros, with the series of this motion.
@@ -169,15 +173,15 @@ impl<'a> SlidingField<'a> {
     ///
     /// # Errors
     /// If a function of the user raises.
+    #[inline(always)]
     pub fn normal_components_at(
         &mut self,
         t: f64,
         x: &[f64],
     ) -> Result<NormalComponents, FieldError> {
         let sides = &mut self.sides;
-        self.n_evaluations += self
-            .system
-            .both_sides(self.surface, t, x, &self.signs, sides)?;
+        let place = self.setting.at(t, x);
+        self.n_evaluations += self.system.both_sides(self.surface, &place, sides)?;
         self.exits = [sides.normal_minus, -sides.normal_plus];
         if let Some((_, [minus, plus])) = self.given_at(t) {
             self.exits = [minus, -plus];
@@ -216,7 +220,7 @@ impl Motion for SlidingField<'_> {
             return Ok(());
         }
         self.projector
-            .project(self.system, self.surface, t, x, &self.signs)
+            .project(self.system, self.surface, t, x, self.setting.get())
     }
 }
 
@@ -227,7 +231,7 @@ impl SmoothField for SlidingField<'_> {
         if let Some(factor) = self.restoring {
             let term = (&[self.surface][..], factor);
             self.projector
-                .pull_back(self.system, term, (t, x), &self.signs, dx)?;
+                .pull_back(self.system, term, &self.setting.at(t, x), dx)?;
         }
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 use super::Projector;
 use crate::error::FieldError;
-use crate::system::{dot, PiecewiseSystem};
+use crate::system::{dot, PiecewiseSystem, Place};
 use crate::tolerances::{BESIDE, TANGENT};
 
 /// Two surfaces in one place: of the four regions around them two exist.
@@ -36,16 +36,16 @@ impl Tie {
 /// If a function of the user raises.
 pub fn sense_of(
     system: &dyn PiecewiseSystem,
-    (t, x): (f64, &[f64]),
+    place: &Place<'_>,
     [j, k]: [usize; 2],
-    signs: &[f64],
 ) -> Result<Option<i8>, FieldError> {
-    let (mut signs, mut senses) = (signs.to_vec(), [0; 2]);
+    let (mut signs, mut senses) = (place.signs.to_vec(), [0; 2]);
     for (sense, side) in senses.iter_mut().zip([-1.0, 1.0]) {
         signs[j] = side;
-        let [one, other] = [j, k].map(|j| normal(system, (t, x), j, &signs));
+        let on_side = place.with_signs(&signs);
+        let [one, other] = [j, k].map(|j| normal(system, &on_side, j));
         let (one, other) = (one?, other?);
-        if !parallel(&one, &other) || in_the_place_of(system, (t, x), j, &[k], &signs)?.is_empty() {
+        if !parallel(&one, &other) || in_the_place_of(system, &on_side, j, &[k])?.is_empty() {
             return Ok(None);
         }
         *sense = dot(&one, &other)
@@ -62,19 +62,19 @@ pub fn sense_of(
 /// If a function of the user raises.
 pub fn in_the_place_of(
     system: &dyn PiecewiseSystem,
-    (t, x): (f64, &[f64]),
+    place: &Place<'_>,
     j: usize,
     others: &[usize],
-    signs: &[f64],
 ) -> Result<Vec<usize>, FieldError> {
     // Beside the place, so that surfaces that only touch are told apart.
-    let (later, beside) = beside_on(system, (t, x), j, signs, 1.0)?;
-    let mut h = [(); 2].map(|()| vec![0.0; signs.len()]);
-    system.surfaces(later, &beside, signs, &mut h[0])?;
-    system.surfaces(t, x, signs, &mut h[1])?;
+    let (later, beside) = beside_on(system, place, j, 1.0)?;
+    let moved = place.moved(later, &beside);
+    let mut h = [(); 2].map(|()| vec![0.0; place.signs.len()]);
+    system.surfaces(&moved, &mut h[0])?;
+    system.surfaces(place, &mut h[1])?;
     let (mut found, mut gradient) = (Vec::new(), vec![0.0; beside.len()]);
     for &k in others {
-        let rate = system.gradient(k, later, &beside, signs, &mut gradient)?;
+        let rate = system.gradient(k, &moved, &mut gradient)?;
         let size = rate.abs() + gradient.iter().fold(0.0_f64, |sum, g| sum + g.abs());
         // One with a multiple zero has no gradient there.
         if h[0][k].abs().max(h[1][k].abs()) <= TANGENT * size {
@@ -90,17 +90,17 @@ pub fn in_the_place_of(
 /// If a function of the user raises.
 pub fn beside_on(
     system: &dyn PiecewiseSystem,
-    (t, x): (f64, &[f64]),
+    place: &Place<'_>,
     j: usize,
-    signs: &[f64],
     side: f64,
 ) -> Result<(f64, Vec<f64>), FieldError> {
+    let &Place { t, x, signs, .. } = place;
     let later = t + side * BESIDE * (1.0 + t.abs());
     let shifts = (0..x.len()).map(|i| side * BESIDE * (1.0 + side / (2.0 + i as f64)));
     let pairs = x.iter().zip(shifts);
     let mut beside: Vec<f64> = pairs.map(|(x, d)| x + d * (1.0 + x.abs())).collect();
     let mut projector = Projector::new(beside.len(), signs.len());
-    projector.project(system, j, later, &mut beside, signs)?;
+    projector.project(system, j, later, &mut beside, place.setting())?;
     Ok((later, beside))
 }
 
@@ -110,13 +110,12 @@ pub fn beside_on(
 /// If a function of the user raises.
 pub fn normal(
     system: &dyn PiecewiseSystem,
-    (t, x): (f64, &[f64]),
+    place: &Place<'_>,
     j: usize,
-    signs: &[f64],
 ) -> Result<Vec<f64>, FieldError> {
-    let n = x.len();
+    let n = place.x.len();
     let mut row = vec![0.0; n + 1];
-    row[n] = system.gradient(j, t, x, signs, &mut row[..n])?;
+    row[n] = system.gradient(j, place, &mut row[..n])?;
     Ok(row)
 }
 

@@ -16,8 +16,7 @@ use smallvec::{smallvec, SmallVec};
 
 use super::lie::Leading;
 use crate::error::FieldError;
-use crate::mode::Signs;
-use crate::system::{LieValue, PiecewiseSystem};
+use crate::system::{LieValue, PiecewiseSystem, Place};
 use crate::tolerances::{AT_SIDE, DOUBTFUL, MAX_LIE_ORDER, MOST_HALVINGS, TANGENT};
 
 /// A sliding motion through a two-fold. It starts there if it attracts. If it repels it is a solution too, but one that may
@@ -76,17 +75,16 @@ impl TwoFoldMotion {
 
 /// A point where both fields are tangent to surface `j`.
 pub struct TwoFold<'s> {
-    place: Place<'s>,
+    at: TangentPoint<'s>,
     /// The derivatives of h.
     own: Words,
 }
 
-struct Place<'s> {
+/// Where both fields are tangent.
+struct TangentPoint<'s> {
     system: &'s dyn PiecewiseSystem,
     j: usize,
-    t: f64,
-    x: &'s [f64],
-    signs: Signs,
+    place: Place<'s>,
     /// Words of h of so many letters are known to vanish.
     known: usize,
     /// As do those below this part of the largest of as many letters.
@@ -111,31 +109,23 @@ fn with_letter((length, bits): Word, letter: usize) -> Word {
 
 impl<'s> TwoFold<'s> {
     /// `known` derivatives along both fields are known to vanish.
-    pub fn new(
-        system: &'s dyn PiecewiseSystem,
-        j: usize,
-        known: usize,
-        (t, x): (f64, &'s [f64]),
-        signs: &[f64],
-    ) -> Self {
-        let place = Place {
+    pub fn new(system: &'s dyn PiecewiseSystem, j: usize, known: usize, place: Place<'s>) -> Self {
+        let at = TangentPoint {
             system,
             j,
-            t,
-            x,
-            signs: Signs::from_slice(signs),
+            place,
             known: known.max(1),
             noise: TANGENT,
             highest: system.max_lie_order().min(MAX_LIE_ORDER),
         };
         let own = Words::of(j);
-        TwoFold { place, own }
+        TwoFold { at, own }
     }
 
     /// The same at a located event, where the fields are known less well.
     #[must_use]
     pub fn located(mut self) -> Self {
-        self.place.noise = DOUBTFUL;
+        self.at.noise = DOUBTFUL;
         self
     }
 
@@ -149,7 +139,7 @@ impl<'s> TwoFold<'s> {
             return Ok(0.0);
         };
         let mean = self.own.coefficient(EMPTY, length, &[0.0]);
-        let is_clear = mean.value.abs() > self.place.system.lie_tolerance(length) * mean.magnitude;
+        let is_clear = mean.value.abs() > self.at.system.lie_tolerance(length) * mean.magnitude;
         Ok(if is_clear { mean.value } else { 0.0 })
     }
 
@@ -203,14 +193,14 @@ impl<'s> TwoFold<'s> {
         let mut words = Words::of(i);
         let mut lambda: SmallVec<[f64; 6]> = smallvec![motion.multiplier()];
         let mut factorial = 1.0;
-        for n in 1..=self.place.highest {
+        for n in 1..=self.at.highest {
             factorial *= n as f64;
             if lambda.len() < n && !self.continue_series(&mut lambda)? {
                 break;
             }
-            words.fill(&self.place, n)?;
+            words.fill(&self.at, n)?;
             let term = words.coefficient(EMPTY, n, &lambda);
-            if term.value.abs() > self.place.system.lie_tolerance(n) * term.magnitude {
+            if term.value.abs() > self.at.system.lie_tolerance(n) * term.magnitude {
                 let value = factorial * term.value;
                 return Ok(Leading { order: n, value });
             }
@@ -220,8 +210,8 @@ impl<'s> TwoFold<'s> {
 
     /// The length of the shortest words that do not vanish.
     fn first_length(&mut self) -> Result<Option<usize>, FieldError> {
-        for length in self.place.known + 1..=self.place.highest {
-            self.own.fill(&self.place, length)?;
+        for length in self.at.known + 1..=self.at.highest {
+            self.own.fill(&self.at, length)?;
             let mut words = self.own.values[length].iter();
             if words.any(|lie| lie.value != 0.0) {
                 return Ok(Some(length));
@@ -250,15 +240,15 @@ impl<'s> TwoFold<'s> {
         lambda: &mut SmallVec<[f64; 6]>,
     ) -> Result<Leading, FieldError> {
         let first = self.first_length()?.unwrap_or(0);
-        for n in first.saturating_sub(1)..self.place.highest {
+        for n in first.saturating_sub(1)..self.at.highest {
             while lambda.len() + first < n + 2 {
                 if !self.continue_series(lambda)? {
                     return Ok(NONE);
                 }
             }
-            self.own.fill(&self.place, n + 1)?;
+            self.own.fill(&self.at, n + 1)?;
             let term = self.own.coefficient(with_letter(EMPTY, letter), n, lambda);
-            if term.value.abs() > self.place.system.lie_tolerance(n + 1) * term.magnitude {
+            if term.value.abs() > self.at.system.lie_tolerance(n + 1) * term.magnitude {
                 let value = (1..=n).fold(term.value, |value, k| value * k as f64);
                 return Ok(Leading { order: n, value });
             }
@@ -272,10 +262,10 @@ impl<'s> TwoFold<'s> {
             return Ok(false);
         };
         let n = first + lambda.len();
-        if n > self.place.highest {
+        if n > self.at.highest {
             return Ok(false);
         }
-        self.own.fill(&self.place, n)?;
+        self.own.fill(&self.at, n)?;
         lambda.push(0.0);
         let without = self.own.coefficient(EMPTY, n, lambda);
         *lambda.last_mut().expect("it was just added") = 1.0;
@@ -304,7 +294,7 @@ impl Words {
     }
 
     /// Finds all words up to a length; those within rounding of zero are zero.
-    fn fill(&mut self, at: &Place, length: usize) -> Result<(), FieldError> {
+    fn fill(&mut self, at: &TangentPoint<'_>, length: usize) -> Result<(), FieldError> {
         for length in self.values.len()..=length {
             let known = if self.surface == at.j { at.known } else { 0 };
             let mut row = Vec::with_capacity(1 << length);
@@ -317,9 +307,7 @@ impl Words {
                 };
                 if length > known {
                     let (i, j) = (self.surface, at.j);
-                    lie = at
-                        .system
-                        .lie_derivative(i, j, &word, at.t, at.x, &at.signs)?;
+                    lie = at.system.lie_derivative(i, j, &word, &at.place)?;
                     if lie.value.abs() <= at.system.lie_tolerance(length) * lie.magnitude {
                         lie.value = 0.0;
                     }

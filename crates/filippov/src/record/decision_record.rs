@@ -139,7 +139,6 @@ pub fn replay_decision(
     options: &Options,
     point: &DecisionPoint,
 ) -> Result<DecisionOutcome, FieldError> {
-    system.set_discrete(&point.q);
     let (t, mode, law) = (point.t, &point.mode, Law::from(options));
     let (signs, sliding): (_, SlidingSet) = (mode.signs(), mode.sliding_set().collect());
     let mut active = vec![false; signs.len()];
@@ -151,7 +150,7 @@ pub fn replay_decision(
     };
     let mut field = match contact {
         Some(contact) => ModeField::Contact(Box::new(contact)),
-        None => ModeField::of(system, law, mode),
+        None => ModeField::of(system, law, mode, &point.q),
     };
     if let ModeField::Intersection(field) = &mut field {
         field.begin(&point.multipliers, point.oscillates);

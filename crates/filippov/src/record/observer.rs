@@ -189,14 +189,15 @@ impl<'a> Observed<'a> {
 /// The gradient of a guard of the motion at its end: writes its derivatives by the states, and returns that by time. Beside the
 /// surfaces slid on a guard is that of the natural extension of the field, which moves no point onto them.
 fn gradient_of(run: &mut Run, guard: Guard, state: &mut [f64]) -> Result<f64, FieldError> {
-    let (system, t, x, signs) = (run.system, run.t, &run.x, &run.motion.signs);
+    let (system, signs) = (run.system, &run.motion.signs);
+    let place = run.motion.setting().at(run.t, &run.x);
     let (sense, time) = match (guard, run.motion.sliding()) {
-        (Guard::Surface(j), _) => (signs[j], system.gradient(j, t, x, signs, state)?),
+        (Guard::Surface(j), _) => (signs[j], system.gradient(j, &place, state)?),
         // The normal component of f-, or minus that of f+.
         (Guard::Multiplier { surface: j, end }, [_]) if !system.sticks_at(j) => {
             let mut side = Signs::from_slice(signs);
             side[j] = f64::from(end);
-            let rate = system.rate_gradient(j, t, x, &side, state)?;
+            let rate = system.rate_gradient(j, &place.with_signs(&side), state)?;
             (-f64::from(end), rate.time)
         }
         _ => return gradient_by_differences(run, guard, state),

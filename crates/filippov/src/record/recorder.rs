@@ -363,7 +363,7 @@ impl<'a> Recorder<'a> {
     pub fn finish(
         mut self,
         (t_last, x, options): (f64, &[f64], &Options),
-        mode: Mode,
+        (mode, discrete): (Mode, Vec<f64>),
         stop: Stop,
         stats: Stats,
         warnings: Vec<Warning>,
@@ -393,6 +393,7 @@ impl<'a> Recorder<'a> {
             sliding: options.sliding,
             is_projected: options.stabilization == Stabilization::Projection,
             mode,
+            discrete,
             stats,
             warnings,
             steps: self.steps,

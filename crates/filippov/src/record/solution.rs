@@ -13,7 +13,7 @@ use crate::stats::Stats;
 use crate::status::{Stop, Warning};
 use crate::stepper::Basis;
 use crate::switch::Switch;
-use crate::system::{dot_magnitude, PiecewiseSystem};
+use crate::system::{dot_magnitude, PiecewiseSystem, Setting};
 use crate::tolerances::{AT_SIDE, TANGENT};
 
 /// A piece of constant mode.
@@ -80,6 +80,8 @@ pub struct Solution {
     pub is_projected: bool,
     /// The mode at the end.
     pub mode: Mode,
+    /// The discrete states at the end.
+    pub discrete: Vec<f64>,
     /// Counters.
     pub stats: Stats,
     /// Warnings.
@@ -153,15 +155,9 @@ impl Solution {
             .min(self.segments.len() - 1);
         let Segment { mode, discrete, .. } = &self.segments[segment];
         if mode.codimension() > 0 && self.is_projected {
-            system.set_discrete(discrete);
-            let set: Vec<usize> = mode.sliding_set().collect();
-            Projector::new(n, system.n_surfaces()).project_onto(
-                system,
-                &set,
-                t,
-                y,
-                &mode.signs(),
-            )?;
+            let (set, signs) = (mode.sliding_set().collect::<Vec<_>>(), mode.signs());
+            let setting = Setting::new(&signs, discrete);
+            Projector::new(n, system.n_surfaces()).project_onto(system, &set, t, y, setting)?;
         }
         Ok(Some(mode))
     }
@@ -194,6 +190,7 @@ impl Solution {
         let set: Vec<usize> = mode.sliding_set().collect();
         let segment = self.segment_at(t, side);
         let near = segment.map_or(&[][..], |segment| &segment.multipliers);
+        let q = segment.map_or(&[][..], |segment| &segment.discrete);
         if near.iter().any(|lambda| lambda.is_nan()) {
             // Contact: the forces depend on the actions of the run.
             return Ok(set.into_iter().zip(near.iter().copied()).collect());
@@ -201,7 +198,7 @@ impl Solution {
         Ok(match set.as_slice() {
             [] => Vec::new(),
             &[j] => {
-                let mut field = SlidingField::new(system, j, &mode.signs());
+                let mut field = SlidingField::new(system, j, Setting::new(&mode.signs(), q));
                 let components = field.normal_components(t, &mut y)?;
                 // At a two-fold from which sliding starts it is a quotient of two zeros, and known from the run.
                 let lambda = match (components.minus - components.plus, near) {
@@ -220,7 +217,11 @@ impl Solution {
                     pairs.for_each(|(largest, y)| *largest = largest.abs().max(y.abs()));
                     for side in [-1, 1] {
                         let signs = mode.with(j, side).signs();
-                        let rate = system.rate_gradient(j, t, &y, &signs, &mut gradient)?;
+                        let rate = system.rate_gradient(
+                            j,
+                            &Setting::new(&signs, q).at(t, &y),
+                            &mut gradient,
+                        )?;
                         size += dot_magnitude(&gradient, &largest) + (rate.time * t).abs();
                     }
                     if beyond < TANGENT * size {
@@ -231,7 +232,9 @@ impl Solution {
             }
             _ => {
                 // Of several roots that which the motion follows.
-                let field = IntersectionField::new(system, &set, &mode.signs(), near);
+                let signs = mode.signs();
+                let setting = Setting::new(&signs, q);
+                let field = IntersectionField::new(system, &set, setting, near);
                 let mut field = field.with_rule(self.sliding);
                 field.eval(t, &mut y, &mut vec![0.0; self.n_states])?;
                 let values = field.multipliers().into_iter().map(as_multiplier);

@@ -112,8 +112,9 @@ impl StepControl {
             None if self.dt.is_nan() => initial_step(field, t, x, derivative, scale, longest)?,
             None => restart_step(field, t, x, derivative, scale, self.dt.min(longest))?,
         };
+        let place = at.motion.setting().at(t, x);
         for (j, leading) in left {
-            dt = dt.min(excursion(at.system, (t, x), mode, j, leading)?);
+            dt = dt.min(excursion(at.system, &place, mode, j, leading)?);
         }
         Ok(dt)
     }

@@ -101,14 +101,14 @@ impl Midpoint {
         if !matches!(at.motion.field, ModeField::Region(_)) {
             return Ok(dt);
         }
-        let (system, t, x, signs) = (at.system, at.t, &at.x, &at.motion.signs);
+        let (system, t, x, setting) = (at.system, at.t, &at.x, at.motion.setting());
         let derivative = &self.step.start_derivative;
         let mut h = vec![0.0; system.n_surfaces()];
         let mut stage = x.to_vec();
         let mut value = |index: usize, dt: f64| -> Result<f64, FieldError> {
             let points = stage.iter_mut().zip(x.iter().zip(derivative));
             points.for_each(|(stage, (x, k))| *stage = x + 0.5 * dt * k);
-            system.surfaces(t + 0.5 * dt, &stage, signs, &mut h)?;
+            system.surfaces(&setting.at(t + 0.5 * dt, &stage), &mut h)?;
             Ok(h[index])
         };
         let mut longest = dt;

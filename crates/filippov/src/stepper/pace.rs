@@ -7,7 +7,7 @@ use crate::error::FieldError;
 use crate::error_scale::ErrorScale;
 use crate::mode::Mode;
 use crate::motion::Leading;
-use crate::system::PiecewiseSystem;
+use crate::system::{PiecewiseSystem, Place};
 use crate::tolerances::{FAMILIAR, MANY, MAX_LIE_ORDER, REACH, SEVERAL};
 
 /// How the last motion in a mode went.
@@ -72,7 +72,7 @@ impl Paces {
 /// a τ^k/k! + b τ^(k+1)/(k+1)!, with a fifth to spare.
 pub(super) fn excursion(
     system: &dyn PiecewiseSystem,
-    (t, x): (f64, &[f64]),
+    place: &Place<'_>,
     mode: &Mode,
     j: usize,
     leading: Leading,
@@ -84,7 +84,7 @@ pub(super) fn excursion(
         return Ok(f64::INFINITY);
     }
     let word = [mode.entries()[j]; MAX_LIE_ORDER];
-    let next = system.lie_derivative(j, j, &word[..order], t, x, &mode.signs())?;
+    let next = system.lie_derivative(j, j, &word[..order], place)?;
     let back = -(order as f64) * leading.value / next.value;
     Ok(if back > 0.0 {
         1.2 * back

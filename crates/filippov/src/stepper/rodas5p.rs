@@ -204,8 +204,8 @@ impl Rodas5p {
         at.motion.field.eval(at.t, &mut x, &mut rates)?;
         let multipliers = at.motion.multipliers();
         for (k, &j) in at.motion.sliding.iter().enumerate() {
-            let at_signs = &at.motion.signs;
-            let ratio = at.system.stick_ratio(j, at.t, &at.x, at_signs);
+            let place = at.motion.setting().at(at.t, &at.x);
+            let ratio = at.system.stick_ratio(j, &place);
             signs[j] = ratio * multipliers.get(k).copied().unwrap_or(f64::NAN);
         }
         Ok(signs)
@@ -333,8 +333,9 @@ impl Stepper for Rodas5p {
         let is_finite = match self.jacobian.clone() {
             Some(jacobian) => {
                 let signs = Self::signs_and_multipliers(at)?;
-                let (system, t, x) = (at.system, at.t, &at.x);
-                self.linearise(|out| system.eval_jacobian(&jacobian, t, x, &signs, out))
+                let (system, setting) = (at.system, at.motion.setting());
+                let place = setting.with_signs(&signs).at(at.t, &at.x);
+                self.linearise(|out| system.eval_jacobian(&jacobian, &place, out))
             }
             None => self.linearise_by_differences(at)?,
         };

@@ -29,10 +29,11 @@ impl Taylor {
     /// step that they allow.
     #[inline(always)]
     fn expand_motion(&mut self, at: &Run, jets: &MotionJets, signs: Option<&[f64]>) -> f64 {
-        let (system, t, x) = (at.system, at.t, &at.x);
-        let signs = signs.unwrap_or(&at.motion.signs);
-        let fill = |rows: &mut [f64]| system.eval_jets(jets, t, x, signs, rows);
-        self.expand(jets.width(), x, &at.scale, fill)
+        let setting = at.motion.setting();
+        let setting = setting.with_signs(signs.unwrap_or(setting.signs));
+        let place = setting.at(at.t, &at.x);
+        let fill = |rows: &mut [f64]| at.system.eval_jets(jets, &place, rows);
+        self.expand(jets.width(), &at.x, &at.scale, fill)
     }
 
     /// The length of step that the states allow, or the monitored functions if they allow less.

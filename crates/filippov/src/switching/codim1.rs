@@ -7,7 +7,7 @@ use super::surface::{Arrival, Decision};
 use crate::error::FieldError;
 use crate::mode::Signs;
 use crate::motion::{first_nonzero, first_nonzero_of_both, Leading, TwoFold, TwoFoldMotion};
-use crate::system::{dot_magnitude, BothSides, PiecewiseSystem};
+use crate::system::{dot_magnitude, BothSides, PiecewiseSystem, Place};
 use crate::tolerances::TANGENT;
 
 /// Decides what follows at a point of h_j = 0.
@@ -37,12 +37,10 @@ pub fn decide(
     system: &dyn PiecewiseSystem,
     j: usize,
     arrival: Arrival,
-    t: f64,
-    x: &[f64],
-    signs: &[f64],
+    place: &Place<'_>,
 ) -> Result<Decision, FieldError> {
     if system.sticks_at(j) {
-        return decide_sticking(system, j, arrival, (t, x), signs);
+        return decide_sticking(system, j, arrival, place);
     }
     let exits = [Arrival::ExitMinus, Arrival::ExitPlus];
     let is_known = |exit: Arrival| arrival == exit || arrival == Arrival::TwoFold;
@@ -50,14 +48,14 @@ pub fn decide(
         Arrival::Flat(_, vanishing) => vanishing,
         _ => exits.map(|exit| usize::from(is_known(exit))),
     };
-    let firsts = first_nonzero_of_both(system, j, vanishing, t, x, signs)?;
-    let [minus, plus] = without_rounding(system, j, (arrival, firsts), t, x, signs)?;
+    let firsts = first_nonzero_of_both(system, j, vanishing, place)?;
+    let [minus, plus] = without_rounding(system, j, (arrival, firsts), place)?;
     let mut candidates = SmallVec::new();
     if minus.sign() < 0 || stays(minus, plus, -1) {
         candidates.push(-1);
     }
     let at_two_fold = || {
-        let at = TwoFold::new(system, j, vanishing[0].min(vanishing[1]), (t, x), signs);
+        let at = TwoFold::new(system, j, vanishing[0].min(vanishing[1]), *place);
         match arrival {
             Arrival::Start => at,
             _ => at.located(),
@@ -81,7 +79,7 @@ pub fn decide(
     if minus.order == 0 && plus.order == 0 {
         // Neither field leaves the surface: the motion stays on it, and if they differ, any combination
         // of them is a Filippov solution.
-        let agree = fields_agree(system, j, (t, x), signs)?;
+        let agree = fields_agree(system, j, place)?;
         candidates = if agree { smallvec![] } else { smallvec![-1, 1] };
         two_fold = None;
     }
@@ -107,9 +105,7 @@ fn without_rounding(
     system: &dyn PiecewiseSystem,
     j: usize,
     (arrival, mut firsts): (Arrival, [Leading; 2]),
-    t: f64,
-    x: &[f64],
-    signs: &[f64],
+    place: &Place<'_>,
 ) -> Result<[Leading; 2], FieldError> {
     if arrival != Arrival::Start || system.lie_tolerance(2) > TANGENT {
         return Ok(firsts);
@@ -119,13 +115,14 @@ fn without_rounding(
         if order != 1 {
             continue;
         }
-        let mut signs = Signs::from_slice(signs);
+        let mut signs = Signs::from_slice(place.signs);
         signs[j] = f64::from(side);
-        let mut gradient = vec![0.0; x.len()];
-        let partials = system.rate_gradient(j, t, x, &signs, &mut gradient)?;
-        let size = dot_magnitude(&gradient, x) + (partials.time * t).abs();
+        let on_side = place.with_signs(&signs);
+        let mut gradient = vec![0.0; place.x.len()];
+        let partials = system.rate_gradient(j, &on_side, &mut gradient)?;
+        let size = dot_magnitude(&gradient, place.x) + (partials.time * place.t).abs();
         if value.abs() <= TANGENT * size {
-            firsts[index] = first_nonzero(system, j, side, 1, t, x, &signs)?;
+            firsts[index] = first_nonzero(system, j, side, 1, &on_side)?;
         }
     }
     Ok(firsts)
@@ -141,11 +138,10 @@ fn stays(own: Leading, other: Leading, side: i8) -> bool {
 fn fields_agree(
     system: &dyn PiecewiseSystem,
     j: usize,
-    (t, x): (f64, &[f64]),
-    signs: &[f64],
+    place: &Place<'_>,
 ) -> Result<bool, FieldError> {
-    let mut sides = BothSides::new(x.len(), signs.len());
-    system.both_sides(j, t, x, signs, &mut sides)?;
+    let mut sides = BothSides::new(place.x.len(), place.signs.len());
+    system.both_sides(j, place, &mut sides)?;
     let pairs = || sides.f_minus.iter().zip(&sides.f_plus);
     let size = pairs().fold(0.0_f64, |m, (a, b)| m.max(a.abs()).max(b.abs()));
     Ok(pairs().all(|(a, b)| (a - b).abs() <= TANGENT * size))

@@ -9,7 +9,7 @@
 use super::surface::{Arrival, Decision};
 use crate::error::FieldError;
 use crate::motion::{first_nonzero, Leading};
-use crate::system::{BothSides, PiecewiseSystem};
+use crate::system::{BothSides, PiecewiseSystem, Place};
 use crate::tolerances::NO_GAP;
 
 /// What follows where the motion is on such a surface.
@@ -17,11 +17,10 @@ pub(super) fn decide_sticking(
     system: &dyn PiecewiseSystem,
     j: usize,
     arrival: Arrival,
-    (t, x): (f64, &[f64]),
-    signs: &[f64],
+    place: &Place<'_>,
 ) -> Result<Decision, FieldError> {
-    let mut sides = BothSides::new(x.len(), signs.len());
-    system.both_sides(j, t, x, signs, &mut sides)?;
+    let mut sides = BothSides::new(place.x.len(), place.signs.len());
+    system.both_sides(j, place, &mut sides)?;
     let holds = sides.normal_minus > 0.0 && sides.normal_plus < 0.0;
     let entry = match arrival {
         Arrival::ExitMinus => -1,
@@ -36,10 +35,10 @@ pub(super) fn decide_sticking(
         (first(sides.normal_minus), first(sides.normal_plus))
     } else {
         // Without a gap between static and kinetic friction the component vanishes where the motion breaks away.
-        let has_gap = system.stick_ratio(j, t, x, signs) > 1.0 + NO_GAP;
+        let has_gap = system.stick_ratio(j, place) > 1.0 + NO_GAP;
         let along = |side: i8, exit: Arrival| {
             let vanishing = usize::from(arrival == exit && !has_gap);
-            first_nonzero(system, j, side, vanishing, t, x, signs)
+            first_nonzero(system, j, side, vanishing, place)
         };
         (along(-1, Arrival::ExitMinus)?, along(1, Arrival::ExitPlus)?)
     };

@@ -14,7 +14,7 @@
 
 use filippov_expr::{Enclosure, Motion};
 
-use super::PiecewiseSystem;
+use super::{PiecewiseSystem, Place, Setting};
 use crate::error::FieldError;
 use crate::sparse::{Pattern, SparseProduct, SparseRows, SparseSolver};
 use crate::system::eval_on_side;
@@ -51,25 +51,24 @@ pub trait AffineSigns: PiecewiseSystem {
     /// If a function of the user raises.
     fn fill_affine_parts(
         &self,
-        t: f64,
-        x: &[f64],
-        signs: &[f64],
+        place: &Place<'_>,
         parts: &mut AffineParts,
     ) -> Result<u64, FieldError> {
+        let signs = place.signs;
         let n = self.n_states();
         let mut vertex = signs.to_vec();
         for &j in &parts.surfaces {
             vertex[j] = if signs[j] < 0.0 { -1.0 } else { 1.0 };
         }
-        let mut evaluations = eval_on_side(self, t, x, &vertex, &mut parts.field)?;
+        let mut evaluations = eval_on_side(self, &place.with_signs(&vertex), &mut parts.field)?;
         let base = parts.field.clone();
         let mut flipped = vec![0.0; n];
         for (row, &j) in parts.surfaces.iter().enumerate() {
             let range = row * n..(row + 1) * n;
             let gradient = &mut parts.gradients.values_mut()[range.clone()];
-            parts.time_rates[row] = self.gradient(j, t, x, &vertex, gradient)?;
+            parts.time_rates[row] = self.gradient(j, &place.with_signs(&vertex), gradient)?;
             vertex[j] = -vertex[j];
-            evaluations += eval_on_side(self, t, x, &vertex, &mut flipped)?;
+            evaluations += eval_on_side(self, &place.with_signs(&vertex), &mut flipped)?;
             vertex[j] = -vertex[j];
             let jump = &mut parts.jumps.values_mut()[range];
             for (i, jump) in jump.iter_mut().enumerate() {
@@ -88,8 +87,13 @@ pub trait AffineSigns: PiecewiseSystem {
 
     /// Rigorous bounds of dh_j/dt, and of its derivative, along a piece of motion; entries of `signs` may be any numbers on surfaces that
     /// [`affine_parts`](Self::affine_parts) accepts together. `None` if there are none.
-    fn enclose_rate(&self, j: usize, motion: &dyn Motion, signs: &[f64]) -> Option<Enclosure> {
-        let _ = (j, motion, signs);
+    fn enclose_rate(
+        &self,
+        j: usize,
+        motion: &dyn Motion,
+        setting: Setting<'_>,
+    ) -> Option<Enclosure> {
+        let _ = (j, motion, setting);
         None
     }
 }
@@ -106,7 +110,7 @@ pub struct SingularSliding {
 ///
 /// # Example
 /// ```
-/// use filippov::{AffineSigns, ClosureSystem, PiecewiseSystem};
+/// use filippov::{AffineSigns, ClosureSystem, PiecewiseSystem, Place};
 /// // Two masses on a belt each: v_i' = 0.2 - v_i - sign(v_i), sliding on both surfaces.
 /// let system = ClosureSystem::new(
 ///     2,
@@ -117,7 +121,7 @@ pub struct SingularSliding {
 /// .with_affine_signs();
 /// let affine = system.affine_signs().expect("declared above");
 /// let mut parts = affine.affine_parts(&[0, 1]).expect("affine in all signs");
-/// parts.evaluate(affine, 0.0, &[0.0, 0.0], &[1.0, 1.0])?;
+/// parts.evaluate(affine, &Place::new(0.0, &[0.0, 0.0], &[1.0, 1.0]))?;
 /// let mut rates = [f64::NAN; 2];
 /// parts.slide(&mut rates).expect("both jumps are independent");
 /// assert!(rates.iter().all(|v| v.abs() < 1e-15));
@@ -203,11 +207,10 @@ impl AffineParts {
     pub fn evaluate(
         &mut self,
         system: &dyn AffineSigns,
-        t: f64,
-        x: &[f64],
-        signs: &[f64],
+        place: &Place<'_>,
     ) -> Result<u64, FieldError> {
-        let evaluations = system.fill_affine_parts(t, x, signs, self)?;
+        let signs = place.signs;
+        let evaluations = system.fill_affine_parts(place, self)?;
         if !self.is_formed {
             self.normal.update(&self.gradients, &self.jumps);
             (self.is_formed, self.is_factored) = (self.is_steady, false);

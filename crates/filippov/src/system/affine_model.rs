@@ -12,6 +12,7 @@ use filippov_expr::{
 
 use super::affine::AffineParts;
 use super::tiered::TieredProgram;
+use super::Place;
 use crate::sparse::SparseRows;
 
 /// A value that is a number, or computed by the program.
@@ -195,18 +196,11 @@ impl AffineModel {
     }
 
     /// Evaluates everything that varies.
-    pub fn fill(
-        &self,
-        t: f64,
-        x: &[f64],
-        signs: &[f64],
-        parameters: &[f64],
-        parts: &mut AffineParts,
-    ) {
+    pub fn fill(&self, place: &Place<'_>, parameters: &[f64], parts: &mut AffineParts) {
         let program = self.program.program();
         let mut outputs = std::mem::take(&mut parts.outputs);
         outputs.resize(program.n_outputs(), 0.0);
-        program.eval(t, x, signs, parameters, &[], &mut outputs);
+        program.eval(place.t, place.x, place.signs, parameters, &[], &mut outputs);
         parts.field.copy_from_slice(&outputs[..self.n_states]);
         let value = |source: Source| match source {
             Source::Constant(value) => value,

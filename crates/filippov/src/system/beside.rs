@@ -2,7 +2,7 @@
 
 use smallvec::SmallVec;
 
-use super::PiecewiseSystem;
+use super::{PiecewiseSystem, Place};
 use crate::error::FieldError;
 use crate::tolerances::{EPS, OFFSET_ROUNDING, SIDE_OFFSET, SIDE_REACH, STEPS_INSIDE};
 
@@ -13,21 +13,20 @@ use crate::tolerances::{EPS, OFFSET_ROUNDING, SIDE_OFFSET, SIDE_REACH, STEPS_INS
 /// If a function of the user raises.
 pub fn move_inside<S: PiecewiseSystem + ?Sized>(
     system: &S,
-    t: f64,
-    x: &[f64],
-    signs: &[f64],
+    place: &Place<'_>,
     offset: f64,
     reach: f64,
 ) -> Result<Vec<f64>, FieldError> {
+    let &Place { t, x, signs, .. } = place;
     let mut moved = x.to_vec();
     let mut h = vec![0.0; system.n_surfaces()];
     let mut gradient = vec![0.0; x.len()];
     let mut is_moved: SmallVec<[bool; 8]> = SmallVec::from_elem(false, h.len());
     for _ in 0..STEPS_INSIDE {
         let mut is_there = true;
-        system.surfaces(t, &moved, signs, &mut h)?;
+        system.surfaces(&place.moved(t, &moved), &mut h)?;
         for (j, h) in h.iter().enumerate() {
-            system.gradient(j, t, &moved, signs, &mut gradient)?;
+            system.gradient(j, &place.moved(t, &moved), &mut gradient)?;
             let norm2: f64 = gradient.iter().map(|g| g * g).sum();
             let wanted = offset * norm2.sqrt();
             let missing = wanted - signs[j] * h;
@@ -70,16 +69,14 @@ pub fn side_offsets(x: &[f64]) -> impl Iterator<Item = f64> {
 /// If a function of the user raises.
 pub fn eval_on_side<S: PiecewiseSystem + ?Sized>(
     system: &S,
-    t: f64,
-    x: &[f64],
-    signs: &[f64],
+    place: &Place<'_>,
     dx: &mut [f64],
 ) -> Result<u64, FieldError> {
-    system.field(t, x, signs, dx)?;
+    system.field(place, dx)?;
     if dx.iter().all(|v| v.is_finite()) {
         return Ok(1);
     }
-    Ok(1 + eval_off_surface(system, t, x, signs, dx)?)
+    Ok(1 + eval_off_surface(system, place, dx)?)
 }
 
 /// As [`eval_on_side`], for a field known not to exist on its surface: moves the point first.
@@ -88,15 +85,13 @@ pub fn eval_on_side<S: PiecewiseSystem + ?Sized>(
 /// If a function of the user raises.
 pub fn eval_off_surface<S: PiecewiseSystem + ?Sized>(
     system: &S,
-    t: f64,
-    x: &[f64],
-    signs: &[f64],
+    place: &Place<'_>,
     dx: &mut [f64],
 ) -> Result<u64, FieldError> {
     let mut evaluations = 0;
-    for offset in side_offsets(x) {
-        let inside = move_inside(system, t, x, signs, offset, SIDE_REACH * offset)?;
-        system.field(t, &inside, signs, dx)?;
+    for offset in side_offsets(place.x) {
+        let inside = move_inside(system, place, offset, SIDE_REACH * offset)?;
+        system.field(&place.moved(place.t, &inside), dx)?;
         evaluations += 1;
         if dx.iter().all(|v| v.is_finite()) {
             break;

@@ -2,7 +2,7 @@
 
 use filippov_expr::{Graph, NodeId};
 
-use super::{dot, PiecewiseSystem};
+use super::{dot, PiecewiseSystem, Place};
 use crate::error::FieldError;
 use crate::system::{eval_off_surface, eval_on_side};
 
@@ -51,21 +51,20 @@ impl BothSides {
         &mut self,
         system: &S,
         j: usize,
-        t: f64,
-        x: &[f64],
-        signs: &[f64],
+        place: &Place<'_>,
     ) -> Result<u64, FieldError> {
-        self.signs.copy_from_slice(signs);
+        self.signs.copy_from_slice(place.signs);
         self.signs[j] = 1.0;
-        let ht = system.gradient(j, t, x, &self.signs, &mut self.gradient)?;
+        let above = place.with_signs(&self.signs);
+        let ht = system.gradient(j, &above, &mut self.gradient)?;
         let eval = if self.meets_edges {
             eval_off_surface
         } else {
             eval_on_side
         };
-        let mut evaluations = eval(system, t, x, &self.signs, &mut self.f_plus)?;
+        let mut evaluations = eval(system, &above, &mut self.f_plus)?;
         self.signs[j] = -1.0;
-        evaluations += eval(system, t, x, &self.signs, &mut self.f_minus)?;
+        evaluations += eval(system, &place.with_signs(&self.signs), &mut self.f_minus)?;
         self.meets_edges |= evaluations > 2;
         self.normal_minus = ht + dot(&self.gradient, &self.f_minus);
         self.normal_plus = ht + dot(&self.gradient, &self.f_plus);

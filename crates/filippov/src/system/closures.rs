@@ -1,6 +1,8 @@
 //! A system given by Rust closures.
 
-use super::{dot, dot_magnitude, AffineSigns, LieValue, PiecewiseSystem, RatePartials, Word};
+use super::{
+    dot, dot_magnitude, AffineSigns, LieValue, PiecewiseSystem, Place, RatePartials, Word,
+};
 use crate::error::FieldError;
 use crate::tolerances::EPS;
 
@@ -79,13 +81,13 @@ where
         self.n_surfaces
     }
 
-    fn field(&self, t: f64, x: &[f64], signs: &[f64], dx: &mut [f64]) -> Result<(), FieldError> {
-        (self.field)(t, x, signs, dx);
+    fn field(&self, place: &Place<'_>, dx: &mut [f64]) -> Result<(), FieldError> {
+        (self.field)(place.t, place.x, place.signs, dx);
         Ok(())
     }
 
-    fn surfaces(&self, t: f64, x: &[f64], _signs: &[f64], h: &mut [f64]) -> Result<(), FieldError> {
-        (self.surfaces)(t, x, h);
+    fn surfaces(&self, place: &Place<'_>, h: &mut [f64]) -> Result<(), FieldError> {
+        (self.surfaces)(place.t, place.x, h);
         Ok(())
     }
 
@@ -113,13 +115,12 @@ where
 pub(super) fn rate_gradient_by_differences<S: PiecewiseSystem + ?Sized>(
     system: &S,
     j: usize,
-    t: f64,
-    x: &[f64],
-    signs: &[f64],
+    place: &Place<'_>,
     gradient: &mut [f64],
 ) -> Result<RatePartials, FieldError> {
+    let &Place { t, x, signs, .. } = place;
     let side = if signs[j] < 0.0 { -1 } else { 1 };
-    let at = |t: f64, x: &[f64]| system.lie_derivative(j, j, &[side], t, x, signs);
+    let at = |t: f64, x: &[f64]| system.lie_derivative(j, j, &[side], &place.moved(t, x));
     let LieValue {
         value: rate,
         magnitude,
@@ -151,13 +152,12 @@ pub(super) fn lie_by_differences<S: PiecewiseSystem + ?Sized>(
     i: usize,
     j: usize,
     word: Word,
-    t: f64,
-    x: &[f64],
-    signs: &[f64],
+    place: &Place<'_>,
 ) -> Result<LieValue, FieldError> {
+    let &Place { t, x, signs, .. } = place;
     let Some((&last, rest)) = word.split_last() else {
         let mut h = vec![0.0; system.n_surfaces()];
-        system.surfaces(t, x, signs, &mut h)?;
+        system.surfaces(place, &mut h)?;
         return Ok(LieValue {
             value: h[i],
             magnitude: h[i].abs(),
@@ -167,10 +167,10 @@ pub(super) fn lie_by_differences<S: PiecewiseSystem + ?Sized>(
     let mut f = vec![0.0; n];
     let mut signs_here = signs.to_vec();
     signs_here[j] = f64::from(last);
-    crate::system::eval_on_side(system, t, x, &signs_here, &mut f)?;
+    crate::system::eval_on_side(system, &place.with_signs(&signs_here), &mut f)?;
     if rest.is_empty() {
         let mut gradient = vec![0.0; n];
-        let ht = system.gradient(i, t, x, signs, &mut gradient)?;
+        let ht = system.gradient(i, place, &mut gradient)?;
         return Ok(LieValue {
             value: ht + dot(&gradient, &f),
             magnitude: ht.abs() + dot_magnitude(&gradient, &f),
@@ -181,7 +181,7 @@ pub(super) fn lie_by_differences<S: PiecewiseSystem + ?Sized>(
     let d = EPS.powf(1.0 / (word.len() as f64 + 2.0)) * size / speed;
     let at = |shift: f64| {
         let moved: Vec<f64> = x.iter().zip(&f).map(|(x, f)| x + shift * f).collect();
-        lie_by_differences(system, i, j, rest, t + shift, &moved, signs)
+        lie_by_differences(system, i, j, rest, &place.moved(t + shift, &moved))
     };
     let (above, below, here) = (at(d)?, at(-d)?, at(0.0)?);
     let value = match (above.value.is_finite(), below.value.is_finite()) {

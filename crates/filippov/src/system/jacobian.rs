@@ -5,7 +5,7 @@ use filippov_expr::{Backend, Gradient, Graph, NodeId};
 use super::blended::{Blended, BySign};
 use super::tiered::TieredProgram;
 use crate::sparse::SparseRows;
-use crate::system::Linearisation;
+use crate::system::{Linearisation, Place};
 
 /// The derivatives of the field of the motions on a set of surfaces; see [`Linearisation`].
 ///
@@ -74,18 +74,10 @@ impl MotionJacobian {
     }
 
     /// Evaluates the derivatives; entries of `signs` on the surfaces slid on are their multipliers.
-    pub(super) fn eval(
-        &self,
-        t: f64,
-        x: &[f64],
-        signs: &[f64],
-        p: &[f64],
-        out: &mut Linearisation,
-    ) {
+    pub(super) fn eval(&self, place: &Place<'_>, p: &[f64], out: &mut Linearisation) {
         let mut outputs = vec![0.0; self.n_outputs];
-        self.program
-            .program()
-            .eval(t, x, signs, p, &[], &mut outputs);
+        let program = self.program.program();
+        program.eval(place.t, place.x, place.signs, p, &[], &mut outputs);
         out.fill(|values, time| {
             for &(place, value) in &self.constants {
                 values[place] = value;

@@ -4,6 +4,7 @@ use filippov_expr::{Backend, ExprError, Gradient, Graph, JetProgram, Multipliers
 
 use super::jet_multipliers::MultiplierEquations;
 use super::tiered::Tiered;
+use super::Place;
 
 /// Taylor coefficients of the motions on a set of surfaces, and of what is monitored on them.
 ///
@@ -113,7 +114,8 @@ impl MotionJets {
         self.tells_of_exits
     }
 
-    pub(super) fn eval(&self, t: f64, x: &[f64], signs: &[f64], p: &[f64], out: &mut [f64]) {
+    pub(super) fn eval(&self, place: &Place<'_>, p: &[f64], out: &mut [f64]) {
+        let &Place { t, x, signs, .. } = place;
         let program = self.program.program();
         let Some(equations) = &self.equations else {
             return program.eval(t, x, signs, p, &[], out);

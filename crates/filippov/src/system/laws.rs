@@ -15,7 +15,7 @@ use std::sync::Arc;
 use filippov_expr::{Backend, ExprError, Graph, NodeId, Program, Wrt};
 use smallvec::{smallvec, SmallVec};
 
-use super::{PiecewiseSystem, TracedSystem};
+use super::{PiecewiseSystem, Setting, TracedSystem};
 use crate::error::FieldError;
 use crate::switch::Kind;
 use crate::system::{ActionMap, Clock, Trigger};
@@ -150,7 +150,7 @@ impl Laws {
         out
     }
 
-    /// The discrete states at a start at (t, x), given to the system too.
+    /// The discrete states at a start at (t, x).
     ///
     /// # Errors
     /// If a function of the user raises.
@@ -174,8 +174,7 @@ impl Laws {
                     Law::Hysteresis { initial, .. } => relay(values, *initial),
                 };
             }
-            system.set_discrete(&q);
-            system.surfaces(t, x, &signs, &mut h)?;
+            system.surfaces(&Setting::new(&signs, &q).at(t, x), &mut h)?;
             let sides = h.iter().map(|&h| if h < 0.0 { -1.0 } else { 1.0 });
             signs = sides.collect();
             if before == (q.clone(), signs.clone()) {

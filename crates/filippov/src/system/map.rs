@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use filippov_expr::{Backend, NodeId, Program};
 
-use super::{PiecewiseSystem, TracedSystem};
+use super::{PiecewiseSystem, Place, TracedSystem};
 use crate::error::FieldError;
 use crate::system::ActionMap;
 
@@ -31,7 +31,8 @@ impl TracedMap {
         let mut h = vec![0.0; d];
         // Switching functions may contain signs of others.
         for _ in 0..d {
-            self.expressions.surfaces(t, x, &signs, &mut h)?;
+            self.expressions
+                .surfaces(&Place::new(t, x, &signs), &mut h)?;
             let sides = h.iter().map(|&h| if h < 0.0 { -1.0 } else { 1.0 });
             signs = sides.collect();
         }
@@ -63,7 +64,7 @@ impl ActionMap for TracedMap {
     fn apply(&self, t: f64, x: &mut [f64], _: &[f64], _: &mut [f64]) -> Result<(), FieldError> {
         let signs = self.signs(t, x)?;
         let before = x.to_vec();
-        self.expressions.field(t, &before, &signs, x)
+        self.expressions.field(&Place::new(t, &before, &signs), x)
     }
 
     fn impulse(
@@ -77,9 +78,10 @@ impl ActionMap for TracedMap {
     ) -> Result<(), FieldError> {
         let signs = self.signs(t, x)?;
         match self.derivative() {
-            Some(program) => self
-                .expressions
-                .with_values(|p| program.eval(t, x, &signs, p, along, impulse)),
+            Some(program) => {
+                self.expressions
+                    .eval(program, &Place::new(t, x, &signs), along, impulse)
+            }
             None => impulse.fill(f64::NAN),
         }
         Ok(())

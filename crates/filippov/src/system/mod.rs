@@ -2,7 +2,8 @@
 //!
 //! A system is x' = f(t, x, s), where the entry `s_j` of the sign vector is the sign of the
 //! switching function h_j(t, x). The signs are *data*: the caller says which smooth field it
-//! wants, also slightly beyond a surface, and the field never looks at the sign of h itself.
+//! wants, also slightly beyond a surface, and the field never looks at the sign of h itself. So are the discrete
+//! states: nothing that a function reads is kept behind a reference to the system.
 
 mod action;
 mod activity;
@@ -15,13 +16,13 @@ mod clock;
 mod closures;
 mod compiled;
 mod definition;
-mod discrete;
 mod jacobian;
 mod jet_multipliers;
 mod jets;
 mod laws;
 mod linearisation;
 mod map;
+mod place;
 mod sections;
 mod tiered;
 mod traced;
@@ -41,6 +42,8 @@ pub use jets::MotionJets;
 pub use laws::{Law, LawAction, LawMap, Laws};
 pub use linearisation::Linearisation;
 pub use map::TracedMap;
+pub(crate) use place::OwnSetting;
+pub use place::{Place, Setting};
 pub use traced::TracedSystem;
 
 use std::sync::Arc;
@@ -84,7 +87,8 @@ pub type Word<'a> = &'a [i8];
 ///    are themselves piecewise smooth (an `abs` inside of a `sign`).
 /// 3. [`gradient`](Self::gradient) is the gradient of h_j in x, and returns the partial derivative in t.
 /// 4. [`active`](Self::active) may say `true` too often, never `false` wrongly.
-/// 5. All functions are pure: the same arguments give the same bits.
+/// 5. All functions are pure: the same arguments give the same bits. They read the discrete states from the
+///    [`Place`].
 pub trait PiecewiseSystem: Sync {
     /// Number of states.
     fn n_states(&self) -> usize;
@@ -96,13 +100,13 @@ pub trait PiecewiseSystem: Sync {
     ///
     /// # Errors
     /// If a function of the user raises.
-    fn field(&self, t: f64, x: &[f64], signs: &[f64], dx: &mut [f64]) -> Result<(), FieldError>;
+    fn field(&self, place: &Place<'_>, dx: &mut [f64]) -> Result<(), FieldError>;
 
     /// Writes h_j(t, x), j = 0..n_surfaces.
     ///
     /// # Errors
     /// If a function of the user raises.
-    fn surfaces(&self, t: f64, x: &[f64], signs: &[f64], h: &mut [f64]) -> Result<(), FieldError>;
+    fn surfaces(&self, place: &Place<'_>, h: &mut [f64]) -> Result<(), FieldError>;
 
     /// Writes h_j and its rate along the velocity `v`, dh_j/dt = d_t h_j + grad h_j . v.
     ///
@@ -110,17 +114,15 @@ pub trait PiecewiseSystem: Sync {
     /// If a function of the user raises.
     fn surface_rates(
         &self,
-        t: f64,
-        x: &[f64],
-        signs: &[f64],
+        place: &Place<'_>,
         v: &[f64],
         h: &mut [f64],
         rate: &mut [f64],
     ) -> Result<(), FieldError> {
-        self.surfaces(t, x, signs, h)?;
+        self.surfaces(place, h)?;
         let mut gradient = vec![0.0; self.n_states()];
         for (j, rate) in rate.iter_mut().enumerate() {
-            let ht = self.gradient(j, t, x, signs, &mut gradient)?;
+            let ht = self.gradient(j, place, &mut gradient)?;
             *rate = ht + dot(&gradient, v);
         }
         Ok(())
@@ -134,14 +136,13 @@ pub trait PiecewiseSystem: Sync {
     fn gradient(
         &self,
         j: usize,
-        t: f64,
-        x: &[f64],
-        signs: &[f64],
+        place: &Place<'_>,
         gradient: &mut [f64],
     ) -> Result<f64, FieldError> {
+        let &Place { t, x, .. } = place;
         let mut h = vec![0.0; self.n_surfaces()];
         let mut at = |t: f64, x: &[f64]| -> Result<f64, FieldError> {
-            self.surfaces(t, x, signs, &mut h)?;
+            self.surfaces(&place.moved(t, x), &mut h)?;
             Ok(h[j])
         };
         let mut moved = x.to_vec();
@@ -168,14 +169,14 @@ pub trait PiecewiseSystem: Sync {
     fn gradient_products(
         &self,
         j: usize,
-        (t, x): (f64, &[f64]),
-        signs: &[f64],
+        place: &Place<'_>,
         vectors: &[f64],
         products: &mut [f64],
     ) -> Result<f64, FieldError> {
-        let mut gradient = vec![0.0; x.len()];
-        let ht = self.gradient(j, t, x, signs, &mut gradient)?;
-        for (product, vector) in products.iter_mut().zip(vectors.chunks_exact(x.len())) {
+        let n = place.x.len();
+        let mut gradient = vec![0.0; n];
+        let ht = self.gradient(j, place, &mut gradient)?;
+        for (product, vector) in products.iter_mut().zip(vectors.chunks_exact(n)) {
             *product = dot(&gradient, vector);
         }
         Ok(ht)
@@ -186,10 +187,10 @@ pub trait PiecewiseSystem: Sync {
     ///
     /// # Errors
     /// If a function of the user raises.
-    fn surface_size(&self, j: usize, t: f64, x: &[f64], signs: &[f64]) -> Result<f64, FieldError> {
-        let mut gradient = vec![0.0; x.len()];
-        let ht = self.gradient(j, t, x, signs, &mut gradient)?;
-        Ok(dot_magnitude(&gradient, x) + (ht * t).abs())
+    fn surface_size(&self, j: usize, place: &Place<'_>) -> Result<f64, FieldError> {
+        let mut gradient = vec![0.0; place.x.len()];
+        let ht = self.gradient(j, place, &mut gradient)?;
+        Ok(dot_magnitude(&gradient, place.x) + (ht * place.t).abs())
     }
 
     /// Everything that sliding on h_j needs at a point of the surface: fields and normal components of
@@ -200,12 +201,10 @@ pub trait PiecewiseSystem: Sync {
     fn both_sides(
         &self,
         j: usize,
-        t: f64,
-        x: &[f64],
-        signs: &[f64],
+        place: &Place<'_>,
         out: &mut BothSides,
     ) -> Result<u64, FieldError> {
-        out.both_sides_by_parts(self, j, t, x, signs)
+        out.both_sides_by_parts(self, j, place)
     }
 
     /// Marks the surfaces whose sign matters for the motion with these signs (and with either
@@ -228,8 +227,13 @@ pub trait PiecewiseSystem: Sync {
 
     /// Rigorous bounds of h_j and of its rate along a piece of motion; `None` if the system cannot say,
     /// and zeros are then found by sampling.
-    fn enclose_surface(&self, j: usize, motion: &dyn Motion, signs: &[f64]) -> Option<Enclosure> {
-        let _ = (j, motion, signs);
+    fn enclose_surface(
+        &self,
+        j: usize,
+        motion: &dyn Motion,
+        setting: Setting<'_>,
+    ) -> Option<Enclosure> {
+        let _ = (j, motion, setting);
         None
     }
 
@@ -239,9 +243,9 @@ pub trait PiecewiseSystem: Sync {
         &self,
         j: usize,
         motion: &dyn Motion,
-        signs: &[f64],
+        setting: Setting<'_>,
     ) -> Option<[Enclosure; 2]> {
-        let _ = (j, motion, signs);
+        let _ = (j, motion, setting);
         None
     }
 
@@ -255,22 +259,14 @@ pub trait PiecewiseSystem: Sync {
         i: usize,
         j: usize,
         word: Word,
-        t: f64,
-        x: &[f64],
-        signs: &[f64],
+        place: &Place<'_>,
     ) -> Result<LieValue, FieldError> {
-        closures::lie_by_differences(self, i, j, word, t, x, signs)
+        closures::lie_by_differences(self, i, j, word, place)
     }
 
     /// The first Lie derivatives of h_j along f- and f+, where one evaluation gives both; `signs[j]` is ignored.
-    fn first_lie_derivatives(
-        &self,
-        j: usize,
-        t: f64,
-        x: &[f64],
-        signs: &[f64],
-    ) -> Option<[LieValue; 2]> {
-        let _ = (j, t, x, signs);
+    fn first_lie_derivatives(&self, j: usize, place: &Place<'_>) -> Option<[LieValue; 2]> {
+        let _ = (j, place);
         None
     }
 
@@ -313,8 +309,8 @@ pub trait PiecewiseSystem: Sync {
     }
 
     /// Writes the coefficients at a point: (order + 1) rows. Not finite from the order on that does not exist.
-    fn eval_jets(&self, jets: &MotionJets, t: f64, x: &[f64], signs: &[f64], out: &mut [f64]) {
-        let _ = (jets, t, x, signs);
+    fn eval_jets(&self, jets: &MotionJets, place: &Place<'_>, out: &mut [f64]) {
+        let _ = (jets, place);
         out.fill(f64::NAN);
     }
 
@@ -326,15 +322,8 @@ pub trait PiecewiseSystem: Sync {
     }
 
     /// Writes these derivatives at a point; entries of `signs` on the surfaces slid on are their multipliers.
-    fn eval_jacobian(
-        &self,
-        jacobian: &MotionJacobian,
-        t: f64,
-        x: &[f64],
-        signs: &[f64],
-        out: &mut Linearisation,
-    ) {
-        let _ = (jacobian, t, x, signs);
+    fn eval_jacobian(&self, jacobian: &MotionJacobian, place: &Place<'_>, out: &mut Linearisation) {
+        let _ = (jacobian, place);
         out.fill(|values, _| values.fill(f64::NAN));
     }
 
@@ -371,8 +360,8 @@ pub trait PiecewiseSystem: Sync {
     }
 
     /// The ratio of static to kinetic friction at h_j = 0, at least 1.
-    fn stick_ratio(&self, j: usize, t: f64, x: &[f64], signs: &[f64]) -> f64 {
-        let _ = (j, t, x, signs);
+    fn stick_ratio(&self, j: usize, place: &Place<'_>) -> f64 {
+        let _ = (j, place);
         1.0
     }
 
@@ -384,18 +373,10 @@ pub trait PiecewiseSystem: Sync {
     fn rate_gradient(
         &self,
         j: usize,
-        t: f64,
-        x: &[f64],
-        signs: &[f64],
+        place: &Place<'_>,
         gradient: &mut [f64],
     ) -> Result<RatePartials, FieldError> {
-        closures::rate_gradient_by_differences(self, j, t, x, signs, gradient)
-    }
-
-    /// Gives the discrete states, which the functions read from now on, new values. Called between evaluations,
-    /// by one run at a time.
-    fn set_discrete(&self, q: &[f64]) {
-        let _ = q;
+        closures::rate_gradient_by_differences(self, j, place, gradient)
     }
 
     /// A readable name of surface `j` for messages.

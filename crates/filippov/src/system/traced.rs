@@ -6,15 +6,13 @@ mod rounding;
 
 use std::sync::Arc;
 
+use filippov_expr::{Backend, Enclosure, ExprError, Graph, Motion, Names, NodeId, Program};
 use smallvec::SmallVec;
 
-use filippov_expr::{Backend, Enclosure, ExprError, Graph, Motion, Names, NodeId};
-
 use super::compiled::Model;
-use super::discrete::DiscreteStates;
 use super::{
-    AffineSigns, BothSides, LieValue, MotionJacobian, MotionJets, PiecewiseSystem, RatePartials,
-    Word,
+    AffineSigns, BothSides, LieValue, MotionJacobian, MotionJets, PiecewiseSystem, Place,
+    RatePartials, Setting, Word,
 };
 use crate::error::FieldError;
 use crate::system::Linearisation;
@@ -36,8 +34,8 @@ const MOST_TERMS: usize = 16;
 pub struct TracedSystem {
     model: Arc<Model>,
     parameters: Vec<f64>,
-    /// Read by the functions behind the parameters.
-    discrete: DiscreteStates,
+    /// How many discrete states the functions read, behind the parameters.
+    n_discrete: usize,
 }
 
 impl TracedSystem {
@@ -56,7 +54,7 @@ impl TracedSystem {
         Ok(TracedSystem {
             model: Arc::new(model),
             parameters,
-            discrete: DiscreteStates::default(),
+            n_discrete: 0,
         })
     }
 
@@ -80,11 +78,10 @@ impl TracedSystem {
         self
     }
 
-    /// The same system, whose functions read `count` discrete states behind the parameters. Every copy has its
-    /// own.
+    /// The same system, whose functions read `count` discrete states behind the parameters.
     #[must_use]
     pub fn with_discrete(mut self, count: usize) -> Self {
-        self.discrete = (0..count).map(|_| f64::NAN).collect();
+        self.n_discrete = count;
         self
     }
 
@@ -94,13 +91,13 @@ impl TracedSystem {
         TracedSystem {
             model: Arc::clone(&self.model),
             parameters,
-            discrete: self.discrete.clone(),
+            n_discrete: self.n_discrete,
         }
     }
 
     /// How many discrete states its functions read.
     pub fn n_discrete(&self) -> usize {
-        self.discrete.len()
+        self.n_discrete
     }
 
     /// The parameter values.
@@ -130,33 +127,77 @@ impl TracedSystem {
 }
 
 impl TracedSystem {
-    /// Calls a function with the parameters, the discrete states behind them.
+    /// Calls a function with the parameters, these discrete states behind them.
     #[inline(always)]
-    pub fn with_values<R>(&self, f: impl FnOnce(&[f64]) -> R) -> R {
+    pub fn with_values<R>(&self, q: &[f64], f: impl FnOnce(&[f64]) -> R) -> R {
         // Filled only where there are discrete states.
         let values;
-        f(if self.discrete.is_empty() {
+        f(if q.is_empty() {
             &self.parameters
         } else {
-            values = self.discrete.behind(&self.parameters);
+            values = behind(&self.parameters, q);
             &values
         })
     }
 
-    /// The field where there are discrete states: apart, so that the way without them is short.
+    /// Evaluates a program at a place, with a vector handed in.
+    #[inline(always)]
+    pub(super) fn eval(&self, program: &Program, place: &Place<'_>, v: &[f64], out: &mut [f64]) {
+        self.with_values(place.q, |p| {
+            program.eval(place.t, place.x, place.signs, p, v, out);
+        });
+    }
+
+    /// The field where there are discrete states, or no native code: apart, so that the way without them is short.
     #[cold]
     #[inline(never)]
-    fn field_with_discrete(
-        &self,
-        t: f64,
-        x: &[f64],
-        signs: &[f64],
-        dx: &mut [f64],
-    ) -> Result<(), FieldError> {
-        let program = &self.model.field_program;
-        self.with_values(|p| program.eval(t, x, signs, p, &[], dx));
-        Ok(())
+    fn field_apart(&self, place: &Place<'_>, dx: &mut [f64]) {
+        self.eval(&self.model.field_program, place, &[], dx);
     }
+}
+
+impl TracedSystem {
+    /// Values and rates of switching functions that have to be computed.
+    #[inline(never)]
+    fn computed_rates(&self, place: &Place<'_>, v: &[f64], h: &mut [f64], rate: &mut [f64]) {
+        let (d, program) = (h.len(), self.model.rates());
+        if d == 1 {
+            let mut out = [0.0; 2];
+            self.eval(program, place, v, &mut out);
+            (h[0], rate[0]) = (out[0], out[1]);
+        } else {
+            let mut out = vec![0.0; 2 * d];
+            self.eval(program, place, v, &mut out);
+            h.copy_from_slice(&out[..d]);
+            rate.copy_from_slice(&out[d..]);
+        }
+    }
+}
+
+impl TracedSystem {
+    /// The size of the terms of a switching function that has to be computed.
+    #[inline(never)]
+    fn computed_size(&self, j: usize, place: &Place<'_>) -> f64 {
+        let &Place { t, x, .. } = place;
+        let size = self.with_gradient(j, place, |time, states, values| {
+            let entries = states.iter().zip(values);
+            let size: f64 = entries.map(|(&i, value)| (value * x[i]).abs()).sum();
+            size + (time * t).abs()
+        });
+        if self.is_affine(j) {
+            return size;
+        }
+        // Terms may cancel where the gradient vanishes.
+        size.max(self.rounding_of_surface(j, place) / SURFACE_NOISE)
+    }
+}
+
+/// The parameters with the discrete states behind them.
+#[cold]
+fn behind(parameters: &[f64], q: &[f64]) -> SmallVec<[f64; 16]> {
+    let mut all = SmallVec::from_slice(parameters);
+    all.extend_from_slice(q);
+    all
 }
 
 impl PiecewiseSystem for TracedSystem {
@@ -169,50 +210,35 @@ impl PiecewiseSystem for TracedSystem {
     }
 
     #[inline]
-    fn field(&self, t: f64, x: &[f64], signs: &[f64], dx: &mut [f64]) -> Result<(), FieldError> {
-        if !self.discrete.is_empty() {
-            return self.field_with_discrete(t, x, signs, dx);
+    fn field(&self, place: &Place<'_>, dx: &mut [f64]) -> Result<(), FieldError> {
+        let &Place { t, x, signs, q } = place;
+        let (program, p) = (&self.model.field_program, &self.parameters);
+        if !(q.is_empty() && program.eval_native(t, x, signs, p, &[], dx)) {
+            self.field_apart(place, dx);
         }
-        self.model
-            .field_program
-            .eval(t, x, signs, &self.parameters, &[], dx);
         Ok(())
     }
 
-    fn surfaces(&self, t: f64, x: &[f64], signs: &[f64], h: &mut [f64]) -> Result<(), FieldError> {
+    fn surfaces(&self, place: &Place<'_>, h: &mut [f64]) -> Result<(), FieldError> {
         if let Some(i) = self.model.only_state {
-            h[0] = x[i];
+            h[0] = place.x[i];
             return Ok(());
         }
-        let program = self.model.surfaces_program.program();
-        self.with_values(|p| program.eval(t, x, signs, p, &[], h));
+        self.eval(self.model.surfaces_program.program(), place, &[], h);
         Ok(())
     }
 
     fn surface_rates(
         &self,
-        t: f64,
-        x: &[f64],
-        signs: &[f64],
+        place: &Place<'_>,
         v: &[f64],
         h: &mut [f64],
         rate: &mut [f64],
     ) -> Result<(), FieldError> {
-        let d = h.len();
         if let Some(i) = self.model.only_state {
-            (h[0], rate[0]) = (x[i], v[i]);
-            return Ok(());
-        }
-        let program = self.model.rates();
-        if d == 1 {
-            let mut out = [0.0; 2];
-            self.with_values(|p| program.eval(t, x, signs, p, v, &mut out));
-            (h[0], rate[0]) = (out[0], out[1]);
+            (h[0], rate[0]) = (place.x[i], v[i]);
         } else {
-            let mut out = vec![0.0; 2 * d];
-            self.with_values(|p| program.eval(t, x, signs, p, v, &mut out));
-            h.copy_from_slice(&out[..d]);
-            rate.copy_from_slice(&out[d..]);
+            self.computed_rates(place, v, h, rate);
         }
         Ok(())
     }
@@ -220,83 +246,65 @@ impl PiecewiseSystem for TracedSystem {
     fn gradient(
         &self,
         j: usize,
-        t: f64,
-        x: &[f64],
-        signs: &[f64],
+        place: &Place<'_>,
         gradient: &mut [f64],
     ) -> Result<f64, FieldError> {
-        Ok(
-            self.with_gradient((j, signs), (t, x), |time, states, values| {
-                gradient.fill(0.0);
-                for (&state, &value) in states.iter().zip(values) {
-                    gradient[state] = value;
-                }
-                time
-            }),
-        )
+        Ok(self.with_gradient(j, place, |time, states, values| {
+            gradient.fill(0.0);
+            for (&state, &value) in states.iter().zip(values) {
+                gradient[state] = value;
+            }
+            time
+        }))
     }
 
     fn gradient_products(
         &self,
         j: usize,
-        (t, x): (f64, &[f64]),
-        signs: &[f64],
+        place: &Place<'_>,
         vectors: &[f64],
         products: &mut [f64],
     ) -> Result<f64, FieldError> {
-        Ok(
-            self.with_gradient((j, signs), (t, x), |time, states, values| {
-                let vectors = vectors.chunks_exact(x.len());
-                if let (&[i], &[slope]) = (states, values) {
-                    for (product, vector) in products.iter_mut().zip(vectors) {
-                        *product = slope * vector[i];
-                    }
-                    return time;
-                }
+        Ok(self.with_gradient(j, place, |time, states, values| {
+            let vectors = vectors.chunks_exact(place.x.len());
+            if let (&[i], &[slope]) = (states, values) {
                 for (product, vector) in products.iter_mut().zip(vectors) {
-                    let entries = states.iter().zip(values);
-                    *product = entries.map(|(&i, value)| value * vector[i]).sum();
+                    *product = slope * vector[i];
                 }
-                time
-            }),
-        )
+                return time;
+            }
+            for (product, vector) in products.iter_mut().zip(vectors) {
+                let entries = states.iter().zip(values);
+                *product = entries.map(|(&i, value)| value * vector[i]).sum();
+            }
+            time
+        }))
     }
 
-    fn surface_size(&self, j: usize, t: f64, x: &[f64], signs: &[f64]) -> Result<f64, FieldError> {
-        if let Some(i) = self.model.only_state {
-            return Ok(x[i].abs());
-        }
-        let size = self.with_gradient((j, signs), (t, x), |time, states, values| {
-            let entries = states.iter().zip(values);
-            let size: f64 = entries.map(|(&i, value)| (value * x[i]).abs()).sum();
-            size + (time * t).abs()
-        });
-        if self.is_affine(j) {
-            return Ok(size);
-        }
-        // Terms may cancel where the gradient vanishes.
-        Ok(size.max(self.rounding_of_surface(j, t, x, signs) / SURFACE_NOISE))
+    fn surface_size(&self, j: usize, place: &Place<'_>) -> Result<f64, FieldError> {
+        Ok(match self.model.only_state {
+            Some(i) => place.x[i].abs(),
+            None => self.computed_size(j, place),
+        })
     }
 
     fn both_sides(
         &self,
         j: usize,
-        t: f64,
-        x: &[f64],
-        signs: &[f64],
+        place: &Place<'_>,
         out: &mut BothSides,
     ) -> Result<u64, FieldError> {
         let n = self.model.n_states;
         if self.model.sticks_at(j) {
-            let evaluations = out.both_sides_by_parts(self, j, t, x, signs)?;
-            out.stretch(self.stick_ratio(j, t, x, signs));
+            let evaluations = out.both_sides_by_parts(self, j, place)?;
+            out.stretch(self.stick_ratio(j, place));
             return Ok(evaluations);
         }
         if n > FUSED_STATES || out.meets_edges {
-            return out.both_sides_by_parts(self, j, t, x, signs);
+            return out.both_sides_by_parts(self, j, place);
         }
         let program = self.model.both_sides(j);
-        self.with_values(|p| program.eval(t, x, signs, p, &[], &mut out.outputs));
+        self.eval(program, place, &[], &mut out.outputs);
         let (head, rest) = out.outputs.split_at(2);
         (out.normal_minus, out.normal_plus) = (head[0], head[1]);
         out.f_minus.copy_from_slice(&rest[..n]);
@@ -306,7 +314,7 @@ impl PiecewiseSystem for TracedSystem {
         if finite {
             Ok(2)
         } else {
-            out.both_sides_by_parts(self, j, t, x, signs)
+            out.both_sides_by_parts(self, j, place)
         }
     }
 
@@ -322,10 +330,16 @@ impl PiecewiseSystem for TracedSystem {
         self.model.affine[j]
     }
 
-    fn enclose_surface(&self, j: usize, motion: &dyn Motion, signs: &[f64]) -> Option<Enclosure> {
+    fn enclose_surface(
+        &self,
+        j: usize,
+        motion: &dyn Motion,
+        setting: Setting<'_>,
+    ) -> Option<Enclosure> {
         let mut out = [Enclosure::UNKNOWN];
         let program = self.model.enclosed_surface(j)?;
-        self.with_values(|p| program.eval(motion, signs, p, &mut out));
+        let signs = setting.signs;
+        self.with_values(setting.q, |p| program.eval(motion, signs, p, &mut out));
         Some(out[0])
     }
 
@@ -333,11 +347,12 @@ impl PiecewiseSystem for TracedSystem {
         &self,
         j: usize,
         motion: &dyn Motion,
-        signs: &[f64],
+        setting: Setting<'_>,
     ) -> Option<[Enclosure; 2]> {
         let mut out = [Enclosure::UNKNOWN; 2];
         let program = self.model.enclosed_normal_components(j)?;
-        self.with_values(|p| program.eval(motion, signs, p, &mut out));
+        let signs = setting.signs;
+        self.with_values(setting.q, |p| program.eval(motion, signs, p, &mut out));
         Some(out)
     }
 
@@ -346,9 +361,7 @@ impl PiecewiseSystem for TracedSystem {
         i: usize,
         j: usize,
         word: Word,
-        t: f64,
-        x: &[f64],
-        signs: &[f64],
+        place: &Place<'_>,
     ) -> Result<LieValue, FieldError> {
         Ok(self.model.with_lie_derivative((i, j), word, |program| {
             let (mut small, mut large) = ([0.0; MOST_TERMS], Vec::new());
@@ -359,7 +372,7 @@ impl PiecewiseSystem for TracedSystem {
                 large.resize(count, 0.0);
                 &mut large[..]
             };
-            self.with_values(|p| program.eval(t, x, signs, p, &[], out));
+            self.eval(program, place, &[], out);
             LieValue {
                 value: out[0],
                 magnitude: out[1..].iter().map(|v| v.abs()).sum(),
@@ -367,17 +380,11 @@ impl PiecewiseSystem for TracedSystem {
         }))
     }
 
-    fn first_lie_derivatives(
-        &self,
-        j: usize,
-        t: f64,
-        x: &[f64],
-        signs: &[f64],
-    ) -> Option<[LieValue; 2]> {
+    fn first_lie_derivatives(&self, j: usize, place: &Place<'_>) -> Option<[LieValue; 2]> {
         let program = self.model.first_lie_derivatives(j);
         let mut values = [0.0; 2 * MOST_TERMS];
         let out = values.get_mut(..program.n_outputs())?;
-        program.eval(t, x, signs, &self.parameters, &[], out);
+        self.eval(program, place, &[], out);
         let (minus, plus) = out.split_at(out.len() / 2);
         Some([minus, plus].map(|side| LieValue {
             value: side[0],
@@ -409,23 +416,16 @@ impl PiecewiseSystem for TracedSystem {
         self.model.motion_jets(sliding, order)
     }
 
-    fn eval_jets(&self, jets: &MotionJets, t: f64, x: &[f64], signs: &[f64], out: &mut [f64]) {
-        self.with_values(|p| jets.eval(t, x, signs, p, out));
+    fn eval_jets(&self, jets: &MotionJets, place: &Place<'_>, out: &mut [f64]) {
+        self.with_values(place.q, |p| jets.eval(place, p, out));
     }
 
     fn motion_jacobian(&self, sliding: &[usize]) -> Option<Arc<MotionJacobian>> {
         self.model.motion_jacobian(sliding)
     }
 
-    fn eval_jacobian(
-        &self,
-        jacobian: &MotionJacobian,
-        t: f64,
-        x: &[f64],
-        signs: &[f64],
-        out: &mut Linearisation,
-    ) {
-        self.with_values(|p| jacobian.eval(t, x, signs, p, out));
+    fn eval_jacobian(&self, jacobian: &MotionJacobian, place: &Place<'_>, out: &mut Linearisation) {
+        self.with_values(place.q, |p| jacobian.eval(place, p, out));
     }
 
     fn sign_groups(&self, surfaces: &[usize]) -> Vec<Vec<usize>> {
@@ -444,36 +444,30 @@ impl PiecewiseSystem for TracedSystem {
         self.model.sticks_at(j)
     }
 
-    fn stick_ratio(&self, j: usize, t: f64, x: &[f64], signs: &[f64]) -> f64 {
+    fn stick_ratio(&self, j: usize, place: &Place<'_>) -> f64 {
         let Some(program) = self.model.stick_ratio(j) else {
             return 1.0;
         };
         let mut ratio = [1.0];
-        self.with_values(|p| program.eval(t, x, signs, p, &[], &mut ratio));
+        self.eval(program, place, &[], &mut ratio);
         ratio[0].max(1.0)
     }
 
     fn rate_gradient(
         &self,
         j: usize,
-        t: f64,
-        x: &[f64],
-        signs: &[f64],
+        place: &Place<'_>,
         gradient: &mut [f64],
     ) -> Result<RatePartials, FieldError> {
         let program = self.model.rate_gradient(j);
         let mut out = SmallVec::<[f64; 16]>::from_elem(0.0, program.n_outputs());
-        self.with_values(|p| program.eval(t, x, signs, p, &[], &mut out));
+        self.eval(program, place, &[], &mut out);
         gradient.copy_from_slice(&out[3..]);
         Ok(RatePartials {
             rate: out[0],
             magnitude: out[2],
             time: out[1],
         })
-    }
-
-    fn set_discrete(&self, q: &[f64]) {
-        self.discrete.set(q);
     }
 
     fn surface_name(&self, j: usize) -> String {

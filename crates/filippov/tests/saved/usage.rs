@@ -1,7 +1,8 @@
 //! Everything that can be done with a system, for any system that was accepted.
 
 use filippov::{
-    classify, BothSides, Inspection, Method, Options, PiecewiseSystem, SavedSystem, TracedSystem,
+    classify, BothSides, Inspection, Method, Options, PiecewiseSystem, Place, SavedSystem, Setting,
+    TracedSystem,
 };
 use filippov_expr::Backend;
 
@@ -26,8 +27,8 @@ pub fn use_everything(system: SavedSystem, case: u64) -> bool {
     };
     for (t, scale) in [(0.0, 0.0), (0.3, 0.7)] {
         let x: Vec<f64> = (0..n).map(|i| scale * (1.0 - 0.6 * i as f64)).collect();
-        let (system, _) = runnable.at(&parameters, t, &x).unwrap();
-        evaluate(&system, t, &x);
+        let (system, q) = runnable.at(&parameters, t, &x).unwrap();
+        evaluate(&system, (t, &x), &q);
     }
     let methods = [
         Method::Auto,
@@ -51,27 +52,28 @@ pub fn use_everything(system: SavedSystem, case: u64) -> bool {
     true
 }
 
-fn evaluate(system: &TracedSystem, t: f64, x: &[f64]) {
+fn evaluate(system: &TracedSystem, (t, x): (f64, &[f64]), q: &[f64]) {
     let (n, d) = (system.n_states(), system.n_surfaces());
     let mut out = vec![0.0; n];
     let (mut h, mut rates) = (vec![0.0; d], vec![0.0; d]);
     for side in [1.0, -1.0] {
         let signs = vec![side; d];
-        system.field(t, x, &signs, &mut out).unwrap();
-        system.surfaces(t, x, &signs, &mut h).unwrap();
+        let place = Setting::new(&signs, q).at(t, x);
+        system.field(&place, &mut out).unwrap();
+        system.surfaces(&place, &mut h).unwrap();
         let velocity = out.clone();
         system
-            .surface_rates(t, x, &signs, &velocity, &mut h, &mut rates)
+            .surface_rates(&place, &velocity, &mut h, &mut rates)
             .unwrap();
         system.active(&signs, &[], &mut vec![false; d]);
-        series(system, &[], t, x, &signs);
+        series(system, &[], &place);
         for j in 0..d.min(MOST_SURFACES) {
-            at_surface(system, j, t, x, &signs);
+            at_surface(system, j, &place);
         }
     }
     for pair in [[0, 1], [1, 2]] {
         if pair[1] < d {
-            series(system, &pair, t, x, &vec![1.0; d]);
+            series(system, &pair, &Setting::new(&vec![1.0; d], q).at(t, x));
             system.sign_groups(&pair);
         }
     }
@@ -83,37 +85,38 @@ fn evaluate(system: &TracedSystem, t: f64, x: &[f64]) {
             x,
             Inspection {
                 reach: REACH,
+                q,
                 ..Inspection::default()
             },
         );
     }
 }
 
-fn at_surface(system: &TracedSystem, j: usize, t: f64, x: &[f64], signs: &[f64]) {
+fn at_surface(system: &TracedSystem, j: usize, place: &Place<'_>) {
     let n = system.n_states();
     let mut gradient = vec![0.0; n];
-    system.gradient(j, t, x, signs, &mut gradient).unwrap();
-    system.surface_size(j, t, x, signs).unwrap();
+    system.gradient(j, place, &mut gradient).unwrap();
+    system.surface_size(j, place).unwrap();
     let mut sides = BothSides::new(n, system.n_surfaces());
-    system.both_sides(j, t, x, signs, &mut sides).unwrap();
+    system.both_sides(j, place, &mut sides).unwrap();
     for word in [&[][..], &[1], &[-1, 1]] {
-        system.lie_derivative(j, j, word, t, x, signs).unwrap();
+        system.lie_derivative(j, j, word, place).unwrap();
     }
-    system.rate_gradient(j, t, x, signs, &mut gradient).unwrap();
-    system.first_lie_derivatives(j, t, x, signs);
-    system.stick_ratio(j, t, x, signs);
+    system.rate_gradient(j, place, &mut gradient).unwrap();
+    system.first_lie_derivatives(j, place);
+    system.stick_ratio(j, place);
     system.switches_at(j);
     assert!(system.surface_name(j).len() < 10_000);
-    series(system, &[j], t, x, signs);
+    series(system, &[j], place);
 }
 
-fn series(system: &TracedSystem, sliding: &[usize], t: f64, x: &[f64], signs: &[f64]) {
+fn series(system: &TracedSystem, sliding: &[usize], place: &Place<'_>) {
     if let Some(jets) = system.motion_jets(sliding, 5) {
         let mut out = vec![0.0; jets.width() * (jets.order() + 1)];
-        system.eval_jets(&jets, t, x, signs, &mut out);
+        system.eval_jets(&jets, place, &mut out);
     }
     if let Some(jacobian) = system.motion_jacobian(sliding) {
         let mut out = jacobian.linearisation();
-        system.eval_jacobian(&jacobian, t, x, signs, &mut out);
+        system.eval_jacobian(&jacobian, place, &mut out);
     }
 }

@@ -11,6 +11,7 @@ use crate::locate::refine;
 use crate::motion::Monitored;
 use crate::motion::{Guard, ModeField};
 use crate::stepper::{powers_of_nested, Basis, ExitSeries};
+use crate::system::Setting;
 use crate::tolerances::{EPS, SERIES_MARGIN};
 
 /// A guard along a step, as far as it is a polynomial.
@@ -85,14 +86,11 @@ impl StepSearch<'_, '_> {
     /// An affine switching function along the step, positive inside of the mode, into `rows`.
     pub(super) fn affine_series(&self, m: &Monitored, rows: &mut [f64]) -> Result<(), FieldError> {
         let extension = self.stepper.interpolant();
-        let (point, signs) = ((self.run.t, &self.run.x[..]), &self.run.motion.signs);
-        let ht = self.run.system.gradient_products(
-            m.place,
-            point,
-            signs,
-            extension.coefficients(),
-            rows,
-        )?;
+        let place = self.run.motion.setting().at(self.run.t, &self.run.x);
+        let ht =
+            self.run
+                .system
+                .gradient_products(m.place, &place, extension.coefficients(), rows)?;
         if m.orientation < 0.0 {
             rows.iter_mut().for_each(|row| *row = -*row);
         }
@@ -156,7 +154,7 @@ impl StepSearch<'_, '_> {
         let mut curve = Curve {
             system: self.run.system,
             field: &mut self.run.motion.field,
-            signs: &self.run.motion.signs,
+            setting: Setting::new(&self.run.motion.signs, &self.run.motion.discrete),
             interpolant: self.stepper.interpolant(),
             is_straight: self.run.motion.is_straight,
             h: &mut self.detector.h,

@@ -12,14 +12,14 @@ use crate::mode::Signs;
 use crate::motion::Monitored;
 use crate::motion::{AffineBounds, Guard, RootEnd, Seen};
 use crate::stepper::Interpolant;
-use crate::system::PiecewiseSystem;
+use crate::system::{PiecewiseSystem, Setting};
 use crate::tolerances::{MOST_ENCLOSED, ROOT_BOXES};
 
 /// The continuous extension of a step, as far as it bounds what is monitored.
 pub(crate) struct BoundedCurve<'a> {
     pub system: &'a dyn PiecewiseSystem,
     pub interpolant: &'a Interpolant,
-    pub signs: &'a [f64],
+    pub setting: Setting<'a>,
     pub sliding: &'a [usize],
     /// How far the projection onto a curved surface moves the extension.
     pub margin: &'a [f64],
@@ -54,7 +54,7 @@ impl BoundedCurve<'_> {
         let (enclosure, orientation) = match (m.guard, self.sliding) {
             (Guard::Surface(j), _) => {
                 let tube = Tube::new(self.interpolant, (a, b), self.margin);
-                let enclosure = self.system.enclose_surface(j, &tube, self.signs)?;
+                let enclosure = self.system.enclose_surface(j, &tube, self.setting)?;
                 (enclosure, m.orientation)
             }
             (Guard::Multiplier { end, .. }, &[j]) => {
@@ -99,16 +99,17 @@ impl BoundedCurve<'_> {
         let tube = Tube::new(self.interpolant, (a, b), self.margin);
         let m = self.sliding.len();
         let mut components = SmallVec::from_elem(Interval::ALL, m << m);
-        let mut signs = Signs::from_slice(self.signs);
+        let mut signs = Signs::from_slice(self.setting.signs);
         for pattern in 0..1_usize << m {
             for (i, &j) in self.sliding.iter().enumerate() {
                 signs[j] = if pattern >> i & 1 == 1 { 1.0 } else { -1.0 };
             }
             let below = (0..m).filter(|i| pattern >> i & 1 == 0);
             for i in below {
+                let setting = self.setting.with_signs(&signs);
                 let sides =
                     self.system
-                        .enclose_normal_components(self.sliding[i], &tube, &signs)?;
+                        .enclose_normal_components(self.sliding[i], &tube, setting)?;
                 components[pattern * m + i] = sides[0].value;
                 components[(pattern | 1 << i) * m + i] = sides[1].value;
             }
@@ -123,7 +124,7 @@ impl BoundedCurve<'_> {
         let tube = Tube::new(self.interpolant, (a, b), self.margin);
         let components = self
             .system
-            .enclose_normal_components(j, &tube, self.signs)?;
+            .enclose_normal_components(j, &tube, self.setting)?;
         self.known_exits.borrow_mut().push((a, b, components));
         Some(components)
     }
@@ -135,7 +136,7 @@ impl BoundedCurve<'_> {
             let exits = self.seen.chunks_exact(2).take(self.sliding.len());
             let middles = exits.map(|pair| 0.5 * (pair[0].start + pair[0].end) - 1.0);
             let near: Vector = middles.collect();
-            let found = bounds.enclose(affine, self.sliding, &tube, self.signs, &near);
+            let found = bounds.enclose(affine, self.sliding, &tube, self.setting, &near);
             return Some(found.map_or(RootBounds::Unproved, |found| {
                 RootBounds::Proved(EnclosedRoot {
                     multipliers: found.values,

@@ -4,13 +4,13 @@ use crate::error::FieldError;
 use crate::motion::Monitored;
 use crate::motion::{Exits, ModeField};
 use crate::stepper::Interpolant;
-use crate::system::PiecewiseSystem;
+use crate::system::{PiecewiseSystem, Setting};
 
 /// A monitored function along the continuous extension.
 pub(crate) struct Curve<'a, 'b> {
     pub system: &'a dyn PiecewiseSystem,
     pub field: &'a mut ModeField<'b>,
-    pub signs: &'a [f64],
+    pub setting: Setting<'a>,
     pub interpolant: &'a Interpolant,
     /// The surfaces slid on are affine: the extension stays on them but for rounding.
     pub is_straight: bool,
@@ -54,7 +54,7 @@ impl Curve<'_, '_> {
             self.field.project(t, self.x)?;
         }
         *self.n_evaluations += 1;
-        self.system.surfaces(t, self.x, self.signs, self.h)?;
+        self.system.surfaces(&self.setting.at(t, self.x), self.h)?;
         Ok(m.orientation * self.h[j])
     }
 }

@@ -70,7 +70,8 @@ impl Detector {
         let (system, motion) = (run.system, &run.motion);
         let with_surfaces = motion.monitored.iter().any(|m| m.guard.is_surface());
         if with_surfaces {
-            system.surface_rates(t, x, &motion.signs, v, &mut self.h, &mut self.rate)?;
+            let place = motion.setting().at(t, x);
+            system.surface_rates(&place, v, &mut self.h, &mut self.rate)?;
         }
         self.right.clear();
         for m in &motion.monitored {
@@ -128,8 +129,8 @@ impl Detector {
             });
             return Ok(noise);
         };
-        let signs = &run.motion.signs;
-        let size = |x| run.system.surface_size(j, run.t, x, signs);
+        let setting = run.motion.setting();
+        let size = |x| run.system.surface_size(j, &setting.at(run.t, x));
         let size = size(end)?.max(size(&run.x)?);
         Ok(SURFACE_NOISE * size)
     }

@@ -15,6 +15,7 @@ use crate::event::series::{FirstZero, Near, Series, NO_TERMS};
 use crate::event::Found;
 use crate::locate::refine;
 use crate::motion::Guard;
+use crate::system::Setting;
 use crate::tolerances::{
     BEYOND_GUESS, BEYOND_TOUCH, EPS, POLE, RESOLVED_DEPTH, SMALL_REST, UNBOUNDED_DEPTH,
     UNPROVED_DEPTH,
@@ -239,10 +240,11 @@ impl StepSearch<'_, '_> {
         let ends_root = self.run.motion.ends_root(&m);
         let by_multipliers = !self.run.motion.slides_by_rule() && self.run.motion.has_bounds();
         let interpolant = self.stepper.interpolant();
+        let setting = Setting::new(&self.run.motion.signs, &self.run.motion.discrete);
         let bounds = BoundedCurve {
             system: self.run.system,
             interpolant,
-            signs: &self.run.motion.signs,
+            setting,
             sliding: &self.run.motion.sliding,
             margin: &self.detector.margin,
             seen: &self.run.seen,
@@ -259,7 +261,7 @@ impl StepSearch<'_, '_> {
         let mut curve = Curve {
             system: self.run.system,
             field: &mut self.run.motion.field,
-            signs: &self.run.motion.signs,
+            setting,
             interpolant,
             is_straight: self.run.motion.is_straight,
             h: &mut self.detector.h,

@@ -302,7 +302,7 @@ impl StepSearch<'_, '_> {
         let t = self.run.t + theta * self.stepper.interpolant().dt;
         self.run
             .system
-            .gradient(j, t, &x, &self.run.motion.signs, &mut gradient)?;
+            .gradient(j, &self.run.motion.setting().at(t, &x), &mut gradient)?;
         let tolerance = self.run.scale.along(&gradient, &x);
         Ok(TOUCH_DEPTH * tolerance)
     }
@@ -322,10 +322,10 @@ impl StepSearch<'_, '_> {
         }
         let n = self.run.system.n_surfaces();
         let (mut h, mut rates) = (vec![0.0; n], vec![0.0; n]);
-        let signs = &self.run.motion.signs;
+        let place = self.run.motion.setting().at(t, &x);
         self.run
             .system
-            .surface_rates(t, &x, signs, &velocity, &mut h, &mut rates)?;
+            .surface_rates(&place, &velocity, &mut h, &mut rates)?;
         self.run.stats.n_surface_evaluations += 1;
         Ok((m.orientation * h[j], m.orientation * rates[j]))
     }
@@ -347,10 +347,11 @@ impl StepSearch<'_, '_> {
         let mut signs = self.run.motion.signs.clone();
         signs[j] = f64::from(side);
         let word = [side; MAX_LIE_ORDER];
+        let place = self.run.motion.setting().with_signs(&signs).at(t, &x);
         let lie = self
             .run
             .system
-            .lie_derivative(j, j, &word[..order], t, &x, &signs)?;
+            .lie_derivative(j, j, &word[..order], &place)?;
         Ok(m.orientation * lie.value)
     }
 

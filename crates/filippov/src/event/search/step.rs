@@ -170,10 +170,8 @@ impl StepSearch<'_, '_> {
             let Guard::Surface(j) = m.guard else {
                 continue;
             };
-            let signs = &self.run.motion.signs;
-            self.run
-                .system
-                .gradient(j, self.run.t, &self.run.x, signs, &mut gradient)?;
+            let place = self.run.motion.setting().at(self.run.t, &self.run.x);
+            self.run.system.gradient(j, &place, &mut gradient)?;
             let tolerance = self.run.scale.along(&gradient, &self.run.x);
             if m.rate < 0.0 && m.value <= ARRIVED * tolerance {
                 return Ok(Some(Found::here(smallvec![m.guard])));
@@ -203,8 +201,8 @@ impl StepSearch<'_, '_> {
             h.resize(self.detector.h.len(), 0.0);
             let run = &mut *self.run;
             let t = run.t + theta * dt;
-            run.system
-                .surfaces(t, &self.detector.x, &run.motion.signs, h)?;
+            let place = run.motion.setting().at(t, &self.detector.x);
+            run.system.surfaces(&place, h)?;
             run.stats.n_surface_evaluations += 1;
         }
         Ok(())
@@ -259,7 +257,7 @@ impl StepSearch<'_, '_> {
         let curve = BoundedCurve {
             system: self.run.system,
             interpolant: self.stepper.interpolant(),
-            signs: &self.run.motion.signs,
+            setting: self.run.motion.setting(),
             sliding: self.run.motion.sliding(),
             margin: &self.detector.margin,
             seen: &self.run.seen,

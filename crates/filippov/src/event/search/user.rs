@@ -42,7 +42,7 @@ pub(super) fn value_along(
     let mut y = vec![0.0; interpolant.n_states()];
     interpolant.at(theta, &mut y);
     motion.project(t, &mut y)?;
-    function.value(t, &y)
+    function.value(t, &y, &motion.discrete)
 }
 
 /// Where the search of a step has come to.
@@ -239,6 +239,7 @@ impl StepSearch<'_, '_> {
     ) -> Result<Outcome, FieldError> {
         let limit = (to - from) * 1e-7;
         let (interpolant, motion) = (self.stepper.interpolant(), &mut self.run.motion);
+        let q = motion.discrete.clone();
         let (t0, dt) = (interpolant.t0, interpolant.dt);
         let mut g = |at: f64| {
             if !divided {
@@ -261,7 +262,7 @@ impl StepSearch<'_, '_> {
         }
         let margin = &self.detector.margin;
         let mut bounds = |a: f64, b: f64| {
-            let enclosure = function.enclose(&Tube::new(interpolant, (a, b), margin))?;
+            let enclosure = function.enclose(&Tube::new(interpolant, (a, b), margin), &q)?;
             Some(Bound::new(enclosure, sign, dt))
         };
         let evidence = Evidence::Bounds {

@@ -1,7 +1,7 @@
 //! Parts of chains with friction against the fields themselves, and what they cost.
 
 use crate::sparse::Pattern;
-use crate::{AffineSigns, ClosureSystem, PiecewiseSystem, SingularSliding, TracedSystem};
+use crate::{AffineSigns, ClosureSystem, PiecewiseSystem, Place, SingularSliding, TracedSystem};
 use filippov_expr::{Backend, Graph, Names, NodeId, UnaryOp};
 
 /// d masses on springs, each with Stribeck friction on the ground (`ground`) or between neighbours:
@@ -63,7 +63,7 @@ fn sliding_on_all_surfaces_keeps_them_at_linear_cost() {
             let mut parts = affine.affine_parts(&surfaces).expect("affine");
             let (x, mut dx) = (state(d), vec![0.0; 2 * d]);
             let evaluations = parts
-                .evaluate(affine, 0.0, &x, &vec![0.25; d])
+                .evaluate(affine, &Place::new(0.0, &x, &vec![0.25; d]))
                 .expect("traced");
             assert_eq!(evaluations, 1);
             parts.slide(&mut dx).expect("independent");
@@ -71,7 +71,9 @@ fn sliding_on_all_surfaces_keeps_them_at_linear_cost() {
             assert_eq!(parts.pattern(), pattern);
             // The field at the multipliers, evaluated there, is the one that was combined.
             let lambda = parts.multipliers().to_vec();
-            parts.evaluate(affine, 0.0, &x, &lambda).expect("traced");
+            parts
+                .evaluate(affine, &Place::new(0.0, &x, &lambda))
+                .expect("traced");
             assert!(parts
                 .field
                 .iter()
@@ -104,12 +106,14 @@ fn parts_agree_with_the_fields_of_all_signs_for_any_set() {
             for &j in &surfaces {
                 elsewhere[j] = 0.125;
             }
-            parts.evaluate(affine, 0.0, &x, &elsewhere).expect("traced");
+            parts
+                .evaluate(affine, &Place::new(0.0, &x, &elsewhere))
+                .expect("traced");
             let at: Vec<f64> = surfaces.iter().map(|&j| signs[j]).collect();
             let (mut found, mut expected) = (vec![0.0; 2 * d], vec![0.0; 2 * d]);
             parts.combine(&at, &mut found);
             system
-                .field(0.0, &x, &signs, &mut expected)
+                .field(&Place::new(0.0, &x, &signs), &mut expected)
                 .expect("traced");
             assert!(found
                 .iter()
@@ -155,7 +159,7 @@ fn redundant_surfaces_are_named() {
     let mut parts = affine.affine_parts(&[0, 1, 2]).expect("declared");
     assert_eq!(
         parts
-            .evaluate(affine, 0.0, &[0.0; 2], &[0.5, 0.0, -0.5])
+            .evaluate(affine, &Place::new(0.0, &[0.0; 2], &[0.5, 0.0, -0.5]))
             .expect("pure"),
         4
     );

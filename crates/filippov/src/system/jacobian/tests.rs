@@ -2,7 +2,7 @@
 
 use filippov_expr::{Backend, Graph, Names, NodeId, UnaryOp};
 
-use super::super::{PiecewiseSystem, TracedSystem};
+use super::super::{PiecewiseSystem, Place, Setting, TracedSystem};
 use crate::motion::{IntersectionField, Motion, RegionField, SlidingField, SmoothField};
 
 /// Three states, two surfaces: h_0 = x_0 - sin(x_1)/2 - t/10, h_1 = x_1 + x_2^2 - t/5. The signs multiply one another if
@@ -77,7 +77,7 @@ fn from_graph(system: &TracedSystem, sliding: &[usize], signs: &[f64]) -> Vec<[f
     let jacobian = system.motion_jacobian(sliding).expect("signs are blended");
     let mut out = jacobian.linearisation();
     let (t, x) = POINT;
-    system.eval_jacobian(&jacobian, t, &x, signs, &mut out);
+    system.eval_jacobian(&jacobian, &Place::new(t, &x, signs), &mut out);
     let size = out.n_unknowns();
     // Rows [-F_x, -F_l | F_t] and [G_x, G_l | -G_t].
     let mut rows = vec![vec![0.0; size + 1]; size];
@@ -115,7 +115,7 @@ fn assert_close(exact: &[[f64; 4]], approximate: &[[f64; 4]]) {
 fn derivatives_in_a_region() {
     let system = system(true);
     for signs in [[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0]] {
-        let mut field = RegionField::new(&system, &signs);
+        let mut field = RegionField::new(&system, Setting::of_signs(&signs));
         assert_close(
             &from_graph(&system, &[], &signs),
             &by_differences(&mut field),
@@ -128,7 +128,7 @@ fn derivatives_while_sliding_on_one_surface() {
     let system = system(true);
     for j in [0, 1] {
         let mut signs = [1.0, 1.0];
-        let mut field = SlidingField::new(&system, j, &signs);
+        let mut field = SlidingField::new(&system, j, Setting::of_signs(&signs));
         let (t, x) = POINT;
         field.normal_components_at(t, &x).unwrap();
         signs[j] = field.last().multiplier();
@@ -145,7 +145,8 @@ fn derivatives_while_sliding_on_one_surface() {
 fn derivatives_while_sliding_on_an_intersection() {
     for entangled in [false, true] {
         let system = system(entangled);
-        let mut field = IntersectionField::new(&system, &[0, 1], &[1.0, 1.0], &[]);
+        let mut field =
+            IntersectionField::new(&system, &[0, 1], Setting::of_signs(&[1.0, 1.0]), &[]);
         let (t, x) = POINT;
         let mut rates = [0.0; 3];
         field

@@ -4,7 +4,7 @@ use filippov_expr::{Enclosure, Motion};
 
 use super::TracedSystem;
 use crate::error::FieldError;
-use crate::system::{AffineParts, AffineSigns, PiecewiseSystem};
+use crate::system::{AffineParts, AffineSigns, PiecewiseSystem, Place, Setting};
 
 impl AffineSigns for TracedSystem {
     fn affine_parts(&self, surfaces: &[usize]) -> Option<AffineParts> {
@@ -14,26 +14,25 @@ impl AffineSigns for TracedSystem {
 
     fn fill_affine_parts(
         &self,
-        t: f64,
-        x: &[f64],
-        signs: &[f64],
+        place: &Place<'_>,
         parts: &mut AffineParts,
     ) -> Result<u64, FieldError> {
         let compiled = self.model.affine_signs();
         if !self.model.has_sticking() {
-            self.with_values(|p| compiled.fill(t, x, signs, p, parts));
+            self.with_values(place.q, |p| compiled.fill(place, p, parts));
             return Ok(1);
         }
-        let mut stretched = signs.to_vec();
+        let mut stretched = place.signs.to_vec();
         let ratios: Vec<f64> = parts
             .surfaces()
             .iter()
-            .map(|&j| self.stick_ratio(j, t, x, signs))
+            .map(|&j| self.stick_ratio(j, place))
             .collect();
         for (&j, ratio) in parts.surfaces().iter().zip(&ratios) {
             stretched[j] *= ratio;
         }
-        self.with_values(|p| compiled.fill(t, x, &stretched, p, parts));
+        let place = place.with_signs(&stretched);
+        self.with_values(place.q, |p| compiled.fill(&place, p, parts));
         parts.stretch(&ratios);
         Ok(1)
     }
@@ -42,8 +41,15 @@ impl AffineSigns for TracedSystem {
         !self.model.sticks_at(j) && self.model.affine_signs().is_steady(j)
     }
 
-    fn enclose_rate(&self, j: usize, motion: &dyn Motion, signs: &[f64]) -> Option<Enclosure> {
+    fn enclose_rate(
+        &self,
+        j: usize,
+        motion: &dyn Motion,
+        setting: Setting<'_>,
+    ) -> Option<Enclosure> {
         let model = self.model.affine_signs();
-        self.with_values(|p| model.enclose_rate(j, motion, signs, p))
+        self.with_values(setting.q, |p| {
+            model.enclose_rate(j, motion, setting.signs, p)
+        })
     }
 }

@@ -3,14 +3,15 @@
 use super::TracedSystem;
 use crate::system::compiled::{CompiledGradient, GradientValues};
 use crate::system::tiered::TieredProgram;
+use crate::system::Place;
 
 impl TracedSystem {
     /// Calls a function with the derivative of h_j in t and those by the listed states, in their order.
     #[inline(always)]
     pub(super) fn with_gradient<R>(
         &self,
-        (j, signs): (usize, &[f64]),
-        (t, x): (f64, &[f64]),
+        j: usize,
+        place: &Place<'_>,
         f: impl FnOnce(f64, &[usize], &[f64]) -> R,
     ) -> R {
         let CompiledGradient { states, values } = self.model.gradient(j);
@@ -18,7 +19,7 @@ impl TracedSystem {
         let values = match values {
             GradientValues::Constant(values) => values,
             GradientValues::Computed(tiered) => {
-                computed = self.computed_gradient(tiered, (t, x), signs);
+                computed = self.computed_gradient(tiered, place);
                 &computed
             }
         };
@@ -26,15 +27,10 @@ impl TracedSystem {
     }
 
     #[inline(never)]
-    fn computed_gradient(
-        &self,
-        tiered: &TieredProgram,
-        (t, x): (f64, &[f64]),
-        signs: &[f64],
-    ) -> Vec<f64> {
+    fn computed_gradient(&self, tiered: &TieredProgram, place: &Place<'_>) -> Vec<f64> {
         let program = tiered.program();
         let mut computed = vec![0.0; program.n_outputs()];
-        self.with_values(|p| program.eval(t, x, signs, p, &[], &mut computed));
+        self.eval(program, place, &[], &mut computed);
         computed
     }
 }

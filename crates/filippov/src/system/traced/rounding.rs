@@ -3,7 +3,7 @@
 use filippov_expr::{Enclosure, Interval, Motion};
 
 use super::TracedSystem;
-use crate::system::PiecewiseSystem;
+use crate::system::{PiecewiseSystem, Place};
 
 /// A single point, as a motion.
 struct StandingStill<'a> {
@@ -26,8 +26,9 @@ impl Motion for StandingStill<'_> {
 
 impl TracedSystem {
     /// Twice a bound of what rounding makes of h_j at a point, in interval arithmetic; 0 where there is none.
-    pub(super) fn rounding_of_surface(&self, j: usize, t: f64, x: &[f64], signs: &[f64]) -> f64 {
-        let enclosed = self.enclose_surface(j, &StandingStill { t, x }, signs);
+    pub(super) fn rounding_of_surface(&self, j: usize, place: &Place<'_>) -> f64 {
+        let &Place { t, x, .. } = place;
+        let enclosed = self.enclose_surface(j, &StandingStill { t, x }, place.setting());
         let width = enclosed.map_or(0.0, |h| h.value.hi - h.value.lo);
         if width.is_finite() {
             width
