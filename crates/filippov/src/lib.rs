@@ -119,7 +119,7 @@ pub use stats::Stats;
 pub use status::{Stop, Warning, WarningCode};
 pub use switch::{Kind, Switch};
 pub use system::{
-    AffineParts, AffineSigns, BothSides, ClosureSystem, Definition, Law, LawAction, LawMap, Laws,
-    LieValue, MotionJacobian, PiecewiseSystem, Place, Rules, Setting, SingularSliding, TracedMap,
-    TracedSystem, Word,
+    AffineParts, AffineSigns, BothSides, ClosureSystem, Definition, Enclosures, Law, LawAction,
+    LawMap, Laws, LieDerivatives, LieValue, Linearisations, MotionJacobian, PiecewiseSystem, Place,
+    Rules, Setting, SignStructure, SingularSliding, TaylorSeries, TracedMap, TracedSystem, Word,
 };
