@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use filippov::PiecewiseSystem;
+use filippov::{PiecewiseSystem, SignStructure};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 

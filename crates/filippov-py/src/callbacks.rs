@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use filippov::action::ActionMap;
-use filippov::{FieldError, PiecewiseSystem, Place, TracedSystem, UserFunction};
+use filippov::{FieldError, PiecewiseSystem, Place, SignStructure, TracedSystem, UserFunction};
 use filippov_expr::{
     Backend, Enclosure, EnclosureProgram, ExprError, Graph, Motion, NodeId, Program,
 };
@@ -47,6 +47,12 @@ pub struct Opaque {
     pub n_states: usize,
 }
 
+impl SignStructure for Opaque {
+    fn switches_at(&self, j: usize) -> bool {
+        j < self.surfaces.n_switching
+    }
+}
+
 impl PiecewiseSystem for Opaque {
     fn n_states(&self) -> usize {
         self.n_states
@@ -75,10 +81,6 @@ impl PiecewiseSystem for Opaque {
         self.surfaces.write(place.t, place.x, h)
     }
 
-    fn switches_at(&self, j: usize) -> bool {
-        j < self.surfaces.n_switching
-    }
-
     fn surface_name(&self, j: usize) -> String {
         self.surfaces.names[j].clone()
     }
@@ -89,6 +91,12 @@ pub struct Signed {
     pub fun: Py<PyAny>,
     pub surfaces: Surfaces,
     pub n_states: usize,
+}
+
+impl SignStructure for Signed {
+    fn switches_at(&self, j: usize) -> bool {
+        j < self.surfaces.n_switching
+    }
 }
 
 impl PiecewiseSystem for Signed {
@@ -115,10 +123,6 @@ impl PiecewiseSystem for Signed {
 
     fn surfaces(&self, place: &Place<'_>, h: &mut [f64]) -> Result<(), FieldError> {
         self.surfaces.write(place.t, place.x, h)
-    }
-
-    fn switches_at(&self, j: usize) -> bool {
-        j < self.surfaces.n_switching
     }
 
     fn surface_name(&self, j: usize) -> String {

@@ -3,7 +3,9 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use filippov::motion::{SlidingField, SmoothField};
-use filippov::{Definition, Error, FieldError, Laws, PiecewiseSystem, Rules, Setting};
+use filippov::{
+    Definition, Error, FieldError, Laws, PiecewiseSystem, Rules, Setting, SignStructure,
+};
 use filippov_expr::{Backend, Names};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};

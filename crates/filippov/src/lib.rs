@@ -122,7 +122,8 @@ pub use stats::Stats;
 pub use status::{Stop, Warning, WarningCode};
 pub use switch::{Kind, Switch};
 pub use system::{
-    AffineParts, AffineSigns, BothSides, ClosureSystem, Definition, Law, LawAction, LawMap, Laws,
-    LieValue, Linearisation, MotionJacobian, MotionJets, PiecewiseSystem, Place, RatePartials,
-    Rules, Setting, SingularSliding, TracedMap, TracedSystem, Word,
+    AffineParts, AffineSigns, BothSides, ClosureSystem, Definition, Enclosures, Law, LawAction,
+    LawMap, Laws, LieDerivatives, LieValue, Linearisation, Linearisations, MotionJacobian,
+    MotionJets, PiecewiseSystem, Place, RatePartials, Rules, Setting, SignStructure,
+    SingularSliding, TaylorSeries, TracedMap, TracedSystem, Word,
 };

@@ -33,7 +33,7 @@ fn chain(d: u32) -> TracedSystem {
 }
 
 /// The modes of all masses at rest with these positions, and the accelerations that follow.
-fn released(system: &TracedSystem, x: &[f64]) -> (Vec<i8>, Vec<f64>) {
+fn released(system: &dyn PiecewiseSystem, x: &[f64]) -> (Vec<i8>, Vec<f64>) {
     let d = system.n_surfaces();
     let affine = system.affine_signs().unwrap();
     let surfaces: Vec<usize> = (0..d).collect();

@@ -45,7 +45,7 @@ fn sliding_on_all_masses_of_a_chain_costs_the_sum_over_the_groups() {
     for d in [12_usize, 40] {
         let system = chain(d as u32);
         let set: Vec<usize> = (0..d).collect();
-        let groups = system.sign_groups(&set);
+        let groups = (&system as &dyn PiecewiseSystem).sign_groups(&set);
         assert_eq!(groups.len(), d - 1);
         assert!(groups.contains(&vec![4, 5]));
         let mut field =
@@ -76,7 +76,7 @@ fn only_groups_of_the_sliding_surfaces_count() {
     let system = chain(12);
     let set = [0, 3, 4, 7];
     assert_eq!(
-        system.sign_groups(&set),
+        (&system as &dyn PiecewiseSystem).sign_groups(&set),
         [vec![0], vec![3], vec![4], vec![7]]
     );
     let mut fields = MeetingFields::new(&system, &set);

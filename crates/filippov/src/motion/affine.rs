@@ -121,7 +121,7 @@ impl<'a> AffineLaw<'a> {
             let problem = RelayProblem {
                 nu: self.parts.nu(),
                 n: self.parts.normal().clone(),
-                noise: self.system.lie_tolerance(1),
+                noise: self.system.noise_of_rates(),
             };
             if let Ok(inside) = solve_relay(&problem, &vec![0; here.len()]) {
                 for (place, reserve) in shared.reserves.iter().enumerate() {

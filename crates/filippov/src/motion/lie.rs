@@ -74,8 +74,10 @@ pub(crate) fn first_nonzero_of_both(
     vanishing: [usize; 2],
     place: &Place<'_>,
 ) -> Result<[Leading; 2], FieldError> {
-    let firsts = system.first_lie_derivatives(j, place);
-    let tolerance = system.lie_tolerance(1);
+    let (firsts, tolerance) = match system.lie_derivatives() {
+        Some(lie) => (lie.first_lie_derivatives(j, place), lie.lie_tolerance(1)),
+        None => (None, 0.0),
+    };
     let leading = |index: usize, side: i8| match firsts.map(|firsts| firsts[index]) {
         Some(LieValue { value, magnitude })
             if vanishing[index] == 0
@@ -90,6 +92,7 @@ pub(crate) fn first_nonzero_of_both(
 }
 
 /// As [`first_nonzero`] at this very point; `None` where a derivative is not finite.
+#[inline]
 fn scan(
     system: &dyn PiecewiseSystem,
     j: usize,

@@ -32,7 +32,10 @@ impl Taylor {
         let setting = at.motion.setting();
         let setting = setting.with_signs(signs.unwrap_or(setting.signs));
         let place = setting.at(at.t, &at.x);
-        let fill = |rows: &mut [f64]| at.system.eval_jets(jets, &place, rows);
+        let Some(series) = at.system.taylor_series() else {
+            return f64::NAN;
+        };
+        let fill = |rows: &mut [f64]| series.eval_jets(jets, &place, rows);
         self.expand(jets.width(), &at.x, &at.scale, fill)
     }
 

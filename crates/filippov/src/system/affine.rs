@@ -14,6 +14,7 @@
 
 use filippov_expr::{Enclosure, Motion};
 
+use super::closures::tolerance_of_differences;
 use super::{PiecewiseSystem, Place, Setting};
 use crate::error::FieldError;
 use crate::sparse::{Pattern, SparseProduct, SparseRows, SparseSolver};
@@ -40,7 +41,7 @@ pub trait AffineSigns: PiecewiseSystem {
             full.push_row((0..n).map(|i| (i, 0.0)));
         }
         let mut parts = AffineParts::new(n, surfaces, full.clone(), full);
-        parts.solver = SparseSolver::with_noise(self.lie_tolerance(1));
+        parts.solver = SparseSolver::with_noise(self.noise_of_rates());
         Some(parts)
     }
 
@@ -77,6 +78,12 @@ pub trait AffineSigns: PiecewiseSystem {
             }
         }
         Ok(evaluations)
+    }
+
+    /// Below this fraction of its magnitude a rate of a switching function counts as zero.
+    fn noise_of_rates(&self) -> f64 {
+        let lie = self.lie_derivatives();
+        lie.map_or(tolerance_of_differences(1), |lie| lie.lie_tolerance(1))
     }
 
     /// Are the gradient of h_j, and what s_j changes in the rates of switching functions, the same all along every motion?

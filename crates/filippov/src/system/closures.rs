@@ -1,7 +1,8 @@
 //! A system given by Rust closures.
 
 use super::{
-    dot, dot_magnitude, AffineSigns, LieValue, PiecewiseSystem, Place, RatePartials, Word,
+    dot, dot_magnitude, AffineSigns, LieValue, PiecewiseSystem, Place, RatePartials, SignStructure,
+    Word,
 };
 use crate::error::FieldError;
 use crate::tolerances::EPS;
@@ -91,10 +92,6 @@ where
         Ok(())
     }
 
-    fn switches_at(&self, j: usize) -> bool {
-        !self.smooth.contains(&j)
-    }
-
     fn affine_signs(&self) -> Option<&dyn AffineSigns> {
         if self.is_affine_in_signs {
             Some(self)
@@ -104,11 +101,29 @@ where
     }
 }
 
+impl<F, H> SignStructure for ClosureSystem<F, H> {
+    fn switches_at(&self, j: usize) -> bool {
+        !self.smooth.contains(&j)
+    }
+}
+
 impl<F, H> AffineSigns for ClosureSystem<F, H>
 where
     F: Fn(f64, &[f64], &[f64], &mut [f64]) + Sync,
     H: Fn(f64, &[f64], &mut [f64]) + Sync,
 {
+}
+
+/// Highest order of Lie derivative that differences give.
+pub(super) const HIGHEST_DIFFERENCE: usize = 3;
+
+/// Below this fraction of its magnitude a Lie derivative of this order, found by differences, counts as zero.
+pub(super) fn tolerance_of_differences(order: usize) -> f64 {
+    match order {
+        0 | 1 => 1e-8,
+        2 => 1e-4,
+        _ => 1e-2,
+    }
 }
 
 /// The gradient of L_f h_j by central differences.
@@ -120,7 +135,7 @@ pub(super) fn rate_gradient_by_differences<S: PiecewiseSystem + ?Sized>(
 ) -> Result<RatePartials, FieldError> {
     let &Place { t, x, signs, .. } = place;
     let side = if signs[j] < 0.0 { -1 } else { 1 };
-    let at = |t: f64, x: &[f64]| system.lie_derivative(j, j, &[side], &place.moved(t, x));
+    let at = |t: f64, x: &[f64]| lie_by_differences(system, j, j, &[side], &place.moved(t, x));
     let LieValue {
         value: rate,
         magnitude,

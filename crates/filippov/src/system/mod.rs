@@ -12,18 +12,24 @@ mod affine_model;
 mod beside;
 mod blended;
 mod both_sides;
+mod capabilities;
 mod clock;
 mod closures;
 mod compiled;
 mod definition;
+mod enclosures;
 mod jacobian;
 mod jet_multipliers;
 mod jets;
 mod laws;
+mod lie_derivatives;
 mod linearisation;
+mod linearisations;
 mod map;
 mod place;
 mod sections;
+mod sign_structure;
+mod taylor_series;
 mod tiered;
 mod traced;
 
@@ -37,44 +43,22 @@ pub use clock::Clock;
 pub use closures::ClosureSystem;
 pub(crate) use definition::{check_index, inconsistent};
 pub use definition::{Definition, Rules};
+pub use enclosures::Enclosures;
 pub use jacobian::MotionJacobian;
 pub use jets::MotionJets;
 pub use laws::{Law, LawAction, LawMap, Laws};
+pub use lie_derivatives::{LieDerivatives, LieValue, RatePartials, Word};
 pub use linearisation::Linearisation;
+pub use linearisations::Linearisations;
 pub use map::TracedMap;
 pub(crate) use place::OwnSetting;
 pub use place::{Place, Setting};
+pub use sign_structure::SignStructure;
+pub use taylor_series::TaylorSeries;
 pub use traced::TracedSystem;
-
-use std::sync::Arc;
-
-use filippov_expr::{Enclosure, Motion};
 
 use crate::error::FieldError;
 use crate::tolerances::EPS;
-
-/// The value of a Lie derivative and the sum of the magnitudes that make it up.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LieValue {
-    /// The derivative.
-    pub value: f64,
-    /// Sum of the absolute values of the terms; `value` counts as zero far below it.
-    pub magnitude: f64,
-}
-
-/// The rate of a switching function along a field, with what it depends on.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RatePartials {
-    /// L_f h.
-    pub rate: f64,
-    /// The size of its terms; `rate` counts as zero far below it.
-    pub magnitude: f64,
-    /// Its derivative in t.
-    pub time: f64,
-}
-
-/// Which sides a step of differentiation takes: +1 for f+, -1 for f- of the surface concerned.
-pub type Word<'a> = &'a [i8];
 
 /// A piecewise-smooth system.
 ///
@@ -86,10 +70,13 @@ pub type Word<'a> = &'a [i8];
 /// 2. [`surfaces`](Self::surfaces) writes h_j for every j; `signs` is for switching functions that
 ///    are themselves piecewise smooth (an `abs` inside of a `sign`).
 /// 3. [`gradient`](Self::gradient) is the gradient of h_j in x, and returns the partial derivative in t.
-/// 4. [`active`](Self::active) may say `true` too often, never `false` wrongly.
-/// 5. All functions are pure: the same arguments give the same bits. They read the discrete states from the
+/// 4. All functions are pure: the same arguments give the same bits. They read the discrete states from the
 ///    [`Place`].
-pub trait PiecewiseSystem: Sync {
+///
+/// What is known of its signs is its [`SignStructure`]: asked too often for a detour. Everything else is a capability, which a
+/// system may have: [`AffineSigns`], [`LieDerivatives`], [`TaylorSeries`], [`Enclosures`], [`Linearisations`]. The methods of
+/// `dyn PiecewiseSystem` ask for it, with an answer that is always right where it is absent.
+pub trait PiecewiseSystem: SignStructure + Sync {
     /// Number of states.
     fn n_states(&self) -> usize;
 
@@ -207,176 +194,30 @@ pub trait PiecewiseSystem: Sync {
         out.both_sides_by_parts(self, j, place)
     }
 
-    /// Marks the surfaces whose sign matters for the motion with these signs (and with either
-    /// sign of the surfaces slid on).
-    fn active(&self, signs: &[f64], sliding: &[usize], active: &mut [bool]) {
-        let _ = (signs, sliding);
-        active.fill(true);
-    }
-
-    /// Do switching functions contain signs of others? Then they may jump where those change.
-    fn has_nested_signs(&self) -> bool {
-        false
-    }
-
-    /// Is h_j affine in (t, x)? Then the filter on end values and slopes decides more steps.
-    fn is_affine(&self, j: usize) -> bool {
-        let _ = j;
-        false
-    }
-
-    /// Rigorous bounds of h_j and of its rate along a piece of motion; `None` if the system cannot say,
-    /// and zeros are then found by sampling.
-    fn enclose_surface(
-        &self,
-        j: usize,
-        motion: &dyn Motion,
-        setting: Setting<'_>,
-    ) -> Option<Enclosure> {
-        let _ = (j, motion, setting);
-        None
-    }
-
-    /// Rigorous bounds of the normal components of f- and f+ at h_j, and of their rates, along a piece of
-    /// motion on that surface; `None` if the system cannot say.
-    fn enclose_normal_components(
-        &self,
-        j: usize,
-        motion: &dyn Motion,
-        setting: Setting<'_>,
-    ) -> Option<[Enclosure; 2]> {
-        let _ = (j, motion, setting);
-        None
-    }
-
-    /// The Lie derivative L_{f^w_k} ... L_{f^w_1} h_i, where f^w is the field with entry `j` of the
-    /// signs replaced by w; by differences along the field unless overridden.
-    ///
-    /// # Errors
-    /// If a function of the user raises.
-    fn lie_derivative(
-        &self,
-        i: usize,
-        j: usize,
-        word: Word,
-        place: &Place<'_>,
-    ) -> Result<LieValue, FieldError> {
-        closures::lie_by_differences(self, i, j, word, place)
-    }
-
-    /// The first Lie derivatives of h_j along f- and f+, where one evaluation gives both; `signs[j]` is ignored.
-    fn first_lie_derivatives(&self, j: usize, place: &Place<'_>) -> Option<[LieValue; 2]> {
-        let _ = (j, place);
-        None
-    }
-
-    /// Below this fraction of its magnitude a Lie derivative of this order counts as zero.
-    fn lie_tolerance(&self, order: usize) -> f64 {
-        match order {
-            0 | 1 => 1e-8,
-            2 => 1e-4,
-            _ => 1e-2,
-        }
-    }
-
-    /// Highest order of Lie derivative worth asking for.
-    fn max_lie_order(&self) -> usize {
-        3
-    }
-
     /// The system as one whose field is affine in the signs of sets of surfaces, where the multipliers of
     /// sliding follow from a linear system; `None` if it cannot say.
     fn affine_signs(&self) -> Option<&dyn AffineSigns> {
         None
     }
 
-    /// Do all fields and switching functions have Taylor series wherever they are finite? Square roots and powers
-    /// do not.
-    fn is_analytic(&self) -> bool {
-        false
-    }
-
-    /// May fields or switching functions change where no Taylor coefficient tells, as pulses exp(-t^2) do?
-    fn hides_changes(&self) -> bool {
-        true
-    }
-
-    /// Taylor coefficients up to `order` of the motions on these surfaces, in a region if there are none; `None`
-    /// if the system has none.
-    fn motion_jets(&self, sliding: &[usize], order: usize) -> Option<Arc<MotionJets>> {
-        let _ = (sliding, order);
+    /// Its Lie derivatives; if there are none, they are found by differences.
+    fn lie_derivatives(&self) -> Option<&dyn LieDerivatives> {
         None
     }
 
-    /// Writes the coefficients at a point: (order + 1) rows. Not finite from the order on that does not exist.
-    fn eval_jets(&self, jets: &MotionJets, place: &Place<'_>, out: &mut [f64]) {
-        let _ = (jets, place);
-        out.fill(f64::NAN);
-    }
-
-    /// The derivatives of the field of the motions on these surfaces, in a region if there are none; `None` if the
-    /// system has them by differences only.
-    fn motion_jacobian(&self, sliding: &[usize]) -> Option<Arc<MotionJacobian>> {
-        let _ = sliding;
+    /// Its Taylor series, if there are any.
+    fn taylor_series(&self) -> Option<&dyn TaylorSeries> {
         None
     }
 
-    /// Writes these derivatives at a point; entries of `signs` on the surfaces slid on are their multipliers.
-    fn eval_jacobian(&self, jacobian: &MotionJacobian, place: &Place<'_>, out: &mut Linearisation) {
-        let _ = (jacobian, place);
-        out.fill(|values, _| values.fill(f64::NAN));
+    /// Its rigorous bounds; if there are none, zeros are found by sampling.
+    fn enclosures(&self) -> Option<&dyn Enclosures> {
+        None
     }
 
-    /// These surfaces (increasing) in groups such that the field is a sum of functions of the signs of one group
-    /// each: signs of different groups are nowhere multiplied. One group of all is always right.
-    fn sign_groups(&self, surfaces: &[usize]) -> Vec<Vec<usize>> {
-        let affine = self.affine_signs();
-        match affine.and_then(|affine| affine.affine_parts(surfaces)) {
-            Some(_) => surfaces.iter().map(|&j| vec![j]).collect(),
-            None => vec![surfaces.to_vec()],
-        }
-    }
-
-    /// Does the field, or a switching function, depend on the sign of h_j? If not, h_j only triggers actions, and
-    /// motion that stays on it is contact.
-    fn switches_at(&self, j: usize) -> bool {
-        let _ = j;
-        true
-    }
-
-    /// May the field, or an active switching function, jump at h_j = 0 in the mode with these signs, sliding on these
-    /// surfaces (increasing)? If not, the sign of h_j makes no difference where h_j is zero.
-    fn jumps_across(&self, j: usize, signs: &[f64], sliding: &[usize]) -> bool {
-        let _ = (j, signs, sliding);
-        true
-    }
-
-    /// Is static friction above kinetic at h_j = 0? Then the motion sticks there while the sign that it needs lies in
-    /// [-r, r] with the ratio r of [`stick_ratio`](Self::stick_ratio), and [`both_sides`](Self::both_sides) has the
-    /// fields at the signs -r and +r.
-    fn sticks_at(&self, j: usize) -> bool {
-        let _ = j;
-        false
-    }
-
-    /// The ratio of static to kinetic friction at h_j = 0, at least 1.
-    fn stick_ratio(&self, j: usize, place: &Place<'_>) -> f64 {
-        let _ = (j, place);
-        1.0
-    }
-
-    /// Writes the gradient in x of the rate L_f h_j along the field with these signs; by central differences
-    /// unless overridden.
-    ///
-    /// # Errors
-    /// If a function of the user raises.
-    fn rate_gradient(
-        &self,
-        j: usize,
-        place: &Place<'_>,
-        gradient: &mut [f64],
-    ) -> Result<RatePartials, FieldError> {
-        closures::rate_gradient_by_differences(self, j, place, gradient)
+    /// The derivatives of its motions by states and multipliers; if there are none, they are found by differences.
+    fn linearisations(&self) -> Option<&dyn Linearisations> {
+        None
     }
 
     /// A readable name of surface `j` for messages.

@@ -11,8 +11,8 @@ use smallvec::SmallVec;
 
 use super::compiled::Model;
 use super::{
-    AffineSigns, BothSides, LieValue, MotionJacobian, MotionJets, PiecewiseSystem, Place,
-    RatePartials, Setting, Word,
+    AffineSigns, BothSides, Enclosures, LieDerivatives, LieValue, Linearisations, MotionJacobian,
+    MotionJets, PiecewiseSystem, Place, RatePartials, Setting, SignStructure, TaylorSeries, Word,
 };
 use crate::error::FieldError;
 use crate::system::Linearisation;
@@ -318,6 +318,34 @@ impl PiecewiseSystem for TracedSystem {
         }
     }
 
+    fn affine_signs(&self) -> Option<&dyn AffineSigns> {
+        Some(self)
+    }
+
+    fn lie_derivatives(&self) -> Option<&dyn LieDerivatives> {
+        Some(self)
+    }
+
+    fn taylor_series(&self) -> Option<&dyn TaylorSeries> {
+        Some(self)
+    }
+
+    fn enclosures(&self) -> Option<&dyn Enclosures> {
+        Some(self)
+    }
+
+    fn linearisations(&self) -> Option<&dyn Linearisations> {
+        Some(self)
+    }
+
+    fn surface_name(&self, j: usize) -> String {
+        self.model
+            .graph
+            .text(self.model.graph.surface(j as u32), &self.model.names)
+    }
+}
+
+impl SignStructure for TracedSystem {
     fn active(&self, signs: &[f64], sliding: &[usize], active: &mut [bool]) {
         self.model.active(signs, sliding, active);
     }
@@ -330,32 +358,33 @@ impl PiecewiseSystem for TracedSystem {
         self.model.affine[j]
     }
 
-    fn enclose_surface(
-        &self,
-        j: usize,
-        motion: &dyn Motion,
-        setting: Setting<'_>,
-    ) -> Option<Enclosure> {
-        let mut out = [Enclosure::UNKNOWN];
-        let program = self.model.enclosed_surface(j)?;
-        let signs = setting.signs;
-        self.with_values(setting.q, |p| program.eval(motion, signs, p, &mut out));
-        Some(out[0])
+    fn known_groups(&self, surfaces: &[usize]) -> Option<Vec<Vec<usize>>> {
+        Some(self.model.affine_signs().groups(surfaces))
     }
 
-    fn enclose_normal_components(
-        &self,
-        j: usize,
-        motion: &dyn Motion,
-        setting: Setting<'_>,
-    ) -> Option<[Enclosure; 2]> {
-        let mut out = [Enclosure::UNKNOWN; 2];
-        let program = self.model.enclosed_normal_components(j)?;
-        let signs = setting.signs;
-        self.with_values(setting.q, |p| program.eval(motion, signs, p, &mut out));
-        Some(out)
+    fn switches_at(&self, j: usize) -> bool {
+        self.model.switches_at(j)
     }
 
+    fn jumps_across(&self, j: usize, signs: &[f64], sliding: &[usize]) -> bool {
+        self.model.jumps_across(j, signs, sliding)
+    }
+
+    fn sticks_at(&self, j: usize) -> bool {
+        self.model.sticks_at(j)
+    }
+
+    fn stick_ratio(&self, j: usize, place: &Place<'_>) -> f64 {
+        let Some(program) = self.model.stick_ratio(j) else {
+            return 1.0;
+        };
+        let mut ratio = [1.0];
+        self.eval(program, place, &[], &mut ratio);
+        ratio[0].max(1.0)
+    }
+}
+
+impl LieDerivatives for TracedSystem {
     fn lie_derivative(
         &self,
         i: usize,
@@ -400,59 +429,6 @@ impl PiecewiseSystem for TracedSystem {
         MAX_LIE_ORDER
     }
 
-    fn affine_signs(&self) -> Option<&dyn AffineSigns> {
-        Some(self)
-    }
-
-    fn is_analytic(&self) -> bool {
-        self.model.is_analytic
-    }
-
-    fn hides_changes(&self) -> bool {
-        self.model.hides_changes
-    }
-
-    fn motion_jets(&self, sliding: &[usize], order: usize) -> Option<Arc<MotionJets>> {
-        self.model.motion_jets(sliding, order)
-    }
-
-    fn eval_jets(&self, jets: &MotionJets, place: &Place<'_>, out: &mut [f64]) {
-        self.with_values(place.q, |p| jets.eval(place, p, out));
-    }
-
-    fn motion_jacobian(&self, sliding: &[usize]) -> Option<Arc<MotionJacobian>> {
-        self.model.motion_jacobian(sliding)
-    }
-
-    fn eval_jacobian(&self, jacobian: &MotionJacobian, place: &Place<'_>, out: &mut Linearisation) {
-        self.with_values(place.q, |p| jacobian.eval(place, p, out));
-    }
-
-    fn sign_groups(&self, surfaces: &[usize]) -> Vec<Vec<usize>> {
-        self.model.affine_signs().groups(surfaces)
-    }
-
-    fn switches_at(&self, j: usize) -> bool {
-        self.model.switches_at(j)
-    }
-
-    fn jumps_across(&self, j: usize, signs: &[f64], sliding: &[usize]) -> bool {
-        self.model.jumps_across(j, signs, sliding)
-    }
-
-    fn sticks_at(&self, j: usize) -> bool {
-        self.model.sticks_at(j)
-    }
-
-    fn stick_ratio(&self, j: usize, place: &Place<'_>) -> f64 {
-        let Some(program) = self.model.stick_ratio(j) else {
-            return 1.0;
-        };
-        let mut ratio = [1.0];
-        self.eval(program, place, &[], &mut ratio);
-        ratio[0].max(1.0)
-    }
-
     fn rate_gradient(
         &self,
         j: usize,
@@ -469,10 +445,60 @@ impl PiecewiseSystem for TracedSystem {
             time: out[1],
         })
     }
+}
 
-    fn surface_name(&self, j: usize) -> String {
-        self.model
-            .graph
-            .text(self.model.graph.surface(j as u32), &self.model.names)
+impl TaylorSeries for TracedSystem {
+    fn is_analytic(&self) -> bool {
+        self.model.is_analytic
+    }
+
+    fn hides_changes(&self) -> bool {
+        self.model.hides_changes
+    }
+
+    fn motion_jets(&self, sliding: &[usize], order: usize) -> Option<Arc<MotionJets>> {
+        self.model.motion_jets(sliding, order)
+    }
+
+    fn eval_jets(&self, jets: &MotionJets, place: &Place<'_>, out: &mut [f64]) {
+        self.with_values(place.q, |p| jets.eval(place, p, out));
+    }
+}
+
+impl Enclosures for TracedSystem {
+    fn enclose_surface(
+        &self,
+        j: usize,
+        motion: &dyn Motion,
+        setting: Setting<'_>,
+    ) -> Option<Enclosure> {
+        let mut out = [Enclosure::UNKNOWN];
+        let program = self.model.enclosed_surface(j)?;
+        let signs = setting.signs;
+        self.with_values(setting.q, |p| program.eval(motion, signs, p, &mut out));
+        Some(out[0])
+    }
+
+    fn enclose_normal_components(
+        &self,
+        j: usize,
+        motion: &dyn Motion,
+        setting: Setting<'_>,
+    ) -> Option<[Enclosure; 2]> {
+        let mut out = [Enclosure::UNKNOWN; 2];
+        let program = self.model.enclosed_normal_components(j)?;
+        let signs = setting.signs;
+        self.with_values(setting.q, |p| program.eval(motion, signs, p, &mut out));
+        Some(out)
+    }
+}
+
+impl Linearisations for TracedSystem {
+    fn motion_jacobian(&self, sliding: &[usize]) -> Option<Arc<MotionJacobian>> {
+        self.model.motion_jacobian(sliding)
+    }
+
+    fn eval_jacobian(&self, jacobian: &MotionJacobian, place: &Place<'_>, out: &mut Linearisation) {
+        self.with_values(place.q, |p| jacobian.eval(place, p, out));
     }
 }

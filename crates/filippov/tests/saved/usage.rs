@@ -2,7 +2,6 @@
 
 use filippov::{
     classify, BothSides, Inspection, Method, Options, PiecewiseSystem, Place, SavedSystem, Setting,
-    TracedSystem,
 };
 use filippov_expr::Backend;
 
@@ -52,7 +51,7 @@ pub fn use_everything(system: SavedSystem, case: u64) -> bool {
     true
 }
 
-fn evaluate(system: &TracedSystem, (t, x): (f64, &[f64]), q: &[f64]) {
+fn evaluate(system: &dyn PiecewiseSystem, (t, x): (f64, &[f64]), q: &[f64]) {
     let (n, d) = (system.n_states(), system.n_surfaces());
     let mut out = vec![0.0; n];
     let (mut h, mut rates) = (vec![0.0; d], vec![0.0; d]);
@@ -92,7 +91,7 @@ fn evaluate(system: &TracedSystem, (t, x): (f64, &[f64]), q: &[f64]) {
     }
 }
 
-fn at_surface(system: &TracedSystem, j: usize, place: &Place<'_>) {
+fn at_surface(system: &dyn PiecewiseSystem, j: usize, place: &Place<'_>) {
     let n = system.n_states();
     let mut gradient = vec![0.0; n];
     system.gradient(j, place, &mut gradient).unwrap();
@@ -103,14 +102,15 @@ fn at_surface(system: &TracedSystem, j: usize, place: &Place<'_>) {
         system.lie_derivative(j, j, word, place).unwrap();
     }
     system.rate_gradient(j, place, &mut gradient).unwrap();
-    system.first_lie_derivatives(j, place);
+    let lie = system.lie_derivatives().expect("traced");
+    lie.first_lie_derivatives(j, place);
     system.stick_ratio(j, place);
     system.switches_at(j);
     assert!(system.surface_name(j).len() < 10_000);
     series(system, &[j], place);
 }
 
-fn series(system: &TracedSystem, sliding: &[usize], place: &Place<'_>) {
+fn series(system: &dyn PiecewiseSystem, sliding: &[usize], place: &Place<'_>) {
     if let Some(jets) = system.motion_jets(sliding, 5) {
         let mut out = vec![0.0; jets.width() * (jets.order() + 1)];
         system.eval_jets(&jets, place, &mut out);

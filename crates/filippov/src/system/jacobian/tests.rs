@@ -2,7 +2,7 @@
 
 use filippov_expr::{Backend, Graph, Names, NodeId, UnaryOp};
 
-use super::super::{PiecewiseSystem, Place, Setting, TracedSystem};
+use super::super::{Linearisations, Place, Setting, TracedSystem};
 use crate::motion::{IntersectionField, Motion, RegionField, SlidingField, SmoothField};
 
 /// Three states, two surfaces: h_0 = x_0 - sin(x_1)/2 - t/10, h_1 = x_1 + x_2^2 - t/5. The signs multiply one another if

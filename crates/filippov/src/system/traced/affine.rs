@@ -4,7 +4,7 @@ use filippov_expr::{Enclosure, Motion};
 
 use super::TracedSystem;
 use crate::error::FieldError;
-use crate::system::{AffineParts, AffineSigns, PiecewiseSystem, Place, Setting};
+use crate::system::{AffineParts, AffineSigns, Place, Setting, SignStructure};
 
 impl AffineSigns for TracedSystem {
     fn affine_parts(&self, surfaces: &[usize]) -> Option<AffineParts> {

@@ -3,7 +3,7 @@
 use filippov_expr::{Enclosure, Interval, Motion};
 
 use super::TracedSystem;
-use crate::system::{PiecewiseSystem, Place};
+use crate::system::{Enclosures, Place};
 
 /// A single point, as a motion.
 struct StandingStill<'a> {
