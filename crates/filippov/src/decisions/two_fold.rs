@@ -16,7 +16,7 @@ use crate::tolerances::{
 };
 
 /// A time and the state there.
-type Place = (f64, Vec<f64>);
+type TimeAndState = (f64, Vec<f64>);
 
 /// The components of both fields normal to a surface, f- first.
 struct Components {
@@ -87,9 +87,9 @@ pub(crate) enum EndOfSliding {
     /// An exit like any other.
     Exit,
     /// The motion has come to a two-fold, which is here.
-    TwoFold(Place),
+    TwoFold(TimeAndState),
     /// The difference of the normal components has a double zero, and the motion goes on from here, in this mode.
-    DoubleZero(Place, Mode),
+    DoubleZero(TimeAndState, Mode),
 }
 
 /// What the end of sliding on surface `j` is, if no other surface vanishes. The steps before say whether it may be a double
@@ -118,7 +118,7 @@ pub(crate) fn end_of_sliding(
 }
 
 /// The two-fold that the motion on one surface has come to, if it has: its time and state.
-pub(super) fn two_fold_here(at: &Point) -> Result<Option<Place>, FieldError> {
+pub(super) fn two_fold_here(at: &Point) -> Result<Option<TimeAndState>, FieldError> {
     let mut field = at.arrival.field.borrow_mut();
     let ModeField::Sliding(field) = &mut **field else {
         return Ok(None);
@@ -167,7 +167,7 @@ pub(super) fn beyond_double_zero(
     at: &Point,
     notes: &mut Notes,
     j: usize,
-) -> Result<Option<Place>, FieldError> {
+) -> Result<Option<TimeAndState>, FieldError> {
     if !is_known(at, j) {
         return Ok(None);
     }
@@ -215,9 +215,9 @@ fn settle_on_zeros(
     at: &Point,
     j: usize,
     shares: &[f64],
-    (mut t, mut x): Place,
+    (mut t, mut x): TimeAndState,
     unit: f64,
-) -> Result<Option<Place>, FieldError> {
+) -> Result<Option<TimeAndState>, FieldError> {
     let (n, signs) = (x.len(), at.arrival.signs);
     let units = (0..n).map(|i| at.scale.of(i, x[i], x[i])).chain([unit]);
     let units: Vec<f64> = units.collect();

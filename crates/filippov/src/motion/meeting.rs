@@ -10,8 +10,8 @@ use crate::tolerances::{DOUBTFUL, MOST_MEETING, TANGENT};
 
 /// The fields around an intersection of m surfaces, and the gradients of the switching functions.
 ///
-/// Where the field is a sum of functions of groups of signs ([`known_groups`](crate::SignStructure::known_groups)), 2^|group| fields
-/// of each group are evaluated, with the signs of the other groups at -1, and kept as differences to the field with
+/// Where the field is a sum of functions of groups of signs ([`known_groups`](crate::SignStructure::known_groups)),
+/// 2^|group| fields of each group are evaluated, with the signs of the other groups at -1, and kept as differences to the field with
 /// all signs at -1; only the first group is kept as it is. Then sums over all groups are those of the fields.
 ///
 /// Of the regions around two surfaces in one place two exist. The others get the mean of these two fields, so that the

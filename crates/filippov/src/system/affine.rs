@@ -14,7 +14,7 @@
 
 use filippov_expr::{Enclosure, Motion};
 
-use super::closures::tolerance_of_differences;
+use super::lie_derivatives::tolerance_of_differences;
 use super::{PiecewiseSystem, Place, Setting};
 use crate::error::FieldError;
 use crate::sparse::{Pattern, SparseProduct, SparseRows, SparseSolver};

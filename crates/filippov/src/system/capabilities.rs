@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use filippov_expr::{Enclosure, Motion};
 
+use super::lie_derivatives::{tolerance_of_differences, HIGHEST_DIFFERENCE};
 use super::{
     closures, LieValue, Linearisation, MotionJacobian, MotionJets, PiecewiseSystem, Place,
     RatePartials, Setting, Word,
@@ -49,14 +50,14 @@ impl dyn PiecewiseSystem + '_ {
     pub fn lie_tolerance(&self, order: usize) -> f64 {
         match self.lie_derivatives() {
             Some(lie) => lie.lie_tolerance(order),
-            None => closures::tolerance_of_differences(order),
+            None => tolerance_of_differences(order),
         }
     }
 
     /// Highest order of Lie derivative worth asking for.
     pub fn max_lie_order(&self) -> usize {
         self.lie_derivatives()
-            .map_or(closures::HIGHEST_DIFFERENCE, |lie| lie.max_lie_order())
+            .map_or(HIGHEST_DIFFERENCE, |lie| lie.max_lie_order())
     }
 
     /// Writes the gradient in x of the rate L_f h_j along the field with these signs.

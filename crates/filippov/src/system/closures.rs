@@ -114,18 +114,6 @@ where
 {
 }
 
-/// Highest order of Lie derivative that differences give.
-pub(super) const HIGHEST_DIFFERENCE: usize = 3;
-
-/// Below this fraction of its magnitude a Lie derivative of this order, found by differences, counts as zero.
-pub(super) fn tolerance_of_differences(order: usize) -> f64 {
-    match order {
-        0 | 1 => 1e-8,
-        2 => 1e-4,
-        _ => 1e-2,
-    }
-}
-
 /// The gradient of L_f h_j by central differences.
 pub(super) fn rate_gradient_by_differences<S: PiecewiseSystem + ?Sized>(
     system: &S,

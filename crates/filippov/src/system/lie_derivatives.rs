@@ -26,6 +26,18 @@ pub struct RatePartials {
 /// Which sides a step of differentiation takes: +1 for f+, -1 for f- of the surface concerned.
 pub type Word<'a> = &'a [i8];
 
+/// Highest order of Lie derivative that differences give.
+pub(super) const HIGHEST_DIFFERENCE: usize = 3;
+
+/// Below this fraction of its magnitude a Lie derivative of this order, found by differences, counts as zero.
+pub(super) fn tolerance_of_differences(order: usize) -> f64 {
+    match order {
+        0 | 1 => 1e-8,
+        2 => 1e-4,
+        _ => 1e-2,
+    }
+}
+
 /// A system that has its Lie derivatives exactly, but for rounding.
 ///
 /// Duties of an implementer:
