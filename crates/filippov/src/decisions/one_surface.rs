@@ -49,7 +49,7 @@ fn follow_at_surface(
     j: usize,
     mut decision: Decision,
 ) -> Decided {
-    if decision.turns_back() {
+    if decision.has_no_continuation() {
         return Err(Stop::InvisibleTwoFold {
             surface: j,
             sliding: decision.two_fold,

@@ -1,8 +1,8 @@
 //! Sliding whose multipliers are lost, or go on beyond their ends by rounding.
 
+use super::end_of_sliding::{beyond_double_zero, two_fold_here};
 use super::point::{Notes, Point};
 use super::surroundings::Surroundings;
-use super::two_fold::{beyond_double_zero, two_fold_here};
 use smallvec::{smallvec, SmallVec};
 
 use crate::error::FieldError;

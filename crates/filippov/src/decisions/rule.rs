@@ -25,7 +25,7 @@ pub(crate) enum Rule {
     /// The first derivatives of all guards that do not vanish, where first-order data are doubtful.
     Germs,
     /// The rule of sliding that the caller chose ends.
-    Law,
+    SlidingLaw,
     /// The relay problem of a field that is affine in the signs.
     Relay,
     /// The signs of too many surfaces multiply one another.
@@ -49,7 +49,7 @@ impl Rule {
             Rule::OneSurface => "one_surface",
             Rule::Limit => "limit",
             Rule::Germs => "germs",
-            Rule::Law => "sliding_rule",
+            Rule::SlidingLaw => "sliding_rule",
             Rule::Relay => "relay",
             Rule::TooMany => "too_many",
             Rule::FirstOrder => "first_order",

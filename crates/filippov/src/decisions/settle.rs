@@ -24,7 +24,7 @@ const RULES: [(Rule, Apply); 9] = [
     (Rule::Limit, stay_at_limit),
     (Rule::Entangled, decide_if_entangled),
     (Rule::OneSurface, one_surface),
-    (Rule::Law, leave_by_rule),
+    (Rule::SlidingLaw, leave_by_rule),
     (Rule::Relay, decide_by_relay),
     (Rule::Germs, decide_if_doubtful),
     (Rule::TooMany, too_many),
@@ -38,7 +38,7 @@ pub(super) fn settle(
 ) -> Result<(Rule, Decided), FieldError> {
     for (rule, apply) in RULES {
         if let Some(decided) = apply(at, notes, meeting)? {
-            let is_kinetic = matches!(rule, Rule::Law | Rule::Relay | Rule::TooMany);
+            let is_kinetic = matches!(rule, Rule::SlidingLaw | Rule::Relay | Rule::TooMany);
             return Ok(match is_kinetic {
                 true => (rule, with_kinetic_friction(at, notes, decided, meeting)?),
                 false => (rule, decided),

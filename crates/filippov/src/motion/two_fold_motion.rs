@@ -14,7 +14,7 @@
 
 use smallvec::{smallvec, SmallVec};
 
-use super::lie::Leading;
+use super::leading::Leading;
 use crate::error::FieldError;
 use crate::system::{LieValue, PiecewiseSystem, Place};
 use crate::tolerances::{AT_SIDE, DOUBTFUL, MAX_LIE_ORDER, MOST_HALVINGS, TANGENT};

@@ -4,14 +4,14 @@
 //! functions that vanish there; they return data. First-order data decide; where they vanish, the
 //! first Lie derivative that does not.
 
-mod codim1;
-mod exits;
+mod after_exit;
 mod hidden;
 mod incoming;
+mod one_surface;
 mod resolution;
 mod resolve;
 mod stick;
-mod surface;
+mod surface_decision;
 
 pub use crate::cube::{
     enclose_root, has_one_mode_only, is_p_matrix, is_scaling_stable, is_stable, is_stable_for,
@@ -24,12 +24,12 @@ pub use crate::cube::{
 pub use crate::error::Undecided;
 pub use crate::motion::{first_nonzero, normal_component, Leading, TwoFold, TwoFoldMotion};
 pub use crate::patience::Patience;
-pub use codim1::decide;
 pub use hidden::{
     admissible, admissible_within, limit as limit_of_hidden_dynamics, Admissible,
     Outcome as HiddenOutcome,
 };
 pub use incoming::{ExitKind, Incoming};
+pub use one_surface::decide;
 pub use resolution::{Continuation, Resolution};
 pub use resolve::{resolve, resolve_within};
-pub use surface::{Arrival, Decision};
+pub use surface_decision::{Arrival, Decision};

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::exits;
+use super::after_exit;
 use super::hidden::{attracting, limit_within, Outcome};
 use super::incoming::{ExitKind, HiddenStart, Incoming};
 use super::resolution::{Continuation, Resolution};
@@ -143,7 +143,7 @@ fn decide(
     ) = (incoming, m <= 2)
     {
         if m == 1 || *kind != ExitKind::Stability {
-            let mut resolution = exits::leave(fields, *kind, lambda, drift.as_deref())?;
+            let mut resolution = after_exit::leave(fields, *kind, lambda, drift.as_deref())?;
             complete(&mut resolution, false, fields, kappa, patience);
             return Ok(resolution);
         }

@@ -6,7 +6,7 @@
 //! can stick and slip, as at a force between the two limits, it sticks: it has come to rest. It breaks away where the
 //! force reaches the static limit, and then slips under the fields f- and f+ of the regions.
 
-use super::surface::{Arrival, Decision};
+use super::surface_decision::{Arrival, Decision};
 use crate::error::FieldError;
 use crate::motion::{first_nonzero, Leading};
 use crate::system::{BothSides, PiecewiseSystem, Place};

@@ -81,7 +81,7 @@ impl Decision {
 
     /// Does neither side continue, nor sliding that attracts? Both fields turn back to the surface, at a two-fold that is
     /// invisible from both sides.
-    pub fn turns_back(&self) -> bool {
+    pub fn has_no_continuation(&self) -> bool {
         let leading = match self.entry {
             -1 => self.minus,
             1 => self.plus,

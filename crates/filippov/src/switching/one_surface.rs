@@ -1,9 +1,12 @@
-//! The decision at one surface.
+//! The decision at one surface: crossing, sliding, or what follows where a field is tangent to it.
+//!
+//! A field is tangent where the first derivative of h along it vanishes. If the next one leads to the own side of the field the
+//! fold is visible, else invisible; at a cusp it vanishes too. All that counts is the sign of the first one that does not.
 
 use smallvec::{smallvec, SmallVec};
 
 use super::stick::decide_sticking;
-use super::surface::{Arrival, Decision};
+use super::surface_decision::{Arrival, Decision};
 use crate::error::FieldError;
 use crate::mode::Signs;
 use crate::motion::{first_nonzero, first_nonzero_of_both, Leading, TwoFold, TwoFoldMotion};
