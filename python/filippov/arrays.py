@@ -1,4 +1,4 @@
-"""Convert arguments to real arrays; complex numbers or masked entries raise an error with the argument's name."""
+"""Convert arguments to real arrays; complex or masked entries raise an error with the argument's name."""
 
 from __future__ import annotations
 

@@ -147,7 +147,8 @@ def grid_of(system: System, y0: Any, params: Mapping[str, Any] | None, last: str
     clash += [name for name in states if name in RESERVED]
     if clash:
         raise InputError(
-            f"params, states: the name {clash[0]!r} would occur twice in the result; rename this parameter or state"
+            f"params, states: the name {clash[0]!r} would occur twice in the result; "
+            "rename this parameter or state"
         )
     values = {name: given.get(name, np.float64(default)) for name, default in defaults.items()}
     fixed = {name: float(value) for name, value in values.items() if np.ndim(value) == 0}
