@@ -9,23 +9,58 @@ pub type Signs = SmallVec<[f64; FEW]>;
 const FEW: usize = 8;
 
 /// A mode: one entry per surface, +1 where h > 0, -1 where h < 0, 0 while sliding on h = 0.
-#[derive(PartialEq, Eq, Hash, Default)]
-pub struct Mode {
-    /// Few are kept without allocation: modes are copied at every switch.
-    entries: SmallVec<[i8; 16]>,
+#[derive(Clone, PartialEq, Eq, Hash)]
+pub struct Mode(Entries);
+
+/// The most surfaces whose entries are copied as a whole: modes are copied and compared at every switch.
+const SHORT: usize = 15;
+
+/// The entries of a mode. Beyond `length` short ones are zero, so that equal modes are equal as a whole.
+#[derive(Clone, PartialEq, Eq, Hash)]
+enum Entries {
+    Short { length: u8, entries: [i8; SHORT] },
+    Long(Box<[i8]>),
+}
+
+impl Default for Mode {
+    fn default() -> Self {
+        Mode::of(&[])
+    }
 }
 
 impl Mode {
     /// A mode from its entries, each -1, 0 or +1.
     pub fn new(entries: Vec<i8>) -> Self {
-        Mode {
-            entries: entries.into(),
+        Mode::of(&entries)
+    }
+
+    fn of(entries: &[i8]) -> Self {
+        let length = entries.len();
+        if length > SHORT {
+            return Mode(Entries::Long(entries.into()));
         }
+        let mut short = [0; SHORT];
+        short[..length].copy_from_slice(entries);
+        Mode(Entries::Short {
+            length: length as u8,
+            entries: short,
+        })
     }
 
     /// The entries.
+    #[inline]
     pub fn entries(&self) -> &[i8] {
-        &self.entries
+        match &self.0 {
+            Entries::Short { length, entries } => &entries[..usize::from(*length)],
+            Entries::Long(entries) => entries,
+        }
+    }
+
+    fn entries_mut(&mut self) -> &mut [i8] {
+        match &mut self.0 {
+            Entries::Short { length, entries } => &mut entries[..usize::from(*length)],
+            Entries::Long(entries) => entries,
+        }
     }
 
     /// The surface slid on, if exactly one is.
@@ -37,21 +72,21 @@ impl Mode {
 
     /// The surfaces slid on.
     pub fn sliding_set(&self) -> impl Iterator<Item = usize> + '_ {
-        let entries = self.entries.iter().enumerate();
+        let entries = self.entries().iter().enumerate();
         entries.filter(|(_, &e)| e == 0).map(|(j, _)| j)
     }
 
     /// Number of surfaces slid on.
     pub fn codimension(&self) -> usize {
-        self.entries.iter().filter(|&&e| e == 0).count()
+        self.entries().iter().filter(|&&e| e == 0).count()
     }
 
     /// The same mode with entry `j` replaced.
     #[must_use]
     pub fn with(&self, j: usize, entry: i8) -> Mode {
-        let mut entries = self.entries.clone();
-        entries[j] = entry;
-        Mode { entries }
+        let mut mode = self.clone();
+        mode.set(j, entry);
+        mode
     }
 
     /// The same mode on the sides of these surfaces that a pattern says: +1 where the bit of a surface is set, else -1.
@@ -67,36 +102,27 @@ impl Mode {
     /// The signs handed to the field: +1.0 or -1.0 per surface, a zero entry as +1.0.
     pub fn signs(&self) -> Signs {
         let sign = |&entry: &i8| if entry < 0 { -1.0 } else { 1.0 };
-        match self.entries.len() {
+        match self.entries().len() {
             n @ ..=FEW => {
                 let mut few = [1.0; FEW];
                 few.iter_mut()
-                    .zip(&self.entries)
+                    .zip(self.entries())
                     .for_each(|(to, entry)| *to = sign(entry));
                 Signs::from_buf_and_len(few, n)
             }
-            _ => self.entries.iter().map(sign).collect(),
+            _ => self.entries().iter().map(sign).collect(),
         }
     }
 
     /// Sets entry `j`.
     pub(crate) fn set(&mut self, j: usize, entry: i8) {
-        self.entries[j] = entry;
-    }
-}
-
-impl Clone for Mode {
-    /// As a whole, not entry by entry.
-    fn clone(&self) -> Self {
-        Mode {
-            entries: SmallVec::from_slice(&self.entries),
-        }
+        self.entries_mut()[j] = entry;
     }
 }
 
 impl fmt::Display for Mode {
     fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
-        self.entries.iter().try_for_each(|e| {
+        self.entries().iter().try_for_each(|e| {
             out.write_str(match e {
                 1 => "+",
                 0 => "0",

@@ -2,6 +2,8 @@
 
 use std::cell::RefCell;
 
+use smallvec::SmallVec;
+
 use super::point::{Arrival, Cause, Notes, Point};
 use crate::motion::Run;
 use crate::patience::Patience;
@@ -28,6 +30,8 @@ impl<'a> Scene<'_, 'a> {
     ) -> R {
         let run = self.run;
         let motion = &mut run.motion;
+        let mut departing = SmallVec::new();
+        motion.departing().for_each(|j| departing.push(j));
         let arrival = Arrival {
             cause,
             mode: &motion.mode,
@@ -36,7 +40,7 @@ impl<'a> Scene<'_, 'a> {
             sides: &motion.sides,
             active: &motion.active,
             resting: &motion.resting,
-            departing: motion.departing().collect(),
+            departing,
             switches: self.switches,
             residuals: &run.residuals,
             passing: &run.passing,

@@ -189,12 +189,11 @@ impl<'a> Integrator<'a> {
         self.record(before, next.mode.clone(), &concerned, rule.name())?;
         if !matches!(rule, Rule::Touch | Rule::Contact | Rule::Triggers) {
             // One surface meets no other.
-            let limit = match self.run.system.n_surfaces() {
-                0 | 1 => None,
-                _ => self.ask(Cause::Start, |at, _| limit_of_switches(at))?,
-            };
-            if let Some(limit) = limit.filter(|limit| limit.t <= self.horizon) {
-                return self.jump_to(limit, next.mode);
+            if self.run.system.n_surfaces() > 1 {
+                let limit = self.ask(Cause::Start, |at, _| limit_of_switches(at))?;
+                if let Some(limit) = limit.filter(|limit| limit.t <= self.horizon) {
+                    return self.jump_to(limit, next.mode);
+                }
             }
         }
         self.begin(next, &event.multiple)
