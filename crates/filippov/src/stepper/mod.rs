@@ -1,7 +1,8 @@
 //! Steppers: advance one smooth field by one step, with an error estimate and a continuous extension.
 //!
 //! [`Stepper`] is what is asked of a method, `Steppers` holds the methods of a run, and `StepControl` chooses the length of
-//! the next step. A new Runge-Kutta pair is a file here and a line in the table of `chosen.rs`. What a method needs of a
+//! the next step. A new Runge-Kutta pair is a file here, a line in the table of `chosen.rs` and a
+//! name in `options.rs` (CONTRIBUTING has the list). What a method needs of a
 //! run is in `Run`; no method knows of events or of the integrator.
 
 mod chatter;
