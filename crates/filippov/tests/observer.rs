@@ -136,16 +136,38 @@ fn a_run_is_the_same_whether_it_is_observed_or_not() {
     assert_eq!(observed.switches.len(), alone.switches.len());
 }
 
-#[test]
-fn maps_are_handed_with_their_derivatives() {
-    let ball = ClosureSystem::new(
+/// A ball above a table.
+fn ball() -> impl PiecewiseSystem {
+    ClosureSystem::new(
         2,
         1,
         |_, x, _, dx| (dx[0], dx[1]) = (x[1], -9.81),
         |_, x, h| h[0] = x[0],
     )
-    .with_smooth_surfaces(&[0]);
-    let bounce = |_t: f64, x: &mut [f64], _q: &mut [f64]| x[1] *= -0.5;
+    .with_smooth_surfaces(&[0])
+}
+
+/// The ball loses half of its speed.
+fn bounce(_t: f64, x: &mut [f64], _q: &mut [f64]) {
+    x[1] *= -0.5;
+}
+
+fn impact() -> Action<'static> {
+    Action {
+        trigger: Trigger::Surface {
+            index: 0,
+            direction: -1,
+            side: 1,
+        },
+        map: &bounce,
+        name: "impact".into(),
+        kind: Some(Kind::Reset),
+    }
+}
+
+#[test]
+fn maps_are_handed_with_their_derivatives() {
+    let ball = ball();
     let kick = |_t: f64, x: &mut [f64], q: &mut [f64]| {
         x[1] += x[0] * x[0];
         q[0] += 1.0;
@@ -156,16 +178,7 @@ fn maps_are_handed_with_their_derivatives() {
     };
     let actions = Actions {
         list: vec![
-            Action {
-                trigger: Trigger::Surface {
-                    index: 0,
-                    direction: -1,
-                    side: 1,
-                },
-                map: &bounce,
-                name: "impact".into(),
-                kind: Some(Kind::Reset),
-            },
+            impact(),
             Action {
                 trigger: Trigger::Clock {
                     clock,
@@ -205,25 +218,9 @@ fn maps_are_handed_with_their_derivatives() {
 
 #[test]
 fn the_limit_of_infinitely_many_impacts_has_a_later_time() {
-    let ball = ClosureSystem::new(
-        2,
-        1,
-        |_, x, _, dx| (dx[0], dx[1]) = (x[1], -9.81),
-        |_, x, h| h[0] = x[0],
-    )
-    .with_smooth_surfaces(&[0]);
-    let bounce = |_t: f64, x: &mut [f64], _q: &mut [f64]| x[1] *= -0.5;
+    let ball = ball();
     let actions = Actions {
-        list: vec![Action {
-            trigger: Trigger::Surface {
-                index: 0,
-                direction: -1,
-                side: 1,
-            },
-            map: &bounce,
-            name: "impact".into(),
-            kind: Some(Kind::Reset),
-        }],
+        list: vec![impact()],
         discrete: Vec::new(),
     };
     let (kept, _) = observe(Problem::new(&ball, (0.0, 5.0), &[1.0, 0.0]).actions(&actions));

@@ -42,7 +42,8 @@ pub struct SharedLoads {
     regular: Vec<usize>,
     solver: SparseSolver,
     loops: Vec<Loop>,
-    /// These surfaces have signs without effect, for instance kinks. They lie in the place of others that the motion slides on.
+    /// The signs of these surfaces have no effect on the field; they are kinks, for instance. Each coincides with a surface that
+    /// the motion slides on.
     idle: Vec<usize>,
 }
 

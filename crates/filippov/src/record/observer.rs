@@ -2,7 +2,8 @@
 //!
 //! Derivatives of a run are a pass over these (`docs/theory/`, P. C. Mueller, *Chaos, Solitons & Fractals* 5 (1995) 1671):
 //! with the gradient dg of the guard g that fixed the time of an instant, the fields F- and F+ before and after, and the
-//! derivative DR of the map, the derivative of what follows by what was before is S = DR + (F+ - DR F-) dg / (dg . F-).
+//! derivative DR of the map, the saltation matrix S = DR + (F+ - DR F-) dg / (dg . F-) maps a small change of the state before
+//! the instant to the change of the state after it.
 
 use smallvec::SmallVec;
 

@@ -40,7 +40,8 @@ pub struct Taylor {
     order: usize,
     /// Entries of a row: the states, then functions of them.
     width: usize,
-    /// Coefficients in powers of time at the start of the step, (order + 1) rows; what follows is of other motions.
+    /// Coefficients in powers of time at the start of the step, in (order + 1) rows. Entries behind these rows are left from
+    /// other motions and are not read.
     rows: Vec<f64>,
     /// The rows belong to the current start.
     is_expanded: bool,

@@ -1,4 +1,4 @@
-//! The decision at one surface: crossing, sliding, or what follows where a field is tangent to it.
+//! The decision at one surface: the motion crosses it, slides on it, or leaves it at a tangency.
 //!
 //! A field is tangent where the first derivative of h along it vanishes. If the next one leads to the own side of the field the
 //! fold is visible, else invisible; at a cusp it vanishes too. All that counts is the sign of the first one that does not.

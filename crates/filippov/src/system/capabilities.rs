@@ -85,7 +85,7 @@ impl dyn PiecewiseSystem + '_ {
             .is_some_and(|series| series.is_analytic())
     }
 
-    /// May fields or switching functions change where no Taylor coefficient tells?
+    /// Can fields or switching functions change although their Taylor coefficients show no change?
     pub fn hides_changes(&self) -> bool {
         self.taylor_series()
             .is_none_or(|series| series.hides_changes())

@@ -16,7 +16,7 @@ pub trait TaylorSeries {
     /// do not.
     fn is_analytic(&self) -> bool;
 
-    /// May fields or switching functions change where no Taylor coefficient tells, as pulses exp(-t^2) do?
+    /// Can fields or switching functions change although their Taylor coefficients show no change, as a late pulse does?
     fn hides_changes(&self) -> bool;
 
     /// Taylor coefficients up to `order` of the motions on these surfaces, in a region if there are none; `None`

@@ -103,11 +103,11 @@ impl StepSearch<'_, '_> {
     ) -> Result<Event, FieldError> {
         let resolved = self.resolve_zero_of_first(event.clone(), dt)?;
         for guard in &event.guards[1..] {
-            let goes_along = match &resolved {
+            let vanishes = match &resolved {
                 Event::At(moved) => self.vanishes(*guard, moved.theta)?,
                 _ => false,
             };
-            if !goes_along {
+            if !vanishes {
                 return Ok(Event::At(event));
             }
         }
