@@ -294,6 +294,20 @@ def test_states_of_any_scale(scale: float) -> None:
     assert sol.y[0, -1] == pytest.approx(-0.25 * scale, rel=1e-8)
 
 
+@pytest.mark.parametrize("method", ["Taylor", "DOPRI5", "Rodas5P"])
+def test_surface_that_a_sliding_motion_leaves_flatly(method: Any) -> None:
+    """While sliding at x = 0, with rounding of 1e-20, x - 0.19 y^3 grows from 1e-36 as t^9."""
+
+    def fun(t: float, x: Any) -> list[Any]:
+        slope = -0.8 * x[0] - 1.05 - 1.49 * np.sign(x[0] - 0.3 * abs(x[0]))
+        return [slope, -(t**2), np.sign(x[0] - 0.19 * x[1] ** 3)]
+
+    sol = fl.solve_ivp(fun, (1e-4, 1), [0, -1e-12 / 3, 0], method=method, rtol=1e-8, max_steps=100)
+    assert sol.success, sol.message
+    assert len(sol.switches) == 0
+    np.testing.assert_allclose(sol.y[:, -1], [0, -1 / 3, 1 - 1e-4], rtol=1e-10, atol=1e-15)
+
+
 @pytest.mark.parametrize("t0", [1e6, 1e12, -1e9])
 def test_large_times(t0: float) -> None:
     sol = fl.solve_ivp(lambda t, x: [-np.sign(x[0])], (t0, t0 + 2), [1.0])

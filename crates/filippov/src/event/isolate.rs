@@ -1,10 +1,10 @@
 //! Isolation of the first zero of a function of theta.
 
-use super::certificate::{Bounds, Verdict};
+use super::certificate::{Bound, Bounds, Verdict};
 use crate::error::FieldError;
 pub use crate::locate::{is_steep, Bracket, Sampled};
 use crate::tolerances::{
-    CANCELLED, FLAT_PIECE, HUGGING, MAX_DEPTH, MOST_OPEN, MOST_SAMPLES, MOST_UNPROVED,
+    CANCELLED, FLAT_PIECE, HUGGING, MAX_DEPTH, MOST_OPEN, MOST_SAMPLES, MOST_UNPROVED, PROOF_DEPTH,
     QUARTIC_REMAINDER,
 };
 
@@ -190,7 +190,7 @@ impl Search<'_, '_> {
                 self.unproved += 1;
                 depth >= self.patience() || self.unproved > MOST_UNPROVED
             }
-            Verdict::Open if self.is_flat(b, &v) => {
+            Verdict::Open if self.is_flat(b, &v) || self.is_below_bounds((a, b), &v, depth) => {
                 self.open += 1;
                 self.open > MOST_OPEN
             }
@@ -234,6 +234,22 @@ impl Search<'_, '_> {
             _ => 1.0,
         };
         values.iter().all(|v| v.abs() * power <= self.flat)
+    }
+
+    /// Are the bounds of a single point wider than the function is on the piece? The motion is then not known better than
+    /// that, and no shorter piece will be decided.
+    fn is_below_bounds(&mut self, (a, b): (f64, f64), values: &[f64; 5], depth: u32) -> bool {
+        let Evidence::Bounds {
+            bounds, divided: 0, ..
+        } = &mut self.evidence
+        else {
+            return false;
+        };
+        let middle = 0.5 * (a + b);
+        depth >= PROOF_DEPTH
+            && bounds(middle, middle).is_some_and(|Bound { value, .. }| {
+                values.iter().all(|v| v.abs() <= value.hi - value.lo)
+            })
     }
 
     /// What the bounds prove about a piece.

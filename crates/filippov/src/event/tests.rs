@@ -1,8 +1,10 @@
 //! Zeros found, not missed and not invented.
 
+use super::certificate::Bound;
 use super::filter::may_vanish;
 use super::isolate::{first_zero, Evidence, Zero, PROBES};
 use crate::locate::refine;
+use filippov_expr::Interval;
 use proptest::prelude::*;
 
 fn find(g: impl Fn(f64) -> f64) -> Option<Zero> {
@@ -47,6 +49,32 @@ fn a_near_miss_is_none() {
 #[test]
 fn an_identically_vanishing_function_has_no_zero() {
     assert_eq!(find(|_| 0.0), None);
+}
+
+/// The bounds of g(theta) = 1e-26 (1 + theta) know the motion to 1e-20 only: samples decide.
+#[test]
+fn bounds_wider_than_the_function_at_every_point_leave_it_to_the_samples() {
+    let mut over = |a: f64, b: f64| {
+        Some(Bound {
+            value: Interval::around(1e-26 * (1.0 + 0.5 * (a + b)), 1e-20),
+            slope: Interval::around(0.0, 1e-20),
+        })
+    };
+    let mut search = |slope: f64| {
+        let evidence = Evidence::Bounds {
+            bounds: &mut over,
+            divided: 0,
+            patience: 0,
+        };
+        let g = |theta: f64| Ok(1e-26 * (1.0 + slope * theta));
+        first_zero(&mut { g }, 0.0, 1.0, 1e-40, evidence).unwrap()
+    };
+    let free = search(1.0);
+    assert!(free.zero.is_none() && !free.exhausted && !free.not_finite);
+    let Some(Zero::Crossing(bracket)) = search(-1.7).zero else {
+        panic!("no crossing")
+    };
+    assert!(bracket.lo < 1.0 / 1.7 && 1.0 / 1.7 < bracket.hi);
 }
 
 #[test]
