@@ -38,10 +38,9 @@ struct Eliminated {
 impl Bilinear {
     /// The canopy of the fields at an intersection of two surfaces.
     pub fn of_fields(fields: &NormalFields) -> Self {
-        let f = |k: [i8; 2], j: usize| fields.in_region(&k)[j];
+        let corners = [[-1, -1], [-1, 1], [1, -1], [1, 1]].map(|k| fields.in_region(&k));
         let row = |j: usize| {
-            let [mm, mp] = [f([-1, -1], j), f([-1, 1], j)];
-            let [pm, pp] = [f([1, -1], j), f([1, 1], j)];
+            let [mm, mp, pm, pp] = [0, 1, 2, 3].map(|corner: usize| corners[corner][j]);
             [
                 0.25 * (mm + mp + pm + pp),
                 0.25 * (pp + pm - mp - mm),

@@ -163,6 +163,15 @@ impl NormalFields {
         Cow::Owned(sum)
     }
 
+    /// The components of the regions with these signs on both sides of surface i, that where h_i < 0 first.
+    pub fn on_both_sides(&self, signs: &[i8], i: usize) -> [Cow<'_, [f64]>; 2] {
+        let mut signs = SmallVec::<[i8; 4]>::from_slice(signs);
+        [-1, 1].map(|side| {
+            signs[i] = side;
+            self.in_region(&signs)
+        })
+    }
+
     /// The largest magnitude of all components.
     pub fn size(&self) -> f64 {
         (0..self.m).fold(0.0, |size, j| self.row_size(j).max(size))

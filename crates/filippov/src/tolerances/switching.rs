@@ -71,6 +71,10 @@ pub const RETURNS_TO_A_CYCLE: usize = 400;
 /// factor gamma.
 pub const FAR_OUT: f64 = 1e5;
 
+/// The last terms of a step of the hidden dynamics, in units of the transition: far below what is doubtful, and below the
+/// difference of returns to a cycle.
+pub const HIDDEN_ERROR: f64 = 1e-12;
+
 /// Components of the hidden dynamics that are within the transition rest if they are slower than this fraction of the field:
 /// Newton's method then finds the rest point. Others leave for ever if they are faster: this is above the rounding of the
 /// field, and below the drift after an exit.

@@ -1,7 +1,10 @@
 //! All modes in which a motion can leave an intersection, or stay on it.
 
-use crate::cube::Lap;
-use crate::cube::{stable_roots_within, Bilinear, Matrix, NormalFields};
+use std::borrow::Cow;
+
+use smallvec::{smallvec, SmallVec};
+
+use crate::cube::{stable_roots_within, Bilinear, Lap, Matrix, NormalFields, Vector};
 use crate::mode::Mode;
 use crate::patience::Patience;
 use crate::switching::incoming::with_multipliers;
@@ -104,23 +107,17 @@ fn independent_parts(fields: &NormalFields) -> Vec<Vec<usize>> {
 }
 
 fn attracting_together(fields: &NormalFields, patience: Patience) -> (Vec<Admissible>, f64) {
+    let m = fields.m();
+    let sizes: Vector = (0..m).map(|j| fields.row_size(j)).collect();
     let (mut found, mut margin) = (Vec::new(), f64::INFINITY);
-    let mut mode = vec![-1_i8; fields.m()];
+    let mut mode: SmallVec<[i8; 4]> = smallvec![-1; m];
     loop {
-        let (roots, slides) = if mode.contains(&0) {
-            let face = fields.restrict(&mode);
-            let slides = match face.m() {
-                1 | 2 => root_margin(fields, &mode, &face),
-                _ => f64::INFINITY,
-            };
-            (stable_roots_within(&face, patience), slides)
-        } else {
-            (vec![Vec::new()], f64::INFINITY)
-        };
-        let fails = roots.is_empty().then_some(slides);
-        margin = margin.min(fails.map_or(f64::INFINITY, f64::abs));
-        for multipliers in roots {
-            let leaves = smallest_departure(fields, &mode, &multipliers);
+        let (points, slides) = roots_of_mode(fields, &mode, &sizes, patience);
+        if points.is_empty() {
+            margin = margin.min(slides.abs());
+        }
+        for MeetingPoint { multipliers, g } in points {
+            let leaves = smallest_departure(&g, &mode, &sizes);
             margin = margin.min(leaves.min(slides).abs());
             if leaves > 0.0 {
                 found.push(Admissible {
@@ -136,7 +133,7 @@ fn attracting_together(fields: &NormalFields, patience: Patience) -> (Vec<Admiss
         mode[i] += 1;
         mode[..i].fill(-1);
     }
-    if fields.m() == 2 && Lap::around(fields, [-1, -1]).is_some_and(|lap| lap.gamma > 1.0) {
+    if m == 2 && Lap::around(fields, [-1, -1]).is_some_and(|lap| lap.gamma > 1.0) {
         found.push(Admissible {
             continuation: Continuation::OutwardSpiral,
             multipliers: Vec::new(),
@@ -145,21 +142,68 @@ fn attracting_together(fields: &NormalFields, patience: Patience) -> (Vec<Admiss
     (found, margin)
 }
 
-/// How clearly there is a root on a face of one or two multipliers.
-fn root_margin(fields: &NormalFields, mode: &[i8], face: &NormalFields) -> f64 {
-    if face.m() == 2 {
-        return Bilinear::of_fields(face).root_margin();
-    }
-    let slid_on = mode.iter().position(|&k| k == 0).unwrap_or(0);
-    face.at(0)[0].min(-face.at(1)[0]) / fields.row_size(slid_on)
+/// A point of the cube at which a mode may move.
+struct MeetingPoint {
+    /// Of the surfaces slid on.
+    multipliers: Vec<f64>,
+    /// The normal components there.
+    g: Vector,
 }
 
-/// How clearly the field at these multipliers leaves the surfaces that the mode does not slide on, by the one least left.
-fn smallest_departure(fields: &NormalFields, mode: &[i8], multipliers: &[f64]) -> f64 {
-    let lambda = with_multipliers(mode, multipliers);
-    let g = fields.interpolate(&lambda);
+/// The stable roots of a mode's face, and how clearly there is one, or none, where a closed form tells: on faces of one or
+/// two multipliers. A corner is its own root.
+fn roots_of_mode(
+    fields: &NormalFields,
+    mode: &[i8],
+    sizes: &[f64],
+    patience: Patience,
+) -> (SmallVec<[MeetingPoint; 1]>, f64) {
+    let mut slid_on = (0..mode.len()).filter(|&i| mode[i] == 0);
+    let (first, second) = (slid_on.next(), slid_on.next());
+    let Some(i) = first else {
+        let corner = MeetingPoint {
+            multipliers: Vec::new(),
+            g: Vector::from_slice(&fields.in_region(mode)),
+        };
+        return (smallvec![corner], f64::INFINITY);
+    };
+    if second.is_none() {
+        let [below, above] = fields.on_both_sides(mode, i);
+        let slides = below[i].min(-above[i]);
+        let root = (slides > 0.0).then(|| {
+            let lambda = (below[i] + above[i]) / (below[i] - above[i]);
+            let between = |(b, a): (&f64, &f64)| 0.5 * ((1.0 - lambda) * b + (1.0 + lambda) * a);
+            MeetingPoint {
+                multipliers: vec![lambda],
+                g: below.iter().zip(&*above).map(between).collect(),
+            }
+        });
+        return (root.into_iter().collect(), slides / sizes[i]);
+    }
+    let slides_on_all = mode.iter().all(|&k| k == 0);
+    let face = match slides_on_all {
+        true => Cow::Borrowed(fields),
+        false => Cow::Owned(fields.restrict(mode)),
+    };
+    let slides = match face.m() {
+        2 => Bilinear::of_fields(&face).root_margin(),
+        _ => f64::INFINITY,
+    };
+    let roots = stable_roots_within(&face, patience).into_iter();
+    let points = roots.map(|multipliers| MeetingPoint {
+        g: match slides_on_all {
+            true => smallvec![0.0; mode.len()],
+            false => fields.interpolate(&with_multipliers(mode, &multipliers)),
+        },
+        multipliers,
+    });
+    (points.collect(), slides)
+}
+
+/// How clearly these normal components leave the surfaces that the mode does not slide on, by the one least left.
+fn smallest_departure(g: &[f64], mode: &[i8], sizes: &[f64]) -> f64 {
     let left = (0..mode.len()).filter(|&i| mode[i] != 0);
     // All fields may be tangent to a surface; that is not left.
-    left.map(|i| f64::from(mode[i]) * g[i] / fields.row_size(i).max(f64::MIN_POSITIVE))
+    left.map(|i| f64::from(mode[i]) * g[i] / sizes[i].max(f64::MIN_POSITIVE))
         .fold(f64::INFINITY, f64::min)
 }
