@@ -2,9 +2,11 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use filippov_expr::{BinaryOp, Graph, Names, NodeId, Switching, UnaryOp};
+use filippov_expr::{BinaryOp, Graph, Names, NodeId, Regions, Switching, UnaryOp};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+
+use crate::regions::{as_tuples, by_name};
 
 /// An expression graph under construction; nodes are handed out as integers.
 #[pyclass(frozen, module = "filippov._core")]
@@ -149,6 +151,27 @@ impl Builder {
 
     fn n_surfaces(&self) -> usize {
         self.graph().n_surfaces()
+    }
+
+    /// The pieces of an expression, none if they were not found out; and whether they are those of these parameters only.
+    fn pieces<'py>(
+        &self,
+        py: Python<'py>,
+        a: u32,
+        parameters: Vec<f64>,
+        discrete: Vec<String>,
+        most: usize,
+        in_full: bool,
+    ) -> PyResult<(Option<Bound<'py, PyAny>>, bool)> {
+        let discrete = by_name(&discrete)?;
+        let mut graph = self.graph();
+        let a = Self::node(&graph, a)?;
+        let mut regions = Regions::new(std::mem::take(&mut *graph), parameters, discrete);
+        let pieces = regions.pieces(a, most, in_full);
+        let used_parameters = regions.used_parameters();
+        *graph = regions.into_graph();
+        let tuples = pieces.map(|pieces| as_tuples(py, &pieces)).transpose()?;
+        Ok((tuples, used_parameters))
     }
 
     #[pyo3(signature = (a, states=None, parameters=None))]

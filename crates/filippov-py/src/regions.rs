@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use filippov_expr::{Discrete, Edge, Kind, Names, NodeId, Switching};
+use filippov_expr::{Discrete, Edge, Kind, Names, NodeId, Pieces, Switching};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -26,6 +26,29 @@ impl Regions {
     }
 }
 
+/// Kinds of discrete states by their names.
+pub fn by_name(discrete: &[String]) -> PyResult<Vec<Discrete>> {
+    let kinds = discrete.iter().map(|name| match name.as_str() {
+        "whole" => Ok(Discrete::Whole),
+        "side" => Ok(Discrete::Side),
+        _ => Err(PyValueError::new_err(format!("no discrete state {name:?}"))),
+    });
+    kinds.collect()
+}
+
+/// Pieces as nested tuples: `(surface, plus, minus)`, and at the ends the kind with the sign or the expression.
+pub fn as_tuples<'py>(py: Python<'py>, pieces: &Pieces) -> PyResult<Bound<'py, PyAny>> {
+    Ok(match pieces {
+        Pieces::Known(sign) => ("known", *sign).into_pyobject(py)?.into_any(),
+        Pieces::Held(node) => ("held", node.0).into_pyobject(py)?.into_any(),
+        Pieces::Open(node) => ("open", node.0).into_pyobject(py)?.into_any(),
+        Pieces::Sides(surface, sides) => {
+            let [plus, minus] = [as_tuples(py, &sides[0])?, as_tuples(py, &sides[1])?];
+            (*surface, plus, minus).into_pyobject(py)?.into_any()
+        }
+    })
+}
+
 /// Signs as the expression crate takes them.
 fn by_surface(regions: &filippov_expr::Regions, signs: &Signs) -> PyResult<Vec<Option<f64>>> {
     let mut all = vec![None; regions.graph().n_surfaces()];
@@ -46,16 +69,8 @@ impl Regions {
         parameters: Vec<f64>,
         discrete: Vec<String>,
     ) -> PyResult<Self> {
-        let discrete = discrete
-            .iter()
-            .map(|name| match name.as_str() {
-                "whole" => Ok(Discrete::Whole),
-                "side" => Ok(Discrete::Side),
-                _ => Err(PyValueError::new_err(format!("no discrete state {name:?}"))),
-            })
-            .collect::<PyResult<Vec<_>>>()?;
         let graph = builder.borrow(py).graph().clone();
-        let regions = filippov_expr::Regions::new(graph, parameters, discrete);
+        let regions = filippov_expr::Regions::new(graph, parameters, by_name(&discrete)?);
         Ok(Regions {
             regions: Mutex::new(regions),
         })

@@ -21,6 +21,7 @@ from filippov.trace.array_functions import apply_function
 from filippov.trace.condition import Comparison, Condition
 from filippov.trace.explain import BLACK_BOX, NotTraceable, UserLine, calling_line
 from filippov.trace.laws import Laws
+from filippov.trace.pieces import Pieces, condition_of, equality_of, sign_of
 from filippov.trace.scalar import Scalar
 
 if TYPE_CHECKING:
@@ -30,6 +31,11 @@ __all__ = ["MAX_DECISIONS", "Guard", "Question", "Tracer"]
 
 # A path this long comes from a loop whose length depends on the state.
 MAX_DECISIONS = 2_000
+
+# Combinations of inner signs looked at for each comparison; for each one after several that have more.
+MOST_COMBINATIONS = 1024
+MOST_AFTER_MANY = 32
+MANY = 3
 
 
 @dataclass(frozen=True)
@@ -57,8 +63,8 @@ class Question(NamedTuple):
     ----------
     node : int
         The expression.
-    kind : {"comparison", "sign", "floor", "quantiser", "hysteresis"}
-        Whether it is positive, its sign, its sign inside of a floor; or the argument of a floor or relay.
+    kind : {"comparison", "sign", "quantiser", "hysteresis"}
+        Whether it is positive, its sign; or the argument of a floor or relay.
     is_strict : bool
         Of a comparison: whether the answer at 0 is no.
     """
@@ -118,10 +124,10 @@ class Tracer:
         self.n_paths = 0
         self.guards: dict[int, Guard] = {}
         self.questions: dict[Question, None] = {}
-        self.sides: tuple[int, int] | None = None
         self.sought: Question | None = None
-        self.replaced: Question | None = None
-        self.found: tuple[UserLine | None, tuple[int, int] | None] | None = None
+        self.found: UserLine | None = None
+        self.unresolved: dict[int, None] = {}
+        self._pieces: dict[tuple[int, bool], Pieces | None] = {}
         self._path: list[tuple[int, float]] = []
         self._flipped: list[bool] = []
         self._answers: dict[int, float] = {}
@@ -198,7 +204,7 @@ class Tracer:
         question = Question(node, kind, is_strict)
         self.questions[question] = None
         if question == self.sought and self.found is None:
-            self.found = (calling_line(), self.sides)
+            self.found = calling_line()
 
     def sign(self, node: int) -> int:
         """Return the node of the sign of an expression."""
@@ -210,9 +216,10 @@ class Tracer:
             sides = [self.builder.sign(self.laws.beside(self, node, side)) for side in (-1.0, 1.0)]
             both = self.builder.binary("add", *sides)
             return self.builder.binary("multiply", self.builder.constant(0.5), both)
+        pieces = self.pieces(node)
+        if pieces is not None:
+            return sign_of(self, pieces)
         self.ask(node, "sign")
-        if self.replaced is not None and self.replaced == Question(node, "sign"):
-            return self.builder.state(self.n_states)
         return self.builder.sign(node)
 
     def absolute(self, node: int) -> int:
@@ -236,12 +243,48 @@ class Tracer:
         if known is None:
             if self.laws.is_held(self, node):
                 node = self.laws.beside(self, node, -1.0 if strict else 1.0)
+            pieces = self.pieces(node)
+            if pieces is not None:
+                return condition_of(self, pieces, strict=strict)
             self.ask(node, "comparison", is_strict=strict)
             surface, orientation = self.builder.switch(node)
             if surface >= 0:
                 return Comparison(self, surface, orientation)
             known = orientation
         return known > 0.0 or (not strict and known == 0.0)
+
+    def equal(self, node: int) -> Condition | bool | None:
+        """Return the condition ``expression == 0``; None if that is so at single points only."""
+        known = self.known_sign(node)
+        if known is not None:
+            return known == 0.0
+        if self.laws.is_held(self, node):
+            return self.is_held_at_zero(node)
+        pieces = self.pieces(node, in_full=True)
+        return None if pieces is None else equality_of(self, pieces)
+
+    def is_held_at_zero(self, node: int) -> Condition | bool:
+        """Return the condition that an expression of discrete states is zero."""
+        is_positive = self.compare(node, strict=True)
+        is_negative = self.compare(self.builder.unary("negative", node), strict=True)
+        return _opposite(is_positive) & _opposite(is_negative)
+
+    def pieces(self, node: int, *, in_full: bool = False) -> Pieces | None:
+        """Return an expression in pieces; None if it is nowhere seen to be identically zero."""
+        if not self.builder.has_signs(node):
+            return None
+        if (node, in_full) not in self._pieces:
+            most = MOST_COMBINATIONS if len(self.unresolved) < MANY else MOST_AFTER_MANY
+            pieces, for_these_values = self.builder.pieces(
+                node, self.values.tolist(), self.laws.discrete(), most, in_full
+            )
+            if for_these_values:
+                self.guards.setdefault(-1, Guard("regions of the comparisons", 0.0))
+            if pieces is None:
+                self.unresolved[node] = None
+            is_whole = pieces is None or (not in_full and pieces[0] == "open")
+            self._pieces[node, in_full] = None if is_whole else pieces
+        return self._pieces[node, in_full]
 
     def known_sign(self, node: int) -> float | None:
         """Return the sign of an expression of constants and parameters; None if it depends on the motion."""
@@ -377,3 +420,7 @@ class Tracer:
             f"  - {BLACK_BOX}\n"
             "  - raise max_paths, if the number of combinations is really small"
         )
+
+
+def _opposite(answer: Condition | bool) -> Condition | bool:
+    return answer.negated() if isinstance(answer, Condition) else not answer

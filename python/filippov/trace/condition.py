@@ -8,13 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from filippov.trace.explain import NotTraceable
-
 if TYPE_CHECKING:
     from filippov.trace.branching import Tracer
     from filippov.trace.scalar import Scalar
 
-__all__ = ["Both", "Comparison", "Condition"]
+__all__ = ["Both", "BySide", "Comparison", "Condition"]
 
 
 class Condition(ABC):
@@ -145,11 +143,16 @@ class Condition(ABC):
         return self.number()
 
     def __gt__(self, other: Any) -> Any:
-        raise NotTraceable(
-            "a comparison of the outcome of a comparison", "combine the conditions with `&`, `|` and `~`"
-        )
+        return self.number() > other
 
-    __ge__ = __lt__ = __le__ = __gt__
+    def __ge__(self, other: Any) -> Any:
+        return self.number() >= other
+
+    def __lt__(self, other: Any) -> Any:
+        return self.number() < other
+
+    def __le__(self, other: Any) -> Any:
+        return self.number() <= other
 
     # As integers they answer by forced branching: `table[v > 0]`, `int(v > 0)`.
     def __int__(self) -> int:
@@ -206,3 +209,31 @@ class Both(Condition):
 
     def __bool__(self) -> bool:
         return (bool(self.first) and bool(self.second)) != self.opposite
+
+
+class BySide(Condition):
+    """The condition `plus` on the side of a surface where ``h > 0``, and `minus` on the other."""
+
+    __slots__ = ("minus", "plus", "surface")
+
+    def __init__(self, tracer: Tracer, surface: int, plus: Condition | bool, minus: Condition | bool) -> None:
+        self.tracer = tracer
+        self.surface = surface
+        self.plus = plus
+        self.minus = minus
+
+    def choose(self, plus: int, minus: int) -> int:
+        first, second = (
+            side.choose(plus, minus) if isinstance(side, Condition) else plus if side else minus
+            for side in (self.plus, self.minus)
+        )
+        return self.tracer.builder.select(self.surface, 1.0, first, second)
+
+    def negated(self) -> Condition:
+        first, second = (
+            side.negated() if isinstance(side, Condition) else not side for side in (self.plus, self.minus)
+        )
+        return BySide(self.tracer, self.surface, first, second)
+
+    def __bool__(self) -> bool:
+        return bool(self.plus if self.tracer.decide(self.surface, 1.0) else self.minus)

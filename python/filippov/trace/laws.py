@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
+from filippov.trace.condition import Condition
 from filippov.trace.explain import NotTraceable
 
 if TYPE_CHECKING:
@@ -77,8 +78,10 @@ class Laws:
         half = builder.constant(0.5)
         distance = builder.binary("subtract", node, level)
         tracer.ask(node, "quantiser")
-        tracer.ask(distance, "floor")
-        step = builder.binary("multiply", half, builder.sign(distance))
+        # At a whole number the floor is that number itself.
+        is_above = tracer.compare(distance, strict=False)
+        up, down = half, builder.constant(-0.5)
+        step = is_above.choose(up, down) if isinstance(is_above, Condition) else up if is_above else down
         return builder.binary("add", builder.binary("subtract", level, half), step)
 
     def hysteresis(self, tracer: Tracer, node: int, low: int, high: int, initial: float) -> int:

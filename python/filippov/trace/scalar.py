@@ -148,7 +148,7 @@ class Scalar:
         node = other.node if type(other) is Scalar and other.tracer is tracer else tracer.operand(other)
         if node is None:
             return NotImplemented
-        first, second = tracer.sides = (self.node, node) if greater else (node, self.node)
+        first, second = (self.node, node) if greater else (node, self.node)
         return tracer.compare(tracer.builder.binary("subtract", first, second), strict=strict)
 
     def __gt__(self, other: Any) -> Any:
@@ -164,27 +164,29 @@ class Scalar:
         return self.compare(other, greater=False, strict=False)
 
     def equals(self, other: Any) -> Any:
-        """Decide ``self == other`` where it is a matter of constants and parameters; refuse it otherwise."""
+        """Return the condition ``self == other`` if it holds in whole regions; refuse it otherwise."""
         if isinstance(other, (np.ndarray, list, tuple)):
             return self.tracer.apply_ufunc(np.equal, "__call__", (self, other), {})
         node = self.tracer.operand(other)
         if node is None:
             return NotImplemented
-        sign = self.tracer.known_sign(self.tracer.builder.binary("subtract", self.node, node))
-        if sign is None:
+        answer = self.tracer.equal(self.tracer.builder.binary("subtract", self.node, node))
+        if answer is None:
             raise NotTraceable(
-                "`==` or `!=` of a traced value (it has measure zero: the solution crosses it in an instant "
-                "or slides on it, and there the multiplier decides)",
+                "`==` or `!=` of two quantities that are equal at single points only (the solution is there "
+                "in an instant, or slides there, and then the multiplier decides)",
                 "write `>`, `>=`, `<` or `<=`, or leave the special case out",
             )
-        return sign == 0.0
+        return answer
 
     def __eq__(self, other: object) -> Any:
         return self.equals(other)
 
     def __ne__(self, other: object) -> Any:
         equal = self.equals(other)
-        return equal if equal is NotImplemented else not equal
+        if equal is NotImplemented or isinstance(equal, bool):
+            return equal if equal is NotImplemented else not equal
+        return ~equal
 
     def __bool__(self) -> bool:
         sign = self.tracer.known_sign(self.node)

@@ -16,7 +16,7 @@ from filippov.trace.branching import Guard, Question, Tracer
 from filippov.trace.condition import Condition
 from filippov.trace.explain import explain_failure, explain_raise
 from filippov.trace.laws import Laws
-from filippov.trace.plateaus import Roots, check_questions, is_exact_at_an_instant, kink_of_event
+from filippov.trace.questions import Roots, check_questions, is_exact_at_an_instant, kink_of_event
 from filippov.trace.reuse import Recent
 from filippov.trace.scalar import Scalar
 from filippov.trace.verify import verify
@@ -281,19 +281,12 @@ class _Again:
         self.new_tracer = new_tracer
         self.record = record
 
-    def line_of(self, question: Question) -> tuple[UserLine | None, tuple[int, int] | None]:
-        """Return the user's line in which a question was asked, and the sides of the comparison."""
+    def line_of(self, question: Question) -> UserLine | None:
+        """Return the user's line in which a question was asked."""
         tracer = self.new_tracer()
         tracer.sought = question
         self.record(tracer)
-        return tracer.found or (None, None)
-
-    def with_symbol(self, question: Question) -> tuple[Tracer, Roots]:
-        """Return a trace in which one more state stands for the sign of an expression, and its roots."""
-        tracer = self.new_tracer()
-        tracer.replaced = question
-        _, field, watched = self.record(tracer)
-        return tracer, Roots(field, [index for index, _ in watched])
+        return tracer.found
 
 
 def _system(tracer: Tracer, field: list[int], watched: Sequence[int] = ()) -> TracedSystem:

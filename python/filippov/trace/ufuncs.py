@@ -91,16 +91,16 @@ def _extreme(a: Any, b: Any, *, largest: bool) -> Any:
 
 
 def _heaviside(a: Any, middle: Any) -> Any:
-    # The middle value has no meaning here: on the surface the multiplier decides.
+    # The middle value counts where a is zero in a whole region: on a surface the multiplier decides.
     a = _scalar(a)
     if type(a) is Scalar:
-        return choose(a > 0, 1.0, 0.0)
+        return choose(a > 0, 1.0, choose(a < 0, 0.0, middle))
     return middle if a == 0 else float(np.heaviside(a, 0.0))
 
 
 def _copysign(a: Any, b: Any) -> Any:
     b = _scalar(b)
-    sign = _sign(b) if type(b) is Scalar else math.copysign(1.0, b)
+    sign = choose(b >= 0, 1.0, -1.0) if type(b) is Scalar else math.copysign(1.0, b)
     return abs(_scalar(a)) * sign
 
 

@@ -10,9 +10,11 @@ mod discrete;
 mod edge;
 mod inequalities;
 mod jump;
+mod pieces;
 
 pub use discrete::Discrete;
 pub use edge::Edge;
+pub use pieces::Pieces;
 
 use crate::graph::Graph;
 use crate::linear::LinearForm;
@@ -90,6 +92,11 @@ impl Regions {
     /// The graph.
     pub fn graph(&self) -> &Graph {
         &self.graph
+    }
+
+    /// The graph, with the nodes that it received.
+    pub fn into_graph(self) -> Graph {
+        self.graph
     }
 
     /// Whether an answer was true for these values of the parameters only.
