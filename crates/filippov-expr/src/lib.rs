@@ -76,6 +76,6 @@ pub use node::{Node, NodeId};
 pub use op::{BinaryOp, UnaryOp};
 pub use print::Names;
 pub use program::{Backend, Program};
-pub use region::{Discrete, Edge, Kind, Pieces, Region, Regions, Split};
+pub use region::{Discrete, Edge, Kind, PartSign, Pieces, Region, Regions, Split};
 pub use schedule::Lengths;
 pub use switching::Switching;

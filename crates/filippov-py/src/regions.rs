@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use filippov_expr::{Discrete, Edge, Kind, Names, NodeId, Pieces, Switching};
+use filippov_expr::{Discrete, Edge, Kind, Names, NodeId, PartSign, Pieces, Switching};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -36,12 +36,12 @@ pub fn by_name(discrete: &[String]) -> PyResult<Vec<Discrete>> {
     kinds.collect()
 }
 
-/// Pieces as nested tuples: `(surface, plus, minus)`, and at the ends the kind with the sign or the expression.
+/// Pieces as nested tuples: `(surface, plus, minus)`, and at the ends the expression with its sign, "held" or `None`.
 pub fn as_tuples<'py>(py: Python<'py>, pieces: &Pieces) -> PyResult<Bound<'py, PyAny>> {
     Ok(match pieces {
-        Pieces::Known(sign) => ("known", *sign).into_pyobject(py)?.into_any(),
-        Pieces::Held(node) => ("held", node.0).into_pyobject(py)?.into_any(),
-        Pieces::Open(node) => ("open", node.0).into_pyobject(py)?.into_any(),
+        Pieces::Part(node, PartSign::Known(sign)) => (node.0, *sign).into_pyobject(py)?.into_any(),
+        Pieces::Part(node, PartSign::Held) => (node.0, "held").into_pyobject(py)?.into_any(),
+        Pieces::Part(node, PartSign::Open) => (node.0, py.None()).into_pyobject(py)?.into_any(),
         Pieces::Sides(surface, sides) => {
             let [plus, minus] = [as_tuples(py, &sides[0])?, as_tuples(py, &sides[1])?];
             (*surface, plus, minus).into_pyobject(py)?.into_any()

@@ -25,7 +25,7 @@ from filippov.trace.pieces import Pieces, condition_of, equality_of, sign_of
 from filippov.trace.scalar import Scalar
 
 if TYPE_CHECKING:
-    from filippov._core import Builder
+    from filippov._core import Builder, Regions
 
 __all__ = ["MAX_DECISIONS", "Guard", "Question", "Tracer"]
 
@@ -225,17 +225,26 @@ class Tracer:
     def absolute(self, node: int) -> int:
         """Return the node of the absolute value of an expression."""
         known = self.known_sign(node) if self.parameters else None
-        if known is None:
+        if known is not None:
+            return node if known >= 0.0 else self.builder.unary("negative", node)
+        if self.pieces(node) is None:
             return self.builder.abs(node)
-        return node if known >= 0.0 else self.builder.unary("negative", node)
+        return self.choose(node, node, self.builder.unary("negative", node))
 
     def extreme(self, first: int, second: int, *, largest: bool) -> int:
         """Return the node of the maximum or the minimum of two expressions."""
-        if self.parameters:
-            known = self.known_sign(self.builder.binary("subtract", first, second))
-            if known is not None:
-                return first if (known >= 0.0) == largest else second
-        return self.builder.maximum(first, second) if largest else self.builder.minimum(first, second)
+        difference = self.builder.binary("subtract", first, second)
+        known = self.known_sign(difference) if self.parameters else None
+        if known is not None:
+            return first if (known >= 0.0) == largest else second
+        if self.pieces(difference) is None:
+            return self.builder.maximum(first, second) if largest else self.builder.minimum(first, second)
+        return self.choose(difference, first, second) if largest else self.choose(difference, second, first)
+
+    def choose(self, node: int, plus: int, minus: int) -> int:
+        """Return the node that is `plus` where an expression is not negative, and `minus` elsewhere."""
+        answer = self.compare(node, strict=False)
+        return answer.choose(plus, minus) if isinstance(answer, Condition) else plus if answer else minus
 
     def compare(self, node: int, *, strict: bool) -> Condition | bool:
         """Return the condition ``expression > 0`` (``>= 0`` unless strict); its answer if it is known."""
@@ -282,9 +291,19 @@ class Tracer:
                 self.guards.setdefault(-1, Guard("regions of the comparisons", 0.0))
             if pieces is None:
                 self.unresolved[node] = None
-            is_whole = pieces is None or (not in_full and pieces[0] == "open")
+            is_whole = pieces is None or (not in_full and pieces == (node, None))
             self._pieces[node, in_full] = None if is_whole else pieces
         return self._pieces[node, in_full]
+
+    def regions(self) -> Regions:
+        """Return the regions of the expressions so far."""
+        from filippov._core import Regions
+
+        return Regions(self.builder, self.values.tolist(), self.laws.discrete())
+
+    def jumps(self, node: int) -> bool:
+        """Whether an expression jumps where a sign inside of it changes, or is not seen to be continuous."""
+        return self.regions().jumps_at(node) is not None
 
     def known_sign(self, node: int) -> float | None:
         """Return the sign of an expression of constants and parameters; None if it depends on the motion."""

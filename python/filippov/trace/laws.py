@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from filippov.trace.condition import Condition
 from filippov.trace.explain import NotTraceable
+from filippov.trace.pieces import by_parts, has_constant_part
 
 if TYPE_CHECKING:
     from filippov.trace.branching import Tracer
@@ -74,14 +74,16 @@ class Laws:
             return self._state(tracer, _Law("held", (node,), ()), "floor")
         if not reads and builder.is_affine(node) and not builder.depends_on_state(node):
             return self._state(tracer, _Law("clock", (node,), ()), "floor")
+        pieces = tracer.pieces(node, in_full=True)
+        if pieces is not None and (has_constant_part(tracer, pieces) or tracer.jumps(node)):
+            # A level follows what moves continuously: each part has its own.
+            return by_parts(tracer, pieces, lambda part, _: self.floor(tracer, part))
         level = self._state(tracer, _Law("level", (node,), ()), "nearest")
         half = builder.constant(0.5)
         distance = builder.binary("subtract", node, level)
         tracer.ask(node, "quantiser")
         # At a whole number the floor is that number itself.
-        is_above = tracer.compare(distance, strict=False)
-        up, down = half, builder.constant(-0.5)
-        step = is_above.choose(up, down) if isinstance(is_above, Condition) else up if is_above else down
+        step = tracer.choose(distance, half, builder.constant(-0.5))
         return builder.binary("add", builder.binary("subtract", level, half), step)
 
     def hysteresis(self, tracer: Tracer, node: int, low: int, high: int, initial: float) -> int:

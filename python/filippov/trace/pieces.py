@@ -7,7 +7,7 @@ or its sign, is put together from those of the pieces: no surface of its own is 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from filippov.trace.condition import BySide, Condition
@@ -15,9 +15,9 @@ from filippov.trace.condition import BySide, Condition
 if TYPE_CHECKING:
     from filippov.trace.branching import Tracer
 
-__all__ = ["Pieces", "condition_of", "equality_of", "sign_of"]
+__all__ = ["Pieces", "by_parts", "condition_of", "equality_of", "has_constant_part", "sign_of"]
 
-# (surface, pieces where its function is positive, where negative), or a kind with a sign or an expression.
+# (surface, pieces where its function is positive, where negative), or (expression, sign, "held", or None).
 Pieces = tuple[Any, ...]
 Answer = Condition | bool
 
@@ -25,37 +25,49 @@ Answer = Condition | bool
 def condition_of(tracer: Tracer, pieces: Pieces, *, strict: bool) -> Answer:
     """Return the condition that a quantity is positive (not negative unless strict)."""
 
-    def answer(kind: str, value: Any) -> Answer:
-        if kind == "known":
-            return bool(value > 0.0 or (value == 0.0 and not strict))
-        return tracer.compare(value, strict=strict)
+    def answer(node: int, sign: Any) -> Answer:
+        if isinstance(sign, float):
+            return sign > 0.0 or (sign == 0.0 and not strict)
+        return tracer.compare(node, strict=strict)
 
     return _by_sides(tracer, pieces, answer)
 
 
 def equality_of(tracer: Tracer, pieces: Pieces) -> Answer | None:
     """Return the condition that a quantity is zero; None if that is so at single points only."""
-    if _has_open(pieces):
+    if any(sign is None for _, sign in _parts(pieces)):
         return None
 
-    def answer(kind: str, value: Any) -> Answer:
-        if kind == "known":
-            return bool(value == 0.0)
-        return tracer.is_held_at_zero(value)
+    def answer(node: int, sign: Any) -> Answer:
+        return tracer.is_held_at_zero(node) if sign == "held" else sign == 0.0
 
     return _by_sides(tracer, pieces, answer)
 
 
 def sign_of(tracer: Tracer, pieces: Pieces) -> int:
     """Return the node of the sign of a quantity."""
-    if len(pieces) == 3:
-        surface, plus, minus = pieces
-        return tracer.builder.select(surface, 1.0, sign_of(tracer, plus), sign_of(tracer, minus))
-    kind, value = pieces
-    return tracer.builder.constant(value) if kind == "known" else tracer.sign(value)
+
+    def sign_of_part(node: int, sign: Any) -> int:
+        return tracer.builder.constant(sign) if isinstance(sign, float) else tracer.sign(node)
+
+    return by_parts(tracer, pieces, sign_of_part)
 
 
-def _by_sides(tracer: Tracer, pieces: Pieces, answer: Callable[[str, Any], Answer]) -> Answer:
+def by_parts(tracer: Tracer, pieces: Pieces, function: Callable[[int, Any], int]) -> int:
+    """Return the node of a function of a quantity that is given on its parts."""
+    if len(pieces) == 2:
+        return function(*pieces)
+    surface, plus, minus = pieces
+    sides = (by_parts(tracer, side, function) for side in (plus, minus))
+    return tracer.builder.select(surface, 1.0, *sides)
+
+
+def has_constant_part(tracer: Tracer, pieces: Pieces) -> bool:
+    """Whether a quantity stands still in some region."""
+    return not all(tracer.builder.depends_on_motion(node) for node, _ in _parts(pieces))
+
+
+def _by_sides(tracer: Tracer, pieces: Pieces, answer: Callable[[int, Any], Answer]) -> Answer:
     if len(pieces) == 2:
         return answer(*pieces)
     surface, *sides = pieces
@@ -63,7 +75,9 @@ def _by_sides(tracer: Tracer, pieces: Pieces, answer: Callable[[str, Any], Answe
     return plus if plus is minus else BySide(tracer, surface, plus, minus)
 
 
-def _has_open(pieces: Pieces) -> bool:
+def _parts(pieces: Pieces) -> Iterator[tuple[int, Any]]:
     if len(pieces) == 2:
-        return bool(pieces[0] == "open")
-    return any(_has_open(side) for side in pieces[1:])
+        yield pieces[0], pieces[1]
+    else:
+        for side in pieces[1:]:
+            yield from _parts(side)

@@ -107,7 +107,7 @@ def kink_of_event(tracer: Tracer, node: int, surfaces: Sequence[str], of_field: 
         check_questions(tracer, Roots([node]), "event")
     except TraceError:
         return "a comparison that is not decided by the sides of a surface"
-    regions = _regions_of(tracer)
+    regions = tracer.regions()
     edge = regions.edge(node)
     if edge is None:
         return ""
@@ -124,7 +124,7 @@ def is_exact_at_an_instant(tracer: Tracer, nodes: Sequence[int]) -> tuple[bool, 
     """
     if tracer.laws.names:
         return False, False
-    regions = _regions_of(tracer)
+    regions = tracer.regions()
     differs = False
     for question in tracer.questions:
         node, surface, sign, _ = regions.question(question.node)
@@ -137,12 +137,6 @@ def is_exact_at_an_instant(tracer: Tracer, nodes: Sequence[int]) -> tuple[bool, 
 
 def _shortened(text: str) -> str:
     return f"`{text}`" if len(text) <= MOST_PRINTED else f"`{text[:MOST_PRINTED]} ...`"
-
-
-def _regions_of(tracer: Tracer) -> Regions:
-    from filippov._core import Regions
-
-    return Regions(tracer.builder, tracer.values.tolist(), tracer.laws.discrete())
 
 
 def _nodes_of(tracer: Tracer, roots: Roots, regions: Regions) -> list[int]:
@@ -159,7 +153,7 @@ class _Check:
         self.role = role
         self.again = again
         self.doubts: list[str] = []
-        self.regions = _regions_of(tracer)
+        self.regions = tracer.regions()
         self.roots = _nodes_of(tracer, roots, self.regions)
 
     # -------------------------------------------------------------- the checks

@@ -14,7 +14,7 @@ mod pieces;
 
 pub use discrete::Discrete;
 pub use edge::Edge;
-pub use pieces::Pieces;
+pub use pieces::{PartSign, Pieces};
 
 use crate::graph::Graph;
 use crate::linear::LinearForm;

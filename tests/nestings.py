@@ -1,0 +1,169 @@
+"""Random nestings of functions that jump, bend or stand still, against the plain Python function.
+
+Every function is y' = f(t, x) along a line x(t); its constants are dyadic, so that rounding decides nothing. The
+rate of y is compared with f at random times: beside jumps and kinks, and where compared quantities are equal in a
+whole region. ``python -m nestings --n 100000`` runs as many and lists what differs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import os
+import random
+import warnings
+from collections import Counter
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import filippov as fl
+import numpy as np
+
+__all__ = ["Outcome", "check", "source_of"]
+
+AFFINE = ["x[0]", "x[1]", "(x[0] - 0.5)", "(x[1] + 0.25)", "(x[0] - x[1])", "t", "(2*x[0] - 1)"]
+NUMBERS = ["0.0", "0.5", "1.0", "-0.75", "2.0", "-1.0"]
+FACTORS = ["0.5", "2.0", "-1.0", "-0.25"]
+TIMES = 40
+END = 4.0
+STEP = 2.0**-20
+
+
+class Outcome(NamedTuple):
+    """What came of one function: "same", "refused", "stopped" or "different", with the reason."""
+
+    kind: str
+    reason: str = ""
+
+
+class _Maker:
+    """Makes random expressions; some of them are made of others that were made before."""
+
+    def __init__(self, seed: int) -> None:
+        self.random = random.Random(seed)
+        self.made: list[str] = list(AFFINE)
+
+    def scalar(self, depth: int) -> str:
+        pick = self.random
+        if depth == 0 or pick.random() < 0.1:
+            return pick.choice([pick.choice(self.made), pick.choice(AFFINE), pick.choice(NUMBERS)])
+        s, c = (lambda: self.scalar(depth - 1)), (lambda: self.condition(depth - 1))
+        low = pick.choice([-1.0, -0.5, 0.0])
+        kind = pick.randrange(14)
+        text = [
+            lambda: f"np.where({c()}, {s()}, {s()})",
+            lambda: f"np.maximum({s()}, {s()})",
+            lambda: f"np.minimum({s()}, {s()})",
+            lambda: f"np.clip({s()}, {low}, {low + pick.choice([0.5, 1.0, 2.0])})",
+            lambda: f"np.sign({s()})",
+            lambda: f"abs({s()})",
+            lambda: f"np.heaviside({s()}, {pick.choice(['0.0', '0.5', '1.0'])})",
+            lambda: f"({s()} + {s()})",
+            lambda: f"({s()} - {s()})",
+            lambda: f"{pick.choice(FACTORS)}*{s()}",
+            lambda: f"1.0*({c()})",
+            lambda: self.count(depth - 1),
+            lambda: f"({s()} if {c()} else {s()})",
+            lambda: self.floor(),
+        ][kind]()
+        self.made.append(text)
+        return text
+
+    def floor(self) -> str:
+        inner = self.random.choice(AFFINE)
+        limited = [inner, f"abs({inner})", f"np.clip({inner}, -1, 1)", f"np.maximum({inner}, 0)"]
+        return f"np.{self.random.choice(['floor', 'ceil', 'rint'])}({self.random.choice(limited)})"
+
+    def count(self, depth: int) -> str:
+        return "(" + " + ".join(f"1*({self.condition(depth)})" for _ in range(self.random.choice([2, 3]))) + ")"
+
+    def condition(self, depth: int) -> str:
+        pick = self.random
+        s, c = (lambda: self.scalar(depth)), (lambda: self.condition(depth - 1))
+        kind = pick.randrange(9) if depth > 0 else 0
+        relation = pick.choice([">", ">=", "<", "<="])
+        if kind == 5:
+            return f"np.logical_and({c()}, {c()})"
+        if kind == 6:
+            return f"np.logical_not({c()})"
+        if kind == 7:
+            return f"({self.count(depth - 1)} {pick.choice([relation, '==', '!='])} {pick.choice(['1', '2'])})"
+        if kind == 8:
+            limited = s()
+            return f"({limited} {pick.choice(['==', '!='])} np.clip({limited}, -0.5, 1.0))"
+        return f"({pick.choice(AFFINE)} {relation} {s()})" if kind < 2 else f"({s()} {relation} {s()})"
+
+
+def source_of(seed: int) -> str:
+    """Return the source of the function of this seed."""
+    maker = _Maker(seed)
+    return f"def f(t, x):\n    return {maker.scalar(maker.random.choice([2, 3]))}\n"
+
+
+def check(seed: int) -> Outcome:
+    """Compare the function of this seed with a run."""
+    names: dict[str, Any] = {"np": np}
+    exec(source_of(seed), names)
+    f = names["f"]
+    rng = np.random.default_rng(seed)
+    velocity = np.array([1.0, rng.choice([-1.0, -0.5, 0.5, 1.0])])
+    start = np.array([rng.choice([-2.0, -1.0, -0.375]), rng.choice([-1.0, 0.125, 1.0])])
+
+    def line(t: float) -> Any:
+        return start + velocity * t
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            sol = fl.solve_ivp(
+                lambda t, x: [velocity[0], velocity[1], 1.0 * f(t, x)],
+                (0.0, END),
+                [*start, 0.0],
+                rtol=1e-9,
+                atol=1e-9,
+                max_steps=5000,
+                max_wall_time=20.0,
+            )
+    except fl.TraceError as error:
+        return Outcome("refused", str(error).partition("\n")[0][:150])
+    except fl.ModelError as error:
+        return Outcome("refused", str(error)[:150])
+    if not sol.success:
+        return Outcome("stopped", sol.message[:200])
+    for t in rng.uniform(2.0 * STEP, END - 2.0 * STEP, TIMES):
+        before, here, after = (float(f(s, line(s))) for s in (t - STEP, t, t + STEP))
+        if abs(before - 2.0 * here + after) > 1e-9:
+            continue
+        rate = (sol.sol(t + STEP)[2] - sol.sol(t - STEP)[2]) / (2.0 * STEP)
+        if abs(rate - here) > 1e-6 * (1.0 + abs(here)):
+            warned = [warning.code for warning in sol.warnings]
+            return Outcome("different", f"at t = {t:.6g}: {rate:.6g}, the function is {here:.6g}; {warned}")
+    return Outcome("same")
+
+
+def outcomes(first: int, n: int) -> Iterator[tuple[int, Outcome]]:
+    """Yield the outcomes of many seeds, in several processes."""
+    seeds = range(first, first + n)
+    with multiprocessing.get_context("spawn").Pool(os.cpu_count()) as pool:
+        yield from zip(seeds, pool.imap(check, seeds, chunksize=50), strict=True)
+
+
+def main() -> None:
+    """Run many, and list what is not the same."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--n", type=int, default=1000)
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+    kinds: Counter[str] = Counter()
+    for seed, outcome in outcomes(options.seed, options.n):
+        kinds[outcome.kind] += 1
+        if outcome.kind in ("different", "stopped"):
+            print(f"{outcome.kind} {seed}: {outcome.reason}", flush=True)
+        elif outcome.kind == "refused":
+            kinds[f"refused: {outcome.reason[:60]}"] += 1
+    for kind, count in kinds.most_common(25):
+        print(f"{count:8d} {kind}")
+
+
+if __name__ == "__main__":
+    main()
