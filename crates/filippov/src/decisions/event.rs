@@ -49,13 +49,30 @@ pub(crate) fn vanishing_surfaces(at: &Point, notes: &mut Notes) -> Result<Reache
         return Ok(reached);
     }
     let h = at.surface_values(notes, at.arrival.signs)?;
+    add_vanishing_surfaces(at, &mut reached.surfaces, &h)?;
+    // The functions of those that do not matter may contain signs of others that do not.
+    let mut is_new = set_sides_of_inactive(at, &mut reached.before, &h);
+    for _ in 0..h.len() {
+        if !is_new || !at.system.has_nested_signs() {
+            break;
+        }
+        let h = at.surface_values(notes, &reached.before.signs())?;
+        is_new = set_sides_of_inactive(at, &mut reached.before, &h);
+    }
+    Ok(reached)
+}
+
+/// Gives surfaces that do not matter the sides of these values; whether one of them is another than before.
+fn set_sides_of_inactive(at: &Point, mode: &mut Mode, h: &[f64]) -> bool {
+    let mut is_new = false;
     for (j, h) in h.iter().enumerate() {
-        if !at.arrival.active[j] && *h != 0.0 {
-            reached.before.set(j, if *h < 0.0 { -1 } else { 1 });
+        let side = if *h < 0.0 { -1 } else { 1 };
+        if !at.arrival.active[j] && *h != 0.0 && mode.entries()[j] != side {
+            mode.set(j, side);
+            is_new = true;
         }
     }
-    add_vanishing_surfaces(at, &mut reached.surfaces, &h)?;
-    Ok(reached)
+    is_new
 }
 
 /// Are all surfaces slid on or located, so that the values of none are needed?
