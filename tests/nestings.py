@@ -1,8 +1,8 @@
 """Random nestings of functions that jump, bend or stand still, against the plain Python function.
 
-Every function is y' = f(t, x) along a line x(t); its constants are dyadic, so that rounding decides nothing. The
-rate of y is compared with f at random times: beside jumps and kinks, and where compared quantities are equal in a
-whole region. ``python -m nestings --n 100000`` runs as many and lists what differs.
+Every function is y' = f(t, x) along a line x(t); its constants are dyadic, so that rounding decides nothing.
+The rate of y is compared with f at random times: beside jumps and kinks, and where compared quantities are
+equal in a whole region. ``python -m nestings --n 100000`` runs as many and lists what differs.
 """
 
 from __future__ import annotations
@@ -75,7 +75,9 @@ class _Maker:
         return f"np.{self.random.choice(['floor', 'ceil', 'rint'])}({self.random.choice(limited)})"
 
     def count(self, depth: int) -> str:
-        return "(" + " + ".join(f"1*({self.condition(depth)})" for _ in range(self.random.choice([2, 3]))) + ")"
+        return (
+            "(" + " + ".join(f"1*({self.condition(depth)})" for _ in range(self.random.choice([2, 3]))) + ")"
+        )
 
     def condition(self, depth: int) -> str:
         pick = self.random
@@ -87,7 +89,9 @@ class _Maker:
         if kind == 6:
             return f"np.logical_not({c()})"
         if kind == 7:
-            return f"({self.count(depth - 1)} {pick.choice([relation, '==', '!='])} {pick.choice(['1', '2'])})"
+            return (
+                f"({self.count(depth - 1)} {pick.choice([relation, '==', '!='])} {pick.choice(['1', '2'])})"
+            )
         if kind == 8:
             limited = s()
             return f"({limited} {pick.choice(['==', '!='])} np.clip({limited}, -0.5, 1.0))"

@@ -185,6 +185,12 @@ impl Graph {
         }
     }
 
+    /// Whether an expression changes only where signs or discrete states inside of it do.
+    pub fn is_stepwise(&self, node: NodeId) -> bool {
+        let moves = |id: &NodeId| matches!(self.node(*id), Node::Time | Node::State(_));
+        !self.all_below(&[node]).iter().any(moves)
+    }
+
     /// All nodes that the roots are made of, in increasing order.
     pub(crate) fn all_below(&self, roots: &[NodeId]) -> Vec<NodeId> {
         self.reachable_by(roots.iter().copied(), |id| {

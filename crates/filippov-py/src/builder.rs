@@ -144,6 +144,12 @@ impl Builder {
         Ok(graph.has_signs(Self::node(&graph, a)?))
     }
 
+    /// Whether an expression changes only where signs or discrete states inside of it do.
+    fn is_stepwise(&self, a: u32) -> PyResult<bool> {
+        let graph = self.graph();
+        Ok(graph.is_stepwise(Self::node(&graph, a)?))
+    }
+
     fn is_affine(&self, a: u32) -> PyResult<bool> {
         let graph = self.graph();
         Ok(graph.is_affine(Self::node(&graph, a)?))

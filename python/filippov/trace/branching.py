@@ -127,6 +127,7 @@ class Tracer:
         self.sought: Question | None = None
         self.found: UserLine | None = None
         self.unresolved: dict[int, None] = {}
+        self.has_pieces = False
         self._pieces: dict[tuple[int, bool], Pieces | None] = {}
         self._path: list[tuple[int, float]] = []
         self._flipped: list[bool] = []
@@ -218,6 +219,7 @@ class Tracer:
             return self.builder.binary("multiply", self.builder.constant(0.5), both)
         pieces = self.pieces(node)
         if pieces is not None:
+            self.has_pieces = True
             return sign_of(self, pieces)
         self.ask(node, "sign")
         return self.builder.sign(node)
@@ -254,7 +256,10 @@ class Tracer:
                 node = self.laws.beside(self, node, -1.0 if strict else 1.0)
             pieces = self.pieces(node)
             if pieces is not None:
+                self.has_pieces = True
                 return condition_of(self, pieces, strict=strict)
+            if self.builder.has_signs(node) and self.builder.is_stepwise(node):
+                node = self.laws.beside(self, node, -1.0 if strict else 1.0)
             self.ask(node, "comparison", is_strict=strict)
             surface, orientation = self.builder.switch(node)
             if surface >= 0:
@@ -270,6 +275,7 @@ class Tracer:
         if self.laws.is_held(self, node):
             return self.is_held_at_zero(node)
         pieces = self.pieces(node, in_full=True)
+        self.has_pieces = True
         return None if pieces is None else equality_of(self, pieces)
 
     def is_held_at_zero(self, node: int) -> Condition | bool:
@@ -289,9 +295,10 @@ class Tracer:
             )
             if for_these_values:
                 self.guards.setdefault(-1, Guard("regions of the comparisons", 0.0))
-            if pieces is None:
+            if pieces is None and not self.builder.is_stepwise(node):
                 self.unresolved[node] = None
-            is_whole = pieces is None or (not in_full and pieces == (node, None))
+            # An expression of one sign, zeros at single points aside, is left to its surface.
+            is_whole = pieces is None or (not in_full and len(pieces) == 2 and pieces[1] != 0.0)
             self._pieces[node, in_full] = None if is_whole else pieces
         return self._pieces[node, in_full]
 

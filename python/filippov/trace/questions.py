@@ -122,7 +122,7 @@ def is_exact_at_an_instant(tracer: Tracer, nodes: Sequence[int]) -> tuple[bool, 
     ``h > 0``, ``h <= 0`` and the sign of h, and it makes no difference where the values do not jump. An
     expression with discrete states has no value at a point.
     """
-    if tracer.laws.names:
+    if tracer.laws.names or tracer.has_pieces:
         return False, False
     regions = tracer.regions()
     differs = False

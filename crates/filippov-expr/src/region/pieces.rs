@@ -5,6 +5,9 @@ use super::{is_zero, Kind, Regions};
 use crate::linear::LinearForm;
 use crate::node::NodeId;
 
+/// Combinations of signs that are looked at where an expression is nowhere identically zero.
+const MOST_OF_NO_ZERO: usize = 64;
+
 /// An expression, by the sides of the surfaces inside of it.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Pieces {
@@ -26,11 +29,43 @@ pub enum PartSign {
 }
 
 impl Pieces {
+    /// The pieces on the sides of a surface. A part that they have in common on one side of another one stands alone there:
+    /// the surface ends at that one.
+    fn on_sides(surface: u32, plus: Pieces, minus: Pieces, by_value: bool) -> Pieces {
+        let are_same = |a: &Pieces, b: &Pieces| {
+            a == b || !by_value && a.known_sign().is_some() && a.known_sign() == b.known_sign()
+        };
+        match (&plus, &minus) {
+            (Pieces::Sides(k, above), Pieces::Sides(l, below)) if k == l => {
+                let [of_plus, of_minus] = [0, 1].map(|side| {
+                    let sides = [above[side].clone(), below[side].clone()];
+                    match are_same(&sides[0], &sides[1]) {
+                        true => Ok(sides[0].clone()),
+                        false => Err(Pieces::Sides(surface, Box::new(sides))),
+                    }
+                });
+                if of_plus.is_ok() || of_minus.is_ok() {
+                    let [a, b] = [of_plus, of_minus].map(|side| side.unwrap_or_else(|sides| sides));
+                    return Pieces::Sides(*k, Box::new([a, b]));
+                }
+            }
+            _ => {}
+        }
+        Pieces::Sides(surface, Box::new([plus, minus]))
+    }
+
     fn has_zero(&self) -> bool {
         match self {
             Pieces::Part(_, PartSign::Known(sign)) => *sign == 0.0,
             Pieces::Part(_, sign) => *sign == PartSign::Held,
             Pieces::Sides(_, sides) => sides.iter().any(Pieces::has_zero),
+        }
+    }
+
+    fn has_open(&self) -> bool {
+        match self {
+            Pieces::Part(_, sign) => *sign == PartSign::Open,
+            Pieces::Sides(_, sides) => sides.iter().any(Pieces::has_open),
         }
     }
 
@@ -43,8 +78,8 @@ impl Pieces {
 }
 
 impl Regions {
-    /// The pieces of an expression. Where it is nowhere identically zero it is one open piece, unless `in_full`. `None` if that
-    /// was not found out by looking at `most` combinations of signs.
+    /// The pieces of an expression. If it is nowhere identically zero, and its sign is open in some of them, it is one open piece,
+    /// unless `in_full`. `None` if they were not found out by looking at `most` combinations of signs.
     ///
     /// # Example
     /// ```
@@ -64,14 +99,20 @@ impl Regions {
         if !in_full {
             let split = self.split(node, most, false);
             let has_zero = split.regions.iter().any(|region| region.kind == Kind::Zero);
-            if !split.is_complete || !has_zero {
-                return split
-                    .is_complete
-                    .then_some(Pieces::Part(node, PartSign::Open));
+            if !split.is_complete {
+                return None;
+            }
+            if !has_zero {
+                let pieces = self.all_pieces(node, MOST_OF_NO_ZERO.min(most), false);
+                return Some(pieces.unwrap_or(Pieces::Part(node, PartSign::Open)));
             }
         }
-        let (signs, mut budget) = (vec![None; self.graph.n_surfaces()], most);
-        self.pieces_at(node, &signs, in_full, &mut budget)
+        self.all_pieces(node, most, in_full)
+    }
+
+    fn all_pieces(&mut self, node: NodeId, mut most: usize, in_full: bool) -> Option<Pieces> {
+        let signs = vec![None; self.graph.n_surfaces()];
+        self.pieces_at(node, &signs, in_full, &mut most)
     }
 
     fn pieces_at(
@@ -109,15 +150,16 @@ impl Regions {
         let Some(plus) = sides.pop() else {
             return Some(minus);
         };
-        if in_full || plus.has_zero() || minus.has_zero() {
-            return Some(Pieces::Sides(k as u32, Box::new([plus, minus])));
-        }
         let same = plus
             .known_sign()
             .filter(|sign| minus.known_sign() == Some(*sign));
-        Some(Pieces::Part(
-            value,
-            same.map_or(PartSign::Open, PartSign::Known),
-        ))
+        if let (Some(sign), false) = (same, in_full) {
+            return Some(Pieces::Part(value, PartSign::Known(sign)));
+        }
+        let is_open = plus.has_open() || minus.has_open();
+        if in_full || !is_open || plus.has_zero() || minus.has_zero() {
+            return Some(Pieces::on_sides(k as u32, plus, minus, in_full));
+        }
+        Some(Pieces::Part(value, PartSign::Open))
     }
 }
