@@ -1,6 +1,8 @@
 //! All fields that meet at an intersection, with their normal components.
 
 use super::weights::product_weights;
+use smallvec::SmallVec;
+
 use super::{parallel, sense_of, Tie};
 use crate::cube::{Matrix, NormalFields, SignGroup};
 use crate::error::FieldError;
@@ -171,7 +173,11 @@ impl MeetingFields {
                 continue;
             }
             let pair = [self.set[leader], self.set[follower]];
-            if let Some(sense) = sense_of(system, place, pair)? {
+            // Functions contain signs of surfaces before them only.
+            let own = ties.iter().filter(|tie| tie.leader == leader);
+            let tied: SmallVec<[_; 2]> =
+                own.map(|tie| (self.set[tie.follower], tie.sense)).collect();
+            if let Some(sense) = sense_of(system, place, pair, &tied)? {
                 ties.push(Tie {
                     leader,
                     follower,

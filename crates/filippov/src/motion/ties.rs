@@ -30,7 +30,8 @@ impl Tie {
 }
 
 /// Have the functions of two surfaces in one place the same sign (+1), or opposite ones (-1)? `None` if they are not in one
-/// place, or if that differs between the sides of the first one, whose sign the second may contain.
+/// place, or if that differs between the sides of the first one, whose sign the second may contain. Surfaces that are `tied` to
+/// the first one, with their senses, change sides with it.
 ///
 /// # Errors
 /// If a function of the user raises.
@@ -38,10 +39,14 @@ pub fn sense_of(
     system: &dyn PiecewiseSystem,
     place: &Place<'_>,
     [j, k]: [usize; 2],
+    tied: &[(usize, i8)],
 ) -> Result<Option<i8>, FieldError> {
     let (mut signs, mut senses) = (place.signs.to_vec(), [0; 2]);
     for (sense, side) in senses.iter_mut().zip([-1.0, 1.0]) {
         signs[j] = side;
+        for &(other, sense) in tied {
+            signs[other] = f64::from(sense) * side;
+        }
         let on_side = place.with_signs(&signs);
         let [one, other] = [j, k].map(|j| normal(system, &on_side, j));
         let (one, other) = (one?, other?);
