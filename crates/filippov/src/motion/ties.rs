@@ -3,7 +3,7 @@
 use super::Projector;
 use crate::error::FieldError;
 use crate::system::{dot, PiecewiseSystem, Place};
-use crate::tolerances::{BESIDE, TANGENT};
+use crate::tolerances::{BESIDE, SURFACE_NOISE, TANGENT};
 
 /// Two surfaces in one place: of the four regions around them two exist.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,11 +41,16 @@ pub fn sense_of(
     [j, k]: [usize; 2],
     tied: &[(usize, i8)],
 ) -> Result<Option<i8>, FieldError> {
-    let (mut signs, mut senses) = (place.signs.to_vec(), [0; 2]);
+    let mut senses = [0; 2];
     for (sense, side) in senses.iter_mut().zip([-1.0, 1.0]) {
+        let mut signs = place.signs.to_vec();
         signs[j] = side;
         for &(other, sense) in tied {
             signs[other] = f64::from(sense) * side;
+        }
+        if system.has_nested_signs() {
+            let fixed: Vec<usize> = tied.iter().map(|tie| tie.0).chain([j, k]).collect();
+            let_others_jump(system, place, &mut signs, &fixed)?;
         }
         let on_side = place.with_signs(&signs);
         let [one, other] = [j, k].map(|j| normal(system, &on_side, j));
@@ -59,6 +64,32 @@ pub fn sense_of(
     }
     let [minus, plus] = senses;
     Ok((minus == plus && plus != 0).then_some(plus))
+}
+
+/// Gives all surfaces but the `fixed` ones the sides that they are on with these signs of the fixed ones.
+fn let_others_jump(
+    system: &dyn PiecewiseSystem,
+    place: &Place<'_>,
+    signs: &mut [f64],
+    fixed: &[usize],
+) -> Result<(), FieldError> {
+    let mut h = vec![0.0; signs.len()];
+    let mut is_new = true;
+    // A jump may make others jump.
+    for _ in 0..h.len() {
+        if !std::mem::take(&mut is_new) {
+            break;
+        }
+        system.surfaces(&place.with_signs(signs), &mut h)?;
+        for i in (0..h.len()).filter(|i| !fixed.contains(i)) {
+            let noise = SURFACE_NOISE * system.surface_size(i, &place.with_signs(signs))?;
+            if h[i] * signs[i] < 0.0 && h[i].abs() > noise {
+                signs[i] = -signs[i];
+                is_new = true;
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Those of `others` whose functions vanish where that of surface j does, around the place.
