@@ -161,10 +161,6 @@ def by_loop(t: Any, x: Any) -> Any:
     return x[1], y
 
 
-def by_condition_order(t: Any, x: Any) -> Any:
-    return x[1], (x[0] > 0) > (x[1] > 0)
-
-
 @pytest.mark.parametrize(
     ("fun", "line", "remedy"),
     [
@@ -200,7 +196,6 @@ def by_condition_order(t: Any, x: Any) -> Any:
         (by_mixed_array, "np.sin(np.array([x[1], 1.0]))", "np.stack([...])"),
         (by_large_solve, "np.linalg.solve(", "element by element"),
         (by_loop, "while y > 0:", "does not depend on t and x"),
-        (by_condition_order, "(x[0] > 0) > (x[1] > 0)", "combine the conditions with `&`"),
     ],
 )
 def test_untraceable_line_is_shown_with_a_remedy(fun: Callable[..., Any], line: str, remedy: str) -> None:

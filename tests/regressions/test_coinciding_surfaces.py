@@ -55,10 +55,10 @@ def test_sliding_on_a_surface_in_the_place_of_a_kink(name: str, method: str) -> 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_switches_accumulate_where_a_kink_is_in_the_place_of_a_surface(method: str) -> None:
-    """An inward spiral around x = 0, y = -0.4; x is in the place of x - 0.6 abs(x)."""
+    """An inward spiral around x = 0, y = -0.4; x is in the place of x - 0.6 abs(x) + x^3."""
 
     def fun(t: float, x: Any) -> list[Any]:
-        a, b = np.sign(x[0] - 0.6 * np.abs(x[0])), np.sign(x[1] + 0.4)
+        a, b = np.sign(x[0] - 0.6 * np.abs(x[0]) + x[0] ** 3), np.sign(x[1] + 0.4)
         return [-0.5 * a - b + 0.3 * x[0] ** 2, a - 0.5 * b + 0.2 * x[0]]
 
     sol = fl.solve_ivp(fun, (0.0, 5.0), [0.5, 0.3], method=method, rtol=1e-8, atol=1e-8)

@@ -39,6 +39,23 @@ def test_a_function_that_vanishes_in_a_region_has_the_sign_0_there(name: str, sp
     assert sol.y[1, -1] == pytest.approx(0.01 * np.sign(h(parts)).sum(), abs=1e-6)
 
 
+@pytest.mark.parametrize("speed", [1.0, -1.0])
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_a_function_that_vanishes_in_a_region_is_decided_by_python_in_a_black_box(
+    name: str, speed: float
+) -> None:
+    h = FUNCTIONS[name]
+
+    def fun(t: float, x: Any) -> Any:
+        return [speed, float(np.sign(h(float(x[0]))))]
+
+    breaks = [lambda t, x, at=at: x[0] - at for at in (-0.5, 0.2, 0.5)]
+    sol = fl.solve_ivp(fun, (0.0, 2.0), [0.5 - speed, 0.0], surfaces=breaks)
+    assert sol.success, sol.message
+    parts = 0.5 + np.arange(-0.995, 1.0, 0.01)
+    assert sol.y[1, -1] == pytest.approx(0.01 * np.sign(h(parts)).sum(), abs=1e-6)
+
+
 def test_a_dead_zone_around_the_start() -> None:
     def fun(t: float, x: Any) -> Any:
         return [np.cos(t), np.sign(np.where(abs(x[0]) > 0.5, x[0], 0.0))]
