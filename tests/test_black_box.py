@@ -169,3 +169,48 @@ def test_declared_surface_where_nothing_jumps() -> None:
     assert sol.success
     assert set(sol.switches.kind) <= {"crossing"}
     assert sol.y[0, -1] == pytest.approx(math.exp(-3), rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    "surface",
+    [
+        lambda t, x: t - 1.0,
+        lambda t, x: np.sin(np.pi * t) * (2.0 - t),
+        lambda t, x: t * t - 1.0,
+    ],
+)
+@pytest.mark.parametrize("t0", [0.1, 1.0])
+def test_surface_of_time_alone(surface: Any, t0: float) -> None:
+    """No state leads to one side of it."""
+    sol = fl.solve_ivp(
+        lambda t, x: [-float(x[0]) + (1.0 if t < 1 else -1.0)],
+        (t0, 1.75),
+        [0.5],
+        surfaces=surface,
+        rtol=1e-10,
+        atol=1e-10,
+    )
+    assert sol.success, sol.message
+    at_switch = 1.0 - 0.5 * math.exp(t0 - 1.0)
+    assert sol.y[0, -1] == pytest.approx(-1.0 + (at_switch + 1.0) * math.exp(-0.75), abs=1e-9)
+
+
+@pytest.mark.parametrize("start", [0.05, -0.4, 0.3])
+def test_sliding_onto_a_surface_with_a_parallel_gradient(start: float) -> None:
+    """Between both, points differ in time only."""
+
+    def fun(t: float, x: Any) -> list[Any]:
+        return [-2.0 * np.sign(x[0] - 0.5 * np.sin(t)) + 0.5 * np.sign(x[0] - 0.2), 1.0]
+
+    surfaces = [lambda t, x: x[0] - 0.5 * np.sin(t), lambda t, x: x[0] - 0.2]
+    box = fl.solve_ivp(
+        lambda t, x: [float(v) for v in fun(t, x.tolist())],
+        (0, 3),
+        [start, 0.0],
+        surfaces=surfaces,
+        rtol=1e-9,
+    )
+    traced = fl.solve_ivp(fun, (0, 3), [start, 0.0], rtol=1e-9)
+    assert box.success, box.message
+    np.testing.assert_allclose(box.switches.t, traced.switches.t, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(box.y[:, -1], traced.y[:, -1], rtol=0, atol=1e-6)

@@ -1,4 +1,4 @@
-"""Random nestings of where, maximum, clip, floor, sign, comparisons and counts: the run has Python's values."""
+"""Random nestings of where, maximum, clip, floor, sign and comparisons: a run has the values of Python."""
 
 from __future__ import annotations
 

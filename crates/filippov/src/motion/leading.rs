@@ -53,8 +53,8 @@ pub fn first_nonzero(
         return Ok(leading);
     }
     for offset in side_offsets(place.x) {
-        let inside = move_inside(system, &on_side, offset, SIDE_REACH * offset)?;
-        if let Some(leading) = scan(system, j, side, 0, &on_side.moved(place.t, &inside))? {
+        let (t, inside) = move_inside(system, &on_side, offset, SIDE_REACH * offset)?;
+        if let Some(leading) = scan(system, j, side, 0, &on_side.moved(t, &inside))? {
             return Ok(leading);
         }
     }
@@ -137,8 +137,8 @@ pub fn normal_component(
         if lie.value.is_finite() {
             break;
         }
-        let inside = move_inside(system, &on_side, offset, SIDE_REACH * offset)?;
-        lie = system.lie_derivative(i, j, &[side], &on_side.moved(place.t, &inside))?;
+        let (t, inside) = move_inside(system, &on_side, offset, SIDE_REACH * offset)?;
+        lie = system.lie_derivative(i, j, &[side], &on_side.moved(t, &inside))?;
     }
     Ok(lie)
 }

@@ -46,7 +46,7 @@ impl<'a> RegionField<'a> {
     fn eval_inside(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), FieldError> {
         for offset in side_offsets(x) {
             let place = self.setting.at(t, x);
-            let inside = move_inside(self.system, &place, offset, f64::INFINITY)?;
+            let (t, inside) = move_inside(self.system, &place, offset, f64::INFINITY)?;
             self.system.field(&place.moved(t, &inside), dx)?;
             self.n_evaluations += 1;
             if dx.iter().all(|v| v.is_finite()) {

@@ -7,7 +7,8 @@ use crate::error::FieldError;
 use crate::tolerances::{EPS, OFFSET_ROUNDING, SIDE_OFFSET, SIDE_REACH, STEPS_INSIDE};
 
 /// Moves a point that lies on surfaces up to rounding into the region of `signs`: off every surface
-/// that is nearer than the distance `offset`, or up to `reach` on the wrong side.
+/// that is nearer than the distance `offset`, or up to `reach` on the wrong side. In time, too, where no state leads
+/// there: off a surface of time alone, or between surfaces with the same gradient.
 ///
 /// # Errors
 /// If a function of the user raises.
@@ -16,17 +17,49 @@ pub fn move_inside<S: PiecewiseSystem + ?Sized>(
     place: &Place<'_>,
     offset: f64,
     reach: f64,
-) -> Result<Vec<f64>, FieldError> {
+) -> Result<(f64, Vec<f64>), FieldError> {
+    let (is_inside, moved) = moved_off(system, place, [offset, reach], 0.0)?;
+    if is_inside {
+        return Ok((place.t, moved));
+    }
+    // Time in units in which its rounding is that of the state.
+    let unit = place.t.abs().max(1.0) / size_of(place.x);
+    let (is_inside, mut in_time) = moved_off(system, place, [offset, reach], unit)?;
+    let t = in_time.pop().unwrap_or(place.t);
+    Ok(match is_inside {
+        true => (t, in_time),
+        false => (place.t, moved),
+    })
+}
+
+/// The state moved off its surfaces, with the time behind it if that moves, in this `unit`; and whether it is in its region.
+fn moved_off<S: PiecewiseSystem + ?Sized>(
+    system: &S,
+    place: &Place<'_>,
+    [offset, reach]: [f64; 2],
+    unit: f64,
+) -> Result<(bool, Vec<f64>), FieldError> {
     let &Place { t, x, signs, .. } = place;
+    let n = x.len();
     let mut moved = x.to_vec();
+    let mut gradient = vec![0.0; n];
+    if unit > 0.0 {
+        moved.push(t);
+        gradient.push(0.0);
+    }
     let mut h = vec![0.0; system.n_surfaces()];
-    let mut gradient = vec![0.0; x.len()];
     let mut is_moved: SmallVec<[bool; 8]> = SmallVec::from_elem(false, h.len());
     for _ in 0..STEPS_INSIDE {
         let mut is_there = true;
-        system.surfaces(&place.moved(t, &moved), &mut h)?;
+        let mut can_move = true;
+        let at = |moved: &[f64]| moved.get(n).copied().unwrap_or(t);
+        system.surfaces(&place.moved(at(&moved), &moved[..n]), &mut h)?;
         for (j, h) in h.iter().enumerate() {
-            system.gradient(j, &place.moved(t, &moved), &mut gradient)?;
+            let here = place.moved(at(&moved), &moved[..n]);
+            let rate = unit * system.gradient(j, &here, &mut gradient[..n])?;
+            if let Some(entry) = gradient.get_mut(n) {
+                *entry = rate;
+            }
             let norm2: f64 = gradient.iter().map(|g| g * g).sum();
             let wanted = offset * norm2.sqrt();
             let missing = wanted - signs[j] * h;
@@ -38,25 +71,29 @@ pub fn move_inside<S: PiecewiseSystem + ?Sized>(
             };
             if norm2 > 0.0 && is_off {
                 let shift = signs[j] * missing / norm2;
-                moved
-                    .iter_mut()
-                    .zip(&gradient)
-                    .for_each(|(x, g)| *x += shift * g);
+                for (i, (x, g)) in moved.iter_mut().zip(&gradient).enumerate() {
+                    *x += shift * g * if i == n { unit } else { 1.0 };
+                }
                 is_moved[j] = true;
                 is_there = false;
             }
+            can_move &= norm2 > 0.0 || signs[j] * h > 0.0;
         }
         if is_there {
-            break;
+            return Ok((can_move, moved));
         }
     }
-    Ok(moved)
+    Ok((false, moved))
 }
 
 /// The offsets to try, from a few units of rounding of the state upwards.
 pub fn side_offsets(x: &[f64]) -> impl Iterator<Item = f64> {
-    let size = x.iter().fold(1.0_f64, |m, v| m.max(v.abs()));
+    let size = size_of(x);
     (0..6).map(move |k| SIDE_OFFSET * EPS * size * 16_f64.powi(k))
+}
+
+fn size_of(x: &[f64]) -> f64 {
+    x.iter().fold(1.0_f64, |m, v| m.max(v.abs()))
 }
 
 /// Evaluates the field of one side at a point that lies on a surface up to rounding.
@@ -90,8 +127,8 @@ pub fn eval_off_surface<S: PiecewiseSystem + ?Sized>(
 ) -> Result<u64, FieldError> {
     let mut evaluations = 0;
     for offset in side_offsets(place.x) {
-        let inside = move_inside(system, place, offset, SIDE_REACH * offset)?;
-        system.field(&place.moved(place.t, &inside), dx)?;
+        let (t, inside) = move_inside(system, place, offset, SIDE_REACH * offset)?;
+        system.field(&place.moved(t, &inside), dx)?;
         evaluations += 1;
         if dx.iter().all(|v| v.is_finite()) {
             break;
