@@ -52,7 +52,7 @@ def test_what_is_proposed_for_such_events_finds_all_zeros() -> None:
     [
         lambda t, x: x[0] - 0.3,
         lambda t, x: np.sqrt(x[0] + 3) - 1.8,
-        lambda t, x: np.sqrt((x[0] - 0.3) ** 2) - 0.1,
+        lambda t, x: np.sqrt((x[0] - 0.3) ** 2 + 0.01) - 0.15,
         lambda t, x: np.log(x[0] + 3) - 1,
         lambda t, x: float(x[0]) - 0.3,  # cannot be traced: what it contains is not known
     ],

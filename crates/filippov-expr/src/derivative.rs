@@ -269,6 +269,7 @@ impl Graph {
         use UnaryOp::*;
         match op {
             Neg => self.neg(da),
+            NotNegative => da,
             Sqrt => {
                 let twice = self.scaled_by(2.0, value);
                 self.div(da, twice)

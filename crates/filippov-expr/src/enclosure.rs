@@ -127,6 +127,7 @@ impl Enclosure {
         let root = |square: Interval| one / square.unary(UnaryOp::Sqrt);
         match op {
             UnaryOp::Neg => Interval::point(-1.0),
+            UnaryOp::NotNegative => Interval { lo: 0.0, hi: 1.0 },
             UnaryOp::Sqrt => Interval::point(0.5) / value,
             UnaryOp::Cbrt => Interval::point(1.0 / 3.0) / value.square(),
             UnaryOp::Exp => value,

@@ -144,7 +144,7 @@ impl Interval {
     pub fn unary(self, op: UnaryOp) -> Self {
         use UnaryOp::{
             Acos, Acosh, Asin, Asinh, Atan, Atanh, Cbrt, Cos, Cosh, Exp, Exp2, Expm1, Log, Log10,
-            Log1p, Log2, Sin, Sinh, Sqrt, Tan, Tanh,
+            Log1p, Log2, NotNegative, Sin, Sinh, Sqrt, Tan, Tanh,
         };
         if !self.is_bounded() {
             // The operand may be NaN: a bound of its sine would hide that.
@@ -159,6 +159,10 @@ impl Interval {
                 let (low, high) = self.magnitudes();
                 Interval::spanning([low.cosh(), high.cosh()], LIBRARY)
             }
+            NotNegative => Interval {
+                lo: op.apply(self.lo),
+                hi: op.apply(self.hi),
+            },
             // A NaN of an operand outside of the domain is noticed: nothing is known.
             Sqrt | Cbrt | Exp | Expm1 | Exp2 | Log | Log1p | Log2 | Log10 | Asin | Acos | Atan
             | Sinh | Tanh | Asinh | Acosh | Atanh => {

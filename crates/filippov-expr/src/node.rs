@@ -132,6 +132,8 @@ impl Facts {
                 facts.affine = !a.varies || (op == UnaryOp::Neg && a.affine);
                 facts.nonnegative = match op {
                     UnaryOp::Exp | UnaryOp::Exp2 | UnaryOp::Cosh => true,
+                    // As its argument is in the regions of its signs.
+                    UnaryOp::NotNegative => a.varies,
                     UnaryOp::Sqrt | UnaryOp::Acos | UnaryOp::Acosh => a.varies || a.nonnegative,
                     UnaryOp::Cbrt
                     | UnaryOp::Expm1

@@ -51,6 +51,8 @@ pub enum UnaryOp {
     Acosh,
     /// Inverse hyperbolic tangent.
     Atanh,
+    /// The operand, or 0 where it is negative: beyond the regions of its signs, of an expression that is not negative in them.
+    NotNegative,
 }
 
 /// Function of two operands.
@@ -75,11 +77,32 @@ pub enum BinaryOp {
 
 impl UnaryOp {
     /// Every operation, in the order of their numbers in a serialised graph.
-    pub const ALL: [UnaryOp; 22] = {
+    pub const ALL: [UnaryOp; 23] = {
         use UnaryOp::*;
         [
-            Neg, Sqrt, Cbrt, Exp, Expm1, Exp2, Log, Log1p, Log2, Log10, Sin, Cos, Tan, Asin, Acos,
-            Atan, Sinh, Cosh, Tanh, Asinh, Acosh, Atanh,
+            Neg,
+            Sqrt,
+            Cbrt,
+            Exp,
+            Expm1,
+            Exp2,
+            Log,
+            Log1p,
+            Log2,
+            Log10,
+            Sin,
+            Cos,
+            Tan,
+            Asin,
+            Acos,
+            Atan,
+            Sinh,
+            Cosh,
+            Tanh,
+            Asinh,
+            Acosh,
+            Atanh,
+            NotNegative,
         ]
     };
 
@@ -108,6 +131,8 @@ impl UnaryOp {
             UnaryOp::Asinh => a.asinh(),
             UnaryOp::Acosh => acosh(a),
             UnaryOp::Atanh => a.atanh(),
+            UnaryOp::NotNegative if a < 0.0 => 0.0,
+            UnaryOp::NotNegative => a,
         }
     }
 
@@ -136,6 +161,7 @@ impl UnaryOp {
             UnaryOp::Asinh => "arcsinh",
             UnaryOp::Acosh => "arccosh",
             UnaryOp::Atanh => "arctanh",
+            UnaryOp::NotNegative => "not negative",
         }
     }
 

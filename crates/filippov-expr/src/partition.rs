@@ -59,6 +59,23 @@ impl Graph {
         known[&id].affine
     }
 
+    /// An expression with other expressions in the place of some that it contains.
+    pub fn substituted(&mut self, root: NodeId, images: &[(NodeId, NodeId)]) -> NodeId {
+        let mut image: FxHashMap<NodeId, NodeId> = images.iter().copied().collect();
+        for id in self.all_below(&[root]) {
+            let is_changed =
+                |operand: &NodeId| image.get(operand).is_some_and(|new| new != operand);
+            let operands: Vec<NodeId> = self.node(id).operands().collect();
+            if image.contains_key(&id) || !operands.iter().any(is_changed) {
+                continue;
+            }
+            let at = |operand: NodeId| image.get(&operand).copied().unwrap_or(operand);
+            let new = self.with_operands(id, at);
+            image.insert(id, new);
+        }
+        image.get(&root).copied().unwrap_or(root)
+    }
+
     /// The values with some signs fixed: `Sign(j)` becomes the number, and a select on it the branch taken,
     /// where `signs[j]` is given. Signs beyond the end of `signs` stay free.
     pub fn at_signs(&mut self, roots: &[NodeId], signs: &[Option<f64>]) -> Vec<NodeId> {

@@ -96,6 +96,7 @@ impl Graph {
                 }
                 pending.push(Piece::Value(a, Binding::Product));
             }
+            Node::Unary(UnaryOp::NotNegative, a) => pending.push(Piece::Value(a, Binding::Sum)),
             Node::Unary(op, a) => call(op.name(), &[a], pending),
             Node::Binary(op, a, b) => self.binary_pieces(op, a, b, signed, pending),
             Node::Select {
@@ -218,6 +219,7 @@ impl Graph {
                 Binding::Product
             }
             Node::Unary(UnaryOp::Neg, _) => Binding::Product,
+            Node::Unary(UnaryOp::NotNegative, a) => self.binding(self.node(a), signed),
             Node::Binary(BinaryOp::Add | BinaryOp::Sub, ..) => Binding::Sum,
             Node::Binary(BinaryOp::Mul, a, b) if a == b => Binding::Factor,
             Node::Binary(BinaryOp::Mul, a, b) if self.is_absolute(a, b) => Binding::Base,

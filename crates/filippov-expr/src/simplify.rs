@@ -27,6 +27,11 @@ impl Graph {
         }
         match op {
             UnaryOp::Neg => self.negative(a),
+            UnaryOp::Sqrt => match *self.node(a) {
+                // It has a kink, at a surface of its own.
+                Node::Binary(BinaryOp::Mul, b, c) if b == c => self.abs(b),
+                _ => self.insert(Node::Unary(op, a)),
+            },
             _ => self.insert(Node::Unary(op, a)),
         }
     }

@@ -144,6 +144,15 @@ impl Builder {
         Ok(graph.has_signs(Self::node(&graph, a)?))
     }
 
+    /// An expression with other expressions in the place of some that it contains.
+    fn substituted(&self, a: u32, images: Vec<(u32, u32)>) -> PyResult<u32> {
+        let mut graph = self.graph();
+        let a = Self::node(&graph, a)?;
+        let pair = |(from, to)| Ok((Self::node(&graph, from)?, Self::node(&graph, to)?));
+        let images = images.into_iter().map(pair).collect::<PyResult<Vec<_>>>()?;
+        Ok(graph.substituted(a, &images).0)
+    }
+
     /// Whether an expression changes only where signs or discrete states inside of it do.
     fn is_stepwise(&self, a: u32) -> PyResult<bool> {
         let graph = self.graph();

@@ -21,7 +21,7 @@ from filippov.trace.array_functions import apply_function
 from filippov.trace.condition import Comparison, Condition
 from filippov.trace.explain import BLACK_BOX, NotTraceable, UserLine, calling_line
 from filippov.trace.laws import Laws
-from filippov.trace.pieces import Pieces, condition_of, equality_of, sign_of
+from filippov.trace.pieces import Pieces, condition_of, equality_of, parts_of, sign_of
 from filippov.trace.scalar import Scalar
 
 if TYPE_CHECKING:
@@ -129,6 +129,7 @@ class Tracer:
         self.unresolved: dict[int, None] = {}
         self.has_pieces = False
         self._pieces: dict[tuple[int, bool], Pieces | None] = {}
+        self._continued: dict[int, int] = {}
         self._path: list[tuple[int, float]] = []
         self._flipped: list[bool] = []
         self._answers: dict[int, float] = {}
@@ -221,6 +222,7 @@ class Tracer:
         if pieces is not None:
             self.has_pieces = True
             return sign_of(self, pieces)
+        node = self.as_surface(node)
         self.ask(node, "sign")
         return self.builder.sign(node)
 
@@ -239,7 +241,7 @@ class Tracer:
         known = self.known_sign(difference) if self.parameters else None
         if known is not None:
             return first if (known >= 0.0) == largest else second
-        if self.pieces(difference) is None:
+        if self.pieces(difference) is None and not self._continued:
             return self.builder.maximum(first, second) if largest else self.builder.minimum(first, second)
         return self.choose(difference, first, second) if largest else self.choose(difference, second, first)
 
@@ -260,6 +262,7 @@ class Tracer:
                 return condition_of(self, pieces, strict=strict)
             if self.builder.has_signs(node) and self.builder.is_stepwise(node):
                 node = self.laws.beside(self, node, -1.0 if strict else 1.0)
+            node = self.as_surface(node)
             self.ask(node, "comparison", is_strict=strict)
             surface, orientation = self.builder.switch(node)
             if surface >= 0:
@@ -311,6 +314,20 @@ class Tracer:
     def jumps(self, node: int) -> bool:
         """Whether an expression jumps where a sign inside of it changes, or is not seen to be continuous."""
         return self.regions().jumps_at(node) is not None
+
+    def continue_root(self, root: int, argument: int, of: Callable[[int], int]) -> None:
+        """Continue a root beyond the regions of the signs in its argument, if it is defined in all of them.
+
+        The root of ``abs(x)`` is that of x or of -x, by the sign of x. Switching functions are looked at a
+        little beyond x = 0, too: there it is 0.
+        """
+        pieces = self.pieces(argument, in_full=True)
+        if pieces is not None and all(sign in (0.0, 1.0) for _, sign in parts_of(pieces)):
+            self._continued[root] = of(self.builder.unary("not negative", argument))
+
+    def as_surface(self, node: int) -> int:
+        """Return an expression as a switching function: with its roots continued."""
+        return self.builder.substituted(node, list(self._continued.items())) if self._continued else node
 
     def known_sign(self, node: int) -> float | None:
         """Return the sign of an expression of constants and parameters; None if it depends on the motion."""

@@ -15,7 +15,7 @@ from filippov.trace.condition import BySide, Condition
 if TYPE_CHECKING:
     from filippov.trace.branching import Tracer
 
-__all__ = ["Pieces", "by_parts", "condition_of", "equality_of", "has_constant_part", "sign_of"]
+__all__ = ["Pieces", "by_parts", "condition_of", "equality_of", "has_constant_part", "parts_of", "sign_of"]
 
 # (surface, pieces where its function is positive, where negative), or (expression, sign, "held", or None).
 Pieces = tuple[Any, ...]
@@ -35,7 +35,7 @@ def condition_of(tracer: Tracer, pieces: Pieces, *, strict: bool) -> Answer:
 
 def equality_of(tracer: Tracer, pieces: Pieces) -> Answer | None:
     """Return the condition that a quantity is zero; None if that is so at single points only."""
-    if any(sign is None for _, sign in _parts(pieces)):
+    if any(sign is None for _, sign in parts_of(pieces)):
         return None
 
     def answer(node: int, sign: Any) -> Answer:
@@ -64,7 +64,7 @@ def by_parts(tracer: Tracer, pieces: Pieces, function: Callable[[int, Any], int]
 
 def has_constant_part(tracer: Tracer, pieces: Pieces) -> bool:
     """Whether a quantity stands still in some region."""
-    return not all(tracer.builder.depends_on_motion(node) for node, _ in _parts(pieces))
+    return not all(tracer.builder.depends_on_motion(node) for node, _ in parts_of(pieces))
 
 
 def _by_sides(tracer: Tracer, pieces: Pieces, answer: Callable[[int, Any], Answer]) -> Answer:
@@ -75,9 +75,10 @@ def _by_sides(tracer: Tracer, pieces: Pieces, answer: Callable[[int, Any], Answe
     return plus if plus is minus else BySide(tracer, surface, plus, minus)
 
 
-def _parts(pieces: Pieces) -> Iterator[tuple[int, Any]]:
+def parts_of(pieces: Pieces) -> Iterator[tuple[int, Any]]:
+    """Yield the expressions of the parts with what is known of their signs."""
     if len(pieces) == 2:
         yield pieces[0], pieces[1]
     else:
         for side in pieces[1:]:
-            yield from _parts(side)
+            yield from parts_of(side)

@@ -291,6 +291,9 @@ impl Plan {
         if op == UnaryOp::Neg {
             return self.push(Rule::Neg(a));
         }
+        if op == UnaryOp::NotNegative {
+            return a;
+        }
         if let Some(&known) = self.made.get(&(op, a)) {
             return known;
         }
@@ -347,7 +350,7 @@ impl Plan {
                 let weight = self.shifted_square(a, -1.0, 1.0);
                 self.inverse_chain(a, weight, 1.0, head)
             }
-            UnaryOp::Neg => a,
+            UnaryOp::Neg | UnaryOp::NotNegative => a,
         };
         self.made.insert((op, a), row);
         row

@@ -4,6 +4,7 @@ use super::contact::place_in_contact;
 use super::point::{Decided, Left, Notes, Point};
 use super::rule::Rule;
 use super::settle::place_on;
+
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::{first_nonzero, Leading};
@@ -69,7 +70,7 @@ fn take_sides(
 }
 
 /// The side of every surface at the current point; a surface that the point lies on has the side of the mode
-/// before, or that which rounding says. `None` if a switching function is not a number.
+/// before, or that which rounding says. `None` if a switching function that matters is not a number.
 pub(crate) fn sides(
     at: &Point,
     notes: &mut Notes,
@@ -79,14 +80,18 @@ pub(crate) fn sides(
     let mut mode = Mode::new(vec![1; d]);
     // Switching functions may contain signs of others: repeat until nothing changes.
     let mut on_surface = vec![false; d];
+    let mut undefined: Vec<usize> = Vec::new();
     for _ in 0..=d {
         let before = mode.clone();
         let signs = mode.signs();
         let h = at.surface_values(notes, &signs)?;
-        if h.iter().any(|h| h.is_nan()) {
-            return Ok(None);
-        }
+        undefined.clear();
         for j in 0..d {
+            // Beyond a surface inside of it a function need not exist.
+            if h[j].is_nan() {
+                undefined.push(j);
+                continue;
+            }
             let size = at.system.surface_size(j, &at.place(&signs))?;
             let residual = at.arrival.residuals.get(j).copied().unwrap_or(0.0);
             let noise = (SURFACE_NOISE * size).max(2.0 * residual);
@@ -106,6 +111,13 @@ pub(crate) fn sides(
         }
         if mode == before {
             break;
+        }
+    }
+    if !undefined.is_empty() {
+        let mut active = vec![false; d];
+        at.system.active(&mode.signs(), &[], &mut active);
+        if undefined.iter().any(|&j| active[j]) {
+            return Ok(None);
         }
     }
     Ok(Some(Sides { mode, on_surface }))

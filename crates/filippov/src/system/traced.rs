@@ -188,7 +188,16 @@ impl TracedSystem {
             return size;
         }
         // Terms may cancel where the gradient vanishes.
-        size.max(self.rounding_of_surface(j, place) / SURFACE_NOISE)
+        let size = size.max(self.rounding_of_surface(j, place) / SURFACE_NOISE);
+        if size.is_finite() {
+            return size;
+        }
+        // A root ends here, and has no slope: what counts is its value.
+        let mut h = vec![0.0; self.n_surfaces()];
+        match self.surfaces(place, &mut h) {
+            Ok(()) => h[j].abs(),
+            Err(_) => size,
+        }
     }
 }
 

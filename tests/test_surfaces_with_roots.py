@@ -1,0 +1,78 @@
+"""Switching functions with a root that ends at another surface: thin layers around that place are found."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import filippov as fl
+import numpy as np
+import pytest
+
+# The layer |x - c| < d**2, or its right half, as the place where a function of x - c and d is negative.
+LAYERS: dict[str, tuple[Callable[[Any, float], Any], float]] = {
+    "root": (lambda v, d: np.sqrt(abs(v)) - d, 2.0),
+    "root, as a power": (lambda v, d: abs(v) ** 0.5 - d, 2.0),
+    "fourth root": (lambda v, d: abs(v) ** 0.25 - math.sqrt(d), 2.0),
+    "power 3/2": (lambda v, d: np.abs(v) ** 1.5 - d**3, 2.0),
+    "root of a square": (lambda v, d: np.sqrt((v / d) ** 2) - d, 2.0),
+    "root of a ramp": (lambda v, d: np.sqrt(np.maximum(v, 0)) - d, math.inf),
+    "root of a sum": (lambda v, d: np.sqrt(1 + abs(v)) - math.sqrt(1 + d * d), 2.0),
+    "root of a choice": (lambda v, d: np.sqrt(np.where(v > 0, v, -v)) - d, 2.0),
+    "sum of roots": (lambda v, d: np.sqrt(abs(v)) + np.sqrt(abs(2 * v)) - d * (1 + math.sqrt(2.0)), 2.0),
+}
+
+
+@pytest.mark.parametrize("method", ["auto", "DOPRI5", "DOP853", "Rodas5P"])
+@pytest.mark.parametrize("name", LAYERS)
+def test_a_thin_layer_is_found(name: str, method: Any) -> None:
+    function, width = LAYERS[name]
+    rng = np.random.default_rng(len(name))
+    for _ in range(15):
+        c, d, speed = rng.uniform(-0.5, 0.5), 10 ** rng.uniform(-3, -1), rng.choice([-1.0, 1.0])
+        start, length = c - speed * rng.uniform(1.0, 2.0), 4.0
+        end = start + speed * length
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            sol = fl.solve_ivp(
+                lambda t, x, c=c, d=d, speed=speed: [speed, np.where(function(x[0] - c, d) > 0, 0.0, 1.0)],
+                (0, length),
+                [start, 0.0],
+                method=method,
+            )
+        assert sol.success, sol.message
+        inside = width * d**2 if math.isfinite(width) else d**2 + max(c - start, c - end)
+        assert sol.y[1, -1] == pytest.approx(inside, rel=1e-6, abs=1e-12)
+
+
+@pytest.mark.parametrize("method", ["auto", "DOPRI5", "DOP853"])
+@pytest.mark.parametrize("start", [2.0, -2.0, 0.5, -3.0])
+def test_time_optimal_control_of_a_double_integrator(start: float, method: Any) -> None:
+    """It slides along the switching curve to the origin, in the time 2 sqrt(|start|)."""
+
+    def fun(t: float, x: Any) -> list[Any]:
+        return [x[1], -np.sign(x[1] + np.sign(x[0]) * np.sqrt(2 * np.abs(x[0])))]
+
+    shortest = 2.0 * math.sqrt(abs(start))
+    sol = fl.solve_ivp(fun, (0, 0.99 * shortest), [start, 0.0], method=method, rtol=1e-9, atol=1e-9)
+    assert sol.success, sol.message
+    assert sol.switches.t == pytest.approx([0.5 * shortest], rel=1e-8)
+    left = 0.01 * shortest
+    np.testing.assert_allclose(
+        sol.y[:, -1], [math.copysign(0.5 * left**2, start), -math.copysign(left, start)], rtol=1e-5
+    )
+
+
+@pytest.mark.parametrize("start", [-2.0, 0.5, 1.5])
+def test_a_function_that_is_guarded_by_a_comparison(start: float) -> None:
+    def fun(t: float, x: Any) -> list[Any]:
+        return [1.0, (1.0 if np.sqrt(x[0]) > 1 else 0.5) if x[0] > 0 else 0.7]
+
+    sol = fl.solve_ivp(fun, (0, 5), [start, 0.0])
+    assert sol.success, sol.message
+    end = start + 5.0
+    parts = [(-math.inf, 0.0, 0.7), (0.0, 1.0, 0.5), (1.0, math.inf, 1.0)]
+    exact = sum(rate * max(0.0, min(end, high) - max(start, low)) for low, high, rate in parts)
+    assert sol.y[1, -1] == pytest.approx(exact, abs=1e-9)
