@@ -103,6 +103,13 @@ impl Regions {
                 return None;
             }
             if !has_zero {
+                let any_open = split
+                    .regions
+                    .iter()
+                    .any(|region| region.kind == Kind::Varies);
+                if any_open && !self.graph.is_stepwise(node) {
+                    return Some(Pieces::Part(node, PartSign::Open));
+                }
                 let pieces = self.all_pieces(node, MOST_OF_NO_ZERO.min(most), false);
                 return Some(pieces.unwrap_or(Pieces::Part(node, PartSign::Open)));
             }
