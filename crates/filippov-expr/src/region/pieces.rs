@@ -103,11 +103,9 @@ impl Regions {
                 return None;
             }
             if !has_zero {
-                let any_open = split
-                    .regions
-                    .iter()
-                    .any(|region| region.kind == Kind::Varies);
-                if any_open && !self.graph.is_stepwise(node) {
+                let depends = self.graph.sign_dependencies(&[node], &[]);
+                let n_inner = depends.into_iter().filter(|depends| *depends).count();
+                if 1 << n_inner.min(31) > MOST_OF_NO_ZERO && !self.graph.is_stepwise(node) {
                     return Some(Pieces::Part(node, PartSign::Open));
                 }
                 let pieces = self.all_pieces(node, MOST_OF_NO_ZERO.min(most), false);
