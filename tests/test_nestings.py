@@ -16,3 +16,8 @@ def test_nested_functions_have_the_values_of_python(first: int) -> None:
     assert kinds["same"] >= 97
     refused = [outcome.reason for outcome in outcomes.values() if outcome.kind == "refused"]
     assert all("equal at single points only" in reason for reason in refused)
+
+
+def test_seven_surfaces_between_which_functions_jump_are_not_passed_to_a_wrong_side() -> None:
+    """The relay problem of their signs does not know that a switching function changes with them."""
+    assert check(1068586).kind != "different"

@@ -59,7 +59,7 @@ impl Graph {
         known[&id].affine
     }
 
-    /// An expression with other expressions in the place of some that it contains.
+    /// Replaces parts of an expression: the first node of each pair by the second one.
     pub fn substituted(&mut self, root: NodeId, images: &[(NodeId, NodeId)]) -> NodeId {
         let mut image: FxHashMap<NodeId, NodeId> = images.iter().copied().collect();
         for id in self.all_below(&[root]) {

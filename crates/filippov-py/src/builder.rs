@@ -144,7 +144,7 @@ impl Builder {
         Ok(graph.has_signs(Self::node(&graph, a)?))
     }
 
-    /// An expression with other expressions in the place of some that it contains.
+    /// Replaces parts of an expression: the first node of each pair by the second one.
     fn substituted(&self, a: u32, images: Vec<(u32, u32)>) -> PyResult<u32> {
         let mut graph = self.graph();
         let a = Self::node(&graph, a)?;

@@ -191,8 +191,8 @@ class _Check:
         asked = [question for question in self.tracer.questions if self._surface_of(question) == surface]
         line = self.line_of(asked[0]) if asked else None
         remedy = (
-            "compare the argument itself, without the root, power or quotient: `abs(v) > d**2` in the "
-            "place of `np.sqrt(abs(v)) > d`, `abs(v) < 1/d` in the place of `1/abs(v) > d`"
+            "compare the argument itself: write `abs(v) > np.exp(d)` instead of `np.log(abs(v)) > d`, "
+            "and `abs(v) < 1/d` instead of `1/abs(v) > d`"
         )
         if is_singular:
             raise TraceError(
@@ -227,10 +227,8 @@ class _Check:
         else:
             what = "rounds (np.floor, np.ceil, np.rint, //, %)"
             remedies = [
-                "round inside of the choice: np.where(c, np.floor(a), np.floor(b)) in the place of "
+                "round the parts of the choice: write np.where(c, np.floor(a), np.floor(b)) instead of "
                 "np.floor(np.where(c, a, b))",
-                "round once: np.floor(x / n) in the place of np.floor(x) // n, np.floor(x) - n * "
-                "np.floor(x / n) in the place of np.floor(x) % n",
                 BLACK_BOX,
             ]
         return TraceError(

@@ -70,7 +70,7 @@ fn take_sides(
 }
 
 /// The side of every surface at the current point; a surface that the point lies on has the side of the mode
-/// before, or that which rounding says. `None` if a switching function that matters is not a number.
+/// before, or that which rounding says. Returns `None` if a switching function is NaN and its sign matters.
 pub(crate) fn sides(
     at: &Point,
     notes: &mut Notes,

@@ -2,6 +2,7 @@
 
 use super::choice::choose;
 use super::coinciding::have_parallels;
+use super::consistency::{consistency, Consistency};
 use super::departures::departures;
 use super::germs::decide_undecided;
 use super::point::{Decided, Left, Lefts, Next, Notes, Point};
@@ -64,7 +65,25 @@ pub(super) fn decide_by_relay(
         return Ok(None);
     }
     let_go(at, mode, surfaces, &mut found);
-    let mut after = meeting.on_all(&Mode::new(found.modes.clone()));
+    let entries = Mode::new(found.modes.clone());
+    let mut after = meeting.on_all(&entries);
+    // Of few surfaces between which functions jump another rule has decided.
+    if at.system.has_nested_signs() && !is_few && entries.codimension() <= MOST_MEETING {
+        after = match consistency(at, notes, meeting, &entries)? {
+            Consistency::Agrees { mode, .. } => mode,
+            Consistency::Contradicts(j) => {
+                return Ok(Some(Err(Stop::Intersection {
+                    surfaces: surfaces.to_vec(),
+                    failing: vec![(after, Guard::Surface(j))],
+                    reason: Undecided::NoOutcome,
+                })))
+            }
+            Consistency::Between(jumping) => {
+                let surfaces = surfaces.to_vec();
+                return Ok(Some(Err(Stop::SlidesAcrossJump { surfaces, jumping })));
+            }
+        };
+    }
     if !is_certain {
         match choose(at, notes, surfaces, after.clone(), vec![after.clone()]) {
             Ok(chosen) => after = chosen,

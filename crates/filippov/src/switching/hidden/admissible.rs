@@ -150,8 +150,8 @@ struct MeetingPoint {
     g: Vector,
 }
 
-/// The stable roots of a mode's face, and how clearly there is one, or none, where a closed form tells: on faces of one or
-/// two multipliers. A corner is its own root.
+/// Finds the stable roots on the face of a mode, and says how clearly a face of one or two multipliers has a root. On larger
+/// faces no closed form says that, and the margin is infinite. A corner is its own root.
 fn roots_of_mode(
     fields: &NormalFields,
     mode: &[i8],
