@@ -54,7 +54,7 @@ def test_multiplier_on_one_surface() -> None:
 
 
 def test_inactive_surfaces_are_left_out() -> None:
-    system = fl.System(lambda t, x: [np.where(x[0] > 0, -1.0 - 0.5 * np.sign(x[1]), 1.0), 0.0], n=2)
+    system = fl.System(lambda t, x: [np.where(x[0] > 0, -1.0 - 0.5 * np.sign(x[1]), 1.0), x[1]], n=2)
     assert system.classify(0.0, [-1.0, 0.0]).kind == "region"
     assert len(system.classify(0.0, [1.0, 0.0]).surfaces) == 1
 

@@ -19,7 +19,7 @@ def repel(t, x):
 
 def rest_on_a_jump(t, x):
     """The jump vanishes at the start, where x[1] is zero, and nothing leaves its surface."""
-    return [0.0, x[1] * np.sign(x[0])]
+    return [x[0], x[1] * np.sign(x[0])]
 
 
 def here():

@@ -345,7 +345,7 @@ def test_resets_without_end_are_jumped_to_their_limit_or_named():
 @pytest.mark.parametrize(
     ("fun", "start", "name"),
     [
-        (lambda t, x: [0.0, np.sign(x[0])], [0.0, 0.0], "x[0]"),
+        (lambda t, x: [-x[0], np.sign(x[0])], [0.0, 0.0], "x[0]"),
         (lambda t, x: [x[0], x[1], np.sign(x[0] - x[1])], [1.0, 1.0, 0.0], "x[0] - x[1]"),
         (lambda t, x: [x[1], -x[0], np.sign(x[0] ** 2 + x[1] ** 2 - 1)], [1.0, 0.0, 0.0], "x[0]**2"),
     ],

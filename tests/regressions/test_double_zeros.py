@@ -32,10 +32,15 @@ def test_a_double_zero_at_the_start_inside_and_at_the_end(
         assert set(sol.switches.kind) <= {"grazing"}
 
 
-def test_a_function_that_rests_where_it_has_a_value_of_its_own_is_refused() -> None:
+def test_a_function_that_rests_where_it_has_a_value_of_its_own_has_that_value() -> None:
     # By NumPy the sign is 0 as long as x0 = 1, and nothing moves it from there.
+    sol = fl.solve_ivp(lambda t, x: [0.0, np.sign((x[0] - 1) ** 2)], (0.0, 1.0), [1.0, 0.0])
+    np.testing.assert_array_equal(sol.y[:, -1], [1.0, 0.0])
+
+
+def test_a_function_that_rests_at_an_equilibrium_with_another_value_is_refused() -> None:
     with pytest.raises(fl.TraceError, match="differs from its traced expression"):
-        fl.solve_ivp(lambda t, x: [0.0, np.sign((x[0] - 1) ** 2)], (0.0, 1.0), [1.0, 0.0])
+        fl.solve_ivp(lambda t, x: [x[0] - 1, np.sign((x[0] - 1) ** 2)], (0.0, 1.0), [1.0, 0.0])
 
 
 def test_a_value_that_changes_between_calls_is_still_refused() -> None:

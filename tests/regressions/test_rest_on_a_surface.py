@@ -46,7 +46,7 @@ def test_tank_runs_empty(law: Any) -> None:
 @pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 def test_jump_on_a_surface_that_the_motion_cannot_leave_is_not_blamed_on_the_field() -> None:
     """x1 stays 0 whatever the sign: the multiplier is free in [-1, 1], the right-hand side is finite."""
-    sol = fl.solve_ivp(lambda t, x: [0.0, 1 + np.sign(x[0])], (0, 1), [0.0, 0.0])
+    sol = fl.solve_ivp(lambda t, x: [x[0], 1 + np.sign(x[0])], (0, 1), [0.0, 0.0])
     assert "not finite" not in sol.message
     if sol.success:
         assert 0.0 <= sol.y[1, -1] <= 2.0

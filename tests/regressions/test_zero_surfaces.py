@@ -68,7 +68,7 @@ def test_a_dead_zone_around_the_start() -> None:
 @pytest.mark.filterwarnings("ignore:non_unique:filippov.FilippovWarning")
 def test_a_warning_about_one_surface_does_not_silence_another_whose_name_it_contains() -> None:
     def f(t: float, x: Any) -> Any:
-        return [0.0, 1.0, np.sign(x[0] - 0.5), np.sign(x[0])]
+        return [x[0] * (x[0] - 0.5), 1.0, np.sign(x[0] - 0.5), np.sign(x[0])]
 
     # Both are zero for ever, from different starts.
     for start, name in [(0.5, "x[0] - 0.5"), (0.0, "x[0]")]:

@@ -40,6 +40,7 @@
 #![warn(unnameable_types)]
 
 pub mod blend;
+mod constant_of_motion;
 pub mod container;
 pub mod derivative;
 pub mod enclosure;
@@ -66,6 +67,7 @@ pub mod switching;
 mod tape;
 
 pub use blend::SignDependence;
+pub use constant_of_motion::RateTerms;
 pub use derivative::{Gradient, Wrt};
 pub use enclosure::{Enclosure, EnclosureProgram, Motion};
 pub use error::ExprError;

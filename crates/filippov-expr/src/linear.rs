@@ -69,11 +69,20 @@ impl Accumulated {
 impl LinearForm {
     /// The linear form of an expression, at a cost linear in its size (shared parts are visited once).
     pub fn of(graph: &Graph, root: NodeId) -> Self {
+        Self::of_sum(graph, &[(root, 1.0)], 0.0)
+    }
+
+    /// That of a sum of multiples of expressions and of a number.
+    pub fn of_sum(graph: &Graph, roots: &[(NodeId, f64)], number: f64) -> Self {
         let mut coefficients: FxHashMap<NodeId, Accumulated> = FxHashMap::default();
-        let mut pending = BinaryHeap::from([root]);
-        coefficients.entry(root).or_default().add(1.0);
+        let mut pending = BinaryHeap::new();
+        for &(root, coefficient) in roots {
+            pending.push(root);
+            coefficients.entry(root).or_default().add(coefficient);
+        }
         let mut terms = Vec::new();
         let mut constant = Accumulated::default();
+        constant.add(number);
         // Largest number first: when a node is taken, everything that uses it has been taken.
         while let Some(id) = pending.pop() {
             let Some(sum) = coefficients.remove(&id) else {
@@ -121,10 +130,15 @@ impl LinearForm {
             form
         } else {
             LinearForm {
-                terms: vec![(root, 1.0)],
-                constant: 0.0,
+                terms: roots.to_vec(),
+                constant: number,
             }
         }
+    }
+
+    /// Whether nothing is left of it.
+    pub fn is_zero(&self) -> bool {
+        self.terms.is_empty() && self.constant == 0.0
     }
 
     /// The coefficient of an atom, 0 if it does not occur.

@@ -2,11 +2,14 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use filippov_expr::{BinaryOp, Graph, Names, NodeId, Regions, Switching, UnaryOp};
+use filippov_expr::{BinaryOp, Graph, Names, NodeId, RateTerms, Regions, Switching, UnaryOp};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::regions::{as_tuples, by_name};
+
+/// The coefficient of the time, the states that an expression is linear in, and the other states in it.
+type Terms = (f64, Vec<(u32, f64)>, Vec<u32>);
 
 /// An expression graph under construction; nodes are handed out as integers.
 #[pyclass(frozen, module = "filippov._core")]
@@ -132,6 +135,27 @@ impl Builder {
     fn depends_on_state(&self, a: u32) -> PyResult<bool> {
         let graph = self.graph();
         Ok(graph.depends_on_state(Self::node(&graph, a)?))
+    }
+
+    /// What the rate of an expression is made of: see `Graph::rate_terms`.
+    fn rate_terms(&self, a: u32) -> PyResult<Option<Terms>> {
+        let graph = self.graph();
+        let terms = graph.rate_terms(Self::node(&graph, a)?);
+        Ok(terms.map(|terms| (terms.of_time, terms.linear, terms.others)))
+    }
+
+    /// Whether an expression with these terms is constant along the motions of a field.
+    fn is_constant_of_motion(&self, terms: Terms, field: Vec<u32>) -> PyResult<bool> {
+        let graph = self.graph();
+        let nodes = field.into_iter().map(|id| Self::node(&graph, id));
+        let field = nodes.collect::<PyResult<Vec<_>>>()?;
+        let (of_time, linear, others) = terms;
+        let terms = RateTerms {
+            of_time,
+            linear,
+            others,
+        };
+        Ok(graph.is_constant_of_motion(&terms, &field))
     }
 
     fn depends_on_parameters_from(&self, a: u32, first: u32) -> PyResult<bool> {

@@ -16,6 +16,7 @@ pub fn read_law(graph: &Graph, (kind, nodes, numbers): &LawRow) -> PyResult<Law>
     Ok(match (kind.as_str(), &found?[..], &numbers[..]) {
         ("clock", &[argument], _) => Law::Clock { argument },
         ("held", &[argument], _) => Law::Held { argument },
+        ("sign", &[argument], _) => Law::Sign { argument },
         ("level", &[argument], &[surface, orientation, guard]) => Law::Level {
             argument,
             surface: surface as usize,

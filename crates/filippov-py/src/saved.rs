@@ -90,6 +90,7 @@ pub fn read_trigger(when: &str, numbers: &[f64]) -> PyResult<Trigger> {
             side: if side < 0.0 { -1 } else { 1 },
         },
         ("times", times) => Trigger::Times(times.to_vec()),
+        ("jump", []) => Trigger::Jump,
         ("clock", &[period, phase]) => ticks(period, phase, true),
         ("clock", &[period, phase, at_start]) => ticks(period, phase, at_start != 0.0),
         _ => return Err(PyValueError::new_err(format!("unknown trigger {when:?}"))),
@@ -108,6 +109,7 @@ fn trigger_row(trigger: Trigger) -> (&'static str, Vec<f64>) {
             vec![index as f64, f64::from(direction), f64::from(side)],
         ),
         Trigger::Times(times) => ("times", times),
+        Trigger::Jump => ("jump", Vec::new()),
         Trigger::Clock {
             clock: Clock { period, phase },
             at_start: true,

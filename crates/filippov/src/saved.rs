@@ -24,6 +24,7 @@ const ACTIONS: Tag = Tag(*b"ACTN");
 const AT_SURFACE: u8 = 0;
 const AT_TIMES: u8 = 1;
 const AT_TICKS: u8 = 2;
+const AT_JUMPS: u8 = 3;
 
 /// Everything that a traced system is.
 ///
@@ -253,6 +254,7 @@ impl SavedSystem {
                 }
             }
             Trigger::Clock { clock, .. } => clock.check("period", "phase"),
+            Trigger::Jump => Ok(()),
         }
     }
 }
@@ -337,7 +339,7 @@ impl RunnableSystem {
                 map,
                 name: name.clone(),
                 kind: Some(match trigger {
-                    Trigger::Surface { .. } => Kind::Reset,
+                    Trigger::Surface { .. } | Trigger::Jump => Kind::Reset,
                     Trigger::Times(_) | Trigger::Clock { .. } => Kind::Clock,
                 }),
             });
@@ -378,6 +380,7 @@ fn write_trigger(writer: &mut Writer, trigger: &Trigger) {
             writer.float(clock.phase);
             writer.byte(u8::from(*at_start));
         }
+        Trigger::Jump => writer.byte(AT_JUMPS),
     }
 }
 
@@ -396,6 +399,7 @@ fn read_trigger(section: &mut Section) -> Result<Trigger, ExprError> {
             },
             at_start: flag(section)?,
         },
+        AT_JUMPS => Trigger::Jump,
         _ => return section.damaged("a trigger of an unknown kind"),
     })
 }

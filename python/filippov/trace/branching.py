@@ -19,6 +19,7 @@ from filippov.errors import TraceError
 from filippov.trace.array import TracedArray, apply_ufunc
 from filippov.trace.array_functions import apply_function
 from filippov.trace.condition import Comparison, Condition
+from filippov.trace.constants_of_motion import ConstantsOfMotion
 from filippov.trace.explain import BLACK_BOX, NotTraceable, UserLine, calling_line
 from filippov.trace.laws import Laws
 from filippov.trace.pieces import Pieces, condition_of, equality_of, parts_of, sign_of
@@ -96,6 +97,15 @@ class Tracer:
         Largest number of combinations of answers.
     laws : Laws, optional
         Laws of the trace that this one continues.
+    constants : ConstantsOfMotion, optional
+        Constants of motion, known from a trace before; the first trace has none.
+
+    Attributes
+    ----------
+    asked : dict of int to None
+        Nodes whose sign was asked for, in a trace that does not know the constants of motion.
+    is_doubtful : bool
+        Whether such a trace answered a question that depends on them without an answer.
     """
 
     apply_ufunc = staticmethod(apply_ufunc)
@@ -111,6 +121,7 @@ class Tracer:
         states: Sequence[str] | None,
         max_paths: int,
         laws: Laws | None = None,
+        constants: ConstantsOfMotion | None = None,
     ) -> None:
         self.builder = builder
         self.t0 = t0
@@ -121,6 +132,9 @@ class Tracer:
         self.states = None if states is None else list(states)
         self.max_paths = max_paths
         self.laws = Laws(len(parameters)) if laws is None else laws
+        self.constants = constants
+        self.asked: dict[int, None] = {}
+        self.is_doubtful = False
         self.n_paths = 0
         self.guards: dict[int, Guard] = {}
         self.questions: dict[Question, None] = {}
@@ -213,6 +227,8 @@ class Tracer:
         known = self.known_sign(node) if self.parameters else None
         if known is not None:
             return self.builder.constant(known)
+        if self.is_constant_of_motion(node):
+            return self.laws.sign(self, node)
         if self.laws.is_held(self, node):
             # Whole numbers may be zero for a while, where the sign is 0.
             sides = [self.builder.sign(self.laws.beside(self, node, side)) for side in (-1.0, 1.0)]
@@ -231,6 +247,8 @@ class Tracer:
         known = self.known_sign(node) if self.parameters else None
         if known is not None:
             return node if known >= 0.0 else self.builder.unary("negative", node)
+        if self.is_constant_of_motion(node):
+            return self.builder.binary("multiply", self.laws.sign(self, node), node)
         if self.pieces(node) is None:
             return self.builder.abs(node)
         return self.choose(node, node, self.builder.unary("negative", node))
@@ -241,7 +259,8 @@ class Tracer:
         known = self.known_sign(difference) if self.parameters else None
         if known is not None:
             return first if (known >= 0.0) == largest else second
-        if self.pieces(difference) is None and not self._continued:
+        as_function = self.pieces(difference) is None and not self._continued
+        if as_function and not self.is_constant_of_motion(difference):
             return self.builder.maximum(first, second) if largest else self.builder.minimum(first, second)
         return self.choose(difference, first, second) if largest else self.choose(difference, second, first)
 
@@ -254,6 +273,8 @@ class Tracer:
         """Return the condition ``expression > 0`` (``>= 0`` unless strict); its answer if it is known."""
         known = self.known_sign(node) if self.parameters else None
         if known is None:
+            if self.is_constant_of_motion(node):
+                node = self.laws.sign(self, node)
             if self.laws.is_held(self, node):
                 node = self.laws.beside(self, node, -1.0 if strict else 1.0)
             pieces = self.pieces(node)
@@ -275,17 +296,30 @@ class Tracer:
         known = self.known_sign(node)
         if known is not None:
             return known == 0.0
+        if self.is_constant_of_motion(node):
+            node = self.laws.sign(self, node)
         if self.laws.is_held(self, node):
             return self.is_held_at_zero(node)
         pieces = self.pieces(node, in_full=True)
         self.has_pieces = True
-        return None if pieces is None else equality_of(self, pieces)
+        answer = None if pieces is None else equality_of(self, pieces)
+        if answer is None and self.constants is None:
+            self.is_doubtful = True
+            return self.compare(node, strict=True)
+        return answer
 
     def is_held_at_zero(self, node: int) -> Condition | bool:
         """Return the condition that an expression of discrete states is zero."""
         is_positive = self.compare(node, strict=True)
         is_negative = self.compare(self.builder.unary("negative", node), strict=True)
         return _opposite(is_positive) & _opposite(is_negative)
+
+    def is_constant_of_motion(self, node: int) -> bool:
+        """Whether an expression is known to stay as it is along every motion."""
+        if self.constants is None:
+            self.asked[node] = None
+            return False
+        return self.constants.have(self.builder, node)
 
     def pieces(self, node: int, *, in_full: bool = False) -> Pieces | None:
         """Return an expression in pieces; None if it is nowhere seen to be identically zero."""

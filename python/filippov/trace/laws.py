@@ -14,6 +14,7 @@ from filippov.trace.pieces import by_parts, has_constant_part
 
 if TYPE_CHECKING:
     from filippov.trace.branching import Tracer
+    from filippov.trace.constants_of_motion import ConstantsOfMotion
 
 __all__ = ["Laws"]
 
@@ -30,6 +31,7 @@ class _Kind(NamedTuple):
 
 _KINDS = {
     "held": _Kind("whole", remembers=False),
+    "sign": _Kind("whole", remembers=False),
     "clock": _Kind("whole", remembers=False),
     "level": _Kind("whole", remembers=False),
     "hysteresis": _Kind("side", remembers=True),
@@ -70,7 +72,7 @@ class Laws:
                 tracer.known_sign(builder.binary("subtract", node, builder.constant(bound)))
             return builder.constant(whole)
         reads = builder.depends_on_parameters_from(node, self.first)
-        if not builder.depends_on_motion(node):
+        if not builder.depends_on_motion(node) or tracer.is_constant_of_motion(node):
             return self._state(tracer, _Law("held", (node,), ()), "floor")
         if not reads and builder.is_affine(node) and not builder.depends_on_state(node):
             return self._state(tracer, _Law("clock", (node,), ()), "floor")
@@ -85,6 +87,10 @@ class Laws:
         # At a whole number the floor is that number itself.
         step = tracer.choose(distance, half, builder.constant(-0.5))
         return builder.binary("add", builder.binary("subtract", level, half), step)
+
+    def sign(self, tracer: Tracer, node: int) -> int:
+        """Return the node of the sign of a constant of motion: -1, 0 or 1 as Python has it."""
+        return self._state(tracer, _Law("sign", (node,), ()), "sign")
 
     def hysteresis(self, tracer: Tracer, node: int, low: int, high: int, initial: float) -> int:
         """Return the node of the state, +1 or -1, of a relay with two thresholds."""
@@ -107,6 +113,12 @@ class Laws:
     def discrete(self) -> list[str]:
         """Return what each discrete state is: a "whole" number, or a "side", -1 or +1."""
         return [_KINDS[law.kind].values for law in self._known]
+
+    def are_of_constants(self, tracer: Tracer, constants: ConstantsOfMotion) -> bool:
+        """Return whether what was taken for constants of motion is constant along these motions."""
+        builder = tracer.builder
+        held = [law.nodes[0] for law in self._known if law.kind in ("held", "sign")]
+        return all(not builder.depends_on_motion(node) or constants.have(builder, node) for node in held)
 
     @property
     def remembers(self) -> bool:

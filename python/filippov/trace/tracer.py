@@ -14,6 +14,7 @@ from filippov.errors import ModelError, TraceError
 from filippov.events import accepted_names
 from filippov.trace.branching import Guard, Question, Tracer
 from filippov.trace.condition import Condition
+from filippov.trace.constants_of_motion import NO_CONSTANTS, ConstantsOfMotion
 from filippov.trace.explain import explain_failure, explain_raise
 from filippov.trace.laws import Laws
 from filippov.trace.questions import Roots, check_questions, is_exact_at_an_instant, kink_of_event
@@ -158,14 +159,20 @@ def trace(
         tracer.laws.complete(tracer)
         return declared, field, watched
 
-    def new_tracer() -> Tracer:
-        named = dict(parameters or {})
-        return Tracer(Builder(), float(t0), start, parameters=named, states=states, max_paths=max_paths)
+    def new_tracer(constants: ConstantsOfMotion | None) -> Tracer:
+        return Tracer(
+            Builder(),
+            float(t0),
+            start,
+            parameters=dict(parameters or {}),
+            states=states,
+            max_paths=max_paths,
+            constants=constants,
+        )
 
-    tracer = new_tracer()
-    declared, field, watched = record(tracer)
+    tracer, (declared, field, watched) = _with_constants_of_motion(new_tracer, record)
     roots = Roots(field, [index for index, _ in watched])
-    doubts = check_questions(tracer, roots, "fun", _Again(new_tracer, record))
+    doubts = check_questions(tracer, roots, "fun", _Again(lambda: new_tracer(tracer.constants), record))
     system = _system(tracer, field, [index for index, _ in watched])
     keywords = dict(parameters or {})
     verify(system, lambda t, x: fun(t, x, *args, **keywords), tracer.t0, start, tracer.values)
@@ -243,7 +250,14 @@ def examine_event(
     def tracer_into(builder: Builder, laws: Laws | None = None) -> Tracer:
         named = dict(values)
         return Tracer(
-            builder, t_start, start, parameters=named, states=own.states, max_paths=own.max_paths, laws=laws
+            builder,
+            t_start,
+            start,
+            parameters=named,
+            states=own.states,
+            max_paths=own.max_paths,
+            laws=laws,
+            constants=ConstantsOfMotion(traced.builder, traced.field),
         )
 
     scratch = tracer_into(Builder())
@@ -264,6 +278,32 @@ def examine_event(
         return _explore(tracer, g, args, "event", None)[0], ""
     except (TraceError, ModelError):
         return None, ""
+
+
+def _with_constants_of_motion(
+    new_tracer: Callable[[ConstantsOfMotion | None], Tracer], record: Callable[[Tracer], _Record]
+) -> tuple[Tracer, _Record]:
+    """Trace, and once more if the sign of a constant of motion was asked for.
+
+    The second field may have other constants than the first, as ``y' = 1*(y >= 0) - 1*(y > 0)`` has: then
+    none is made use of.
+    """
+    first = new_tracer(None)
+    try:
+        recorded = record(first)
+    except TraceError:
+        if not first.is_doubtful:
+            raise
+    else:
+        constants = ConstantsOfMotion(first.builder, recorded[1])
+        if not first.is_doubtful and not any(constants.have(first.builder, node) for node in first.asked):
+            return first, recorded
+        second = new_tracer(constants)
+        recorded = record(second)
+        if second.laws.are_of_constants(second, ConstantsOfMotion(second.builder, recorded[1])):
+            return second, recorded
+    plain = new_tracer(NO_CONSTANTS)
+    return plain, record(plain)
 
 
 class _Again:

@@ -5,7 +5,7 @@ use rustc_hash::FxHashMap;
 use crate::linear::LinearForm;
 use crate::node::{Node, NodeId};
 use crate::op::{BinaryOp, UnaryOp};
-use crate::region::{is_zero, Regions};
+use crate::region::Regions;
 
 /// That many combinations of other signs are looked at before a jump is taken for granted.
 const MOST_COMBINATIONS: usize = 64;
@@ -85,7 +85,7 @@ impl Regions {
     /// Whether a value is zero wherever a function is.
     pub(super) fn vanishes_with(&mut self, value: NodeId, function: NodeId) -> bool {
         let form = LinearForm::of(&self.graph, value);
-        if is_zero(&form) {
+        if form.is_zero() {
             return true;
         }
         let of_function = LinearForm::of(&self.graph, function).key();

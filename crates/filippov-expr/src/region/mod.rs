@@ -157,7 +157,7 @@ impl Regions {
                 break;
             }
             let form = LinearForm::of(&self.graph, value);
-            if !self.graph.facts(value).has_sign || is_zero(&form) {
+            if !self.graph.facts(value).has_sign || form.is_zero() {
                 let (region, is_known) = self.region(value, &form, signs);
                 if is_here {
                     found.is_complete &= is_known;
@@ -226,7 +226,7 @@ impl Regions {
             let at = [-1.0, 0.0, 1.0].map(|number| self.graph.at_state(value, state, number));
             at[1..].iter().any(|&other| {
                 let difference = self.graph.sub(at[0], other);
-                !is_zero(&LinearForm::of(&self.graph, difference))
+                !LinearForm::of(&self.graph, difference).is_zero()
             })
         })
     }
@@ -265,7 +265,7 @@ impl Regions {
         let mut pending = vec![(value, signs.to_vec())];
         while let Some((value, signs)) = pending.pop() {
             let difference = self.difference(value, surface);
-            if is_zero(&LinearForm::of(&self.graph, difference)) {
+            if LinearForm::of(&self.graph, difference).is_zero() {
                 continue;
             }
             let depends = self.graph.sign_dependencies(&[difference], &[]);
@@ -342,7 +342,7 @@ impl Regions {
             let form = LinearForm::of(&self.graph, function);
             if side == 0.0 {
                 rows.extend([1.0, -1.0].map(|side| Inequality::new(&form, side, false)));
-            } else if !is_zero(&form) {
+            } else if !form.is_zero() {
                 rows.push(Inequality::new(&form, side, true));
             }
         }
@@ -450,10 +450,6 @@ impl Regions {
         }
         true
     }
-}
-
-fn is_zero(form: &LinearForm) -> bool {
-    form.terms.is_empty() && form.constant == 0.0
 }
 
 fn kind_of(value: f64) -> Kind {

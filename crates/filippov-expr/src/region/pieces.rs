@@ -1,7 +1,7 @@
 //! An expression that is identically zero in some region, in pieces: a comparison with zero is decided there by the number 0,
 //! and elsewhere by what the expression is on the sides of the surfaces inside of it.
 
-use super::{is_zero, Kind, Regions};
+use super::{Kind, Regions};
 use crate::linear::LinearForm;
 use crate::node::NodeId;
 
@@ -129,7 +129,7 @@ impl Regions {
     ) -> Option<Pieces> {
         *budget = budget.checked_sub(1)?;
         let form = LinearForm::of(&self.graph, value);
-        if !self.graph.facts(value).has_sign || is_zero(&form) {
+        if !self.graph.facts(value).has_sign || form.is_zero() {
             let (region, _) = self.region(value, &form, signs.to_vec());
             let sign = match region.kind {
                 Kind::Zero if region.value == Some(0.0) => PartSign::Known(0.0),

@@ -3,7 +3,7 @@
 //! Specification:
 //!
 //! 1. At one instant the actions whose time has come and those whose surface was reached in their direction are
-//!    done in the order of the list, each on the state that the one before it left.
+//!    done in the order of the list, each on the state that the one before it left; then those that follow every jump.
 //! 2. Then those are done that the jump triggered: it led across their surface in their direction, or onto it with
 //!    a motion that approaches it. This is repeated until there are none.
 //! 3. An action whose state still moves through its surface is not done again in that instant: the motion
@@ -75,6 +75,11 @@ impl<'a> Instant<'_, 'a> {
                     (arrives, self.passage(index, &before, &approach)?)
                 {
                     approach.passes[j] = true;
+                }
+            }
+            for index in self.run.actions.after_jumps() {
+                if let Some(stop) = self.do_action(index, &before)? {
+                    return Ok(Some(stop));
                 }
             }
             self.push_back(&before)?;

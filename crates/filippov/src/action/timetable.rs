@@ -22,7 +22,7 @@ impl Timetable {
     /// All times from `t0` on.
     pub fn new(actions: &Actions, t0: f64) -> Self {
         let row = |(index, trigger): (usize, &Trigger)| match trigger {
-            Trigger::Surface { .. } => None,
+            Trigger::Surface { .. } | Trigger::Jump => None,
             Trigger::Times(times) => {
                 Some((index, Pending::Times(times.partition_point(|&t| t < t0))))
             }

@@ -11,7 +11,7 @@ use crate::motion::Guard;
 use crate::motion::{first_nonzero, normal_component, Leading};
 use crate::switching::Arrival as SurfaceArrival;
 use crate::system::dot;
-use crate::system::eval_on_side;
+use crate::system::{eval_on_side, surfaces_that_matter};
 use crate::tolerances::{AT_SIDE, SURFACE_NOISE};
 
 /// The surfaces among the functions of an event, in order.
@@ -51,15 +51,46 @@ pub(crate) fn vanishing_surfaces(at: &Point, notes: &mut Notes) -> Result<Reache
     let h = at.surface_values(notes, at.arrival.signs)?;
     add_vanishing_surfaces(at, &mut reached.surfaces, &h)?;
     // The functions of those that do not matter may contain signs of others that do not.
+    let mut h = h;
     let mut is_new = set_sides_of_inactive(at, &mut reached.before, &h);
     for _ in 0..h.len() {
         if !is_new || !at.system.has_nested_signs() {
             break;
         }
-        let h = at.surface_values(notes, &reached.before.signs())?;
+        h = at.surface_values(notes, &reached.before.signs())?;
         is_new = set_sides_of_inactive(at, &mut reached.before, &h);
     }
+    add_inactive_that_begin_to_matter(at, &mut reached, &h)?;
     Ok(reached)
+}
+
+/// Adds the surfaces that the point lies on, that did not matter before, and that do on another side of those reached.
+fn add_inactive_that_begin_to_matter(
+    at: &Point,
+    reached: &mut Reached,
+    h: &[f64],
+) -> Result<(), FieldError> {
+    let before = &reached.before;
+    let mut zeros = reached.surfaces.to_vec();
+    for (j, h) in h.iter().enumerate() {
+        let may_matter =
+            !at.arrival.active[j] && before.entries()[j] != 0 && at.system.switches_at(j);
+        if !may_matter || at.arrival.departing.contains(&j) || zeros.contains(&j) {
+            continue;
+        }
+        let size = at.system.surface_size(j, &at.place(&before.signs()))?;
+        if h.abs() <= SURFACE_NOISE * size {
+            zeros.push(j);
+        }
+    }
+    if zeros.len() > reached.surfaces.len() {
+        let located = reached.surfaces.clone();
+        let matter = surfaces_that_matter(at.system, before, zeros);
+        let begin = matter.into_iter().filter(|j| !located.contains(j));
+        reached.surfaces.extend(begin);
+        reached.surfaces.sort_unstable();
+    }
+    Ok(())
 }
 
 /// Gives surfaces that do not matter the sides of these values; whether one of them is another than before.

@@ -31,6 +31,8 @@ pub enum Trigger {
         /// Does a tick at the start of the run count?
         at_start: bool,
     },
+    /// After the other actions of an instant, before it is asked what these have triggered.
+    Jump,
 }
 
 /// What an action does.
@@ -139,6 +141,13 @@ impl Actions<'_> {
         let (first, direction, _) = found.next()?;
         let is_same = found.all(|(_, other, _)| other == direction);
         Some((first, if is_same { direction } else { 0 }))
+    }
+
+    /// The actions, by their place in the list, that follow every jump.
+    pub fn after_jumps(&self) -> impl Iterator<Item = usize> + '_ {
+        let list = self.list.iter().enumerate();
+        list.filter(|(_, action)| action.trigger == Trigger::Jump)
+            .map(|(index, _)| index)
     }
 
     /// The side of surface `j` from which its actions are triggered; where both sides do, the side `last` on which

@@ -17,6 +17,7 @@ const CLOCK: u8 = 0;
 const LEVEL: u8 = 1;
 const HELD: u8 = 2;
 const HYSTERESIS: u8 = 3;
+const SIGN: u8 = 4;
 
 impl Definition {
     /// Writes the definition as the next sections of a container.
@@ -108,6 +109,7 @@ fn write_law(writer: &mut Writer, law: &Law) {
         Law::Clock { .. } => CLOCK,
         Law::Level { .. } => LEVEL,
         Law::Held { .. } => HELD,
+        Law::Sign { .. } => SIGN,
         Law::Hysteresis { .. } => HYSTERESIS,
     };
     writer.byte(kind);
@@ -115,7 +117,7 @@ fn write_law(writer: &mut Writer, law: &Law) {
         writer.number(node.index());
     }
     match *law {
-        Law::Clock { .. } | Law::Held { .. } => {}
+        Law::Clock { .. } | Law::Held { .. } | Law::Sign { .. } => {}
         Law::Level {
             surface,
             orientation,
@@ -145,6 +147,9 @@ fn read_law(section: &mut Section, made: &[NodeId]) -> Result<Law, ExprError> {
             guard: section.number()? as usize,
         },
         HELD => Law::Held {
+            argument: node(section, made)?,
+        },
+        SIGN => Law::Sign {
             argument: node(section, made)?,
         },
         HYSTERESIS => Law::Hysteresis {

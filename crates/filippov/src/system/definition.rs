@@ -177,9 +177,10 @@ impl Definition {
                     return inconsistent("a clock whose argument is not affine in t alone");
                 }
             }
-            Law::Held { argument } => {
-                if graph.depends_on_motion(argument) {
-                    return inconsistent("a held floor whose argument changes along a motion");
+            Law::Held { argument } | Law::Sign { argument } => {
+                let terms = graph.rate_terms(argument);
+                if !terms.is_some_and(|terms| graph.is_constant_of_motion(&terms, &self.field)) {
+                    return inconsistent("a held number whose argument changes along a motion");
                 }
             }
             Law::Level {

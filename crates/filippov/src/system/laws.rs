@@ -4,7 +4,8 @@
 //! |---|---|---|
 //! | clock | the floor of a g that is affine in t | g is a whole number: known times |
 //! | level | the whole number nearest to g | \|g - q\| reaches 1/2 |
-//! | held | the floor of a g made of other discrete states | one of those changes |
+//! | held | the floor of a g that no motion changes | the state, or another discrete state, jumps |
+//! | sign | the sign, -1, 0 or +1, of such a g | the same |
 //! | hysteresis | +1 above `high`, -1 below `low`, between them as it was | h reaches `high` at -1, `low` at +1 |
 //!
 //! The floor of a g that depends on the state is q - 1/2 + sign(g - q)/2, which is the same before and after a change
@@ -40,8 +41,13 @@ pub enum Law {
         /// The surface 1/2 - |g - q| = 0.
         guard: usize,
     },
-    /// The floor of an expression of other discrete states.
+    /// The floor of an expression of other discrete states, and of constants of motion.
     Held {
+        /// The expression g.
+        argument: NodeId,
+    },
+    /// The sign of such an expression, 0 where it is zero.
+    Sign {
         /// The expression g.
         argument: NodeId,
     },
@@ -62,9 +68,10 @@ impl Law {
     /// The nodes that the law refers to.
     pub(crate) fn nodes(&self) -> SmallVec<[NodeId; 3]> {
         match *self {
-            Law::Clock { argument } | Law::Level { argument, .. } | Law::Held { argument } => {
-                smallvec![argument]
-            }
+            Law::Clock { argument }
+            | Law::Level { argument, .. }
+            | Law::Held { argument }
+            | Law::Sign { argument } => smallvec![argument],
             Law::Hysteresis {
                 argument,
                 thresholds: [low, high],
@@ -73,11 +80,18 @@ impl Law {
         }
     }
 
+    /// Does q change with the state, and with other discrete states, in instants only?
+    fn is_held(&self) -> bool {
+        matches!(self, Law::Held { .. } | Law::Sign { .. })
+    }
+
     /// The expressions that the law evaluates: the argument, and two more.
     fn expressions(&self, graph: &mut Graph) -> [NodeId; 3] {
         match *self {
             Law::Clock { argument } => [argument, graph.partial(argument, Wrt::Time), argument],
-            Law::Level { argument, .. } | Law::Held { argument } => [argument; 3],
+            Law::Level { argument, .. } | Law::Held { argument } | Law::Sign { argument } => {
+                [argument; 3]
+            }
             Law::Hysteresis {
                 argument,
                 thresholds: [low, high],
@@ -171,6 +185,7 @@ impl Laws {
                     Law::Clock { .. } => self.ticking(index, x.len(), system.parameters()).start(t),
                     Law::Level { .. } => values[0].round(),
                     Law::Held { .. } => floor(values[0]),
+                    Law::Sign { .. } => sign(values[0]),
                     Law::Hysteresis { initial, .. } => relay(values, *initial),
                 };
             }
@@ -187,10 +202,15 @@ impl Laws {
     /// The actions that change the discrete states in a run with these parameters.
     pub fn actions(self: &Arc<Self>, n_states: usize, parameters: &[f64]) -> Vec<LawAction> {
         let mut actions = Vec::new();
+        let first_held = self.laws.iter().position(Law::is_held).unwrap_or(0);
         for (index, law) in self.laws.iter().enumerate() {
             let mut step = 0.0;
             let (trigger, kind) = match *law {
-                Law::Held { .. } => continue,
+                // One action brings all of them up to date.
+                Law::Held { .. } | Law::Sign { .. } => match index == first_held {
+                    true => (Trigger::Jump, None),
+                    false => continue,
+                },
                 Law::Clock { .. } => {
                     let ticking = self.ticking(index, n_states, parameters);
                     let Some(clock) = ticking.clock() else {
@@ -282,6 +302,14 @@ fn falling(index: usize) -> Trigger {
     }
 }
 
+/// -1, 0 or +1.
+fn sign(value: f64) -> f64 {
+    match value {
+        0.0 => 0.0,
+        _ => value.signum(),
+    }
+}
+
 /// The floor; a value within rounding of a whole number is that number.
 fn floor(value: f64) -> f64 {
     let nearest = value.round();
@@ -302,7 +330,7 @@ impl ActionMap for LawMap {
         match self.laws.laws[index] {
             Law::Clock { .. } => q[index] += self.step,
             Law::Hysteresis { .. } => q[index] = -q[index],
-            Law::Held { .. } => {}
+            Law::Held { .. } | Law::Sign { .. } => {}
             Law::Level { .. } => {
                 let out = self.laws.eval(t, x, signs, &self.parameters, q);
                 let distance = out[3 * index] - q[index];
@@ -316,10 +344,14 @@ impl ActionMap for LawMap {
             }
         }
         for (k, law) in self.laws.laws.iter().enumerate() {
-            if matches!(law, Law::Held { .. }) {
-                let out = self.laws.eval(t, x, signs, &self.parameters, q);
-                q[k] = floor(out[3 * k]);
+            if !law.is_held() {
+                continue;
             }
+            let out = self.laws.eval(t, x, signs, &self.parameters, q);
+            q[k] = match law {
+                Law::Sign { .. } => sign(out[3 * k]),
+                _ => floor(out[3 * k]),
+            };
         }
         Ok(())
     }
