@@ -45,7 +45,8 @@ def verify(
 ) -> None:
     """Compare the traced field with the function it came from, at `y0` and at points around it.
 
-    Points on a surface, where the function raises, and where either result is not finite are skipped. A
+    Points on a surface, where the function raises, and where either result or a comparison that matters is not
+    a number are skipped: there Python's comparisons are all false, and no side is meant. A
     right-hand side may have a value of its own at a point that the motion leaves, as ``sign((t - 1)**2)`` at
     t = 1: what counts is that they agree just behind it.
 
@@ -93,6 +94,8 @@ def _difference(
     if signs is None:
         return None
     traced = system.field(t, x, signs, values)
+    if _is_decided_by_nan(system, t, x, signs, values, traced):
+        return None
     own = _evaluate(fun, t, x)
     if own is None or own.shape != traced.shape or not np.isfinite(own + traced).all():
         return None
@@ -100,6 +103,18 @@ def _difference(
     scale = 1.0 + float(max(np.abs(own).max(), np.abs(traced).max()))
     component = int(difference.argmax())
     return (component, own, traced) if difference[component] > _TOLERANCE * scale else None
+
+
+def _is_decided_by_nan(
+    system: TracedSystem, t: float, x: Vector, signs: Vector, values: Vector, traced: Vector
+) -> bool:
+    """Whether the field depends on the sign of a function that is not a number at the point."""
+    for surface in np.flatnonzero(np.isnan(system.surface_values(t, x, signs, values))):
+        other = signs.copy()
+        other[surface] *= -1.0
+        if not np.array_equal(system.field(t, x, other, values), traced, equal_nan=True):
+            return True
+    return False
 
 
 def consistent_signs(system: TracedSystem, t: float, x: Vector, values: Vector) -> Vector | None:
