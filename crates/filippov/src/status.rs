@@ -56,6 +56,14 @@ pub enum Stop {
         /// The surfaces.
         surfaces: Vec<usize>,
     },
+    /// Contact lasts from here, and the impulse of the reset there depends on the tangential velocity: the friction of an
+    /// impact is not that of a contact.
+    FrictionInMap {
+        /// The surface of the contact.
+        surface: usize,
+        /// The reset.
+        action: String,
+    },
     /// The field, or a switching function, is not finite.
     NotFinite,
     /// A function of the user raised.
@@ -128,6 +136,7 @@ impl Stop {
             Stop::ActionsDoNotEnd { .. } => "resets_do_not_end",
             Stop::ActionNotFinite { .. } => "reset_not_finite",
             Stop::Contact { .. } => "contact",
+            Stop::FrictionInMap { .. } => "friction_in_map",
             Stop::NotFinite => "field_not_finite",
             Stop::FieldRaised(_) => "field_raised",
             Stop::Intersection { .. } | Stop::SlidesAcrossJump { .. } => "intersection",
@@ -195,6 +204,14 @@ impl Stop {
                 "Stopped at t = {t:.10} in mode ({mode}): bodies touch at {}, and no combination of contact and \
                  separation has forces that push. The reset may not act in the direction of the surface.",
                 names(surfaces)
+            ),
+            Stop::FrictionInMap { surface, action } => format!(
+                "Stopped at t = {t:.10} in mode ({mode}): contact at {} lasts from here, and the reset {action} changes \
+                 tangential velocities, as friction does. Its impulse is not the force of lasting contact: it would push a \
+                 body at rest. A law for contact with friction (fl.Contact) is planned. Until then go on from here with a \
+                 second run along the surface, with -friction*np.sign(v) in its right-hand side; or let the reset change \
+                 the normal velocity alone, for contact without friction.",
+                names(&[*surface])
             ),
             Stop::NotFinite => format!(
                 "Stopped at t = {t:.10} in mode ({mode}): the right-hand side, or a switching function, is not finite (NaN or infinity) here."

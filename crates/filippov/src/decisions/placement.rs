@@ -6,12 +6,13 @@ use super::rule::Rule;
 use super::settle::place_on;
 
 use crate::error::FieldError;
-use crate::mode::Mode;
+use crate::mode::{Mode, Signs};
 use crate::motion::{first_nonzero, Leading};
 use crate::motion::{ContactField, Projector, SmoothField};
 use crate::status::Stop;
-use crate::system::{dot, surfaces_that_matter};
-use crate::tolerances::{AT_SIDE, SLIPPED, SLOW, SURFACE_NOISE};
+use crate::system::{dot, surfaces_that_matter, Action};
+use crate::tolerances::{AT_SIDE, FRICTION_IN_MAP, SLIPPED, SLOW, SURFACE_NOISE, TANGENTIAL_SPEED};
+use smallvec::SmallVec;
 
 /// The sides that a point is on.
 pub(crate) struct Sides {
@@ -210,9 +211,18 @@ fn place_on_triggers(
         let is_still = leading.order != 1 || is_slow;
         // What slides beside it may press or lift it.
         let stays = leading.sign() != side || is_slow || !meeting.is_empty();
-        if is_still && stays && can_stay(at, j, &mode)? {
-            contacts.push(j);
-            continue;
+        if is_still && stays {
+            match contact_at(at, j, &mode)? {
+                Touching::Stays => {
+                    contacts.push(j);
+                    continue;
+                }
+                Touching::WithFriction(action) => {
+                    let stop = Stop::FrictionInMap { surface: j, action };
+                    return Ok((Rule::Contact, Err(stop)));
+                }
+                Touching::NoContact => {}
+            }
         }
         let came_from = memory.map_or(side, |memory| memory.entries()[j]);
         let crosses = at.arrival.passing.contains(&j) || came_from == -side;
@@ -266,7 +276,7 @@ pub(crate) fn goes_through(
         return Ok(false);
     }
     let is_still = leading.order != 1 || is_slow(at, j, leading.value, &mode)?;
-    Ok(!is_still || !can_stay(at, j, &mode)?)
+    Ok(!is_still || contact_at(at, j, &mode)? == Touching::NoContact)
 }
 
 /// The first derivative of h_j that does not vanish along the motion that follows on the surfaces of `meeting`.
@@ -309,28 +319,139 @@ pub(super) fn is_slow(at: &Point, j: usize, speed: f64, mode: &Mode) -> Result<b
     Ok(speed.abs() <= SLOW * tolerance)
 }
 
-/// Can a body stay in contact at h_j = 0? The action there leaves the point alone and acts on the velocity.
-fn can_stay(at: &Point, j: usize, mode: &Mode) -> Result<bool, FieldError> {
+/// What becomes of a body that touches h_j = 0 without velocity.
+#[derive(PartialEq)]
+enum Touching {
+    /// The action there is no impact, or nothing is known of the contact: the motion goes on through the surface.
+    NoContact,
+    /// The body may stay.
+    Stays,
+    /// This action is an impact whose impulse depends on tangential velocities, so that it is no force of contact.
+    WithFriction(String),
+}
+
+fn contact_at(at: &Point, j: usize, mode: &Mode) -> Result<Touching, FieldError> {
     let side = mode.entries()[j];
     let Some(action) = at.actions.from_side(j, side) else {
-        return Ok(false);
+        return Ok(Touching::NoContact);
     };
-    let (mut moved, mut q) = (at.x.to_vec(), at.q.to_vec());
-    action.map.apply(at.t, &mut moved, &mode.signs(), &mut q)?;
+    let impact = Impact::new(at, action, j, mode)?;
+    let (moved, q) = impact.applied(at.x)?;
     let size = dot(at.x, at.x).sqrt();
     let shift: Vec<f64> = moved.iter().zip(at.x).map(|(m, x)| m - x).collect();
-    if q != at.q || dot(&shift, &shift).sqrt() > 1e-9 * (1.0 + size) {
-        return Ok(false);
+    let moves = dot(&shift, &shift).sqrt() > 1e-9 * (1.0 + size);
+    if q != at.q || (moves && !leaves_point_alone(at, j, &mode.signs())?) {
+        return Ok(Touching::NoContact);
+    }
+    let usual = impact.impulse(at.x)?;
+    if moves {
+        return Ok(match impact.changes_normal_velocity(&usual) {
+            true => Touching::WithFriction(action.name.clone()),
+            false => Touching::NoContact,
+        });
     }
     let resting = mode.with(j, 0);
     let mut sides = at.arrival.sides.to_vec();
     sides[j] = side;
     let Some(mut field) = ContactField::new(at.system, at.actions, &resting, &sides, at.q) else {
-        return Ok(false);
+        return Ok(Touching::NoContact);
     };
     let (mut x, mut dx) = (at.x.to_vec(), vec![0.0; at.x.len()]);
     field.eval(at.t, &mut x, &mut dx)?;
-    Ok(dx.iter().all(|v| v.is_finite()))
+    if dx.iter().any(|v| !v.is_finite()) {
+        return Ok(Touching::NoContact);
+    }
+    Ok(match impact.depends_on_tangential_velocity(at.x, &usual)? {
+        true => Touching::WithFriction(action.name.clone()),
+        false => Touching::Stays,
+    })
+}
+
+/// The map of an action at a surface that is touched without velocity, as an impact.
+struct Impact<'p, 'm, 'a> {
+    at: &'p Point<'p, 'm, 'a>,
+    action: &'p Action<'a>,
+    signs: Signs,
+    /// The gradient of h_j' by the state: the direction of the normal velocity.
+    normal: Vec<f64>,
+    /// A small velocity.
+    slow: f64,
+    /// One that is small beside it, towards the surface.
+    approach: f64,
+}
+
+impl<'p, 'm, 'a> Impact<'p, 'm, 'a> {
+    fn new(
+        at: &'p Point<'p, 'm, 'a>,
+        action: &'p Action<'a>,
+        j: usize,
+        mode: &Mode,
+    ) -> Result<Self, FieldError> {
+        let signs = mode.signs();
+        let mut normal = vec![0.0; at.x.len()];
+        at.system.rate_gradient(j, &at.place(&signs), &mut normal)?;
+        let slow = TANGENTIAL_SPEED * (1.0 + dot(at.x, at.x).sqrt());
+        let size = dot(&normal, &normal).sqrt();
+        let approach = -f64::from(mode.entries()[j]) * TANGENTIAL_SPEED * slow / size;
+        Ok(Impact {
+            at,
+            action,
+            signs,
+            normal,
+            slow,
+            approach,
+        })
+    }
+
+    /// The state after the action.
+    fn applied(&self, x: &[f64]) -> Result<(Vec<f64>, Vec<f64>), FieldError> {
+        let (mut moved, mut q) = (x.to_vec(), self.at.q.to_vec());
+        self.action
+            .map
+            .apply(self.at.t, &mut moved, &self.signs, &mut q)?;
+        Ok((moved, q))
+    }
+
+    /// What an approach at these velocities adds to the change of the state, per normal velocity.
+    fn impulse(&self, x: &[f64]) -> Result<Vec<f64>, FieldError> {
+        let pairs = x.iter().zip(&self.normal);
+        let hits: Vec<f64> = pairs.map(|(x, n)| x + self.approach * n).collect();
+        let (stays, after) = (self.applied(x)?.0, self.applied(&hits)?.0);
+        let change = |i: usize| ((after[i] - hits[i]) - (stays[i] - x[i])) / self.approach;
+        Ok((0..x.len()).map(change).collect())
+    }
+
+    /// Is it an impact, and not an action that leaves the velocity towards the surface as it is?
+    fn changes_normal_velocity(&self, impulse: &[f64]) -> bool {
+        dot(impulse, &self.normal).abs() > FRICTION_IN_MAP * dot(&self.normal, &self.normal)
+    }
+
+    /// Does its impulse depend on a tangential velocity, as that of friction does?
+    ///
+    /// Approaches are compared that differ in one component of the state: by little, and by the sign of a component that the
+    /// impulse changes. A smooth law hardly differs between states so close, and a linear one not at all between mirrored
+    /// ones; friction points the other way.
+    fn depends_on_tangential_velocity(&self, x: &[f64], usual: &[f64]) -> Result<bool, FieldError> {
+        let mut other = x.to_vec();
+        for i in (0..x.len()).filter(|&i| self.normal[i] == 0.0) {
+            let mut values =
+                SmallVec::<[f64; 3]>::from_slice(&[x[i] + self.slow, x[i] - self.slow]);
+            if usual[i] != 0.0 {
+                values.push(-x[i]);
+            }
+            for value in values {
+                other[i] = value;
+                let impulse = self.impulse(&other)?;
+                let pairs = || impulse.iter().zip(usual);
+                let largest = pairs().fold(0.0_f64, |most, (a, b)| most.max(a.abs()).max(b.abs()));
+                if pairs().any(|(a, b)| (a - b).abs() > FRICTION_IN_MAP * largest) {
+                    return Ok(true);
+                }
+            }
+            other[i] = x[i];
+        }
+        Ok(false)
+    }
 }
 
 /// The triggers that the motion reaches here up to rounding.

@@ -40,3 +40,10 @@ pub const SLIPPED: f64 = 10.0;
 /// Bodies that overlap by less than this fraction of their positions touch; an action that moves them changes h by more
 /// than this fraction.
 pub const PENETRATION: f64 = 1e-6;
+
+/// By this part of the size of the state velocities are changed to see whether an impulse depends on them; the approach is slower by
+/// the same factor again.
+pub const TANGENTIAL_SPEED: f64 = 1e-5;
+
+/// Impulses that differ by more than this part are those of friction.
+pub const FRICTION_IN_MAP: f64 = 1e-3;
