@@ -1,4 +1,4 @@
-"""A reset with friction in its impulse is no law of lasting contact: the run stops where contact begins to last."""
+"""A reset with friction in its impulse is no law of lasting contact: the run stops where contact begins."""
 
 from __future__ import annotations
 

@@ -45,8 +45,8 @@ def verify(
 ) -> None:
     """Compare the traced field with the function it came from, at `y0` and at points around it.
 
-    Points on a surface, where the function raises, and where either result or a comparison that matters is not
-    a number are skipped: there Python's comparisons are all false, and no side is meant. A
+    Points on a surface, where the function raises, and where either result or a comparison that matters is
+    not a number are skipped: there Python's comparisons are all false, and no side is meant. A
     right-hand side may have a value of its own at a point that the motion leaves, as ``sign((t - 1)**2)`` at
     t = 1: what counts is that they agree just behind it.
 
