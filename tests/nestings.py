@@ -146,6 +146,65 @@ def check(seed: int) -> Outcome:
     return Outcome("same")
 
 
+METHODS = ["Taylor", "DOPRI5", "DOP853", "Rodas5P"]
+GRID = np.arange(0.5, END / TICK) * TICK
+
+
+def check_event(seed: int) -> Outcome:
+    """Compare the zeros of the function of this seed, as an event, with its signs.
+
+    Between two points with signs there are as many zeros as changes of sign, up to an even number; and the
+    sign changes at each zero that was found.
+    """
+    names: dict[str, Any] = {"np": np}
+    exec(source_of(seed), names)
+    g = names["f"]
+    rng = np.random.default_rng(seed)
+    velocity = np.array([1.0, rng.choice([-1.0, -0.5, 0.25])])
+    start = np.array([rng.choice([-2.0, -1.0, -0.375]), rng.choice([-1.0, 0.125, 1.0])])
+    offset = rng.choice([0.0, 0.375, -0.5])
+    method, rtol = METHODS[seed % 4], 10.0 ** -int(rng.integers(4, 11))
+
+    def event(t: float, x: Any) -> Any:
+        return 1.0 * g(t, x) - offset
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        sol = fl.solve_ivp(
+            lambda t, x: [velocity[0], velocity[1]],
+            (0.0, END),
+            start,
+            events=event,
+            method=method,
+            rtol=rtol,
+            atol=rtol,
+            max_wall_time=20.0,
+        )
+    if caught:
+        return Outcome("refused", str(caught[0].message)[:150])
+    if not sol.success:
+        return Outcome("stopped", sol.message[:200])
+
+    def sign_at(t: float) -> float:
+        return float(np.sign(event(t, start + velocity * t)))
+
+    zeros = sol.t_events[0]
+    zeros = zeros[zeros > 0.0]  # a zero at the start counts, whatever follows
+    for t in zeros:
+        before, after = sign_at(t - STEP), sign_at(t + STEP)
+        if before * after > 0.0 and np.sum(abs(zeros - t) < 2.0 * STEP) % 2 == 1:
+            return Outcome("different", f"a zero is invented at t = {t:.9g}, where the sign is {after}")
+    signs = np.array([sign_at(t) for t in GRID])
+    known = np.flatnonzero(signs)
+    counts = np.searchsorted(zeros, GRID[known])
+    is_change = signs[known[1:]] != signs[known[:-1]]
+    wrong = np.flatnonzero(is_change != (np.diff(counts) % 2 == 1))
+    if wrong.size:
+        t = GRID[known[wrong[0]]]
+        return Outcome("different", f"behind t = {t:.9g}: {np.diff(counts)[wrong[0]]} zeros; {method}")
+    return Outcome("same")
+
+
 def outcomes(first: int, n: int) -> Iterator[tuple[int, Outcome]]:
     """Yield the outcomes of many seeds, in several processes."""
     seeds = range(first, first + n)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 
 import pytest
-from nestings import check
+from nestings import check, check_event
 
 
 @pytest.mark.parametrize("first", range(0, 600, 100))
@@ -21,3 +21,12 @@ def test_nested_functions_have_the_values_of_python(first: int) -> None:
 def test_seven_surfaces_between_which_functions_jump_are_not_passed_to_a_wrong_side() -> None:
     """The relay problem of their signs does not know that a switching function changes with them."""
     assert check(1068586).kind != "different"
+
+
+@pytest.mark.parametrize("first", range(0, 300, 100))
+def test_nested_functions_as_events_lose_no_zero_and_invent_none(first: int) -> None:
+    seeds = [*range(first, first + 100), *([11447, 14608, 15561] if first == 0 else [])]
+    outcomes = {seed: check_event(seed) for seed in seeds}
+    wrong = {seed: outcome for seed, outcome in outcomes.items() if outcome.kind in ("different", "stopped")}
+    assert wrong == {}
+    assert sum(outcome.kind == "same" for outcome in outcomes.values()) >= 50

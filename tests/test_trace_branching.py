@@ -10,6 +10,7 @@ from typing import Any
 import filippov as fl
 import numpy as np
 import pytest
+from filippov._core import TracedEvent
 from filippov.errors import ModelError, TraceError
 from filippov.trace import Trace, trace, trace_event
 from filippov.trace.verify import consistent_signs
@@ -245,35 +246,33 @@ def test_a_surface_that_cannot_be_traced_is_named() -> None:
 # ----------------------------------------------------------------------- events
 
 
-def test_event_becomes_a_node_of_the_same_builder() -> None:
+def test_an_event_is_traced_beside_the_field() -> None:
     traced = trace_two(lambda t, x: (x[1], -np.sign(x[0])))
-    node = trace_event(traced, lambda t, x, level: abs(x[0]) - level, args=(0.5,))
-    assert node is not None
-    assert traced.builder.text(node, None, None) == "abs(x[0]) - 0.5"
+    event = trace_event(traced, lambda t, x, level: abs(x[0] - 1) + abs(x[0]) - level, args=(0.5,))
+    assert isinstance(event, TracedEvent)
+    assert event.value(0.0, [-2.0, 0.0], []) == 4.5
+    assert event.value(0.0, [1.0, 0.0], []) is None  # on a kink
+    assert traced.builder.n_surfaces() == 1
 
 
 def test_event_takes_the_parameters_that_it_names() -> None:
     traced = trace_two(with_parameters, parameters={"mu": 0.3, "v0": 0.5})
-    node = trace_event(traced, lambda t, x, v0: x[0] - v0)
-    assert node is not None
-    assert traced.builder.text(node, None, traced.parameters) == "x[0] - v0"
+    event = trace_event(traced, lambda t, x, v0: x[0] - v0)
+    assert isinstance(event, TracedEvent)
+    assert event.value(0.0, [2.0, 0.0], [0.3, 0.75]) == 1.25
 
 
-@pytest.mark.parametrize(
-    "event",
-    [
-        lambda t, x: abs(x[1]),
-        lambda t, x: 1.0 if x[1] > 0 else -1.0,
-        lambda t, x: float(x[0]),
-        lambda t, x: x,
-        lambda t, x: None,
-        lambda t: t,
-    ],
-)
+@pytest.mark.parametrize("event", [lambda t, x: float(x[0]), lambda t, x: x, lambda t, x: None, lambda t: t])
 def test_event_that_needs_python_leaves_the_builder_as_it_was(event: Callable[..., Any]) -> None:
     traced = trace_two(lambda t, x: (x[1], -np.sign(x[0])))
-    assert trace_event(traced, event) is None
+    assert trace_event(traced, event) == ""
     assert traced.builder.n_surfaces() == 1
+
+
+def test_an_event_with_a_floor_of_its_own_is_told_apart() -> None:
+    traced = trace_two(lambda t, x: (x[1], np.floor(x[0])))
+    assert isinstance(trace_event(traced, lambda t, x: np.floor(x[0]) - 0.5), TracedEvent)
+    assert "floor" in str(trace_event(traced, lambda t, x: np.floor(x[1]) - 0.5))
 
 
 # ---------------------------------------------------------------------- threads

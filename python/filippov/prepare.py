@@ -244,7 +244,16 @@ def _actions(
         _check_map(bound, n, t0, y0, f"resets: entry {k} ({reset.name})")
         own = selective(reset.map, values)
         try:
-            traced = trace(own, n, args=source.args, parameters=values or None, t0=t0, y0=y0, states=states)
+            traced = trace(
+                own,
+                n,
+                args=source.args,
+                parameters=values or None,
+                t0=t0,
+                y0=y0,
+                states=states,
+                is_field=False,
+            )
         except (TraceError, ModelError):
             traced = None
         if traced is not None and traced.tracer.laws.remembers:

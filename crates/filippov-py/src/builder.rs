@@ -42,6 +42,13 @@ impl Builder {
         }
     }
 
+    /// A builder of its own with the same expressions.
+    fn copy(&self) -> Self {
+        Builder {
+            graph: Mutex::new(self.graph().clone()),
+        }
+    }
+
     fn constant(&self, value: f64) -> u32 {
         self.graph().constant(value).0
     }

@@ -3,13 +3,19 @@
 use std::sync::Arc;
 
 use filippov::action::ActionMap;
-use filippov::{FieldError, PiecewiseSystem, Place, SignStructure, TracedSystem, UserFunction};
+use filippov::{
+    AffinePart, FieldError, PiecewiseSystem, Place, Setting, SignStructure, SmoothParts,
+    TracedSystem, UserFunction,
+};
 use filippov_expr::{
     Backend, Enclosure, EnclosureProgram, ExprError, Graph, Motion, NodeId, Program,
 };
 use numpy::PyArray1;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use smallvec::SmallVec;
 
+use crate::builder::Builder;
 use crate::conversion::{read_scalar, read_vector};
 
 /// Python switching functions h_j(t, x).
@@ -153,23 +159,111 @@ impl UserFunction for CalledEvent {
     }
 }
 
-/// The expression of a user's event, to be evaluated at points and enclosed along motions.
+/// The expression of a user's event in smooth parts: the switching functions inside of it, each after those that it reads,
+/// and the expression itself.
 pub struct EventExpression {
+    parts: Vec<EventPart>,
+    /// The surfaces of the graph that the inner parts are.
+    surfaces: Vec<usize>,
+    /// How many signs the programs read at most.
+    n_signs: usize,
+}
+
+struct EventPart {
     program: Program,
     enclosing: EnclosureProgram,
+    affine: Option<AffinePart>,
 }
 
 impl EventExpression {
     pub fn compile(graph: &Graph, node: NodeId) -> Result<Self, ExprError> {
+        let mut surfaces = Vec::new();
+        add_inner(graph, node, &mut surfaces);
+        let inner = surfaces.iter().map(|&k| graph.surface(k as u32));
+        let nodes: Vec<NodeId> = inner.chain([node]).collect();
+        let parts = nodes.iter().map(|&node| EventPart::compile(graph, node));
         Ok(EventExpression {
+            parts: parts.collect::<Result<_, _>>()?,
+            surfaces,
+            n_signs: graph.n_surfaces(),
+        })
+    }
+
+    /// The signs that the programs read, from those of the inner parts.
+    fn signs(&self, inner: &[f64]) -> SmallVec<[f64; 8]> {
+        let mut signs = SmallVec::from_elem(1.0, self.n_signs);
+        for (&surface, &sign) in self.surfaces.iter().zip(inner) {
+            signs[surface] = sign;
+        }
+        signs
+    }
+}
+
+/// Adds the surfaces whose signs an expression reads, after those that they read.
+fn add_inner(graph: &Graph, node: NodeId, surfaces: &mut Vec<usize>) {
+    let depends = graph.sign_dependencies(&[node], &[]);
+    for (surface, depends) in depends.into_iter().enumerate() {
+        if depends && !surfaces.contains(&surface) {
+            add_inner(graph, graph.surface(surface as u32), surfaces);
+            surfaces.push(surface);
+        }
+    }
+}
+
+impl EventPart {
+    fn compile(graph: &Graph, node: NodeId) -> Result<Self, ExprError> {
+        let terms = graph
+            .rate_terms(node)
+            .filter(|terms| terms.others.is_empty());
+        Ok(EventPart {
             program: Program::compile(graph, &[node], Backend::Auto)?,
             enclosing: EnclosureProgram::compile(graph, &[node])?,
+            affine: terms.map(|terms| AffinePart {
+                of_time: terms.of_time,
+                slopes: terms.linear,
+            }),
         })
     }
 }
 
-/// A user's event as a compiled expression. Expressions with signs, of the field or of their own, are not compiled
-/// as events, so no signs are needed.
+/// A user's event as an expression, for any parameters.
+#[pyclass(frozen, module = "filippov._core")]
+pub struct TracedEvent {
+    pub expression: Arc<EventExpression>,
+}
+
+#[pymethods]
+impl TracedEvent {
+    #[new]
+    fn new(builder: &Builder, node: u32) -> PyResult<Self> {
+        let graph = builder.graph();
+        let root = Builder::node(&graph, node)?;
+        let expression = EventExpression::compile(&graph, root)
+            .map_err(|e| PyValueError::new_err(e.to_string()))?;
+        Ok(TracedEvent {
+            expression: Arc::new(expression),
+        })
+    }
+
+    /// The value with these parameters and discrete states; none within rounding of a zero inside of it.
+    fn value(&self, t: f64, x: Vec<f64>, p: Vec<f64>) -> Option<f64> {
+        let tiny = 1e-13 * x.iter().fold(1.0_f64, |most, x| most.max(x.abs()));
+        let (mut inner, mut out) = (Vec::new(), [0.0]);
+        for part in &self.expression.parts {
+            let signs = self.expression.signs(&inner);
+            part.program.eval(t, &x, &signs, &p, &[], &mut out);
+            if inner.len() < self.expression.surfaces.len() {
+                if out[0].abs() <= tiny {
+                    return None;
+                }
+                inner.push(if out[0] < 0.0 { -1.0 } else { 1.0 });
+            }
+        }
+        Some(out[0])
+    }
+}
+
+/// A user's event as a compiled expression.
 pub struct CompiledEvent {
     pub expression: Arc<EventExpression>,
     /// Knows the parameters.
@@ -178,22 +272,49 @@ pub struct CompiledEvent {
 
 impl UserFunction for CompiledEvent {
     fn value(&self, t: f64, x: &[f64], q: &[f64]) -> Result<f64, FieldError> {
+        let n = self.n_inner();
+        let mut signs: SmallVec<[f64; 8]> = SmallVec::from_elem(0.0, n);
+        for part in 0..n {
+            let value = SmoothParts::value(self, part, &Setting::new(&signs, q).at(t, x));
+            signs[part] = if value == 0.0 { 0.0 } else { value.signum() };
+        }
+        Ok(SmoothParts::value(
+            self,
+            n,
+            &Setting::new(&signs, q).at(t, x),
+        ))
+    }
+
+    fn parts(&self) -> Option<&dyn SmoothParts> {
+        Some(self)
+    }
+}
+
+impl SmoothParts for CompiledEvent {
+    fn n_inner(&self) -> usize {
+        self.expression.surfaces.len()
+    }
+
+    fn value(&self, part: usize, place: &Place<'_>) -> f64 {
         let mut out = [0.0];
-        let program = &self.expression.program;
-        self.system
-            .with_values(q, |p| program.eval(t, x, &[], p, &[], &mut out));
-        Ok(out[0])
+        let program = &self.expression.parts[part].program;
+        let signs = self.expression.signs(place.signs);
+        self.system.with_values(place.q, |p| {
+            program.eval(place.t, place.x, &signs, p, &[], &mut out);
+        });
+        out[0]
     }
 
-    fn has_bounds(&self) -> bool {
-        true
-    }
-
-    fn enclose(&self, motion: &dyn Motion, q: &[f64]) -> Option<Enclosure> {
+    fn enclose(&self, part: usize, motion: &dyn Motion, setting: Setting<'_>) -> Enclosure {
         let mut out = [Enclosure::UNKNOWN];
-        let program = &self.expression.enclosing;
+        let program = &self.expression.parts[part].enclosing;
+        let signs = self.expression.signs(setting.signs);
         self.system
-            .with_values(q, |p| program.eval(motion, &[], p, &mut out));
-        Some(out[0])
+            .with_values(setting.q, |p| program.eval(motion, &signs, p, &mut out));
+        out[0]
+    }
+
+    fn affine(&self, part: usize) -> Option<&AffinePart> {
+        self.expression.parts[part].affine.as_ref()
     }
 }

@@ -27,6 +27,8 @@ mod _core {
     #[pymodule_export]
     use super::builder::Builder;
     #[pymodule_export]
+    use super::callbacks::TracedEvent;
+    #[pymodule_export]
     use super::clock::ManualClock;
     #[pymodule_export]
     use super::decisions::replay_decision;

@@ -8,10 +8,9 @@ use filippov::{
     replay_decision, DecisionOutcome, DecisionPoint, Error, FieldError, Kind, LawAction, Mode,
     Options, Problem, Solution, TracedMap, UserEvent, UserFunction,
 };
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::callbacks::{CalledEvent, CalledMap, CompiledEvent};
+use crate::callbacks::{CalledEvent, CalledMap, CompiledEvent, TracedEvent};
 use crate::run::Run;
 use crate::saved::read_trigger;
 use crate::systems::{core_of, n_visible_of, raised, CoreSystem, TracedSystem};
@@ -61,16 +60,12 @@ impl PreparedRun {
         };
         let mut functions = Vec::with_capacity(events.len());
         for (g, direction, terminal, _name) in events {
-            let handle: Option<usize> = g.extract(py).ok();
-            let function: SharedFunction = match (handle, traced, &compiled) {
-                (Some(handle), Some(traced), Some(own)) => {
-                    let expression = traced.get().event_expression(handle);
-                    let missing = || PyValueError::new_err(format!("no event {handle}"));
-                    Box::new(CompiledEvent {
-                        expression: expression.ok_or_else(missing)?,
-                        system: Arc::clone(own),
-                    })
-                }
+            let traced = g.bind(py).cast::<TracedEvent>().ok();
+            let function: SharedFunction = match (traced, &compiled) {
+                (Some(event), Some(own)) => Box::new(CompiledEvent {
+                    expression: Arc::clone(&event.get().expression),
+                    system: Arc::clone(own),
+                }),
                 _ => Box::new(CalledEvent(g.clone_ref(py))),
             };
             functions.push((function, *direction, *terminal));

@@ -57,7 +57,7 @@ pub fn load_system(py: Python<'_>, data: &[u8]) -> PyResult<Loaded> {
     let saved = SavedSystem::from_bytes(data).map_err(refused)?;
     let actions = saved.actions.into_iter().map(|action| {
         let (when, numbers) = trigger_row(action.trigger);
-        let map = action.map.map(|map| TracedSystem::build(map, None));
+        let map = action.map.map(TracedSystem::build);
         let map = map.transpose()?.map(|map| Py::new(py, map)).transpose()?;
         Ok((when.to_owned(), numbers, map, action.name))
     });
@@ -65,7 +65,7 @@ pub fn load_system(py: Python<'_>, data: &[u8]) -> PyResult<Loaded> {
     let names = &saved.definition.names;
     let states = names.states.clone();
     let parameters = names.parameters[..saved.definition.n_parameters()].to_vec();
-    let system = TracedSystem::build(saved.definition, None)?;
+    let system = TracedSystem::build(saved.definition)?;
     Ok((
         system,
         states,

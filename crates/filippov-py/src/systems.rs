@@ -1,6 +1,6 @@
 //! The systems as Python objects.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use filippov::motion::{SlidingField, SmoothField};
 use filippov::{
@@ -14,7 +14,6 @@ use pyo3::types::PyBytes;
 
 use crate::black_boxes::{OpaqueSystem, SignedSystem};
 use crate::builder::Builder;
-use crate::callbacks::EventExpression;
 use crate::laws::{read_law, LawRow};
 
 pub type Array<'py> = PyReadonlyArray1<'py, f64>;
@@ -148,22 +147,16 @@ pub struct TracedSystem {
     rules: Rules,
     /// The laws of its discrete states, whose number is that of the last parameters' names.
     pub laws: Arc<Laws>,
-    /// Kept for events, which are traced after the system into the same graph.
-    builder: Option<Py<Builder>>,
-    /// Compiled events with their nodes; the index is the handle.
-    events: Mutex<Vec<(u32, Arc<EventExpression>)>>,
 }
 
 impl TracedSystem {
-    pub fn build(definition: Definition, builder: Option<Py<Builder>>) -> PyResult<Self> {
+    pub fn build(definition: Definition) -> PyResult<Self> {
         let rules = definition.rules.clone();
         let (system, laws) = definition.build(Backend::Auto).map_err(refused)?;
         Ok(TracedSystem {
             system,
             laws: Arc::new(laws),
             rules,
-            builder,
-            events: Mutex::default(),
         })
     }
 
@@ -173,14 +166,6 @@ impl TracedSystem {
     }
 
     /// The event with this handle.
-    pub fn event_expression(&self, handle: usize) -> Option<Arc<EventExpression>> {
-        self.events
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .get(handle)
-            .map(|(_, program)| Arc::clone(program))
-    }
-
     /// The system with these parameter values.
     pub fn with(&self, p: &[f64]) -> filippov::TracedSystem {
         self.system.with_parameters(p.to_vec())
@@ -264,7 +249,7 @@ impl TracedSystem {
             names,
             rules,
         };
-        Self::build(definition, Some(builder))
+        Self::build(definition)
     }
 
     #[getter]
@@ -357,38 +342,12 @@ impl TracedSystem {
         self.system.is_native()
     }
 
-    /// Compiles a node of the builder as an event, once; returns the handle for `solve`.
-    fn event(&self, py: Python<'_>, node: u32) -> PyResult<usize> {
-        let builder = self
-            .builder
-            .as_ref()
-            .ok_or_else(|| {
-                PyValueError::new_err("events cannot be traced for a system that was unpickled")
-            })?
-            .borrow(py);
-        let graph = builder.graph();
-        let mut events = self.events.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(known) = events.iter().position(|(compiled, _)| *compiled == node) {
-            return Ok(known);
-        }
-        let root = Builder::node(&graph, node)?;
-        if graph.has_signs(root) {
-            return Err(PyValueError::new_err(
-                "an event that reads signs of the field cannot be compiled: call its function",
-            ));
-        }
-        let event = EventExpression::compile(&graph, root)
-            .map_err(|e| PyValueError::new_err(e.to_string()))?;
-        events.push((node, Arc::new(event)));
-        Ok(events.len() - 1)
-    }
-
     fn to_bytes<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
         PyBytes::new(py, &self.definition().to_bytes())
     }
 
     #[staticmethod]
     fn from_bytes(data: &[u8]) -> PyResult<Self> {
-        Self::build(Definition::from_bytes(data).map_err(refused)?, None)
+        Self::build(Definition::from_bytes(data).map_err(refused)?)
     }
 }

@@ -103,7 +103,7 @@ mod vectors;
 
 pub use clock::{Clock, ManualClock};
 pub use error::{Error, FieldError};
-pub use event::{UserEvent, UserFunction, UserZero};
+pub use event::{AffinePart, SmoothParts, UserEvent, UserFunction, UserZero};
 pub use inspect::{
     classify, contradicts, hidden_dynamics, intersection_field, not_finite, state_text,
     Classification, HiddenDynamics, HiddenRoot, Inspection, IntersectionValue, NotFinitePlace,

@@ -368,7 +368,7 @@ def _function_place(
     values: dict[str, float],
 ) -> Place:
     """Trace a function of the section; one that is a surface of the system is that surface."""
-    from filippov.trace import trace
+    from filippov.trace import OWN_LAW, trace
 
     n = prepared.core.n_states
     called = Place("function", direction, function=g)
@@ -383,17 +383,17 @@ def _function_place(
             t0=t0,
             y0=y0,
             states=states,
+            is_field=False,
         )
     except (TraceError, ModelError):
         return called
     for sign, text in ((1.0, _text(traced, states, 1.0)), (-1.0, _text(traced, states, -1.0))):
         if text in prepared.surfaces:
             return Place("surface", sign * direction, surface=prepared.surfaces.index(text))
-    # A function with jumps or kinks of its own has no bounds: it is called, and sampled.
-    if traced.system.n_surfaces:
-        kink = f"a kink or a jump of its own at `{traced.system.surfaces()[0]}` = 0"
-        warn_user([sampled(f"section ({function_name(g, 'function')})", kink)])
-    if traced.guards or traced.system.n_surfaces:
+    if traced.tracer.laws.names:
+        warn_user([sampled(f"section ({function_name(g, 'function')})", OWN_LAW)])
+        return called
+    if traced.guards:
         return called
     return Place("function", direction, function=traced.system)
 

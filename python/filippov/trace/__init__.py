@@ -9,6 +9,6 @@ from filippov.trace.array import TracedArray
 from filippov.trace.branching import Guard
 from filippov.trace.condition import Condition
 from filippov.trace.scalar import Scalar
-from filippov.trace.tracer import Trace, examine_event, trace, trace_event
+from filippov.trace.tracer import OWN_LAW, Trace, trace, trace_event
 
-__all__ = ["Condition", "Guard", "Scalar", "Trace", "TracedArray", "examine_event", "trace", "trace_event"]
+__all__ = ["OWN_LAW", "Condition", "Guard", "Scalar", "Trace", "TracedArray", "trace", "trace_event"]

@@ -119,6 +119,10 @@ class UserLine:
         return f"{place}\n    {self.text}" if self.text else place
 
 
+class NoSuchLaw(NotTraceable):
+    """A floor or a relay in a function that is traced beside a field without it."""
+
+
 def explain_failure(error: Exception, fun: Callable[..., Any], role: str, path: str = "") -> TraceError:
     """Return the error for a function that works on numbers but not on traced values.
 

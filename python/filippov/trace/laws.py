@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from filippov.trace.explain import NotTraceable
+from filippov.trace.explain import NoSuchLaw, NotTraceable
 from filippov.trace.pieces import by_parts, has_constant_part
 
 if TYPE_CHECKING:
@@ -165,7 +165,7 @@ class Laws:
         index = self._known.get(law)
         if index is None:
             if self._is_complete:
-                raise NotTraceable(f"{name}(...) of an expression that the right-hand side does not have")
+                raise NoSuchLaw(f"{name}(...) of an expression that the right-hand side does not have")
             index = len(self.names)
             self._known[law] = index
             self.names.append(f"{name}({tracer.text(law.nodes[0])})")

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from filippov._core import Regions
     from filippov.trace.branching import Tracer
 
-__all__ = ["Again", "check_questions", "is_exact_at_an_instant", "kink_of_event"]
+__all__ = ["Again", "check_questions", "is_exact_at_an_instant"]
 
 # Characters of an expression that are printed in a message.
 MOST_PRINTED = 160
@@ -85,34 +85,6 @@ def check_questions(tracer: Tracer, roots: Roots, role: str, again: Again | None
     if check.regions.used_parameters:
         tracer.guards.setdefault(-1, Guard("regions of the comparisons", 0.0))
     return tuple(check.doubts)
-
-
-def kink_of_event(tracer: Tracer, node: int, surfaces: Sequence[str], of_field: Sequence[str]) -> str:
-    """Return what keeps the zeros of an event from being bounded; empty if nothing does.
-
-    Parameters
-    ----------
-    tracer : Tracer
-        A trace of the event alone, with its laws complete.
-    node : int
-        The traced event.
-    surfaces, of_field : sequence of str
-        Printed switching functions of the event, and of the field. Those that both have are switches of the
-        run, and the event is smooth between them.
-    """
-    own = [surface for surface in surfaces if surface not in of_field]
-    if own:
-        return f"a kink or a jump of its own at {_shortened(own[0])} = 0"
-    try:
-        check_questions(tracer, Roots([node]), "event")
-    except TraceError:
-        return "a comparison that is not decided by the sides of a surface"
-    regions = tracer.regions()
-    edge = regions.edge(node)
-    if edge is None:
-        return ""
-    text = regions.text(edge[1], tracer.states, tracer.names() or None)
-    return f"{_shortened(text)}, which may end, or is singular, where a sign inside of it changes"
 
 
 def is_exact_at_an_instant(tracer: Tracer, nodes: Sequence[int]) -> tuple[bool, bool]:

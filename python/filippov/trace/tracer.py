@@ -15,18 +15,20 @@ from filippov.events import accepted_names
 from filippov.trace.branching import Guard, Question, Tracer
 from filippov.trace.condition import Condition
 from filippov.trace.constants_of_motion import NO_CONSTANTS, ConstantsOfMotion
-from filippov.trace.explain import explain_failure, explain_raise
-from filippov.trace.laws import Laws
-from filippov.trace.questions import Roots, check_questions, is_exact_at_an_instant, kink_of_event
+from filippov.trace.explain import NoSuchLaw, explain_failure, explain_raise
+from filippov.trace.questions import Roots, check_questions, is_exact_at_an_instant
 from filippov.trace.reuse import Recent
 from filippov.trace.scalar import Scalar
-from filippov.trace.verify import verify
+from filippov.trace.verify import verify, verify_event
 
 if TYPE_CHECKING:
-    from filippov._core import Builder, TracedSystem
+    from filippov._core import Builder, TracedEvent, TracedSystem
     from filippov.trace.explain import UserLine
 
-__all__ = ["Trace", "examine_event", "trace", "trace_event"]
+__all__ = ["Trace", "trace", "trace_event"]
+
+# What a warning says of an event with a law that the field has not.
+OWN_LAW = "a floor or a relay of its own"
 
 Vector = NDArray[np.float64]
 _Record = tuple[tuple[int, ...], list[int], tuple[tuple[int, float], ...]]
@@ -62,8 +64,7 @@ class Trace:
     doubts : tuple of str
         What may be wrong with the comparisons, for warnings.
     events : Recent
-        Handles of events in `system` that were traced, None for those that could not be; and what kept these
-        from it.
+        Events that were traced beside the field, and for others what kept them from it.
     """
 
     builder: Builder
@@ -77,7 +78,7 @@ class Trace:
     triggers: tuple[tuple[int, float], ...]
     tracer: Tracer
     doubts: tuple[str, ...] = ()
-    events: Recent[tuple[int | None, str]] = member(default_factory=lambda: Recent(32))
+    events: Recent[TracedEvent | str] = member(default_factory=lambda: Recent(32))
 
     def is_exact_at_an_instant(self) -> tuple[bool, bool]:
         """Return whether every value is that of the function, and if for these parameters only."""
@@ -97,6 +98,7 @@ def trace(
     y0: NDArray[Any] | None,
     max_paths: int = 256,
     states: Sequence[str] | None = None,
+    is_field: bool = True,
 ) -> Trace:
     """Turn a right-hand side into expressions by calling it with traced values.
 
@@ -126,6 +128,8 @@ def trace(
         Largest number of combinations of answers to the function's ``if``.
     states : sequence of str, optional
         Names of the states.
+    is_field : bool, optional
+        Whether the function is the rate of the state; it has constants of motion then.
 
     Returns
     -------
@@ -170,7 +174,11 @@ def trace(
             constants=constants,
         )
 
-    tracer, (declared, field, watched) = _with_constants_of_motion(new_tracer, record)
+    if is_field:
+        tracer, (declared, field, watched) = _with_constants_of_motion(new_tracer, record)
+    else:
+        tracer = new_tracer(NO_CONSTANTS)
+        declared, field, watched = record(tracer)
     roots = Roots(field, [index for index, _ in watched])
     doubts = check_questions(tracer, roots, "fun", _Again(lambda: new_tracer(tracer.constants), record))
     system = _system(tracer, field, [index for index, _ in watched])
@@ -199,13 +207,13 @@ def trace_event(
     t0: float | None = None,
     y0: NDArray[Any] | None = None,
     parameters: Mapping[str, float] | None = None,
-) -> int | None:
-    """Turn an event function into an expression of an existing trace.
+) -> TracedEvent | str:
+    """Turn an event function into an expression beside an existing trace.
 
     Parameters
     ----------
     traced : Trace
-        The trace of the field; its builder receives the expression.
+        The trace of the field, whose parameters and discrete states the event may read.
     g : callable
         ``g(t, x, *args) -> float``; parameters of the trace that its signature names are handed over by name.
     args : tuple, optional
@@ -216,68 +224,37 @@ def trace_event(
 
     Returns
     -------
-    int or None
-        Node of ``g`` in ``traced.builder``. None if `g` cannot be traced, or uses a switching function that
-        the field has not: it must then be called as a Python function.
+    TracedEvent or str
+        The event. If `g` must be called as a Python function: what it has that was not traced, for a
+        warning, or an empty text if it cannot be traced at all.
     """
-    return examine_event(traced, g, args, t0=t0, y0=y0, parameters=parameters)[0]
-
-
-def examine_event(
-    traced: Trace,
-    g: Callable[..., Any],
-    args: tuple[Any, ...] = (),
-    *,
-    t0: float | None = None,
-    y0: NDArray[Any] | None = None,
-    parameters: Mapping[str, float] | None = None,
-) -> tuple[int | None, str]:
-    """Turn an event function into an expression as `trace_event` does, or tell why it is not used.
-
-    Returns
-    -------
-    tuple of (int or None, str)
-        The node, as of `trace_event`; and what a function that can be traced has of its own, so that it must
-        be called all the same: a kink, a jump, or a function that ends at one. Empty otherwise.
-    """
-    from filippov._core import Builder
+    from filippov._core import TracedEvent
 
     own = traced.tracer
     values = dict(zip(own.parameters, own.values.tolist(), strict=True)) if parameters is None else parameters
-    t_start = own.t0 if t0 is None else t0
-    start = own.y0 if y0 is None else y0
-
-    def tracer_into(builder: Builder, laws: Laws | None = None) -> Tracer:
-        named = dict(values)
-        return Tracer(
-            builder,
-            t_start,
-            start,
-            parameters=named,
-            states=own.states,
-            max_paths=own.max_paths,
-            laws=laws,
-            constants=ConstantsOfMotion(traced.builder, traced.field),
-        )
-
-    scratch = tracer_into(Builder())
-    n = traced.n_states
+    builder = traced.builder.copy()
+    tracer = Tracer(
+        builder,
+        own.t0 if t0 is None else t0,
+        own.y0 if y0 is None else y0,
+        parameters=dict(values),
+        states=own.states,
+        max_paths=own.max_paths,
+        laws=own.laws,
+        constants=ConstantsOfMotion(traced.builder, traced.field),
+    )
     try:
-        node = _explore(scratch, g, args, "event", None)[0]
-        scratch.laws.complete(scratch)
-        system = _system(scratch, [node] * n)
-        # Traced apart first: a switching function of its own must not enter the builder of the field.
-        reason = kink_of_event(scratch, node, system.surfaces(), traced.system.surfaces())
-        if reason:
-            return None, reason
+        node = _explore(tracer, g, args, "event", None)[0]
+        check_questions(tracer, Roots([node]), "event")
+        event = TracedEvent(builder, node)
         keywords = _named(g, dict(values), "event")
-        repeated = lambda t, x: [g(t, x, *args, **keywords)] * n  # noqa: E731
-        verify(system, repeated, t_start, start, scratch.values, role="event")
-        tracer = tracer_into(traced.builder, own.laws)
-        tracer.guards.update(own.guards)
-        return _explore(tracer, g, args, "event", None)[0], ""
-    except (TraceError, ModelError):
-        return None, ""
+        if not own.laws.names:
+            verify_event(event, lambda t, x: g(t, x, *args, **keywords), tracer)
+    except TraceError as error:
+        return OWN_LAW if isinstance(error.__cause__, NoSuchLaw) else ""
+    except ModelError:
+        return ""
+    return event
 
 
 def _with_constants_of_motion(

@@ -18,9 +18,10 @@ from filippov.errors import TraceError
 from filippov.trace.explain import BLACK_BOX
 
 if TYPE_CHECKING:
-    from filippov._core import TracedSystem
+    from filippov._core import TracedEvent, TracedSystem
+    from filippov.trace.branching import Tracer
 
-__all__ = ["N_POINTS", "consistent_signs", "verify"]
+__all__ = ["N_POINTS", "consistent_signs", "verify", "verify_event"]
 
 # Points compared, the initial point included.
 N_POINTS = 5
@@ -84,6 +85,25 @@ def verify(
             behind = (t + dt, x + dt * traced)
             if role != "fun" or _difference(system, fun, *behind, values) is not None:
                 raise _disagreement(fun, role, t, x, component, own, traced)
+
+
+def verify_event(event: TracedEvent, g: Callable[[float, Vector], Any], tracer: Tracer) -> None:
+    """Compare a traced event with its function as `verify` does; points on a kink or a jump are skipped.
+
+    Raises
+    ------
+    TraceError
+        If they differ by more than 1e-9 of their size.
+    """
+    with np.errstate(all="ignore"):
+        for idx in range(N_POINTS):
+            t, x = _point(tracer.t0, tracer.y0, idx)
+            traced = event.value(t, x.tolist(), tracer.values.tolist())
+            own = _evaluate(g, t, x)
+            if traced is None or own is None or own.size != 1 or not np.isfinite(traced + own[0]):
+                continue
+            if abs(own[0] - traced) > _TOLERANCE * (1.0 + max(abs(own[0]), abs(traced))):
+                raise _disagreement(g, "event", t, x, 0, own, np.array([traced]))
 
 
 def _difference(

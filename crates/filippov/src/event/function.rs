@@ -6,6 +6,7 @@ use smallvec::SmallVec;
 
 use crate::error::FieldError;
 use crate::motion::Guard;
+use crate::system::{Place, Setting};
 
 /// What the event stage says of a step.
 #[derive(Clone, Debug)]
@@ -65,17 +66,44 @@ pub trait UserFunction {
     /// If the function raises.
     fn value(&self, t: f64, x: &[f64], q: &[f64]) -> Result<f64, FieldError>;
 
-    /// Does [`enclose`](Self::enclose) give bounds? Then steps may be long: no zero in them is lost.
-    fn has_bounds(&self) -> bool {
-        false
-    }
-
-    /// Rigorous bounds of g and of its rate along a piece of motion; `None` if there are none, and zeros
-    /// are then found by sampling.
-    fn enclose(&self, motion: &dyn Motion, q: &[f64]) -> Option<Enclosure> {
-        let _ = (motion, q);
+    /// The smooth parts of g, with bounds: no zero is lost then. `None` if they are not known: zeros are found by sampling.
+    fn parts(&self) -> Option<&dyn SmoothParts> {
         None
     }
+}
+
+/// A function whose kinks and jumps are known: it is smooth between the zeros of switching functions inside of it.
+///
+/// Duties of an implementer:
+///
+/// 1. The parts are numbered from 0: first the switching functions, at last the function itself.
+/// 2. A part reads the signs of parts before it alone, and is smooth while they stay as they are, also a little beyond the
+///    zeros of these parts.
+/// 3. [`enclose`](Self::enclose) gives rigorous bounds.
+pub trait SmoothParts {
+    /// How many switching functions there are: 0 for a smooth function.
+    fn n_inner(&self) -> usize;
+
+    /// The value of a part where the parts before it have these signs.
+    fn value(&self, part: usize, place: &Place<'_>) -> f64;
+
+    /// Bounds of a part and of its rate along a piece of motion.
+    fn enclose(&self, part: usize, motion: &dyn Motion, setting: Setting<'_>) -> Enclosure;
+
+    /// The part as an affine function, if it is one and reads no signs.
+    fn affine(&self, part: usize) -> Option<&AffinePart> {
+        let _ = part;
+        None
+    }
+}
+
+/// What an affine function is made of beside a constant.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct AffinePart {
+    /// Its rate in time.
+    pub of_time: f64,
+    /// Its slopes in the states that it contains.
+    pub slopes: Vec<(u32, f64)>,
 }
 
 impl<F: Fn(f64, &[f64]) -> f64> UserFunction for F {

@@ -17,7 +17,7 @@ pub mod series;
 pub mod tube;
 mod user_events;
 
-pub use function::{Event, Found, Multiple, UserEvent, UserFunction};
+pub use function::{AffinePart, Event, Found, Multiple, SmoothParts, UserEvent, UserFunction};
 pub use user_events::UserZero;
 pub(crate) use user_events::{UserEvents, TICK};
 

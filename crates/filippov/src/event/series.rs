@@ -80,6 +80,17 @@ impl<'a> Series<'a> {
         b.iter().all(|&b| b > margin + first.rest)
     }
 
+    /// Is it beyond `margin` on the side of this sign, on [0, 1]?
+    pub fn has_sign(&self, sign: f64, margin: f64) -> bool {
+        if sign > 0.0 {
+            return self.stays_above(margin);
+        }
+        let mut negated = NO_TERMS;
+        let negated = &mut negated[..self.0.len()];
+        negated.iter_mut().zip(self.0).for_each(|(n, c)| *n = -c);
+        Series(negated).stays_above(margin)
+    }
+
     /// The first terms: the others together are smaller than `spare` all along.
     fn first_terms(&self, spare: f64) -> FirstTerms {
         let (mut rest, mut used) = (0.0, self.0.len());

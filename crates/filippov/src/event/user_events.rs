@@ -1,5 +1,7 @@
 //! The user's own functions and their zeros so far.
 
+use std::cell::RefCell;
+
 use crate::error::FieldError;
 use crate::event::UserEvent;
 
@@ -19,6 +21,10 @@ pub(crate) struct UserEvents<'a> {
     pub left: Vec<f64>,
     /// Value at the start of the step before, per event.
     pub before: Vec<f64>,
+    /// Sign at the end of the last step, per event, of the piece that ends there; 0 if the state has jumped since.
+    pub sides: Vec<f64>,
+    /// The same of the step that is searched.
+    pub found_sides: RefCell<Vec<f64>>,
     /// Time of the last zero, per event: divided out while it is the start of the search.
     pub last: Vec<f64>,
     pub zeros: Vec<Vec<UserZero>>,
@@ -37,6 +43,8 @@ impl<'a> UserEvents<'a> {
         UserEvents {
             events,
             left: vec![f64::NAN; d],
+            sides: vec![0.0; d],
+            found_sides: RefCell::new(vec![0.0; d]),
             before: vec![f64::NAN; d],
             last: vec![f64::NAN; d],
             zeros: vec![Vec::new(); d],
@@ -51,6 +59,16 @@ impl<'a> UserEvents<'a> {
             *left = event.function.value(t, x, q)?;
         }
         Ok(())
+    }
+
+    /// The step that was searched is accepted.
+    pub fn accept_sides(&mut self) {
+        self.sides.copy_from_slice(&self.found_sides.borrow());
+    }
+
+    /// The state jumps: what follows is not compared with what was.
+    pub fn forget_sides(&mut self) {
+        self.sides.fill(0.0);
     }
 
     pub fn into_zeros(self) -> Vec<Vec<UserZero>> {

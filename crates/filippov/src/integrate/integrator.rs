@@ -463,6 +463,7 @@ impl<'a> Integrator<'a> {
             }
         }
         self.recorder.user_events.at_start = false;
+        self.recorder.user_events.accept_sides();
         for k in 0..self.recorder.user_events.events.len() {
             self.recorder.user_events.before[k] = self.recorder.user_events.left[k];
             let function = self.recorder.user_events.events[k].function;

@@ -150,6 +150,7 @@ impl<'a> Recorder<'a> {
     /// The state just recorded has jumped: the limit from the right is kept.
     pub fn jump(&mut self, t: f64, y: &[f64]) {
         self.jump = Some((t, y.to_vec()));
+        self.user_events.forget_sides();
         if self.keeps_steps() {
             let start = self.y.len() - self.n;
             self.y[start..].copy_from_slice(y);
@@ -158,6 +159,9 @@ impl<'a> Recorder<'a> {
 
     /// The states before the first switch of this instant, which is `first`, and after the last one.
     pub fn set_jump(&mut self, first: usize, before: &[f64], after: &[f64]) {
+        if before != after {
+            self.user_events.forget_sides();
+        }
         if let Some(switch) = self.switches.get_mut(first) {
             switch.y_before = SmallVec::from_slice(before);
         }

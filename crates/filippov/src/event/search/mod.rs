@@ -9,6 +9,7 @@ mod one_guard;
 mod sought;
 mod step;
 mod user;
+mod user_piece;
 
 pub(crate) use detector::Detector;
 

@@ -1,19 +1,19 @@
 //! Zeros of the user's own functions in a step, found piece by piece where a function is finite.
+//!
+//! A function with kinks or jumps is smooth between the zeros of the switching functions inside of it. These are searched
+//! first, each between the zeros of those before it; then the function itself. Where its sign differs on both sides of such
+//! a zero, it has a zero there.
 
-use smallvec::SmallVec;
+use smallvec::{smallvec, SmallVec};
 
+use super::user_piece::{Along, Outcome, Source, Start};
 use super::StepSearch;
 use crate::error::FieldError;
-use crate::event::certificate::Bound;
-use crate::event::isolate::{first_zero_sampled, Evidence, Zero, PROBES};
-use crate::event::tube::Tube;
-use crate::event::{UserEvent, UserEvents, UserFunction};
-use crate::locate::refine;
+use crate::event::{SmoothParts, UserEvent, UserEvents, UserFunction};
+use crate::mode::Signs;
 use crate::motion::CurrentMotion;
 use crate::stepper::Interpolant;
-use crate::tolerances::{
-    EPS, MOST_CUTS, MOST_ZEROS, PIECES_OF_SERIES, POLE, SURFACE_NOISE, UNBOUNDED_DEPTH,
-};
+use crate::tolerances::{MOST_CUTS, MOST_ZEROS, PIECES_OF_SERIES, SURFACE_NOISE};
 
 impl StepSearch<'_, '_> {
     /// The value of a user's function along the motion.
@@ -39,34 +39,63 @@ pub(super) fn value_along(
     theta: f64,
 ) -> Result<f64, FieldError> {
     let t = interpolant.t0 + theta * interpolant.dt;
-    let mut y = vec![0.0; interpolant.n_states()];
+    let mut y: SmallVec<[f64; 8]> = smallvec![0.0; interpolant.n_states()];
     interpolant.at(theta, &mut y);
     motion.project(t, &mut y)?;
     function.value(t, &y, &motion.discrete)
 }
 
-/// Where the search of a step has come to.
+/// A change of the sign of a function.
 #[derive(Clone, Copy)]
-struct Start {
-    from: f64,
-    /// The function is zero there: it is divided by the distance.
-    divided: bool,
-    /// The sign of the function behind it.
-    sign: f64,
+struct Change {
+    at: f64,
+    /// The sign before and after it; 0 where the function is zero all along.
+    before: f64,
+    after: f64,
 }
 
-/// What came of the search of a piece.
-enum Outcome {
-    /// There is no zero.
-    Nothing,
-    /// The first zero.
-    At(f64),
-    /// The sign changes first where the function is infinite.
-    Pole(f64),
-    /// The function is not finite at some of the points looked at, or at all of them.
-    NotFinite { everywhere: bool },
-    /// A shorter step is needed.
-    Exhausted,
+/// Where the signs inside of a function change in the step, and which they are.
+struct Cuts {
+    /// The signs at the start of the step.
+    start: Signs,
+    /// (theta, index of the sign, sign after), in order of theta.
+    changes: SmallVec<[(f64, usize, f64); 4]>,
+}
+
+impl Cuts {
+    /// The signs just behind `theta`.
+    fn signs_behind(&self, theta: f64) -> Signs {
+        let mut signs = self.start.clone();
+        let passed = self.changes.iter().take_while(|change| change.0 <= theta);
+        passed.for_each(|&(_, index, sign)| signs[index] = sign);
+        signs
+    }
+
+    /// Does a sign change at `theta` or later?
+    fn has_change_from(&self, theta: f64) -> bool {
+        self.changes.iter().any(|change| change.0 >= theta)
+    }
+
+    /// The ends of the pieces of [0, theta] on which no sign changes; the last one is `theta`.
+    fn ends(&self, theta: f64) -> SmallVec<[f64; 8]> {
+        let mut ends: SmallVec<[f64; 8]> = SmallVec::new();
+        for &(at, ..) in &self.changes {
+            if at > 0.0 && at < theta && ends.last() != Some(&at) {
+                ends.push(at);
+            }
+        }
+        ends.push(theta);
+        ends
+    }
+}
+
+/// What is known of a function where the search begins.
+#[derive(Clone, Copy)]
+struct AtStart {
+    /// The sign before; 0 if there is none to compare with.
+    before: f64,
+    /// The function is zero there, and it has been said.
+    is_known_zero: bool,
 }
 
 impl StepSearch<'_, '_> {
@@ -80,7 +109,8 @@ impl StepSearch<'_, '_> {
     ) -> Result<Option<Vec<(f64, usize)>>, FieldError> {
         self.stepper.extend_cheaply(&self.run.x);
         let found = self.search_user_zeros(events, theta)?;
-        if !is_extended && found.as_ref().is_none_or(|zeros| zeros.is_empty()) {
+        let is_final = self.stepper.extends_freely();
+        if is_final || !is_extended && found.as_ref().is_none_or(|zeros| zeros.is_empty()) {
             return Ok(found);
         }
         self.stepper
@@ -96,50 +126,208 @@ impl StepSearch<'_, '_> {
     ) -> Result<Option<Vec<(f64, usize)>>, FieldError> {
         let mut zeros = Vec::new();
         for index in 0..events.events.len() {
-            if !self.search_zeros_of(events, index, theta, &mut zeros)? {
+            let UserEvent {
+                function,
+                direction,
+                ..
+            } = events.events[index];
+            let Some(changes) = self.changes_of_event(events, index, theta)? else {
                 return Ok(None);
+            };
+            let wanted = |change: &&Change| direction * change.before <= 0.0;
+            zeros.extend(
+                changes
+                    .iter()
+                    .filter(wanted)
+                    .map(|change| (change.at, index)),
+            );
+            if zeros.len() > MOST_ZEROS {
+                return Ok(None);
+            }
+            if events.at_start && events.left[index] == 0.0 {
+                let sign = sign_of(self.user_value(function, 1e-7 * theta)?);
+                if sign != 0.0 && direction * sign >= 0.0 {
+                    zeros.push((0.0, index));
+                }
             }
         }
         Ok(Some(zeros))
     }
 
-    /// The zeros of one function; false if a shorter step is needed.
-    ///
-    /// A piece where the function is finite at some points only is halved, down to the rounding of time, so that all
-    /// of the step is searched where the function is finite; the piece that is left at the edge is not. Where it is
-    /// finite at none of the points it counts as nowhere finite.
-    fn search_zeros_of(
+    /// The changes of sign of a user's function; `None` if a shorter step is needed.
+    fn changes_of_event(
         &mut self,
         events: &UserEvents,
         index: usize,
         theta: f64,
-        zeros: &mut Vec<(f64, usize)>,
-    ) -> Result<bool, FieldError> {
+    ) -> Result<Option<Vec<Change>>, FieldError> {
+        let function = events.events[index].function;
         let (t0, dt) = (self.stepper.interpolant().t0, self.stepper.interpolant().dt);
-        let together = self.together(dt);
-        let UserEvent {
-            function,
-            direction,
-            ..
-        } = events.events[index];
-        let value = events.left[index];
-        let mut start = Start {
-            from: 0.0,
-            divided: events.last[index] == t0 || value == 0.0,
-            sign: side(value),
+        let left = events.left[index];
+        let was_zero = (events.last[index] - t0).abs() <= self.together(dt) * dt;
+        let mut start = AtStart {
+            before: side(left),
+            is_known_zero: left == 0.0 || was_zero,
         };
-        let mut ends = self.sampled_pieces(function, theta);
-        let longest_unknown = match self.stepper.extends_freely() {
-            true => theta / f64::from(PIECES_OF_SERIES),
-            false => theta,
+        let Some(parts) = function.parts() else {
+            let along = Source::Sampled(function);
+            let changes = self.changes_along(along, &Cuts::none(0), theta, start)?;
+            return Ok(changes.map(|found| found.0));
         };
-        if events.at_start && value == 0.0 {
-            let first = ends.last().map_or(theta, |end| *end);
-            let sign = self.user_value(function, 1e-7 * first)?.signum();
-            if sign != 0.0 && direction * sign >= 0.0 {
-                zeros.push((0.0, index));
+        let mut cuts = Cuts::none(parts.n_inner());
+        if parts.n_inner() > 0 {
+            // At a kink or a jump rounding decides what the value there is: what counts is the piece before.
+            start.is_known_zero = was_zero;
+            start.before = match events.sides[index] {
+                0.0 => sign_of(left),
+                side => side,
+            };
+        }
+        for part in 0..parts.n_inner() {
+            if !self.add_cuts(parts, part, &mut cuts, theta)? {
+                return Ok(None);
             }
         }
+        let whole = Source::Part(parts, parts.n_inner());
+        let changes = self.changes_along(whole, &cuts, theta, start)?;
+        if let Some((_, side)) = &changes {
+            events.found_sides.borrow_mut()[index] = *side;
+        }
+        Ok(changes.map(|found| found.0))
+    }
+
+    /// Adds the zeros of a switching function to the cuts; false if a shorter step is needed.
+    fn add_cuts(
+        &mut self,
+        parts: &dyn SmoothParts,
+        part: usize,
+        cuts: &mut Cuts,
+        theta: f64,
+    ) -> Result<bool, FieldError> {
+        let source = Source::Part(parts, part);
+        let end = cuts.ends(theta)[0];
+        let nothing = AtStart {
+            before: 0.0,
+            is_known_zero: false,
+        };
+        let mut ignored = Vec::new();
+        let along = Along::new(source, &cuts.start, self);
+        let start = self.enter(&along, (0.0, end), nothing, &mut ignored)?;
+        cuts.start[part] = start.sign;
+        let known = AtStart {
+            before: start.sign,
+            is_known_zero: start.divided,
+        };
+        let Some((changes, _)) = self.changes_along(source, cuts, theta, known)? else {
+            return Ok(false);
+        };
+        let changes = changes.iter().map(|change| (change.at, part, change.after));
+        cuts.changes.extend(changes);
+        cuts.changes.sort_by(|a, b| a.0.total_cmp(&b.0));
+        Ok(true)
+    }
+
+    /// The start of the search on a piece, and the change of sign there, if the sign before was another one.
+    fn enter(
+        &mut self,
+        along: &Along,
+        (from, to): (f64, f64),
+        before: AtStart,
+        changes: &mut Vec<Change>,
+    ) -> Result<Start, FieldError> {
+        let value = along.value(self, from)?;
+        let size = match to > from {
+            true => along.value(self, to)?.abs().max(value.abs()),
+            false => value.abs(),
+        };
+        let noise = (SURFACE_NOISE * size).max(along.rounding(self, from));
+        let is_zero = before.is_known_zero || value.abs() <= noise;
+        let sign = match is_zero {
+            true if to == from => 0.0,
+            true => sign_of(along.value(self, from + 1e-7 * (to - from))?),
+            false => sign_of(value),
+        };
+        let sign = if sign == 0.0 { before.before } else { sign };
+        if before.before * sign < 0.0 && !before.is_known_zero {
+            changes.push(Change {
+                at: from,
+                before: before.before,
+                after: sign,
+            });
+        }
+        Ok(Start {
+            from,
+            divided: is_zero,
+            sign: side(sign),
+        })
+    }
+
+    /// The changes of sign of one function, and its sign at the end; `None` if a shorter step is needed.
+    ///
+    /// A piece where the function is finite at some points only is halved, down to the rounding of time, so that all
+    /// of the step is searched where the function is finite; the piece that is left at the edge is not. Where it is
+    /// finite at none of the points it counts as nowhere finite.
+    fn changes_along(
+        &mut self,
+        source: Source,
+        cuts: &Cuts,
+        theta: f64,
+        at_start: AtStart,
+    ) -> Result<Option<(Vec<Change>, f64)>, FieldError> {
+        let together = self.together(self.stepper.interpolant().dt);
+        let mut changes = Vec::new();
+        let mut before = at_start;
+        let mut from = 0.0;
+        for to in cuts.ends(theta) {
+            let signs = cuts.signs_behind(from);
+            let along = Along::new(source, &signs, self);
+            let mut start = match along.is_smooth() {
+                true => Start {
+                    from,
+                    divided: before.is_known_zero,
+                    sign: side(before.before),
+                },
+                false => self.enter(&along, (from, to), before, &mut changes)?,
+            };
+            let kink = to < theta || cuts.has_change_from(theta - together);
+            if !self.search_piece_of(&along, &mut start, (to, theta, kink), &mut changes)? {
+                return Ok(None);
+            }
+            before = AtStart {
+                before: start.sign,
+                is_known_zero: false,
+            };
+            from = to;
+        }
+        // A jump at the very end.
+        let is_known = changes.last().is_some_and(|change| change.at == theta);
+        if cuts.has_change_from(before_end(theta)) && !is_known {
+            let along = Along::new(source, &cuts.signs_behind(theta), self);
+            let end = self.enter(&along, (theta, theta), before, &mut changes)?;
+            before.before = end.sign;
+        }
+        Ok(Some((changes, before.before)))
+    }
+
+    /// Searches one piece on which no inner sign changes, up to `to_end`, where one may change (`kink`); `theta` is the end of
+    /// the search. False if a shorter step is needed.
+    fn search_piece_of(
+        &mut self,
+        along: &Along,
+        start: &mut Start,
+        (to_end, theta, kink): (f64, f64, bool),
+        changes: &mut Vec<Change>,
+    ) -> Result<bool, FieldError> {
+        if along.is_clear(*start, to_end) {
+            start.from = to_end;
+            return Ok(true);
+        }
+        let together = self.together(self.stepper.interpolant().dt);
+        let mut ends = self.sampled_pieces(along, start.from, to_end);
+        let longest_unknown = match self.stepper.extends_freely() {
+            true => (to_end - start.from) / f64::from(PIECES_OF_SERIES),
+            false => to_end - start.from,
+        };
         let mut n_cuts = 0;
         while let Some(&to) = ends.last() {
             if n_cuts > MOST_CUTS {
@@ -147,10 +335,13 @@ impl StepSearch<'_, '_> {
             }
             if start.divided {
                 let probe = start.from + 1e-7 * (to - start.from);
-                start.sign = side(self.user_value(function, probe)?);
+                start.sign = match sign_of(along.value(self, probe)?) {
+                    0.0 => start.sign,
+                    sign => sign,
+                };
             }
-            let piece = self.search_user_piece(function, start, to, ends.len() == 1)?;
-            match piece {
+            let is_last = ends.len() == 1 && to_end == theta && along.is_smooth();
+            match self.search_user_piece(along, *start, to, is_last)? {
                 Outcome::Exhausted => return Ok(false),
                 Outcome::Nothing => {
                     (start.from, start.divided) = (to, false);
@@ -167,12 +358,12 @@ impl StepSearch<'_, '_> {
                         n_cuts += 1;
                         ends.push(start.from + 0.5 * length);
                     } else {
-                        start = self.start_at(function, to)?;
+                        *start = self.start_at(along, to, start.sign)?;
                         ends.pop();
                     }
                 }
                 Outcome::Pole(at) => {
-                    start = self.start_at(function, (at + together).min(theta))?;
+                    *start = self.start_at(along, (at + together).min(to_end), start.sign)?;
                     ends.retain(|end| *end > start.from);
                     // Behind it in pieces over which the function does not change by orders of magnitude.
                     let mut length = ends.last().map_or(0.0, |end| end - start.from);
@@ -182,20 +373,25 @@ impl StepSearch<'_, '_> {
                         ends.push(start.from + length);
                     }
                 }
+                // What the sign is beyond the end of the piece tells whether it changes there.
+                Outcome::At(at) if kink && at >= to_end - together => break,
                 Outcome::At(at) => {
                     // A zero at the end of the step is there to the bit: the next step knows it.
-                    let is_last = at >= theta - together;
-                    let at = if is_last { theta } else { at };
-                    if direction * start.sign <= 0.0 {
-                        zeros.push((at, index));
-                    }
-                    if zeros.len() > MOST_ZEROS {
+                    let is_at_end = at >= theta - together;
+                    let at = if is_at_end { theta } else { at };
+                    changes.push(Change {
+                        at,
+                        before: start.sign,
+                        after: -start.sign,
+                    });
+                    if changes.len() > MOST_ZEROS {
                         return Ok(false);
                     }
-                    if at <= start.from || is_last {
+                    let is_stuck = at <= start.from;
+                    (start.from, start.divided, start.sign) = (at, true, -start.sign);
+                    if is_stuck || is_at_end {
                         break;
                     }
-                    (start.from, start.divided) = (at, true);
                     ends.retain(|end| *end > at + together);
                 }
             }
@@ -203,99 +399,50 @@ impl StepSearch<'_, '_> {
         Ok(true)
     }
 
-    /// The ends of the pieces of a step that are searched one after the other, the first one last: a function without
-    /// bounds is sampled, on a long step in pieces.
-    fn sampled_pieces(&self, function: &dyn UserFunction, theta: f64) -> SmallVec<[f64; 16]> {
-        let is_sampled = !function.has_bounds();
-        let n = match is_sampled && self.stepper.extends_freely() {
+    /// The ends of the pieces that are searched one after the other, the first one last: a function without bounds is
+    /// sampled, on a long step in pieces.
+    fn sampled_pieces(&self, along: &Along, from: f64, to: f64) -> SmallVec<[f64; 16]> {
+        let n = match along.is_sampled() && self.stepper.extends_freely() {
             true => PIECES_OF_SERIES,
             false => 1,
         };
-        let end = |k| theta * f64::from(k) / f64::from(n);
+        let end = |k| from + (to - from) * f64::from(k) / f64::from(n);
         (1..=n).rev().map(end).collect()
     }
 
     /// The search goes on from a point that no zero led to.
-    fn start_at(&mut self, function: &dyn UserFunction, from: f64) -> Result<Start, FieldError> {
-        let value = self.user_value(function, from)?;
+    fn start_at(&mut self, along: &Along, from: f64, before: f64) -> Result<Start, FieldError> {
+        let value = along.value(self, from)?;
         Ok(Start {
             from,
             divided: value == 0.0,
-            sign: side(value),
+            sign: match value.is_nan() {
+                true => before,
+                false => value.signum(),
+            },
         })
     }
+}
 
-    /// The first zero up to `to`, which `is_last` says to be the end of the search.
-    fn search_user_piece(
-        &mut self,
-        function: &dyn UserFunction,
-        Start {
-            from,
-            divided,
-            sign,
-        }: Start,
-        to: f64,
-        is_last: bool,
-    ) -> Result<Outcome, FieldError> {
-        let limit = (to - from) * 1e-7;
-        let (interpolant, motion) = (self.stepper.interpolant(), &mut self.run.motion);
-        let q = motion.discrete.clone();
-        let (t0, dt) = (interpolant.t0, interpolant.dt);
-        let mut g = |at: f64| {
-            if !divided {
-                return Ok(sign * value_along(function, interpolant, motion, at)?);
-            }
-            // The zero at the start is divided out; its limit is the difference quotient.
-            let away = (at - from).max(limit);
-            Ok(sign * value_along(function, interpolant, motion, from + away)? / away)
-        };
-        let mut values = [0.0; 5];
-        for (i, value) in values.iter_mut().enumerate() {
-            *value = g(from + (to - from) * 0.25 * i as f64)?;
+impl Cuts {
+    fn none(n: usize) -> Self {
+        Cuts {
+            start: smallvec![0.0; n],
+            changes: SmallVec::new(),
         }
-        if values.iter().any(|v| !v.is_finite()) {
-            let mut everywhere = values.iter().all(|v| !v.is_finite());
-            for probe in PROBES {
-                everywhere = everywhere && !g(from + (to - from) * probe)?.is_finite();
-            }
-            return Ok(Outcome::NotFinite { everywhere });
-        }
-        let margin = &self.detector.margin;
-        let mut bounds = |a: f64, b: f64| {
-            let enclosure = function.enclose(&Tube::new(interpolant, (a, b), margin), &q)?;
-            Some(Bound::new(enclosure, sign, dt))
-        };
-        let evidence = Evidence::Bounds {
-            bounds: &mut bounds,
-            divided: i32::from(divided),
-            patience: UNBOUNDED_DEPTH,
-        };
-        // Rounding of a function whose terms are not known: that of its values.
-        let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-        let noise = SURFACE_NOISE * largest;
-        let isolated = first_zero_sampled(&mut g, from, to, values, noise, evidence)?;
-        if isolated.not_finite {
-            return Ok(Outcome::NotFinite { everywhere: false });
-        }
-        if isolated.exhausted {
-            return Ok(Outcome::Exhausted);
-        }
-        if let Some(Zero::Crossing(bracket)) = isolated.zero {
-            let width = 0.5 * EPS * (t0.abs() / dt).max(1.0);
-            let zero = refine(&mut g, bracket, width)?;
-            // A jump is no larger than the values beside it.
-            let is_pole = POLE * zero.residual > largest;
-            return Ok(match is_pole {
-                true => Outcome::Pole(zero.theta),
-                false => Outcome::At(zero.theta),
-            });
-        }
-        // Zero up to rounding where the motion may end, as a switching function at its switch.
-        let ends_there = is_last && largest > 0.0 && values[4].abs() <= noise;
-        Ok(match ends_there {
-            true => Outcome::At(to),
-            false => Outcome::Nothing,
-        })
+    }
+}
+
+/// A little less.
+fn before_end(theta: f64) -> f64 {
+    theta * (1.0 - f64::EPSILON)
+}
+
+/// -1, 0 or +1; that of a value that does not exist is 0.
+fn sign_of(value: f64) -> f64 {
+    match value == 0.0 || value.is_nan() {
+        true => 0.0,
+        false => value.signum(),
     }
 }
 

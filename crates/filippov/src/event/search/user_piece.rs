@@ -1,0 +1,292 @@
+//! The first zero of a user's function on a piece of a step on which no sign inside of it changes.
+
+use std::cell::RefCell;
+
+use smallvec::{smallvec, SmallVec};
+
+use super::user::value_along;
+use super::StepSearch;
+use crate::error::FieldError;
+use crate::event::certificate::Bound;
+use crate::event::isolate::{first_zero_sampled, Evidence, Zero, PROBES};
+use crate::event::series::{Series, NO_TERMS};
+use crate::event::tube::Tube;
+use crate::event::{SmoothParts, UserFunction};
+use crate::locate::refine;
+use crate::mode::Signs;
+use crate::motion::CurrentMotion;
+use crate::stepper::{powers_of_nested, Basis, Interpolant};
+use crate::system::Setting;
+use crate::tolerances::{EPS, POLE, SURFACE_NOISE, UNBOUNDED_DEPTH};
+
+/// Where the search of a piece has come to.
+#[derive(Clone, Copy)]
+pub(super) struct Start {
+    pub from: f64,
+    /// The function is zero there: it is divided by the distance.
+    pub divided: bool,
+    /// The sign of the function behind it.
+    pub sign: f64,
+}
+
+/// What came of the search of a piece.
+pub(super) enum Outcome {
+    /// There is no zero.
+    Nothing,
+    /// The first zero.
+    At(f64),
+    /// The sign changes first where the function is infinite.
+    Pole(f64),
+    /// The function is not finite at some of the points looked at, or at all of them.
+    NotFinite { everywhere: bool },
+    /// A shorter step is needed.
+    Exhausted,
+}
+
+/// What is searched.
+#[derive(Clone, Copy)]
+pub(super) enum Source<'f> {
+    /// A function of which only values are known.
+    Sampled(&'f dyn UserFunction),
+    /// A part of a function.
+    Part(&'f dyn SmoothParts, usize),
+}
+
+/// A function along a piece of a step.
+pub(super) struct Along<'f> {
+    source: Source<'f>,
+    signs: Signs,
+    /// Its series along the step, if it is affine.
+    series: Option<SmallVec<[f64; 32]>>,
+    /// Room for a state.
+    y: RefCell<SmallVec<[f64; 8]>>,
+}
+
+impl<'f> Along<'f> {
+    pub fn new(source: Source<'f>, signs: &Signs, search: &mut StepSearch) -> Self {
+        let mut along = Along {
+            source,
+            signs: signs.clone(),
+            series: None,
+            y: RefCell::new(smallvec![0.0; search.run.x.len()]),
+        };
+        along.series = along.affine_series(search);
+        along
+    }
+
+    pub fn is_sampled(&self) -> bool {
+        matches!(self.source, Source::Sampled(_))
+    }
+
+    /// Is it a smooth function of a user? Of one in pieces the sign behind the end of a step is asked for in the next one.
+    pub fn is_smooth(&self) -> bool {
+        match self.source {
+            Source::Sampled(_) => true,
+            Source::Part(parts, _) => parts.n_inner() == 0,
+        }
+    }
+
+    /// The value in the step.
+    pub fn value(&self, search: &mut StepSearch, theta: f64) -> Result<f64, FieldError> {
+        self.value_on(search.stepper.interpolant(), &mut search.run.motion, theta)
+    }
+
+    fn value_on(
+        &self,
+        interpolant: &Interpolant,
+        motion: &mut CurrentMotion,
+        theta: f64,
+    ) -> Result<f64, FieldError> {
+        let (parts, part) = match (&self.series, self.source) {
+            (Some(rows), _) => return Ok(Series::new(rows).value(theta)),
+            (None, Source::Sampled(function)) => {
+                return value_along(function, interpolant, motion, theta)
+            }
+            (None, Source::Part(parts, part)) => (parts, part),
+        };
+        let t = interpolant.t0 + theta * interpolant.dt;
+        let mut y = self.y.borrow_mut();
+        interpolant.at(theta, &mut y);
+        motion.project(t, &mut y)?;
+        let setting = Setting::new(&self.signs, &motion.discrete);
+        Ok(parts.value(part, &setting.at(t, &y)))
+    }
+
+    /// An affine function is a polynomial along the step, unless the motion is drawn back to a curved surface.
+    fn affine_series(&self, search: &mut StepSearch) -> Option<SmallVec<[f64; 32]>> {
+        let Source::Part(parts, part) = self.source else {
+            return None;
+        };
+        let affine = parts
+            .affine(part)
+            .filter(|_| search.run.motion.is_straight)?;
+        let start = self.value(search, 0.0).ok()?;
+        let interpolant = search.stepper.interpolant();
+        let n = interpolant.n_states();
+        let rows = interpolant.coefficients().chunks_exact(n);
+        let slopes = || affine.slopes.iter();
+        let row = |row: &[f64]| slopes().map(|&(i, c)| c * row[i as usize]).sum();
+        let mut series: SmallVec<[f64; 32]> = rows.map(row).collect();
+        if series.len() < 2 || series.len() > NO_TERMS.len() {
+            return None;
+        }
+        series[0] = start;
+        series[1] += affine.of_time * interpolant.dt;
+        if interpolant.basis() == Basis::Nested {
+            powers_of_nested(&mut series);
+        }
+        Some(series)
+    }
+
+    /// Does the series tell at once that there is no zero behind the start, up to `to`?
+    pub fn is_clear(&self, start: Start, to: f64) -> bool {
+        let Some(rows) = &self.series else {
+            return false;
+        };
+        let series = Series::new(rows);
+        if start.divided {
+            // It rises or falls throughout.
+            return !series.bound(start.from, to).slope.contains_zero();
+        }
+        let size: f64 = rows.iter().map(|c| c.abs()).sum();
+        start.from == 0.0 && series.has_sign(start.sign, SURFACE_NOISE * size)
+    }
+
+    /// The only zero in the step, from its start on, if the series has one that is far from rounding.
+    fn only_zero(&self, search: &StepSearch, from: f64, divided: bool, sign: f64) -> Option<f64> {
+        let rows = self.series.as_ref().filter(|_| from == 0.0 && !divided)?;
+        let signed: SmallVec<[f64; 32]> = rows.iter().map(|c| sign * c).collect();
+        let series = Series::new(&signed);
+        let size: f64 = rows.iter().map(|c| c.abs()).sum();
+        let noise = SURFACE_NOISE * size;
+        let [left, right] = series.ends();
+        if left <= noise || right >= -noise || series.bound(0.0, 1.0).slope.hi >= 0.0 {
+            return None;
+        }
+        let interpolant = search.stepper.interpolant();
+        let width = 0.5 * EPS * (interpolant.t0.abs() / interpolant.dt).max(1.0);
+        let (at, _) = series.only_zero((0.0, 1.0), left / (left - right), width);
+        Some(at)
+    }
+
+    /// How well the function is known at a point of the step; 0 for a smooth one, of which its values tell.
+    pub fn rounding(&self, search: &StepSearch, theta: f64) -> f64 {
+        if self.is_smooth() {
+            return 0.0;
+        }
+        let (interpolant, motion) = (search.stepper.interpolant(), &search.run.motion);
+        let (margin, q) = (&search.detector.margin, &motion.discrete);
+        let bound = self.bound(interpolant, margin, q, (theta, theta), 1.0);
+        bound.map_or(0.0, |bound| bound.value.hi - bound.value.lo)
+    }
+
+    /// Bounds on a piece, of the function times `sign`.
+    fn bound(
+        &self,
+        interpolant: &Interpolant,
+        margin: &[f64],
+        q: &[f64],
+        (a, b): (f64, f64),
+        sign: f64,
+    ) -> Option<Bound> {
+        let (parts, part) = match (&self.series, self.source) {
+            (_, Source::Sampled(_)) => return None,
+            (Some(rows), _) => {
+                let Bound { value, slope } = Series::new(rows).bound(a, b);
+                return Some(Bound {
+                    value: value.scaled(sign),
+                    slope: slope.scaled(sign),
+                });
+            }
+            (None, Source::Part(parts, part)) => (parts, part),
+        };
+        let tube = Tube::new(interpolant, (a, b), margin);
+        let enclosure = parts.enclose(part, &tube, Setting::new(&self.signs, q));
+        Some(Bound::new(enclosure, sign, interpolant.dt))
+    }
+}
+
+impl StepSearch<'_, '_> {
+    /// The first zero up to `to`, which `is_last` says to be the end of the search.
+    pub(super) fn search_user_piece(
+        &mut self,
+        along: &Along,
+        Start {
+            from,
+            divided,
+            sign,
+        }: Start,
+        to: f64,
+        is_last: bool,
+    ) -> Result<Outcome, FieldError> {
+        let expected = along.only_zero(self, from, divided, sign);
+        // One at the end of the search needs a closer look.
+        let beside = self.together(self.stepper.interpolant().dt);
+        if let Some(at) = expected.filter(|at| (at - to).abs() > 4.0 * beside) {
+            return Ok(match at < to {
+                true => Outcome::At(at),
+                false => Outcome::Nothing,
+            });
+        }
+        let limit = (to - from) * 1e-7;
+        let rounding = along.rounding(self, from);
+        let (interpolant, motion) = (self.stepper.interpolant(), &mut self.run.motion);
+        let q = motion.discrete.clone();
+        let (t0, dt) = (interpolant.t0, interpolant.dt);
+        let mut g = |at: f64| {
+            if !divided {
+                return Ok(sign * along.value_on(interpolant, motion, at)?);
+            }
+            // The zero at the start is divided out; its limit is the difference quotient.
+            let away = (at - from).max(limit);
+            Ok(sign * along.value_on(interpolant, motion, from + away)? / away)
+        };
+        let mut values = [0.0; 5];
+        for (i, value) in values.iter_mut().enumerate() {
+            *value = g(from + (to - from) * 0.25 * i as f64)?;
+        }
+        if values.iter().any(|v| !v.is_finite()) {
+            let mut everywhere = values.iter().all(|v| !v.is_finite());
+            for probe in PROBES {
+                everywhere = everywhere && !g(from + (to - from) * probe)?.is_finite();
+            }
+            return Ok(Outcome::NotFinite { everywhere });
+        }
+        let margin = &self.detector.margin;
+        let mut bounds = |a: f64, b: f64| along.bound(interpolant, margin, &q, (a, b), sign);
+        let evidence = Evidence::Bounds {
+            bounds: &mut bounds,
+            divided: i32::from(divided),
+            patience: UNBOUNDED_DEPTH,
+        };
+        // Rounding of a function whose terms are not known: that of its values.
+        let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        let noise = (SURFACE_NOISE * largest).max(match divided {
+            true => 0.0,
+            false => rounding,
+        });
+        let isolated = first_zero_sampled(&mut g, from, to, values, noise, evidence)?;
+        if isolated.not_finite {
+            return Ok(Outcome::NotFinite { everywhere: false });
+        }
+        if isolated.exhausted {
+            return Ok(Outcome::Exhausted);
+        }
+        if let Some(Zero::Crossing(bracket)) = isolated.zero {
+            let width = 0.5 * EPS * (t0.abs() / dt).max(1.0);
+            let zero = refine(&mut g, bracket, width)?;
+            // A jump is no larger than the values beside it.
+            let is_pole = POLE * zero.residual > largest;
+            return Ok(match is_pole {
+                true => Outcome::Pole(zero.theta),
+                false => Outcome::At(zero.theta),
+            });
+        }
+        // Zero up to rounding where the motion may end, as a switching function at its switch.
+        let ends_there = is_last && largest > 0.0 && values[4].abs() <= noise;
+        Ok(match ends_there {
+            true => Outcome::At(to),
+            false => Outcome::Nothing,
+        })
+    }
+}
