@@ -345,10 +345,14 @@ fn contact_at(at: &Point, j: usize, mode: &Mode) -> Result<Touching, FieldError>
     }
     let usual = impact.impulse(at.x)?;
     if moves {
-        return Ok(match impact.changes_normal_velocity(&usual) {
-            true => Touching::WithFriction(action.name.clone()),
-            false => Touching::NoContact,
-        });
+        let leaves_speed = dot(&shift, &impact.normal).abs()
+            <= FRICTION_IN_MAP * (dot(&shift, &shift) * dot(&impact.normal, &impact.normal)).sqrt();
+        return Ok(
+            match leaves_speed && impact.changes_normal_velocity(&usual) {
+                true => Touching::WithFriction(action.name.clone()),
+                false => Touching::NoContact,
+            },
+        );
     }
     let resting = mode.with(j, 0);
     let mut sides = at.arrival.sides.to_vec();

@@ -6,13 +6,11 @@
 
 use smallvec::{smallvec, SmallVec};
 
-use super::user_piece::{Along, Outcome, Source, Start};
+use super::user_piece::{value_along, Along, Outcome, Source, Start};
 use super::StepSearch;
 use crate::error::FieldError;
 use crate::event::{SmoothParts, UserEvent, UserEvents, UserFunction};
 use crate::mode::Signs;
-use crate::motion::CurrentMotion;
-use crate::stepper::Interpolant;
 use crate::tolerances::{MOST_CUTS, MOST_ZEROS, PIECES_OF_SERIES, SURFACE_NOISE};
 
 impl StepSearch<'_, '_> {
@@ -29,20 +27,6 @@ impl StepSearch<'_, '_> {
             theta,
         )
     }
-}
-
-/// The value of a user's function along the motion.
-pub(super) fn value_along(
-    function: &dyn UserFunction,
-    interpolant: &Interpolant,
-    motion: &mut CurrentMotion,
-    theta: f64,
-) -> Result<f64, FieldError> {
-    let t = interpolant.t0 + theta * interpolant.dt;
-    let mut y: SmallVec<[f64; 8]> = smallvec![0.0; interpolant.n_states()];
-    interpolant.at(theta, &mut y);
-    motion.project(t, &mut y)?;
-    function.value(t, &y, &motion.discrete)
 }
 
 /// A change of the sign of a function.

@@ -4,7 +4,6 @@ use std::cell::RefCell;
 
 use smallvec::{smallvec, SmallVec};
 
-use super::user::value_along;
 use super::StepSearch;
 use crate::error::FieldError;
 use crate::event::certificate::Bound;
@@ -18,6 +17,20 @@ use crate::motion::CurrentMotion;
 use crate::stepper::{powers_of_nested, Basis, Interpolant};
 use crate::system::Setting;
 use crate::tolerances::{EPS, POLE, SURFACE_NOISE, UNBOUNDED_DEPTH};
+
+/// The value of a user's function along the motion.
+pub(super) fn value_along(
+    function: &dyn UserFunction,
+    interpolant: &Interpolant,
+    motion: &mut CurrentMotion,
+    theta: f64,
+) -> Result<f64, FieldError> {
+    let t = interpolant.t0 + theta * interpolant.dt;
+    let mut y: SmallVec<[f64; 8]> = smallvec![0.0; interpolant.n_states()];
+    interpolant.at(theta, &mut y);
+    motion.project(t, &mut y)?;
+    function.value(t, &y, &motion.discrete)
+}
 
 /// Where the search of a piece has come to.
 #[derive(Clone, Copy)]
