@@ -26,7 +26,8 @@ NAN, INF = float("nan"), float("inf")
 
 
 @pytest.mark.parametrize(
-    "y0", [[], [[1.0]], 1.0, [NAN], [INF], [1j], "abc", ["a"], [[1.0], [1.0, 2.0]], [None], None]
+    "y0",
+    [[], [[1.0]], 1.0, [NAN], [INF], [1j], "abc", ["a"], [[1.0], [1.0, 2.0]], [None], None, ["1"], [10**400]],
 )
 def test_y0(y0: Any) -> None:
     with pytest.raises(fl.InputError, match=r"^y0:"):
@@ -95,6 +96,8 @@ def test_positive_numbers(name: str, value: Any) -> None:
 def test_whole_numbers(name: str) -> None:
     with pytest.raises(fl.InputError, match=rf"^{name}:"):
         fl.solve_ivp(relay, (0, 1), [1.0], **{name: 10.5})
+    with pytest.raises(fl.InputError, match=rf"^{name}:"):
+        fl.solve_ivp(relay, (0, 1), [1.0], **{name: 2**70})
 
 
 def test_first_step_longer_than_the_interval() -> None:
@@ -151,6 +154,18 @@ def test_keywords_that_only_scipy_has() -> None:
 def test_fun(fun: Any) -> None:
     with pytest.raises(fl.InputError, match=r"^fun:"):
         fl.solve_ivp(fun, (0, 1), [1.0])
+
+
+@pytest.mark.parametrize("value", [{1.0: 2.0}, {1.0}, iter([1.0])])
+def test_a_return_of_fun_that_has_no_order_is_refused(value: Any) -> None:
+    with pytest.raises(fl.ModelError, match=f"returned a {type(value).__name__}"):
+        fl.solve_ivp(lambda t, x: value, (0, 1), [1.0])
+
+
+def test_a_time_beyond_all_numbers() -> None:
+    sol = fl.solve_ivp(relay, (0, 1), [1.0])
+    with pytest.raises(fl.InputError, match="t: a number"):
+        sol.sol(10**400)
 
 
 @pytest.mark.parametrize("value", [None, [1.0, 2.0], [[1.0]], "a", ["a"]])

@@ -39,9 +39,11 @@ def real_array(value: Any, name: str, needed: str = "an array of real numbers") 
     refuse_masked(value, name)
     try:
         array = np.array(value)
+        if array.dtype.kind in "USmM":
+            raise TypeError
         if array.dtype.kind not in "fiubc":
             array = array.astype(np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{name}: {needed} is needed, not {value!r}") from None
     if array.dtype.kind == "c":
         raise InputError(f"{name}: {needed} is needed, not complex numbers")

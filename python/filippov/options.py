@@ -203,8 +203,10 @@ def check_y0(y0: Any, name: str = "y0") -> Array:
         )
     if state.dtype.kind not in "fiub":
         try:
+            if state.dtype.kind in "USmM":
+                raise TypeError
             state = state.astype(float)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise InputError(f"{name}: a sequence of n real numbers is needed, not {y0!r}") from None
     if state.ndim != 1:
         hint = f"; use [{name}]" if state.ndim == 0 else ""

@@ -9,6 +9,9 @@ import numpy as np
 
 from filippov.errors import InputError
 
+# The core counts with 64 bits.
+LARGEST_COUNT = 2.0**63
+
 __all__ = ["count", "positive", "real"]
 
 
@@ -21,7 +24,7 @@ def count(name: str, value: Any) -> int:
         If `value` is none.
     """
     number = _real_or_nan(value)
-    if not (math.isfinite(number) and number > 0 and number == int(number)):
+    if not (0 < number < LARGEST_COUNT and number == int(number)):
         raise InputError(f"{name}: a positive whole number is needed, not {value!r}")
     return int(number)
 
@@ -44,7 +47,7 @@ def _real_or_nan(value: Any) -> float:
     """Return a real number; NaN for what is none."""
     try:
         return real(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return math.nan
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from filippov._core import Run
+from filippov.arrays import real_array
 from filippov.backward import ReversedRun
 from filippov.modes import Mode
 from filippov.prepare import Prepared
@@ -70,7 +71,7 @@ class DenseSolution:
         ValueError
             If a time is outside of the interval, or `side` is unknown.
         """
-        times = np.asarray(t, dtype=np.float64)
+        times = real_array(t, "t", "a number or a one-dimensional array")
         if times.ndim > 1:
             raise ValueError(f"t: a number or a one-dimensional array is needed, not shape {times.shape}")
         if side not in ("right", "left"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from dataclasses import field as member
 from typing import TYPE_CHECKING, Any
@@ -395,6 +395,10 @@ def _nodes(tracer: Tracer, result: Any, role: str, n: int | None) -> list[int]:
         raise ModelError(
             f"{role} returned an array of shape {result.shape} for a state of {n}: return shape ({n},), "
             "for example with .ravel()"
+        )
+    if isinstance(result, (Mapping, Set, str, bytes, Iterator)):
+        raise ModelError(
+            f"{role} returned a {type(result).__name__}: return a list or an array of {n} numbers"
         )
     values = list(result)
     if len(values) != n:
