@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import os
 import random
 import signal
@@ -253,7 +254,7 @@ def test_a_place_that_cannot_be_written_is_named(
         relays(Path(path))
 
 
-def test_a_damaged_chunk_is_named_and_can_be_computed_again(tmp_path: Path) -> None:
+def test_a_damaged_chunk_is_named_and_computed_again(tmp_path: Path) -> None:
     expected = relays(tmp_path / "whole")
     store = tmp_path / "runs"
     assert relays(store, part=(0, 2)) is None
@@ -261,10 +262,63 @@ def test_a_damaged_chunk_is_named_and_can_be_computed_again(tmp_path: Path) -> N
     whole = chunk.read_bytes()
     for damage in (b"", whole[: len(whole) // 2], b"nonsense" * 100, whole[:200] + b"x" * 50 + whole[250:]):
         chunk.write_bytes(damage)
-        with pytest.raises(fl.InputError, match=r"^store: .*000000.npz is damaged .*; remove it"):
-            relays(store)
-    chunk.unlink()
+        with pytest.warns(fl.FilippovWarning, match=r"^store: .*000000.npz is damaged .* computed again"):
+            assert relays(store, part=(0, 2)) is None
+        assert chunk.read_bytes() == whole
     assert relays(store).identical(expected)
+
+
+def test_flipped_bits_of_chunks_change_nothing(tmp_path: Path) -> None:
+    expected = relays(tmp_path / "whole")
+    rng = np.random.default_rng(1)
+    for k in range(40):
+        store = tmp_path / f"runs{k}"
+        assert relays(store, part=(0, 2)) is None
+        chunk = store / "chunks" / "000002.npz"
+        data = bytearray(chunk.read_bytes())
+        data[rng.integers(len(data))] ^= 1 << int(rng.integers(8))
+        chunk.write_bytes(bytes(data))
+        with pytest.warns(fl.FilippovWarning, match="000002.npz is damaged"):
+            assert relays(store).identical(expected)
+
+
+def test_flipped_bits_of_a_result_are_named(tmp_path: Path) -> None:
+    store = tmp_path / "runs"
+    relays(store)
+    rng = np.random.default_rng(2)
+    files = sorted(file for file in store.rglob("*") if file.is_file())
+    for file in files:
+        whole = file.read_bytes()
+        for _ in range(3):
+            data = bytearray(whole)
+            data[rng.integers(len(data))] ^= 1 << int(rng.integers(7))
+            file.write_bytes(bytes(data))
+            with pytest.raises(fl.InputError, match=r"^store: "):
+                fl.open_sweep(store)
+        file.unlink()
+        with pytest.raises(fl.InputError, match=r"^store: "):
+            fl.open_sweep(store)
+        file.write_bytes(whole)
+    assert fl.open_sweep(store).sizes["a"] == 40
+
+
+@pytest.mark.parametrize("name", ["chunk_size", "n_points", "identity"])
+@pytest.mark.parametrize("value", [None, -1, 0, "text", [1]])
+def test_a_plan_with_odd_values_is_named(name: str, value: Any, tmp_path: Path) -> None:
+    store = tmp_path / "runs"
+    assert relays(store, part=(0, 2)) is None
+    plan = json.loads((store / "plan.json").read_text())
+    (store / "plan.json").write_text(json.dumps({**plan, name: value}))
+    with pytest.raises(fl.InputError, match=r"plan.json is damaged"):
+        relays(store)
+    (store / "plan.json").write_text("null")
+    with pytest.raises(fl.InputError, match=r"plan.json is damaged"):
+        relays(store)
+
+
+def test_a_path_with_a_null_character_is_named() -> None:
+    with pytest.raises(fl.InputError, match=r"^store: .* null character"):
+        relays(Path("a\0b"))
 
 
 def test_a_chunk_of_another_sweep_is_named(tmp_path: Path) -> None:
@@ -284,5 +338,5 @@ def test_a_damaged_result_is_named(tmp_path: Path) -> None:
         with pytest.raises(fl.InputError, match=r"^store: .*runs.* damaged"):
             call()
     (store / "zarr.json").write_text('{"zarr_format": 3, "node_type": "group", "attributes": {}}')
-    with pytest.raises(fl.InputError, match=r"^store: .*runs is damaged"):
+    with pytest.raises(fl.InputError, match=r"^store: .*runs.* is damaged"):
         fl.open_sweep(store)

@@ -3,10 +3,11 @@
 A store is a folder. While the sweep goes on::
 
     plan.json            what the sweep follows from, and the number of points of a chunk
-    chunks/000042.npz    the table of a finished chunk, in one file
+    chunks/000042.npz    the table of a finished chunk, in one file, with its checksum at the end
 
 and in the end a Zarr group, which any program for Zarr can read: the arrays are moved there, then
-``zarr.json``, then what is above is removed.
+``zarr.json``, in whose attributes are the checksums of all files, then what is above is removed. What is
+damaged is never read: a chunk is computed again, a result is refused.
 
 A chunk is written beside its place, brought to the disk, and renamed: it is there as a whole or not at all,
 however a process ends. Nothing else says that a chunk is finished, so that nothing can disagree.
@@ -21,6 +22,7 @@ import sys
 import uuid
 from collections.abc import Mapping
 from hashlib import sha256
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -33,11 +35,16 @@ from filippov.analysis.optional import need
 from filippov.analysis.plan import Plan
 from filippov.analysis.points import COLUMNS, Table
 from filippov.analysis.schedule import Progress, run_pieces
+from filippov.caution import warn_user
 from filippov.errors import InputError, Interrupted
 
 __all__ = ["Store", "open_sweep", "run_with_store"]
 
-_VERSION = 2
+_VERSION = 3
+# The attribute that has the digests of all files of the result, by name.
+_CHECKSUMS = "filippov_checksums"
+# Bytes of a digest, at the end of each chunk.
+_DIGEST = 32
 # The attribute of the result that has the plan.
 _RECORD = "filippov_sweep"
 # Rows of the ragged arrays that are written at once: what the memory of the last step is bounded by.
@@ -57,6 +64,8 @@ class Store:
             self.path = Path(path)
         except TypeError:
             raise InputError(f"store: the path of a folder is needed, not {path!r}") from None
+        if "\0" in str(self.path):
+            raise InputError(f"store: {str(self.path)!r} is no path: it has a null character")
         if self.path.exists() and not self.path.is_dir():
             raise InputError(f"store: {self.path} is a file; the path of a folder is needed")
         self._digest = ""
@@ -98,7 +107,7 @@ class Store:
             }
             self._write(file, (json.dumps(new, indent=1) + "\n").encode())
         record = self.record()
-        if record is None or record.get("version") != _VERSION:
+        if record is None or record.get("version") != _VERSION or not _is_plan(record):
             raise InputError(
                 f"store: {self.path} holds no sweep, or one of another version of filippov, or its "
                 f"{'zarr.json' if self.is_whole else 'plan.json'} is damaged; give another folder"
@@ -121,7 +130,7 @@ class Store:
                 group = json.loads((self.path / "zarr.json").read_text(encoding="utf-8"))
                 return dict(json.loads(group["attributes"][_RECORD]))
             return dict(json.loads((self.path / "plan.json").read_text(encoding="utf-8")))
-        except (OSError, KeyError, ValueError):
+        except (OSError, KeyError, ValueError, TypeError):
             return None
 
     def _is_begun(self) -> bool:
@@ -147,10 +156,22 @@ class Store:
         columns["messages"] = np.frombuffer(json.dumps(texts).encode(), dtype=np.uint8)
         columns["carry"] = carry
         columns["sweep"] = np.array(self._digest)
-        partial = self._partial(".npz")
-        with open(partial, "wb") as file:
-            np.savez(file, **columns)  # type: ignore[arg-type]
-        self._place(partial, self._chunk(index))
+        buffer = BytesIO()
+        np.savez(buffer, **columns)  # type: ignore[arg-type]
+        data = buffer.getvalue()
+        self._write(self._chunk(index), data + sha256(data).digest())
+
+    def discard_damaged(self) -> None:
+        """Remove the finished chunks that are damaged, with a warning: their points are computed again."""
+        texts = []
+        for index in sorted(self.finished()):
+            path = self._chunk(index)
+            try:
+                self._read(path, ("row_size",))
+            except (OSError, EOFError, KeyError, ValueError, BadZipFile) as error:
+                texts.append(f"store: {path} is damaged ({error}): its points are computed again")
+                path.unlink(missing_ok=True)
+        warn_user(texts)
 
     def read(self, index: int, *names: str) -> Table:
         """Return some columns of a finished chunk, all by default.
@@ -176,7 +197,11 @@ class Store:
         return table
 
     def _read(self, path: Path, names: tuple[str, ...]) -> tuple[Table, str]:
-        with open(path, "rb") as raw, np.load(raw, allow_pickle=False) as file:
+        data = path.read_bytes()
+        data, digest = data[:-_DIGEST], data[-_DIGEST:]
+        if sha256(data).digest() != digest:
+            raise ValueError("its checksum differs")
+        with np.load(BytesIO(data), allow_pickle=False) as file:
             sweep = str(file["sweep"])
             table = {name: file[name] for name in names or (*COLUMNS, "carry")}
             if "message" in table:
@@ -233,7 +258,35 @@ class Store:
                 writer.add(variable.values(table))
         for writer in writers:
             writer.flush()
+        files = {str(file.relative_to(partial)): file for file in partial.rglob("*") if file.is_file()}
+        digests = {name: sha256(files[name].read_bytes()).hexdigest() for name in sorted(files)}
+        digests["zarr.json"] = _digest_of(json.loads(files["zarr.json"].read_text(encoding="utf-8")))
+        group.update_attributes({_CHECKSUMS: json.dumps(digests)})
         self._publish(partial)
+
+    def check(self) -> None:
+        """Compare the files of the result with their checksums.
+
+        Raises
+        ------
+        InputError
+            If one is damaged, or missing.
+        """
+        damaged = self.path / "zarr.json"
+        try:
+            group = json.loads(damaged.read_text(encoding="utf-8"))
+            digests = json.loads(group["attributes"].pop(_CHECKSUMS))
+            if _digest_of(group) != digests.pop("zarr.json"):
+                raise ValueError("its checksum differs")
+            for name, digest in digests.items():
+                damaged = self.path / name
+                if sha256(damaged.read_bytes()).hexdigest() != digest:
+                    raise ValueError("its checksum differs")
+        except (OSError, ValueError, AttributeError, KeyError, TypeError) as error:
+            raise InputError(
+                f"store: {damaged} is damaged ({error}), or {self.path} is no store of a sweep; remove the "
+                "folder, and the same call of the sweep computes it again"
+            ) from None
 
     def _publish(self, partial: Path) -> None:
         """Move the result to its place, what says that it is there last."""
@@ -273,6 +326,18 @@ class Store:
         with open(partial, "rb+") as file:
             os.fsync(file.fileno())
         os.replace(partial, target)
+
+
+def _is_plan(record: dict[str, Any]) -> bool:
+    """Whether what was taken down of a plan has the types of one."""
+    numbers = [record.get("n_points"), record.get("chunk_size")]
+    are_counts = all(type(number) is int and number > 0 for number in numbers)
+    return are_counts and isinstance(record.get("identity"), dict)
+
+
+def _digest_of(group: Any) -> str:
+    """Return the digest of what describes a Zarr group, without its checksums."""
+    return sha256(json.dumps(group, sort_keys=True).encode()).hexdigest()
 
 
 class _Writer:
@@ -323,6 +388,7 @@ def run_with_store(
     store = Store(path)
     size = store.begin(plan, chunk_size)
     if not store.is_whole:
+        store.discard_damaged()
         pieces = plan.pieces(size)
         finished = store.finished()
         k, m = part
@@ -392,12 +458,13 @@ def open_sweep(path: Any, chunks: Mapping[str, int] | str | None = None) -> Any:
                 "the same arguments to go on"
             )
         raise InputError(f"store: there is no sweep in {store.path}")
+    store.check()
     # Times are numbers here, whatever their units.
     try:
         found = xarray.open_zarr(
             store.path, chunks=chunks, consolidated=False, decode_times=False, decode_timedelta=False
         )
-        del found.attrs[_RECORD]
+        del found.attrs[_RECORD], found.attrs[_CHECKSUMS]
     except (OSError, KeyError, ValueError, TypeError) as error:
         text = f"{type(error).__name__}: {error}"
         raise InputError(f"store: {store.path} is damaged, or no store of a sweep ({text})") from error
