@@ -15,6 +15,7 @@ __all__ = [
     "Run",
     "RunOptions",
     "SignedSystem",
+    "TracedEvent",
     "TracedSystem",
     "__version__",
     "classify",

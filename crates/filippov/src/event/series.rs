@@ -80,6 +80,15 @@ impl<'a> Series<'a> {
         b.iter().all(|&b| b > margin + first.rest)
     }
 
+    /// Does it change its sign exactly once on [0, 1]? By Descartes' rule, where all Bernstein coefficients are clear of `margin`.
+    pub fn has_one_zero(&self, margin: f64) -> bool {
+        let mut coefficients = NO_TERMS;
+        let b = &mut coefficients[..self.0.len()];
+        to_bernstein(self.0, b);
+        let n_changes = b.windows(2).filter(|pair| pair[0] * pair[1] < 0.0).count();
+        n_changes == 1 && b.iter().all(|b| b.abs() > margin)
+    }
+
     /// Is it beyond `margin` on the side of this sign, on [0, 1]?
     pub fn has_sign(&self, sign: f64, margin: f64) -> bool {
         if sign > 0.0 {

@@ -157,11 +157,12 @@ impl<'f> Along<'f> {
             return false;
         };
         let series = Series::new(rows);
-        if start.divided {
-            // It rises or falls throughout.
-            return !series.bound(start.from, to).slope.contains_zero();
-        }
         let size: f64 = rows.iter().map(|c| c.abs()).sum();
+        if start.divided {
+            // The zero at the start of the search is the only one, or the function rises or falls throughout.
+            return start.from > 0.0 && series.has_one_zero(SURFACE_NOISE * size)
+                || !series.bound(start.from, to).slope.contains_zero();
+        }
         start.from == 0.0 && series.has_sign(start.sign, SURFACE_NOISE * size)
     }
 
@@ -173,7 +174,7 @@ impl<'f> Along<'f> {
         let size: f64 = rows.iter().map(|c| c.abs()).sum();
         let noise = SURFACE_NOISE * size;
         let [left, right] = series.ends();
-        if left <= noise || right >= -noise || series.bound(0.0, 1.0).slope.hi >= 0.0 {
+        if left <= noise || right >= -noise || !series.has_one_zero(noise) {
             return None;
         }
         let interpolant = search.stepper.interpolant();
