@@ -247,10 +247,6 @@ impl StepSearch<'_, '_> {
     }
 
     /// The changes of sign of one function, and its sign at the end; `None` if a shorter step is needed.
-    ///
-    /// A piece where the function is finite at some points only is halved, down to the rounding of time, so that all
-    /// of the step is searched where the function is finite; the piece that is left at the edge is not. Where it is
-    /// finite at none of the points it counts as nowhere finite.
     fn changes_along(
         &mut self,
         source: Source,
@@ -295,6 +291,10 @@ impl StepSearch<'_, '_> {
 
     /// Searches one piece on which no inner sign changes, up to `to_end`, where one may change (`kink`); `theta` is the end of
     /// the search. False if a shorter step is needed.
+    ///
+    /// A piece where the function is finite at some points only is halved, down to the rounding of time, so that all
+    /// of the step is searched where the function is finite; the piece that is left at the edge is not. Where it is
+    /// finite at none of the points it counts as nowhere finite.
     fn search_piece_of(
         &mut self,
         along: &Along,
