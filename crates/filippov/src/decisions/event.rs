@@ -45,13 +45,22 @@ pub(crate) fn vanishing_surfaces(at: &Point, notes: &mut Notes) -> Result<Reache
         surfaces: located_surfaces(at.arrival.functions()),
         before: at.arrival.mode.clone(),
     };
-    if only_located_matter(at.arrival, &reached.surfaces) {
-        return Ok(reached);
+    if !only_located_matter(at.arrival, &reached.surfaces) {
+        look_at_all_surfaces(at, notes, &mut reached)?;
     }
-    let h = at.surface_values(notes, at.arrival.signs)?;
+    Ok(reached)
+}
+
+/// Adds to what was reached what else vanishes there, and gives surfaces that do not matter the sides of the place.
+#[inline(never)]
+fn look_at_all_surfaces(
+    at: &Point,
+    notes: &mut Notes,
+    reached: &mut Reached,
+) -> Result<(), FieldError> {
+    let mut h = at.surface_values(notes, at.arrival.signs)?;
     add_vanishing_surfaces(at, &mut reached.surfaces, &h)?;
     // The functions of those that do not matter may contain signs of others that do not.
-    let mut h = h;
     let mut is_new = set_sides_of_inactive(at, &mut reached.before, &h);
     for _ in 0..h.len() {
         if !is_new || !at.system.has_nested_signs() {
@@ -60,8 +69,7 @@ pub(crate) fn vanishing_surfaces(at: &Point, notes: &mut Notes) -> Result<Reache
         h = at.surface_values(notes, &reached.before.signs())?;
         is_new = set_sides_of_inactive(at, &mut reached.before, &h);
     }
-    add_inactive_that_begin_to_matter(at, &mut reached, &h)?;
-    Ok(reached)
+    add_inactive_that_begin_to_matter(at, reached, &h)
 }
 
 /// Adds the surfaces that the point lies on, that did not matter before, and that do on another side of those reached.
