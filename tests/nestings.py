@@ -104,15 +104,19 @@ def source_of(seed: int) -> str:
     return f"def f(t, x):\n    return {maker.scalar(maker.random.choice([2, 3]))}\n"
 
 
-def check(seed: int) -> Outcome:
-    """Compare the function of this seed with a run."""
+def _made(seed: int) -> tuple[Any, Any, Any, np.random.Generator]:
+    """Return function, velocity and start of this seed, and a generator of the numbers that follow."""
     names: dict[str, Any] = {"np": np}
     exec(source_of(seed), names)
-    f = names["f"]
     rng = np.random.default_rng(seed)
-    # Along no line is one of the terms zero all the time, where every side is as good as the other.
     velocity = np.array([1.0, rng.choice([-1.0, -0.5, 0.25])])
     start = np.array([rng.choice([-2.0, -1.0, -0.375]), rng.choice([-1.0, 0.125, 1.0])])
+    return names["f"], velocity, start, rng
+
+
+def check(seed: int) -> Outcome:
+    """Compare the function of this seed with a run."""
+    f, velocity, start, rng = _made(seed)
 
     def line(t: float) -> Any:
         return start + velocity * t
@@ -156,12 +160,7 @@ def check_event(seed: int) -> Outcome:
     Between two points with signs there are as many zeros as changes of sign, up to an even number; and the
     sign changes at each zero that was found.
     """
-    names: dict[str, Any] = {"np": np}
-    exec(source_of(seed), names)
-    g = names["f"]
-    rng = np.random.default_rng(seed)
-    velocity = np.array([1.0, rng.choice([-1.0, -0.5, 0.25])])
-    start = np.array([rng.choice([-2.0, -1.0, -0.375]), rng.choice([-1.0, 0.125, 1.0])])
+    g, velocity, start, rng = _made(seed)
     offset = rng.choice([0.0, 0.375, -0.5])
     method, rtol = METHODS[seed % 4], 10.0 ** -int(rng.integers(4, 11))
 

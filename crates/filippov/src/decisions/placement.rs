@@ -70,8 +70,8 @@ fn take_sides(
     Ok(Ok(next))
 }
 
-/// The side of every surface at the current point; a surface that the point lies on has the side of the mode
-/// before, or that which rounding says. Returns `None` if a switching function is NaN and its sign matters.
+/// Finds the side of every surface at the current point. A surface that the point lies on keeps the side that it has in `memory`;
+/// without one, rounding decides. Returns `None` if a switching function is NaN and its sign matters.
 pub(crate) fn sides(
     at: &Point,
     notes: &mut Notes,

@@ -61,12 +61,12 @@ impl<'a> UserEvents<'a> {
         Ok(())
     }
 
-    /// The step that was searched is accepted.
+    /// Keeps the signs that the search of the accepted step found.
     pub fn accept_sides(&mut self) {
         self.sides.copy_from_slice(&self.found_sides.borrow());
     }
 
-    /// The state jumps: what follows is not compared with what was.
+    /// Forgets the signs before a jump of the state, so that the next step does not compare its own with them.
     pub fn forget_sides(&mut self) {
         self.sides.fill(0.0);
     }
