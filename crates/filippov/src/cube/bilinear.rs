@@ -38,9 +38,9 @@ struct Eliminated {
 impl Bilinear {
     /// The canopy of the fields at an intersection of two surfaces.
     pub fn of_fields(fields: &NormalFields) -> Self {
-        let corners = [[-1, -1], [-1, 1], [1, -1], [1, 1]].map(|k| fields.in_region(&k));
+        let values = fields.values();
         let row = |j: usize| {
-            let [mm, mp, pm, pp] = [0, 1, 2, 3].map(|corner: usize| corners[corner][j]);
+            let [mm, pm, mp, pp] = [0, 1, 2, 3].map(|pattern| values[2 * pattern + j]);
             [
                 0.25 * (mm + mp + pm + pp),
                 0.25 * (pp + pm - mp - mm),

@@ -58,14 +58,19 @@ impl Lap {
 
 /// The regions in the order in which rotating fields visit them.
 fn cycle_from(fields: &NormalFields, first: [i8; 2]) -> Option<[[i8; 2]; 4]> {
-    let leads = |region: [i8; 2], next: [i8; 2]| {
+    // Counter-clockwise, on both sides of the border between two regions.
+    let rates = |n: usize| {
+        let (region, next) = (CYCLE[n], CYCLE[(n + 1) % 4]);
         let crossed = usize::from(region[0] == next[0]);
-        let towards = |k: [i8; 2]| f64::from(next[crossed]) * fields.in_region(&k)[crossed] > 0.0;
-        towards(region) && towards(next)
+        let rate = move |k: [i8; 2]| f64::from(next[crossed]) * fields.in_region(&k)[crossed];
+        [region, next].map(rate)
     };
+    let is_clockwise = rates(0)[0] < 0.0;
+    let turn = if is_clockwise { -1.0 } else { 1.0 };
+    if !(0..4).flat_map(rates).all(|rate| turn * rate > 0.0) {
+        return None;
+    }
     let start = CYCLE.iter().position(|&region| region == first)?;
-    let counter_clockwise = [0, 1, 2, 3].map(|n| CYCLE[(start + n) % 4]);
-    let clockwise = [0, 1, 2, 3].map(|n| CYCLE[(start + 4 - n) % 4]);
-    let rotates = |cycle: &[[i8; 2]; 4]| (0..4).all(|n| leads(cycle[n], cycle[(n + 1) % 4]));
-    [counter_clockwise, clockwise].into_iter().find(rotates)
+    let step = if is_clockwise { 3 } else { 1 };
+    Some([0, 1, 2, 3].map(|n| CYCLE[(start + step * n) % 4]))
 }

@@ -26,7 +26,7 @@ pub(crate) use p_matrix::symmetrising_scale;
 pub use relay::{solve_relay, solve_relay_within, RelayError, RelayProblem, RelaySolution};
 pub use roots::{
     is_undetermined, least_multipliers, multiplier_rates, newton, roots_in_cube, stable_roots,
-    stable_roots_with_border, stable_roots_within, Roots,
+    stable_roots_with_border, stable_roots_within, zero_between, Roots,
 };
 pub use shared_load::{stay_together, SharedLoad, SharedLoads, Uniqueness};
 pub(crate) use small_matrix::invert;

@@ -405,15 +405,14 @@ impl SignGroup {
 
     /// The weights prod_i (1 + k_i lambda_i)/2 of all patterns, or their derivatives by one multiplier.
     fn weights(&self, lambda: &[f64], derivative: Option<usize>) -> PatternValues {
-        let mut weights = PatternValues::with_capacity(1 << self.members.len());
-        weights.push(1.0);
+        let mut weights = PatternValues::from_elem(1.0, 1 << self.members.len());
         for (bit, &i) in self.members.iter().enumerate() {
             let (minus, plus) = match derivative {
                 Some(p) if p == i => (-0.5, 0.5),
                 _ => (0.5 * (1.0 - lambda[i]), 0.5 * (1.0 + lambda[i])),
             };
             for pattern in 0..1 << bit {
-                weights.push(plus * weights[pattern]);
+                weights[pattern | 1 << bit] = plus * weights[pattern];
                 weights[pattern] *= minus;
             }
         }

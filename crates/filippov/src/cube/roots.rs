@@ -97,7 +97,7 @@ pub fn stable_roots_within(fields: &NormalFields, patience: Patience) -> Vec<Vec
         1 => {
             let (minus, plus) = (fields.at(0)[0], fields.at(1)[0]);
             let slides = minus > 0.0 && plus < 0.0;
-            let root = slides.then(|| vec![(minus + plus) / (minus - plus)]);
+            let root = slides.then(|| vec![zero_between(minus, plus)]);
             root.into_iter().collect()
         }
         2 => {
@@ -138,9 +138,18 @@ pub fn is_undetermined(fields: &NormalFields) -> bool {
     fields.m() == 2 && Bilinear::of_fields(fields).is_undetermined() && (0..2).all(crosses_zero)
 }
 
+/// The multiplier at which the component between these ends vanishes.
+pub fn zero_between(minus: f64, plus: f64) -> f64 {
+    (minus + plus) / (minus - plus)
+}
+
 /// Newton's method from `start`, with full steps: for tracking a root from the last one.
-/// `None` if it does not converge.
+/// `None` if it does not converge. Of one surface the first step is exact.
 pub fn newton(fields: &NormalFields, start: &[f64]) -> Option<Vec<f64>> {
+    if fields.m() == 1 {
+        let root = zero_between(fields.at(0)[0], fields.at(1)[0]);
+        return (root.abs() <= FAR_FROM_THE_CUBE).then(|| vec![root]);
+    }
     iterate(start, |lambda| {
         fields.jacobian(lambda).solve(&fields.interpolate(lambda))
     })

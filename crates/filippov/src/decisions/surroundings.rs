@@ -1,7 +1,7 @@
 //! The fields around the place where surfaces vanish, and what of them is clear of zero.
 
 use super::point::{Notes, Point};
-use crate::cube::NormalFields;
+use crate::cube::{zero_between, NormalFields};
 use crate::error::FieldError;
 use crate::error::Undecided;
 use crate::mode::Mode;
@@ -81,7 +81,7 @@ impl Surroundings {
             place[slid] = 1.0;
             let plus = fields.interpolate(&place)[slid];
             if minus > 0.0 && plus < 0.0 {
-                place[slid] = (minus + plus) / (minus - plus);
+                place[slid] = zero_between(minus, plus);
                 let components = fields.interpolate(&place);
                 let is_tangent = |i: usize| i != slid && components[i].abs() <= noise[i];
                 if (0..m).any(is_tangent) {

@@ -2,8 +2,10 @@
 
 use std::borrow::Cow;
 
+use smallvec::SmallVec;
+
 use crate::cube::NormalFields;
-use crate::cube::{merged_root, multiplier_rates, newton, stable_roots_within};
+use crate::cube::{merged_root, multiplier_rates, newton, stable_roots_within, zero_between};
 use crate::error::Undecided;
 use crate::patience::Patience;
 use crate::tolerances::{AFTER_THE_EXIT, UNSTABLE_START};
@@ -158,14 +160,22 @@ fn polished(
     multipliers: &[f64],
     patience: Patience,
 ) -> Result<Vec<f64>, Undecided> {
-    let face = fields.restrict(mode);
+    let slid_on: SmallVec<[usize; 4]> = (0..mode.len()).filter(|&i| mode[i] == 0).collect();
     let not_sliding = Undecided::NotArriving {
-        surface: mode.iter().position(|&k| k == 0).unwrap_or(0),
+        surface: slid_on.first().copied().unwrap_or(0),
     };
-    let root = if multipliers.len() == face.m() {
-        newton(&face, multipliers)
-    } else {
-        stable_roots_within(&face, patience).into_iter().next()
+    let is_known = multipliers.len() == slid_on.len();
+    let root = match slid_on[..] {
+        [i] if is_known => {
+            let [below, above] = fields.on_both_sides(mode, i);
+            let root = zero_between(below[i], above[i]);
+            root.is_finite().then(|| vec![root])
+        }
+        _ if is_known => newton(&fields.restrict(mode), multipliers),
+        _ => {
+            let roots = stable_roots_within(&fields.restrict(mode), patience);
+            roots.into_iter().next()
+        }
     };
     root.ok_or(not_sliding)
 }

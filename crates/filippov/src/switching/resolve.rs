@@ -1,7 +1,5 @@
 //! The decision at an intersection, whatever came before and however many surfaces meet.
 
-use std::borrow::Cow;
-
 use super::after_exit;
 use super::hidden::{attracting, limit_within, Outcome};
 use super::incoming::{ExitKind, HiddenStart, Incoming};
@@ -18,8 +16,9 @@ const ONLY: &str = "only";
 /// Decides what follows at an intersection of m surfaces, scaled by `kappa`.
 ///
 /// All attracting continuations are listed; a single one follows. Among several, and of more than six surfaces, the hidden
-/// dynamics at `kappa` selects. If a quantity whose sign decided is doubtful (`tolerances/`), the decision is
-/// repeated with perturbed fields: if they agree, theirs counts, and if not, [`Resolution::degenerate`] is set.
+/// dynamics at `kappa` selects. If a quantity whose sign decided is doubtful (`tolerances/`), the list is made again
+/// for perturbed fields, and the hidden dynamics asked once for each list: if they agree, theirs counts, and if not,
+/// [`Resolution::degenerate`] is set.
 ///
 /// # Example
 /// ```
@@ -61,31 +60,29 @@ pub fn resolve_within(
         return Err(Undecided::Scaling { m: fields.m() });
     }
     check_lengths(fields.m(), incoming)?;
-    let resolution = match decide(fields, incoming, kappa, patience) {
-        Ok(doubtful) if doubtful.margin <= DOUBTFUL => {
-            Ok(in_doubt(doubtful, fields, incoming, kappa, patience))
-        }
-        resolution => resolution,
-    };
+    let mut selections = Selections::new();
+    let mut resolution = decide(fields, incoming, kappa, patience, &mut selections)?;
+    let is_doubtful = resolution.margin <= DOUBTFUL;
+    let is_of_these_fields = !is_doubtful && !matches!(incoming, Incoming::Exit { .. });
+    if is_doubtful {
+        let others = perturbations(fields)
+            .map(|other| decide(&other, incoming, kappa, patience, &mut selections));
+        resolution = agreed(resolution, &others.collect::<Vec<_>>());
+    }
+    complete(&mut resolution, is_of_these_fields, fields, kappa, patience);
     match patience.is_over() {
         true => Err(Undecided::Interrupted),
-        false => resolution,
+        false => Ok(resolution),
     }
 }
 
-/// The decision for fields next to these. If all of them agree, theirs counts: a tie, as between
+/// What the hidden dynamics selected among these continuations.
+type Selections = Vec<(Vec<Continuation>, Result<Resolution, Undecided>)>;
+
+/// The decision for the fields next to these. If all of them agree, theirs counts: a tie, as between
 /// surfaces that do not know of each other, is then no obstacle. Otherwise the decision is
 /// degenerate.
-fn in_doubt(
-    mut resolution: Resolution,
-    fields: &NormalFields,
-    incoming: &Incoming,
-    kappa: &[f64],
-    patience: Patience,
-) -> Resolution {
-    let others: Vec<Result<Resolution, Undecided>> = perturbations(fields)
-        .map(|other| decide(&other, incoming, kappa, patience))
-        .collect();
+fn agreed(mut resolution: Resolution, others: &[Result<Resolution, Undecided>]) -> Resolution {
     let agreed: Vec<&Resolution> = others.iter().flatten().collect();
     let agree = agreed.len() == others.len() && agreed.iter().all(|o| o.chosen == agreed[0].chosen);
     if agree {
@@ -98,7 +95,6 @@ fn in_doubt(
     }
     resolution.degenerate |= !agree;
     resolution.unique &= resolution.candidates.len() == 1 && !resolution.degenerate;
-    complete(&mut resolution, false, fields, kappa, patience);
     resolution
 }
 
@@ -114,11 +110,14 @@ fn check_lengths(m: usize, incoming: &Incoming) -> Result<(), Undecided> {
     fits.then_some(()).ok_or(Undecided::IncomingShape { m })
 }
 
+/// The decision for these very fields. What was selected before, for fields next to them, is not selected again: of a motion
+/// that arrives, only what is listed is in doubt.
 fn decide(
     fields: &NormalFields,
     incoming: &Incoming,
     kappa: &[f64],
     patience: Patience,
+    selections: &mut Selections,
 ) -> Result<Resolution, Undecided> {
     let m = fields.m();
     let is_undetermined = match m {
@@ -143,9 +142,7 @@ fn decide(
     ) = (incoming, m <= 2)
     {
         if m == 1 || *kind != ExitKind::Stability {
-            let mut resolution = after_exit::leave(fields, *kind, lambda, drift.as_deref())?;
-            complete(&mut resolution, false, fields, kappa, patience);
-            return Ok(resolution);
+            return after_exit::leave(fields, *kind, lambda, drift.as_deref());
         }
     }
     let is_start = *incoming == Incoming::Start;
@@ -162,7 +159,15 @@ fn decide(
         last => {
             found.extend(last);
             let found: Vec<Continuation> = found.into_iter().map(|one| one.continuation).collect();
-            let mut resolution = selected(&start, &found, incoming, kappa, patience)?;
+            let known = selections.iter().find(|(among, _)| *among == found);
+            let mut resolution = match known.filter(|_| !is_start) {
+                Some((_, selection)) => selection.clone()?,
+                None => {
+                    let selection = selected(&start, &found, incoming, kappa, patience);
+                    selections.push((found, selection.clone()));
+                    selection?
+                }
+            };
             resolution.unique &=
                 are_listed || incoming.is_followed() || has_one_mode_only(&start.fields);
             resolution
@@ -173,8 +178,6 @@ fn decide(
         true => smallest_component(fields),
         false => margin,
     };
-    let is_polished = m <= 2 && resolution.leaf == ONLY && matches!(start.fields, Cow::Borrowed(_));
-    complete(&mut resolution, is_polished, fields, kappa, patience);
     Ok(resolution)
 }
 
@@ -215,11 +218,11 @@ fn selected(
     Ok(resolution)
 }
 
-/// Adds the multipliers of the chosen mode, and whether the regularised motion oscillates in it. Polished ones are roots of
-/// these very fields.
+/// Adds the multipliers of the chosen mode, and whether the regularised motion oscillates in it. Those that were listed for
+/// these very fields are known to rounding where they have a closed form.
 fn complete(
     resolution: &mut Resolution,
-    is_polished: bool,
+    is_of_these_fields: bool,
     fields: &NormalFields,
     kappa: &[f64],
     patience: Patience,
@@ -227,6 +230,7 @@ fn complete(
     let Some(mode) = resolution.mode().filter(|mode| mode.codimension() > 0) else {
         return;
     };
+    let is_polished = is_of_these_fields && resolution.leaf == ONLY && fields.m() <= 2;
     if is_polished && mode.codimension() == 1 {
         return;
     }

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use smallvec::{smallvec, SmallVec};
 
-use crate::cube::{stable_roots_within, Bilinear, Lap, Matrix, NormalFields, Vector};
+use crate::cube::{stable_roots_within, zero_between, Bilinear, Lap, Matrix, NormalFields, Vector};
 use crate::mode::Mode;
 use crate::patience::Patience;
 use crate::switching::incoming::with_multipliers;
@@ -108,23 +108,20 @@ fn independent_parts(fields: &NormalFields) -> Vec<Vec<usize>> {
 
 fn attracting_together(fields: &NormalFields, patience: Patience) -> (Vec<Admissible>, f64) {
     let m = fields.m();
-    let sizes: Vector = (0..m).map(|j| fields.row_size(j)).collect();
-    let (mut found, mut margin) = (Vec::new(), f64::INFINITY);
+    let corners = fields.values();
+    let corner = |pattern: usize| &corners[pattern * m..][..m];
+    let mut listing = Listing::new(fields);
     let mut mode: SmallVec<[i8; 4]> = smallvec![-1; m];
     loop {
-        let (points, slides) = roots_of_mode(fields, &mode, &sizes, patience);
-        if points.is_empty() {
-            margin = margin.min(slides.abs());
-        }
-        for MeetingPoint { multipliers, g } in points {
-            let leaves = smallest_departure(&g, &mode, &sizes);
-            margin = margin.min(leaves.min(slides).abs());
-            if leaves > 0.0 {
-                found.push(Admissible {
-                    continuation: Continuation::mode(&mode),
-                    multipliers,
-                });
+        let bit = |i: usize| usize::from(mode[i] > 0) << i;
+        let pattern: usize = (0..m).map(bit).sum();
+        let mut slid_on = (0..m).filter(|&i| mode[i] == 0);
+        match (slid_on.next(), slid_on.next()) {
+            (None, _) => listing.note(&mode, &[], corner(pattern), f64::INFINITY),
+            (Some(i), None) => {
+                listing.look_at_edge(&mode, i, corner(pattern), corner(pattern | 1 << i));
             }
+            _ => listing.look_at_face(&mode, fields, patience),
         }
         // The next mode in counting order.
         let Some(i) = mode.iter().position(|&k| k < 1) else {
@@ -134,70 +131,81 @@ fn attracting_together(fields: &NormalFields, patience: Patience) -> (Vec<Admiss
         mode[..i].fill(-1);
     }
     if m == 2 && Lap::around(fields, [-1, -1]).is_some_and(|lap| lap.gamma > 1.0) {
-        found.push(Admissible {
+        listing.found.push(Admissible {
             continuation: Continuation::OutwardSpiral,
             multipliers: Vec::new(),
         });
     }
-    (found, margin)
+    (listing.found, listing.margin)
 }
 
-/// A point of the cube at which a mode may move.
-struct MeetingPoint {
-    /// Of the surfaces slid on.
-    multipliers: Vec<f64>,
-    /// The normal components there.
-    g: Vector,
+/// The attracting modes among those that were looked at.
+struct Listing {
+    found: Vec<Admissible>,
+    /// As in [`attracting`].
+    margin: f64,
+    /// The largest normal components.
+    sizes: Vector,
 }
 
-/// Finds the stable roots on the face of a mode, and says how clearly a face of one or two multipliers has a root. On larger
-/// faces no closed form says that, and the margin is infinite. A corner is its own root.
-fn roots_of_mode(
-    fields: &NormalFields,
-    mode: &[i8],
-    sizes: &[f64],
-    patience: Patience,
-) -> (SmallVec<[MeetingPoint; 1]>, f64) {
-    let mut slid_on = (0..mode.len()).filter(|&i| mode[i] == 0);
-    let (first, second) = (slid_on.next(), slid_on.next());
-    let Some(i) = first else {
-        let corner = MeetingPoint {
-            multipliers: Vec::new(),
-            g: Vector::from_slice(&fields.in_region(mode)),
-        };
-        return (smallvec![corner], f64::INFINITY);
-    };
-    if second.is_none() {
-        let [below, above] = fields.on_both_sides(mode, i);
-        let slides = below[i].min(-above[i]);
-        let root = (slides > 0.0).then(|| {
-            let lambda = (below[i] + above[i]) / (below[i] - above[i]);
-            let between = |(b, a): (&f64, &f64)| 0.5 * ((1.0 - lambda) * b + (1.0 + lambda) * a);
-            MeetingPoint {
-                multipliers: vec![lambda],
-                g: below.iter().zip(&*above).map(between).collect(),
-            }
-        });
-        return (root.into_iter().collect(), slides / sizes[i]);
+impl Listing {
+    fn new(fields: &NormalFields) -> Self {
+        Listing {
+            found: Vec::new(),
+            margin: f64::INFINITY,
+            sizes: (0..fields.m()).map(|j| fields.row_size(j)).collect(),
+        }
     }
-    let slides_on_all = mode.iter().all(|&k| k == 0);
-    let face = match slides_on_all {
-        true => Cow::Borrowed(fields),
-        false => Cow::Owned(fields.restrict(mode)),
-    };
-    let slides = match face.m() {
-        2 => Bilinear::of_fields(&face).root_margin(),
-        _ => f64::INFINITY,
-    };
-    let roots = stable_roots_within(&face, patience).into_iter();
-    let points = roots.map(|multipliers| MeetingPoint {
-        g: match slides_on_all {
-            true => smallvec![0.0; mode.len()],
-            false => fields.interpolate(&with_multipliers(mode, &multipliers)),
-        },
-        multipliers,
-    });
-    (points.collect(), slides)
+
+    /// A face of one multiplier, between two corners.
+    fn look_at_edge(&mut self, mode: &[i8], i: usize, below: &[f64], above: &[f64]) {
+        let pull = below[i].min(-above[i]);
+        let slides = pull / self.sizes[i];
+        if pull <= 0.0 {
+            self.margin = self.margin.min(slides.abs());
+            return;
+        }
+        let lambda = zero_between(below[i], above[i]);
+        let between = |(b, a): (&f64, &f64)| 0.5 * ((1.0 - lambda) * b + (1.0 + lambda) * a);
+        let g: Vector = below.iter().zip(above).map(between).collect();
+        self.note(mode, &[lambda], &g, slides);
+    }
+
+    /// A face of two multipliers or more. No closed form says how clearly one of three or more has a root.
+    fn look_at_face(&mut self, mode: &[i8], fields: &NormalFields, patience: Patience) {
+        let slides_on_all = mode.iter().all(|&k| k == 0);
+        let face = match slides_on_all {
+            true => Cow::Borrowed(fields),
+            false => Cow::Owned(fields.restrict(mode)),
+        };
+        let slides = match face.m() {
+            2 => Bilinear::of_fields(&face).root_margin(),
+            _ => f64::INFINITY,
+        };
+        let roots = stable_roots_within(&face, patience);
+        if roots.is_empty() {
+            self.margin = self.margin.min(slides.abs());
+        }
+        for multipliers in roots {
+            let g: Vector = match slides_on_all {
+                true => smallvec![0.0; mode.len()],
+                false => fields.interpolate(&with_multipliers(mode, &multipliers)),
+            };
+            self.note(mode, &multipliers, &g, slides);
+        }
+    }
+
+    /// A point of the face at which the motion stays on the surfaces slid on, so clearly, with the normal components there.
+    fn note(&mut self, mode: &[i8], multipliers: &[f64], g: &[f64], slides: f64) {
+        let leaves = smallest_departure(g, mode, &self.sizes);
+        self.margin = self.margin.min(leaves.min(slides).abs());
+        if leaves > 0.0 {
+            self.found.push(Admissible {
+                continuation: Continuation::mode(mode),
+                multipliers: multipliers.to_vec(),
+            });
+        }
+    }
 }
 
 /// How clearly these normal components leave the surfaces that the mode does not slide on, by the one least left.

@@ -1,6 +1,6 @@
 //! Hidden dynamics within one cell, by Taylor series.
 
-use super::first_zero::{first_loss, value};
+use super::first_zero::{first_loss, largest_change, value};
 use crate::cube::{NormalFields, SignGroup, Vector};
 use crate::tolerances::HIDDEN_ERROR;
 
@@ -79,6 +79,7 @@ impl Cell {
         let mut end = self.step();
         let mut stop: Option<(StepEnd, usize, f64)> = None;
         for i in 0..u.len() {
+            let change = largest_change(&self.state[i], end);
             // Each border with the direction into the cell.
             let borders: &[(f64, f64)] = match self.sides[i] {
                 0 => &[(-1.0, 1.0), (1.0, -1.0)],
@@ -86,6 +87,10 @@ impl Cell {
                 _ => &[(-1.0, -1.0)],
             };
             for &(border, inwards) in borders {
+                // Most motions do not come near.
+                if inwards * (u[i] - border) > change {
+                    continue;
+                }
                 let distance = self.distance(i, border, inwards);
                 if let Some(t) = first_loss(&distance, end, tests) {
                     (end, stop) = (t, Some((StepEnd::Border, i, border)));
@@ -129,6 +134,11 @@ impl Cell {
     fn expand(&mut self, u: &[f64]) {
         for (series, u) in self.state.iter_mut().zip(u) {
             series[0] = *u;
+        }
+        if let ([x, y], [term]) = (&mut self.state[..], &self.terms[..]) {
+            if term.active.len() == 2 {
+                return term.expand_pair(&self.constant, x, y);
+            }
         }
         let mut rates = Vector::from_slice(&self.constant);
         for order in 0..ORDER {
@@ -182,6 +192,20 @@ impl Term {
         }
     }
 
+    /// The series of two components that multiply one another, which most cells have.
+    fn expand_pair(&self, constant: &[f64], x: &mut Series, y: &mut Series) {
+        let row = |j: usize| [1, 2, 3].map(|subset| self.coefficients[2 * subset + j]);
+        let (rows, mut held) = ([row(0), row(1)], [constant[0], constant[1]]);
+        for order in 0..ORDER {
+            let product = of_product(x, y, order);
+            let next = |[b, c, d]: [f64; 3], held: f64| {
+                (held + b * x[order] + c * y[order] + d * product) / (order + 1) as f64
+            };
+            (x[order + 1], y[order + 1]) = (next(rows[0], held[0]), next(rows[1], held[1]));
+            held = [0.0; 2];
+        }
+    }
+
     /// Adds its share of the rates at this order, from the products at this order.
     fn add_rates(&mut self, state: &[Series], order: usize, rates: &mut [f64]) {
         let rows = self.coefficients.chunks_exact(rates.len());
@@ -201,6 +225,6 @@ impl Term {
 
 /// The coefficient of a product at this order.
 fn of_product(a: &Series, b: &Series, order: usize) -> f64 {
-    let order = order.min(ORDER);
-    (0..=order).fold(0.0, |sum, k| sum + a[k] * b[order - k])
+    let pairs = a.iter().zip(b[..=order].iter().rev());
+    pairs.fold(0.0, |sum, (a, b)| sum + a * b)
 }

@@ -1,5 +1,7 @@
 //! The first time at which a polynomial becomes negative.
 
+use smallvec::{smallvec, SmallVec};
+
 use crate::tolerances::{NEWTON_DONE, ZERO_SEARCHES};
 
 /// The first time in (0, end] at which `p`, not negative at 0, becomes negative. A zero at 0 itself is
@@ -8,16 +10,14 @@ use crate::tolerances::{NEWTON_DONE, ZERO_SEARCHES};
 /// Intervals are excluded, or found to be monotone, by a bound of the derivative, and halved
 /// otherwise: no pair of zeros is lost, except one nearer together than rounding. `tests` counts them.
 pub(super) fn first_loss(p: &[f64], end: f64, tests: &mut usize) -> Option<f64> {
-    // Most motions do not come near.
-    let change = p[1..].iter().rev().fold(0.0, |sum, c| sum * end + c.abs()) * end;
-    if p[0] > change {
+    if p[0] > largest_change(p, end) {
         return None;
     }
     let p = if p[0] > 0.0 { p } else { &p[1..] };
     if p[0] < 0.0 {
         return Some(0.0);
     }
-    let mut pending = vec![(0.0, end)];
+    let mut pending: SmallVec<[(f64, f64); 8]> = smallvec![(0.0, end)];
     for _ in 0..ZERO_SEARCHES {
         let (a, b) = pending.pop()?;
         *tests += 1;
@@ -31,6 +31,12 @@ pub(super) fn first_loss(p: &[f64], end: f64, tests: &mut usize) -> Option<f64> 
         }
     }
     None
+}
+
+/// A bound of how far p moves until `end`.
+pub(super) fn largest_change(p: &[f64], end: f64) -> f64 {
+    let terms = p[1..].iter().rev();
+    terms.fold(0.0, |sum, c| sum * end + c.abs()) * end
 }
 
 /// Does p become negative in [a, b]? Known is p(a) >= 0; the derivative at the middle and a bound of the second one
