@@ -339,21 +339,12 @@ def test_a_quantiser_of_what_is_continuous_runs(quantised: Condition, exact: flo
 # --------------------------------------------------------------------- domains
 
 
-@pytest.mark.parametrize(
-    ("condition", "instead", "exact"),
-    [
-        (lambda x: np.abs(np.cbrt(x - 0.3)) < 0.2, lambda x: np.abs(x - 0.3) < 0.2**3, 0.016),
-        (lambda x: 1 / np.abs(x - 0.3) > 5, lambda x: np.abs(x - 0.3) < 1 / 5, 0.4),
-    ],
-)
-def test_a_surface_with_a_pole_at_another_one_is_refused(
-    condition: Condition, instead: Condition, exact: float
-) -> None:
-    text = refusal(along_x(condition), [-2.0, 0.0])
+def test_a_surface_with_a_vertical_tangent_at_another_one_is_refused() -> None:
+    text = refusal(along_x(lambda x: np.abs(np.cbrt(x - 0.3)) < 0.2), [-2.0, 0.0])
     assert "pole or a vertical tangent" in text
     assert f'File "{__file__}", line' in text
     assert "compare the argument itself" in text
-    assert final(instead, -2.0, 4.0) == pytest.approx(exact, abs=1e-9)
+    assert final(lambda x: np.abs(x - 0.3) < 0.2**3, -2.0, 4.0) == pytest.approx(0.016, abs=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -55,6 +55,7 @@ mod node;
 mod on_surface;
 mod op;
 mod partition;
+mod poles;
 mod print;
 pub mod program;
 pub mod region;

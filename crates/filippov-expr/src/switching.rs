@@ -11,7 +11,8 @@
 //! - what cannot be negative has no surface: `exp(v)`, `v**2`, `1 + abs(v)` give the constant sign +1. This
 //!   includes `abs(v)` itself: it is positive on both sides of v = 0, so its sign switches nowhere, and no
 //!   second surface is created in the place of v;
-//! - what is made of a sign switches where that one does: `sign(v)`, `1 + sign(v)`, `sign(v)*exp(y)`.
+//! - what is made of a sign switches where that one does: `sign(v)`, `1 + sign(v)`, `sign(v)*exp(y)`;
+//! - a quotient or a tangent changes its sign at its poles too: `tan(v) - 1` switches as `cos(v)*(sin(v) - cos(v))`.
 //!
 //! Division by a parameter is not stripped, since its sign is not known.
 
@@ -34,6 +35,19 @@ pub enum Switching {
         /// +1.0 or -1.0.
         orientation: f64,
     },
+}
+
+impl Switching {
+    /// The sign of a multiple by +-1.
+    fn times(self, side: f64) -> Self {
+        match self {
+            Switching::Constant(sign) => Switching::Constant(side * sign + 0.0),
+            Switching::Surface { index, orientation } => Switching::Surface {
+                index,
+                orientation: side * orientation,
+            },
+        }
+    }
 }
 
 /// A surface and the orientation by which its sign is multiplied.
@@ -130,6 +144,13 @@ impl Graph {
                 let Some((key, lead)) = form.key() else {
                     return Switching::Constant(0.0);
                 };
+                if let Some(cleared) = self.without_poles(spelling) {
+                    let switching = self.switch(cleared).times(side);
+                    if let Switching::Surface { index, orientation } = switching {
+                        self.surfaces.switches.insert(id, (index, orientation));
+                    }
+                    return switching;
+                }
                 let (index, orientation) = match self.surfaces.switch_of_form(&key) {
                     Some(known) => known,
                     None => {
@@ -263,13 +284,7 @@ impl Graph {
         loop {
             let form = LinearForm::of(self, current);
             if let Some(known) = self.known_sign(&form) {
-                return Reduced::Known(match known {
-                    Switching::Constant(sign) => Switching::Constant(side * sign + 0.0),
-                    Switching::Surface { index, orientation } => Switching::Surface {
-                        index,
-                        orientation: side * orientation,
-                    },
-                });
+                return Reduced::Known(known.times(side));
             }
             let Some((atom, coefficient)) = form.single_atom() else {
                 return Reduced::Form(current, form, side);
@@ -285,7 +300,7 @@ impl Graph {
     }
 
     /// The sign of a linear form, where it follows from its terms.
-    fn known_sign(&self, form: &LinearForm) -> Option<Switching> {
+    pub(crate) fn known_sign(&self, form: &LinearForm) -> Option<Switching> {
         let Some(&(first, c)) = form.terms.first() else {
             let sign = if form.constant == 0.0 {
                 0.0

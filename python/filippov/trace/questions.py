@@ -164,7 +164,7 @@ class _Check:
         line = self.line_of(asked[0]) if asked else None
         remedy = (
             "compare the argument itself: write `abs(v) > np.exp(d)` instead of `np.log(abs(v)) > d`, "
-            "and `abs(v) < 1/d` instead of `1/abs(v) > d`"
+            "and `abs(v) < d**3` instead of `abs(np.cbrt(v)) < d`"
         )
         if is_singular:
             raise TraceError(

@@ -104,6 +104,17 @@ def _copysign(a: Any, b: Any) -> Any:
     return abs(_scalar(a)) * sign
 
 
+def _arctan2(y: Any, x: Any) -> Any:
+    # It jumps across y = 0 where x < 0: there each side has an angle that goes on beyond it.
+    angle = _binary("arctan2")
+    y, x = _scalar(y), _scalar(x)
+    is_right = x >= 0
+    if is_right is True:
+        return angle(y, x)
+    left = choose(y >= 0, 0.5 * math.pi - angle(x, y), angle(x, -y) - 0.5 * math.pi)
+    return choose(is_right, angle(y, x), left)
+
+
 def _clip(a: Any, low: Any, high: Any) -> Any:
     return _smaller(_larger(a, low), high)
 
@@ -197,7 +208,8 @@ ELEMENTS: dict[str, Element] = {
             "arctanh",
         ]
     },
-    **{name: _binary(name) for name in ("power", "arctan2", "hypot")},
+    **{name: _binary(name) for name in ("power", "hypot")},
+    "arctan2": _arctan2,
     "float_power": _binary("power"),
     "add": _operator(operator.add),
     "subtract": _operator(operator.sub),

@@ -415,3 +415,35 @@ fn absolute_values_times_products_have_no_surface_of_their_own() {
     assert_eq!(g.switch(product), Switching::Constant(1.0));
     assert_eq!(g.n_surfaces(), 1);
 }
+
+#[test]
+fn a_quotient_switches_at_its_poles_too() {
+    let (mut g, _, x, v, w, mu) = variables();
+    let ratio = g.div(x, v);
+    assert_eq!(g.switch(ratio), PLUS);
+    let tangent = g.unary(UnaryOp::Tan, w);
+    let beyond = plus(&mut g, tangent, -1.0);
+    g.switch(beyond);
+    let one = g.constant(1.0);
+    let size = g.abs(v);
+    let reciprocal = g.div(one, size);
+    let limited = plus(&mut g, reciprocal, -4.0);
+    g.switch(limited);
+    // Divisors that do not vanish along a motion.
+    let square = g.mul(x, x);
+    let positive = plus(&mut g, square, 1.0);
+    for divisor in [positive, mu] {
+        let quotient = g.div(w, divisor);
+        let compared = plus(&mut g, quotient, -1.0);
+        g.switch(compared);
+    }
+    let expected = [
+        "x*v",
+        "cos(w)*(sin(w) - cos(w))",
+        "v",
+        "4*abs(v) - 1",
+        "w/(x**2 + 1) - 1",
+        "w/mu - 1",
+    ];
+    assert_eq!(surfaces(&g), expected);
+}

@@ -78,7 +78,7 @@ impl Cell {
         self.expand(u);
         let mut end = self.step();
         let mut stop: Option<(StepEnd, usize, f64)> = None;
-        for i in 0..u.len() {
+        for (i, &start) in u.iter().enumerate() {
             let change = largest_change(&self.state[i], end);
             // Each border with the direction into the cell.
             let borders: &[(f64, f64)] = match self.sides[i] {
@@ -88,7 +88,7 @@ impl Cell {
             };
             for &(border, inwards) in borders {
                 // Most motions do not come near.
-                if inwards * (u[i] - border) > change {
+                if inwards * (start - border) > change {
                     continue;
                 }
                 let distance = self.distance(i, border, inwards);
