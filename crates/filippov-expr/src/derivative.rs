@@ -6,6 +6,7 @@
 use rustc_hash::FxHashMap;
 
 use crate::graph::Graph;
+use crate::linear::LinearForm;
 use crate::node::{Node, NodeId};
 use crate::op::{BinaryOp, UnaryOp};
 
@@ -103,6 +104,22 @@ impl Graph {
             }
         }
         self.reverse(of)
+    }
+
+    /// The derivatives of an expression in the time and in the states, if they are numbers.
+    pub fn constant_gradient(&self, of: NodeId) -> Option<(f64, Vec<(u32, f64)>)> {
+        let (mut time, mut states) = (0.0, Vec::new());
+        for (atom, coefficient) in LinearForm::of(self, of).terms {
+            match *self.node(atom) {
+                Node::Time => time = coefficient,
+                Node::State(index) => states.push((index, coefficient)),
+                Node::Sign(_) => {}
+                _ if self.facts(atom).varies => return None,
+                _ => {}
+            }
+        }
+        states.sort_unstable_by_key(|(index, _)| *index);
+        Some((time, states))
     }
 
     /// The derivative of `of`, given the derivatives of the leaves, by forward mode. `known` maps nodes to

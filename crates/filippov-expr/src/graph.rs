@@ -1,5 +1,7 @@
 //! The expression graph: nodes kept once each, in an order in which operands come first.
 
+use std::sync::Arc;
+
 use rustc_hash::FxHashMap;
 
 use crate::derivative::DerivativeCache;
@@ -22,7 +24,8 @@ pub struct Graph {
     pub(crate) nodes: Vec<Node>,
     pub(crate) facts: Vec<Facts>,
     pub(crate) ids: FxHashMap<Node, NodeId>,
-    pub(crate) surfaces: SurfaceTable,
+    /// Shared by copies, most of which add no surfaces.
+    pub(crate) surfaces: Arc<SurfaceTable>,
     pub(crate) derivatives: DerivativeCache,
 }
 
@@ -134,6 +137,10 @@ impl Graph {
             Node::State(index) => Some(index as usize),
             _ => None,
         }
+    }
+
+    pub(crate) fn surfaces_mut(&mut self) -> &mut SurfaceTable {
+        Arc::make_mut(&mut self.surfaces)
     }
 
     pub(crate) fn facts(&self, id: NodeId) -> Facts {

@@ -98,9 +98,9 @@ impl Graph {
         let mut graph = Graph::new();
         let made = graph.build(&nodes, &absolute);
         let surfaces = functions.into_iter().map(|function| made[function]);
-        graph.surfaces.functions = surfaces.collect();
+        graph.surfaces_mut().functions = surfaces.collect();
         for (id, side) in switches {
-            graph.surfaces.switches.insert(made[id], side);
+            graph.surfaces_mut().switches.insert(made[id], side);
         }
         for index in 0..graph.n_surfaces() as u32 {
             graph.register_surface(index);

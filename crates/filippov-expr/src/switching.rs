@@ -120,7 +120,7 @@ impl Graph {
             return index as u32;
         }
         let index = self.surfaces.functions.len() as u32;
-        self.surfaces.functions.push(function);
+        self.surfaces_mut().functions.push(function);
         self.register_surface(index);
         index
     }
@@ -147,7 +147,9 @@ impl Graph {
                 if let Some(cleared) = self.without_poles(spelling) {
                     let switching = self.switch(cleared).times(side);
                     if let Switching::Surface { index, orientation } = switching {
-                        self.surfaces.switches.insert(id, (index, orientation));
+                        self.surfaces_mut()
+                            .switches
+                            .insert(id, (index, orientation));
                     }
                     return switching;
                 }
@@ -157,14 +159,16 @@ impl Graph {
                         let (function, flip) = self.spell(spelling, &form);
                         let (index, orientation) = self.surface_of_spelling(function);
                         let known = (index, lead * flip * orientation);
-                        self.surfaces.insert_form(key, known);
+                        self.surfaces_mut().insert_form(key, known);
                         known
                     }
                 };
                 (index, side * lead * orientation)
             }
         };
-        self.surfaces.switches.insert(id, (index, orientation));
+        self.surfaces_mut()
+            .switches
+            .insert(id, (index, orientation));
         Switching::Surface { index, orientation }
     }
 
@@ -175,8 +179,8 @@ impl Graph {
             return known;
         }
         let index = self.surfaces.functions.len() as u32;
-        self.surfaces.functions.push(function);
-        self.surfaces.switches.insert(function, (index, 1.0));
+        self.surfaces_mut().functions.push(function);
+        self.surfaces_mut().switches.insert(function, (index, 1.0));
         (index, 1.0)
     }
 
@@ -227,7 +231,7 @@ impl Graph {
             Switching::Constant(_) => self.constant(0.0),
             Switching::Surface { index, orientation } => {
                 let positive = if orientation < 0.0 { self.neg(a) } else { a };
-                self.surfaces.switches.insert(positive, (index, 1.0));
+                self.surfaces_mut().switches.insert(positive, (index, 1.0));
                 let sign = self.sign_of(index);
                 self.mul(sign, positive)
             }
@@ -266,9 +270,9 @@ impl Graph {
         if let Reduced::Form(_, form, side) = self.reduce(function) {
             if let Some((key, lead)) = form.key() {
                 if self.surfaces.switch_of_form(&key).is_none() {
-                    self.surfaces.insert_form(key, (index, side * lead));
+                    self.surfaces_mut().insert_form(key, (index, side * lead));
                 }
-                self.surfaces
+                self.surfaces_mut()
                     .switches
                     .entry(function)
                     .or_insert((index, 1.0));

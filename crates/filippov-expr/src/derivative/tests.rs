@@ -1,3 +1,5 @@
+#![allow(clippy::unwrap_used)]
+
 use super::*;
 use crate::print::Names;
 
@@ -56,4 +58,27 @@ fn gradients_of_long_sums_are_cheap() {
     let size = g.len();
     assert_eq!(g.gradient(sum).states.len(), 10_000);
     assert!(g.len() < 2 * size);
+}
+
+#[test]
+fn constant_gradients_are_the_gradients() {
+    let mut g = Graph::new();
+    let (t, x, y, w) = (g.time(), g.state(0), g.state(3), g.parameter(0));
+    let sign = g.sign(x);
+    let three = g.constant(3.0);
+    let scaled = g.mul(three, y);
+    let sum = g.add(scaled, t);
+    let sum = g.add(sum, sign);
+    let sum = g.sub(sum, w);
+    let sum = g.sub(sum, x);
+    let by_numbers = g.constant_gradient(sum).unwrap();
+    let Gradient { time, states } = g.gradient(sum);
+    let number = |id| g.as_constant(id).unwrap();
+    let states: Vec<_> = states.iter().map(|&(i, id)| (i, number(id))).collect();
+    assert_eq!(by_numbers, (number(time), states));
+    // A parameter is no number, and neither is a state.
+    for slope in [w, x] {
+        let product = g.mul(slope, y);
+        assert_eq!(g.constant_gradient(product), None);
+    }
 }

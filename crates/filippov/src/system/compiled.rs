@@ -1,5 +1,6 @@
 //! What is compiled of a traced system: field, surfaces, rates, gradients, Lie derivatives.
 
+use std::iter::once;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use filippov_expr::{
@@ -339,24 +340,30 @@ impl Model {
 
     pub fn gradient(&self, j: usize) -> &CompiledGradient {
         self.gradients[j].get_or_init(|| {
+            let h = self.graph.surface(j as u32);
+            if let Some((time, states)) = self.graph.constant_gradient(h) {
+                let slopes = states.iter().map(|(_, slope)| *slope);
+                return CompiledGradient {
+                    states: states.iter().map(|(i, _)| *i as usize).collect(),
+                    values: GradientValues::Constant(once(time).chain(slopes).collect()),
+                };
+            }
             let mut graph = self.graph.clone();
-            let Gradient { time, states } = graph.gradient(graph.surface(j as u32));
-            let mut outputs = vec![time];
-            outputs.extend(states.iter().map(|(_, node)| *node));
+            let Gradient { time, states } = graph.gradient(h);
+            let outputs: Vec<NodeId> = once(time)
+                .chain(states.iter().map(|(_, node)| *node))
+                .collect();
             let constants: Option<Vec<f64>> = outputs
                 .iter()
                 .map(|&node| graph.as_constant(node))
                 .collect();
+            let compiled = || TieredProgram::new(graph, outputs, self.backend);
             CompiledGradient {
                 states: states.iter().map(|(i, _)| *i as usize).collect(),
-                values: match constants {
-                    Some(values) => GradientValues::Constant(values),
-                    None => GradientValues::Computed(Box::new(TieredProgram::new(
-                        graph,
-                        outputs,
-                        self.backend,
-                    ))),
-                },
+                values: constants.map_or_else(
+                    || GradientValues::Computed(Box::new(compiled())),
+                    GradientValues::Constant,
+                ),
             }
         })
     }
