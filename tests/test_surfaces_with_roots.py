@@ -10,6 +10,7 @@ from typing import Any
 import filippov as fl
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 # The layer |x - c| < d**2, or its right half, as the place where a function of x - c and d is negative.
 LAYERS: dict[str, tuple[Callable[[Any, float], Any], float]] = {
@@ -76,3 +77,44 @@ def test_a_function_that_is_guarded_by_a_comparison(start: float) -> None:
     parts = [(-math.inf, 0.0, 0.7), (0.0, 1.0, 0.5), (1.0, math.inf, 1.0)]
     exact = sum(rate * max(0.0, min(end, high) - max(start, low)) for low, high, rate in parts)
     assert sol.y[1, -1] == pytest.approx(exact, abs=1e-9)
+
+
+ROOTS_OF_PIECES: dict[str, tuple[Any, Any]] = {
+    # The function, and the same without a root of what is zero in a region.
+    "maximum of a root": (
+        lambda x: np.maximum(np.sqrt(np.maximum(x - 0.3, 0)), x - 0.1),
+        lambda x: max((x - 0.3) ** 0.5 if x > 0.3 else 0.0, x - 0.1),
+    ),
+    "root of a multiple": (
+        lambda x: np.maximum(np.sqrt(2 * 9.81 * np.maximum(x, 0)) - 1, -0.5 - x),
+        lambda x: max((19.62 * x) ** 0.5 - 1 if x > 0 else -1.0, -0.5 - x),
+    ),
+    "power of a clip": (
+        lambda x: np.maximum(np.clip(x, 0, 1) ** 0.75, 0.2 - x),
+        lambda x: max(min(max(x, 0.0), 1.0) ** 0.75, 0.2 - x),
+    ),
+    "root of a sum": (
+        lambda x: np.maximum(np.sqrt(np.maximum(x, 0) + np.maximum(x - 1, 0)), 0.1 - 0.3 * x),
+        lambda x: max((max(x, 0.0) + max(x - 1, 0.0)) ** 0.5, 0.1 - 0.3 * x),
+    ),
+}
+
+
+@pytest.mark.parametrize("method", ["auto", "DOPRI5", "DOP853", "Rodas5P"])
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+@pytest.mark.parametrize("name", ROOTS_OF_PIECES)
+def test_a_root_of_what_is_zero_in_a_region(name: str, direction: float, method: Any) -> None:
+    """There its slope by the rule for roots is 0/0: crossings were taken for grazing, without a word."""
+    function, plain = ROOTS_OF_PIECES[name]
+    sol = fl.solve_ivp(
+        lambda t, x: [direction, function(x[0])],
+        (0.0, 4.0),
+        [-2.0 * direction, 0.0],
+        method=method,
+        rtol=1e-9,
+        atol=1e-9,
+    )
+    assert sol.success, sol.message
+    places = [-2.0, -0.8, -0.7, -0.6, -0.5, 0.0, 0.1, 0.2, 0.3, 0.8, 1.0, 1.1, 2.0]
+    expected = quad(plain, -2.0, 2.0, points=places, limit=400, epsabs=1e-10)[0]
+    assert sol.y[1, -1] == pytest.approx(expected, abs=1e-6)

@@ -349,15 +349,21 @@ class Tracer:
         """Whether an expression jumps where a sign inside of it changes, or is not seen to be continuous."""
         return self.regions().jumps_at(node) is not None
 
-    def continue_root(self, root: int, argument: int, of: Callable[[int], int]) -> None:
-        """Continue a root beyond the regions of the signs in its argument, if it is defined in all of them.
+    def root(self, argument: int, of: Callable[[int], int]) -> int:
+        """Return the node of a root, continued beyond the regions of the signs in its argument where needed.
 
         The root of ``abs(x)`` is that of x or of -x, by the sign of x. Switching functions are looked at a
-        little beyond x = 0, too: there it is 0.
+        little beyond x = 0, too: there it is 0. So is that of a field where x jumps: beside the jump the
+        sign of before is taken with the x of behind.
         """
+        root = of(argument)
         pieces = self.pieces(argument, in_full=True)
-        if pieces is not None and all(sign in (0.0, 1.0) for _, sign in parts_of(pieces)):
-            self._continued[root] = of(self.builder.unary("not negative", argument))
+        if pieces is None or any(sign not in (0.0, 1.0) for _, sign in parts_of(pieces)):
+            return root
+        parts = [part for part, sign in parts_of(pieces) if sign == 1.0]
+        for inner in [*parts, argument]:
+            self._continued[of(inner)] = of(self.builder.unary("not negative", inner))
+        return self._continued[root] if self.jumps(argument) else root
 
     def as_surface(self, node: int) -> int:
         """Return an expression as a switching function: with its roots continued."""

@@ -80,6 +80,7 @@ class Laws:
         if pieces is not None and (has_constant_part(tracer, pieces) or tracer.jumps(node)):
             # A level follows what moves continuously: each part has its own.
             return by_parts(tracer, pieces, lambda part, _: self.floor(tracer, part))
+        node = tracer.as_surface(node)
         level = self._state(tracer, _Law("level", (node,), ()), "nearest")
         half = builder.constant(0.5)
         distance = builder.binary("subtract", node, level)

@@ -64,10 +64,9 @@ class Scalar:
     def unary(self, op: str) -> Scalar:
         """Apply the function that NumPy calls `op`."""
         tracer = self.tracer
-        node = tracer.builder.unary(op, self.node)
         if op == "sqrt":
-            tracer.continue_root(node, self.node, lambda argument: tracer.builder.unary(op, argument))
-        return Scalar(tracer, node)
+            return Scalar(tracer, tracer.root(self.node, lambda argument: tracer.builder.unary(op, argument)))
+        return Scalar(tracer, tracer.builder.unary(op, self.node))
 
     def binary(self, op: str, other: Any) -> Any:
         """Return ``op(self, other)``; element by element if `other` is an array."""
@@ -83,11 +82,10 @@ class Scalar:
             if operand is None:
                 return NotImplemented
             node = operand
-        result = tracer.builder.binary(op, self.node, node)
         power = tracer.builder.as_constant(node) if op == "power" else None
         if power is not None and power > 0.0 and not power.is_integer():
-            tracer.continue_root(result, self.node, lambda base: tracer.builder.binary(op, base, node))
-        return Scalar(tracer, result)
+            return Scalar(tracer, tracer.root(self.node, lambda base: tracer.builder.binary(op, base, node)))
+        return Scalar(tracer, tracer.builder.binary(op, self.node, node))
 
     def reflected(self, op: str, other: Any) -> Any:
         """Return ``op(other, self)``; element by element if `other` is an array."""

@@ -4,7 +4,7 @@ use crate::error::FieldError;
 use crate::mode::Signs;
 use crate::system::{move_inside, side_offsets};
 use crate::system::{LieValue, PiecewiseSystem, Place};
-use crate::tolerances::{MAX_LIE_ORDER, SIDE_REACH};
+use crate::tolerances::{MAX_LIE_ORDER, SAME_VALUE, SIDE_REACH};
 
 /// The first non-vanishing derivative of h along a field: h(t) = value (t - t0)^order / order! + ...
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,9 +58,34 @@ pub fn first_nonzero(
             return Ok(leading);
         }
     }
+    by_difference(system, j, &on_side)
+}
+
+/// What two values of h along the field tell, where no derivative is finite: a root of what is zero all around has none.
+fn by_difference(
+    system: &dyn PiecewiseSystem,
+    j: usize,
+    place: &Place<'_>,
+) -> Result<Leading, FieldError> {
+    let mut rate = vec![0.0; place.x.len()];
+    system.field(place, &mut rate)?;
+    let speed = rate.iter().fold(1.0_f64, |most, v| most.max(v.abs()));
+    let duration = side_offsets(place.x).last().unwrap_or(0.0) / speed;
+    let moved: Vec<f64> = (place.x.iter().zip(&rate))
+        .map(|(x, v)| x + duration * v)
+        .collect();
+    let mut h = [
+        vec![0.0; system.n_surfaces()],
+        vec![0.0; system.n_surfaces()],
+    ];
+    system.surfaces(place, &mut h[0])?;
+    system.surfaces(&place.moved(place.t + duration, &moved), &mut h[1])?;
+    let change = h[1][j] - h[0][j];
+    let is_known =
+        change.abs() > SAME_VALUE * (h[0][j].abs() + h[1][j].abs()) && change.is_finite();
     Ok(Leading {
-        order: 0,
-        value: 0.0,
+        order: usize::from(is_known),
+        value: change / duration,
     })
 }
 

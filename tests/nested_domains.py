@@ -1,0 +1,254 @@
+"""Random right-hand sides with roots, logarithms, quotients and quantisers in one another, and quadrature.
+
+Every function is y' = f(t, x) along a line x(t). The oracle knows nothing of the package: it evaluates f with
+NumPy, finds all zeros of what its signs, comparisons and floors read on a fine grid with refinement, and sums
+the integrals between them.
+``python -m nested_domains --n 10000`` runs as many and lists what differs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import os
+import random
+import warnings
+from collections import Counter
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import filippov as fl
+import numpy as np
+from nestings import METHODS, Outcome
+
+__all__ = ["check", "made"]
+
+END = 4.0
+CELLS = 8192
+SMOOTH = [
+    "x[0]",
+    "x[1]",
+    "t",
+    "(x[0] - 0.3)",
+    "np.sin(2*x[0])",
+    "x[0]*x[1]",
+    "(x[1]**2 - 0.7)",
+    "np.exp(-x[0]**2)",
+]
+LEVELS = ["0.1", "0.35", "-0.2", "0.6", "1.1"]
+
+
+class Function(NamedTuple):
+    """A function as it is run, as the oracle evaluates it, and what vanishes where it is not smooth."""
+
+    run: str
+    oracle: str
+    inner: tuple[str, ...]
+
+
+class _Maker:
+    """Makes random functions."""
+
+    def __init__(self, seed: int) -> None:
+        self.random = random.Random(seed)
+
+    def smooth(self) -> Function:
+        text = self.random.choice(SMOOTH)
+        return Function(text, text, ())
+
+    def value(self, depth: int) -> Function:
+        pick = self.random
+        if depth == 0:
+            return self.smooth()
+        a = self.value(depth - 1)
+        kind = pick.randrange(13)
+        if kind < 5:
+            # Of one argument, which has a root or a pole of its own where that vanishes.
+            of = [
+                "np.sqrt(np.abs({}))",
+                "np.cbrt({})",
+                "np.abs({})",
+                "np.log(0.2 + np.abs({}))",
+                "np.abs({})**1.5",
+            ][kind]
+            return Function(of.format(a.run), of.format(a.oracle), (*a.inner, a.oracle))
+        if kind == 5:
+            of = "np.sqrt(np.maximum({}, 0))"
+            return Function(of.format(a.run), of.format(a.oracle), (*a.inner, a.oracle))
+        if kind in (6, 7):
+            of, steps = pick.choice(
+                [
+                    ("(0.25*np.floor(4*({})))", "np.sin(4*np.pi*({}))"),
+                    ("(0.5*np.rint(2*({})))", "np.cos(2*np.pi*({}))"),
+                    ("(({}) % 0.5)", "np.sin(2*np.pi*({}))"),
+                    ("(0.5*(({}) // 0.5))", "np.sin(2*np.pi*({}))"),
+                ]
+            )
+            return Function(of.format(a.run), of.format(a.oracle), (*a.inner, steps.format(a.oracle)))
+        b = self.value(depth - 1)
+        inner = (*a.inner, *b.inner)
+        if kind in (8, 9):
+            c = self.condition(depth - 1)
+            oracle = f"np.where({c.oracle}, {a.oracle}, {b.oracle})"
+            run = (
+                f"({a.run} if {c.run} else {b.run})" if kind == 8 else f"np.where({c.run}, {a.run}, {b.run})"
+            )
+            return Function(run, oracle, (*inner, *c.inner))
+        if kind == 10:
+            of = pick.choice(["np.maximum({}, {})", "np.minimum({}, {})"])
+            difference = f"({a.oracle} - ({b.oracle}))"
+            return Function(of.format(a.run, b.run), of.format(a.oracle, b.oracle), (*inner, difference))
+        of = "({} - 0.5*{})" if kind == 11 else "({} + {})"
+        return Function(of.format(a.run, b.run), of.format(a.oracle, b.oracle), inner)
+
+    def condition(self, depth: int) -> Function:
+        pick = self.random
+        a = self.value(depth)
+        level = pick.choice(LEVELS)
+        if pick.random() < 0.25:
+            smooth = self.smooth()
+            text = f"1/({smooth.run}) > {level}"
+            return Function(text, text, (smooth.run, f"1 - {level}*({smooth.run})"))
+        text = f"{{}} {pick.choice(['>', '<', '>=', '<='])} {level}"
+        inside = f"({a.oracle}) - ({level})"
+        return Function(text.format(a.run), text.format(a.oracle), (*a.inner, inside))
+
+
+class Made(NamedTuple):
+    """The function of a seed, its line and its places."""
+
+    source: str
+    value: Callable[..., Any]
+    inner: list[Callable[..., Any]]
+    velocity: Any
+    start: Any
+
+
+def made(seed: int) -> Made:
+    """Return what belongs to a seed."""
+    maker = _Maker(seed)
+    function = maker.value(maker.random.choice([2, 3]))
+    rng = np.random.default_rng(seed)
+
+    def of(text: str) -> Callable[..., Any]:
+        return eval(f"lambda t, x: 1.0*({text})", {"np": np})  # type: ignore[no-any-return]
+
+    inner = [of(text) for text in dict.fromkeys(function.inner)]
+    return Made(
+        function.run, of(function.oracle), inner, rng.uniform(-1.0, 1.0, 2), rng.uniform(-1.5, 1.5, 2)
+    )
+
+
+def places(of: Callable[[Any], Any]) -> list[float]:
+    """Return where a function of the time changes its sign, jumps through zero, or touches it on the way."""
+    t = np.linspace(0.0, END, CELLS + 1)
+    h = of(t)
+    found = []
+    # A dip towards zero between two points of the grid is looked at on a grid of its own.
+    dips = np.flatnonzero((abs(h[1:-1]) < abs(h[:-2])) & (abs(h[1:-1]) < abs(h[2:])) & (h[:-2] * h[2:] > 0))
+    fine = [np.linspace(t[k], t[k + 2], 257) for k in dips]
+    for grid in [t, *fine]:
+        values = of(grid)
+        for k in np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0):
+            low, high = grid[k], grid[k + 1]
+            side = np.sign(values[k])
+            for _ in range(60):
+                middle = 0.5 * (low + high)
+                if np.sign(of(np.array([middle]))[0]) == side:
+                    low = middle
+                else:
+                    high = middle
+            found.append(0.5 * (low + high))
+        found.extend(grid[1:-1][values[1:-1] == 0.0])
+    return found
+
+
+# Nodes and weights of the double exponential rule on [0, 1]: it integrates roots at the ends, too. No node is
+# in the middle, where a function may have its only point on a step.
+_S = np.linspace(-3.2, 3.2, 81) + 0.013
+_NODES = 0.5 * (1.0 + np.tanh(0.5 * np.pi * np.sinh(_S)))
+_WEIGHTS = (_S[1] - _S[0]) * 0.25 * np.pi * np.cosh(_S) / np.cosh(0.5 * np.pi * np.sinh(_S)) ** 2
+
+
+def exact(function: Made) -> float:
+    """Return the integral of the function along its line."""
+
+    def along(of: Callable[..., Any]) -> Callable[[Any], Any]:
+        def value(t: Any) -> Any:
+            x = function.start[:, None] + function.velocity[:, None] * t
+            return np.broadcast_to(of(t, x), np.shape(t))
+
+        return value
+
+    with np.errstate(all="ignore"):
+        ends = {0.0, END}
+        for inner in function.inner:
+            ends.update(places(along(inner)))
+        knots = np.array(sorted(ends))
+        widths = np.diff(knots)
+        t = knots[:-1, None] + widths[:, None] * _NODES
+        values = along(function.value)(t.ravel()).reshape(t.shape)
+        return float(np.sum(widths[:, None] * _WEIGHTS * values))
+
+
+def check(seed: int) -> Outcome:
+    """Compare a run with the integral."""
+    function = made(seed)
+    expected = exact(function)
+    if not np.isfinite(expected):
+        return Outcome("undefined")
+    names: dict[str, Any] = {"np": np}
+    exec(f"def f(t, x):\n    return {function.source}\n", names)
+    velocity, rtol = function.velocity, 10.0 ** -(7 + seed % 4)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            sol = fl.solve_ivp(
+                lambda t, x: [velocity[0], velocity[1], 1.0 * names["f"](t, x)],
+                (0.0, END),
+                [*function.start, 0.0],
+                method=METHODS[seed % 4],
+                rtol=rtol,
+                atol=rtol,
+                max_wall_time=20.0,
+            )
+    except (fl.TraceError, fl.ModelError) as error:
+        return Outcome("refused", str(error).partition("\n")[0][:150])
+    warned = [warning.code for warning in sol.warnings]
+    if np.isnan(sol.t).any():
+        return Outcome("different", "a time is NaN")
+    if not sol.success:
+        return Outcome("stopped", f"{sol.message[:200]} {warned}")
+    error = abs(sol.y[2, -1] - expected)
+    if error > 1000.0 * rtol + 1e-6:  # next to roots a method is that accurate
+        kind = "different, with a warning" if warned else "different"
+        return Outcome(kind, f"{error:.1e} with {METHODS[seed % 4]} and {rtol:.0e}; {warned}")
+    return Outcome("same")
+
+
+def outcomes(first: int, n: int) -> Iterator[tuple[int, Outcome]]:
+    """Yield the outcomes of many seeds, in several processes."""
+    seeds = range(first, first + n)
+    with multiprocessing.get_context("spawn").Pool(os.cpu_count()) as pool:
+        yield from zip(seeds, pool.imap(check, seeds, chunksize=20), strict=True)
+
+
+def main() -> None:
+    """Run many, and list what is not the same."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--n", type=int, default=1000)
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+    kinds: Counter[str] = Counter()
+    for seed, outcome in outcomes(options.seed, options.n):
+        kinds[outcome.kind] += 1
+        if outcome.kind not in ("same", "refused", "undefined"):
+            print(f"{outcome.kind} {seed}: {outcome.reason}", flush=True)
+        elif outcome.kind == "refused":
+            kinds[f"refused: {outcome.reason[:60]}"] += 1
+    for kind, count in kinds.most_common(25):
+        print(f"{count:8d} {kind}")
+
+
+if __name__ == "__main__":
+    main()
