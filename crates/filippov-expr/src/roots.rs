@@ -4,16 +4,44 @@
 
 use crate::graph::Graph;
 use crate::node::NodeId;
+use crate::op::{BinaryOp, UnaryOp};
 
 /// Signs in an argument, of which all combinations are looked at.
 const MOST_SIGNS: usize = 3;
 
 impl Graph {
+    /// A function as it is traced: `op(a)`, with roots by regions.
+    ///
+    /// # Examples
+    /// ```
+    /// use filippov_expr::{Graph, Names, UnaryOp};
+    ///
+    /// let mut g = Graph::new();
+    /// let (x, zero) = (g.state(0), g.constant(0.0));
+    /// let ramp = g.maximum(x, zero);
+    /// let root = g.apply(UnaryOp::Sqrt, ramp);
+    /// assert_eq!(g.text(root, &Names::default()), "where(x[0] > 0, sqrt(x[0]), 0)");
+    /// ```
+    pub fn apply(&mut self, op: UnaryOp, a: NodeId) -> NodeId {
+        // The continuation of a root is treated as the root.
+        let is_root = matches!(op, UnaryOp::Sqrt | UnaryOp::Cbrt | UnaryOp::NotNegative);
+        let choice = is_root.then(|| self.root_by_regions(a, &|graph, a| graph.unary(op, a)));
+        choice.flatten().unwrap_or_else(|| self.unary(op, a))
+    }
+
+    /// A function of two values as it is traced: `op(a, b)`, with powers that are roots by regions.
+    pub fn apply_to_two(&mut self, op: BinaryOp, a: NodeId, b: NodeId) -> NodeId {
+        let is_root = |exponent: f64| exponent > 0.0 && exponent.fract() != 0.0;
+        let is_root = op == BinaryOp::Pow && self.as_constant(b).is_some_and(is_root);
+        let choice = is_root.then(|| self.root_by_regions(a, &|graph, a| graph.binary(op, a, b)));
+        choice.flatten().unwrap_or_else(|| self.binary(op, a, b))
+    }
+
     /// A root of an argument that stands still for some signs in it, as a choice; `None` if there are no such signs, or many.
-    pub(crate) fn root_by_regions(
+    fn root_by_regions(
         &mut self,
         argument: NodeId,
-        root: impl Fn(&mut Graph, NodeId) -> NodeId,
+        root: &dyn Fn(&mut Graph, NodeId) -> NodeId,
     ) -> Option<NodeId> {
         if !self.facts(argument).has_sign {
             return None;
@@ -41,7 +69,8 @@ impl Graph {
         let sides = [1.0, -1.0].map(|sign| {
             signs[first] = Some(sign);
             let value = self.at_signs(&[argument], &signs)[0];
-            root(self, value)
+            let choice = self.root_by_regions(value, root);
+            choice.unwrap_or_else(|| root(self, value))
         });
         Some(self.select(first as u32, 1.0, sides[0], sides[1]))
     }

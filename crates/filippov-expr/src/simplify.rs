@@ -25,12 +25,6 @@ impl Graph {
         if let Some(value) = self.as_constant(a) {
             return self.constant(op.apply(value));
         }
-        // The continuation of a root is treated as the root.
-        if matches!(op, UnaryOp::Sqrt | UnaryOp::Cbrt | UnaryOp::NotNegative) {
-            if let Some(choice) = self.root_by_regions(a, |graph, a| graph.unary(op, a)) {
-                return choice;
-            }
-        }
         match op {
             UnaryOp::Neg => self.negative(a),
             UnaryOp::Sqrt => match *self.node(a) {
@@ -431,11 +425,6 @@ impl Graph {
             };
         }
         if exponent.fract() != 0.0 || exponent.abs() > LARGEST_PRODUCT_POWER {
-            if exponent > 0.0 {
-                if let Some(choice) = self.root_by_regions(a, |graph, a| graph.power(a, b)) {
-                    return choice;
-                }
-            }
             return self.insert(Node::Binary(BinaryOp::Pow, a, b));
         }
         let product = self.product_power(a, exponent.abs() as u32);

@@ -69,14 +69,14 @@ impl Builder {
         let op = UnaryOp::from_name(op).ok_or_else(|| unknown(op))?;
         let mut graph = self.graph();
         let a = Self::node(&graph, a)?;
-        Ok(graph.unary(op, a).0)
+        Ok(graph.apply(op, a).0)
     }
 
     fn binary(&self, op: &str, a: u32, b: u32) -> PyResult<u32> {
         let op = BinaryOp::from_name(op).ok_or_else(|| unknown(op))?;
         let mut graph = self.graph();
         let (a, b) = (Self::node(&graph, a)?, Self::node(&graph, b)?);
-        Ok(graph.binary(op, a, b).0)
+        Ok(graph.apply_to_two(op, a, b).0)
     }
 
     fn sign(&self, a: u32) -> PyResult<u32> {

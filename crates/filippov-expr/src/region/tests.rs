@@ -225,8 +225,7 @@ fn edges() {
     let inside = g.unary(UnaryOp::Sqrt, inside);
     let mut regions = Regions::new(g, vec![], vec![]);
     assert_eq!(regions.edge(root), Some(Edge::Domain(root)));
-    // A choice between a root and 0: where it is compared the root goes on as 0.
-    assert_eq!(regions.edge(root_of_ramp), None);
+    assert_eq!(regions.edge(root_of_ramp), Some(Edge::Domain(root_of_ramp)));
     assert_eq!(regions.edge(bent), Some(Edge::Singular(cube_root)));
     assert!(matches!(regions.edge(reciprocal), Some(Edge::Singular(_))));
     assert_eq!(regions.edge(plain), None);

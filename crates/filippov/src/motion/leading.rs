@@ -81,11 +81,16 @@ fn by_difference(
     system.surfaces(place, &mut h[0])?;
     system.surfaces(&place.moved(place.t + duration, &moved), &mut h[1])?;
     let change = h[1][j] - h[0][j];
-    let is_known =
-        change.abs() > SAME_VALUE * (h[0][j].abs() + h[1][j].abs()) && change.is_finite();
-    Ok(Leading {
-        order: usize::from(is_known),
-        value: change / duration,
+    let is_clear = change.abs() > SAME_VALUE * (h[0][j].abs() + h[1][j].abs());
+    Ok(match is_clear && change.is_finite() {
+        true => Leading {
+            order: 1,
+            value: change / duration,
+        },
+        false => Leading {
+            order: 0,
+            value: 0.0,
+        },
     })
 }
 
