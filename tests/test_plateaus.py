@@ -442,3 +442,18 @@ def test_a_search_that_is_given_up_is_warned_of() -> None:
         fl.solve_ivp(fun, (0, 0.01), np.linspace(1, 2, 30))
     assert caught[0].filename == __file__
     assert "more than 1024 combinations" in str(caught[0].message)
+
+
+@pytest.mark.parametrize(
+    ("rounded", "exact"),
+    [
+        # Held at 0.5 and at -0.5, where Python rounds to 0.
+        (lambda x: np.rint(np.clip(x, -0.5, 0.5)), 0.0),
+        (lambda x: np.rint(np.clip(x, 0.0, 1.5)), 2.0 * 0.5 + 1.0 * 1.0),
+        # Halves of whole numbers from -4 to 3, half a unit of x each.
+        (lambda x: np.rint(0.5 * np.floor(2 * x)), 0.5 * sum(float(np.rint(0.5 * k)) for k in range(-4, 4))),
+        (lambda x: round(0.5 * np.floor(2 * x)), 0.5 * sum(float(np.rint(0.5 * k)) for k in range(-4, 4))),
+    ],
+)
+def test_what_stands_halfway_is_rounded_to_the_even_number(rounded: Any, exact: float) -> None:
+    assert final(lambda x: 1.0 * rounded(x), -2.0, 4.0) == pytest.approx(exact, abs=1e-9)

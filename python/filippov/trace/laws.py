@@ -89,6 +89,26 @@ class Laws:
         step = tracer.choose(distance, half, builder.constant(-0.5))
         return builder.binary("add", builder.binary("subtract", level, half), step)
 
+    def rint(self, tracer: Tracer, node: int) -> int:
+        """Return the node of the nearest whole number of an expression; halfway the even one."""
+        builder = tracer.builder
+        constant = builder.as_constant(node)
+        if constant is not None:
+            return builder.constant(float(round(constant)))
+        pieces = tracer.pieces(node, in_full=True)
+        if pieces is not None and has_constant_part(tracer, pieces) and len(pieces) > 2:
+            return by_parts(tracer, pieces, lambda part, _: self.rint(tracer, part))
+        above = self.floor(tracer, builder.binary("add", node, builder.constant(0.5)))
+        if not self.is_held(tracer, node):
+            return above
+        # What stands still may stand halfway: there the whole number above is one more than the one below.
+        below = self.floor(tracer, builder.binary("subtract", builder.constant(0.5), node))
+        is_halfway = builder.binary("add", above, below)
+        half = builder.binary("multiply", builder.constant(0.5), above)
+        rest = builder.binary("subtract", half, self.floor(tracer, half))
+        odd = builder.binary("multiply", builder.constant(2.0), rest)
+        return builder.binary("subtract", above, builder.binary("multiply", is_halfway, odd))
+
     def sign(self, tracer: Tracer, node: int) -> int:
         """Return the node of the sign of a constant of motion: -1, 0 or 1 as Python has it."""
         return self._state(tracer, _Law("sign", (node,), ()), "sign")

@@ -260,8 +260,8 @@ class Scalar:
         return self.__ceil__()
 
     def rint(self) -> Any:
-        """Return the nearest whole number."""
-        return (self + 0.5).floor()
+        """Return the nearest whole number; the even one halfway between two."""
+        return Scalar(self.tracer, self.tracer.laws.rint(self.tracer, self.node))
 
     def __floordiv__(self, other: Any) -> Any:
         return np.floor(self / _divisor(other))
