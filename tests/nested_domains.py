@@ -8,18 +8,14 @@ the integrals between them.
 
 from __future__ import annotations
 
-import argparse
-import multiprocessing
-import os
 import random
 import warnings
-from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import filippov as fl
 import numpy as np
-from nestings import METHODS, Outcome
+from nestings import METHODS, Outcome, run_many
 
 __all__ = ["check", "made"]
 
@@ -226,29 +222,5 @@ def check(seed: int) -> Outcome:
     return Outcome("same")
 
 
-def outcomes(first: int, n: int) -> Iterator[tuple[int, Outcome]]:
-    """Yield the outcomes of many seeds, in several processes."""
-    seeds = range(first, first + n)
-    with multiprocessing.get_context("spawn").Pool(os.cpu_count()) as pool:
-        yield from zip(seeds, pool.imap(check, seeds, chunksize=20), strict=True)
-
-
-def main() -> None:
-    """Run many, and list what is not the same."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--n", type=int, default=1000)
-    parser.add_argument("--seed", type=int, default=0)
-    options = parser.parse_args()
-    kinds: Counter[str] = Counter()
-    for seed, outcome in outcomes(options.seed, options.n):
-        kinds[outcome.kind] += 1
-        if outcome.kind not in ("same", "refused", "undefined"):
-            print(f"{outcome.kind} {seed}: {outcome.reason}", flush=True)
-        elif outcome.kind == "refused":
-            kinds[f"refused: {outcome.reason[:60]}"] += 1
-    for kind, count in kinds.most_common(25):
-        print(f"{count:8d} {kind}")
-
-
 if __name__ == "__main__":
-    main()
+    run_many(check, __doc__)

@@ -13,13 +13,13 @@ import os
 import random
 import warnings
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import filippov as fl
 import numpy as np
 
-__all__ = ["Outcome", "check", "source_of"]
+__all__ = ["METHODS", "Outcome", "check", "check_event", "run_many", "source_of"]
 
 AFFINE = ["x[0]", "x[1]", "(x[0] - 0.5)", "(x[1] + 0.25)", "(x[0] - x[1])", "t", "(2*x[0] - 1)"]
 NUMBERS = ["0.0", "0.5", "1.0", "-0.75", "2.0", "-1.0"]
@@ -204,29 +204,24 @@ def check_event(seed: int) -> Outcome:
     return Outcome("same")
 
 
-def outcomes(first: int, n: int) -> Iterator[tuple[int, Outcome]]:
-    """Yield the outcomes of many seeds, in several processes."""
-    seeds = range(first, first + n)
-    with multiprocessing.get_context("spawn").Pool(os.cpu_count()) as pool:
-        yield from zip(seeds, pool.imap(check, seeds, chunksize=50), strict=True)
-
-
-def main() -> None:
-    """Run many, and list what is not the same."""
-    parser = argparse.ArgumentParser(description=__doc__)
+def run_many(check_seed: Callable[[int], Outcome], description: str) -> None:
+    """Check as many seeds as the command line says, in several processes; list what differs or stops."""
+    parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--n", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
+    seeds = range(options.seed, options.seed + options.n)
     kinds: Counter[str] = Counter()
-    for seed, outcome in outcomes(options.seed, options.n):
-        kinds[outcome.kind] += 1
-        if outcome.kind in ("different", "stopped"):
-            print(f"{outcome.kind} {seed}: {outcome.reason}", flush=True)
-        elif outcome.kind == "refused":
-            kinds[f"refused: {outcome.reason[:60]}"] += 1
+    with multiprocessing.get_context("spawn").Pool(os.cpu_count()) as pool:
+        for seed, outcome in zip(seeds, pool.imap(check_seed, seeds, chunksize=20), strict=True):
+            kinds[outcome.kind] += 1
+            if outcome.kind.startswith(("different", "stopped")):
+                print(f"{outcome.kind} {seed}: {outcome.reason}", flush=True)
+            elif outcome.kind == "refused":
+                kinds[f"refused: {outcome.reason[:60]}"] += 1
     for kind, count in kinds.most_common(25):
         print(f"{count:8d} {kind}")
 
 
 if __name__ == "__main__":
-    main()
+    run_many(check, __doc__)

@@ -105,7 +105,8 @@ def _copysign(a: Any, b: Any) -> Any:
 
 
 def _arctan2(y: Any, x: Any) -> Any:
-    # It jumps across y = 0 where x < 0: there each side has an angle that goes on beyond it.
+    # arctan2 jumps across y = 0 where x < 0. There each side of y = 0 gets a formula of its own, which is
+    # continuous across y = 0.
     angle = _binary("arctan2")
     y, x = _scalar(y), _scalar(x)
     is_right = x >= 0

@@ -46,7 +46,7 @@ pub enum FirstZero {
 }
 
 /// The Bernstein coefficients, as many as `b` has, of the first coefficients of a polynomial; returns the sum of the sizes
-/// of these. Most steps of a run come here once per surface: in the place of a call it costs 8 % less.
+/// of these. Most steps call this function once per surface; inlined, it takes 8 % fewer instructions.
 #[inline(always)]
 pub(super) fn to_bernstein(coefficients: &[f64], b: &mut [f64]) -> f64 {
     // The coefficient of degree i is the sum of C(i, k)/C(n, k) c_k.
