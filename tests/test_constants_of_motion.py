@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import pickle
-import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +12,7 @@ import numpy as np
 import pytest
 
 METHODS = ["Taylor", "DOPRI5", "DOP853", "Rodas5P"]
-
-
-@pytest.fixture(autouse=True)
-def no_warnings() -> Iterator[None]:
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        yield
+pytestmark = pytest.mark.usefixtures("no_warnings")
 
 
 SPELLINGS: dict[str, Callable[[Any], Any]] = {

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import filippov as fl
@@ -11,13 +10,7 @@ import numpy as np
 import pytest
 
 METHODS = ["Taylor", "DOPRI5", "DOP853", "Rodas5P"]
-
-
-@pytest.fixture(autouse=True)
-def no_warnings() -> Iterator[None]:
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        yield
+pytestmark = pytest.mark.usefixtures("no_warnings")
 
 
 def oscillator(t: float, x: Any) -> Any:
