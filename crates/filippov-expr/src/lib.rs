@@ -59,7 +59,7 @@ mod poles;
 mod print;
 pub mod program;
 pub mod region;
-mod roots;
+pub mod roots;
 mod schedule;
 mod serial;
 mod sign_gradient;

@@ -18,130 +18,137 @@ struct Fraction {
     denominator: Option<NodeId>,
 }
 
-impl Graph {
-    /// An expression with the same sign, without the poles of quotients and tangents; `None` if there are none, or too many.
-    pub(crate) fn without_poles(&mut self, id: NodeId) -> Option<NodeId> {
-        let graph = &*self;
-        let nodes = graph.reachable_by([id], |id| graph.terms_and_factors(id));
-        let n_poles = nodes.iter().filter(|&&id| graph.has_pole(id)).count();
-        if n_poles == 0 || n_poles > MOST_DENOMINATORS {
-            return None;
-        }
-        let mut fractions = FxHashMap::default();
-        for node in nodes {
-            let fraction = self.as_fraction(node, &fractions);
-            fractions.insert(node, fraction);
-        }
-        let Fraction {
-            numerator,
-            denominator,
-        } = fractions[&id];
-        let denominator = denominator?;
-        let form = LinearForm::of(self, denominator);
-        Some(match self.known_sign(&form) {
-            Some(Switching::Constant(1.0)) => numerator,
-            Some(Switching::Constant(-1.0)) => self.neg(numerator),
-            _ => self.mul(numerator, denominator),
-        })
-    }
+/// The nodes of an expression as quotients.
+struct Fractions<'g> {
+    graph: &'g mut Graph,
+    known: FxHashMap<NodeId, Fraction>,
+}
 
-    /// The operands that a sum, a product or a quotient is made of.
-    fn terms_and_factors(&self, id: NodeId) -> Vec<NodeId> {
-        use BinaryOp::{Add, Div, Mul, Sub};
-        match *self.node(id) {
-            Node::Unary(UnaryOp::Neg, a) => vec![a],
-            Node::Binary(Add | Sub | Mul | Div, a, b) => vec![a, b],
-            _ => Vec::new(),
-        }
+/// An expression with the same sign, without the poles of quotients and tangents; `None` if there are none, or too many.
+pub(crate) fn without_poles(graph: &mut Graph, id: NodeId) -> Option<NodeId> {
+    let nodes = graph.reachable_by([id], |id| terms_and_factors(graph, id));
+    let n_poles = nodes.iter().filter(|&&id| has_pole(graph, id)).count();
+    if n_poles == 0 || n_poles > MOST_DENOMINATORS {
+        return None;
     }
-
-    /// Is this a quotient whose divisor may vanish along a motion, or a tangent? Of a divisor that is a smooth function of one
-    /// sign the poles change no sign, and are left.
-    fn has_pole(&self, id: NodeId) -> bool {
-        match *self.node(id) {
-            Node::Unary(UnaryOp::Tan, a) => self.facts(a).varies,
-            Node::Binary(BinaryOp::Div, _, b) => {
-                let facts = self.facts(b);
-                let form = LinearForm::of(self, b);
-                facts.varies
-                    && match self.known_sign(&form) {
-                        Some(Switching::Constant(_)) => form.constant == 0.0 && facts.has_sign,
-                        _ => true,
-                    }
-            }
-            _ => false,
-        }
+    let mut fractions = Fractions {
+        graph,
+        known: FxHashMap::default(),
+    };
+    for node in nodes {
+        let fraction = fractions.of(node);
+        fractions.known.insert(node, fraction);
     }
+    let Fraction {
+        numerator,
+        denominator,
+    } = fractions.known[&id];
+    let denominator = denominator?;
+    let form = LinearForm::of(graph, denominator);
+    Some(match graph.known_sign(&form) {
+        Some(Switching::Constant(1.0)) => numerator,
+        Some(Switching::Constant(-1.0)) => graph.neg(numerator),
+        _ => graph.mul(numerator, denominator),
+    })
+}
 
+/// The operands that a sum, a product or a quotient is made of.
+fn terms_and_factors(graph: &Graph, id: NodeId) -> Vec<NodeId> {
+    use BinaryOp::{Add, Div, Mul, Sub};
+    match *graph.node(id) {
+        Node::Unary(UnaryOp::Neg, a) => vec![a],
+        Node::Binary(Add | Sub | Mul | Div, a, b) => vec![a, b],
+        _ => Vec::new(),
+    }
+}
+
+/// Is this a quotient whose divisor may vanish along a motion, or a tangent? Of a divisor that is a smooth function of one
+/// sign the poles change no sign, and are left.
+fn has_pole(graph: &Graph, id: NodeId) -> bool {
+    match *graph.node(id) {
+        Node::Unary(UnaryOp::Tan, a) => graph.facts(a).varies,
+        Node::Binary(BinaryOp::Div, _, b) => {
+            let facts = graph.facts(b);
+            let form = LinearForm::of(graph, b);
+            facts.varies
+                && match graph.known_sign(&form) {
+                    Some(Switching::Constant(_)) => form.constant == 0.0 && facts.has_sign,
+                    _ => true,
+                }
+        }
+        _ => false,
+    }
+}
+
+impl Fractions<'_> {
     /// A node as a quotient, from those of its operands.
-    fn as_fraction(&mut self, id: NodeId, known: &FxHashMap<NodeId, Fraction>) -> Fraction {
-        let whole = |id| Fraction {
+    fn of(&mut self, id: NodeId) -> Fraction {
+        let whole = Fraction {
             numerator: id,
             denominator: None,
         };
-        let is_pole = self.has_pole(id);
-        match *self.node(id) {
+        let is_pole = has_pole(self.graph, id);
+        match *self.graph.node(id) {
             Node::Unary(UnaryOp::Tan, a) if is_pole => Fraction {
-                numerator: self.unary(UnaryOp::Sin, a),
-                denominator: Some(self.unary(UnaryOp::Cos, a)),
+                numerator: self.graph.unary(UnaryOp::Sin, a),
+                denominator: Some(self.graph.unary(UnaryOp::Cos, a)),
             },
-            Node::Unary(UnaryOp::Neg, a) if known[&a].denominator.is_some() => Fraction {
-                numerator: self.neg(known[&a].numerator),
-                ..known[&a]
+            Node::Unary(UnaryOp::Neg, a) if self.known[&a].denominator.is_some() => Fraction {
+                numerator: self.graph.neg(self.known[&a].numerator),
+                ..self.known[&a]
             },
-            Node::Binary(op, a, b) if known.contains_key(&a) && known.contains_key(&b) => {
-                let (of_a, of_b) = (known[&a], known[&b]);
+            Node::Binary(op, a, b)
+                if self.known.contains_key(&a) && self.known.contains_key(&b) =>
+            {
+                let (of_a, of_b) = (self.known[&a], self.known[&b]);
                 if !is_pole && of_a.denominator.is_none() && of_b.denominator.is_none() {
-                    return whole(id);
+                    return whole;
                 }
                 match op {
                     // s (n/d) is n/(s d): the divisor of 1/abs(v) has one sign.
-                    BinaryOp::Mul if matches!(*self.node(a), Node::Sign(_)) => Fraction {
-                        denominator: of_b.denominator.map(|divisor| self.mul(a, divisor)),
+                    BinaryOp::Mul if matches!(*self.graph.node(a), Node::Sign(_)) => Fraction {
+                        denominator: self.product(Some(a), of_b.denominator),
                         ..of_b
                     },
                     BinaryOp::Mul => Fraction {
-                        numerator: self.mul(of_a.numerator, of_b.numerator),
-                        denominator: self
-                            .product_of_denominators(of_a.denominator, of_b.denominator),
+                        numerator: self.graph.mul(of_a.numerator, of_b.numerator),
+                        denominator: self.product(of_a.denominator, of_b.denominator),
                     },
-                    BinaryOp::Div => {
-                        let numerator =
-                            self.product_of_denominators(Some(of_a.numerator), of_b.denominator);
-                        Fraction {
-                            numerator: numerator.unwrap_or(of_a.numerator),
-                            denominator: self
-                                .product_of_denominators(of_a.denominator, Some(of_b.numerator)),
-                        }
-                    }
-                    _ => self.sum_of_fractions(op, of_a, of_b),
+                    BinaryOp::Div => Fraction {
+                        numerator: match of_b.denominator {
+                            Some(divisor) => self.graph.mul(of_a.numerator, divisor),
+                            None => of_a.numerator,
+                        },
+                        denominator: self.product(of_a.denominator, Some(of_b.numerator)),
+                    },
+                    _ => self.sum(op, of_a, of_b),
                 }
             }
-            _ => whole(id),
+            _ => whole,
         }
     }
 
     /// a + b or a - b over a common denominator.
-    fn sum_of_fractions(&mut self, op: BinaryOp, a: Fraction, b: Fraction) -> Fraction {
+    fn sum(&mut self, op: BinaryOp, a: Fraction, b: Fraction) -> Fraction {
         let is_common = a.denominator == b.denominator;
         let mut over = |own: NodeId, other: Option<NodeId>| match other {
-            Some(other) if !is_common => self.mul(own, other),
+            Some(other) if !is_common => self.graph.mul(own, other),
             _ => own,
         };
         let left = over(a.numerator, b.denominator);
         let right = over(b.numerator, a.denominator);
         Fraction {
-            numerator: self.binary(op, left, right),
+            numerator: self.graph.binary(op, left, right),
             denominator: match is_common {
                 true => a.denominator,
-                false => self.product_of_denominators(a.denominator, b.denominator),
+                false => self.product(a.denominator, b.denominator),
             },
         }
     }
 
-    fn product_of_denominators(&mut self, a: Option<NodeId>, b: Option<NodeId>) -> Option<NodeId> {
+    fn product(&mut self, a: Option<NodeId>, b: Option<NodeId>) -> Option<NodeId> {
         match (a, b) {
-            (Some(a), Some(b)) => Some(self.mul(a, b)),
+            (Some(a), Some(b)) => Some(self.graph.mul(a, b)),
             _ => a.or(b),
         }
     }

@@ -22,6 +22,7 @@ use crate::graph::Graph;
 use crate::linear::{LinearForm, LinearKey};
 use crate::node::{Node, NodeId};
 use crate::op::{BinaryOp, UnaryOp};
+use crate::poles::without_poles;
 
 /// What the sign of an expression is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -144,7 +145,7 @@ impl Graph {
                 let Some((key, lead)) = form.key() else {
                     return Switching::Constant(0.0);
                 };
-                if let Some(cleared) = self.without_poles(spelling) {
+                if let Some(cleared) = without_poles(self, spelling) {
                     let switching = self.switch(cleared).times(side);
                     if let Switching::Surface { index, orientation } = switching {
                         self.surfaces_mut()

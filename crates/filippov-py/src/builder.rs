@@ -2,7 +2,9 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use filippov_expr::{BinaryOp, Graph, Names, NodeId, RateTerms, Regions, Switching, UnaryOp};
+use filippov_expr::{
+    roots, BinaryOp, Graph, Names, NodeId, RateTerms, Regions, Switching, UnaryOp,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -69,14 +71,14 @@ impl Builder {
         let op = UnaryOp::from_name(op).ok_or_else(|| unknown(op))?;
         let mut graph = self.graph();
         let a = Self::node(&graph, a)?;
-        Ok(graph.apply(op, a).0)
+        Ok(roots::apply(&mut graph, op, a).0)
     }
 
     fn binary(&self, op: &str, a: u32, b: u32) -> PyResult<u32> {
         let op = BinaryOp::from_name(op).ok_or_else(|| unknown(op))?;
         let mut graph = self.graph();
         let (a, b) = (Self::node(&graph, a)?, Self::node(&graph, b)?);
-        Ok(graph.apply_to_two(op, a, b).0)
+        Ok(roots::apply_to_two(&mut graph, op, a, b).0)
     }
 
     fn sign(&self, a: u32) -> PyResult<u32> {
