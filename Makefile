@@ -98,6 +98,7 @@ bench: $(BENCH_STAMP) ## run the benchmarks
 	$(PY) benchmarks/stiff.py
 	$(PY) benchmarks/counts.py
 	$(PY) benchmarks/diagram.py
+	$(PY) benchmarks/tables.py
 
 demo: $(BUILD_STAMP) ## simulate and plot a stick-slip oscillator
 	$(PY) examples/01_stick_slip/stick_slip.py

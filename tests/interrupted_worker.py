@@ -16,6 +16,7 @@ from typing import Any
 import filippov as fl
 import numpy as np
 import xarray  # noqa: F401 - else it is imported when the first sweep begins
+from untraced import number
 
 LONG = {"F": np.linspace(0.1, 0.9, 200), "omega": np.linspace(0.1, 2.0, 1000)}
 ONCE_PER_PERIOD = fl.Phase(lambda omega: 2 * np.pi / omega)
@@ -32,8 +33,8 @@ def bistable(t: Any, x: Any) -> Any:
 
 
 def black_box(t: float, x: Any) -> list[float]:
-    push = 0.5 * math.cos(t) - 0.2 * (1 if float(x[1]) > 0 else -1)
-    return [float(x[1]), push - math.sin(float(x[0]))]
+    push = 0.5 * math.cos(t) - 0.2 * (1 if number(x[1]) > 0 else -1)
+    return [number(x[1]), push - math.sin(number(x[0]))]
 
 
 def run(what: str, store: str) -> Any:
@@ -48,9 +49,9 @@ def run(what: str, store: str) -> Any:
         grid = np.linspace(-2.0, 2.0, 1000)
         return fl.basins(fl.System(bistable, n=2, states=("a", "b")), None, (0, 100), {"a": grid, "b": grid})
     if what == "black_box":
-        return fl.solve_ivp(black_box, (0, 1e6), [1.0, 0.0], surfaces=lambda t, x: float(x[1]))
+        return fl.solve_ivp(black_box, (0, 1e6), [1.0, 0.0], surfaces=lambda t, x: number(x[1]))
     if what == "sweep of a black box":
-        box = fl.System(black_box, n=2, surfaces=lambda t, x: float(x[1]), states=("a", "b"))
+        box = fl.System(black_box, n=2, surfaces=lambda t, x: number(x[1]), states=("a", "b"))
         return fl.sweep(box, (0, 10), {"a": np.linspace(-1, 1, 1000), "b": np.linspace(-1, 1, 1000)})
     more: dict[str, Any] = {"sweep": {}, "follow": {"follow": True}, "store": {"store": store}}[what]
     return fl.bifurcation_diagram(friction, section, span, start, LONG, **more)

@@ -8,10 +8,11 @@ from typing import Any
 import filippov as fl
 import numpy as np
 import pytest
+from untraced import number
 
 
 def friction_in_math(t: float, x: Any) -> Any:
-    y, v = float(x[0]), float(x[1])
+    y, v = number(x[0]), number(x[1])
     return [v, -y + math.sin(t / 3) - (0.4 if v > 0 else -0.4)]
 
 
@@ -43,7 +44,7 @@ def test_short_slides_of_a_relay_are_those_of_the_traced_one(rtol: float) -> Non
     problem = fl.problems.get("relay_feedback")
 
     def relay(t: float, x: Any) -> Any:
-        return problem.fun(float(t), np.array(x, dtype=float), *problem.args)
+        return problem.fun(number(t), np.array(x, dtype=float), *problem.args)
 
     sol = fl.solve_ivp(relay, problem.t_span, problem.y0, surfaces=lambda t, x: x[0], rtol=rtol, atol=rtol)
     assert sol.stats["backend"] == "black box"
@@ -53,7 +54,7 @@ def test_short_slides_of_a_relay_are_those_of_the_traced_one(rtol: float) -> Non
 
 def test_sliding_stays_on_a_curved_surface() -> None:
     def field(t: float, z: Any) -> Any:
-        x, y = float(z[0]), float(z[1])
+        x, y = number(z[0]), number(z[1])
         return [1.0, -1.0] if x * x + y * y > 2 else [x, y]
 
     sol = fl.solve_ivp(
@@ -75,7 +76,7 @@ def test_scipy_interpolant_as_characteristic() -> None:
     spring = interpolate.CubicSpline(nodes, np.sin(nodes))
 
     def field(t: float, x: Any) -> Any:
-        return [x[1], -float(spring(float(x[0]))) - 0.1 * float(np.sign(float(x[1])))]
+        return [x[1], -float(spring(number(x[0]))) - 0.1 * float(np.sign(number(x[1])))]
 
     def exact(t: float, x: Any) -> Any:
         return [x[1], -np.sin(x[0]) - 0.1 * np.sign(x[1])]
@@ -93,7 +94,7 @@ def test_several_surfaces() -> None:
     problem = fl.problems.get("two_masses")
 
     def field(t: float, x: Any) -> Any:
-        y1, y2, v1, v2 = (float(value) for value in x)
+        y1, y2, v1, v2 = (number(value) for value in x)
         rough1, rough2 = (0.6 if y1 < 0 else 1.0), (0.5 if y2 < 0 else 0.2)
         return [
             v1,
@@ -114,7 +115,7 @@ def test_several_surfaces() -> None:
 
 def test_moving_surface() -> None:
     def field(t: float, x: Any) -> Any:
-        return [-2.0 if float(x[0]) > math.sin(t) else 2.0]
+        return [-2.0 if number(x[0]) > math.sin(t) else 2.0]
 
     sol = fl.solve_ivp(field, (0, 10), [1.0], surfaces=lambda t, x: x[0] - np.sin(t), rtol=1e-9, atol=1e-9)
     assert [s.kind for s in sol.switches] == ["enter_sliding"]
@@ -126,7 +127,7 @@ def test_moving_surface() -> None:
 @pytest.mark.parametrize("height", [0.5, 1.0, 30.0])
 def test_undeclared_jump_in_time_is_noticed(height: float) -> None:
     def field(t: float, x: Any) -> Any:
-        return [-float(x[0]) + (height if float(t) > 0.7 else 0.0)]
+        return [-number(x[0]) + (height if number(t) > 0.7 else 0.0)]
 
     sol = fl.solve_ivp(field, (0, 2), [1.0], surfaces=lambda t, x: x[0] + 1000.0)
     assert sol.success
@@ -139,7 +140,7 @@ def test_undeclared_jump_in_time_is_noticed(height: float) -> None:
 @pytest.mark.filterwarnings("ignore:undeclared_jump:filippov.FilippovWarning")
 def test_undeclared_jump_in_the_state_is_noticed() -> None:
     def field(t: float, x: Any) -> Any:
-        return [1.0 if float(x[0]) < 0.7 else 3.0]
+        return [1.0 if number(x[0]) < 0.7 else 3.0]
 
     sol = fl.solve_ivp(field, (0, 2), [0.0], surfaces=lambda t, x: x[0] + 10.0)
     (warning,) = sol.warnings
@@ -150,10 +151,10 @@ def test_undeclared_jump_in_the_state_is_noticed() -> None:
 def test_smooth_black_boxes_give_no_warning() -> None:
     """Fast but smooth: sharp peaks, decay, high frequency."""
     fields: list[Any] = [
-        lambda t, x: [math.exp(-((float(t) - 1.0) ** 2) / 2e-4)],
-        lambda t, x: [-50.0 * float(x[0])],
-        lambda t, x: [math.sin(40.0 * float(t))],
-        lambda t, x: [1.0 / (1e-3 + (float(t) - 1.0) ** 2)],
+        lambda t, x: [math.exp(-((number(t) - 1.0) ** 2) / 2e-4)],
+        lambda t, x: [-50.0 * number(x[0])],
+        lambda t, x: [math.sin(40.0 * number(t))],
+        lambda t, x: [1.0 / (1e-3 + (number(t) - 1.0) ** 2)],
     ]
     for field in fields:
         sol = fl.solve_ivp(field, (0, 2), [1.0], surfaces=lambda t, x: x[0] + 1e6)
@@ -164,7 +165,7 @@ def test_smooth_black_boxes_give_no_warning() -> None:
 def test_declared_surface_where_nothing_jumps() -> None:
     """It is a crossing if it is monitored at all, and it changes nothing."""
     sol = fl.solve_ivp(
-        lambda t, x: [-float(x[0])], (0, 3), [1.0], surfaces=lambda t, x: x[0] - 0.5, rtol=1e-9, atol=1e-12
+        lambda t, x: [-number(x[0])], (0, 3), [1.0], surfaces=lambda t, x: x[0] - 0.5, rtol=1e-9, atol=1e-12
     )
     assert sol.success
     assert set(sol.switches.kind) <= {"crossing"}
@@ -183,7 +184,7 @@ def test_declared_surface_where_nothing_jumps() -> None:
 def test_surface_of_time_alone(surface: Any, t0: float) -> None:
     """No state leads to one side of it."""
     sol = fl.solve_ivp(
-        lambda t, x: [-float(x[0]) + (1.0 if t < 1 else -1.0)],
+        lambda t, x: [-number(x[0]) + (1.0 if t < 1 else -1.0)],
         (t0, 1.75),
         [0.5],
         surfaces=surface,

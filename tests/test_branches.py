@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import reference
 from test_itinerary_cases import FILE, system_of
+from untraced import number
 
 
 def away(t: float, x: Any) -> Any:
@@ -135,7 +136,7 @@ def test_unique_solution_has_one_path() -> None:
 
 def test_black_box_and_pickle() -> None:
     def rhs(t: float, x: Any) -> list[float]:
-        return [1.0 if float(x[0]) > 0 else -1.0]
+        return [1.0 if number(x[0]) > 0 else -1.0]
 
     sol = fl.solve_ivp(rhs, (0, 1), [0.0], surfaces=lambda t, x: x[0], nonunique="branch")
     copy = pickle.loads(pickle.dumps(sol))

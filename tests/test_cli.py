@@ -109,7 +109,7 @@ def test_a_mistake_is_one_line(
         ("import filippov as fl\na, b = (fl.System(lambda t, x: x, n=1) for _ in 'ab')\n", "has several"),
         ("def rhs(t, x):\n    return [1 / 0]\ny0 = [1]\n", "ZeroDivisionError"),
         ("def rhs(t, x):\n    return x[:1]\ny0 = [1, 2]\n", "returned 1 value for a state of 2"),
-        ("import math\ndef rhs(t, x):\n    return [math.sin(x[0])]\ny0 = [1]\n", 'File "model.py", line 3'),
+        ("import math\ndef rhs(t, x):\n    return [math.gamma(x[0])]\ny0 = [1]\n", 'File "model.py", line 3'),
     ],
 )
 def test_a_mistake_in_the_model_names_the_place(

@@ -18,6 +18,7 @@ from black_box_decisions import differences_of_runs, untraced
 from decision_corpus import Entry, differences, read
 from decision_recorder import recording
 from filippov._core import Run, RunOptions, TracedSystem, replay_decision, solve
+from untraced import number
 
 SHOWN = 10
 
@@ -29,10 +30,10 @@ def entries() -> list[Entry]:
 
 def test_decisions_are_those_recorded(entries: list[Entry]) -> None:
     changed = []
-    for number, entry in enumerate(entries):
+    for index, entry in enumerate(entries):
         found = [*differences(entry.outcome, entry.replay())]
         if found:
-            changed.append(f"{number} ({entry.source}, {entry.outcome['rule']}): {'; '.join(found)}")
+            changed.append(f"{index} ({entry.source}, {entry.outcome['rule']}): {'; '.join(found)}")
     assert not changed, "\n".join([f"{len(changed)} of {len(entries)} differ", *changed[:SHOWN]])
 
 
@@ -123,7 +124,7 @@ def sliding_black_box() -> None:
     """A relay that slides from t = 1/0.7 on, as a function that is called."""
 
     def relay(t: float, x: Any) -> Any:
-        return [0.3 - (1.0 if float(x[0]) > 0.0 else -1.0)]
+        return [0.3 - (1.0 if number(x[0]) > 0.0 else -1.0)]
 
     fl.solve_ivp(relay, (0, 2), [1.0], surfaces=lambda t, x: x[0])
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import reference
 from scipy.integrate import solve_ivp
+from untraced import number
 
 # References C, E, F, and H, example 6.4 (i).
 NAMES = [
@@ -82,7 +83,7 @@ def test_powers_at_their_surface() -> None:
 @pytest.mark.filterwarnings("ignore:undeclared_jump:filippov.FilippovWarning")
 def test_an_undeclared_jump_of_a_black_box_is_noticed() -> None:
     def called(t: float, x: Any) -> Any:
-        return [-float(x[0]) + (1.0 if float(t) > 0.7 else 0.0)]
+        return [-number(x[0]) + (1.0 if number(t) > 0.7 else 0.0)]
 
     sol = fl.solve_ivp(called, (0, 2), [1.0], surfaces=lambda t, x: x[0] - 9.0, method="DOP853")
     (warning,) = sol.warnings

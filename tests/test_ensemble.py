@@ -8,6 +8,7 @@ from typing import Any
 import filippov as fl
 import numpy as np
 import pytest
+from untraced import number
 
 
 def oscillator(t: float, x: Any, F: float, omega: float) -> Any:
@@ -68,9 +69,9 @@ def test_events_and_wanted_times(system: fl.System) -> None:
         np.testing.assert_array_equal(member.t_events[0], alone.t_events[0])
         np.testing.assert_allclose(member.y, alone.y, rtol=0, atol=1e-14)
     # Functions that cannot be traced are called one after the other.
-    called = system.ensemble((0, 30), starts(5), events=lambda t, x: float(x[0]))
+    called = system.ensemble((0, 30), starts(5), events=lambda t, x: number(x[0]))
     for member, start in zip(called, starts(5), strict=True):
-        alone = system.solve((0, 30), start, events=lambda t, x: float(x[0]))
+        alone = system.solve((0, 30), start, events=lambda t, x: number(x[0]))
         np.testing.assert_array_equal(member.t_events[0], alone.t_events[0])
 
 
@@ -124,7 +125,7 @@ def branching(t: float, x: Any, a: float) -> Any:
 
 
 def black_box(t: float, x: Any, a: float) -> Any:
-    return [math.cos(t) - a * (1 if x[0] > 0 else -1)]
+    return [math.cos(number(t)) - a * (1 if x[0] > 0 else -1)]
 
 
 @pytest.mark.parametrize("fun", [branching, black_box])
@@ -140,7 +141,7 @@ def test_functions_that_hold_for_some_parameters_only(fun: Any) -> None:
 
 def test_an_event_that_cannot_be_traced_reads_the_parameters_of_its_member(system: fl.System) -> None:
     def level(t: float, x: Any, F: float) -> float:
-        return float(x[0]) - F
+        return number(x[0]) - F
 
     force = [0.2, 0.5]
     runs = system.ensemble((0, 10), [1.0, 2.0], {"F": force}, events=level)

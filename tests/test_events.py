@@ -8,6 +8,7 @@ from typing import Any
 import filippov as fl
 import numpy as np
 import pytest
+from untraced import number
 
 integrate = pytest.importorskip("scipy.integrate")
 
@@ -84,7 +85,7 @@ def test_called_events_equal_traced_ones() -> None:
     np.testing.assert_allclose(called.t_events[0], traced.t_events[0], rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("wrap", [lambda g: g, lambda g: lambda t, y: float(g(float(t), y))])
+@pytest.mark.parametrize("wrap", [lambda g: g, lambda g: lambda t, y: number(g(number(t), y))])
 @pytest.mark.parametrize("count", [2, 5, 20])
 def test_many_zeros_in_one_step(count: int, wrap: Any) -> None:
     """x' = 1 is one step of any length; the event oscillates within it."""

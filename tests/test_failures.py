@@ -14,6 +14,7 @@ import filippov as fl
 import numpy as np
 import pytest
 from clocks import ManualClock, solve_by
+from untraced import number
 
 
 def oscillator(t: float, x: Any) -> Any:
@@ -21,7 +22,7 @@ def oscillator(t: float, x: Any) -> Any:
 
 
 def slow_oscillator(t: float, x: Any) -> Any:
-    y, v = float(x[0]), float(x[1])
+    y, v = number(x[0]), number(x[1])
     return [v, -y + math.sin(t / 3) - (0.4 if v > 0 else -0.4)]
 
 
@@ -49,7 +50,7 @@ def test_traced_field_that_becomes_nan() -> None:
 
 def test_called_field_that_becomes_nan() -> None:
     def field(t: float, x: Any) -> Any:
-        return [math.nan if t > 0.5 else -float(x[0])]
+        return [math.nan if t > 0.5 else -number(x[0])]
 
     sol = fl.solve_ivp(field, (0, 2), [1.0], surfaces=lambda t, x: x[0] + 10.0)
     assert "not finite" in sol.message
@@ -89,9 +90,9 @@ def test_failure_keeps_the_switches_before_it() -> None:
 @pytest.mark.parametrize("error", [RuntimeError, ValueError, ZeroDivisionError, KeyError])
 def test_field_that_raises(error: type[Exception]) -> None:
     def field(t: float, x: Any) -> Any:
-        if float(t) > 0.5:
+        if number(t) > 0.5:
             raise error("half-way")
-        return [-float(x[0])]
+        return [-number(x[0])]
 
     sol = fl.solve_ivp(field, (0, 2), [1.0], surfaces=lambda t, x: x[0] + 10.0)
     assert type(sol.error) is error
@@ -102,7 +103,7 @@ def test_field_that_raises(error: type[Exception]) -> None:
 
 def test_traceback_leads_to_the_line_of_the_user() -> None:
     def field(t: float, x: Any) -> Any:
-        return [-float(x[0]) / (0 if float(t) > 0.5 else 1)]
+        return [-number(x[0]) / (0 if number(t) > 0.5 else 1)]
 
     sol = fl.solve_ivp(field, (0, 2), [1.0], surfaces=lambda t, x: x[0] + 10.0)
     assert isinstance(sol.error, ZeroDivisionError)
@@ -115,12 +116,12 @@ def test_traceback_leads_to_the_line_of_the_user() -> None:
 
 def test_surface_and_event_that_raise() -> None:
     def late(t: float, x: Any) -> Any:
-        if float(t) > 0.5:
+        if number(t) > 0.5:
             raise RuntimeError("half-way")
         return x[0] + 10.0
 
     for options in ({"surfaces": late}, {"surfaces": lambda t, x: x[0] + 10.0, "events": late}):
-        sol = fl.solve_ivp(lambda t, x: [-float(x[0])], (0, 2), [1.0], **options)
+        sol = fl.solve_ivp(lambda t, x: [-number(x[0])], (0, 2), [1.0], **options)
         assert isinstance(sol.error, RuntimeError)
         assert not sol.success
         assert 0.1 < sol.t[-1] <= 0.5
@@ -129,7 +130,7 @@ def test_surface_and_event_that_raise() -> None:
 
 def test_wrong_shape_half_way() -> None:
     def field(t: float, x: Any) -> Any:
-        return [-float(x[0])] if float(t) <= 0.5 else [1.0, 2.0]
+        return [-number(x[0])] if number(t) <= 0.5 else [1.0, 2.0]
 
     sol = fl.solve_ivp(field, (0, 2), [1.0], surfaces=lambda t, x: x[0] + 10.0)
     assert not sol.success
@@ -139,9 +140,9 @@ def test_wrong_shape_half_way() -> None:
 
 def test_keyboard_interrupt_inside_a_function() -> None:
     def field(t: float, x: Any) -> Any:
-        if float(t) > 0.5:
+        if number(t) > 0.5:
             raise KeyboardInterrupt
-        return [-float(x[0])]
+        return [-number(x[0])]
 
     with pytest.raises(KeyboardInterrupt) as info:
         fl.solve_ivp(field, (0, 2), [1.0], surfaces=lambda t, x: x[0] + 10.0)
@@ -151,9 +152,9 @@ def test_keyboard_interrupt_inside_a_function() -> None:
 
 def test_system_exit_is_not_swallowed() -> None:
     def field(t: float, x: Any) -> Any:
-        if float(t) > 0.5:
+        if number(t) > 0.5:
             raise SystemExit(3)
-        return [-float(x[0])]
+        return [-number(x[0])]
 
     sol = fl.solve_ivp(field, (0, 2), [1.0], surfaces=lambda t, x: x[0] + 10.0)
     assert isinstance(sol.error, SystemExit)
@@ -262,7 +263,7 @@ def test_t_eval_up_to_the_failure() -> None:
 @pytest.mark.filterwarnings("ignore:undeclared_jump:filippov.FilippovWarning")
 def test_chatter_along_an_undeclared_surface_ends_the_run() -> None:
     def force(t: float, x: Any) -> list[float]:
-        return [math.cos(t) - (2.0 if float(x[0]) > 0.5 else -2.0)]
+        return [math.cos(t) - (2.0 if number(x[0]) > 0.5 else -2.0)]
 
     sol = fl.solve_ivp(force, (0, 1000), [1.0], surfaces=lambda t, x: x[0] - 100.0)
     assert not sol.success
@@ -304,11 +305,11 @@ def test_friction_in_two_directions_does_not_run_for_ever() -> None:
 def _fails_late(t: float, x: Any) -> float:
     if t > 0.5:
         raise RuntimeError("mine")
-    return float(x[0])
+    return number(x[0])
 
 
 def _fails_at_impact(t: float, x: Any) -> Any:
-    if float(t) > 0.1:
+    if number(t) > 0.1:
         raise RuntimeError("mine")
     return [x[0], -x[1]]
 

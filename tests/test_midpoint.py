@@ -7,6 +7,7 @@ from typing import Any
 import filippov as fl
 import numpy as np
 import pytest
+from untraced import number
 
 
 def test_steps_are_those_of_the_rule() -> None:
@@ -62,8 +63,8 @@ def test_the_field_is_never_evaluated_beyond_a_surface() -> None:
     seen: list[tuple[float, float]] = []
 
     def called(t: float, x: Any) -> Any:
-        seen.append((float(t), float(x[1])))
-        return [1.0, -1.0 - 0.2 * float(x[0]) if float(x[1]) > 0 else 1.0]
+        seen.append((number(t), number(x[1])))
+        return [1.0, -1.0 - 0.2 * number(x[0]) if number(x[1]) > 0 else 1.0]
 
     for dt in (0.3, 0.7, 1.9):
         seen.clear()

@@ -10,6 +10,7 @@ from typing import Any
 import filippov as fl
 import numpy as np
 import pytest
+from untraced import number
 
 RELAY = fl.System(lambda t, x: [-np.sign(x[0])], n=1, states=["z"])
 
@@ -119,9 +120,9 @@ def box(change: Any) -> Any:
     """Return a black box that changes at t = 1."""
 
     def fun(t: float, x: Any) -> Any:
-        if float(t) > 1.0:
+        if number(t) > 1.0:
             return change()
-        return [math.sin(float(x[0])), -1.0]
+        return [math.sin(number(x[0])), -1.0]
 
     return fun
 
@@ -130,7 +131,7 @@ def test_a_black_box_that_raises_keeps_what_was_computed() -> None:
     def raises() -> None:
         raise RuntimeError("no more")
 
-    sol = fl.solve_ivp(box(raises), (0, 3), [1.0, 5.0], surfaces=lambda t, x: float(x[1]))
+    sol = fl.solve_ivp(box(raises), (0, 3), [1.0, 5.0], surfaces=lambda t, x: number(x[1]))
     assert not sol.success
     assert 0.0 < sol.t[-1] <= 1.0
     last = ", ".join(repr(float(value)) for value in sol.y[:, -1])
@@ -141,7 +142,7 @@ def test_a_black_box_that_raises_keeps_what_was_computed() -> None:
 
 @pytest.mark.parametrize(("value", "message"), [([1.0], "1 values"), (["a", 1.0], ""), (None, "")])
 def test_a_black_box_that_returns_something_else_keeps_what_was_computed(value: Any, message: str) -> None:
-    sol = fl.solve_ivp(box(lambda: value), (0, 3), [1.0, 5.0], surfaces=lambda t, x: float(x[1]))
+    sol = fl.solve_ivp(box(lambda: value), (0, 3), [1.0, 5.0], surfaces=lambda t, x: number(x[1]))
     assert not sol.success
     assert 0.0 < sol.t[-1] <= 1.0
     assert sol.error is not None

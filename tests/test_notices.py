@@ -9,6 +9,7 @@ import warnings
 import filippov as fl
 import numpy as np
 import pytest
+from untraced import number
 
 SHOWN = "non_unique"
 
@@ -200,7 +201,7 @@ def test_all_solutions_are_no_surprise_to_the_one_who_asks_for_them():
 
 def test_how_a_run_was_made_is_not_shown():
     sol, found = caught(
-        lambda: fl.solve_ivp(lambda t, x: [-float(x[0])], (0, 3), [1.0], method="Taylor", surfaces=[])
+        lambda: fl.solve_ivp(lambda t, x: [-number(x[0])], (0, 3), [1.0], method="Taylor", surfaces=[])
     )
     assert [warning.code for warning in sol.warnings] == ["no_series"]
     assert found == []
@@ -212,7 +213,7 @@ def test_how_a_run_was_made_is_not_shown():
         (
             "undeclared_jump",
             lambda: fl.solve_ivp(
-                lambda t, x: [float(x[0]) * 0.0 + (1.0 if float(x[0]) < 0.5 else 3.0)],
+                lambda t, x: [number(x[0]) * 0.0 + (1.0 if number(x[0]) < 0.5 else 3.0)],
                 (0, 1),
                 [0.0],
                 surfaces=[],

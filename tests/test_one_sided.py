@@ -9,6 +9,7 @@ import filippov as fl
 import numpy as np
 import pytest
 from reference import Event, of_problem
+from untraced import number
 
 
 def expected(name: str) -> list[Event]:
@@ -55,7 +56,7 @@ def test_planar_problem_with_functions_that_raise_beyond() -> None:
         return value * math.sqrt(value)  # raises for negative arguments
 
     def field(t: float, y: Any) -> Any:
-        y1, y2 = float(y[0]), float(y[1])
+        y1, y2 = number(y[0]), number(y[1])
         g = y2 - 0.2 - math.sin(2 * y1)
         u = -1 / (1 + power(g)) if g > 0 else 1 / (1 + power(-g))
         slope = y2 - math.sin(2 * y1)

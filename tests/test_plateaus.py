@@ -9,6 +9,7 @@ from typing import Any
 import filippov as fl
 import numpy as np
 import pytest
+from untraced import number
 
 Condition = Callable[[Any], Any]
 
@@ -76,7 +77,7 @@ def test_a_comparison_with_a_plateau_has_the_answer_of_python(name: str) -> None
 @pytest.mark.parametrize("name", COMPARISONS)
 def test_as_a_black_box_python_decides(name: str) -> None:
     condition, exact = COMPARISONS[name]
-    box = lambda x: float(condition(np.float64(float(x))))  # noqa: E731
+    box = lambda x: float(condition(np.float64(number(x))))  # noqa: E731
     breaks = [lambda t, x, at=at: x[0] - at for at in (0.5, 1.0, 1.25, 1.5, 2.0)]
     assert final(box, 0.0, 2.5, surfaces=breaks) == pytest.approx(exact, abs=1e-9)
 

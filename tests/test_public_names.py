@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 
 
-def test_the_top_level_has_about_45_names() -> None:
-    assert len(fl.__all__) <= 45
+def test_the_top_level_has_few_names() -> None:
+    assert len(fl.__all__) <= 46
     assert fl.__all__ == sorted(set(fl.__all__))
     assert all(getattr(fl, name) is not None for name in fl.__all__)
 
 
 def test_the_functions_of_numpy_are_in_a_module_of_their_own() -> None:
     assert len(fnp.__all__) == 36
-    assert not set(fnp.__all__) & set(fl.__all__)
+    assert set(fnp.__all__) & set(fl.__all__) == {"square"}  # at the top it is a wave
     assert all(hasattr(np, name) for name in fnp.__all__)
 
 
-@pytest.mark.parametrize("name", fnp.__all__)
+@pytest.mark.parametrize("name", sorted({*fnp.__all__} - {"square"}))
 def test_a_function_of_numpy_at_the_top_says_where_it_is(name: str) -> None:
     with pytest.raises(AttributeError, match=rf"'{name}'; it is in filippov\.numpy: .*`fnp\.{name}`"):
         getattr(fl, name)

@@ -6,6 +6,7 @@ import pickle
 import filippov as fl
 import numpy as np
 import pytest
+from untraced import number
 
 EITHER = [None, "both", "towards"]
 
@@ -243,7 +244,7 @@ def test_a_map_that_fails_where_it_is_not_asked_for_does_no_harm():
     def fails(t, x):
         if t > 0.5:
             raise RuntimeError("not asked for")
-        return [float(x[0]), float(x[1])]
+        return [number(x[0]), number(x[1])]
 
     wall = fl.Reset(lambda t, x: x[0] - 0.5, fails, direction="down")
     sol = fl.solve_ivp(rise, (0, 2), [0.0, 0.0], resets=wall)
@@ -263,7 +264,7 @@ def test_the_side_travels_with_a_pickled_system():
 
 def test_a_black_box_rests_below_a_wall():
     def opaque(t, x):
-        return [float(x[1]), 1.0]
+        return [number(x[1]), 1.0]
 
     sol = fl.solve_ivp(opaque, (0, 6), [0.0, 0.0], surfaces=[], resets=wall())
     assert sol.stats["backend"] == "black box"

@@ -6,6 +6,7 @@ import pickle
 import filippov as fl
 import numpy as np
 import pytest
+from untraced import number
 
 G = 9.8
 
@@ -176,8 +177,8 @@ def test_a_map_that_cannot_be_traced_is_called():
     speeds = []
 
     def impact(t, x):
-        speeds.append(float(x[1]))
-        return [x[0], -0.5 * float(x[1])]
+        speeds.append(number(x[1]))
+        return [x[0], -0.5 * number(x[1])]
 
     reset = fl.Reset(lambda t, x: x[0], impact)
     sol = fl.solve_ivp(fall, (0, 3), [1.0, 0.0], resets=reset)
@@ -188,7 +189,7 @@ def test_a_map_that_cannot_be_traced_is_called():
 
 def test_a_black_box_bounces_too():
     def opaque(t, x):
-        return [float(x[1]), -G]
+        return [number(x[1]), -G]
 
     sol = fl.solve_ivp(opaque, (0, 3), [1.0, 0.0], surfaces=[], resets=bounce(0.5))
     assert sol.stats["backend"] == "black box"
@@ -338,7 +339,7 @@ def test_a_map_that_raises_or_is_not_finite_ends_the_run_with_its_name():
     def fails(t, x):
         if t > 0.0:
             raise RuntimeError("no")
-        return [float(x[0]), float(x[1])]
+        return [number(x[0]), number(x[1])]
 
     sol = fl.solve_ivp(fall, (0, 1), [1.0, 0.0], resets=fl.Reset(lambda t, x: x[0], fails))
     assert not sol.success

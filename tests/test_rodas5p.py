@@ -9,6 +9,7 @@ import filippov as fl
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from untraced import number
 
 MU = 1e6
 T_END = 2.2
@@ -35,7 +36,7 @@ def by_radau() -> tuple[list[float], Any]:
             return [[MU * (1 - x[0] ** 2), MU], [-1.0, 0.0]]
 
         def surface(t: float, x: Any) -> float:
-            return float(x[0]) - 1.5
+            return number(x[0]) - 1.5
 
         surface.terminal = True  # type: ignore[attr-defined]
         surface.direction = -side  # type: ignore[attr-defined]
@@ -136,7 +137,7 @@ def test_stiff_sliding_on_an_intersection(entangled: bool) -> None:
 
 def test_black_boxes_have_derivatives_by_differences() -> None:
     def called(t: float, x: Any) -> Any:
-        u, w = float(x[0]), float(x[1])
+        u, w = number(x[0]), number(x[1])
         return [-1e4 * (u - np.sin(t)), 0.5 * np.cos(3 * t) - float(np.sign(w - 0.1 * u))]
 
     def surface(t: float, x: Any) -> Any:

@@ -9,6 +9,7 @@ from typing import Any
 import filippov as fl
 import numpy as np
 import pytest
+from untraced import number
 
 
 def oscillator(t: float, x: Any) -> Any:
@@ -32,7 +33,7 @@ def test_an_event_with_a_floor_of_its_own_is_said_to_be_sampled() -> None:
         lambda t, x: np.sqrt(x[0] + 3) - 1.8,
         lambda t, x: np.sqrt((x[0] - 0.3) ** 2 + 0.01) - 0.15,
         lambda t, x: np.log(x[0] + 3) - 1,
-        lambda t, x: float(x[0]) - 0.3,  # cannot be traced: what it contains is not known
+        lambda t, x: number(x[0]) - 0.3,  # cannot be traced: what it contains is not known
     ],
 )
 def test_a_smooth_event_is_not_warned_of(event: Callable[..., Any]) -> None:

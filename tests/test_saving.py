@@ -11,6 +11,7 @@ from pathlib import Path
 import filippov as fl
 import numpy as np
 import pytest
+from untraced import number
 
 
 def oscillator(t, x, F, omega):
@@ -104,13 +105,13 @@ def test_a_system_that_branches_on_parameters_holds_for_its_values(tmp_path: Pat
 
 def test_what_cannot_be_saved_is_named(tmp_path: Path) -> None:
     path = tmp_path / "a.flp"
-    box = fl.System(lambda t, x: [-math.sin(x[0])], n=1, surfaces=lambda t, x: x[0])
+    box = fl.System(lambda t, x: [-math.sin(number(x[0]))], n=1, surfaces=lambda t, x: x[0])
     with pytest.raises(fl.ModelError, match="only traced expressions are saved"):
         box.save(path)
     mapped = fl.System(
         lambda t, x: [x[1], -1.0],
         n=2,
-        resets=fl.Reset(lambda t, x: x[0], lambda t, x: [x[0], math.fabs(x[1])], name="wall"),
+        resets=fl.Reset(lambda t, x: x[0], lambda t, x: [x[0], math.fabs(number(x[1]))], name="wall"),
     )
     with pytest.raises(fl.ModelError, match="the map of the reset wall could not be traced"):
         mapped.save(path)
@@ -120,7 +121,7 @@ def test_what_cannot_be_saved_is_named(tmp_path: Path) -> None:
 
 
 def kick(t, x):
-    return [x[0], math.fabs(x[1])]
+    return [x[0], math.fabs(number(x[1]))]
 
 
 def test_functions_of_modules_travel_with_a_pickle() -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from scipy.integrate import solve_ivp as solve_stiff
+from untraced import number
 
 Array = npt.NDArray[np.float64]
 
@@ -69,7 +70,7 @@ def test_the_groups_change_nothing_but_the_cost() -> None:
     d = 6
 
     def field(t: float, y: Any) -> Array:
-        signs = [math.copysign(1.0, v) for v in y[d:]]
+        signs = [math.copysign(1.0, number(v)) for v in y[d:]]
         return np.array([*y[d:], *accelerations(t, y[:d], y[d:], signs)])
 
     hidden = fl.System(field, n=2 * d, surfaces=[lambda t, y, i=i: y[d + i] for i in range(d)])

@@ -286,7 +286,7 @@ def test_a_field_that_was_not_asked_for_survives_pickling() -> None:
     np.testing.assert_array_equal(copy.y, untouched.y)
     assert repr(copy) == repr(untouched)
     with pytest.raises(AttributeError, match="the fields are t, y"):
-        _ = copy.state
+        _ = copy.steps
 
 
 def test_fields_can_be_replaced() -> None:

@@ -14,6 +14,7 @@ import filippov as fl
 import numpy as np
 import pytest
 from filippov.options import Options, check_options
+from untraced import number
 
 
 def oscillator(t: float, x: Any, F: float, omega: float) -> Any:
@@ -121,9 +122,9 @@ def test_black_box_with_surfaces() -> None:
     table = np.linspace(0.0, 1.0, 50)
 
     def looked_up(t: float, x: Any) -> Any:
-        return [0.3 * float(np.interp(float(t), table, table)) - (1.0 if float(x[0]) > 0 else -1.0)]
+        return [0.3 * float(np.interp(number(t), table, table)) - (1.0 if number(x[0]) > 0 else -1.0)]
 
-    sol = fl.solve_ivp(looked_up, (0, 3), [0.5], surfaces=lambda t, x: float(x[0]))
+    sol = fl.solve_ivp(looked_up, (0, 3), [0.5], surfaces=lambda t, x: number(x[0]))
     assert sol.success
     assert sol.stats["backend"] == "black box"
     assert "black_box_reason" in sol.stats
@@ -246,7 +247,7 @@ FORMS = {
     ),
     "base": lambda: fl.System.from_base([-1.0, 1.0], [lambda t, x: [3.0, -1.0]], [first], n=2),
     "black box": lambda: fl.System.from_fields(
-        {1: lambda t, x: [-1.0 + 0.0 * float(x[0]), 1.0], -1: lambda t, x: [2.0, 0.0 * float(x[0])]}, first
+        {1: lambda t, x: [-1.0 + 0.0 * number(x[0]), 1.0], -1: lambda t, x: [2.0, 0.0 * number(x[0])]}, first
     ),
 }
 

@@ -6,6 +6,7 @@ import pickle
 import filippov as fl
 import numpy as np
 import pytest
+from untraced import number
 
 TIGHT = {"rtol": 1e-12, "atol": 1e-12}
 
@@ -151,7 +152,7 @@ def test_classify_knows_what_holds():
         ),
         (
             lambda: fl.solve_ivp(
-                lambda t, x: [-math.sin(fl.stick(x[0], 1.2))], (0, 1), [1.0], surfaces=lambda t, x: x[0]
+                lambda t, x: [-number(x[0]) * fl.stick(x[0], 1.2)], (0, 1), [1.0], surfaces=lambda t, x: x[0]
             ),
             fl.ModelError,
             "black box",

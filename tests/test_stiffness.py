@@ -7,6 +7,7 @@ from typing import Any
 import filippov as fl
 import numpy as np
 import pytest
+from untraced import number
 
 
 def relaxation(t: float, x: Any) -> Any:
@@ -54,7 +55,7 @@ def test_auto_goes_on_with_rodas5p() -> None:
 
 def test_auto_goes_on_with_rodas5p_from_dopri5() -> None:
     def called(t: float, x: Any) -> Any:
-        y, z = float(x[0]), float(x[1])
+        y, z = number(x[0]), number(x[1])
         return [1e4 * (z - (y**3 / 3 - y)), -(y + 0.3 * float(np.sign(y - 1.5)))]
 
     sol = fl.solve_ivp(called, (0, 1), START, surfaces=lambda t, x: x[0] - 1.5)

@@ -15,6 +15,7 @@ import filippov as fl
 import numpy as np
 import pytest
 from filippov.analysis.identity import identity_of
+from untraced import number
 
 pytest.importorskip("xarray")
 pytest.importorskip("zarr")
@@ -29,15 +30,15 @@ def sweep(fun: Any, store: Path, a: Any = (0.1, 0.2), **more: Any) -> Any:
 
 def with_gain(gain: Any) -> Any:
     """Return a black box: `math.cos` cannot be traced."""
-    return lambda t, x, a: [gain * math.cos(t) - a * (1 if x[0] > 0 else -1)]
+    return lambda t, x, a: [gain * math.cos(number(t)) - a * (1 if x[0] > 0 else -1)]
 
 
 def with_table(table: Any) -> Any:
-    return lambda t, x, a: [float(np.interp(math.fmod(t, 1.0), [0.0, 1.0], table)) - a]
+    return lambda t, x, a: [float(np.interp(math.fmod(number(t), 1.0), [0.0, 1.0], table)) - a]
 
 
 def with_global(t: float, x: Any, a: float) -> Any:
-    return [strength * math.cos(t) - a]
+    return [strength * math.cos(number(t)) - a]
 
 
 def with_helper(helper: Any) -> Any:
@@ -49,7 +50,7 @@ class Motor:
         self.torque = torque
 
     def field(self, t: float, x: Any, a: float) -> Any:
-        return [self.torque * math.cos(t) - a]
+        return [self.torque * math.cos(number(t)) - a]
 
     __call__ = field
 
@@ -111,13 +112,13 @@ def test_a_branch_that_the_first_point_does_not_take_counts(tmp_path: Path) -> N
 def test_sections_and_maps_that_cannot_be_traced_count(tmp_path: Path) -> None:
     def returns(c: float) -> Any:
         system = fl.System(lambda t, x, a: [x[1], -x[0] - a * np.sign(x[1])], n=2, params={"a": 1.0})
-        section = lambda t, x: math.sin(x[0]) - c  # noqa: E731
+        section = lambda t, x: math.sin(number(x[0])) - c  # noqa: E731
         return fl.sweep(
             system, (0, 5), [3.0, 0.0], {"a": [0.1, 0.2]}, section=section, store=tmp_path / "section"
         )
 
     def bounces(c: float) -> Any:
-        bounce = fl.Reset(lambda t, x: x[0], lambda t, x: [x[0], c * math.sin(-x[1])])
+        bounce = fl.Reset(lambda t, x: x[0], lambda t, x: [x[0], c * math.sin(number(-x[1]))])
         system = fl.System(lambda t, x, a: [x[1], -a], n=2, params={"a": 9.8}, resets=bounce)
         return fl.sweep(system, (0, 1), [3.0, 0.0], {"a": [9.0, 9.8]}, store=tmp_path / "map")
 
@@ -129,8 +130,8 @@ def test_sections_and_maps_that_cannot_be_traced_count(tmp_path: Path) -> None:
 
 def test_fields_of_regions_count(tmp_path: Path) -> None:
     def runs(c: float) -> Any:
-        fields = {+1: lambda t, x, a: [-a * math.cos(t)], -1: [c]}
-        system = fl.System.from_fields(fields, lambda t, x: math.sin(x[0]), n=1, params={"a": 1.0})
+        fields = {+1: lambda t, x, a: [-a * math.cos(number(t))], -1: [c]}
+        system = fl.System.from_fields(fields, lambda t, x: math.sin(number(x[0])), n=1, params={"a": 1.0})
         runs = [fl.sweep(system, (0, 1), [1.0], {"a": [1.0, 2.0]}, store=tmp_path) for _ in range(2)]
         assert runs[0].identical(runs[1])
 
@@ -144,7 +145,7 @@ def test_what_cannot_be_compared_is_named(tmp_path: Path) -> None:
 
     def locked(t: float, x: Any, a: float) -> Any:
         with lock:
-            return [math.cos(t) - a]
+            return [math.cos(number(t)) - a]
 
     with pytest.raises(fl.InputError, match=r"^store: a function of the system cannot be traced, and reads"):
         sweep(locked, tmp_path / "a")
@@ -183,13 +184,14 @@ class Car:
     mass: float = 2.0
     gears: tuple = (1.0, 2.0)
     def force(self, t):
-        return {FACTOR} * math.cos(t) / self.mass + self.gears[0] + constants.K * len(names)
+        return {FACTOR} * math.cos(t.__float__()) / self.mass + self.gears[0] + constants.K * len(names)
 
 car, table = Car(), np.linspace(0, 1, 5)
 
 def fun(t, x, a):
     assert "drag" in {"drag", "other", "third"}
-    return [car.force(t) - a * (1 if x[0] > 0 else -1) + float(np.interp(math.fmod(t, 1.0), table, table))]
+    wave = np.interp(math.fmod(t.__float__(), 1.0), table, table)
+    return [car.force(t) - a * (1 if x[0] > 0 else -1) + float(wave)]
 
 system = fl.System(fun, n=1, params={"a": 1.0}, surfaces=lambda t, x: x[0])
 print(fl.sweep(system, (0, 1), [1.0], {"a": [0.1, 0.2]}, store=sys.argv[1])["x[0]"].values.tolist())

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import reference
 from filippov.analysis import expand_returns, failures, itineraries
+from untraced import number
 
 xarray = pytest.importorskip("xarray")
 
@@ -223,11 +224,11 @@ def test_a_function_that_branches_on_parameters() -> None:
 
 def test_black_boxes_and_called_sections() -> None:
     def fun(t: float, x: Any, k: float) -> Any:
-        return [float(x[1]), -k * float(x[0])]
+        return [number(x[1]), -k * number(x[0])]
 
     box = fl.System(fun, n=2, params={"k": 1.0}, surfaces=lambda t, x: x[0] + 10.0)
     found = fl.sweep(
-        box, (0, 7), [1.0, 0.0], {"k": [1.0, 4.0]}, section=lambda t, x, k: float(x[0]) - 0.1 * k, rtol=1e-9
+        box, (0, 7), [1.0, 0.0], {"k": [1.0, 4.0]}, section=lambda t, x, k: number(x[0]) - 0.1 * k, rtol=1e-9
     )
     assert found.row_size.values.tolist() == [2, 5]
     first = [np.arccos(0.1), np.arccos(0.4) / 2]

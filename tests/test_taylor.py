@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import scipy.integrate
 import scipy.optimize
+from untraced import number
 
 
 def oscillator(t: float, x: Any) -> Any:
@@ -63,7 +64,7 @@ def test_powers_at_their_surface_are_left_to_dopri5() -> None:
 
 def test_a_black_box_has_no_series() -> None:
     def called(t: float, x: Any) -> Any:
-        return [float(x[1]), -float(x[0])]
+        return [number(x[1]), -number(x[0])]
 
     sol = fl.solve_ivp(called, (0, 1), [1.0, 0.0], surfaces=lambda t, x: x[0] - 5.0, method="Taylor")
     assert sol.stats["method"] == "DOPRI5"
@@ -173,7 +174,7 @@ def test_a_called_event_is_found_between_the_ends_of_long_steps() -> None:
         return [x[1], -x[0], np.sign(x[0] - 5.0)]
 
     def near_top(t: float, x: Any) -> float:
-        return float(x[0]) - 0.95
+        return number(x[0]) - 0.95
 
     sol = fl.solve_ivp(circle, (0, 40), [0.0, 1.0, 0.0], rtol=1e-10, atol=1e-10, events=near_top)
     turns = np.arange(0, 40, 2 * np.pi)

@@ -14,6 +14,7 @@ from filippov._core import TracedEvent
 from filippov.errors import ModelError, TraceError
 from filippov.trace import Trace, trace, trace_event
 from filippov.trace.verify import consistent_signs
+from untraced import number
 
 Y0 = np.array([0.7, -0.4])
 
@@ -83,7 +84,7 @@ def early_return(t: Any, x: Any) -> Any:
 
 
 def by_table(t: Any, x: Any) -> Any:
-    return x[1], [2.0, -3.0][int(x[1] > 0)] + int(x[0] > 0) + float(x[0] > 1)
+    return x[1], [2.0, -3.0][int(x[1] > 0)] + int(x[0] > 0) + number(x[0] > 1)
 
 
 def array_in_if(t: Any, x: Any) -> Any:
@@ -240,7 +241,7 @@ def test_a_constant_surface_is_refused() -> None:
 
 def test_a_surface_that_cannot_be_traced_is_named() -> None:
     with pytest.raises(TraceError, match=r"surfaces\[0\] could not be traced"):
-        trace_two(lambda t, x: x, surfaces=[lambda t, x: float(x[0])])
+        trace_two(lambda t, x: x, surfaces=[lambda t, x: number(x[0])])
 
 
 # ----------------------------------------------------------------------- events
@@ -262,7 +263,7 @@ def test_event_takes_the_parameters_that_it_names() -> None:
     assert event.value(0.0, [2.0, 0.0], [0.3, 0.75]) == 1.25
 
 
-@pytest.mark.parametrize("event", [lambda t, x: float(x[0]), lambda t, x: x, lambda t, x: None, lambda t: t])
+@pytest.mark.parametrize("event", [lambda t, x: number(x[0]), lambda t, x: x, lambda t, x: None, lambda t: t])
 def test_event_that_needs_python_leaves_the_builder_as_it_was(event: Callable[..., Any]) -> None:
     traced = trace_two(lambda t, x: (x[1], -np.sign(x[0])))
     assert trace_event(traced, event) == ""

@@ -35,10 +35,6 @@ def by_math_atan2(t: Any, x: Any) -> Any:
     return x[1], math.atan2(x[0], x[1])
 
 
-def by_math_trunc(t: Any, x: Any) -> Any:
-    return x[1], math.trunc(t)
-
-
 def by_float(t: Any, x: Any) -> Any:
     y = float(x[0])
     return x[1], y
@@ -89,14 +85,6 @@ def by_asarray(t: Any, x: Any) -> Any:
     return x
 
 
-def by_interp(t: Any, x: Any) -> Any:
-    return x[1], np.interp(x[0], [0.0, 1.0], [0.0, 2.0])
-
-
-def by_mask(t: Any, x: Any) -> Any:
-    return x[1], x[x > 0].sum()
-
-
 def by_masked_values(t: Any, x: Any) -> Any:
     x[x > 0] = x[:1]
     return x
@@ -104,22 +92,6 @@ def by_masked_values(t: Any, x: Any) -> Any:
 
 def by_lookup(t: Any, x: Any) -> Any:
     return x[1], TABLE[int(x[0])]
-
-
-def by_trunc(t: Any, x: Any) -> Any:
-    return x[1], np.trunc(t)
-
-
-def by_fmod(t: Any, x: Any) -> Any:
-    return x[1], np.fmod(t, 1.0)
-
-
-def by_array_fmod(t: Any, x: Any) -> Any:
-    return np.fmod(x, 2)
-
-
-def by_modf(t: Any, x: Any) -> Any:
-    return x[1], np.modf(x[0])[0]
 
 
 def by_equality(t: Any, x: Any) -> Any:
@@ -138,20 +110,12 @@ def by_nonzero(t: Any, x: Any) -> Any:
     return x[np.where(x > 0)]
 
 
-def by_isclose(t: Any, x: Any) -> Any:
-    return x[1], np.where(np.isclose(x[0], 1.0), 1, 2)
-
-
 def by_unknown_ufunc(t: Any, x: Any) -> Any:
     return x[1], np.spacing(x[0])
 
 
 def by_mixed_array(t: Any, x: Any) -> Any:
     return np.sin(np.array([x[1], 1.0]))
-
-
-def by_large_solve(t: Any, x: Any) -> Any:
-    return np.linalg.solve(np.eye(4) * x[0], np.ones(4))[:2]
 
 
 def by_loop(t: Any, x: Any) -> Any:
@@ -164,37 +128,13 @@ def by_loop(t: Any, x: Any) -> Any:
 @pytest.mark.parametrize(
     ("fun", "line", "remedy"),
     [
-        (by_math, "return x[1], -math.sin(x[0])", "write np.sin instead of math.sin"),
-        (by_imported_math, "return x[1], -root(x[0])", "write np.sqrt instead of root"),
-        (by_math_atan2, "math.atan2(x[0], x[1])", "write np.arctan2 instead of math.atan2"),
-        (by_math_trunc, "math.trunc(t)", "np.floor"),
-        (by_float, "y = float(x[0])", "leave out the conversion"),
-        (by_int, "int(x[0])", "jumps at every integer"),
         (by_complex, "abs(x[0] + 1j * x[1])", "real and imaginary parts"),
-        (by_filling, "dx[0] = x[1]", "np.zeros_like(x)"),
-        (by_filling, "dx[0] = x[1]", "or return a list"),
-        (by_filling_in_one_line, "dx[0] = x[1]", "np.zeros_like(x)"),
-        (by_filling_slice, "dx[:] = -x", "np.zeros_like(x)"),
-        (by_adding_in_place, "dx += x", "np.zeros_like(x)"),
-        (by_adding_plain_objects, "dx += np.array", "np.zeros_like(x)"),
-        (by_dtype, "dtype=float", "leave out dtype=float"),
-        (by_asarray, "x = np.asarray(x, dtype=float)", "leave out dtype=float"),
-        (by_interp, "np.interp(x[0]", "np.where, np.select or np.piecewise"),
-        (by_mask, "x[x > 0].sum()", "np.where(mask, a, b)"),
         (by_masked_values, "x[x > 0] = x[:1]", "np.where(mask, a, b)"),
-        (by_lookup, "TABLE[int(x[0])]", "write the pieces with np.where"),
-        (by_trunc, "np.trunc(t)", "np.floor"),
-        (by_fmod, "np.fmod(t, 1.0)", "np.floor"),
-        (by_array_fmod, "return np.fmod(x, 2)", "np.floor"),
-        (by_modf, "np.modf(x[0])", "np.floor"),
         (by_equality, "0.0 if x[1] == 0 else -x[0]", "write `>`, `>=`, `<` or `<=`"),
         (by_array_inequality, "np.where(x != 0, 1 / x, 0)", "write `>`, `>=`, `<` or `<=`"),
         (by_truth, "1.0 if x[0] else 2.0", "write a comparison"),
         (by_nonzero, "x[np.where(x > 0)]", "np.where(mask, a, b)"),
-        (by_isclose, "np.isclose(x[0], 1.0)", "np.abs(a - b) < tolerance"),
         (by_unknown_ufunc, "np.spacing(x[0])", "NumPy functions"),
-        (by_mixed_array, "np.sin(np.array([x[1], 1.0]))", "np.stack([...])"),
-        (by_large_solve, "np.linalg.solve(", "element by element"),
         (by_loop, "while y > 0:", "does not depend on t and x"),
     ],
 )
@@ -207,27 +147,64 @@ def test_untraceable_line_is_shown_with_a_remedy(fun: Callable[..., Any], line: 
     assert "surfaces=[" in message
 
 
+def left_as_it_is(fun: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function that assigns a global: no copy is made of it, and nothing stands in for its names."""
+
+    def calls(t: Any, x: Any) -> Any:
+        global LAST
+        LAST = fun
+        return LAST(t, x)
+
+    return calls
+
+
+@pytest.mark.parametrize(
+    ("fun", "line", "remedy"),
+    [
+        (by_math, "return x[1], -math.sin(x[0])", "write np.sin instead of math.sin"),
+        (by_imported_math, "return x[1], -root(x[0])", "write np.sqrt instead of root"),
+        (by_math_atan2, "math.atan2(x[0], x[1])", "write np.arctan2 instead of math.atan2"),
+        (by_float, "y = float(x[0])", "leave out the conversion"),
+        (by_int, "int(x[0])", "write np.trunc(v)"),
+        (by_filling, "dx[0] = x[1]", "np.zeros_like(x)"),
+        (by_filling, "dx[0] = x[1]", "or return a list"),
+        (by_filling_in_one_line, "dx[0] = x[1]", "np.zeros_like(x)"),
+        (by_filling_slice, "dx[:] = -x", "np.zeros_like(x)"),
+        (by_adding_in_place, "dx += x", "np.zeros_like(x)"),
+        (by_adding_plain_objects, "dx += np.array", "np.zeros_like(x)"),
+        (by_dtype, "dtype=float", "leave out dtype=float"),
+        (by_asarray, "x = np.asarray(x, dtype=float)", "leave out dtype=float"),
+        (by_lookup, "TABLE[int(x[0])]", "write np.trunc(v)"),
+        (by_mixed_array, "np.sin(np.array([x[1], 1.0]))", "np.stack([...])"),
+    ],
+)
+def test_a_line_of_which_no_copy_is_made(fun: Callable[..., Any], line: str, remedy: str) -> None:
+    message = refuse(left_as_it_is(fun))
+    assert line in message
+    assert remedy in message
+    assert f"in {fun.__name__}" in message
+
+
 def test_scipy_is_named() -> None:
-    interpolate = pytest.importorskip("scipy.interpolate")
-    spline = interpolate.CubicSpline([0.0, 1.0, 2.0], [0.0, 1.0, 0.0])
+    ndimage = pytest.importorskip("scipy.ndimage")
 
-    def by_spline(t: Any, x: Any) -> Any:
-        return x[1], spline(x[0])
+    def by_filter(t: Any, x: Any) -> Any:
+        return ndimage.gaussian_filter1d(x, 1.0)
 
-    message = refuse(by_spline)
-    assert "return x[1], spline(x[0])" in message
+    message = refuse(by_filter)
+    assert "ndimage.gaussian_filter1d(x, 1.0)" in message
     assert "SciPy's functions cannot be traced" in message
 
 
 def test_scipy_special_is_named() -> None:
     special = pytest.importorskip("scipy.special")
 
-    def by_erf(t: Any, x: Any) -> Any:
-        return x[1], special.erf(x[0])
+    def by_gamma(t: Any, x: Any) -> Any:
+        return x[1], special.gamma(x[0])
 
-    message = refuse(by_erf)
-    assert "`erf`" in message
-    assert "special.erf(x[0])" in message
+    message = refuse(by_gamma)
+    assert "`gamma`" in message
+    assert "special.gamma(x[0])" in message
 
 
 def test_sparse_matrix_is_named() -> None:
@@ -237,7 +214,7 @@ def test_sparse_matrix_is_named() -> None:
     def by_sparse(t: Any, x: Any) -> Any:
         return matrix @ x
 
-    message = refuse(by_sparse)
+    message = refuse(left_as_it_is(by_sparse))
     assert "return matrix @ x" in message
     assert "toarray()" in message
 
@@ -266,7 +243,7 @@ def test_too_many_paths_names_the_lines() -> None:
 def test_a_function_without_source_is_explained_by_its_names() -> None:
     names: dict[str, Any] = {}
     exec("import math\ndef typed(t, x):\n    return x[1], math.acos(x[0])", names)
-    message = refuse(names["typed"])
+    message = refuse(left_as_it_is(names["typed"]))
     assert 'File "<string>", line 3, in typed' in message
     assert "write np.arccos instead of math.acos" in message
 
@@ -443,4 +420,4 @@ def test_an_array_filled_by_a_function_without_source() -> None:
     """As one typed at the prompt."""
     names: dict[str, Any] = {"np": np}
     exec("def typed(t, x):\n    dx = np.zeros(2)\n    dx[0] = x[1]\n    return dx", names)
-    assert "np.zeros_like(x)" in refuse(names["typed"])
+    assert "np.zeros_like(x)" in refuse(left_as_it_is(names["typed"]))

@@ -8,6 +8,7 @@ from typing import Any
 import filippov as fl
 import numpy as np
 import pytest
+from untraced import number
 
 
 def relay(t: float, x: Any) -> Any:
@@ -19,7 +20,7 @@ def decay(t: float, x: Any) -> Any:
 
 
 def untraceable(t: float, x: Any) -> Any:
-    return [-float(x[0])]
+    return [-number(x[0])]
 
 
 NAN, INF = float("nan"), float("inf")
@@ -176,7 +177,7 @@ def test_wrong_return_of_fun(value: Any) -> None:
 
 def test_wrong_return_of_a_black_box() -> None:
     with pytest.raises(fl.ModelError, match="2"):
-        fl.solve_ivp(lambda t, x: [float(x[0]), 1.0], (0, 1), [1.0], surfaces=lambda t, x: float(x[0]))
+        fl.solve_ivp(lambda t, x: [number(x[0]), 1.0], (0, 1), [1.0], surfaces=lambda t, x: number(x[0]))
 
 
 def test_function_that_cannot_be_traced_needs_surfaces() -> None:
@@ -284,9 +285,9 @@ def test_exception_before_the_first_step_reaches_the_caller() -> None:
 
 def test_exception_during_the_run_keeps_the_partial_solution() -> None:
     def fails(t: float, x: Any) -> Any:
-        if float(t) > 1.0:
+        if number(t) > 1.0:
             raise RuntimeError("past one")
-        return [-float(x[0])]
+        return [-number(x[0])]
 
     sol = fl.solve_ivp(fails, (0, 5), [1.0], surfaces=lambda t, x: x[0] + 10.0)
     assert not sol.success
@@ -314,7 +315,7 @@ def test_interrupt_carries_the_partial_solution() -> None:
         calls += 1
         if calls == 100:
             raise KeyboardInterrupt
-        return [float(x[1]), -float(x[0])]
+        return [number(x[1]), -number(x[0])]
 
     with pytest.raises(KeyboardInterrupt) as info:
         fl.solve_ivp(interrupts, (0, 100), [1.0, 0.0], surfaces=lambda t, x: x[0] + 10.0)

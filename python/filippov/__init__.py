@@ -28,7 +28,7 @@ from filippov.errors import (
     TraceError,
 )
 from filippov.events import Event
-from filippov.laws import Hysteresis, Stick, hysteresis, sawtooth, stick
+from filippov.laws import Hysteresis, Stick, hysteresis, sawtooth, square, stick
 from filippov.modes import Mode
 from filippov.resets import Reset
 from filippov.sliding_policy import SlidingPolicy
@@ -95,6 +95,7 @@ __all__ = [
     "problems",
     "sawtooth",
     "solve_ivp",
+    "square",
     "stick",
     "surface_parts",
     "sweep",

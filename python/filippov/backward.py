@@ -63,6 +63,10 @@ class ReversedRun:
         """Return the states at the times `t`, shape (n, k)."""
         return self._run.evaluate(-t, not left)
 
+    def rates(self, t: Array, left: bool) -> Array:
+        """Return the derivatives at the times `t`, shape (n, k)."""
+        return -self._run.rates(-t, not left)
+
     def multipliers(self, t: Array) -> Array:
         """Return the multipliers: an array without rows, for there are no surfaces."""
         return self._run.multipliers(-t)

@@ -48,9 +48,20 @@ class Ensemble(Sequence[Solution]):
     An index gives the `Solution` of a member, with what `keep` left of it; its `message` says why it ended.
     """
 
-    def __init__(self, runs: Sequence[Run], prepared: Sequence[Prepared], **origin: Any) -> None:
+    def __init__(
+        self,
+        runs: Sequence[Run],
+        system: System,
+        prepared: Sequence[Prepared],
+        parameters: Sequence[str],
+        values: Array,
+        **origin: Any,
+    ) -> None:
         self._runs = runs
+        self._system = system
         self._prepared = prepared  # one per member
+        self._parameters = tuple(parameters)
+        self._values = values  # one row per member
         self._origin = origin
 
     def __len__(self) -> int:
@@ -63,7 +74,9 @@ class Ensemble(Sequence[Solution]):
     def __getitem__(self, index: int | slice) -> Solution | list[Solution]:
         if isinstance(index, slice):
             return [self[i] for i in range(*index.indices(len(self)))]
-        return Solution.from_run(self._runs[index], self._prepared[index], **self._origin)
+        values = dict(zip(self._parameters, self._values[index].tolist(), strict=True))
+        prepared = self._prepared[index]
+        return Solution.from_run(self._runs[index], self._system, prepared, values=values, **self._origin)
 
     def __iter__(self) -> Iterator[Solution]:
         return (self[i] for i in range(len(self)))
@@ -141,7 +154,10 @@ def run_ensemble(
             break
     ensemble = Ensemble(
         runs,
+        system,
         [group.prepared for group in groups for _ in range(len(states))[group.members]],
+        tuple(values),
+        table,
         t0=t0,
         states=system.state_names(n),
         has_events=specs is not None,

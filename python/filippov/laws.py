@@ -13,7 +13,7 @@ from filippov.errors import InputError, ModelError
 from filippov.trace import Scalar
 from filippov.trace.pure import PURE, PureFunction
 
-__all__ = ["Hysteresis", "Stick", "hysteresis", "sawtooth", "stick", "without_memory"]
+__all__ = ["Hysteresis", "Stick", "hysteresis", "sawtooth", "square", "stick", "without_memory"]
 
 _refused: ContextVar[str] = ContextVar("_refused", default="")
 
@@ -52,14 +52,47 @@ def sawtooth(t: Any, period: Any) -> Any:
     >>> sol.switches.kind.tolist(), sol.y[0, -1].round(12)
     (['clock', 'clock', 'clock', 'clock'], np.float64(1.0))
     """
-    if isinstance(period, int | float | np.number) and not 0 < period < np.inf:
-        raise InputError(f"period: a positive number is needed, not {period!r}")
+    _check_period(period)
     phase = t / period
     return phase - np.floor(phase)
 
 
-# A trace is kept for functions that call it: it depends on its arguments alone.
-PURE[id(sawtooth)] = PureFunction.of(sawtooth)
+def _check_period(period: Any) -> None:
+    if isinstance(period, int | float | np.number) and not 0 < period < np.inf:
+        raise InputError(f"period: a positive number is needed, not {period!r}")
+
+
+def square(t: Any, period: Any, duty: Any = 0.5) -> Any:
+    """Return a square wave: 1 in the first part of each period, -1 in the rest.
+
+    Parameters
+    ----------
+    t : number or traced value
+        Usually the time; then its jumps are ticks of clocks, ends of steps that are never searched for.
+    period : number or parameter
+        Positive.
+    duty : number, parameter or traced value, optional
+        The part of a period in which the wave is 1, from 0 to 1.
+
+    Raises
+    ------
+    InputError
+        If the period is a number that is not positive, or the duty a number beyond 0 and 1.
+
+    Examples
+    --------
+    >>> import filippov as fl
+    >>> float(fl.square(0.3, 1.0)), float(fl.square(0.3, 1.0, duty=0.25))
+    (1.0, -1.0)
+    >>> sol = fl.solve_ivp(lambda t, x: [fl.square(t, 0.5, 0.2)], (0, 2), [0.0])
+    >>> sol.y[0, -1].round(12)
+    np.float64(-1.2)
+    """
+    _check_period(period)
+    if isinstance(duty, int | float | np.number) and not 0 <= duty <= 1:
+        raise InputError(f"duty: a number from 0 to 1 is needed, not {duty!r}")
+    phase = t / period
+    return 2.0 * (np.floor(phase) - np.floor(phase - duty)) - 1.0
 
 
 def hysteresis(value: Any, low: Any, high: Any, initial: float = -1) -> Any:
@@ -80,11 +113,7 @@ def hysteresis(value: Any, low: Any, high: Any, initial: float = -1) -> Any:
     -------
     traced value, +1 or -1
     """
-    if initial not in (-1, 1):
-        raise InputError(f"initial: -1 or 1 is needed, not {initial!r}")
-    plain = not any(isinstance(part, Scalar) for part in (low, high))
-    if plain and not float(low) < float(high):
-        raise InputError(f"low, high: low must be below high, they are {low!r} and {high!r}")
+    _check_relay(low, high, initial)
     if isinstance(value, Scalar):
         tracer = value.tracer
         bounds = (tracer.node(low), tracer.node(high))
@@ -93,6 +122,14 @@ def hysteresis(value: Any, low: Any, high: Any, initial: float = -1) -> Any:
         raise ModelError(why)
     # At a point alone, without the past.
     return 1.0 if value >= high else -1.0 if value <= low else float(initial)
+
+
+def _check_relay(low: Any, high: Any, initial: float) -> None:
+    if initial not in (-1, 1):
+        raise InputError(f"initial: -1 or 1 is needed, not {initial!r}")
+    plain = not any(isinstance(part, Scalar) for part in (low, high))
+    if plain and not float(low) < float(high):
+        raise InputError(f"low, high: low must be below high, they are {low!r} and {high!r}")
 
 
 class Hysteresis:
@@ -105,7 +142,7 @@ class Hysteresis:
     ----------
     h : callable
         ``h(t, x) -> float``.
-    low, high : float
+    low, high : float, parameter or traced value
         The thresholds.
     initial : {-1, 1}, optional
         The state at a start between the thresholds; beyond them `h` says it.
@@ -133,10 +170,7 @@ class Hysteresis:
     def __init__(self, h: Callable[..., Any], low: float, high: float, initial: float = -1) -> None:
         if not callable(h):
             raise InputError(f"h: a function h(t, x) is needed, not {type(h).__name__}; see fl.hysteresis")
-        if not float(low) < float(high):
-            raise InputError(f"low, high: low must be below high, they are {low!r} and {high!r}")
-        if initial not in (-1, 1):
-            raise InputError(f"initial: -1 or 1 is needed, not {initial!r}")
+        _check_relay(low, high, initial)
         self.h, self.low, self.high, self.initial = h, low, high, initial
 
     def __call__(self, t: Any, x: Any) -> Any:
@@ -144,7 +178,7 @@ class Hysteresis:
         return hysteresis(self.h(t, x), self.low, self.high, self.initial)
 
     def __repr__(self) -> str:
-        return f"Hysteresis({self.low:g}, {self.high:g}, initial={self.initial:g})"
+        return f"Hysteresis({self.low}, {self.high}, initial={self.initial:g})"
 
 
 def stick(v: Any, static: Any) -> Any:
@@ -226,3 +260,7 @@ class Stick:
 
     def __repr__(self) -> str:
         return f"Stick(static={self.static})"
+
+
+# A trace is kept for functions that call these: they depend on their arguments alone.
+PURE.update((id(wave), PureFunction.of(wave)) for wave in (sawtooth, square))

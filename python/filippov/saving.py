@@ -51,6 +51,7 @@ class Saving(ABC):
     _n: int | None
     _prepared: Prepared | None
     _calls: dict[Any, Any]
+    _outputs: dict[str, Callable[..., Any]]
 
     @abstractmethod
     def _prepared_now(self) -> Prepared:
@@ -183,7 +184,7 @@ class Saving(ABC):
     ) -> None:
         self._prepared, self._states, self._params = unpacked(data, functions, remembers)
         self._n = self._prepared.core.n_states
-        self._source, self._calls = None, {}
+        self._source, self._calls, self._outputs = None, {}, {}
 
     def __getstate__(self) -> dict[str, Any]:
         state = self.__dict__.copy()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, KeysView
+from collections.abc import Callable, Iterator, KeysView
 from functools import cached_property
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -13,6 +13,7 @@ import numpy.typing as npt
 from filippov._core import Run
 from filippov.arrays import real_array
 from filippov.backward import ReversedRun
+from filippov.errors import ModelError
 from filippov.modes import Mode
 from filippov.prepare import Prepared
 from filippov.start import StandingRun
@@ -20,6 +21,7 @@ from filippov.switches import RunWarning, SegmentTable, SwitchTable, import_pand
 
 if TYPE_CHECKING:
     from filippov.branches import Branches
+    from filippov.system import System
 
 __all__ = ["DenseSolution", "Solution"]
 
@@ -52,15 +54,17 @@ class DenseSolution:
         self.t_min = min(t_first, t_last)
         self.t_max = max(t_first, t_last)
 
-    def __call__(self, t: npt.ArrayLike, side: str = "right") -> Array:
-        """Evaluate the solution.
+    def __call__(self, t: npt.ArrayLike, side: str = "right", *, nu: int = 0) -> Array:
+        """Evaluate the solution, or its derivative in time.
 
         Parameters
         ----------
         t : float or array_like, shape (k,)
             Times within ``[t_min, t_max]``, in any order.
         side : {"right", "left"}, optional
-            Which limit is meant at a time at which the state jumps.
+            Which limit is meant at a time at which the state, or its derivative, jumps.
+        nu : {0, 1}, optional
+            Order of the derivative, of the continuous extension of the method.
 
         Returns
         -------
@@ -76,9 +80,11 @@ class DenseSolution:
             raise ValueError(f"t: a number or a one-dimensional array is needed, not shape {times.shape}")
         if side not in ("right", "left"):
             raise ValueError(f'side: "right" or "left" is needed, not {side!r}')
-        flat = np.atleast_1d(times)
+        if nu not in (0, 1):
+            raise ValueError(f"nu: the order of the derivative is 0 or 1, not {nu!r}")
+        flat = np.ascontiguousarray(np.atleast_1d(times))
         self._check_range(flat)
-        values = self._run.evaluate(np.ascontiguousarray(flat), side == "left")
+        values = self._run.rates(flat, side == "left") if nu else self._run.evaluate(flat, side == "left")
         return values[:, 0] if times.ndim == 0 else values
 
     def multipliers(self, t: npt.ArrayLike) -> Array:
@@ -137,13 +143,16 @@ _FIELDS = (
     "switches",
     "segments",
     "branches",
+    "outputs",
 )
 
 
 class _Origin(NamedTuple):
     """What the fields of a solution are made of, besides the record of the core."""
 
+    system: System
     prepared: Prepared
+    values: dict[str, float] | None
     t0: float
     states: tuple[str, ...]
     has_events: bool
@@ -189,6 +198,8 @@ class Solution:
         Printed switching functions ``h_j``, in the order of the entries of a mode.
     states : tuple of str
         Names of the states.
+    outputs : dict of str to ndarray, shape (n_points,)
+        The outputs of the system at `t`, by name.
 
     Notes
     -----
@@ -209,8 +220,10 @@ class Solution:
     def from_run(
         cls,
         run: AnyRun,
+        system: System,
         prepared: Prepared,
         *,
+        values: dict[str, float] | None,
         t0: float,
         states: tuple[str, ...],
         has_events: bool,
@@ -222,8 +235,12 @@ class Solution:
         ----------
         run : Run
             The record of the core.
+        system : System
+            Whose run it is.
         prepared : Prepared
-            The system that was run.
+            The form of it that was run.
+        values : dict of str to float or None
+            Values of its parameters; None for the defaults.
         t0 : float
             Initial time.
         states : tuple of str
@@ -239,7 +256,7 @@ class Solution:
         """
         solution = cls()
         solution._run = run
-        solution._origin = _Origin(prepared, t0, states, has_events, dense_output)
+        solution._origin = _Origin(system, prepared, values, t0, states, has_events, dense_output)
         return solution
 
     @cached_property
@@ -386,15 +403,129 @@ class Solution:
         """Return a field, or `default` if there is none of that name."""
         return self._fields().get(key, default)
 
-    def mode_at(self, t: float) -> Mode:
-        """Return the mode in force at time `t` (at a switch: just after it).
+    def mode_at(self, t: npt.ArrayLike) -> Any:
+        """Return the mode in force at a time (at a switch: just after it).
+
+        Parameters
+        ----------
+        t : float or array_like, shape (k,)
+            Times, in any order.
+
+        Returns
+        -------
+        Mode, or list of Mode
 
         Raises
         ------
         ValueError
-            If `t` is outside of the interval that was computed.
+            If a time is outside of the interval that was computed.
         """
-        return self._modes_at(np.array([t], dtype=np.float64))[0]
+        times = real_array(t, "t", "a number or a one-dimensional array")
+        modes = self._modes_at(np.atleast_1d(times))
+        return modes if times.ndim else modes[0]
+
+    def state(self, name: str) -> Array:
+        """Return a state by its name, at the times `t`.
+
+        Parameters
+        ----------
+        name : str
+            One of `states`.
+
+        Returns
+        -------
+        ndarray, shape (n_points,)
+
+        Raises
+        ------
+        KeyError
+            If no state has the name.
+
+        Examples
+        --------
+        >>> import filippov as fl
+        >>> system = fl.System(lambda t, x: [x[1], -1.0], states=("height", "speed"))
+        >>> system.solve((0, 2), {"height": 0.0, "speed": 1.0}).state("speed")[-1].round(12)
+        np.float64(-1.0)
+        """
+        if name not in self.states:
+            raise KeyError(f"no state {name!r}; the states are {', '.join(self.states)}")
+        values: Array = self.y[self.states.index(name)]
+        return values
+
+    def multipliers(self, t: npt.ArrayLike | None = None) -> Array:
+        """Return the multipliers of the sliding surfaces; see `DenseSolution.multipliers`.
+
+        Parameters
+        ----------
+        t : float or array_like, shape (k,), optional
+            Times; by default those of the field `t`.
+
+        Returns
+        -------
+        ndarray, shape (n_surfaces,) or (n_surfaces, k)
+
+        Raises
+        ------
+        ModelError
+            If the solution was not kept as a function.
+        """
+        return self._kept_function().multipliers(self.t if t is None else t)
+
+    def evaluate(self, fun: Callable[..., Any], t: npt.ArrayLike | None = None, side: str = "right") -> Array:
+        """Return a quantity along the solution: a control, a force, an energy.
+
+        Where the motion slides, the signs in the quantity are the multipliers: a friction force is the one
+        that holds the body, and a control is the equivalent one.
+
+        Parameters
+        ----------
+        fun : callable
+            ``fun(t, x, *args) -> float``, as the right-hand side of the system; parameters that its signature
+            names are handed over by name.
+        t : float or array_like, shape (k,), optional
+            Times; by default those of the field `t`.
+        side : {"right", "left"}, optional
+            Which limit is meant at a time at which the quantity jumps.
+
+        Returns
+        -------
+        float or ndarray, shape (k,)
+
+        Raises
+        ------
+        ModelError
+            If the function raises, if it could not be traced and the motion slides, or if the solution was
+            not kept as a function.
+
+        Examples
+        --------
+        >>> import numpy as np, filippov as fl
+        >>> friction = lambda t, x, F: -F * np.sign(x[1])
+        >>> system = fl.System(lambda t, x, F: [x[1], 0.3 + friction(t, x, F)], n=2, params={"F": 1.0})
+        >>> sol = system.solve((0, 3), [0.0, 1.0])
+        >>> float(sol.evaluate(friction, 1.0)), round(float(sol.evaluate(friction, 2.0)), 9)
+        (-1.0, -0.3)
+        """
+        from filippov.outputs import along
+
+        self._kept_function()
+        times = real_array(self.t if t is None else t, "t", "a number or a one-dimensional array")
+        values = along(self, self._origin, fun, "fun", np.atleast_1d(times), side)
+        return values if times.ndim else values[0]
+
+    def _kept_function(self) -> DenseSolution:
+        if self.sol is None:
+            raise ModelError(
+                "the solution is no function here: solve with dense_output=True, and do not pickle it"
+            )
+        return self.sol
+
+    @cached_property
+    def outputs(self) -> dict[str, Array]:
+        """The outputs of the system at the times `t`, by name."""
+        given = self._origin.system.outputs if self._origin.dense_output else {}
+        return {name: self.evaluate(fun) for name, fun in given.items()}
 
     def _modes_at(self, times: Array) -> list[Mode]:
         starts, modes = self.segments.t_start, self.segments.mode
@@ -418,6 +549,7 @@ class Solution:
         """
         pandas = import_pandas()
         columns: dict[str, Any] = {name: self.y[i] for i, name in enumerate(self.states)}
+        columns.update(self.outputs)
         if self.surfaces and len(self.segments):
             columns["mode"] = [str(mode) for mode in self._modes_at(self.t)]
         return pandas.DataFrame(columns, index=pandas.Index(self.t, name="t"))
@@ -435,9 +567,10 @@ class Solution:
         except ImportError as error:
             raise ImportError("to_xarray() needs xarray: pip install xarray") from error
         variables: dict[str, Any] = {name: ("t", self.y[i]) for i, name in enumerate(self.states)}
+        variables.update((name, ("t", values)) for name, values in self.outputs.items())
         if self.surfaces and len(self.segments):
             variables["mode"] = ("t", np.array([str(mode) for mode in self._modes_at(self.t)]))
-        attributes = {"message": self.message, "status": self.status, "surfaces": list(self.surfaces)}
+        attributes = {"message": self.message, "status": self.status, "surfaces": "\n".join(self.surfaces)}
         return xarray.Dataset(variables, coords={"t": self.t}, attrs=attributes)
 
     def plot(self, ax: Any = None, states: Any = None, dark: bool | None = None) -> Any:

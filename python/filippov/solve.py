@@ -27,6 +27,7 @@ from filippov.options import (
     check_y0,
     repeatable_key,
 )
+from filippov.outputs import refuse_outputs_that_fail
 from filippov.prepare import Prepared, parameter_vector
 from filippov.progress import Report
 from filippov.sliding_policy import SlidingPolicy, fit_kappa
@@ -300,6 +301,8 @@ def _solve(
     system, values = _as_system(fun, n, constants, params, surfaces, resets)
     prepared = system.prepare(n, t0, state, values)
     fit_kappa(options.sliding, prepared.surfaces)
+    if system.outputs:
+        refuse_outputs_that_fail(system, t0, state, values)
     functions = [(f"the event {spec.name!r}", spec.g) for spec in specs or []]
     if t1 < t0:
         prepared, specs = _backward(system, prepared, specs, state, values, t0)
@@ -331,7 +334,14 @@ def _present(
     """Present what the core computed; raise what the options ask to raise."""
     dense_output = options.dense_output and options.keep == "steps"
     solution = Solution.from_run(
-        run, prepared, t0=t0, states=states, has_events=has_events, dense_output=dense_output
+        run,
+        system,
+        prepared,
+        values=values,
+        t0=t0,
+        states=states,
+        has_events=has_events,
+        dense_output=dense_output,
     )
     if run.reason == "field_not_finite" and isinstance(run, Run):
         given = system.parameter_values(None) if values is None else values

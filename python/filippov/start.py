@@ -50,6 +50,10 @@ class StandingRun:
         """Return the initial state at every time."""
         return np.repeat(self._y0[:, None], len(t), axis=1)
 
+    def rates(self, t: Array, left: bool) -> Array:
+        """Return NaN: no motion, no rate."""
+        return np.full((len(self._y0), len(t)), np.nan)
+
     def multipliers(self, t: Array) -> Array:
         """Return NaN: no motion, no sliding."""
         return np.full((self._n_surfaces, len(t)), np.nan)

@@ -134,7 +134,8 @@ class SwitchTable(Sequence[Switch]):
     """The switches of a run in order of time: a sequence of `Switch` and a table with columns.
 
     Every attribute of `Switch` is also a column: ``table.t`` is an array of shape (k,), ``table.y_before``
-    one of shape (k, n), ``table.kind`` an array of str, the others are lists. A slice is a table again.
+    one of shape (k, n), ``table.kind`` an array of str, the others are lists. A slice is a table again,
+    and so is a selection by a mask or an array of indices, ``table[table.kind == "crossing"]``.
 
     Examples
     --------
@@ -159,11 +160,12 @@ class SwitchTable(Sequence[Switch]):
     @overload
     def __getitem__(self, index: int) -> Switch: ...
     @overload
-    def __getitem__(self, index: slice) -> SwitchTable: ...
-    def __getitem__(self, index: int | slice) -> Switch | SwitchTable:
-        if isinstance(index, slice):
-            return SwitchTable(self._rows[index], self._surfaces, self._states)
-        return _switch(self._rows[index])
+    def __getitem__(self, index: slice | npt.NDArray[Any] | list[Any]) -> SwitchTable: ...
+    def __getitem__(self, index: int | slice | npt.NDArray[Any] | list[Any]) -> Switch | SwitchTable:
+        found = _selected(self._rows, index)
+        return (
+            _switch(found) if isinstance(found, tuple) else SwitchTable(found, self._surfaces, self._states)
+        )
 
     def __iter__(self) -> Iterator[Switch]:
         return map(_switch, self._rows)
@@ -280,11 +282,10 @@ class SegmentTable(Sequence[Segment]):
     @overload
     def __getitem__(self, index: int) -> Segment: ...
     @overload
-    def __getitem__(self, index: slice) -> SegmentTable: ...
-    def __getitem__(self, index: int | slice) -> Segment | SegmentTable:
-        if isinstance(index, slice):
-            return SegmentTable(self._rows[index])
-        return _segment(self._rows[index])
+    def __getitem__(self, index: slice | npt.NDArray[Any] | list[Any]) -> SegmentTable: ...
+    def __getitem__(self, index: int | slice | npt.NDArray[Any] | list[Any]) -> Segment | SegmentTable:
+        found = _selected(self._rows, index)
+        return _segment(found) if isinstance(found, tuple) else SegmentTable(found)
 
     def __iter__(self) -> Iterator[Segment]:
         return map(_segment, self._rows)
@@ -304,6 +305,17 @@ class SegmentTable(Sequence[Segment]):
         """Modes."""
         return [Mode(row[2]) for row in self._rows]
 
+    def to_pandas(self) -> Any:
+        """Return a `pandas.DataFrame` with one row per segment.
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+        """
+        columns = {"t_start": self.t_start, "t_end": self.t_end, "mode": [str(mode) for mode in self.mode]}
+        return import_pandas().DataFrame(columns)
+
     def __repr__(self) -> str:
         count = len(self)
         cells = [("", "t_start", "t_end", "mode")]
@@ -315,6 +327,14 @@ class SegmentTable(Sequence[Segment]):
         if head < count:
             lines.insert(head + 1, f"... {count - head - 4} more ...")
         return "\n".join([f"{count} segment{'' if count == 1 else 's'}", *lines])
+
+
+def _selected(rows: Sequence[tuple[Any, ...]], index: Any) -> Any:
+    """Return one row, or those of a slice, of a mask, or of an array of indices."""
+    if isinstance(index, (np.ndarray, list)):
+        places = np.arange(len(rows))[np.asarray(index, dtype=None if len(index) else int)]
+        return [rows[place] for place in np.atleast_1d(places)]
+    return rows[index]
 
 
 def import_pandas() -> Any:

@@ -18,6 +18,7 @@ from filippov.options import (
     check_args,
     check_params,
 )
+from filippov.outputs import check_outputs
 from filippov.points import Points
 from filippov.prepare import Prepared, check_n, numbered_states, prepare
 from filippov.resets import check_resets
@@ -58,6 +59,9 @@ class System(Points, Saving):
         Constants handed to `fun`, `surfaces` and `resets` after `x`.
     resets : Reset or sequence of Reset, optional
         Jumps of the state.
+    outputs : dict of str to callable, optional
+        Quantities of interest, ``{"u": lambda t, x, ...: ...}``: functions like those of `Solution.evaluate`,
+        whose values every solution has in `Solution.outputs` and in its tables.
 
     Raises
     ------
@@ -91,6 +95,7 @@ class System(Points, Saving):
         surfaces: Any = None,
         args: Any = (),
         resets: Any = None,
+        outputs: Any = None,
     ) -> None:
         if not callable(fun):
             raise InputError(f"fun: a function fun(t, x) is needed, not {type(fun).__name__}")
@@ -99,6 +104,7 @@ class System(Points, Saving):
             fun, check_surfaces(surfaces), check_args(args), black_box=declared, resets=check_resets(resets)
         )
         self._setup(source, n, params, states)
+        self._outputs = check_outputs(outputs, self._states or ())
         if not self._params:
             return
         refused = set(self._params).difference(accepted_names(fun, self._params))
@@ -235,6 +241,7 @@ class System(Points, Saving):
         self._states = tuple(str(name) for name in states) if states is not None else None
         self._n = check_n(n)
         self._prepared: Prepared | None = None
+        self._outputs: dict[str, Callable[..., Any]] = {}
         self._calls: dict[Any, Any] = {}  # what earlier calls of `solve` need again, by their options
         if self._states is not None:
             if self._n is None:
@@ -259,6 +266,11 @@ class System(Points, Saving):
     def states(self) -> tuple[str, ...]:
         """Names of the states."""
         return self.state_names(self._known_n())
+
+    @property
+    def outputs(self) -> dict[str, Callable[..., Any]]:
+        """The outputs by name (a copy)."""
+        return dict(self._outputs)
 
     @property
     def surfaces(self) -> list[str]:
@@ -287,8 +299,8 @@ class System(Points, Saving):
         ----------
         t_span : (float, float)
             Interval of integration.
-        y0 : array_like, shape (n,)
-            Initial state.
+        y0 : array_like, shape (n,), or dict
+            Initial state, or its components by the names of the states.
         params : dict, optional
             Parameter values other than the defaults. They may also be given as keywords of their own.
         **options
@@ -303,6 +315,8 @@ class System(Points, Saving):
         if self._params:
             named = {name: options.pop(name) for name in self._params if name in options}
             params = {**(params or {}), **named}
+        if isinstance(y0, Mapping):
+            y0 = self.state_vector(y0)
         return solve_prepared(self, t_span, y0, params, options)
 
     def ensemble(
@@ -349,6 +363,25 @@ class System(Points, Saving):
         from filippov.ensemble import run_ensemble
 
         return run_ensemble(self, t_span, y0, params, events, threads, options)
+
+    def state_vector(self, given: Mapping[str, float]) -> list[float]:
+        """Return a state that is given by the names of its components.
+
+        Raises
+        ------
+        InputError
+            If the states have no names, or one is missing or unknown.
+        """
+        if self._states is None:
+            raise InputError("y0: the states have no names; give states= to System, or an array")
+        for name in given:
+            if name not in self._states:
+                hint = did_you_mean(name, dict.fromkeys(self._states))
+                raise InputError(f"y0: no state {name!r}{hint}; the states are {', '.join(self._states)}")
+        missing = [name for name in self._states if name not in given]
+        if missing:
+            raise InputError(f"y0: {', '.join(map(repr, missing))} is missing")
+        return [given[name] for name in self._states]
 
     def parameter_values(self, given: Mapping[str, float] | None) -> dict[str, float]:
         """Return the values of all parameters, the defaults overridden by `given`.

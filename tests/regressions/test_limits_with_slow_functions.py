@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from clocks import ManualClock, solve_by
+from untraced import number
 
 
 def test_max_wall_time_is_looked_at_often() -> None:
@@ -12,7 +13,7 @@ def test_max_wall_time_is_looked_at_often() -> None:
 
     def slow(t: float, x: Any) -> Any:
         clock.advance(0.002)
-        return [float(x[1]), -float(x[0])]
+        return [number(x[1]), -number(x[0])]
 
     sol = solve_by(clock, slow, (0, 1e6), [1.0, 0.0], surfaces=lambda t, x: x[1] + 10.0, max_wall_time=0.1)
     assert "max_wall_time" in sol.message

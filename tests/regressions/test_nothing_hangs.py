@@ -17,7 +17,7 @@ CASES = {
     """,
     "called event becomes NaN": """
         def event(t, x):
-            return math.nan if float(t) > 0.5 else 1.0
+            return math.nan if t.__float__() > 0.5 else 1.0
         sol = fl.solve_ivp(lambda t, x: [-1.0], (0, 2), [1.0], events=event)
         assert sol.status < 0 or len(sol.t_events[0]) == 0
     """,
@@ -28,7 +28,7 @@ CASES = {
     "surface of a black box becomes NaN": """
         def surface(t, x):
             return math.nan if t > 0.5 else x[0] + 10.0
-        sol = fl.solve_ivp(lambda t, x: [-float(x[0])], (0, 2), [1.0], surfaces=surface)
+        sol = fl.solve_ivp(lambda t, x: [-x[0].__float__()], (0, 2), [1.0], surfaces=surface)
         assert not sol.success
         assert 0.4 < sol.t[-1] < 0.6
     """,
@@ -40,7 +40,7 @@ CASES = {
         clock = ManualClock()
         def event(t, x):
             clock.advance(1e-5)
-            return math.sin(1e9 * float(t))
+            return math.sin(1e9 * t.__float__())
         sol = solve_by(clock, lambda t, x: [-1.0], (0, 2), [1.0], events=event, max_wall_time=1.0)
         assert clock.seconds < 3.0
     """,

@@ -1,4 +1,4 @@
-"""A surface that vanishes in the instant in which the discrete state of a floor changes unseen is recorded."""
+"""A surface that vanishes in the instant in which a floor changes unseen is recorded."""
 
 from __future__ import annotations
 

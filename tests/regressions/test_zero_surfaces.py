@@ -8,6 +8,7 @@ from typing import Any
 import filippov as fl
 import numpy as np
 import pytest
+from untraced import number
 
 # Each is zero on one side of 1/2.
 FUNCTIONS: dict[str, Callable[[Any], Any]] = {
@@ -47,7 +48,7 @@ def test_a_function_that_vanishes_in_a_region_is_decided_by_python_in_a_black_bo
     h = FUNCTIONS[name]
 
     def fun(t: float, x: Any) -> Any:
-        return [speed, float(np.sign(h(float(x[0]))))]
+        return [speed, float(np.sign(h(number(x[0]))))]
 
     breaks = [lambda t, x, at=at: x[0] - at for at in (-0.5, 0.2, 0.5)]
     sol = fl.solve_ivp(fun, (0.0, 2.0), [0.5 - speed, 0.0], surfaces=breaks)

@@ -375,6 +375,14 @@ impl Graph {
                 let product = self.one_minus_square(a);
                 self.div(da, product)
             }
+            Erf => {
+                let square = self.mul(a, a);
+                let opposite = self.neg(square);
+                let bell = self.unary(Exp, opposite);
+                let factor = self.constant(std::f64::consts::FRAC_2_SQRT_PI);
+                let slope = self.mul(factor, bell);
+                self.mul(slope, da)
+            }
         }
     }
 

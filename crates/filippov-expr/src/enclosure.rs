@@ -149,6 +149,9 @@ impl Enclosure {
             UnaryOp::Asinh => root(one + a.square()),
             UnaryOp::Acosh => root(a.square() - one),
             UnaryOp::Atanh => one / (one - a.square()),
+            UnaryOp::Erf => (-a.square())
+                .unary(UnaryOp::Exp)
+                .scaled(std::f64::consts::FRAC_2_SQRT_PI),
         }
     }
 }

@@ -143,8 +143,8 @@ impl Interval {
     #[must_use]
     pub fn unary(self, op: UnaryOp) -> Self {
         use UnaryOp::{
-            Acos, Acosh, Asin, Asinh, Atan, Atanh, Cbrt, Cos, Cosh, Exp, Exp2, Expm1, Log, Log10,
-            Log1p, Log2, NotNegative, Sin, Sinh, Sqrt, Tan, Tanh,
+            Acos, Acosh, Asin, Asinh, Atan, Atanh, Cbrt, Cos, Cosh, Erf, Exp, Exp2, Expm1, Log,
+            Log10, Log1p, Log2, NotNegative, Sin, Sinh, Sqrt, Tan, Tanh,
         };
         if !self.is_bounded() {
             // The operand may be NaN: a bound of its sine would hide that.
@@ -165,7 +165,7 @@ impl Interval {
             },
             // A NaN of an operand outside of the domain is noticed: nothing is known.
             Sqrt | Cbrt | Exp | Expm1 | Exp2 | Log | Log1p | Log2 | Log10 | Asin | Acos | Atan
-            | Sinh | Tanh | Asinh | Acosh | Atanh => {
+            | Sinh | Tanh | Asinh | Acosh | Atanh | Erf => {
                 Interval::spanning([op.apply(self.lo), op.apply(self.hi)], LIBRARY)
             }
         }

@@ -287,7 +287,7 @@ macro_rules! c_functions {
 fn unary_function(op: UnaryOp) -> extern "C" fn(f64) -> f64 {
     c_functions!(op, UnaryOp, (a: f64), (a), extern "C" fn(f64) -> f64, [
         Neg, Sqrt, Cbrt, Exp, Expm1, Exp2, Log, Log1p, Log2, Log10, Sin, Cos, Tan, Asin, Acos, Atan, Sinh, Cosh,
-        Tanh, Asinh, Acosh, Atanh, NotNegative
+        Tanh, Asinh, Acosh, Atanh, NotNegative, Erf
     ])
 }
 

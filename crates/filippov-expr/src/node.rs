@@ -143,7 +143,8 @@ impl Facts {
                     | UnaryOp::Asin
                     | UnaryOp::Atan
                     | UnaryOp::Asinh
-                    | UnaryOp::Atanh => a.nonnegative,
+                    | UnaryOp::Atanh
+                    | UnaryOp::Erf => a.nonnegative,
                     _ => false,
                 };
             }

@@ -53,6 +53,8 @@ pub enum UnaryOp {
     Atanh,
     /// The operand, or 0 where it is negative: beyond the regions of its signs, of an expression that is not negative in them.
     NotNegative,
+    /// The error function.
+    Erf,
 }
 
 /// Function of two operands.
@@ -77,7 +79,7 @@ pub enum BinaryOp {
 
 impl UnaryOp {
     /// Every operation, in the order of their numbers in a serialised graph.
-    pub const ALL: [UnaryOp; 23] = {
+    pub const ALL: [UnaryOp; 24] = {
         use UnaryOp::*;
         [
             Neg,
@@ -103,6 +105,7 @@ impl UnaryOp {
             Acosh,
             Atanh,
             NotNegative,
+            Erf,
         ]
     };
 
@@ -133,6 +136,7 @@ impl UnaryOp {
             UnaryOp::Atanh => a.atanh(),
             UnaryOp::NotNegative if a < 0.0 => 0.0,
             UnaryOp::NotNegative => a,
+            UnaryOp::Erf => libm::erf(a),
         }
     }
 
@@ -162,6 +166,7 @@ impl UnaryOp {
             UnaryOp::Acosh => "arccosh",
             UnaryOp::Atanh => "arctanh",
             UnaryOp::NotNegative => "not negative",
+            UnaryOp::Erf => "erf",
         }
     }
 

@@ -22,11 +22,19 @@ impl Graph {
         self.facts(id).has_sign
     }
 
+    /// The indices of the parameters that the value contains.
+    pub fn parameters_read(&self, id: NodeId) -> Vec<u32> {
+        let below = self.all_below(&[id]);
+        let parameters = below.into_iter().filter_map(|id| match *self.node(id) {
+            Node::Parameter(index) => Some(index),
+            _ => None,
+        });
+        parameters.collect()
+    }
+
     /// Whether the value contains a parameter with this index or a higher one.
     pub fn depends_on_parameters_from(&self, id: NodeId, first: u32) -> bool {
-        self.all_below(&[id])
-            .into_iter()
-            .any(|id| matches!(*self.node(id), Node::Parameter(i) if i >= first))
+        self.parameters_read(id).iter().any(|&index| index >= first)
     }
 
     /// Whether the value is affine in (t, x) with coefficients made of constants and parameters.

@@ -407,7 +407,7 @@ impl Graph {
                 use UnaryOp::*;
                 matches!(
                     op,
-                    Cbrt | Expm1 | Log1p | Sinh | Tanh | Asin | Atan | Asinh | Atanh
+                    Cbrt | Expm1 | Log1p | Sinh | Tanh | Asin | Atan | Asinh | Atanh | Erf
                 )
                 .then_some((a, 1.0))
             }

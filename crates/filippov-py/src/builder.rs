@@ -167,9 +167,10 @@ impl Builder {
         Ok(graph.is_constant_of_motion(&terms, &field))
     }
 
-    fn depends_on_parameters_from(&self, a: u32, first: u32) -> PyResult<bool> {
+    /// The indices of the parameters in an expression.
+    fn parameters_read(&self, a: u32) -> PyResult<Vec<u32>> {
         let graph = self.graph();
-        Ok(graph.depends_on_parameters_from(Self::node(&graph, a)?, first))
+        Ok(graph.parameters_read(Self::node(&graph, a)?))
     }
 
     fn has_signs(&self, a: u32) -> PyResult<bool> {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use filippov::action::ActionMap;
 use filippov::{
-    AffinePart, FieldError, PiecewiseSystem, Place, Setting, SignStructure, SmoothParts,
+    AffinePart, FieldError, Mode, PiecewiseSystem, Place, Setting, SignStructure, SmoothParts,
     TracedSystem, UserFunction,
 };
 use filippov_expr::{
@@ -260,6 +260,45 @@ impl TracedEvent {
             }
         }
         Some(out[0])
+    }
+}
+
+impl TracedEvent {
+    /// The value in a mode. The surfaces slid on, with their multipliers, count with the weights of both of their sides.
+    pub fn along(
+        &self,
+        t: f64,
+        x: &[f64],
+        p: &[f64],
+        mode: &Mode,
+        multipliers: &[(usize, f64)],
+    ) -> f64 {
+        let inside = &self.expression.surfaces;
+        let slides = |(j, _): &&(usize, f64)| inside.contains(j);
+        let sliding: SmallVec<[(usize, f64); 4]> =
+            multipliers.iter().filter(slides).copied().collect();
+        let mut total = 0.0;
+        for corner in 0..1_u64 << sliding.len() {
+            let above = |k: usize| corner >> k & 1 == 1;
+            let sign = |k: usize| if above(k) { 1.0 } else { -1.0 };
+            let weight: f64 = (0..sliding.len())
+                .map(|k| 0.5 * (1.0 + sign(k) * sliding[k].1))
+                .product();
+            let (mut inner, mut out) = (Vec::new(), [0.0]);
+            for part in &self.expression.parts {
+                let signs = self.expression.signs(&inner);
+                part.program.eval(t, x, &signs, p, &[], &mut out);
+                let Some(&j) = inside.get(inner.len()) else {
+                    continue;
+                };
+                let own = if out[0] == 0.0 { 0.0 } else { out[0].signum() };
+                let slid = sliding.iter().position(|s| s.0 == j).map(sign);
+                let entry = mode.entries().get(j).filter(|entry| **entry != 0);
+                inner.push(slid.or(entry.map(|&entry| f64::from(entry))).unwrap_or(own));
+            }
+            total += weight * out[0];
+        }
+        total
     }
 }
 

@@ -31,6 +31,7 @@ pub fn by_name(discrete: &[String]) -> PyResult<Vec<Discrete>> {
     let kinds = discrete.iter().map(|name| match name.as_str() {
         "whole" => Ok(Discrete::Whole),
         "side" => Ok(Discrete::Side),
+        "real" => Ok(Discrete::Real),
         _ => Err(PyValueError::new_err(format!("no discrete state {name:?}"))),
     });
     kinds.collect()

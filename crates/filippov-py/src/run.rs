@@ -11,6 +11,7 @@ use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
+use crate::callbacks::TracedEvent;
 use crate::conversion::columns;
 use crate::decisions::record_as_pair;
 use crate::systems::raised;
@@ -396,20 +397,60 @@ impl Run {
         let times = t.as_slice()?;
         let mut out = vec![0.0; n * times.len()];
         for (&t, y) in times.iter().zip(out.chunks_exact_mut(n)) {
-            let side = if left { Side::Left } else { Side::Right };
-            if solution
-                .evaluate(&*self.system, t, side, y)
+            let found = solution.evaluate(&*self.system, t, side_of(left), y);
+            found
                 .map_err(raised)?
-                .is_none()
-            {
-                let first = solution.segments.first().map_or(f64::NAN, |s| s.t_start);
-                return Err(PyValueError::new_err(format!(
-                    "t = {t} is outside of the solution, which covers [{first}, {}], or dense_output was off",
-                    solution.t_last
-                )));
-            }
+                .ok_or_else(|| outside(&solution, t))?;
         }
         Ok(columns(py, &out, n))
+    }
+
+    /// Derivatives in time of the continuous extension at the times `t`, shape (n, len(t)).
+    fn rates<'py>(
+        &self,
+        py: Python<'py>,
+        t: PyReadonlyArray1<'py, f64>,
+        left: bool,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let solution = self.solution();
+        let n = solution.n_states;
+        let times = t.as_slice()?;
+        let mut out = vec![0.0; n * times.len()];
+        for (&t, dy) in times.iter().zip(out.chunks_exact_mut(n)) {
+            let known = solution.rate(t, side_of(left), dy);
+            known.ok_or_else(|| outside(&solution, t))?;
+        }
+        Ok(columns(py, &out, n))
+    }
+
+    /// An expression along the solution, at the times `t`: while sliding the combination of its values on the sides of the
+    /// surfaces, by their multipliers.
+    fn signal<'py>(
+        &self,
+        py: Python<'py>,
+        expression: &TracedEvent,
+        t: PyReadonlyArray1<'py, f64>,
+        p: PyReadonlyArray1<'py, f64>,
+        left: bool,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let (solution, side) = (self.solution(), side_of(left));
+        let mut y = vec![0.0; solution.n_states];
+        let mut out = Vec::new();
+        for &t in t.as_slice()? {
+            let mode = solution
+                .evaluate(&*self.system, t, side, &mut y)
+                .map_err(raised)?
+                .ok_or_else(|| outside(&solution, t))?;
+            let known = solution
+                .multipliers(&*self.system, t, side)
+                .map_err(raised)?;
+            let discrete = solution
+                .segment_at(t, side)
+                .map_or(&[][..], |s| &s.discrete);
+            let parameters = [p.as_slice()?, discrete].concat();
+            out.push(expression.along(t, &y, &parameters, mode, &known));
+        }
+        Ok(PyArray1::from_vec(py, out))
     }
 
     /// Multipliers at the times `t`, shape (n_surfaces, len(t)); NaN for surfaces not slid on.
@@ -425,6 +466,21 @@ impl Run {
         }
         Ok(columns(py, &out, self.n_visible))
     }
+}
+
+fn side_of(left: bool) -> Side {
+    match left {
+        true => Side::Left,
+        false => Side::Right,
+    }
+}
+
+fn outside(solution: &Solution, t: f64) -> PyErr {
+    let first = solution.segments.first().map_or(f64::NAN, |s| s.t_start);
+    PyValueError::new_err(format!(
+        "t = {t} is outside of the solution, which covers [{first}, {}], or dense_output was off",
+        solution.t_last
+    ))
 }
 
 /// The methods that took steps, the first of which the run preferred.

@@ -125,5 +125,5 @@ pub use system::{
     AffineParts, AffineSigns, BothSides, ClosureSystem, Definition, Enclosures, Law, LawAction,
     LawMap, Laws, LieDerivatives, LieValue, Linearisation, Linearisations, MotionJacobian,
     MotionJets, PiecewiseSystem, Place, RatePartials, Rules, Setting, SignStructure,
-    SingularSliding, TaylorSeries, TracedMap, TracedSystem, Word,
+    SingularSliding, Step, TaylorSeries, TracedMap, TracedSystem, Word,
 };

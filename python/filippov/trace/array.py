@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from filippov.trace.condition import Condition
 from filippov.trace.explain import ZEROS, NotTraceable
-from filippov.trace.scalar import Scalar
+from filippov.trace.scalar import Scalar, as_type
+from filippov.trace.selected import Selected
+from filippov.trace.tables import lookup
 from filippov.trace.ufuncs import ELEMENTS, NATIVE, choose, is_traced, refuse
 
-__all__ = ["TracedArray", "apply_ufunc", "plain", "where", "wrap"]
+if TYPE_CHECKING:
+    from filippov.trace.branching import Tracer
+
+__all__ = ["NumberTable", "TracedArray", "apply_ufunc", "at_index", "by_element", "plain", "where", "wrap"]
 
 _OBJECT = np.dtype(object)
 
@@ -47,26 +52,100 @@ class TracedArray(np.ndarray):
 
         return apply_function(func, tuple(args), dict(kwargs))
 
+    def __getitem__(self, key: Any) -> Any:
+        if _is_mask(key):
+            return Selected(self, np.broadcast_to(plain(key), self.shape))
+        if _has_traced(key):
+            return _at(self, key)
+        return super().__getitem__(key)
+
     def __setitem__(self, key: Any, value: Any) -> None:
-        if isinstance(key, Condition) or (
-            isinstance(key, np.ndarray) and key.dtype == _OBJECT and _holds_conditions(key)
-        ):
+        if _is_mask(key):
             # a[mask] = value: only where `value` does not depend on how many elements the mask selects.
-            if np.ndim(value) != 0:
+            if isinstance(value, Selected) and value.is_like(np.broadcast_to(plain(key), self.shape)):
+                value = value.values
+            elif np.ndim(value) != 0 or isinstance(value, Selected):
                 raise IndexError("arrays used as indices must be of integer (or boolean) type")
             value = where(key, value, self)
             key = ...
         super().__setitem__(key, value)
 
     def astype(self, dtype: Any, *args: Any, **kwargs: Any) -> Any:
-        """Return a copy with conditions turned into the numbers 1 and 0; traced values have no other type."""
-        if np.dtype(dtype).kind not in "fiuO":
-            return super().astype(dtype, *args, **kwargs)
-        return wrap(_loop("positive")(plain(self)))
+        """Return a copy, with conditions as the numbers 1 and 0; whole numbers are rounded towards zero."""
+        return as_type(self, dtype)
 
-    def round(self, *args: Any, **kwargs: Any) -> Any:
-        """Refuse: rounding has no traced form."""
-        raise refuse("round")
+    def round(self, decimals: Any = 0, out: Any = None) -> Any:
+        """Return the array rounded to this number of decimals."""
+        return np.round(self, decimals, out=out)
+
+
+class NumberTable(np.ndarray):
+    """A NumPy array of plain numbers that is indexed by traced whole numbers too.
+
+    Attributes
+    ----------
+    name : str
+        What the user calls it, if it was there before the function was called.
+    """
+
+    name = ""
+
+    def __getitem__(self, key: Any) -> Any:
+        return _at(self, key) if _has_traced(key) else super().__getitem__(key)
+
+    def __setitem__(self, key: Any, value: Any) -> None:
+        if isinstance(value, (Scalar, Condition, TracedArray)):
+            if not self.name:
+                raise NotTraceable("an array of whole numbers as the place for traced values", ZEROS)
+            raise NotTraceable(
+                f"`{self.name}`, an array that outlives the call, as the place for traced values",
+                "make the array inside of the function: np.zeros(n), np.empty(n) or np.zeros_like(x)",
+            )
+        super().__setitem__(key, value)
+
+
+def by_element(x: Any, function: Callable[[Tracer, int], int]) -> Any:
+    """Apply a function of a tracer and a node to each element, traced or not; one of them is."""
+
+    def apply(element: Any) -> Any:
+        element = element.number() if isinstance(element, Condition) else element
+        return Scalar(element.tracer, function(element.tracer, element.node))
+
+    if is_traced(x):
+        return apply(x)
+    values = plain(x)
+    tracer = next(element.tracer for element in values.flat if is_traced(element))
+    return wrap(np.frompyfunc(lambda element: apply(tracer.scalar(tracer.node(element))), 1, 1)(values))
+
+
+def at_index(entries: Sequence[Any], index: Scalar) -> Any:
+    """Return the entry of a list at a traced whole number."""
+    return lookup(index.tracer, index.node, entries)
+
+
+def _has_traced(key: Any) -> bool:
+    if isinstance(key, tuple):
+        return any(map(_has_traced, key))
+    return isinstance(key, Scalar) or (isinstance(key, np.ndarray) and key.dtype == _OBJECT)
+
+
+def _at(array: NDArray[Any], key: Any) -> Any:
+    """Return the entries of an array at indices some of which are traced."""
+    key = key if isinstance(key, tuple) else (key,)
+    axis = next(k for k, index in enumerate(key) if _has_traced(index))
+    index, rest = key[axis], key[axis + 1 :]
+    # Indices in front of a traced one are taken first, so that it is that of the first axis.
+    part = array.view(np.ndarray)[key[:axis]] if axis else array.view(np.ndarray)
+    kept = part.ndim - (array.ndim - axis)
+    part = np.moveaxis(part, kept, 0)
+    if isinstance(index, np.ndarray):
+        return np.stack([_at(part, each) for each in index.flat]).reshape(index.shape + part.shape[1:])
+    if part.ndim == 1:
+        return at_index(part.tolist(), index)
+    columns = part.reshape(len(part), -1).T
+    found = np.array([at_index(column.tolist(), index) for column in columns], dtype=object)
+    found = found.reshape(part.shape[1:]).view(TracedArray)
+    return found[(slice(None),) * kept + rest] if rest else found
 
 
 def wrap(result: Any) -> Any:
@@ -91,6 +170,13 @@ def plain(value: Any) -> Any:
     return value
 
 
+def numbers(array: Any) -> Any:
+    """Return an array of objects that are all plain numbers as an array of numbers, all else as it is."""
+    if isinstance(array, np.ndarray) and array.dtype == _OBJECT and not _holds_traced(array.flat):
+        return array.astype(float)
+    return array
+
+
 def apply_ufunc(ufunc: np.ufunc, method: str, inputs: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
     """Apply a ufunc (or its ``reduce``, ``accumulate``, ``outer``, ...) to traced operands."""
     name = ufunc.__name__
@@ -112,7 +198,7 @@ def apply_ufunc(ufunc: np.ufunc, method: str, inputs: tuple[Any, ...], kwargs: d
     if name in NATIVE or name in ("matmul", "vecdot", "matvec", "vecmat"):
         loop = ufunc
     elif name in ELEMENTS:
-        loop = _loop(name)
+        loop = _loop(ufunc)
     elif ufunc.types == ["O" * ufunc.nin + "->" + "O" * ufunc.nout]:
         # Made by np.frompyfunc or np.vectorize: it calls a function of the user on each element.
         loop = ufunc
@@ -133,7 +219,7 @@ def where(condition: Any, plus: Any, minus: Any) -> Any:
 
 def multiply_matrices(a: Any, b: Any) -> Any:
     """Return ``a @ b``; the zeros of a constant factor give no terms."""
-    a, b = plain(a), plain(b)
+    a, b = numbers(plain(a)), numbers(plain(b))
     if not (isinstance(a, np.ndarray) and isinstance(b, np.ndarray)):
         raise TypeError("matmul: both operands must be arrays")
     if 1 <= a.ndim <= 2 and 1 <= b.ndim <= 2 and a.shape[-1] == b.shape[0]:
@@ -160,17 +246,23 @@ def _constant_times(matrix: NDArray[Any], operand: NDArray[Any]) -> NDArray[Any]
     return result.reshape((matrix.shape[0], *operand.shape[1:]))
 
 
-def _loop(name: str) -> np.ufunc:
+def _loop(ufunc: np.ufunc) -> np.ufunc:
     """Return the elementwise function as a ufunc over arrays of objects."""
+    name = ufunc.__name__
     loop = _LOOPS.get(name)
     if loop is None:
-        n_inputs = 3 if name == "clip" else getattr(np, name).nin
         options = {"identity": _IDENTITIES[name]} if name in _IDENTITIES else {}
-        loop = _LOOPS[name] = np.frompyfunc(ELEMENTS[name], n_inputs, 1, **options)
+        loop = _LOOPS[name] = np.frompyfunc(ELEMENTS[name], ufunc.nin, ufunc.nout, **options)
     return loop
 
 
 _CHOOSE = np.frompyfunc(choose, 3, 1)
+
+
+def _is_mask(key: Any) -> bool:
+    return isinstance(key, Condition) or (
+        isinstance(key, np.ndarray) and key.dtype == _OBJECT and _holds_conditions(key)
+    )
 
 
 def _holds_conditions(array: NDArray[Any]) -> bool:

@@ -7,15 +7,20 @@ those that look at values, that make arrays of plain numbers, or that would mult
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from filippov.trace.array import TracedArray, multiply_matrices, plain, where, wrap
-from filippov.trace.explain import MASK, TABLE, NotTraceable
+from filippov.trace.array import TracedArray, by_element, multiply_matrices, numbers, plain, where, wrap
+from filippov.trace.condition import Condition
+from filippov.trace.explain import MASK, NotTraceable
 from filippov.trace.scalar import Scalar
+from filippov.trace.tables import count, damaged, increasing, linear, lookup, polynomial
 from filippov.trace.ufuncs import ELEMENTS, choose, is_traced
+
+if TYPE_CHECKING:
+    from filippov.trace.branching import Tracer
 
 __all__ = ["apply_function"]
 
@@ -30,6 +35,9 @@ def apply_function(func: Callable[..., Any], args: tuple[Any, ...], kwargs: dict
         name = f"{func.__module__}.{func.__name__}".replace("numpy", "np", 1)
         raise NotTraceable(f"`{name}` of traced values", remedy)
     implementation: Callable[..., Any] = func._implementation  # type: ignore[attr-defined]
+    if all(numbers(arg).dtype != object for arg in args if isinstance(arg, np.ndarray)):
+        # Arrays that might have been filled with traced values, and were not.
+        args = tuple(numbers(arg) for arg in args)
     return wrap(implementation(*args, **kwargs))
 
 
@@ -137,28 +145,45 @@ def _norm(x: Any, ord: Any = None, axis: Any = None, keepdims: bool = False) -> 
 
 
 def _solve(a: Any, b: Any) -> Any:
-    matrix = plain(a)
+    matrix = numbers(plain(a))
     if matrix.dtype != object:
         return multiply_matrices(np.linalg.inv(matrix), b)
-    if matrix.shape not in ((1, 1), (2, 2), (3, 3)):
-        raise NotTraceable(
-            "np.linalg.solve with a traced matrix of more than 3 rows",
-            "write the solution out, element by element",
-        )
-    adjugate, determinant = _adjugate(wrap(matrix))
-    return multiply_matrices(adjugate, b) / determinant
+    if matrix.shape in ((1, 1), (2, 2), (3, 3)):
+        adjugate, determinant = _adjugate(wrap(matrix))
+        return multiply_matrices(adjugate, b) / determinant
+    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
+        raise ValueError(f"np.linalg.solve: a square matrix is needed, not one of shape {matrix.shape}")
+    return _by_orthogonal_columns(wrap(matrix), wrap(plain(b)))
+
+
+def _by_orthogonal_columns(matrix: NDArray[Any], b: NDArray[Any]) -> Any:
+    """Solve by the modified method of Gram and Schmidt: no pivot to choose, no loss for a regular matrix.
+
+    Golub and Van Loan, Matrix Computations, section 5.2.8: the right-hand sides are further columns.
+    """
+    n = len(matrix)
+    columns = [*matrix.T, *b.reshape(n, -1).T]
+    upper = np.zeros((n, len(columns)), dtype=object).view(TracedArray)
+    for k in range(n):
+        square = np.dot(columns[k], columns[k])
+        for j in range(k + 1, len(columns)):
+            upper[k, j] = np.dot(columns[k], columns[j]) / square
+            columns[j] = columns[j] - upper[k, j] * columns[k]
+    solution = upper[:, n:]
+    for k in reversed(range(n)):
+        for j in range(k + 1, n):
+            solution[k] = solution[k] - upper[k, j] * solution[j]
+    return solution.reshape(b.shape)
 
 
 def _inverse(a: Any) -> Any:
-    matrix = plain(a)
-    if matrix.shape not in ((1, 1), (2, 2), (3, 3)):
-        raise NotTraceable("np.linalg.inv of a traced matrix of more than 3 rows", "write the inverse out")
-    adjugate, determinant = _adjugate(wrap(matrix))
-    return adjugate / determinant
+    return _solve(a, np.eye(len(plain(a))))
 
 
 def _determinant(a: Any) -> Any:
-    matrix = plain(a)
+    matrix = numbers(plain(a))
+    if matrix.dtype != object:
+        return np.linalg.det(matrix)
     if matrix.shape not in ((1, 1), (2, 2), (3, 3)):
         raise NotTraceable(
             "np.linalg.det of a traced matrix of more than 3 rows", "write the determinant out"
@@ -180,11 +205,28 @@ def _adjugate(matrix: NDArray[Any]) -> tuple[NDArray[Any], Any]:
     return adjugate, np.dot(matrix[0], adjugate[:, 0])
 
 
-def _isclose(*args: Any, **kwargs: Any) -> Any:
-    raise NotTraceable(
-        "np.isclose or np.allclose of traced values (equality has measure zero)",
-        "leave the special case out, or write `np.abs(a - b) < tolerance`",
-    )
+def _isclose(a: Any, b: Any, rtol: Any = 1e-5, atol: Any = 1e-8, equal_nan: bool = False) -> Any:
+    a, b = (wrap(plain(value)) if isinstance(value, (list, tuple)) else value for value in (a, b))
+    return np.abs(a - b) <= atol + rtol * np.abs(b)
+
+
+def _allclose(*args: Any, **kwargs: Any) -> Any:
+    return _all(_isclose(*args, **kwargs))
+
+
+def _choose(a: Any, choices: Any, out: Any = None, mode: str = "raise") -> Any:
+    def pick(index: Any, *entries: Any) -> Any:
+        if isinstance(index, Condition):
+            return choose(index, entries[1], entries[0])
+        return lookup(index.tracer, index.node, entries) if isinstance(index, Scalar) else entries[index]
+
+    entries = [plain(entry) for entry in choices]
+    return wrap(np.frompyfunc(pick, 1 + len(entries), 1)(plain(a), *entries))
+
+
+def _nan_to_num(x: Any, *args: Any, **kwargs: Any) -> Any:
+    # A traced value stands for a finite number.
+    return x
 
 
 def _scalar_or_array(name: str) -> Callable[..., Any]:
@@ -213,7 +255,7 @@ def _count_nonzero(a: Any, axis: Any = None, **kwargs: Any) -> Any:
     return np.sum(wrap(np.asarray(loop(plain(a)), dtype=object)), axis=axis, **kwargs)
 
 
-def _round(a: Any, decimals: int = 0, **kwargs: Any) -> Any:
+def _round(a: Any, decimals: int = 0, out: Any = None) -> Any:
     scale = 10.0**decimals
     if isinstance(a, Scalar):
         return np.rint(a * scale) / scale
@@ -224,6 +266,55 @@ def _sinc(x: Any) -> Any:
     if isinstance(x, Scalar):
         return np.sin(np.pi * x) / (np.pi * x)
     return np.sin(np.pi * wrap(plain(x))) / (np.pi * wrap(plain(x)))
+
+
+def _interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None, period: Any = None) -> Any:
+    places, values = np.asarray(xp), np.asarray(plain(fp))
+    if places.shape != values.shape:
+        raise damaged(f"np.interp: xp has {places.size} numbers and fp has {values.size}")
+    if values.dtype == object or is_traced(left) or is_traced(right):
+        raise NotTraceable(
+            "np.interp of values that depend on the state or on parameters",
+            "write the pieces with np.where, or scale a table of numbers by a parameter",
+        )
+    values = np.asarray(values, dtype=float)
+    if not np.isfinite(values).all():
+        raise damaged(f"np.interp: fp[{np.flatnonzero(~np.isfinite(values))[0]}] is not finite")
+    if period is not None:
+        # As NumPy has it: one period before the table and one behind it.
+        x = x % period
+        places = np.asarray(places, dtype=float) % period
+        order = np.argsort(places)
+        places, values = places[order], values[order]
+        places = np.concatenate([places[-1:] - period, places, places[:1] + period])
+        values = np.concatenate([values[-1:], values, values[:1]])
+    places = increasing(places, "np.interp: xp")
+    left = values[0] if left is None else left
+    right = values[-1] if right is None else right
+    table = linear(places, values, float(left), float(right))
+    return by_element(x, lambda tracer, node: polynomial(tracer, node, table))
+
+
+def _digitize(x: Any, bins: Any, right: bool = False) -> Any:
+    bins = np.asarray(bins)
+    if bins.ndim == 1 and bins.size > 1 and bins[0] > bins[-1]:
+        return len(bins) - _searchsorted(bins[::-1], x, side="right" if right else "left")
+    return _searchsorted(bins, x, side="left" if right else "right")
+
+
+def _searchsorted(a: Any, v: Any, side: str = "left", sorter: Any = None) -> Any:
+    knots = increasing(a if sorter is None else np.asarray(a)[sorter], "the table")
+    distinct, counts = np.unique(knots, return_counts=True)
+    strictly = side == "left"
+
+    def place(tracer: Tracer, node: int) -> int:
+        found = count(tracer, node, distinct, strictly=strictly)
+        if len(distinct) == len(knots):
+            return found
+        node = lookup(tracer, found, [0, *np.cumsum(counts).tolist()]).node
+        return int(node)
+
+    return by_element(v, place)
 
 
 _FUNCTIONS: dict[Any, Callable[..., Any]] = {
@@ -241,13 +332,19 @@ _FUNCTIONS: dict[Any, Callable[..., Any]] = {
     np.linalg.inv: _inverse,
     np.linalg.det: _determinant,
     np.isclose: _isclose,
-    np.allclose: _isclose,
+    np.allclose: _allclose,
+    np.choose: _choose,
+    np.nan_to_num: _nan_to_num,
+    np.fix: np.trunc,
     np.any: _any,
     np.all: _all,
     np.count_nonzero: _count_nonzero,
     np.round: _round,
     np.around: _round,
     np.sinc: _sinc,
+    np.interp: _interp,
+    np.digitize: _digitize,
+    np.searchsorted: _searchsorted,
     **{
         getattr(np, name): _scalar_or_array(name)
         for name in ["sum", "prod", "mean", "max", "min", "amax", "amin"]
@@ -255,15 +352,11 @@ _FUNCTIONS: dict[Any, Callable[..., Any]] = {
 }
 
 _REFUSED: dict[Any, str] = {
-    np.interp: TABLE,
     np.nonzero: MASK,
     np.flatnonzero: MASK,
     np.extract: MASK,
     np.compress: MASK,
-    np.digitize: TABLE,
-    np.searchsorted: TABLE,
     np.array_equal: "leave the comparison out: equality has measure zero",
     np.unwrap: "leave the angle as it is",
-    np.nan_to_num: "leave it out: a traced value stands for a finite number",
     np.angle: "write np.arctan2(y, x)",
 }

@@ -24,9 +24,11 @@ from filippov.trace.explain import BLACK_BOX, NotTraceable, UserLine, calling_li
 from filippov.trace.laws import Laws
 from filippov.trace.pieces import Pieces, condition_of, equality_of, parts_of, sign_of
 from filippov.trace.scalar import Scalar
+from filippov.trace.still import parts_that_stand_still
 
 if TYPE_CHECKING:
     from filippov._core import Builder, Regions
+    from filippov.trace.stand_ins import StandIns
 
 __all__ = ["MAX_DECISIONS", "Guard", "Question", "Tracer"]
 
@@ -99,6 +101,8 @@ class Tracer:
         Laws of the trace that this one continues.
     constants : ConstantsOfMotion, optional
         Constants of motion, known from a trace before; the first trace has none.
+    stand_ins : StandIns, optional
+        What stands in for the names that traced values cannot be handed to; by default nothing does.
 
     Attributes
     ----------
@@ -122,6 +126,7 @@ class Tracer:
         max_paths: int,
         laws: Laws | None = None,
         constants: ConstantsOfMotion | None = None,
+        stand_ins: StandIns | None = None,
     ) -> None:
         self.builder = builder
         self.t0 = t0
@@ -133,6 +138,7 @@ class Tracer:
         self.max_paths = max_paths
         self.laws = Laws(len(parameters)) if laws is None else laws
         self.constants = constants
+        self.stand_ins = stand_ins
         self.asked: dict[int, None] = {}
         self.is_doubtful = False
         self.n_paths = 0
@@ -230,6 +236,7 @@ class Tracer:
         if self.is_constant_of_motion(node):
             return self.laws.sign(self, node)
         if self.laws.is_held(self, node):
+            node = self.laws.whole(self, node)
             # Whole numbers may be zero for a while, where the sign is 0.
             sides = [self.builder.sign(self.laws.beside(self, node, side)) for side in (-1.0, 1.0)]
             both = self.builder.binary("add", *sides)
@@ -276,7 +283,7 @@ class Tracer:
             if self.is_constant_of_motion(node):
                 node = self.laws.sign(self, node)
             if self.laws.is_held(self, node):
-                node = self.laws.beside(self, node, -1.0 if strict else 1.0)
+                node = self.laws.beside(self, self.laws.whole(self, node), -1.0 if strict else 1.0)
             pieces = self.pieces(node)
             if pieces is not None:
                 self.has_pieces = True
@@ -324,7 +331,9 @@ class Tracer:
     def pieces(self, node: int, *, in_full: bool = False) -> Pieces | None:
         """Return an expression in pieces; None if it is nowhere seen to be identically zero."""
         if not self.builder.has_signs(node):
-            return None
+            if (node, in_full) not in self._pieces:
+                self._pieces[node, in_full] = parts_that_stand_still(self, node, in_full=in_full)
+            return self._pieces[node, in_full]
         if (node, in_full) not in self._pieces:
             most = MOST_COMBINATIONS if len(self.unresolved) < MANY else MOST_AFTER_MANY
             pieces, for_these_values = self.builder.pieces(
@@ -338,6 +347,10 @@ class Tracer:
             is_whole = pieces is None or (not in_full and len(pieces) == 2 and pieces[1] != 0.0)
             self._pieces[node, in_full] = None if is_whole else pieces
         return self._pieces[node, in_full]
+
+    def take_as_whole(self, node: int) -> None:
+        """Leave an expression in one piece: where it would stand still, it is not asked for."""
+        self._pieces[node, False] = self._pieces[node, True] = None
 
     def regions(self) -> Regions:
         """Return the regions of the expressions so far."""

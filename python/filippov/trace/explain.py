@@ -20,6 +20,7 @@ from filippov.errors import ModelError, TraceError
 __all__ = [
     "BLACK_BOX",
     "CLOCKS",
+    "NUMPY_NAMES",
     "NotTraceable",
     "UserLine",
     "calling_line",
@@ -42,7 +43,7 @@ MASK = "write np.where(mask, a, b) instead of selecting elements by a condition"
 TABLE = "a table lookup cannot be traced: write the pieces with np.where, np.select or np.piecewise"
 SPELLING = "write it with NumPy functions (np.sin, np.where, ...)"
 
-_NUMPY_NAMES = {
+NUMPY_NAMES = {
     **{
         name: f"np.{name}"
         for name in [
@@ -280,7 +281,7 @@ def _of_math(line: UserLine) -> str:
     text = line.text
     if not text and "math" in line.frame.f_code.co_names + line.frame.f_code.co_varnames:
         # A function typed at the prompt has no source: its names have to do.
-        text = " ".join(f"math.{name}(" for name in line.frame.f_code.co_names if name in _NUMPY_NAMES)
+        text = " ".join(f"math.{name}(" for name in line.frame.f_code.co_names if name in NUMPY_NAMES)
     for name in re.findall(r"\b(?:c?math|m)\.(\w+)\s*\(", text):
         names[f"math.{name}"] = name
     for name in re.findall(r"(?<![\w.])(\w+)\s*\(", line.text):
@@ -291,7 +292,7 @@ def _of_math(line: UserLine) -> str:
     for spelling, name in names.items():
         if name in ("floor", "ceil", "trunc", "fmod", "remainder", "modf"):
             return CLOCKS
-        advice.append(f"write {_NUMPY_NAMES.get(name, 'a NumPy function')} instead of {spelling}")
+        advice.append(f"write {NUMPY_NAMES.get(name, 'a NumPy function')} instead of {spelling}")
     return "; ".join(advice)
 
 

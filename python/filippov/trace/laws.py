@@ -7,7 +7,10 @@ core knows the rule by which it changes (``crates/filippov/src/system/laws.rs``)
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from filippov.trace.explain import NoSuchLaw, NotTraceable
 from filippov.trace.pieces import by_parts, has_constant_part
@@ -32,16 +35,28 @@ class _Kind(NamedTuple):
 _KINDS = {
     "held": _Kind("whole", remembers=False),
     "sign": _Kind("whole", remembers=False),
+    "place": _Kind("whole", remembers=False),
+    "entry": _Kind("real", remembers=False),
+    "piece": _Kind("whole", remembers=False),
     "clock": _Kind("whole", remembers=False),
     "level": _Kind("whole", remembers=False),
     "hysteresis": _Kind("side", remembers=True),
 }
+
+# Their argument is constant between jumps.
+_HELD = ("held", "sign", "place", "entry")
 
 
 class _Law(NamedTuple):
     kind: str
     nodes: tuple[int, ...]
     numbers: tuple[float, ...]
+
+    @property
+    def values(self) -> str:
+        """What the discrete state is: a "whole" number, a "side", -1 or +1, or a "real" number."""
+        is_whole = self.kind == "entry" and all(number.is_integer() for number in self.numbers)
+        return "whole" if is_whole else _KINDS[self.kind].values
 
 
 class Laws:
@@ -59,7 +74,10 @@ class Laws:
         self.rows: list[tuple[str, list[int], list[float]]] = []
         self.n_guards = 0
         self.sticking: dict[int, int] = {}
+        self._laws: list[_Law] = []
         self._known: dict[_Law, int] = {}
+        self._entries: dict[int, tuple[int, _Law]] = {}
+        self._values: list[str] = []
         self._is_complete = False
 
     def floor(self, tracer: Tracer, node: int) -> int:
@@ -71,10 +89,9 @@ class Laws:
             for bound in (whole, whole + 1):
                 tracer.known_sign(builder.binary("subtract", node, builder.constant(bound)))
             return builder.constant(whole)
-        reads = builder.depends_on_parameters_from(node, self.first)
         if not builder.depends_on_motion(node) or tracer.is_constant_of_motion(node):
             return self._state(tracer, _Law("held", (node,), ()), "floor")
-        if not reads and builder.is_affine(node) and not builder.depends_on_state(node):
+        if self.is_clock(tracer, node):
             return self._state(tracer, _Law("clock", (node,), ()), "floor")
         pieces = tracer.pieces(node, in_full=True)
         if pieces is not None and (has_constant_part(tracer, pieces) or tracer.jumps(node)):
@@ -88,6 +105,29 @@ class Laws:
         # At a whole number the floor is that number itself.
         step = tracer.choose(distance, half, builder.constant(-0.5))
         return builder.binary("add", builder.binary("subtract", level, half), step)
+
+    def ceil(self, tracer: Tracer, node: int) -> int:
+        """Return the node of the smallest whole number that is not below an expression."""
+        builder = tracer.builder
+        pieces = tracer.pieces(node, in_full=True)
+        if pieces is not None and has_constant_part(tracer, pieces) and len(pieces) > 2:
+            return by_parts(tracer, pieces, lambda part, _: self.ceil(tracer, part))
+        if builder.depends_on_motion(node) and not tracer.is_constant_of_motion(node):
+            # What moves is a whole number in instants only.
+            return builder.binary("add", self.floor(tracer, node), builder.constant(1.0))
+        return builder.unary("negative", self.floor(tracer, builder.unary("negative", node)))
+
+    def trunc(self, tracer: Tracer, node: int) -> int:
+        """Return the node of the whole number that is next to an expression on the side of zero."""
+        builder = tracer.builder
+        if not self.is_clock(tracer, node) or builder.as_constant(node) is not None:
+            return tracer.choose(node, self.floor(tracer, node), self.ceil(tracer, node))
+        # Of the time it is the floor from 0 on and one more before: without a surface at 0.
+        below = self.floor(tracer, node)
+        half = builder.constant(0.5)
+        side = self.sign(tracer, builder.binary("add", below, half))
+        rise = builder.binary("subtract", half, builder.binary("multiply", half, side))
+        return builder.binary("add", below, rise)
 
     def rint(self, tracer: Tracer, node: int) -> int:
         """Return the node of the nearest whole number of an expression; halfway the even one."""
@@ -131,29 +171,87 @@ class Laws:
             self.sticking[surface] = ratio
         return tracer.builder.sign(node)
 
+    def place(self, tracer: Tracer, node: int, knots: tuple[float, ...]) -> int:
+        """Return the node of the number of knots that are not above an expression.
+
+        The expression stands still between jumps, or is affine in time, or moves continuously.
+        """
+        builder = tracer.builder
+        if not builder.depends_on_motion(node) or tracer.is_constant_of_motion(node):
+            return self._state(tracer, _Law("place", (node,), knots), "place")
+        if self.is_clock(tracer, node):
+            return self._state(tracer, _Law("piece", (node,), knots), "piece")
+        return self._state(tracer, _Law("piece", (tracer.as_surface(node),), knots), "piece")
+
+    def entry(
+        self, tracer: Tracer, place: int, entries: tuple[float, ...], *, first: int = 0, name: str = ""
+    ) -> int:
+        """Return the node of the entry of a list at a place that stands still between jumps.
+
+        The list begins at the place `first`; `name` is what messages call the entry.
+        """
+        if len(set(entries)) == 1:
+            return tracer.builder.constant(float(entries[0]))
+        read = self._entries.get(place)
+        if read is not None:
+            # The entry at an entry is that of a list of its own.
+            place, through = read
+            first = int(through.numbers[0])
+            entries = tuple(entries[int(at) - first] for at in through.numbers[1:])
+        law = _Law("entry", (place,), (float(first), *map(float, entries)))
+        node = self._state(tracer, law, name or f"entry({tracer.text(place)})")
+        if law.values == "whole":
+            self._entries[node] = (place, law)
+        return node
+
+    def entries_in(self, tracer: Tracer, node: int) -> dict[int, list[tuple[int, int, NDArray[np.float64]]]]:
+        """Return the lists that an expression reads, by place: node of the entry, first place, entries."""
+        found: dict[int, list[tuple[int, int, NDArray[np.float64]]]] = {}
+        for index in self._read(tracer, node):
+            law = self._laws[index]
+            if law.kind == "entry":
+                state = tracer.builder.parameter(self.first + index)
+                first, *entries = law.numbers
+                found.setdefault(law.nodes[0], []).append((state, int(first), np.array(entries)))
+        return found
+
+    def knots(self, tracer: Tracer, place: int) -> tuple[int, NDArray[np.float64]] | None:
+        """Return the expression of a place and its knots, if it changes where the expression meets them."""
+        law = self._laws[self._read(tracer, place)[0]]
+        if law.kind != "piece" or self.is_clock(tracer, law.nodes[0]):
+            return None
+        return law.nodes[0], np.array(law.numbers)
+
     def discrete(self) -> list[str]:
-        """Return what each discrete state is: a "whole" number, or a "side", -1 or +1."""
-        return [_KINDS[law.kind].values for law in self._known]
+        """Return what each discrete state is: a "whole" number, a "side", -1 or +1, or a "real" number."""
+        return self._values
 
     def are_of_constants(self, tracer: Tracer, constants: ConstantsOfMotion) -> bool:
         """Return whether what was taken for constants of motion is constant along these motions."""
         builder = tracer.builder
-        held = [law.nodes[0] for law in self._known if law.kind in ("held", "sign")]
+        held = [law.nodes[0] for law in self._laws if law.kind in _HELD]
         return all(not builder.depends_on_motion(node) or constants.have(builder, node) for node in held)
 
     @property
     def remembers(self) -> bool:
         """Whether what a law returns depends on the past, and not on the point alone."""
-        return bool(self.sticking) or any(_KINDS[law.kind].remembers for law in self._known)
+        return bool(self.sticking) or any(_KINDS[law.kind].remembers for law in self._laws)
 
     def is_held(self, tracer: Tracer, node: int) -> bool:
         """Whether an expression contains discrete states and is constant between their changes."""
-        builder = tracer.builder
         return (
-            bool(self.names)
-            and not builder.depends_on_motion(node)
-            and builder.depends_on_parameters_from(node, self.first)
+            bool(self.names) and not tracer.builder.depends_on_motion(node) and bool(self._read(tracer, node))
         )
+
+    def is_clock(self, tracer: Tracer, node: int) -> bool:
+        """Whether an expression is affine in time, with coefficients that no run changes."""
+        builder = tracer.builder
+        return not builder.depends_on_state(node) and builder.is_affine(node) and not self._read(tracer, node)
+
+    def whole(self, tracer: Tracer, node: int) -> int:
+        """Return an expression of whole numbers with the sign of one that stands still between jumps."""
+        is_real = any(self._values[index] == "real" for index in self._read(tracer, node))
+        return self.sign(tracer, node) if is_real else node
 
     def beside(self, tracer: Tracer, node: int, side: float) -> int:
         """Return an expression of whole numbers moved off them, so that it is never zero."""
@@ -164,7 +262,8 @@ class Laws:
         builder = tracer.builder
         half = builder.constant(0.5)
         before = builder.n_surfaces()
-        for index, law in enumerate(list(self._known)):
+        # A table adds laws for the ends of its pieces.
+        for index, law in enumerate(self._laws):
             state = builder.parameter(self.first + index)
             numbers = list(law.numbers)
             if law.kind == "level":
@@ -172,6 +271,10 @@ class Laws:
                 surface, orientation = builder.switch(distance)
                 guard = builder.declare_surface(builder.binary("subtract", half, builder.abs(distance)))
                 numbers = [float(surface), orientation, float(guard)]
+            elif law.kind == "piece":
+                is_clock = self.is_clock(tracer, law.nodes[0])
+                guard = -1 if is_clock else builder.declare_surface(self._between(tracer, law, state))
+                numbers = [float(guard), *law.numbers]
             elif law.kind == "hysteresis":
                 value, low, high = law.nodes
                 middle = builder.binary("multiply", half, builder.binary("add", low, high))
@@ -182,12 +285,36 @@ class Laws:
         self.n_guards = builder.n_surfaces() - before
         self._is_complete = True
 
+    def _between(self, tracer: Tracer, law: _Law, piece: int) -> int:
+        """Return what is positive between the knots around an expression, and zero at them."""
+        builder = tracer.builder
+        (node,), knots = law.nodes, np.array(law.numbers)
+        rates = 1.0 / np.diff(knots)
+        ends = rates[[0, -1]] if len(rates) else np.ones(2)
+        above, below = np.insert(rates, 0, ends[0]), np.append(rates, ends[1])
+
+        def distance(rates: NDArray[Any], ends: NDArray[Any]) -> int:
+            rate, end = (self.entry(tracer, piece, tuple(values.tolist())) for values in (rates, ends))
+            return builder.binary("subtract", builder.binary("multiply", rate, node), end)
+
+        # Beyond the ends of the table one of the two distances is 1.
+        from_below = distance(np.insert(below, 0, 0.0), np.insert(below * knots, 0, -1.0))
+        from_above = distance(np.append(above, 0.0), np.append(above * knots, 1.0))
+        return builder.unary("negative", builder.binary("multiply", from_below, from_above))
+
+    def _read(self, tracer: Tracer, node: int) -> list[int]:
+        """Return the indices of the discrete states in an expression."""
+        read = tracer.builder.parameters_read(node)
+        return [index - self.first for index in read if index >= self.first]
+
     def _state(self, tracer: Tracer, law: _Law, name: str) -> int:
         index = self._known.get(law)
         if index is None:
             if self._is_complete:
                 raise NoSuchLaw(f"{name}(...) of an expression that the right-hand side does not have")
-            index = len(self.names)
+            index = len(self._laws)
             self._known[law] = index
-            self.names.append(f"{name}({tracer.text(law.nodes[0])})")
+            self._laws.append(law)
+            self._values.append(law.values)
+            self.names.append(name if name.endswith(")") else f"{name}({tracer.text(law.nodes[0])})")
         return tracer.builder.parameter(self.first + index)

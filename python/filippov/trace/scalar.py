@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
-from filippov.trace.explain import CLOCKS, NotTraceable
+from filippov.trace.explain import NotTraceable
 
 if TYPE_CHECKING:
     from filippov.trace.branching import Tracer
 
-__all__ = ["Scalar"]
+__all__ = ["Scalar", "as_type", "divisor"]
 
 
 class Scalar:
@@ -127,7 +127,7 @@ class Scalar:
 
     def __pow__(self, other: Any, modulus: Any = None) -> Any:
         if modulus is not None:
-            raise NotTraceable("pow(v, n, m)", CLOCKS)
+            raise NotTraceable("pow(v, n, m)", "write np.mod(v ** n, m)")
         return self.binary("power", other)
 
     def __rpow__(self, other: Any) -> Any:
@@ -196,6 +196,9 @@ class Scalar:
     def __bool__(self) -> bool:
         sign = self.tracer.known_sign(self.node)
         if sign is None:
+            is_zero = self.tracer.equal(self.node)
+            if is_zero is not None:
+                return not is_zero
             raise NotTraceable(
                 "the truth value of a traced number (`if v:` asks whether v is exactly zero)",
                 "write a comparison: `if v > 0:`",
@@ -213,14 +216,14 @@ class Scalar:
     def __int__(self) -> int:
         return self.integer(
             "the conversion of a traced value to an integer",
-            "it jumps at every integer: write the pieces with np.where, np.select or np.piecewise",
+            "write np.trunc(v), which jumps at every integer",
         )
 
     def __index__(self) -> int:
         return self.integer(
             "a traced value used as an index",
-            "for a table, write the pieces with np.where or np.select; a parameter that counts "
-            "something belongs in `args`",
+            "make an array of the list, np.array([...])[k], or make the list outside of the function; a "
+            "parameter that counts something belongs in `args`",
         )
 
     def integer(self, what: str, remedy: str) -> int:
@@ -245,11 +248,11 @@ class Scalar:
     def __floor__(self) -> Scalar:
         return Scalar(self.tracer, self.tracer.laws.floor(self.tracer, self.node))
 
-    def __ceil__(self) -> Any:
-        return -(-self).__floor__()
+    def __ceil__(self) -> Scalar:
+        return Scalar(self.tracer, self.tracer.laws.ceil(self.tracer, self.node))
 
-    def __trunc__(self) -> NoReturn:
-        raise NotTraceable("trunc(v)", CLOCKS)
+    def __trunc__(self) -> Scalar:
+        return Scalar(self.tracer, self.tracer.laws.trunc(self.tracer, self.node))
 
     def floor(self) -> Scalar:
         """Return the largest whole number that is not above the number."""
@@ -259,18 +262,22 @@ class Scalar:
         """Return the smallest whole number that is not below the number."""
         return self.__ceil__()
 
+    def trunc(self) -> Scalar:
+        """Return the whole number next to the number on the side of zero."""
+        return self.__trunc__()
+
     def rint(self) -> Any:
         """Return the nearest whole number; the even one halfway between two."""
         return Scalar(self.tracer, self.tracer.laws.rint(self.tracer, self.node))
 
     def __floordiv__(self, other: Any) -> Any:
-        return np.floor(self / _divisor(other))
+        return np.floor(self / divisor(other))
 
     def __rfloordiv__(self, other: Any) -> Any:
         return np.floor(other / self)
 
     def __mod__(self, other: Any) -> Any:
-        return self - other * np.floor(self / _divisor(other))
+        return self - other * np.floor(self / divisor(other))
 
     def __rmod__(self, other: Any) -> Any:
         return other - self * np.floor(other / self)
@@ -289,6 +296,25 @@ class Scalar:
 
     copy = conjugate = item
 
+    def sum(self, *_: Any, **__: Any) -> Scalar:
+        """Return the number itself, as ``numpy.float64.sum`` does."""
+        return self
+
+    prod = mean = max = min = squeeze = sum
+
+    def clip(self, *args: Any, **kwargs: Any) -> Any:
+        """Return ``numpy.clip`` of the number."""
+        clip: Any = np.clip
+        return clip(self, *args, **kwargs)
+
+    def round(self, decimals: int = 0) -> Any:
+        """Return ``numpy.round`` of the number."""
+        return self.__round__(decimals)
+
+    def astype(self, dtype: Any, **_: Any) -> Any:
+        """Return the number, or what is left of it without its fraction for a type of whole numbers."""
+        return as_type(self, dtype)
+
     @property
     def real(self) -> Scalar:
         """The number itself: traced numbers are real."""
@@ -300,7 +326,20 @@ class Scalar:
         return 0.0
 
 
-def _divisor(value: Any) -> Any:
+def as_type(value: Any, dtype: Any) -> Any:
+    """Return a traced number or an array of such as NumPy converts it to another type."""
+    kind = np.dtype(dtype).kind
+    if kind in "iu":
+        return np.trunc(value)
+    if kind in "fO":
+        return +value
+    raise NotTraceable(
+        f"the conversion of a traced value to {np.dtype(dtype)}", "write the comparison: `x > 0`"
+    )
+
+
+def divisor(value: Any) -> Any:
+    """Return what a remainder is taken by, which must not be 0."""
     if not isinstance(value, Scalar) and np.ndim(value) == 0 and value == 0:
         raise NotTraceable("a remainder, or a whole quotient, by 0", "the divisor must not be zero")
     return value

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from dataclasses import field as member
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from filippov.events import accepted_names
 from filippov.trace.branching import Guard, Question, Tracer
 from filippov.trace.condition import Condition
 from filippov.trace.constants_of_motion import NO_CONSTANTS, ConstantsOfMotion
-from filippov.trace.explain import NoSuchLaw, explain_failure, explain_raise
+from filippov.trace.explain import NoSuchLaw, NotTraceable, explain_failure, explain_raise
 from filippov.trace.questions import Roots, check_questions, is_exact_at_an_instant
 from filippov.trace.reuse import Recent
 from filippov.trace.scalar import Scalar
@@ -24,6 +24,7 @@ from filippov.trace.verify import verify, verify_event
 if TYPE_CHECKING:
     from filippov._core import Builder, TracedEvent, TracedSystem
     from filippov.trace.explain import UserLine
+    from filippov.trace.stand_ins import StandIns
 
 __all__ = ["Trace", "trace", "trace_event"]
 
@@ -31,6 +32,7 @@ __all__ = ["Trace", "trace", "trace_event"]
 OWN_LAW = "a floor or a relay of its own"
 
 Vector = NDArray[np.float64]
+_T = TypeVar("_T")
 _Record = tuple[tuple[int, ...], list[int], tuple[tuple[int, float], ...]]
 
 
@@ -163,7 +165,7 @@ def trace(
         tracer.laws.complete(tracer)
         return declared, field, watched
 
-    def new_tracer(constants: ConstantsOfMotion | None) -> Tracer:
+    def new_tracer(constants: ConstantsOfMotion | None, stand_ins: StandIns | None = None) -> Tracer:
         return Tracer(
             Builder(),
             float(t0),
@@ -172,15 +174,19 @@ def trace(
             states=states,
             max_paths=max_paths,
             constants=constants,
+            stand_ins=stand_ins,
         )
 
-    if is_field:
-        tracer, (declared, field, watched) = _with_constants_of_motion(new_tracer, record)
-    else:
-        tracer = new_tracer(NO_CONSTANTS)
-        declared, field, watched = record(tracer)
+    def attempt(stand_ins: StandIns | None) -> tuple[Tracer, _Record]:
+        if is_field:
+            return _with_constants_of_motion(lambda constants: new_tracer(constants, stand_ins), record)
+        tracer = new_tracer(NO_CONSTANTS, stand_ins)
+        return tracer, record(tracer)
+
+    tracer, (declared, field, watched) = _with_stand_ins(attempt)
     roots = Roots(field, [index for index, _ in watched])
-    doubts = check_questions(tracer, roots, "fun", _Again(lambda: new_tracer(tracer.constants), record))
+    again = _Again(lambda: new_tracer(tracer.constants, tracer.stand_ins), record)
+    doubts = check_questions(tracer, roots, "fun", again)
     system = _system(tracer, field, [index for index, _ in watched])
     keywords = dict(parameters or {})
     verify(system, lambda t, x: fun(t, x, *args, **keywords), tracer.t0, start, tracer.values)
@@ -232,19 +238,24 @@ def trace_event(
 
     own = traced.tracer
     values = dict(zip(own.parameters, own.values.tolist(), strict=True)) if parameters is None else parameters
-    builder = traced.builder.copy()
-    tracer = Tracer(
-        builder,
-        own.t0 if t0 is None else t0,
-        own.y0 if y0 is None else y0,
-        parameters=dict(values),
-        states=own.states,
-        max_paths=own.max_paths,
-        laws=own.laws,
-        constants=ConstantsOfMotion(traced.builder, traced.field),
-    )
+
+    def attempt(stand_ins: StandIns | None) -> tuple[Tracer, int]:
+        tracer = Tracer(
+            traced.builder.copy(),
+            own.t0 if t0 is None else t0,
+            own.y0 if y0 is None else y0,
+            parameters=dict(values),
+            states=own.states,
+            max_paths=own.max_paths,
+            laws=own.laws,
+            constants=ConstantsOfMotion(traced.builder, traced.field),
+            stand_ins=stand_ins,
+        )
+        return tracer, _explore(tracer, g, args, "event", None)[0]
+
     try:
-        node = _explore(tracer, g, args, "event", None)[0]
+        tracer, node = _with_stand_ins(attempt)
+        builder = tracer.builder
         check_questions(tracer, Roots([node]), "event")
         event = TracedEvent(builder, node)
         keywords = _named(g, dict(values), "event")
@@ -255,6 +266,20 @@ def trace_event(
     except ModelError:
         return ""
     return event
+
+
+def _with_stand_ins(attempt: Callable[[StandIns | None], _T]) -> _T:
+    """Trace a function, and once more with what stands in for names if that fails."""
+    try:
+        return attempt(None)
+    except TraceError as error:
+        from filippov.trace.stand_ins import StandIns
+
+        try:
+            return attempt(StandIns())
+        except TraceError as second:
+            # What was raised by chance says less than what a traced value refused.
+            raise second if isinstance(second.__cause__, NotTraceable) else error  # noqa: B904
 
 
 def _with_constants_of_motion(
@@ -345,9 +370,12 @@ def _explore(
 ) -> list[int]:
     """Trace one function on all of its paths; `n` values are expected, or one number if `n` is None."""
 
+    stand_ins = tracer.stand_ins
+    called, with_args = (fun, args) if stand_ins is None else (stand_ins.of(fun), stand_ins.of(args))
+
     def call() -> list[int]:
         try:
-            result = fun(tracer.time(), tracer.state(), *args, **_named(fun, tracer.keywords(), role))
+            result = called(tracer.time(), tracer.state(), *with_args, **_named(fun, tracer.keywords(), role))
             return _nodes(tracer, result, role, n)
         except ModelError:
             raise

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from filippov.trace.condition import Condition
-from filippov.trace.explain import CLOCKS, NotTraceable
-from filippov.trace.scalar import Scalar
+from filippov.trace.explain import NotTraceable
+from filippov.trace.scalar import Scalar, divisor
 
-__all__ = ["ELEMENTS", "NATIVE", "REFUSED", "choose", "is_traced", "refuse"]
+__all__ = ["ELEMENTS", "NATIVE", "choose", "is_traced", "refuse"]
 
 Element = Callable[..., Any]
 
@@ -35,8 +35,8 @@ def _scalar(value: Any) -> Any:
     return value
 
 
-def _unary(name: str) -> Element:
-    number = getattr(np, name)
+def _unary(name: str, number: Element | None = None) -> Element:
+    number = number or getattr(np, name)
 
     def apply(a: Any) -> Any:
         if type(a) is Scalar:
@@ -175,6 +175,34 @@ def _rint(a: Any) -> Any:
     return a.rint() if type(a) is Scalar else float(np.rint(a))
 
 
+def _trunc(a: Any) -> Any:
+    a = _scalar(a)
+    return a.trunc() if type(a) is Scalar else float(np.trunc(a))
+
+
+def _fmod(a: Any, b: Any) -> Any:
+    return _scalar(a) - _scalar(b) * _trunc(_scalar(a) / divisor(_scalar(b)))
+
+
+def _modf(a: Any) -> tuple[Any, Any]:
+    whole = _trunc(a)
+    return _scalar(a) - whole, whole
+
+
+def _expit(a: Any) -> Any:
+    # As a tangent it overflows nowhere.
+    return 0.5 + 0.5 * ELEMENTS["tanh"](0.5 * _scalar(a))
+
+
+def _logit(a: Any) -> Any:
+    return 2.0 * ELEMENTS["arctanh"](2.0 * _scalar(a) - 1.0)
+
+
+def _logaddexp(a: Any, b: Any) -> Any:
+    a, b = _scalar(a), _scalar(b)
+    return 0.5 * (a + b) + ELEMENTS["log"](2.0 * ELEMENTS["cosh"](0.5 * (a - b)))
+
+
 def _scaled(factor: float) -> Element:
     return lambda a: _scalar(a) * factor
 
@@ -229,6 +257,17 @@ ELEMENTS: dict[str, Element] = {
     "floor": _floor,
     "ceil": _ceil,
     "rint": _rint,
+    "trunc": _trunc,
+    "fmod": _fmod,
+    "modf": _modf,
+    "logaddexp": _logaddexp,
+    # Of scipy.special.
+    "expit": _expit,
+    "logit": _logit,
+    "xlogy": lambda a, b: _scalar(a) * ELEMENTS["log"](b),
+    "xlog1py": lambda a, b: _scalar(a) * ELEMENTS["log1p"](b),
+    "erf": _unary("erf", math.erf),
+    "erfc": lambda a: 1.0 - ELEMENTS["erf"](a),
     "floor_divide": _operator(operator.floordiv),
     "remainder": _operator(operator.mod),
     "mod": _operator(operator.mod),
@@ -264,12 +303,7 @@ ELEMENTS: dict[str, Element] = {
     "isinf": lambda a: False if is_traced(a) else bool(np.isinf(a)),
 }
 
-REFUSED: dict[str, str] = dict.fromkeys(
-    ["trunc", "fmod", "modf"],
-    CLOCKS,
-)
-
 
 def refuse(name: str) -> NotTraceable:
     """Return the error for a ufunc that has no traced form."""
-    return NotTraceable(f"the function `{name}` of a traced value", REFUSED.get(name, ""))
+    return NotTraceable(f"the function `{name}` of a traced value")

@@ -350,6 +350,12 @@ impl Plan {
                 let weight = self.shifted_square(a, -1.0, 1.0);
                 self.inverse_chain(a, weight, 1.0, head)
             }
+            UnaryOp::Erf => {
+                let square = self.push(Rule::Mul(a, a));
+                let opposite = self.push(Rule::Neg(square));
+                let bell = self.function(UnaryOp::Exp, opposite);
+                self.chain(a, bell, std::f64::consts::FRAC_2_SQRT_PI, head)
+            }
             UnaryOp::Neg | UnaryOp::NotNegative => a,
         };
         self.made.insert((op, a), row);

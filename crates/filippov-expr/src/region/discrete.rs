@@ -12,6 +12,8 @@ pub enum Discrete {
     Whole,
     /// -1 and +1.
     Side,
+    /// Any numbers.
+    Real,
 }
 
 /// What an expression of discrete states takes as values.
@@ -79,6 +81,7 @@ fn linear(states: &[(Discrete, f64)], constant: f64) -> Option<Found> {
                 offset += c;
                 span += c.abs();
             }
+            Discrete::Real => return None,
         }
     }
     let rest = offset / step - (offset / step).round();
@@ -129,6 +132,7 @@ fn nonlinear(
         let tried: Vec<f64> = match discrete.get(k)? {
             Discrete::Side => vec![-1.0, 1.0],
             Discrete::Whole => (-LARGEST_TRIED..=LARGEST_TRIED).map(f64::from).collect(),
+            Discrete::Real => return None,
         };
         if points.len() * tried.len() > MOST_TRIED {
             return None;

@@ -103,7 +103,7 @@ impl Regions {
             match *self.graph.node(atom) {
                 Node::Unary(
                     Sqrt | Cbrt | Expm1 | Log1p | Sin | Tan | Sinh | Tanh | Asin | Atan | Asinh
-                    | Atanh,
+                    | Atanh | Erf,
                     a,
                 ) => self.vanishes_with(a, function),
                 Node::Binary(BinaryOp::Mul, a, b) => {

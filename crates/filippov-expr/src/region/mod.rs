@@ -353,7 +353,7 @@ impl Regions {
             if self.graph.facts(atom).nonnegative && !self.graph.facts(atom).has_sign {
                 rows.push(Inequality::bound(atom, 1.0, 0.0));
             }
-            if let Node::Unary(UnaryOp::Sin | UnaryOp::Cos | UnaryOp::Tanh, _) =
+            if let Node::Unary(UnaryOp::Sin | UnaryOp::Cos | UnaryOp::Tanh | UnaryOp::Erf, _) =
                 *self.graph.node(atom)
             {
                 rows.extend([1.0, -1.0].map(|side| Inequality::bound(atom, side, 1.0)));

@@ -451,31 +451,6 @@ impl<'a> Integrator<'a> {
         self.begin(next, &Multiple::default())
     }
 
-    /// Records what happens at surfaces that vanish in the instant in which a law changes its discrete state unseen. The sign
-    /// of a surface that does not vanish may change with the state; that is no switch.
-    fn record_beside_law(
-        &mut self,
-        before: &Mode,
-        after: &Mode,
-        rule: Rule,
-    ) -> Result<(), FieldError> {
-        let sides = self.ask(Cause::Anew(before), |at, notes| {
-            sides(at, notes, Some(before))
-        })?;
-        let Some(Sides { on_surface, .. }) = sides else {
-            return Ok(());
-        };
-        let triggers = self.run.motion.triggers(self.run.system);
-        let passed = (0..on_surface.len()).filter(|&j| {
-            on_surface[j] && !triggers.is_internal(j) && before.entries()[j] != after.entries()[j]
-        });
-        let passed: Vec<usize> = passed.collect();
-        match passed.is_empty() {
-            true => Ok(()),
-            false => self.record(before.clone(), after.clone(), &passed, rule.name()),
-        }
-    }
-
     /// Finds the mode of the initial state and starts the motion.
     pub(super) fn start(&mut self) -> Result<Option<Stop>, FieldError> {
         self.recorder.start(self.run.t, &self.run.x);
@@ -646,7 +621,21 @@ impl<'a> Integrator<'a> {
             Err(stop) => return Ok(Some(stop)),
         };
         if self.recorder.switches().len() == first && before != next.mode {
-            self.record_beside_law(&before, &next.mode, rule)?;
+            // A law has changed unseen, in the instant in which surfaces vanish. The sign of one that does not vanish may
+            // change with the state; that is no switch.
+            let sides = self.ask(Cause::Anew(&before), |at, notes| {
+                sides(at, notes, Some(&before))
+            })?;
+            let on_surface = sides.map_or_else(Default::default, |sides| sides.on_surface);
+            let triggers = self.run.motion.triggers(self.run.system);
+            let passed = (0..on_surface.len()).filter(|&j| {
+                let changes = before.entries()[j] != next.mode.entries()[j];
+                on_surface[j] && !triggers.is_internal(j) && changes
+            });
+            let passed: Vec<usize> = passed.collect();
+            if !passed.is_empty() {
+                self.record(before.clone(), next.mode.clone(), &passed, rule.name())?;
+            }
         }
         self.run.residuals.clear();
         self.run.passing.clear();

@@ -135,13 +135,7 @@ impl Solution {
             y.copy_from_slice(&self.y0);
             return Ok((t == first.t_start).then_some(&first.mode));
         }
-        let index = match side {
-            Side::Right => self.steps.partition_point(|s| s.t0 <= t).max(1) - 1,
-            Side::Left => self
-                .steps
-                .partition_point(|s| s.t_stop < t)
-                .min(self.steps.len() - 1),
-        };
+        let index = self.step_at(t, side);
         let step = self.steps[index];
         let theta = (t - step.t0) / step.dt;
         let (from, to) = step.coefficients;
@@ -164,8 +158,33 @@ impl Solution {
 }
 
 impl Solution {
+    /// Writes the derivative in time of the continuous extension; `None` outside of the span or without dense output.
+    pub fn rate(&self, t: f64, side: Side, dy: &mut [f64]) -> Option<()> {
+        let (first, last) = (self.segments.first()?, self.segments.last()?);
+        if self.steps.is_empty() || !(t >= first.t_start && t <= last.t_end) {
+            return None;
+        }
+        let step = self.steps[self.step_at(t, side)];
+        let (from, to) = step.coefficients;
+        let coefficients = self.coefficients.get(from..to)?;
+        let theta = (t - step.t0) / step.dt;
+        crate::stepper::derivative(step.basis, coefficients, (theta, step.dt), dy);
+        Some(())
+    }
+
+    /// The place of the step that `t` belongs to, of at least one.
+    fn step_at(&self, t: f64, side: Side) -> usize {
+        match side {
+            Side::Right => self.steps.partition_point(|s| s.t0 <= t).max(1) - 1,
+            Side::Left => {
+                let place = self.steps.partition_point(|s| s.t_stop < t);
+                place.min(self.steps.len() - 1)
+            }
+        }
+    }
+
     /// The segment that `t` belongs to.
-    fn segment_at(&self, t: f64, side: Side) -> Option<&Segment> {
+    pub fn segment_at(&self, t: f64, side: Side) -> Option<&Segment> {
         let before = match side {
             Side::Right => self.segments.partition_point(|s| s.t_start <= t),
             Side::Left => self.segments.partition_point(|s| s.t_start < t),

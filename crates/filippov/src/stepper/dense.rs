@@ -129,25 +129,7 @@ impl Interpolant {
 
     /// Writes the derivative of the state in t at theta.
     pub fn derivative(&self, theta: f64, dy: &mut [f64]) {
-        let n = self.n;
-        let r = |i: usize| &self.coefficients[i * n..(i + 1) * n];
-        if self.basis == Basis::Powers {
-            for (i, dy) in dy.iter_mut().enumerate() {
-                let (mut slope, mut k) = (0.0, (self.coefficients.len() / n) as f64);
-                for c in self.coefficients[n + i..].iter().step_by(n).rev() {
-                    k -= 1.0;
-                    slope = slope * theta + k * c;
-                }
-                *dy = slope / self.dt;
-            }
-            return;
-        }
-        let u = 1.0 - theta;
-        let (w, dw) = ((theta * u).powi(2), 2.0 * theta * u * (u - theta));
-        for (i, dy) in dy.iter_mut().enumerate() {
-            let cubic = r(1)[i] + (u - theta) * r(2)[i] + theta * (2.0 - 3.0 * theta) * r(3)[i];
-            *dy = (cubic + dw * (r(4)[i] + theta * r(5)[i]) + w * r(5)[i]) / self.dt;
-        }
+        derivative(self.basis, &self.coefficients, (theta, self.dt), dy);
     }
 }
 
@@ -174,6 +156,34 @@ pub(crate) fn powers_of_nested(rows: &mut [f64]) {
     if let &mut [_, r1, r2, r3, r4, r5] = rows {
         let powers = [r1 + r2, r3 + r4 - r2, r5 - r3 - 2.0 * r4, r4 - 2.0 * r5];
         rows[1..5].copy_from_slice(&powers);
+    }
+}
+
+/// Evaluates the derivative of rows of coefficients at theta, of a step of this length, in time.
+pub(crate) fn derivative(
+    basis: Basis,
+    coefficients: &[f64],
+    (theta, dt): (f64, f64),
+    dy: &mut [f64],
+) {
+    let n = dy.len();
+    let r = |i: usize| &coefficients[i * n..(i + 1) * n];
+    if basis == Basis::Powers {
+        for (i, dy) in dy.iter_mut().enumerate() {
+            let (mut slope, mut k) = (0.0, (coefficients.len() / n) as f64);
+            for c in coefficients[n + i..].iter().step_by(n).rev() {
+                k -= 1.0;
+                slope = slope * theta + k * c;
+            }
+            *dy = slope / dt;
+        }
+        return;
+    }
+    let u = 1.0 - theta;
+    let (w, dw) = ((theta * u).powi(2), 2.0 * theta * u * (u - theta));
+    for (i, dy) in dy.iter_mut().enumerate() {
+        let cubic = r(1)[i] + (u - theta) * r(2)[i] + theta * (2.0 - 3.0 * theta) * r(3)[i];
+        *dy = (cubic + dw * (r(4)[i] + theta * r(5)[i]) + w * r(5)[i]) / dt;
     }
 }
 

@@ -29,7 +29,7 @@ mod taylor;
 pub use crate::error_scale::ErrorScale;
 pub(crate) use control::StepControl;
 pub use controller::Controller;
-pub(crate) use dense::{evaluate, powers_of_nested, shift};
+pub(crate) use dense::{derivative, evaluate, powers_of_nested, shift};
 pub use dense::{Basis, Expansion, Interpolant};
 pub use dop853::Dop853;
 pub use dopri5::Dopri5;

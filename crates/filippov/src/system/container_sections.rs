@@ -3,10 +3,12 @@
 //! Four sections: the graph (that of `filippov-expr`); the nodes of the field; the names of states and parameters;
 //! the rules: surfaces that trigger actions, hidden ones, ratios of friction, laws.
 
+use std::sync::Arc;
+
 use filippov_expr::container::{Container, Section, Tag, Writer};
 use filippov_expr::{ExprError, Graph, Names, NodeId};
 
-use super::{Definition, Law, Rules};
+use super::{Definition, Law, Rules, Step};
 use crate::error::Error;
 
 const FIELD: Tag = Tag(*b"FELD");
@@ -15,9 +17,12 @@ const RULES: Tag = Tag(*b"RULE");
 
 const CLOCK: u8 = 0;
 const LEVEL: u8 = 1;
-const HELD: u8 = 2;
+const FLOOR: u8 = 2;
 const HYSTERESIS: u8 = 3;
 const SIGN: u8 = 4;
+const PIECE: u8 = 5;
+const ENTRY: u8 = 6;
+const PLACE: u8 = 7;
 
 impl Definition {
     /// Writes the definition as the next sections of a container.
@@ -108,29 +113,47 @@ fn write_law(writer: &mut Writer, law: &Law) {
     let kind = match law {
         Law::Clock { .. } => CLOCK,
         Law::Level { .. } => LEVEL,
-        Law::Held { .. } => HELD,
-        Law::Sign { .. } => SIGN,
+        Law::Held { step, .. } => match step {
+            Step::Floor => FLOOR,
+            Step::Sign => SIGN,
+            Step::Place(_) => PLACE,
+            Step::Entry { .. } => ENTRY,
+        },
+        Law::Piece { .. } => PIECE,
         Law::Hysteresis { .. } => HYSTERESIS,
     };
     writer.byte(kind);
     for node in law.nodes() {
         writer.number(node.index());
     }
-    match *law {
-        Law::Clock { .. } | Law::Held { .. } | Law::Sign { .. } => {}
+    match law {
+        Law::Clock { .. } => {}
         Law::Level {
             surface,
             orientation,
             guard,
             ..
         } => {
-            writer.number(surface);
-            writer.float(orientation);
-            writer.number(guard);
+            writer.number(*surface);
+            writer.float(*orientation);
+            writer.number(*guard);
         }
+        Law::Piece { knots, guard, .. } => {
+            // No surface is numbered 0 here.
+            writer.number(guard.map_or(0, |guard| guard + 1));
+            write_floats(writer, knots);
+        }
+        Law::Held { step, .. } => match step {
+            Step::Floor | Step::Sign => {}
+            Step::Place(knots) => write_floats(writer, knots),
+            Step::Entry { first, list } => {
+                writer.float(*first);
+                write_floats(writer, list);
+            }
+        },
         Law::Hysteresis { initial, guard, .. } => {
-            writer.float(initial);
-            writer.number(guard);
+            writer.float(*initial);
+            writer.number(*guard);
         }
     }
 }
@@ -146,11 +169,10 @@ fn read_law(section: &mut Section, made: &[NodeId]) -> Result<Law, ExprError> {
             orientation: section.float()?,
             guard: section.number()? as usize,
         },
-        HELD => Law::Held {
+        PIECE => Law::Piece {
             argument: node(section, made)?,
-        },
-        SIGN => Law::Sign {
-            argument: node(section, made)?,
+            guard: (section.number()? as usize).checked_sub(1),
+            knots: read_floats(section)?,
         },
         HYSTERESIS => Law::Hysteresis {
             argument: node(section, made)?,
@@ -158,8 +180,33 @@ fn read_law(section: &mut Section, made: &[NodeId]) -> Result<Law, ExprError> {
             initial: section.float()?,
             guard: section.number()? as usize,
         },
+        kind => Law::Held {
+            argument: node(section, made)?,
+            step: read_step(section, kind)?,
+        },
+    })
+}
+
+fn read_step(section: &mut Section, kind: u8) -> Result<Step, ExprError> {
+    Ok(match kind {
+        FLOOR => Step::Floor,
+        SIGN => Step::Sign,
+        PLACE => Step::Place(read_floats(section)?),
+        ENTRY => Step::Entry {
+            first: section.float()?,
+            list: read_floats(section)?,
+        },
         _ => return section.damaged("a law of an unknown kind"),
     })
+}
+
+fn write_floats(writer: &mut Writer, values: &[f64]) {
+    writer.number(values.len());
+    values.iter().for_each(|&value| writer.float(value));
+}
+
+fn read_floats(section: &mut Section) -> Result<Arc<[f64]>, ExprError> {
+    (0..section.count(8)?).map(|_| section.float()).collect()
 }
 
 fn write_nodes(writer: &mut Writer, nodes: &[NodeId]) {

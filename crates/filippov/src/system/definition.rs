@@ -4,7 +4,7 @@
 use filippov_expr::container::{Container, Tag, Writer};
 use filippov_expr::{Backend, Graph, Lengths, Names, NodeId};
 
-use super::{Law, Laws, PiecewiseSystem, TracedSystem};
+use super::{Law, Laws, PiecewiseSystem, Step, TracedSystem};
 use crate::error::Error;
 
 /// The content of a container that holds one definition.
@@ -171,17 +171,27 @@ impl Definition {
             return inconsistent("a law that reads its own discrete state, or that of a later one");
         }
         match *law {
-            Law::Clock { argument } => {
+            Law::Clock { argument }
+            | Law::Piece {
+                argument,
+                guard: None,
+                ..
+            } => {
                 let reads = graph.depends_on_parameters_from(argument, self.n_parameters() as u32);
                 if reads || graph.depends_on_state(argument) || !graph.is_affine(argument) {
                     return inconsistent("a clock whose argument is not affine in t alone");
                 }
             }
-            Law::Held { argument } | Law::Sign { argument } => {
+            Law::Held { argument, .. } => {
                 let terms = graph.rate_terms(argument);
                 if !terms.is_some_and(|terms| graph.is_constant_of_motion(&terms, &self.field)) {
                     return inconsistent("a held number whose argument changes along a motion");
                 }
+            }
+            Law::Piece {
+                guard: Some(guard), ..
+            } => {
+                check_index("surface", guard, graph.n_surfaces())?;
             }
             Law::Level {
                 surface,
@@ -196,6 +206,17 @@ impl Definition {
             Law::Hysteresis { initial, guard, .. } => {
                 check_index("surface", guard, graph.n_surfaces())?;
                 check_sign("initial", initial)?;
+            }
+        }
+        if let Law::Piece { knots, .. }
+        | Law::Held {
+            step: Step::Place(knots),
+            ..
+        } = law
+        {
+            let is_finite = knots.iter().all(|knot| knot.is_finite());
+            if !is_finite || knots.windows(2).any(|pair| pair[0] >= pair[1]) {
+                return inconsistent("a table whose knots do not increase");
             }
         }
         Ok(())

@@ -4,16 +4,19 @@
 //! |---|---|---|
 //! | clock | the floor of a g that is affine in t | g is a whole number: known times |
 //! | level | the whole number nearest to g | \|g - q\| reaches 1/2 |
-//! | held | the floor of a g that no motion changes | the state, or another discrete state, jumps |
-//! | sign | the sign, -1, 0 or +1, of such a g | the same |
+//! | held | a step function of a g that no motion changes | the state, or another discrete state, jumps |
 //! | hysteresis | +1 above `high`, -1 below `low`, between them as it was | h reaches `high` at -1, `low` at +1 |
+//! | piece | how many knots of a table are not above g | g reaches a knot: known times if g is affine in t |
+//!
+//! The step functions are the floor, the sign (-1, 0 or +1), the place among the knots of a table, and the entry of a
+//! list. So a table is a polynomial whose coefficients are entries at its piece.
 //!
 //! The floor of a g that depends on the state is q - 1/2 + sign(g - q)/2, which is the same before and after a change
 //! of q: its jumps are those of an ordinary surface g - q = 0, on which the motion may slide.
 
 use std::sync::Arc;
 
-use filippov_expr::{Backend, ExprError, Graph, NodeId, Program, Wrt};
+use filippov_expr::{Backend, ExprError, Graph, Node, NodeId, Program, Wrt};
 use smallvec::{smallvec, SmallVec};
 
 use super::{PiecewiseSystem, Setting, TracedSystem};
@@ -41,15 +44,21 @@ pub enum Law {
         /// The surface 1/2 - |g - q| = 0.
         guard: usize,
     },
-    /// The floor of an expression of other discrete states, and of constants of motion.
+    /// A step function of an expression of other discrete states, and of constants of motion.
     Held {
         /// The expression g.
         argument: NodeId,
+        /// The function.
+        step: Step,
     },
-    /// The sign of such an expression, 0 where it is zero.
-    Sign {
+    /// The number of knots that are not above an expression.
+    Piece {
         /// The expression g.
         argument: NodeId,
+        /// In increasing order.
+        knots: Arc<[f64]>,
+        /// The surface that is positive between the knots around g; none if g is affine in t and contains no state.
+        guard: Option<usize>,
     },
     /// A relay with two thresholds.
     Hysteresis {
@@ -64,14 +73,51 @@ pub enum Law {
     },
 }
 
+/// What is constant between jumps.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Step {
+    /// The floor.
+    Floor,
+    /// The sign, 0 at zero.
+    Sign,
+    /// The number of knots, in increasing order, that are not above.
+    Place(Arc<[f64]>),
+    /// A number of a list, NaN beyond its ends.
+    Entry {
+        /// Where the list begins: at this whole number.
+        first: f64,
+        /// The list.
+        list: Arc<[f64]>,
+    },
+}
+
+impl Step {
+    /// The value at g.
+    fn at(&self, g: f64) -> f64 {
+        match self {
+            Step::Floor => floor(g),
+            Step::Sign => sign(g),
+            Step::Place(knots) => passed(knots, g, 1.0),
+            Step::Entry { first, list } => {
+                let place = (g - first).round();
+                if place >= 0.0 && place < list.len() as f64 {
+                    list[place as usize]
+                } else {
+                    f64::NAN
+                }
+            }
+        }
+    }
+}
+
 impl Law {
     /// The nodes that the law refers to.
     pub(crate) fn nodes(&self) -> SmallVec<[NodeId; 3]> {
         match *self {
             Law::Clock { argument }
             | Law::Level { argument, .. }
-            | Law::Held { argument }
-            | Law::Sign { argument } => smallvec![argument],
+            | Law::Held { argument, .. }
+            | Law::Piece { argument, .. } => smallvec![argument],
             Law::Hysteresis {
                 argument,
                 thresholds: [low, high],
@@ -80,18 +126,18 @@ impl Law {
         }
     }
 
-    /// Does q change with the state, and with other discrete states, in instants only?
-    fn is_held(&self) -> bool {
-        matches!(self, Law::Held { .. } | Law::Sign { .. })
-    }
-
     /// The expressions that the law evaluates: the argument, and two more.
     fn expressions(&self, graph: &mut Graph) -> [NodeId; 3] {
         match *self {
-            Law::Clock { argument } => [argument, graph.partial(argument, Wrt::Time), argument],
-            Law::Level { argument, .. } | Law::Held { argument } | Law::Sign { argument } => {
-                [argument; 3]
-            }
+            Law::Clock { argument }
+            | Law::Piece {
+                argument,
+                guard: None,
+                ..
+            } => [argument, graph.partial(argument, Wrt::Time), argument],
+            Law::Level { argument, .. }
+            | Law::Piece { argument, .. }
+            | Law::Held { argument, .. } => [argument; 3],
             Law::Hysteresis {
                 argument,
                 thresholds: [low, high],
@@ -106,6 +152,8 @@ impl Law {
 pub struct Laws {
     laws: Vec<Law>,
     program: Option<Program>,
+    /// The parameter that the argument of a law is, if it is one.
+    reads: Vec<Option<usize>>,
 }
 
 /// What triggers a change of a discrete state, what it does, and how it is recorded.
@@ -147,7 +195,15 @@ impl Laws {
                 Backend::Interpreter,
             )?)
         };
-        Ok(Laws { laws, program })
+        let reads = laws.iter().map(|law| match *graph.node(law.nodes()[0]) {
+            Node::Parameter(index) => Some(index as usize),
+            _ => None,
+        });
+        Ok(Laws {
+            reads: reads.collect(),
+            laws,
+            program,
+        })
     }
 
     /// The laws.
@@ -184,8 +240,11 @@ impl Laws {
                 q[index] = match &self.laws[index] {
                     Law::Clock { .. } => self.ticking(index, x.len(), system.parameters()).start(t),
                     Law::Level { .. } => values[0].round(),
-                    Law::Held { .. } => floor(values[0]),
-                    Law::Sign { .. } => sign(values[0]),
+                    Law::Piece {
+                        knots, guard: None, ..
+                    } => passed(knots, values[0], values[1]),
+                    Law::Piece { knots, .. } => passed(knots, values[0], 1.0),
+                    Law::Held { step, .. } => step.at(values[0]),
                     Law::Hysteresis { initial, .. } => relay(values, *initial),
                 };
             }
@@ -202,15 +261,26 @@ impl Laws {
     /// The actions that change the discrete states in a run with these parameters.
     pub fn actions(self: &Arc<Self>, n_states: usize, parameters: &[f64]) -> Vec<LawAction> {
         let mut actions = Vec::new();
-        let first_held = self.laws.iter().position(Law::is_held).unwrap_or(0);
+        // What reads one discrete state alone is brought up to date with that.
+        let follows_jumps = |(index, law): (usize, &Law)| {
+            matches!(law, Law::Held { .. }) && self.reads[index].is_none()
+        };
+        let first_held = self.laws.iter().enumerate().position(follows_jumps);
         for (index, law) in self.laws.iter().enumerate() {
             let mut step = 0.0;
             let (trigger, kind) = match *law {
                 // One action brings all of them up to date.
-                Law::Held { .. } | Law::Sign { .. } => match index == first_held {
+                Law::Held { .. } => match Some(index) == first_held {
                     true => (Trigger::Jump, None),
                     false => continue,
                 },
+                Law::Piece {
+                    guard: Some(guard), ..
+                } => (falling(guard), None),
+                Law::Piece { ref knots, .. } => {
+                    let ticking = self.ticking(index, n_states, parameters);
+                    (Trigger::Times(ticking.times(knots)), None)
+                }
                 Law::Clock { .. } => {
                     let ticking = self.ticking(index, n_states, parameters);
                     let Some(clock) = ticking.clock() else {
@@ -273,6 +343,16 @@ impl Ticking {
         })
     }
 
+    /// When it is at the knots, in increasing order.
+    fn times(self, knots: &[f64]) -> Vec<f64> {
+        let time = |knot: &f64| (knot - self.offset) / self.rate;
+        match self.rate {
+            0.0 => Vec::new(),
+            rate if rate > 0.0 => knots.iter().map(time).collect(),
+            _ => knots.iter().rev().map(time).collect(),
+        }
+    }
+
     /// Its floor just after t.
     fn start(self, t: f64) -> f64 {
         match self.clock() {
@@ -280,6 +360,28 @@ impl Ticking {
             Some(clock) if self.rate > 0.0 => clock.last_up_to(t),
             Some(clock) => -clock.last_up_to(t) - 1.0,
         }
+    }
+}
+
+/// How many knots are not above g, which moves in the direction of `rate`; one within rounding of g has been passed.
+fn passed(knots: &[f64], g: f64, rate: f64) -> f64 {
+    let beside = WHOLE_NUMBER * (1.0 + g.abs()) * if rate < 0.0 { -1.0 } else { 1.0 };
+    knots.partition_point(|&knot| knot <= g + beside) as f64
+}
+
+/// The piece that g has come to from `piece`: at an end of it the one beyond.
+fn piece_beyond(knots: &[f64], piece: f64, g: f64) -> f64 {
+    let below = (piece as usize).checked_sub(1).map(|k| knots[k]);
+    let above = knots.get(piece as usize).copied();
+    let distance = |end: Option<f64>| end.map_or(f64::INFINITY, |end| (g - end).abs());
+    let rises = distance(above) <= distance(below);
+    let next = if rises { piece + 1.0 } else { piece - 1.0 };
+    // After a jump it may be anywhere.
+    let located = passed(knots, g, if rises { 1.0 } else { -1.0 });
+    if (located - piece).abs() > 1.0 {
+        located
+    } else {
+        next
     }
 }
 
@@ -327,10 +429,18 @@ impl ActionMap for LawMap {
 
     fn apply(&self, t: f64, x: &mut [f64], signs: &[f64], q: &mut [f64]) -> Result<(), FieldError> {
         let index = self.index;
-        match self.laws.laws[index] {
+        match &self.laws.laws[index] {
             Law::Clock { .. } => q[index] += self.step,
             Law::Hysteresis { .. } => q[index] = -q[index],
-            Law::Held { .. } | Law::Sign { .. } => {}
+            Law::Held { .. } => {}
+            Law::Piece { knots, guard, .. } => {
+                let out = self.laws.eval(t, x, signs, &self.parameters, q);
+                let g = out[3 * index];
+                q[index] = match guard {
+                    Some(_) => piece_beyond(knots, q[index], g),
+                    None => passed(knots, g, out[3 * index + 1]),
+                };
+            }
             Law::Level { .. } => {
                 let out = self.laws.eval(t, x, signs, &self.parameters, q);
                 let distance = out[3 * index] - q[index];
@@ -344,14 +454,15 @@ impl ActionMap for LawMap {
             }
         }
         for (k, law) in self.laws.laws.iter().enumerate() {
-            if !law.is_held() {
+            let Law::Held { step, .. } = law else {
                 continue;
-            }
-            let out = self.laws.eval(t, x, signs, &self.parameters, q);
-            q[k] = match law {
-                Law::Sign { .. } => sign(out[3 * k]),
-                _ => floor(out[3 * k]),
             };
+            let discrete = self.laws.reads[k].and_then(|p| p.checked_sub(self.parameters.len()));
+            let value = match discrete {
+                Some(read) => q[read],
+                None => self.laws.eval(t, x, signs, &self.parameters, q)[3 * k],
+            };
+            q[k] = step.at(value);
         }
         Ok(())
     }

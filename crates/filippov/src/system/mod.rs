@@ -46,7 +46,7 @@ pub use definition::{Definition, Rules};
 pub use enclosures::Enclosures;
 pub use jacobian::MotionJacobian;
 pub use jets::MotionJets;
-pub use laws::{Law, LawAction, LawMap, Laws};
+pub use laws::{Law, LawAction, LawMap, Laws, Step};
 pub use lie_derivatives::{LieDerivatives, LieValue, RatePartials, Word};
 pub use linearisation::Linearisation;
 pub use linearisations::Linearisations;

@@ -5,7 +5,7 @@ pub mod damage;
 pub mod usage;
 
 use filippov::action::{Clock, Trigger};
-use filippov::{Definition, Law, Rules, SavedAction, SavedSystem};
+use filippov::{Definition, Law, Rules, SavedAction, SavedSystem, Step};
 use filippov_expr::{BinaryOp, Graph, Names, NodeId, Switching, UnaryOp};
 
 /// A saved system, and a state at which it starts.
@@ -178,7 +178,10 @@ pub fn laws() -> SavedSystem {
     let n_hidden = g.n_surfaces();
     let laws = vec![
         Law::Clock { argument: ticks },
-        Law::Held { argument: halved },
+        Law::Held {
+            argument: halved,
+            step: Step::Floor,
+        },
         Law::Level {
             argument: fine,
             surface: index as usize,

@@ -1,7 +1,7 @@
 #![allow(clippy::unwrap_used)]
 
 use super::{Definition, Rules};
-use crate::{Error, Law};
+use crate::{Error, Law, Step};
 use filippov_expr::{Graph, Names, NodeId};
 
 /// x' = -sign(x) + p + q with a discrete state q; node 1 is the time.
@@ -96,12 +96,14 @@ fn laws_are_what_they_say() {
     let held = text(|d| {
         d.rules.laws[0] = Law::Held {
             argument: NodeId(0),
+            step: Step::Floor,
         }
     });
     assert!(held.contains("changes along a motion"), "{held}");
     let own = text(|d| {
         d.rules.laws[0] = Law::Held {
             argument: NodeId(3),
+            step: Step::Floor,
         }
     });
     assert!(own.contains("reads its own discrete state"), "{own}");

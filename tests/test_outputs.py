@@ -1,0 +1,144 @@
+"""Quantities along a solution, and other ways in which people ask for results."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+from typing import Any
+
+import filippov as fl
+import numpy as np
+import pytest
+
+
+def friction(t: Any, x: Any, F: float) -> Any:
+    return -F * np.sign(x[1] - 0.5)
+
+
+def block(t: Any, x: Any, F: float) -> Any:
+    return [x[1], -x[0] + friction(t, x, F)]
+
+
+def energy(t: Any, x: Any) -> Any:
+    return (x[0] ** 2 + x[1] ** 2) / 2
+
+
+@pytest.fixture
+def system() -> fl.System:
+    outputs = {"friction": friction, "energy": energy}
+    return fl.System(block, states=("x", "v"), params={"F": 1.0}, outputs=outputs)
+
+
+def test_while_it_sticks_friction_holds_the_block(system: fl.System) -> None:
+    sol = system.solve((0, 10), {"x": 0.0, "v": 0.0}, rtol=1e-10, atol=1e-12)
+    kinds = sol.switches.kind.tolist()
+    assert kinds[:2] == ["enter_sliding", "exit_sliding"]
+    begin, end = sol.switches.t[:2]
+    times = np.linspace(begin, end, 20)[1:-1]
+    force = sol.evaluate(friction, times)
+    assert force == pytest.approx(sol.sol(times)[0], abs=1e-9)  # it balances the spring
+    assert sol.evaluate(friction, 0.5 * begin) == 1.0
+    assert sol.evaluate(friction, end, side="left") == pytest.approx(1.0, abs=1e-6)
+    assert sol.multipliers(times)[0] == pytest.approx(-force, abs=1e-9)
+    assert sol.outputs["friction"].shape == sol.t.shape
+    assert sol.outputs["energy"] == pytest.approx((sol.y**2).sum(axis=0) / 2)
+
+
+def test_outputs_are_columns_and_travel(system: fl.System) -> None:
+    sol = system.solve((0, 3), [0.0, 0.0], F=0.7)
+    pytest.importorskip("pandas")
+    pytest.importorskip("xarray")
+    assert list(sol.to_pandas().columns) == ["x", "v", "friction", "energy", "mode"]
+    assert "energy" in sol.to_xarray()
+    copy = pickle.loads(pickle.dumps(sol))
+    assert np.array_equal(copy.outputs["friction"], sol.outputs["friction"])
+    assert max(sol.outputs["friction"]) == pytest.approx(0.7)
+
+
+def test_members_of_an_ensemble_have_the_outputs_of_their_parameters(system: fl.System) -> None:
+    members = system.ensemble((0, 2), [0.0, 0.0], {"F": [0.5, 0.7]}, keep="steps")
+    assert [float(member.evaluate(friction, 0.01)) for member in members] == [0.5, 0.7]
+
+
+def test_an_output_with_a_sign_of_its_own(system: fl.System) -> None:
+    sol = system.solve((0, 3), [0.0, 0.0])
+    times = np.linspace(0.1, 2.9, 15)
+    assert np.array_equal(
+        sol.evaluate(lambda t, x: np.sign(x[0] - 0.3), times), np.sign(sol.sol(times)[0] - 0.3)
+    )
+
+
+def test_a_relay_in_an_output_remembers() -> None:
+    warm = fl.Hysteresis(lambda t, x: x[0], 19.0, 21.0)
+    room = fl.System(lambda t, x: [0.1 * (10.0 - x[0]) + (1.0 - warm(t, x))], n=1, outputs={"relay": warm})
+    sol = room.solve((0, 30), [15.0])
+    first, second = sol.switches.t[:2]
+    assert sol.evaluate(warm, [0.5 * first, 0.5 * (first + second), second + 0.1]).tolist() == [
+        -1.0,
+        1.0,
+        -1.0,
+    ]
+
+
+@pytest.mark.parametrize(
+    ("outputs", "kind", "message"),
+    [
+        ({"u": lambda t, x: x[7]}, fl.ModelError, "the output 'u' raised IndexError"),
+        ({"u": lambda t, x: x}, fl.ModelError, r"the output 'u' returned an array of shape \(2,\)"),
+        ({"u": 3}, fl.InputError, "'u' is a function"),
+        ({"v": energy}, fl.InputError, "'v' is the name of something else"),
+        ([energy], fl.InputError, "outputs: a mapping"),
+    ],
+)
+def test_wrong_outputs_are_refused_by_name(outputs: Any, kind: type[Exception], message: str) -> None:
+    with pytest.raises(kind, match=message):
+        fl.System(block, states=("x", "v"), params={"F": 1.0}, outputs=outputs).solve((0, 1), [0.0, 0.0])
+
+
+def test_a_quantity_that_cannot_be_traced_is_called_where_nothing_slides(system: fl.System) -> None:
+    sol = system.solve((0, 3), [0.0, 0.0])
+    opaque = lambda t, x: x[0].__float__()  # noqa: E731
+    begin = sol.switches.t[0]
+    assert sol.evaluate(opaque, 0.5 * begin) == pytest.approx(sol.sol(0.5 * begin)[0])
+    with pytest.raises(fl.ModelError, match="its signs have no values of their own"):
+        sol.evaluate(opaque, begin + 0.01)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [({"x": 0.0}, "'v' is missing"), ({"x": 0.0, "w": 1.0, "v": 0.0}, "no state 'w'")],
+)
+def test_a_wrong_initial_state_by_names(system: fl.System, given: dict[str, float], message: str) -> None:
+    with pytest.raises(fl.InputError, match=message):
+        system.solve((0, 1), given)
+
+
+def test_the_derivative_is_the_field(system: fl.System) -> None:
+    sol = system.solve((0, 3), [0.0, 0.0], rtol=1e-10, atol=1e-12)
+    for t in (0.1, sol.switches.t[0] + 0.1, 2.5):
+        field = system.field(t, sol.sol(t), sol.mode_at(t))
+        assert sol.sol(t, nu=1) == pytest.approx(field, abs=1e-7)
+    with pytest.raises(ValueError, match="nu: the order"):
+        sol.sol(1.0, nu=2)
+
+
+def test_tables_are_selected_by_masks(system: fl.System) -> None:
+    sol = system.solve((0, 10), [0.0, 0.0])
+    mask = sol.switches.kind == "enter_sliding"
+    assert len(sol.switches[mask]) == mask.sum() > 0
+    assert np.array_equal(sol.switches[[0, 1]].t, sol.switches.t[:2])
+    assert len(sol.switches[[]]) == 0
+    assert sol.segments[sol.segments.t_start > 1][0].t_start > 1
+    assert sol.mode_at([0.1, 9.9])[0] == sol.mode_at(0.1)
+    pytest.importorskip("pandas")
+    assert list(sol.segments.to_pandas().columns) == ["t_start", "t_end", "mode"]
+
+
+def test_a_solution_is_written_as_netcdf(system: fl.System, tmp_path: Path) -> None:
+    pytest.importorskip("scipy.io")
+    xarray = pytest.importorskip("xarray")
+    sol = system.solve((0, 3), [0.0, 0.0])
+    sol.to_xarray().to_netcdf(tmp_path / "run.nc", engine="scipy")
+    with xarray.open_dataset(tmp_path / "run.nc", engine="scipy") as back:
+        assert np.array_equal(back["x"], sol.y[0])
+        assert back.attrs["surfaces"] == "\n".join(sol.surfaces)

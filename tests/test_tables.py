@@ -1,0 +1,146 @@
+"""Tables of numbers: where they break, jump, stand still, and what is refused."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable
+from typing import Any
+
+import filippov as fl
+import numpy as np
+import pytest
+
+PLACES, VALUES = [0.0, 1.0, 2.0, 3.0], [1.0, 0.0, 0.0, -1.0]
+SIGNS, SHORT = [0.0, 1.0, -1.0], [1.0, 2.0]
+SIX, PROFILE = [0, 1, 2, 3, 4, 5, 6], [0, 0, 1, 1, 0, 0, -1]
+
+
+def run(fun: Callable[..., Any], end: float, y0: list[float]) -> fl.Solution:
+    sol = fl.solve_ivp(fun, (0, end), y0, rtol=1e-10, atol=1e-12)
+    assert sol.success, sol.message
+    assert sol.stats["backend"] == "native"
+    return sol
+
+
+def test_knots_of_time_are_ends_of_steps_and_no_switches() -> None:
+    sol = run(lambda t, x: [np.interp(t, [0.0, 0.3, 1.0], [0.0, 3.0, 0.0])], 2.0, [0.0])
+    assert 0.3 in sol.t
+    assert 1.0 in sol.t
+    assert len(sol.switches) == 0
+    assert sol.y[0, -1] == pytest.approx(1.5, abs=1e-14)
+
+
+def test_a_table_of_the_state_is_its_pieces() -> None:
+    table = lambda t, x: [x[1], -np.interp(x[0], [-1, 0, 1], [-2, 0, 1]) - 0.1 * np.sign(x[1])]  # noqa: E731
+    pieces = lambda t, x: [x[1], -np.clip(np.where(x[0] < 0, 2 * x[0], x[0]), -2, 1) - 0.1 * np.sign(x[1])]  # noqa: E731
+    one, other = run(table, 13.0, [2.0, 0.3]), run(pieces, 13.0, [2.0, 0.3])
+    assert one.y[:, -1] == pytest.approx(other.y[:, -1], abs=1e-12)
+    assert len(one.switches) < len(other.switches)
+    assert fl.System(table, n=2).surfaces == ["x[1]"]
+
+
+def test_a_table_that_jumps_with_the_state_slides() -> None:
+    sol = run(lambda t, x: [1 - np.interp(x[0], [0, 1, 1, 2], [0, 0, 2, 2])], 3.0, [0.0])
+    assert sol.switches.kind.tolist() == ["enter_sliding"]
+    assert sol.y[0, -1] == 1.0
+
+
+@pytest.mark.parametrize(
+    "steps",
+    [
+        lambda x: np.digitize(x, [-0.5, 0.0, 0.5]),
+        lambda x: np.searchsorted([-0.5, 0.0, 0.5], x),
+        lambda x: 3 - np.digitize(x, [0.5, 0.0, -0.5]),
+        lambda x: np.array([0, 1, 2, 3])[np.digitize(x, [-0.5, 0.0, 0.5])],
+    ],
+)
+def test_steps_of_the_state_switch(steps: Callable[..., Any]) -> None:
+    one = run(lambda t, x: [x[1], -x[0] * (1 + steps(x[0])) - 0.2 * x[1]], 13.0, [2.0, 0.3])
+    layers = lambda x: 1.0 * (x >= -0.5) + (x >= 0) + (x >= 0.5)  # noqa: E731
+    other = run(lambda t, x: [x[1], -x[0] * (1 + layers(x[0])) - 0.2 * x[1]], 13.0, [2.0, 0.3])
+    assert one.switches.t == pytest.approx(other.switches.t, abs=1e-10)
+    assert one.y[:, -1] == pytest.approx(other.y[:, -1], abs=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("fun", "y0", "end", "exact"),
+    [
+        (
+            lambda t, x: [np.sign(np.interp(t, SIX, PROFILE))],
+            [0.0],
+            7.0,
+            1.0,
+        ),
+        (lambda t, x: [1.0 * (np.interp(t, [0, 1, 2, 3, 4], [0, 0, 1, 1, 0]) >= 1)], [0.0], 7.0, 1.0),
+        (
+            lambda t, x: [np.floor(np.interp(t, SIX, PROFILE))],
+            [0.0],
+            7.0,
+            -1.0,
+        ),
+        (lambda t, x: [0.5 - np.sign(np.interp(x[0], [0, 1], [0, 1]))], [-1.0], 7.0, 0.0),
+        (lambda t, x: [0.5 - np.sign(np.interp(x[0], PLACES, VALUES))], [1.2], 7.0, 10.1),
+        (lambda t, x: [0.5 + np.sign(np.interp(x[0], PLACES, VALUES))], [1.2], 7.0, 2.0),
+        (lambda t, x: [np.sign(SIGNS[int(t) % 3] * (2.0 + np.sin(t)))], [0.0], 8.0, 1.0),
+    ],
+)
+def test_a_comparison_with_a_level_part_has_the_answer_of_python(
+    fun: Callable[..., Any], y0: list[float], end: float, exact: float
+) -> None:
+    sol = run(fun, end, y0)
+    assert sol.y[0, -1] == pytest.approx(exact, abs=1e-9)
+    assert not sol.warnings
+
+
+def test_the_zero_of_a_table_is_found_exactly() -> None:
+    times, values = np.linspace(0, 20, 201), np.sin(np.linspace(0, 20, 201))
+    sol = run(lambda t, x: [np.sign(np.interp(t, times, values))], 5.0, [0.0])
+    k = 31  # the place before pi
+    zero = times[k] + values[k] / (values[k] - values[k + 1]) * (times[k + 1] - times[k])
+    assert sol.switches.t == pytest.approx([zero], abs=1e-14)
+
+
+def test_a_table_of_a_sawtooth_is_periodic() -> None:
+    for fun in (
+        lambda t, x: [np.interp(t % 3, [0, 1, 2, 3], [0, 1, 5, 0])],
+        lambda t, x: [np.interp(t, [0, 1, 2, 3], [0, 1, 5, 0], period=3)],
+    ):
+        assert run(fun, 9.0, [0.0]).y[0, -1] == pytest.approx(18.0, abs=1e-12)
+
+
+def test_beyond_a_list_the_run_ends() -> None:
+    sol = fl.solve_ivp(lambda t, x: [SHORT[int(t)]], (0, 5), [0.0])
+    assert not sol.success
+    assert sol.t[-1] == pytest.approx(2.0)
+    assert sol.y[0, -1] == pytest.approx(3.0)
+
+
+def test_a_list_that_the_function_makes_is_refused_and_the_way_out_works() -> None:
+    with pytest.raises(fl.TraceError, match=r"np\.array\(\[\.\.\.\]\)\[k\]"):
+        fl.solve_ivp(lambda t, x: [[1.0, 2.0][int(t)]], (0, 2), [0.0])
+    sol = run(lambda t, x: [np.array([1.0, 2.0])[int(t)]], 1.5, [0.0])
+    assert sol.y[0, -1] == pytest.approx(2.0)
+
+
+def test_a_system_with_a_table_travels() -> None:
+    def fun(t: Any, x: Any) -> Any:
+        return [np.interp(t, PLACES, VALUES) - np.digitize(x[0], [0.1, 0.2])]
+
+    system = fl.System(fun, n=1)
+    for copy in (pickle.loads(pickle.dumps(system)), fl.System.from_bytes(system.to_bytes())):
+        assert np.array_equal(copy.solve((0, 3), [0.0]).y, system.solve((0, 3), [0.0]).y)
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        (lambda t: np.interp(t, [0, 2, 1], [0, 1, 2]), r"xp\[2\] = 1 comes after 2: sort the table"),
+        (lambda t: np.interp(t, [0, 1, 2], [0, 1]), "xp has 3 numbers and fp has 2"),
+        (lambda t: np.interp(t, [0, np.nan, 2], [0, 1, 2]), r"xp\[1\] is nan"),
+        (lambda t: np.interp(t, [0, 1, 2], [0, np.inf, 2]), r"fp\[1\] is not finite"),
+        (lambda t: np.searchsorted([2, 1], t), "must increase"),
+    ],
+)
+def test_a_damaged_table_is_refused_by_name(table: Callable[..., Any], message: str) -> None:
+    with pytest.raises(fl.ModelError, match=message):
+        fl.solve_ivp(lambda t, x: [table(t)], (0, 1), [0.0])
