@@ -142,3 +142,84 @@ def test_a_solution_is_written_as_netcdf(system: fl.System, tmp_path: Path) -> N
     with xarray.open_dataset(tmp_path / "run.nc", engine="scipy") as back:
         assert np.array_equal(back["x"], sol.y[0])
         assert back.attrs["surfaces"] == "\n".join(sol.surfaces)
+
+
+def test_a_solution_in_a_file_is_the_same(system: fl.System, tmp_path: Path) -> None:
+    sol = system.solve((0, 10), [0.0, 0.0], events=lambda t, x: x[0] - 0.5)
+    path = tmp_path / "run.npz"
+    sol.save(path)
+    back = fl.load(path)
+    assert isinstance(back, fl.Solution)
+    assert repr(back) == repr(sol)
+    assert str(back.switches) == str(sol.switches)
+    assert str(back.segments) == str(sol.segments)
+    assert np.array_equal(back.y, sol.y)
+    assert np.array_equal(back.t_events[0], sol.t_events[0])
+    assert np.array_equal(back.y_events[0], sol.y_events[0])
+    assert np.array_equal(back.outputs["friction"], sol.outputs["friction"])
+    assert np.array_equal(back.switches.y_after, sol.switches.y_after)
+    assert [(w.code, w.candidates) for w in back.warnings] == [(w.code, w.candidates) for w in sol.warnings]
+    assert np.array_equal(
+        back.segments[1].multipliers_start, sol.segments[1].multipliers_start, equal_nan=True
+    )
+    assert list(back) == list(sol)
+    assert back.sol is None
+    assert "<th>message</th>" in back._repr_html_()
+
+
+def test_warnings_and_failures_are_in_the_file(tmp_path: Path) -> None:
+    with pytest.warns(fl.FilippovWarning, match="non_unique"):
+        sol = fl.solve_ivp(lambda t, x: [np.sign(x[0]) * x[1], 1.0], (0, 2), [0.0, -1.0])
+    failed = fl.solve_ivp(lambda t, x: [np.sqrt(1.0 - x[0]) + 0.1], (0, 20), [0.0])
+    assert not failed.success
+    for k, run in enumerate((sol, failed)):
+        run.save(tmp_path / str(k))
+        back = fl.load(tmp_path / str(k))
+        assert repr(back) == repr(run)
+        assert back.status == run.status
+
+
+def test_other_files_are_refused_by_name(system: fl.System, tmp_path: Path) -> None:
+    path = tmp_path / "run.npz"
+    system.solve((0, 1), [0.0, 0.0]).save(path)
+    with np.load(path) as file:
+        arrays = dict(file)
+    newer = str(arrays["text"]).replace('"version": 1', '"version": 2')
+    np.savez(tmp_path / "newer.npz", **{**arrays, "text": np.array(newer)})
+    with pytest.raises(fl.InputError, match=r"newer\.npz: written in version 2 of the format"):
+        fl.load(tmp_path / "newer.npz")
+    np.savez(tmp_path / "other.npz", a=np.zeros(3))
+    with pytest.raises(fl.InputError, match=r"other\.npz: no file of a solution"):
+        fl.load(tmp_path / "other.npz")
+    arrays.pop("y")
+    np.savez(tmp_path / "cut.npz", **arrays)
+    with pytest.raises(fl.InputError, match=r"cut\.npz: a damaged file"):
+        fl.load(tmp_path / "cut.npz")
+    (tmp_path / "half.npz").write_bytes(path.read_bytes()[:200])
+    with pytest.raises(fl.InputError, match=r"half\.npz: no file of a solution"):
+        fl.load(tmp_path / "half.npz")
+    with pytest.raises(FileNotFoundError):
+        fl.load(tmp_path / "nothing")
+    with pytest.raises(fl.InputError, match="the name of a file"):
+        fl.load(None)  # type: ignore[arg-type]
+
+
+def test_states_are_given_by_name_everywhere(system: fl.System) -> None:
+    start = {"v": 0.25, "x": 0.5}
+    alone = system.solve((0, 3), [0.5, 0.25]).y[:, -1]
+    assert np.array_equal(fl.solve_ivp(system, (0, 3), start).y[:, -1], alone)
+    members = system.ensemble((0, 3), {"x": [0.5, 0.0], "v": 0.25})
+    assert np.array_equal(members.y[0], alone)
+    assert np.array_equal(system.field(0.0, start, "+"), system.field(0.0, [0.5, 0.25], "+"))
+    assert system.classify(0.0, start).mode == system.classify(0.0, [0.5, 0.25]).mode
+    with pytest.raises(fl.InputError, match="the states have no names"):
+        fl.solve_ivp(lambda t, x: [-x[0]], (0, 1), {"x": 1.0})
+
+
+def test_defaults_of_the_function_are_parameters() -> None:
+    system = fl.System(lambda t, x, F=0.4, n=2: [x[1], -n * x[0] - F * np.sign(x[1])], n=2)
+    assert system.params == {"F": 0.4, "n": 2.0}
+    changed = fl.System(lambda t, x: [x[1], -2 * x[0] - 0.1 * np.sign(x[1])], n=2)
+    one = system.solve((0, 3), [1.0, 0.0], F=0.1)
+    assert np.allclose(one.y[:, -1], changed.solve((0, 3), [1.0, 0.0]).y[:, -1], rtol=0, atol=1e-12)
+    assert fl.System(lambda t, x, a, b=3.0: [a * b * x[0]], n=1, args=(2.0,)).params == {"b": 3.0}

@@ -151,6 +151,9 @@ SPELLINGS: dict[str, Callable[..., Any]] = {
     "a method": Pendulum(0.1, np.array(LEVELS)).__call__,
     "inner functions": with_inner_functions,
     "a namespace": lambda t, x: [x[1], -PARAMETERS.k * math.sin(x[0]) + PARAMETERS.table["a"][int(t) % 3]],
+    "arrays that are not filled": lambda t, x: (
+        -np.linalg.eigvalsh(np.array([[2.0, 1.0], [1.0, 3.0]])) * x + np.linalg.cond(np.diag([1.0, 2.0]))
+    ),
     "mixed arrays": lambda t, x: np.sin(np.array([x[1], 1.0])) - np.array([0.0, x[0]]),
     "sums": lambda t, x: [math.fsum([x[1], 0.1]), -max(x[0], 0.1 * math.sqrt(1 + x[1] ** 2))],
 }

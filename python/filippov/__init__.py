@@ -29,6 +29,7 @@ from filippov.errors import (
 )
 from filippov.events import Event
 from filippov.laws import Hysteresis, Stick, hysteresis, sawtooth, square, stick
+from filippov.loading import load
 from filippov.modes import Mode
 from filippov.resets import Reset
 from filippov.sliding_policy import SlidingPolicy
@@ -89,6 +90,7 @@ __all__ = [
     "bifurcation_diagram",
     "hidden_dynamics",
     "hysteresis",
+    "load",
     "open_sweep",
     "plot",
     "poincare",

@@ -6,10 +6,8 @@ import inspect
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, overload
 
-import numpy as np
-
 from filippov.errors import ModelError
-from filippov.events import function_name
+from filippov.events import default_parameters, function_name
 from filippov.system import System
 
 __all__ = ["system"]
@@ -25,6 +23,7 @@ def system(
     params: Mapping[str, float] | None = None,
     states: Sequence[str] | None = None,
     surfaces: Any = None,
+    outputs: Any = None,
 ) -> Callable[[Callable[..., Any]], System]: ...
 def system(
     fun: Callable[..., Any] | None = None,
@@ -33,6 +32,7 @@ def system(
     params: Mapping[str, float] | None = None,
     states: Sequence[str] | None = None,
     surfaces: Any = None,
+    outputs: Any = None,
 ) -> System | Callable[[Callable[..., Any]], System]:
     """Turn a function ``f(t, x, a=1.0, b=2.0)`` into a `System` with the parameters `a` and `b`.
 
@@ -40,7 +40,7 @@ def system(
     ----------
     fun : callable
         The right-hand side. What follows ``(t, x)`` and has a number as default is a parameter.
-    n, states, surfaces
+    n, states, surfaces, outputs
         As for `System`.
     params : dict, optional
         Default values that replace or complete those of the function.
@@ -66,23 +66,19 @@ def system(
     """
 
     def build(function: Callable[..., Any]) -> System:
-        defaults = _default_parameters(function, params or {})
-        return System(function, n=n, params=defaults, states=states, surfaces=surfaces)
+        defaults = _all_parameters(function, params or {})
+        return System(function, n=n, params=defaults, states=states, surfaces=surfaces, outputs=outputs)
 
     return build if fun is None else build(fun)
 
 
-def _default_parameters(function: Callable[..., Any], given: Mapping[str, float]) -> dict[str, float]:
-    defaults: dict[str, float] = {}
+def _all_parameters(function: Callable[..., Any], given: Mapping[str, float]) -> dict[str, float]:
+    """Return the default values of a function, replaced and completed by those given; all must have one."""
     for parameter in list(inspect.signature(function).parameters.values())[2:]:
-        if parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
-            continue
-        value = given.get(parameter.name, parameter.default)
-        if value is parameter.empty:
+        is_collected = parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
+        if parameter.default is parameter.empty and not is_collected and parameter.name not in given:
             raise ModelError(
                 f"{function_name(function, 'fun')}(): {parameter.name!r} needs a default value, "
                 "in the signature or in params="
             )
-        if isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool):
-            defaults[parameter.name] = float(value)
-    return {**defaults, **given}
+    return {**default_parameters(function), **given}

@@ -17,7 +17,7 @@ from filippov.core_events import CoreEvent, core_events
 from filippov.errors import InputError, Interrupted
 from filippov.events import EventSpec, normalise_events
 from filippov.notices import show_summary
-from filippov.options import OPTIONS, check_options, check_t_span
+from filippov.options import OPTIONS, check_options, check_t_span, in_order
 from filippov.prepare import Prepared
 from filippov.sliding_policy import fit_kappa
 from filippov.solution import Solution
@@ -237,6 +237,9 @@ def _members(
     """Return the initial states (one row per member) and the parameter columns, all of one length."""
     if params is not None and not isinstance(params, Mapping):
         raise InputError(f"params: a dict of names and values is needed, not {type(params).__name__}")
+    if isinstance(y0, Mapping):
+        columns = [finite_array(column, "y0") for column in in_order(y0, "y0", system._states)]
+        y0 = np.stack(np.broadcast_arrays(*columns), axis=-1)
     states = finite_array(y0, "y0")
     if states.ndim not in (1, 2) or 0 in states.shape:
         raise InputError(f"y0: shape (n_members, n) or (n,) is needed, not {states.shape}")

@@ -179,6 +179,20 @@ def names_argument(function: Callable[..., Any], name: str) -> bool:
     )
 
 
+def default_parameters(function: Callable[..., Any], n_given: int = 0) -> dict[str, float]:
+    """Return the arguments that have a number as default, behind ``(t, x)`` and `n_given` more."""
+    try:
+        parameters = list(inspect.signature(function).parameters.values())[2 + n_given :]
+    except (TypeError, ValueError):  # builtins and C functions have no signature
+        return {}
+    numbers = (int, float, np.integer, np.floating)
+    return {
+        parameter.name: float(parameter.default)
+        for parameter in parameters
+        if isinstance(parameter.default, numbers) and not isinstance(parameter.default, bool)
+    }
+
+
 def check_scalar_function(g: Callable[[float, Any], Any], t0: float, y0: Any, what: str) -> None:
     """Call `g` once at the start and refuse what is not a single real number."""
     try:

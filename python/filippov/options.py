@@ -19,7 +19,7 @@ from filippov.scalars import count, positive, real
 from filippov.sliding_policy import SlidingPolicy, as_policy
 from filippov.unknown import did_you_mean
 
-__all__ = ["Options", "check_options", "check_t_span", "check_y0"]
+__all__ = ["Options", "check_options", "check_t_span", "check_y0", "in_order"]
 
 Array = npt.NDArray[np.float64]
 
@@ -182,14 +182,38 @@ def check_t_span(t_span: Any) -> tuple[float, float]:
     return ends[0], ends[1]
 
 
-def check_y0(y0: Any, name: str = "y0") -> Array:
-    """Return the initial state, or another one of that name, as a new array of floats, shape (n,).
+def in_order(given: Mapping[str, Any], name: str, states: Sequence[str] | None) -> list[Any]:
+    """Return what is given for each state, in their order.
 
     Raises
     ------
     InputError
-        If `y0` is not one-dimensional, empty, complex, or not finite.
+        If the states have no names, or one is missing or unknown.
     """
+    if states is None:
+        raise InputError(f"{name}: the states have no names; give states= to System, or an array")
+    for key in given:
+        if key not in states:
+            hint = did_you_mean(key, dict.fromkeys(states))
+            raise InputError(f"{name}: no state {key!r}{hint}; the states are {', '.join(states)}")
+    missing = [key for key in states if key not in given]
+    if missing:
+        raise InputError(f"{name}: {', '.join(map(repr, missing))} is missing")
+    return [given[key] for key in states]
+
+
+def check_y0(y0: Any, name: str = "y0", states: Sequence[str] | None = None) -> Array:
+    """Return the initial state, or another one of that name, as a new array of floats, shape (n,).
+
+    It may be given by the names of the `states`, if these have names.
+
+    Raises
+    ------
+    InputError
+        If `y0` is not one-dimensional, empty, complex, or not finite, or a name is missing or unknown.
+    """
+    if isinstance(y0, Mapping):
+        y0 = in_order(y0, name, states)
     if type(y0) in (list, tuple) and {*map(type, y0)} == {float} and math.isfinite(sum(y0)):
         return np.array(y0)
     refuse_masked(y0, name)

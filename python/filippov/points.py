@@ -26,6 +26,8 @@ Array = npt.NDArray[np.float64]
 class Points(ABC):
     """Questions about points, for a class that knows its parameters and can be traced."""
 
+    _states: tuple[str, ...] | None
+
     @abstractmethod
     def parameter_values(self, given: Mapping[str, float] | None) -> dict[str, float]:
         """Return the values of all parameters."""
@@ -72,7 +74,7 @@ class Points(ABC):
         >>> bool(abs(system.field(0.0, [0.0], "0")[0]) < 1e-12)
         True
         """
-        t, state = check_time(t), check_y0(x, "x")
+        t, state = check_time(t), check_y0(x, "x", self._states)
         values = self.parameter_values(params)
         prepared = self.prepare(len(state), float(t), state, values)
         entries = _check_mode("mode", mode, prepared)
@@ -131,7 +133,7 @@ class Points(ABC):
         >>> relays.classify(0.0, [0.0, 0.0], before="0+").mode
         Mode('00')
         """
-        t, state = check_time(t), check_y0(x, "x")
+        t, state = check_time(t), check_y0(x, "x", self._states)
         policy, reach = canopy_of(sliding), check_distance(atol)
         refuse_former(params, self.classify, self.parameter_values(None))
         values = self.parameter_values(params)

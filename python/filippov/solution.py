@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, KeysView
 from functools import cached_property
+from html import escape
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -572,6 +574,58 @@ class Solution:
             variables["mode"] = ("t", np.array([str(mode) for mode in self._modes_at(self.t)]))
         attributes = {"message": self.message, "status": self.status, "surfaces": "\n".join(self.surfaces)}
         return xarray.Dataset(variables, coords={"t": self.t}, attrs=attributes)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the solution to a file, from which `filippov.load` makes it again.
+
+        The file holds arrays and texts, and no code. As in a copy by `pickle` all is there but `sol` and
+        the other `branches`.
+
+        Parameters
+        ----------
+        path : str or path-like
+            The file; one that exists is replaced.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile, numpy as np, filippov as fl
+        >>> sol = fl.solve_ivp(lambda t, x: -np.sign(x), (0, 2), [1.0])
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     sol.save(folder + "/relay.npz")
+        ...     back = fl.load(folder + "/relay.npz")
+        >>> bool((back.y == sol.y).all()), back.switches.kind.tolist()
+        (True, ['enter_sliding'])
+        """
+        from filippov.solution_files import write_solution
+
+        write_solution(self._fields(), path)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Solution:
+        """Return the solution that `save` wrote.
+
+        Raises
+        ------
+        InputError
+            If the file is not one of `save`, damaged, or of another version.
+        OSError
+            If it cannot be read.
+        """
+        from filippov.solution_files import read_solution
+
+        fields = read_solution(path)
+        return cls(**{name: fields[name] for name in _FIELDS})
+
+    def _repr_html_(self) -> str:
+        """Return the solution as a notebook shows it."""
+        rows = [line.partition(":") for line in repr(self).splitlines()]
+        cells = (f"<tr><th>{escape(name)}</th><td>{escape(text)}</td></tr>" for name, _, text in rows)
+        return f"<table>{''.join(cells)}</table>"
 
     def plot(self, ax: Any = None, states: Any = None, dark: bool | None = None) -> Any:
         """Draw the states over time, coloured by mode; see `filippov.plot.time_series`.

@@ -236,7 +236,7 @@ def solve_prepared(
     key = None if params else repeatable_key(options)
     call = None if key is None else system._calls.get(key)
     if call is not None:
-        (t0, t1), state = check_t_span(t_span), check_y0(y0)
+        (t0, t1), state = check_t_span(t_span), check_y0(y0, states=system._states)
         prepared = call.prepared
         if t0 < t1 and len(state) == prepared.core.n_states:
             run = run_core(prepared.core, t0, t1, state, call.parameters, call.core_options, [], call.actions)
@@ -244,7 +244,7 @@ def solve_prepared(
             return _shown(solution) if run.n_warnings or prepared.warnings else solution
     solution = _solve(system, t_span, y0, _changed(options), None, (), params, None, None)
     if key is not None and call is None and len(system._calls) < _MOST_CALLS:
-        _keep_call(system, key, options, np.size(y0))
+        _keep_call(system, key, options, len(solution.states))
     return _shown(solution)
 
 
@@ -293,7 +293,7 @@ def _solve(
 ) -> Solution:
     """Solve with the options that differ from their defaults; all arguments as in `solve_ivp`."""
     t0, t1 = check_t_span(t_span)
-    state = check_y0(y0)
+    state = check_y0(y0, states=fun._states if isinstance(fun, System) else None)
     n = len(state)
     options = check_options(changed, (t0, t1), n)
     constants = check_args(args)
@@ -399,7 +399,9 @@ def _as_system(
         return fun, fun.parameter_values(params)
     if not callable(fun):
         raise InputError(f"fun: a function fun(t, y) or a System is needed, not {type(fun).__name__}")
-    system = System(fun, n=n, params=params, surfaces=surfaces, args=args, resets=resets)
+    system = System(
+        fun, n=n, params={} if params is None else params, surfaces=surfaces, args=args, resets=resets
+    )
     return system, system.parameter_values(None)
 
 

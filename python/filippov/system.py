@@ -12,7 +12,7 @@ from filippov._core import Run
 from filippov.backward import reversed_source
 from filippov.caution import warn_user
 from filippov.errors import InputError, ModelError
-from filippov.events import accepted_names, function_name, names_argument
+from filippov.events import accepted_names, default_parameters, function_name, names_argument
 from filippov.forms import Source, base_source, check_surfaces, fields_source, relay_source
 from filippov.options import (
     check_args,
@@ -49,7 +49,7 @@ class System(Points, Saving):
         Number of states; by default known from `y0` at the first run.
     params : dict, optional
         Names and default values of the parameters that may be changed at every run. They are handed to `fun`
-        by name.
+        by name. By default the arguments of `fun` that have a number as default.
     states : sequence of str, optional
         Names of the states for tables and plots; ``x[0], x[1], ...`` by default.
     surfaces : callable or sequence of callable, optional
@@ -103,6 +103,8 @@ class System(Points, Saving):
         source = Source(
             fun, check_surfaces(surfaces), check_args(args), black_box=declared, resets=check_resets(resets)
         )
+        if params is None:
+            params = default_parameters(fun, len(source.args))
         self._setup(source, n, params, states)
         self._outputs = check_outputs(outputs, self._states or ())
         if not self._params:
@@ -315,8 +317,6 @@ class System(Points, Saving):
         if self._params:
             named = {name: options.pop(name) for name in self._params if name in options}
             params = {**(params or {}), **named}
-        if isinstance(y0, Mapping):
-            y0 = self.state_vector(y0)
         return solve_prepared(self, t_span, y0, params, options)
 
     def ensemble(
@@ -363,25 +363,6 @@ class System(Points, Saving):
         from filippov.ensemble import run_ensemble
 
         return run_ensemble(self, t_span, y0, params, events, threads, options)
-
-    def state_vector(self, given: Mapping[str, float]) -> list[float]:
-        """Return a state that is given by the names of its components.
-
-        Raises
-        ------
-        InputError
-            If the states have no names, or one is missing or unknown.
-        """
-        if self._states is None:
-            raise InputError("y0: the states have no names; give states= to System, or an array")
-        for name in given:
-            if name not in self._states:
-                hint = did_you_mean(name, dict.fromkeys(self._states))
-                raise InputError(f"y0: no state {name!r}{hint}; the states are {', '.join(self._states)}")
-        missing = [name for name in self._states if name not in given]
-        if missing:
-            raise InputError(f"y0: {', '.join(map(repr, missing))} is missing")
-        return [given[name] for name in self._states]
 
     def parameter_values(self, given: Mapping[str, float] | None) -> dict[str, float]:
         """Return the values of all parameters, the defaults overridden by `given`.
@@ -439,7 +420,7 @@ class System(Points, Saving):
             return ""
         return (
             f"; {name} is an argument of the function that was not declared: give fl.System(fun, "
-            f"params={{{name!r}: value}}), or take @fl.system, which declares all that have defaults"
+            f"params={{{name!r}: value}}), or give the argument a default"
         )
 
     def prepare(self, n: int, t0: float, y0: Array | None, values: dict[str, float]) -> Prepared:

@@ -173,7 +173,7 @@ def plain(value: Any) -> Any:
 def numbers(array: Any) -> Any:
     """Return an array of objects that are all plain numbers as an array of numbers, all else as it is."""
     if isinstance(array, np.ndarray) and array.dtype == _OBJECT and not _holds_traced(array.flat):
-        return array.astype(float)
+        return plain(array).astype(float)
     return array
 
 
@@ -204,7 +204,11 @@ def apply_ufunc(ufunc: np.ufunc, method: str, inputs: tuple[Any, ...], kwargs: d
         loop = ufunc
     else:
         raise refuse(name)
-    result = getattr(loop, method)(*[plain(value) for value in inputs], **kwargs)
+    operands = [plain(value) for value in inputs]
+    if method == "reduce" and kwargs.get("axis", 0) is None and not kwargs.get("keepdims"):
+        # NumPy reduces one axis at most with a function of Python.
+        operands[0] = operands[0].ravel()
+    result = getattr(loop, method)(*operands, **kwargs)
     if out is not None:
         return out[0] if len(out) == 1 else out
     return wrap(result)

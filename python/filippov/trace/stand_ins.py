@@ -11,6 +11,7 @@ from __future__ import annotations
 import builtins
 import copy
 import dis
+import enum
 import functools
 import math
 import sys
@@ -180,7 +181,8 @@ def _names_in(code: CodeType) -> set[str]:
 
 def _is_of_user(kind: type) -> bool:
     """Whether a class is written in Python, by the user."""
-    if "__slots__" in vars(kind) or not kind.__flags__ & 1 << 9 or kind.__module__.startswith("filippov."):
+    is_written_in_python = kind.__flags__ & 1 << 9
+    if issubclass(kind, (enum.Enum, BaseException, type)) or not is_written_in_python:
         return False
     path = getattr(sys.modules.get(kind.__module__), "__file__", "")
     return path is None or not is_foreign(path)
@@ -222,6 +224,18 @@ class _Object:
 
     def __setattr__(self, name: str, new: Any) -> None:
         setattr(self._parts[1], name, new)
+
+    def __eq__(self, other: object) -> Any:
+        return self.__getattr__("__eq__")(other._parts[1] if type(other) is _Object else other)
+
+    def __hash__(self) -> int:
+        return hash(self._parts[1])
+
+    def __bool__(self) -> bool:
+        return bool(self._parts[1])
+
+    def __contains__(self, entry: object) -> bool:
+        return entry in self._parts[1]
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         return self.__getattr__("__call__")(*args, **kwargs)
@@ -310,6 +324,9 @@ class _NumberType(type):
 
     def __instancecheck__(cls, value: Any) -> bool:
         return isinstance(value, cls.original) or (not cls.is_whole and isinstance(value, Scalar))
+
+    def __subclasscheck__(cls, kind: type) -> bool:
+        return issubclass(kind, cls.original)
 
     def __getattr__(cls, name: str) -> Any:
         return getattr(cls.original, name)

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 __all__ = ["Trace", "trace", "trace_event"]
 
 # What a warning says of an event with a law that the field has not.
-OWN_LAW = "a floor or a relay of its own"
+OWN_LAW = "a floor, a relay or a table of its own"
 
 Vector = NDArray[np.float64]
 _T = TypeVar("_T")
