@@ -144,3 +144,56 @@ def test_a_system_with_a_table_travels() -> None:
 def test_a_damaged_table_is_refused_by_name(table: Callable[..., Any], message: str) -> None:
     with pytest.raises(fl.ModelError, match=message):
         fl.solve_ivp(lambda t, x: [table(t)], (0, 1), [0.0])
+
+
+def by_choices(x: Any, places: np.ndarray, values: np.ndarray) -> Any:
+    """Return the table as nested choices, with the value of the next piece at a place."""
+    result: Any = values[-1]
+    for k in range(len(places) - 2, -1, -1):
+        if places[k + 1] > places[k]:
+            slope = (values[k + 1] - values[k]) / (places[k + 1] - places[k])
+            result = np.where(x < places[k + 1], values[k] + (x - places[k]) * slope, result)
+    return np.where(x < places[0], values[0], result)
+
+
+ARGUMENTS = [
+    lambda t, x: x[0],
+    lambda t, x: x[0] - x[1],
+    lambda t, x: t + 0 * x[0],
+    lambda t, x: t - x[0],
+    lambda t, x: x[0] + np.sin(t),
+    lambda t, x: t % 2.0,
+]
+USES = [
+    lambda v, x: np.sign(v),
+    lambda v, x: np.where(v >= 0.5, 1.0, -1.0),
+    lambda v, x: v - 0.3 * np.sign(x[1]),
+    lambda v, x: np.abs(v - 0.5),
+    lambda v, x: np.maximum(v, x[0]),
+    lambda v, x: np.sign(v - x[1]),
+]
+
+
+@pytest.mark.filterwarnings("ignore::filippov.FilippovWarning")
+@pytest.mark.parametrize("seed", [*range(36), 203, 250])
+def test_random_tables_are_nested_choices(seed: int) -> None:
+    """Some jump, many stand still at what they are compared with, and the motion slides on some."""
+    rng = np.random.default_rng(seed)
+    count = rng.integers(2, 6)
+    places = np.cumsum(rng.integers(0 if rng.random() < 0.3 else 1, 4, count) * 0.5) - 2.0
+    values = rng.integers(-2, 3, count) * 0.5
+    argument = ARGUMENTS[rng.integers(0, 6)]
+    a, b, c = rng.normal(size=3).round(2)
+    use = USES[rng.integers(0, 6)]
+    y0 = rng.normal(size=2).round(2)
+    ends = []
+    for table in (np.interp, by_choices):
+
+        def fun(t: Any, x: Any, table: Any = table) -> Any:
+            u = use(table(argument(t, x), places, values), x)
+            return [x[1] + a * u, -x[0] - 0.3 * x[1] + b * u + c]
+
+        sol = fl.solve_ivp(fun, (0, 6), y0, rtol=1e-9, atol=1e-11, max_steps=20_000)
+        assert sol.success, sol.message
+        ends.append(sol.y[:, -1])
+    assert ends[0] == pytest.approx(ends[1], abs=1e-6)

@@ -21,6 +21,8 @@ __all__ = ["parts_that_stand_still"]
 
 # A table of the state with more knots around such pieces is left as it is: a run warns of them.
 MOST_KNOTS = 64
+# Relative to the values at the ends of a piece.
+ROUNDING = 1e-10
 
 # Node of the entry, first place of its list, the list.
 _Entry = tuple[int, int, NDArray[np.float64]]
@@ -111,13 +113,21 @@ def _by_knots(
         return builder.substituted(node, images)
 
     kept = [k for k in np.flatnonzero(is_still).tolist() if in_full or _may_be_zero(tracer, section(k, k))]
-    ends = sorted({end for k in kept for end in (k - 1, k) if 0 <= end < len(knots)})
+    # The neighbours of such a piece are sections of their own too: they are zero where it begins or ends.
+    ends = sorted({end for k in kept for end in range(k - 2, k + 2) if 0 <= end < len(knots)})
     if not ends or len(ends) > MOST_KNOTS:
         return None
     begins = [0, *(end + 1 for end in ends)]
-    leaves = [_leaf(tracer, section(*ends)) for ends in zip(begins, [*ends, len(knots)], strict=True)]
+    leaves = []
+    for begin, end in zip(begins, [*ends, len(knots)], strict=True):
+        leaf = _leaf(tracer, section(begin, end))
+        if begin == end and leaf[1] is None:
+            leaf = (leaf[0], _sign_between(tracer, leaf[0], argument, knots, begin))
+        leaves.append(leaf)
     pieces: Pieces = leaves[0]
-    for end, leaf in zip(ends, leaves[1:], strict=True):
+    for end, below, leaf in zip(ends, leaves, leaves[1:], strict=False):
+        if not in_full and isinstance(leaf[1], float) and leaf[1] == below[1]:
+            continue  # only the sign matters
         knot = builder.constant(float(knots[end]))
         surface, orientation = builder.switch(builder.binary("subtract", argument, knot))
         pieces = (surface, leaf, pieces) if orientation > 0.0 else (surface, pieces, leaf)
@@ -130,6 +140,26 @@ def _leaf(tracer: Tracer, node: int) -> Pieces:
     if tracer.laws.is_held(tracer, node):
         return (node, "held")
     return (node, tracer.known_sign(node))
+
+
+def _sign_between(
+    tracer: Tracer, node: int, argument: int, knots: NDArray[np.float64], piece: int
+) -> float | None:
+    """Return the sign in a piece of what is zero at one end of it and moves evenly; None if it is not so."""
+    builder = tracer.builder
+    width = knots[piece] - knots[piece - 1] if 0 < piece < len(knots) else 1.0
+    first = knots[piece - 1] if piece > 0 else knots[0] - width
+    values = [
+        builder.as_constant(builder.substituted(node, [(argument, builder.constant(float(place)))]))
+        for place in (first, first + 0.5 * width, first + width)
+    ]
+    if any(value is None for value in values):
+        return None
+    start, middle, end = np.array(values, dtype=float)
+    rounding = ROUNDING * max(abs(start), abs(end))
+    if min(abs(start), abs(end)) > rounding or abs(start + end - 2.0 * middle) > rounding:
+        return None
+    return float(np.sign(middle)) or None
 
 
 def _may_be_zero(tracer: Tracer, node: int) -> bool:
