@@ -34,16 +34,16 @@ def test_a_mode_that_is_none_is_named(mode: Any) -> None:
 
 
 def test_an_argument_that_was_not_declared_says_how_to() -> None:
-    pulled = fl.System(lambda t, x, F=1.0: [F - np.sign(x[0])], n=1)
+    pulled = fl.System(lambda t, x, F=1.0: [F - np.sign(x[0])], n=1, params={})
     for call in (
         lambda: pulled.solve((0, 1), [1.0], F=2.0),
         lambda: pulled.solve((0, 1), [1.0], params={"F": 2.0}),
         lambda: pulled.ensemble((0, 1), [1.0], F=2.0),
         lambda: pulled.field(0.0, [1.0], "+", F=2.0),
     ):
-        with pytest.raises(fl.InputError, match=r"F is an argument .* params=\{'F': value\}\), or take @fl"):
+        with pytest.raises(fl.InputError, match=r"F is an argument .* params=\{'F': value\}\), or leave params= out"):
             call()
-    declared = fl.System(lambda t, x, F=1.0: [F - np.sign(x[0])], n=1, params={"F": 1.0})
+    declared = fl.System(lambda t, x, F=1.0: [F - np.sign(x[0])], n=1)
     assert declared.solve((0, 1), [1.0], F=3.0).y[0, -1] == pytest.approx(3.0)
 
 

@@ -420,7 +420,7 @@ class System(Points, Saving):
             return ""
         return (
             f"; {name} is an argument of the function that was not declared: give fl.System(fun, "
-            f"params={{{name!r}: value}}), or give the argument a default"
+            f"params={{{name!r}: value}}), or leave params= out, which declares all that have defaults"
         )
 
     def prepare(self, n: int, t0: float, y0: Array | None, values: dict[str, float]) -> Prepared:
