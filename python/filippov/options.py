@@ -212,10 +212,10 @@ def check_y0(y0: Any, name: str = "y0", states: Sequence[str] | None = None) -> 
     InputError
         If `y0` is not one-dimensional, empty, complex, or not finite, or a name is missing or unknown.
     """
-    if isinstance(y0, Mapping):
-        y0 = in_order(y0, name, states)
     if type(y0) in (list, tuple) and {*map(type, y0)} == {float} and math.isfinite(sum(y0)):
         return np.array(y0)
+    if isinstance(y0, Mapping):
+        y0 = in_order(y0, name, states)
     refuse_masked(y0, name)
     try:
         state = np.asarray(y0)
