@@ -65,6 +65,7 @@ mod serial;
 mod sign_gradient;
 mod simplify;
 mod spelling;
+mod surface_order;
 pub mod switching;
 mod tape;
 
