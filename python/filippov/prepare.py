@@ -78,8 +78,8 @@ class Prepared(NamedTuple):
         text = (
             f"fun assigns {', '.join(self.remembers)}, outside of itself: a trace does not remember what "
             "an earlier call left there. For a relay with two thresholds use fl.Hysteresis; for a phase, a "
-            "gear or a counter a discrete state, fl.System(fun, discrete={...}), which fl.Reset(..., set={...}) "
-            "changes"
+            "gear or a counter a discrete state, fl.System(fun, discrete={...}), which fl.Reset(..., "
+            "set={...}) changes"
         )
         return [(MEMORY, text)]
 
