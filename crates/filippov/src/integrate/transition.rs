@@ -117,7 +117,8 @@ impl<'a> Integrator<'a> {
             vanishing: event.multiple.vanishing,
             at_two_fold,
         };
-        if let (&[j], true) = (self.run.motion.sliding(), n_ends > 0) {
+        let is_first_order = matches!(self.run.motion.field, ModeField::Sliding(_));
+        if let (&[j], true) = (self.run.motion.sliding(), n_ends > 0 && is_first_order) {
             let speed = self.stepper.end_derivative().iter();
             let speed = speed.fold(0.0_f64, |most, v| most.max(v.abs()));
             let may_lose = self.run.may_lose_multiplier(speed);
@@ -188,8 +189,9 @@ impl<'a> Integrator<'a> {
         }
         self.record(before, next.mode.clone(), &concerned, rule.name())?;
         if !matches!(rule, Rule::Touch | Rule::Contact | Rule::Triggers) {
-            // One surface meets no other.
-            if self.run.system.n_surfaces() > 1 {
+            // One surface meets no other, but perhaps its rate.
+            let is_of_higher_degree = |j: usize| self.run.system.reduced(&[j]).is_some();
+            if self.run.system.n_surfaces() > 1 || is_of_higher_degree(0) {
                 let limit = self.ask(Cause::Start, |at, _| limit_of_switches(at))?;
                 if let Some(limit) = limit.filter(|limit| limit.t <= self.horizon) {
                     return self.jump_to(limit, next.mode);

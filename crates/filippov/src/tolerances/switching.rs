@@ -132,6 +132,9 @@ pub const SPIRAL_START: f64 = 100.0;
 /// Switches in one turn of an accumulation at most: a turn around two surfaces has four.
 pub const LONGEST_TURN: usize = 32;
 
+/// Flights below the tolerance that do not shrink by this factor at least take long to end: their limit is not extrapolated.
+pub const SLOWEST_EXTRAPOLATED: f64 = 0.9;
+
 /// The square of the distance from which accumulating switches are extrapolated is at least this, also for a tolerance
 /// of zero.
 pub const NEAREST_ACCUMULATION: f64 = 1e-20;
