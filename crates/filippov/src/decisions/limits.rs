@@ -88,20 +88,21 @@ pub(crate) fn limit_of_switches(at: &Point) -> Result<Option<Limit>, FieldError>
     Ok(is_on_all(at, &limit)?.then_some(limit))
 }
 
-/// The limit of crossings of one surface, to and fro, at rates that shrink, where the last flight between two of them was
-/// shorter than the tolerance. Further flights would be rounding and error: they are as a geometric series would have them.
-fn limit_of_unresolved_flights(at: &Point) -> Result<Option<Limit>, FieldError> {
+/// The limit of crossings of one surface, to and fro, or of impacts there, at rates that shrink, where the last flight between
+/// two of them was shorter than the tolerance. Further flights would be rounding and error: they are as a geometric series
+/// would have them.
+pub(crate) fn limit_of_unresolved_flights(at: &Point) -> Result<Option<Limit>, FieldError> {
     let [.., first, middle, last] = at.arrival.switches else {
         return Ok(None);
     };
     let &[j] = &last.surfaces[..] else {
         return Ok(None);
     };
-    let is_crossing = |s: &&Switch| s.kind == Kind::Crossing && s.surfaces[..] == [j];
-    let (Some(reduced), true) = (
-        at.system.reduced(&[j]),
-        [first, middle, last].iter().all(is_crossing),
-    ) else {
+    let is_same = |s: &&Switch| s.kind == last.kind && s.surfaces == last.surfaces;
+    if !matches!(last.kind, Kind::Crossing | Kind::Reset) || ![first, middle].iter().all(is_same) {
+        return Ok(None);
+    }
+    let Some(reduced) = at.system.reduced(&[j]) else {
         return Ok(None);
     };
     let mut h = vec![0.0; at.system.n_surfaces()];
@@ -179,9 +180,7 @@ pub(crate) fn limits_of_impacts(
         s.kind == last.kind && s.surfaces == last.surfaces && s.mode_after == last.mode_after
     };
     let series = match earlier {
-        [.., a, b, c] if [a, b, c].into_iter().all(same) => {
-            Limit::of([a, b, c, last], vec![j])
-        }
+        [.., a, b, c] if [a, b, c].into_iter().all(same) => Limit::of([a, b, c, last], vec![j]),
         _ => None,
     };
     let here = is_unresolved.then(|| Limit {
@@ -257,6 +256,15 @@ pub(super) fn stay_at_limit(
     if meeting.how != How::Limit || meeting.surfaces.len() == 1 {
         return Ok(None);
     }
+    stay_on_all(at, notes, meeting)
+}
+
+/// The motion that stays on all surfaces of a meeting, if there is one; why it cannot be known.
+pub(super) fn stay_on_all(
+    at: &Point,
+    notes: &mut Notes,
+    meeting: &Meeting,
+) -> Result<Option<Decided>, FieldError> {
     let (mode, meeting) = (meeting.mode, meeting.surfaces);
     let fields = at.corners(notes, meeting, mode)?;
     let telling = fields.telling();

@@ -78,7 +78,13 @@ fn of_higher_degree(
         Arrival::ExitMinus | Arrival::ExitPlus | Arrival::TwoFold
     );
     if !ends_sliding && rate.abs() > noise {
-        let (entry, leading) = (rate.signum() as i8, Leading { order: 1, value: rate });
+        let (entry, leading) = (
+            rate.signum() as i8,
+            Leading {
+                order: 1,
+                value: rate,
+            },
+        );
         let crossing = Decision {
             entry,
             candidates: smallvec![entry],

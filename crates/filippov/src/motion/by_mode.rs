@@ -5,7 +5,8 @@ use std::ops::{Deref, DerefMut};
 use smallvec::SmallVec;
 
 use super::{
-    ContactField, IntersectionField, Motion, ReducedField, RegionField, SlidingField, SmoothField,
+    ContactField, IntersectionField, Motion, ReducedField, RegionField, RestField, SlidingField,
+    SmoothField,
 };
 use crate::error::FieldError;
 use crate::mode::Mode;
@@ -19,6 +20,7 @@ pub(crate) enum ModeField<'a> {
     Intersection(Box<IntersectionField<'a>>),
     Contact(Box<ContactField<'a>>),
     Reduced(Box<ReducedField<'a>>),
+    Rest(RestField),
 }
 
 /// How a motion slides where several surfaces meet.
@@ -111,6 +113,7 @@ impl ModeField<'_> {
             ModeField::Intersection(field) => field.set_discrete(q),
             ModeField::Contact(field) => field.set_discrete(q),
             ModeField::Reduced(field) => field.set_discrete(q),
+            ModeField::Rest(_) => {}
         }
     }
 }
@@ -126,6 +129,7 @@ impl<'a> Deref for ModeField<'a> {
             ModeField::Intersection(field) => &**field,
             ModeField::Contact(field) => &**field,
             ModeField::Reduced(field) => &**field,
+            ModeField::Rest(field) => field,
         }
     }
 }
@@ -139,6 +143,7 @@ impl DerefMut for ModeField<'_> {
             ModeField::Intersection(field) => &mut **field,
             ModeField::Contact(field) => &mut **field,
             ModeField::Reduced(field) => &mut **field,
+            ModeField::Rest(field) => field,
         }
     }
 }

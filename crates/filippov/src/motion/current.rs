@@ -5,7 +5,8 @@ use std::sync::Arc;
 use smallvec::SmallVec;
 
 use super::{
-    AffineBounds, ContactField, Deflation, Guard, Law, ModeField, Monitored, SlidingSet, Triggers,
+    AffineBounds, ContactField, Deflation, Guard, Law, ModeField, Monitored, RestField, SlidingSet,
+    Triggers,
 };
 use crate::error::FieldError;
 use crate::mode::{Mode, Signs};
@@ -276,7 +277,7 @@ impl<'a> CurrentMotion<'a> {
 
     /// Do bounds of the multipliers hold for the exit functions?
     pub fn has_bounds(&self) -> bool {
-        !self.is_in_contact() && !self.is_of_higher_order() && !self.sticks
+        !self.is_in_contact() && !self.is_of_higher_order() && !self.is_at_rest() && !self.sticks
     }
 
     /// Is it drawn back to the surfaces slid on, and not projected?
@@ -287,7 +288,7 @@ impl<'a> CurrentMotion<'a> {
     /// Is its field the multilinear combination of the fields around the surfaces slid on?
     pub fn has_canopy_field(&self) -> bool {
         match &self.field {
-            ModeField::Contact(_) | ModeField::Reduced(_) => false,
+            ModeField::Contact(_) | ModeField::Reduced(_) | ModeField::Rest(_) => false,
             ModeField::Intersection(field) => field.rule() == SlidingRule::Canopy,
             ModeField::Region(_) | ModeField::Sliding(_) => true,
         }
@@ -306,6 +307,27 @@ impl<'a> CurrentMotion<'a> {
     /// Is the motion in contact at some surface?
     pub fn is_in_contact(&self) -> bool {
         matches!(self.field, ModeField::Contact(_))
+    }
+
+    /// The system whose normal components end it: a reduced one on a surface of higher relative degree.
+    #[inline]
+    pub fn sliding_system(&self, system: &'a dyn PiecewiseSystem) -> &'a dyn PiecewiseSystem {
+        match &self.field {
+            ModeField::Reduced(field) => field.innermost(),
+            _ => system,
+        }
+    }
+
+    /// Rests in its mode from now on.
+    pub fn rest(&mut self, system: &dyn PiecewiseSystem) {
+        let field = ModeField::Rest(RestField::new(self.sliding.len()));
+        self.replace_field(field);
+        self.find_monitored(system, &[]);
+    }
+
+    /// Does it rest?
+    pub fn is_at_rest(&self) -> bool {
+        matches!(self.field, ModeField::Rest(_))
     }
 
     /// Does it slide on a surface of higher relative degree?

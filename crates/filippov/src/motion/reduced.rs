@@ -16,6 +16,7 @@ pub struct ReducedField<'a> {
     surfaces: SlidingSet,
     setting: OwnSetting,
     projector: Projector,
+    reduced: &'a dyn PiecewiseSystem,
     inner: Box<ModeField<'a>>,
 }
 
@@ -33,8 +34,17 @@ impl<'a> ReducedField<'a> {
             surfaces: SlidingSet::from_slice(surfaces),
             setting: OwnSetting::new(setting),
             projector: Projector::new(system.n_states(), system.n_surfaces()),
+            reduced,
             inner: Box::new(ModeField::new(reduced, law, surfaces, setting)),
         })
+    }
+
+    /// The system in which no surface slid on has a higher relative degree.
+    pub(super) fn innermost(&self) -> &'a dyn PiecewiseSystem {
+        match &*self.inner {
+            ModeField::Reduced(inner) => inner.innermost(),
+            _ => self.reduced,
+        }
     }
 
     /// Takes over the discrete states that an action left.

@@ -221,6 +221,11 @@ pub trait PiecewiseSystem: SignStructure + Sync {
         None
     }
 
+    /// Do field or switching functions contain the time? Yes if nothing is known.
+    fn depends_on_time(&self) -> bool {
+        true
+    }
+
     /// The system of the motions that stay on these surfaces, if both fields cross one of them at the same rate all over it: this
     /// rate is in the place of its switching function there, and the field is that on the surfaces. `None` if a motion
     /// that slides on them is one of this system.

@@ -361,6 +361,13 @@ impl PiecewiseSystem for TracedSystem {
         Some(self)
     }
 
+    fn depends_on_time(&self) -> bool {
+        let graph = &self.model.graph;
+        let surfaces = (0..graph.n_surfaces()).map(|j| graph.surface(j as u32));
+        let all: Vec<NodeId> = surfaces.chain(self.model.field.iter().copied()).collect();
+        graph.depends_on_time(&all)
+    }
+
     fn reduced(&self, surfaces: &[usize]) -> Option<&dyn PiecewiseSystem> {
         if !self.model.is_reducible(surfaces) {
             return None;
