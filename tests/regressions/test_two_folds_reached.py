@@ -59,11 +59,18 @@ def test_a_visible_two_fold_in_the_plane_of_a_surface() -> None:
 
 
 def test_what_is_said_about_a_point_agrees_with_the_run_from_there() -> None:
-    # Both fields turn back to x0 = 0 from the other side: orbits wind around the origin.
+    # Both fields turn back to x0 = 0 from the other side: the rate of x0 is kept at zero too, and the state rests.
     system = fl.System(lambda t, x: [x[1] - x[0], 0.3 - x[1] - np.sign(x[0])], n=2)
     said = system.classify(0.0, [0.0, 0.0])
-    assert said.mode is None
-    assert not said.unique
+    assert said.mode == (0,)
+    assert said.unique
+    sol = system.solve((0.0, 1.0), [0.0, 0.0])
+    assert sol.success
+    assert not sol.y.any()
+    assert sol.multipliers(0.5) == pytest.approx([0.3])
+    # Where the rate jumps on the surface off the origin, there is no such motion.
+    system = fl.System(lambda t, x: [x[1] + 0.5 * x[1] * np.sign(x[0]), 0.3 - np.sign(x[0])], n=2)
+    assert system.classify(0.0, [0.0, 0.0]).mode is None
     assert "keep to the points where both fields are tangent" in system.solve((0.0, 1.0), [0.0, 0.0]).message
 
 

@@ -13,9 +13,9 @@ use crate::node::NodeId;
 pub enum RateOnSurface {
     /// It is not the same for both.
     Jumps,
-    /// It is the same all over the surface, and constant.
-    Constant,
-    /// It is the same all over the surface: this rate, and the field on the surface.
+    /// It is the same, and constant, or not smooth all over the surface.
+    Other,
+    /// It is the same, and smooth: this rate, and the field on the surface.
     Same(NodeId, Vec<NodeId>),
 }
 
@@ -46,10 +46,13 @@ impl Graph {
             self.where_zero(&[rate], h)[0]
         });
         let differ = LinearForm::of_sum(self, &[(rates[0], 1.0), (rates[1], -1.0)], 0.0);
-        match differ.is_zero() {
-            false => RateOnSurface::Jumps,
-            true if self.depends_on_motion(rates[1]) => RateOnSurface::Same(rates[1], field),
-            true => RateOnSurface::Constant,
+        if !differ.is_zero() {
+            return RateOnSurface::Jumps;
+        }
+        let is_smooth = self.depends_on_motion(rates[1]) && !self.has_signs(rates[1]);
+        match is_smooth {
+            true => RateOnSurface::Same(rates[1], field),
+            false => RateOnSurface::Other,
         }
     }
 

@@ -75,7 +75,8 @@ fn after_event(
     };
     let how = How::Event(arrival_at_surface(at.arrival, fresh));
     let meeting = Meeting::new(mode, surfaces, fresh, how);
-    if !(is_touch || at.system.has_nested_signs()) {
+    let is_plain = !is_touch && at.system.reduced(surfaces).is_none();
+    if is_plain && !at.system.has_nested_signs() {
         // No rule before that of one surface applies: the list need not be asked.
         if let Some(decided) = one_surface(at, notes, &meeting)? {
             return Ok((Rule::OneSurface, decided));

@@ -195,9 +195,6 @@ pub(super) fn touch(
     };
     let mode = meeting.mode;
     if let (&[j], []) = (meeting.fresh, at.arrival.sliding) {
-        if is_pressed(at, mode, j)? {
-            return Ok(None);
-        }
         if let Some(leading) = goes_on_beyond(at, mode, j, vanishing)? {
             let beyond = mode.with(j, -mode.entries()[j]);
             let candidates = vec![mode.clone(), beyond.clone()];
@@ -223,17 +220,21 @@ pub(super) fn touch(
     Ok(Some(Ok(Next::new(mode.clone(), left))))
 }
 
-/// Where the motion in `mode` seems to touch a surface of higher relative degree: does its field push it onto the surface? Then it
-/// arrives, at a rate that is as small as rounding makes that of a touch.
-fn is_pressed(at: &Point, mode: &Mode, j: usize) -> Result<bool, FieldError> {
+/// Does the motion touch a surface of higher relative degree? Where its field pushes it onto the surface it arrives, at a rate
+/// that is as small as rounding makes that of a touch.
+pub(super) fn touches(at: &Point, meeting: &Meeting) -> Result<bool, FieldError> {
+    let is_touch = matches!(at.arrival.cause, Cause::Event { touch: true, .. });
+    let (true, &[j], mode) = (is_touch, meeting.fresh, meeting.mode) else {
+        return Ok(is_touch);
+    };
     let Some(reduced) = at.system.reduced(&[j]) else {
-        return Ok(false);
+        return Ok(true);
     };
     let mut sides = BothSides::new(at.x.len(), mode.entries().len());
     reduced.both_sides(j, &at.place(&mode.signs()), &mut sides)?;
     Ok(match mode.entries()[j] {
-        side if side > 0 => sides.normal_plus < 0.0,
-        _ => sides.normal_minus > 0.0,
+        side if side > 0 => sides.normal_plus >= 0.0,
+        _ => sides.normal_minus <= 0.0,
     })
 }
 

@@ -73,7 +73,7 @@ pub(super) fn decide_undecided(
 ) -> Result<Decided, FieldError> {
     notes.leaf = "germs";
     let found = decide_by_germs(at, notes, meeting)?;
-    if found.is_err() {
+    if found.as_ref().is_err_and(|found| found.between.is_empty()) {
         if let Some(stays) = stay_if_nothing_leaves(at, notes, meeting)? {
             notes.leaf = "rest";
             return Ok(Ok(stays));

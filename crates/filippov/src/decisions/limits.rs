@@ -14,7 +14,7 @@ use crate::switch::Switch;
 use crate::switching::admissible_within;
 use crate::system::dot;
 use crate::tolerances::{
-    ACCUMULATION_AGREEMENT, LONGEST_TURN, MOST_MEETING, NEAREST_ACCUMULATION, SLOWEST_EXTRAPOLATED,
+    ACCUMULATION_AGREEMENT, FAST_SHRINKING, LONGEST_TURN, MOST_MEETING, NEAREST_ACCUMULATION,
     SURFACE_NOISE, UNRESOLVED_FLIGHT,
 };
 
@@ -54,6 +54,13 @@ fn shrinks_by([first, second]: [f64; 2]) -> Option<f64> {
     agree.then_some(second)
 }
 
+/// Are these the ratios of a geometric series, and not of one that shrinks like a power of the number of its members, and takes for
+/// ever? Those of such a series tend to 1, by a part of the square of their distance from it at each member.
+fn is_no_power([first, second]: [f64; 2]) -> bool {
+    let distance = 1.0 - second;
+    (first - second).abs() <= ACCUMULATION_AGREEMENT * distance * distance
+}
+
 /// Does a later switch repeat an earlier one?
 fn repeats(a: &Switch, b: &Switch) -> bool {
     a.surfaces == b.surfaces && a.mode_before == b.mode_before && a.mode_after == b.mode_after
@@ -80,7 +87,12 @@ pub(crate) fn limit_of_switches(at: &Point) -> Result<Option<Limit>, FieldError>
     }
     // Time and distance may shrink by different powers of one ratio, as they do where a field is a root of the distance.
     let [a, b, c] = distances;
-    let limit = shrinks_by([b / a, c / b]).and_then(|_| Limit::of(turns, meeting));
+    let ratios = [b / a, c / b];
+    if meeting.len() == 1 && ratios[0].max(ratios[1]) > FAST_SHRINKING {
+        // At one surface slow turns need not be those of a geometric series.
+        return Ok(None);
+    }
+    let limit = shrinks_by(ratios).and_then(|_| Limit::of(turns, meeting));
     let Some(mut limit) = limit.filter(|limit| c < reach(at.scale, at.x) && limit.t > at.t) else {
         return Ok(None);
     };
@@ -92,46 +104,52 @@ pub(crate) fn limit_of_switches(at: &Point) -> Result<Option<Limit>, FieldError>
 /// two of them was shorter than the tolerance. Further flights would be rounding and error: they are as a geometric series
 /// would have them.
 pub(crate) fn limit_of_unresolved_flights(at: &Point) -> Result<Option<Limit>, FieldError> {
-    let [.., first, middle, last] = at.arrival.switches else {
+    let [earlier @ .., second, third, last] = at.arrival.switches else {
         return Ok(None);
     };
     let &[j] = &last.surfaces[..] else {
         return Ok(None);
     };
     let is_same = |s: &&Switch| s.kind == last.kind && s.surfaces == last.surfaces;
-    if !matches!(last.kind, Kind::Crossing | Kind::Reset) || ![first, middle].iter().all(is_same) {
+    let is_passage = matches!(last.kind, Kind::Crossing | Kind::Reset);
+    if !is_passage || ![second, third].iter().all(is_same) {
         return Ok(None);
     }
     let Some(reduced) = at.system.reduced(&[j]) else {
         return Ok(None);
     };
+    let [b, c] = [third.t - second.t, last.t - third.t];
+    let s = c / b;
+    let shrinks = match earlier.last().filter(is_same) {
+        Some(first) => {
+            let r = b / (second.t - first.t);
+            r.max(s) <= FAST_SHRINKING || shrinks_by([r, s]).is_some() && is_no_power([r, s])
+        }
+        None => s <= FAST_SHRINKING * FAST_SHRINKING,
+    };
+    if !shrinks {
+        return Ok(None);
+    }
     let mut h = vec![0.0; at.system.n_surfaces()];
     let mut rate = |s: &Switch| -> Result<f64, FieldError> {
         let signs = s.mode_after.signs();
         reduced.surfaces(&at.place_at(s.t, &s.y_after, &signs), &mut h)?;
         Ok(h[j].abs())
     };
-    let rates = [rate(first)?, rate(middle)?, rate(last)?];
-    let (a, b) = (middle.t - first.t, last.t - middle.t);
+    let rates = [rate(second)?, rate(third)?, rate(last)?];
     let mut gradient = vec![0.0; at.x.len()];
     at.system
         .gradient(j, &at.place(at.arrival.signs), &mut gradient)?;
-    let is_unresolved = rates[1] * b <= at.scale.along(&gradient, at.x);
-    let shrinks = rates[1] < rates[0] && rates[2] < rates[1] && b < a;
-    if !(is_unresolved && shrinks) {
+    // How far the next flight leads from the surface.
+    let height = rates[2] * c * s;
+    let is_unresolved = height <= at.scale.along(&gradient, at.x);
+    if !is_unresolved || rates[1] >= rates[0] || rates[2] >= rates[1] {
         return Ok(None);
     }
-    reduced.gradient(j, &at.place(at.arrival.signs), &mut gradient)?;
-    let share = if rates[2] <= at.scale.along(&gradient, at.x) {
-        0.0
-    } else if b < SLOWEST_EXTRAPOLATED * a {
-        b / (a - b)
-    } else {
-        return Ok(None);
-    };
-    let states = last.y_after.iter().zip(&middle.y_after);
+    let (before, share) = (third, s / (1.0 - s));
+    let states = last.y_after.iter().zip(&before.y_after);
     let mut limit = Limit {
-        t: last.t + share * b,
+        t: last.t + share * c,
         x: states.map(|(y, before)| y + share * (y - before)).collect(),
         surfaces: vec![j],
         is_rest: false,
@@ -233,7 +251,7 @@ fn is_on_all(at: &Point, limit: &Limit) -> Result<bool, FieldError> {
 pub(crate) fn limit_here(at: &Point, meeting: &[usize]) -> Result<Option<Limit>, FieldError> {
     let switches = at.arrival.switches.iter().rev();
     let mut now = switches.take_while(|s| s.t == at.t);
-    let only_crosses = now.all(|s| s.kind == Kind::Crossing);
+    let only_crosses = now.all(|s| matches!(s.kind, Kind::Crossing | Kind::Grazing));
     if !only_crosses || !may_be_limit(at, meeting) {
         return Ok(None);
     }

@@ -25,6 +25,7 @@ mod meeting;
 mod one_surface;
 mod placement;
 mod point;
+mod reduction;
 mod relay;
 mod rest;
 mod resting;

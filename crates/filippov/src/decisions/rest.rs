@@ -18,7 +18,7 @@ pub(super) fn stay_if_nothing_leaves(
     meeting: &Meeting,
 ) -> Result<Option<Next>, FieldError> {
     let m = meeting.surfaces.len();
-    if m > MOST_AROUND_REST {
+    if !(2..=MOST_AROUND_REST).contains(&m) {
         return Ok(None);
     }
     for distance in PLACES_BESIDE_REST {

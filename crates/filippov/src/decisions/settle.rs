@@ -1,13 +1,14 @@
 //! Surfaces vanish together: the rules in their order, of which the first that applies answers.
 
 use super::departures::departures;
-use super::event::touch;
+use super::event::{touch, touches};
 use super::germs::{decide_if_doubtful, decide_if_entangled};
 use super::leave_by_rule::leave_by_rule;
 use super::limits::stay_at_limit;
 use super::meeting::{resolve_first_order, too_many};
 use super::one_surface::one_surface;
 use super::point::{Decided, Lefts, Next, Notes, Point};
+use super::reduction::Reduced;
 use super::relay::decide_by_relay;
 use super::rule::{How, Meeting, Rule};
 use crate::error::FieldError;
@@ -30,8 +31,28 @@ const RULES: [(Rule, Apply); 9] = [
     (Rule::TooMany, too_many),
 ];
 
-/// The answer of the first rule that applies, with its name; first-order data where none of the list does.
+/// The answer of the first rule that applies, with its name; first-order data where none of the list does. Surfaces of higher
+/// relative degree are crossed before, or replaced by their rates.
 pub(super) fn settle(
+    at: &Point,
+    notes: &mut Notes,
+    meeting: &Meeting,
+) -> Result<(Rule, Decided), FieldError> {
+    if at.system.reduced(meeting.surfaces).is_some() && !touches(at, meeting)? {
+        if let Some(left) = Reduced::of(at, notes, meeting)? {
+            let point = Point {
+                system: left.system,
+                x: &left.x,
+                ..*at
+            };
+            let (rule, decided) = settle_by_rules(&point, notes, &left.meeting())?;
+            return Ok((rule, left.lifted(decided)));
+        }
+    }
+    settle_by_rules(at, notes, meeting)
+}
+
+fn settle_by_rules(
     at: &Point,
     notes: &mut Notes,
     meeting: &Meeting,

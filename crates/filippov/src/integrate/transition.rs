@@ -815,6 +815,10 @@ impl<'a> Integrator<'a> {
         let mut projector = Projector::new(run.x.len(), run.motion.signs.len());
         let setting = run.motion.setting();
         projector.project(run.system, j, run.t, &mut run.x, setting)?;
+        if let Some(reduced) = run.system.reduced(&[j]) {
+            // The flights beside the surface are below its rounding.
+            projector.project(reduced, j, run.t, &mut run.x, setting)?;
+        }
         let stop = self.go_on_from_here(&[])?;
         if !self.run.motion.sliding().contains(&j) {
             if !self.run.motion.resting.contains(&j) {

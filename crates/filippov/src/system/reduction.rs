@@ -44,7 +44,7 @@ pub(super) fn relative_degree(graph: &Graph, field: &[NodeId], j: usize) -> usiz
     for degree in 1..=field.len() {
         match graph.rate_on_surface(&field, j as u32) {
             RateOnSurface::Jumps => return degree,
-            RateOnSurface::Constant => break,
+            RateOnSurface::Other => break,
             RateOnSurface::Same(rate, on_surface) => {
                 (graph, field) = (graph.with_surface(j as u32, rate), on_surface);
             }

@@ -43,8 +43,7 @@ pub const SHORTEST_STEP: f64 = 16.0 * EPS;
 /// Shortest step where the time is zero: below it numbers lose digits, and a step that is rounded to zero is no step.
 pub const SHORTEST_STEP_AT_ZERO: f64 = f64::MIN_POSITIVE;
 
-/// A point nearer than this fraction of the tolerance counts as reached: the surface at the edge of a field that a motion can go
-/// no further towards, and the limit of Newton's method.
+/// A point nearer than this fraction of the tolerance counts as reached: the limit of Newton's method.
 pub const ARRIVED: f64 = 1e-3;
 
 /// Less than this, relative to the time, is no progress: bodies with the speed of rounding hit one another that often.

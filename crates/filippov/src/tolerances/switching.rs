@@ -141,8 +141,8 @@ pub const PLACES_BESIDE_REST: [f64; 2] = [1.0, 1e-3];
 /// Newton steps that look for such a place.
 pub const STEPS_BESIDE_REST: usize = 6;
 
-/// Flights below the tolerance that do not shrink by this factor at least take long to end: their limit is not extrapolated.
-pub const SLOWEST_EXTRAPOLATED: f64 = 0.99;
+/// Flights that shrink by this factor or more at a time end soon, whether the factors agree or not.
+pub const FAST_SHRINKING: f64 = 0.5;
 
 /// The square of the distance from which accumulating switches are extrapolated is at least this, also for a tolerance
 /// of zero.

@@ -14,7 +14,7 @@ use crate::event::isolate::PROBES;
 use crate::event::{Event, Found};
 use crate::motion::{AffineBounds, Guard, ModeField, Monitored};
 use crate::options::SlidingRule;
-use crate::tolerances::{ARRIVED, EPS, EXTRAPOLATION, MARGIN, ONE_SIDED_AIM, PROOF_DEPTH};
+use crate::tolerances::{EPS, EXTRAPOLATION, MARGIN, ONE_SIDED_AIM, PROOF_DEPTH};
 
 impl StepSearch<'_, '_> {
     /// The first event of the step that was just computed, and how long the next step may be. Where the field ends beyond
@@ -163,7 +163,7 @@ impl StepSearch<'_, '_> {
     }
 
     /// The event at the start of the step, if the motion can go no further because its field ends at a surface that it has
-    /// reached to a small part of the tolerance.
+    /// reached to the tolerance.
     pub(crate) fn arrival_at_edge(&self) -> Result<Option<Found>, FieldError> {
         let mut gradient = vec![0.0; self.run.x.len()];
         for m in &self.run.motion.monitored {
@@ -173,7 +173,7 @@ impl StepSearch<'_, '_> {
             let place = self.run.motion.setting().at(self.run.t, &self.run.x);
             self.run.system.gradient(j, &place, &mut gradient)?;
             let tolerance = self.run.scale.along(&gradient, &self.run.x);
-            if m.rate < 0.0 && m.value <= ARRIVED * tolerance {
+            if m.rate < 0.0 && m.value <= tolerance {
                 return Ok(Some(Found::here(smallvec![m.guard])));
             }
         }

@@ -1,0 +1,190 @@
+"""Sliding of higher order: surfaces that both fields cross at the same rate; targets reached in finite time.
+
+The references are closed forms. For super-twisting control x' = -k1 sqrt(abs(x)) sign(x) + v, v' = -k2 sign(x), the change
+of time dt = sqrt(abs(x)) ds makes the motion between two zeros of x linear: there v shrinks by
+rho = exp(-k1 pi / (4 w)), w = sqrt(k2/2 - k1**2/16), and it takes (1 + rho) v / k2.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import filippov as fl
+
+METHODS = ("auto", "Taylor", "DOPRI5", "DOP853", "Rodas5P")
+
+
+def super_twisting(k1: float, k2: float, d: Callable[[Any], Any] = lambda t: 0.0) -> Callable[..., list[Any]]:
+    def fun(t: float, x: Any) -> list[Any]:
+        return [-k1 * np.sqrt(np.abs(x[0])) * np.sign(x[0]) + x[1], -k2 * np.sign(x[0]) + d(t)]
+
+    return fun
+
+
+def shrinking(k1: float, k2: float) -> float:
+    return math.exp(-k1 * math.pi / (4 * math.sqrt(k2 / 2 - k1**2 / 16)))
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(("k1", "k2"), [(1.5, 1.1), (1.0, 2.0), (2.5, 1.0)])
+def test_super_twisting_arrives_when_it_should(method: str, k1: float, k2: float) -> None:
+    sol = fl.solve_ivp(super_twisting(k1, k2), (0, 20), [0.0, 1.0], method=method, rtol=1e-9, atol=1e-13)
+    assert sol.success
+    last = sol.switches[-1]
+    rho = shrinking(k1, k2)
+    assert (last.kind, str(last.mode_after)) == ("accumulation", "0")
+    assert last.t == pytest.approx((1 + rho) / (1 - rho) / k2, abs=2e-6)
+    assert np.abs(sol.y[:, -1]).max() < 1e-12
+    rates = sol.switches.y_before[:, 1]
+    shares = (rates[1:] / rates[:-1])[np.abs(rates[1:]) > 1e-3]
+    assert np.append(shares, rates[0]) == pytest.approx(-rho, abs=1e-5)
+
+
+def test_super_twisting_holds_a_disturbance_with_the_equivalent_control() -> None:
+    sol = fl.solve_ivp(super_twisting(1.5, 1.1, lambda t: 0.5 * np.cos(t)), (0, 20), [1.0, 0.0])
+    assert sol.success
+    assert sol.switches[-1].t == pytest.approx(1.4553395, abs=1e-4)
+    t = np.linspace(3, 20, 50)
+    assert np.abs(sol.sol(t)).max() < 1e-12
+    assert sol.multipliers(t)[0] == pytest.approx(0.5 * np.cos(t) / 1.1, abs=1e-10)
+
+
+def test_disturbance_that_is_too_large_moves_the_state_again() -> None:
+    """x'' = -sign(x) + 1.1 sin(5 t) rests at 0 until 1.1 sin(5 t) = 1, and follows the pull from there."""
+    for method in METHODS:
+        sol = fl.solve_ivp(
+            lambda t, x: [x[1], -np.sign(x[0]) + 1.1 * np.sin(5 * t)], (0, 0.5), [0.0, 0.0], method=method
+        )
+        (leaves,) = sol.switches
+        t0 = math.asin(1 / 1.1) / 5
+        assert (leaves.kind, str(leaves.mode_before), str(leaves.mode_after)) == ("exit_sliding", "0", "+")
+        assert leaves.t == pytest.approx(t0, abs=1e-9)
+        t = 0.5
+        v = 0.22 * (math.cos(5 * t0) - math.cos(5 * t)) - (t - t0)
+        assert sol.y[1, -1] == pytest.approx(v, abs=1e-5)
+
+
+def test_chain_of_three_integrators_rests_at_a_start_at_its_target() -> None:
+    sol = fl.solve_ivp(lambda t, x: [x[1], x[2], -np.sign(x[0]) + 0.3], (0, 3), [0.0, 0.0, 0.0])
+    assert sol.success
+    assert len(sol.switches) == 0
+    assert sol.y[:, -1].tolist() == [0.0, 0.0, 0.0]
+    assert sol.multipliers(1.0) == pytest.approx([0.3])
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e3])
+def test_units_do_not_matter(scale: float) -> None:
+    """x in other units: the surface is a multiple of a sum of states, and the roots contain it in another spelling."""
+
+    def fun(t: float, z: Any) -> list[Any]:
+        s = z[0] / scale - z[1]
+        push = -1.5 * np.sqrt(np.abs(s)) * np.sign(z[0] - scale * z[1])
+        return [scale * (push + z[2] + 0.2), 0.2, -1.1 * np.sign(s)]
+
+    sol = fl.solve_ivp(fun, (0, 5), [scale, 0.0, 1.0], rtol=1e-9, atol=[1e-12 * scale, 1e-12, 1e-12])
+    assert sol.success
+    assert sol.y[0, -1] / scale == pytest.approx(1.0, abs=1e-9)
+    assert sol.y[2, -1] == pytest.approx(0.0, abs=1e-9)
+    assert str(sol.switches[-1].mode_after) == "0"
+
+
+def test_two_channels_arrive_one_after_the_other() -> None:
+    def fun(t: float, x: Any) -> list[Any]:
+        one = super_twisting(1.5, 1.1)(t, x[:2])
+        other = super_twisting(1.0, 2.0)(t, x[2:])
+        return [*one, *other]
+
+    sol = fl.solve_ivp(fun, (0, 8), [0.0, 1.0, 0.0, 1.0], rtol=1e-9, atol=1e-13)
+    assert sol.success
+    arrivals = sol.switches.t[sol.switches.kind == "accumulation"]
+    expected = sorted(
+        (1 + rho) / (1 - rho) / k2 for rho, k2 in ((shrinking(1.5, 1.1), 1.1), (shrinking(1.0, 2.0), 2.0))
+    )
+    assert arrivals == pytest.approx(expected, abs=1e-5)
+    assert np.abs(sol.y[:, -1]).max() < 1e-10
+
+
+@pytest.mark.parametrize(
+    "control",
+    [
+        lambda x: -np.sign(x[0] + 0.5 * x[1] * abs(x[1])),
+        lambda x: -np.sign(x[0] + 0.5 * np.abs(x[1]) * x[1]),
+        lambda x: -1.0 if x[0] + 0.5 * x[1] * abs(x[1]) > 0 else 1.0,
+    ],
+)
+def test_time_optimal_double_integrator_rests_at_its_target(control: Callable[[Any], Any]) -> None:
+    sol = fl.solve_ivp(lambda t, x: [x[1], control(x)], (0, 6), [3.0, 1.0], rtol=1e-9, atol=1e-11)
+    assert sol.success
+    assert np.abs(sol.y[:, -1]).max() < 1e-9
+    assert sol.switches[-1].t == pytest.approx(1 + 2 * math.sqrt(3.5), abs=1e-6)
+
+
+def test_terminal_sliding_rests_when_its_surface_has_led_to_the_target() -> None:
+    def fun(t: float, x: Any) -> list[Any]:
+        s = x[1] + np.abs(x[0]) ** 0.6 * np.sign(x[0])
+        return [x[1], -0.6 * np.abs(x[0]) ** -0.4 * x[1] - 2 * np.sign(s)]
+
+    with pytest.warns(fl.FilippovWarning, match="rests from here"):
+        sol = fl.solve_ivp(fun, (0, 10), [1.0, 0.5], rtol=1e-9, atol=1e-12)
+    assert sol.success
+    reached, rests = sol.switches
+    # On the surface x' = -x**0.6, which takes x**0.4 / 0.4.
+    assert rests.t == pytest.approx(reached.t + reached.y_before[0] ** 0.4 / 0.4, abs=1e-4)
+    assert sol.warnings[-1].code == "at_rest"
+    assert np.abs(sol.y[:, -1]).max() < 1e-8
+
+
+def test_finite_time_controller_with_fractional_powers_rests() -> None:
+    def fun(t: float, x: Any) -> list[Any]:
+        push = np.sign(x[0]) * np.abs(x[0]) ** (1 / 3)
+        return [x[1], -3 * push - 3 * np.sign(x[1]) * np.abs(x[1]) ** 0.5]
+
+    ends = []
+    for tol in (1e-6, 1e-9):
+        sol = fl.solve_ivp(fun, (0, 20), [1.0, 0.0], rtol=tol, atol=tol * 1e-3)
+        assert sol.success
+        assert np.abs(sol.y[:, -1]).max() < 1e-10
+        assert sol.switches[-1].kind == "accumulation"
+        ends.append(sol.switches[-1].t)
+    assert ends[0] == pytest.approx(ends[1], abs=1e-4)
+
+
+def rocking(t: float, x: Any, shake: float = 0.0) -> list[Any]:
+    return [x[1], -4 * np.sin(0.25 * np.sign(x[0]) - x[0]) - shake * np.sin(5 * t)]
+
+
+HIT = fl.Reset(lambda t, x: x[0], lambda t, x: [x[0], 0.9 * x[1]])
+
+
+def test_rocking_block_comes_to_rest() -> None:
+    sol = fl.solve_ivp(rocking, (0, 20), [0.2, 0.0], resets=HIT)
+    assert sol.success
+    assert sol.switches[-1].kind == "accumulation"
+    # The limit of its impacts, from a run that counted 320 of them.
+    assert sol.switches[-1].t == pytest.approx(11.3940945, abs=1e-4)
+    assert sol.y[:, -1].tolist() == [0.0, 0.0]
+
+
+def test_rocking_block_stays_until_its_base_is_shaken_hard_enough() -> None:
+    still = fl.solve_ivp(lambda t, x: rocking(t, x, 0.98), (0, 3), [0.0, 0.0], resets=HIT)
+    assert still.success
+    assert len(still.switches) == 0
+    moved = fl.solve_ivp(lambda t, x: rocking(t, x, 1.6), (0, 1), [0.0, 0.0], resets=HIT)
+    assert moved.switches[0].kind == "exit_sliding"
+    assert moved.switches[0].t == pytest.approx(math.asin(4 * math.sin(0.25) / 1.6) / 5, abs=1e-9)
+
+
+def test_nothing_rests_that_is_only_small() -> None:
+    """Small, slow and unstable motions are followed, whatever the tolerance."""
+    slow = fl.solve_ivp(lambda t, x: [1e-12 + 0 * np.sign(x[0])], (0, 10), [0.0])
+    assert slow.y[0, -1] == pytest.approx(1e-11, rel=1e-9)
+    grows = fl.solve_ivp(lambda t, x: [x[1], -np.sign(x[0]) + 0.5 * x[1]], (0, 1), [0.0, 1e-3], atol=1e-12)
+    crossings = np.abs(grows.switches.y_before[:, 1])
+    assert (np.diff(crossings) > 0).all()
+    swings = fl.solve_ivp(lambda t, x: [x[1], -np.sign(x[0])], (0, 0.1), [0.0, 1e-3], atol=1e-6)
+    assert np.abs(swings.switches.y_before[:, 1]) == pytest.approx(1e-3, rel=1e-6)
