@@ -188,7 +188,7 @@ class Run:
     def switches(
         self,
     ) -> list[
-        tuple[float, _Array, _Array, str, tuple[int, ...], tuple[int, ...], tuple[int, ...], str, str]
+        tuple[float, _Array, _Array, str, tuple[int, ...], tuple[int, ...], tuple[int, ...], str, str, bool]
     ]: ...
     @property
     def segments(self) -> list[tuple[float, float, tuple[int, ...], int, int, _Array, _Array]]: ...

@@ -6,7 +6,6 @@ import os
 from collections.abc import Callable, Iterator, KeysView
 from functools import cached_property
 from html import escape
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -19,7 +18,7 @@ from filippov.errors import ModelError
 from filippov.modes import Mode
 from filippov.prepare import Prepared
 from filippov.start import StandingRun
-from filippov.switches import RunWarning, SegmentTable, SwitchTable, import_pandas
+from filippov.switches import RunWarning, SegmentTable, SwitchTable, import_pandas, import_xarray
 
 if TYPE_CHECKING:
     from filippov.branches import Branches
@@ -184,7 +183,7 @@ class Solution:
     success : bool
         ``status >= 0``.
     switches : SwitchTable
-        Every change of mode.
+        Every change of mode; its column ``is_kink`` tells those apart at which the field is continuous.
     segments : SegmentTable
         Pieces of constant mode.
     stats : dict
@@ -559,15 +558,14 @@ class Solution:
     def to_xarray(self) -> Any:
         """Return an `xarray.Dataset` with one variable per state over the dimension ``t``.
 
+        The switches have one of their own, `SwitchTable.to_xarray`.
+
         Raises
         ------
         ImportError
             If xarray is not installed.
         """
-        try:
-            xarray = import_module("xarray")
-        except ImportError as error:
-            raise ImportError("to_xarray() needs xarray: pip install xarray") from error
+        xarray = import_xarray()
         variables: dict[str, Any] = {name: ("t", self.y[i]) for i, name in enumerate(self.states)}
         variables.update((name, ("t", values)) for name, values in self.outputs.items())
         if self.surfaces and len(self.segments):
@@ -654,6 +652,7 @@ class Solution:
 
     def __repr__(self) -> str:
         n_sliding = sum(mode.is_sliding for mode in self.segments.mode)
+        switches = _counted(self.switches)
         lines = [
             f"message:  {self.message}",
             f"success:  {self.success} (status {self.status})",
@@ -661,7 +660,7 @@ class Solution:
             + (f", {self.t[0]:.10g} ... {self.t[-1]:.10g}" if len(self.t) else ""),
             f"y:        shape {self.y.shape}" + (f", last {_short(self.y[:, -1])}" if self.y.size else ""),
             f"surfaces: {', '.join(self.surfaces) if self.surfaces else 'none'}",
-            f"switches: {len(self.switches)}; segments: {len(self.segments)}, {n_sliding} of them sliding",
+            f"switches: {switches}; segments: {len(self.segments)}, {n_sliding} of them sliding",
             f"nfev:     {self.nfev} ({self.stats.get('backend', '')})",
         ]
         if self.t_events is not None:
@@ -670,6 +669,13 @@ class Solution:
         if len(self.warnings) > 5:
             lines.append(f"          ... and {len(self.warnings) - 5} more in .warnings")
         return "\n".join(lines)
+
+
+def _counted(switches: SwitchTable) -> str:
+    """Return the number of switches, those that are kinks apart."""
+    n_kinks = int(switches.is_kink.sum())
+    kinks = f" and {n_kinks} kink{'s' if n_kinks > 1 else ''}" if n_kinks else ""
+    return f"{len(switches) - n_kinks}{kinks}"
 
 
 def _message(run: AnyRun) -> str:

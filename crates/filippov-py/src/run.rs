@@ -27,6 +27,7 @@ type SwitchRow<'py> = (
     Bound<'py, PyTuple>,
     String,
     &'static str,
+    bool,
 );
 type SegmentRow<'py> = (
     f64,
@@ -213,7 +214,8 @@ impl Run {
                 || s.surfaces.iter().any(|&j| j < self.n_visible)
                 || visible(&s.mode_before) != visible(&s.mode_after)
         };
-        self.solution()
+        let solution = self.solution();
+        solution
             .switches
             .iter()
             .filter(is_told)
@@ -230,6 +232,7 @@ impl Run {
                     self.mode(py, &s.mode_after)?,
                     s.note.clone(),
                     s.rule,
+                    solution.is_kink(&*self.system, s).map_err(raised)?,
                 ))
             })
             .collect()

@@ -1,6 +1,7 @@
 //! What is kept of a run: steps, segments, switches, decisions, returns to a section.
 
 mod decision_record;
+mod kinks;
 mod observer;
 mod recorder;
 pub mod section;
