@@ -473,6 +473,54 @@ class Solution:
         """
         return self._kept_function().multipliers(self.t if t is None else t)
 
+    def contact_acceleration(self, t: npt.ArrayLike | None = None, side: str = "right") -> Array:
+        """Return what holds bodies apart that are in contact: the acceleration that each contact gives.
+
+        Contact at the surface h of a reset (mode entry 0 there) keeps ``h = h' = 0``. Its force changes h''
+        by this acceleration, at least 0 and away from the obstacle; times the mass of the body it is the
+        force.
+
+        Parameters
+        ----------
+        t : float or array_like, shape (k,), optional
+            Times; by default those of the field `t`.
+        side : {"right", "left"}, optional
+            Which limit is meant at a time at which it jumps.
+
+        Returns
+        -------
+        ndarray, shape (n_surfaces,) or (n_surfaces, k)
+            0 where there is no contact.
+
+        Raises
+        ------
+        ModelError
+            If the solution was not kept as a function.
+        ValueError
+            If a time is outside of the interval, or `side` is unknown.
+
+        Examples
+        --------
+        A body lies on the floor until it is pulled up:
+
+        >>> import filippov as fl
+        >>> floor = fl.Reset(lambda t, x: x[0], lambda t, x: [x[0], 0.0], name="floor")
+        >>> body = fl.System(lambda t, x: [x[1], t - 9.81], n=2, resets=floor)
+        >>> body.solve((0, 12), [0.0, 0.0]).contact_acceleration([0.0, 5.0, 11.0])[0].round(9).tolist()
+        [9.81, 4.81, 0.0]
+        """
+        known = self._kept_function()
+        times = real_array(self.t if t is None else t, "t", "a number or a one-dimensional array")
+        if side not in ("right", "left"):
+            raise ValueError(f'side: "right" or "left" is needed, not {side!r}')
+        flat = np.ascontiguousarray(np.atleast_1d(times))
+        known._check_range(flat)
+        if isinstance(self._run, Run):
+            values = self._run.contacts(flat, side == "left")
+        else:
+            values = np.zeros((len(self.surfaces), len(flat)))
+        return values if times.ndim else values[:, 0]
+
     def evaluate(self, fun: Callable[..., Any], t: npt.ArrayLike | None = None, side: str = "right") -> Array:
         """Return a quantity along the solution: a control, a force, an energy.
 
@@ -483,7 +531,8 @@ class Solution:
         ----------
         fun : callable
             ``fun(t, x, *args) -> float``, as the right-hand side of the system; parameters that its signature
-            names are handed over by name.
+            names are handed over by name. So is ``contact``: what `contact_acceleration` returns, by the name
+            of the reset, by the printed surface, or by its index.
         t : float or array_like, shape (k,), optional
             Times; by default those of the field `t`.
         side : {"right", "left"}, optional
@@ -525,8 +574,21 @@ class Solution:
     @cached_property
     def outputs(self) -> dict[str, Array]:
         """The outputs of the system at the times `t`, by name."""
-        given = self._origin.system.outputs if self._origin.dense_output else {}
-        return {name: self.evaluate(fun) for name, fun in given.items()}
+        return {name: self.evaluate(fun) for name, fun in self.output_functions.items()}
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """The names of the outputs that the solution has."""
+        if hasattr(self, "_origin"):
+            return tuple(self.output_functions)
+        return tuple(self.outputs)
+
+    @property
+    def output_functions(self) -> dict[str, Callable[..., Any]]:
+        """The functions of these outputs by name; none in a copy, which has their values alone."""
+        if not hasattr(self, "_origin") or not self._origin.dense_output:
+            return {}
+        return self._origin.system.outputs
 
     def _modes_at(self, times: Array) -> list[Mode]:
         starts, modes = self.segments.t_start, self.segments.mode
@@ -633,7 +695,7 @@ class Solution:
         ax : matplotlib.axes.Axes, optional
             Where to draw; a new figure by default.
         states : sequence of int or str, optional
-            Which states; all by default.
+            Which states and outputs; all states by default.
         dark : bool, optional
             Light lines on a dark ground; by default as `filippov.plot.style` around says.
 

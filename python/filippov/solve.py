@@ -302,7 +302,7 @@ def _solve(
     prepared = system.prepare(n, t0, state, values)
     fit_kappa(options.sliding, prepared.surfaces)
     if system.outputs:
-        refuse_outputs_that_fail(system, t0, state, values)
+        refuse_outputs_that_fail(system, prepared, t0, state, values)
     functions = [(f"the event {spec.name!r}", spec.g) for spec in specs or []]
     if t1 < t0:
         prepared, specs = _backward(system, prepared, specs, state, values, t0)

@@ -144,6 +144,11 @@ impl PreparedRun {
         &self.core
     }
 
+    /// Is its field native code?
+    pub fn is_native(&self) -> bool {
+        self.is_native
+    }
+
     /// How many of its surfaces a user sees.
     pub fn n_visible(&self) -> usize {
         self.n_visible
@@ -164,7 +169,7 @@ impl PreparedRun {
     }
 
     /// What the user gives comes first: a sample at a tick sees the ramp before it drops.
-    fn actions(&self) -> Actions<'_> {
+    pub fn actions(&self) -> Actions<'_> {
         let given = self.given.iter().map(|(map, trigger, name)| Action {
             kind: Some(match trigger {
                 Trigger::Surface { .. } => Kind::Reset,
@@ -188,7 +193,7 @@ impl PreparedRun {
 
     /// The result of the run as a Python object.
     pub fn result(self, solution: Solution) -> Run {
-        Run::new(self.core, solution, self.is_native, self.n_visible)
+        Run::new(self, solution)
     }
 }
 

@@ -398,7 +398,11 @@ impl<'a> Integrator<'a> {
         self.run.stats.stiff_since = self.control.stiff_since();
         self.recorder.finish(
             (self.run.t, &self.run.x, self.run.options),
-            (self.run.motion.mode, self.run.motion.discrete),
+            (
+                self.run.motion.mode,
+                self.run.motion.discrete,
+                self.run.motion.sides.to_vec(),
+            ),
             stop,
             self.run.stats,
             self.warnings,
