@@ -160,9 +160,10 @@ def solve_ivp(
     -----
     Backward time, ``t1 < t0``, is allowed only without surfaces: Filippov flow is not reversible.
 
-    A function that is solved again is not traced again if nothing that it reads has changed. For a method, or
-    a function that reads objects, this is not known: make a `System` of it, which is traced once. The `args`
-    are constants of the trace; one trace serves all values of `params`.
+    A function that is solved again is not traced again if nothing that it reads has changed. For one that
+    reads more than data, functions, interpolants and objects of plain classes this is not known: make a
+    `System` of it, which is traced once. The `args` and what a closure reads are constants of the trace; one trace serves
+    all values of `params`.
 
     References
     ----------
