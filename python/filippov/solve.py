@@ -162,8 +162,8 @@ def solve_ivp(
 
     A function that is solved again is not traced again if nothing that it reads has changed. For one that
     reads more than data, functions, interpolants and objects of plain classes this is not known: make a
-    `System` of it, which is traced once. The `args` and what a closure reads are constants of the trace; one trace serves
-    all values of `params`.
+    `System` of it, which is traced once. The `args` and what a closure reads are constants of the trace; one
+    trace serves all values of `params`.
 
     References
     ----------
