@@ -18,7 +18,14 @@ from filippov.errors import ModelError
 from filippov.modes import Mode
 from filippov.prepare import Prepared
 from filippov.start import StandingRun
-from filippov.switches import RunWarning, SegmentTable, SwitchTable, import_pandas, import_xarray
+from filippov.switches import (
+    RunWarning,
+    SegmentTable,
+    SwitchTable,
+    as_texts,
+    import_pandas,
+    import_xarray,
+)
 
 if TYPE_CHECKING:
     from filippov.branches import Branches
@@ -631,7 +638,7 @@ class Solution:
         variables: dict[str, Any] = {name: ("t", self.y[i]) for i, name in enumerate(self.states)}
         variables.update((name, ("t", values)) for name, values in self.outputs.items())
         if self.surfaces and len(self.segments):
-            variables["mode"] = ("t", np.array([str(mode) for mode in self._modes_at(self.t)]))
+            variables["mode"] = ("t", as_texts(self._modes_at(self.t)))
         attributes = {"message": self.message, "status": self.status, "surfaces": "\n".join(self.surfaces)}
         return xarray.Dataset(variables, coords={"t": self.t}, attrs=attributes)
 

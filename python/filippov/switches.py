@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from importlib import import_module
 from typing import Any, NamedTuple, overload
 
@@ -273,7 +273,7 @@ class SwitchTable(Sequence[Switch]):
         ImportError
             If xarray is not installed.
         """
-        texts = {
+        texts: dict[str, Any] = {
             "kind": self.kind,
             "surfaces": [self.surface_text(switch) for switch in self],
             "mode_before": [str(mode) for mode in self.mode_before],
@@ -282,10 +282,10 @@ class SwitchTable(Sequence[Switch]):
             "rule": self.rule,
         }
         variables: dict[str, Any] = {"t": ("switch", self.t), "is_kink": ("switch", self.is_kink)}
-        variables.update((name, ("switch", np.array(text, dtype=np.str_))) for name, text in texts.items())
+        variables.update((name, ("switch", as_texts(text))) for name, text in texts.items())
         for name in ("y_before", "y_after"):
             variables[name] = (("switch", "state"), getattr(self, name))
-        return import_xarray().Dataset(variables, coords={"state": np.array(self._states, dtype=np.str_)})
+        return import_xarray().Dataset(variables, coords={"state": as_texts(self._states)})
 
     def __repr__(self) -> str:
         count = len(self)
@@ -395,6 +395,11 @@ def import_xarray() -> Any:
         return import_module("xarray")
     except ImportError as error:
         raise ImportError("to_xarray() needs xarray: pip install xarray") from error
+
+
+def as_texts(texts: Iterable[Any]) -> npt.NDArray[Any]:
+    """Return texts as an array that NetCDF and Zarr both have a type for."""
+    return np.array(list(map(str, texts)), dtype=object)
 
 
 def _switch(row: tuple[Any, ...]) -> Switch:
