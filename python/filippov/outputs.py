@@ -254,7 +254,10 @@ def _called(
     args = () if system._source is None else system._source.args
     named = {name: values[name] for name in accepted_names(fun, values)}
     try:
-        value = np.asarray(fun(t, x, *args, **named), dtype=float)
+        found = fun(t, x, *args, **named)
+        if found is None:
+            raise ModelError(f"{role} returned None: is a `return` missing?")
+        value = np.asarray(found, dtype=float)
     except ModelError:
         raise
     except Exception as error:

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from filippov._core import Run
 from filippov.arrays import real_array
 from filippov.backward import ReversedRun
-from filippov.errors import ModelError
+from filippov.errors import InputError, ModelError
 from filippov.modes import Mode
 from filippov.prepare import Prepared
 from filippov.start import StandingRun
@@ -551,9 +551,11 @@ class Solution:
 
         Raises
         ------
+        InputError
+            If `fun` is no function.
         ModelError
-            If the function raises, if it could not be traced and the motion slides, or if the solution was
-            not kept as a function.
+            If the function raises or returns no number, if it could not be traced and the motion slides, or
+            if the solution was not kept as a function.
 
         Examples
         --------
@@ -567,6 +569,8 @@ class Solution:
         from filippov.outputs import along
 
         self._kept_function()
+        if not callable(fun):
+            raise InputError(f"fun: a function fun(t, x) is needed, not {type(fun).__name__}")
         times = real_array(self.t if t is None else t, "t", "a number or a one-dimensional array")
         values = along(self, self._origin, fun, "fun", np.atleast_1d(times), side)
         return values if times.ndim else values[0]
