@@ -294,6 +294,30 @@ def test_a_name_of_the_result_is_refused() -> None:
     assert set(system.outputs) == {"reason", "a"}
 
 
+def test_outputs_read_discrete_states_everywhere() -> None:
+    """Those that are called, too: their values in `params` are those at the start only."""
+    pytest.importorskip("xarray")
+    up = fl.Reset(times=[1.0, 2.0], set={"gear": lambda t, x, gear: gear + 1})
+    outputs = {
+        "ratio": lambda t, x, gear: 10.0 * gear,
+        "called": lambda t, x, gear: 10.0 * gear + 0 * number(x[0]),
+    }
+    system = fl.System(
+        lambda t, x, gear, k=1.0: [k * gear], n=1, discrete={"gear": 1}, resets=up, outputs=outputs
+    )
+    sol = system.solve((0, 3), [0.0])
+    assert sol.outputs["ratio"] == pytest.approx(10 * sol.discrete["gear"])
+    assert sol.outputs["called"] == pytest.approx(sol.outputs["ratio"])
+    assert sol.evaluate(outputs["called"], [0.5, 1.0, 1.5, 2.5]) == pytest.approx([10, 20, 20, 30])
+    assert sol.evaluate(outputs["called"], 1.0, side="left") == 10.0
+    members = system.ensemble((0, 2.5), [0.0], {"gear": [1.0, 2.0]})
+    for name in outputs:
+        assert members.outputs[name] == pytest.approx([30.0, 40.0])
+    with pytest.warns(fl.FilippovWarning, match="'called' could not be traced"):
+        result = fl.sweep(system, (0, 2.5), [0.0], {"k": [1.0, 2.0]})
+    assert result.ratio.values == pytest.approx([30.0, 30.0])
+
+
 # ------------------------------------------------------------------ plots
 
 

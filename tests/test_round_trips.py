@@ -144,6 +144,20 @@ def test_parquet(sol: fl.Solution, tmp_path: Path) -> None:
         assert pickle.loads(pickle.dumps(table)).equals(table)
 
 
+def test_discrete_states(tmp_path: Path) -> None:
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("scipy.io")
+    up = fl.Reset(times=[1.0, 2.0], set={"gear": lambda t, x, gear: gear + 1})
+    sol = fl.System(lambda t, x, gear: [gear], n=1, discrete={"gear": 1}, resets=up).solve((0, 3), [0.0])
+    sol.save(tmp_path / "run.npz")
+    assert same(fl.load(tmp_path / "run.npz").discrete, sol.discrete)
+    assert same(pickle.loads(pickle.dumps(sol)).discrete, sol.discrete)
+    sol.to_xarray().to_netcdf(tmp_path / "run.nc", engine="scipy")
+    with xarray.open_dataset(tmp_path / "run.nc", engine="scipy") as back:
+        check_dataset(back.load(), sol.to_xarray())
+    assert sol.switches.is_kink.tolist() == [False, False]
+
+
 def test_results_of_sweeps(tmp_path: Path) -> None:
     xarray = pytest.importorskip("xarray")
     pytest.importorskip("zarr")

@@ -23,7 +23,9 @@ def system(
     params: Mapping[str, float] | None = None,
     states: Sequence[str] | None = None,
     surfaces: Any = None,
+    resets: Any = None,
     outputs: Any = None,
+    discrete: Mapping[str, float] | None = None,
 ) -> Callable[[Callable[..., Any]], System]: ...
 def system(
     fun: Callable[..., Any] | None = None,
@@ -32,7 +34,9 @@ def system(
     params: Mapping[str, float] | None = None,
     states: Sequence[str] | None = None,
     surfaces: Any = None,
+    resets: Any = None,
     outputs: Any = None,
+    discrete: Mapping[str, float] | None = None,
 ) -> System | Callable[[Callable[..., Any]], System]:
     """Turn a function ``f(t, x, a=1.0, b=2.0)`` into a `System` with the parameters `a` and `b`.
 
@@ -40,7 +44,7 @@ def system(
     ----------
     fun : callable
         The right-hand side. What follows ``(t, x)`` and has a number as default is a parameter.
-    n, states, surfaces, outputs
+    n, states, surfaces, resets, outputs, discrete
         As for `System`.
     params : dict, optional
         Default values that replace or complete those of the function.
@@ -66,8 +70,18 @@ def system(
     """
 
     def build(function: Callable[..., Any]) -> System:
-        defaults = _all_parameters(function, params or {})
-        return System(function, n=n, params=defaults, states=states, surfaces=surfaces, outputs=outputs)
+        named, given = discrete or {}, params or {}
+        defaults = _all_parameters(function, {**named, **given})
+        return System(
+            function,
+            n=n,
+            params={name: defaults[name] for name in defaults if name in given or name not in named},
+            states=states,
+            surfaces=surfaces,
+            resets=resets,
+            outputs=outputs,
+            discrete=discrete,
+        )
 
     return build if fun is None else build(fun)
 

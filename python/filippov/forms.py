@@ -46,6 +46,8 @@ class Source(NamedTuple):
         Jumps of the state.
     black_box : bool
         Whether surfaces were declared, even none at all (``surfaces=[]``): `fun` may then be a black box.
+    discrete : tuple of str
+        Parameters that resets may set: their values are those at the start.
     """
 
     fun: Callable[..., Any]
@@ -55,6 +57,7 @@ class Source(NamedTuple):
     branching: Callable[..., Any] | None = None
     black_box: bool = False
     resets: tuple[Reset, ...] = ()
+    discrete: tuple[str, ...] = ()
 
     def named_functions(self) -> list[tuple[str, Any]]:
         """Return the functions with what they are called in messages; `fun` may call others of them."""

@@ -258,22 +258,22 @@ def check_args(args: Any) -> tuple[Any, ...]:
         return (args,)
 
 
-def check_params(params: Any) -> dict[str, float]:
-    """Return named parameters as a dict of finite floats."""
+def check_params(params: Any, role: str = "params") -> dict[str, float]:
+    """Return named parameters as a dict of finite floats; `role` is the argument that they belong to."""
     if params is None:
         return {}
     if not isinstance(params, Mapping):
-        raise InputError(f"params: a dict of names and values is needed, not {type(params).__name__}")
+        raise InputError(f"{role}: a dict of names and values is needed, not {type(params).__name__}")
     checked: dict[str, float] = {}
     for name, value in params.items():
         if not isinstance(name, str) or not name.isidentifier():
-            raise InputError(f"params: {name!r} is not a name")
+            raise InputError(f"{role}: {name!r} is not a name")
         try:
             checked[name] = real(value)
         except (TypeError, ValueError):
-            raise InputError(f"params: {name!r} must be a real number, not {value!r}") from None
+            raise InputError(f"{role}: {name!r} must be a real number, not {value!r}") from None
         if not math.isfinite(checked[name]):
-            raise InputError(f"params: {name!r} must be finite, it is {value!r}")
+            raise InputError(f"{role}: {name!r} must be finite, it is {value!r}")
     return checked
 
 

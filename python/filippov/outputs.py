@@ -115,8 +115,12 @@ def along(
     if reads.surfaces and isinstance(run, Run):
         contacts = run.contacts(np.ascontiguousarray(times), side == "left")[list(reads.surfaces)].T
     points = zip(times.tolist(), states.T.copy(), contacts, strict=True)
+    known = _discrete_at(system, run, times, values, side == "left")
     return np.array(
-        [_called(system, reads.with_values(contact), role, t, x, values) for t, x, contact in points]
+        [
+            _called(system, reads.with_values(contact), role, t, x, {**values, **own})
+            for (t, x, contact), own in zip(points, known, strict=True)
+        ]
     )
 
 
@@ -141,7 +145,9 @@ def at_ends(
             continue
         _refuse_sliding(prepared, role, fun, [Mode(run.mode_last)])
         contacts = run.contacts_at_end()[list(reads.surfaces)]
-        found.append(_called(system, reads.with_values(contacts), role, run.t_last, run.y_last, values))
+        (own,) = _discrete_at(system, run, np.array([run.t_last]), values, False)
+        called = reads.with_values(contacts)
+        found.append(_called(system, called, role, run.t_last, run.y_last, {**values, **own}))
     return np.array(found)
 
 
@@ -223,6 +229,17 @@ class _Reads:
         named = {name: params[name] for name in self._named if name in params}
         contact = self._contact([x[n + k] for k in range(len(self.surfaces))])
         return self._fun(t, x[:n], *args, **named, **{CONTACT: contact})
+
+
+def _discrete_at(
+    system: System, run: Any, times: Array, values: Mapping[str, float], is_left: bool
+) -> list[dict[str, float]]:
+    """Return the discrete states at some times by name; their values in `values` are those at the start."""
+    names = tuple(system.discrete)
+    if not names or not isinstance(run, Run):
+        return [{name: values[name] for name in names}] * len(times)
+    rows = run.discrete(np.ascontiguousarray(times), len(names), is_left)
+    return [dict(zip(names, column, strict=True)) for column in rows.T.tolist()]
 
 
 _NOT_TRACED = (

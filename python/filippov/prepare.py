@@ -14,7 +14,8 @@ from filippov.errors import InputError, ModelError, TraceError
 from filippov.events import bind_function, check_scalar_function, function_name, selective
 from filippov.forms import Source
 from filippov.laws import without_memory
-from filippov.resets import CoreAction, check_map_value
+from filippov.resets import CoreAction, Reset, check_map_value
+from filippov.scalars import real
 from filippov.trace import Trace, trace
 from filippov.trace.fingerprint import fingerprint
 from filippov.trace.memory import remembered
@@ -76,8 +77,9 @@ class Prepared(NamedTuple):
             return []
         text = (
             f"fun assigns {', '.join(self.remembers)}, outside of itself: a trace does not remember what "
-            "an earlier call left there. For a relay with two thresholds use fl.Hysteresis; else keep such "
-            "values out of fun"
+            "an earlier call left there. For a relay with two thresholds use fl.Hysteresis; for a phase, a "
+            "gear or a counter a discrete state, fl.System(fun, discrete={...}), which fl.Reset(..., "
+            "set={...}) changes"
         )
         return [(MEMORY, text)]
 
@@ -198,7 +200,7 @@ def _key(
         return None
     resets = [reset.parts() for reset in source.resets]
     read = fingerprint(source.fun, source.args, source.surfaces, resets)
-    return None if read is None else (n, tuple(values), states and tuple(states), read)
+    return None if read is None else (n, tuple(values), source.discrete, states and tuple(states), read)
 
 
 def _point(values: dict[str, float], t0: float, y0: Array) -> Hashable:
@@ -224,6 +226,7 @@ def _trace(
         t0=t0,
         y0=y0,
         states=states,
+        discrete=source.discrete,
     )
 
 
@@ -239,19 +242,24 @@ def _actions(
     """Return the resets for the core, traced if possible, and whether they hold for these values only."""
     surfaces = iter(triggers)
     actions, is_pinned = [], False
+    discrete = source.discrete
+    start = np.append(y0, [values[name] for name in discrete])
     for k, reset in enumerate(source.resets):
-        bound = bind_function(reset.map, source.args, values)
-        _check_map(bound, n, t0, y0, f"resets: entry {k} ({reset.name})")
-        own = selective(reset.map, values)
+        change = reset.on_all(n, discrete)
+        bound = bind_function(change, source.args, values)
+        if reset.map is not None:
+            own = bind_function(reset.map, source.args, values)
+            _check_map(own, n, t0, y0, f"resets: entry {k} ({reset.name})")
+        _check_set(reset, bound(t0, start.copy())[n:] if discrete else (), discrete, f"resets: entry {k}")
         try:
             traced = trace(
-                own,
-                n,
+                selective(change, values),
+                len(start),
                 args=source.args,
                 parameters=values or None,
                 t0=t0,
-                y0=y0,
-                states=states,
+                y0=start,
+                states=[*(states or numbered_states(n)), *discrete] if discrete else states,
                 is_field=False,
             )
         except (TraceError, ModelError):
@@ -268,6 +276,11 @@ def _actions(
 def _prepare_opaque(
     source: Source, n: int, values: dict[str, float], t0: float, y0: Array | None, reason: TraceError
 ) -> Prepared:
+    if source.discrete:
+        raise ModelError(
+            f"discrete: {', '.join(map(repr, source.discrete))} cannot be read by a black box, and the "
+            f"function could not be traced: {reason}"
+        )
     n_switching = len(source.surfaces)
     functions = [*source.surfaces, *(reset.h for reset in source.resets if reset.h is not None)]
     surfaces = [bind_function(surface, source.args, values) for surface in functions]
@@ -276,7 +289,8 @@ def _prepare_opaque(
     for reset in source.resets:
         n_found = sum(action.when == "surface" for action in actions)
         trigger = None if reset.h is None else (n_switching + n_found, 1.0)
-        actions.append(reset.action(trigger, bind_function(reset.map, source.args, values)))
+        own = reset.on_all(n, ())
+        actions.append(reset.action(trigger, bind_function(own, source.args, values)))
     core: CoreSystem
     if source.signed is not None:
         signed = source.signed
@@ -301,6 +315,17 @@ def _check_map(bound: Callable[..., Any], n: int, t0: float, y0: Array, what: st
     with without_memory(f"{what}: {NO_MEMORY_IN_A_MAP}"):
         value = bound(t0, y0.copy())
     check_map_value(value, n, what)
+
+
+def _check_set(reset: Reset, values: Sequence[Any], discrete: Sequence[str], what: str) -> None:
+    """Refuse a reset that sets a discrete state to something else than a number."""
+    for name, value in zip(discrete, values, strict=False):
+        try:
+            real(value)
+        except (TypeError, ValueError):
+            raise InputError(
+                f"{what} ({reset.name}): set[{name!r}] must return a real number, it returned {value!r}"
+            ) from None
 
 
 def check_components(value: Any, n: int) -> None:
@@ -329,7 +354,8 @@ NO_MEMORY_IN_A_BLACK_BOX = (
 )
 NO_MEMORY_IN_A_MAP = (
     "a law with a memory (a relay with hysteresis, static friction) cannot be part of a map, which is "
-    "evaluated at an instant: keep what it remembers in a state, and let the map read and write that"
+    "evaluated at an instant: keep what it remembers in a discrete state (fl.System(discrete=...)), which "
+    "the map reads and the reset sets"
 )
 
 _NO_PARAMETERS: Array = np.zeros(0)

@@ -52,6 +52,7 @@ class Saving(ABC):
     _prepared: Prepared | None
     _calls: dict[Any, Any]
     _outputs: dict[str, Callable[..., Any]]
+    _discrete: tuple[str, ...]
 
     @abstractmethod
     def _prepared_now(self) -> Prepared:
@@ -185,6 +186,8 @@ class Saving(ABC):
         self._prepared, self._states, self._params = unpacked(data, functions, remembers)
         self._n = self._prepared.core.n_states
         self._source, self._calls, self._outputs = None, {}, {}
+        core = self._prepared.core
+        self._discrete = tuple(core.discrete()) if isinstance(core, TracedSystem) else ()
 
     def __getstate__(self) -> dict[str, Any]:
         state = self.__dict__.copy()

@@ -152,6 +152,7 @@ _FIELDS = (
     "segments",
     "branches",
     "outputs",
+    "discrete",
 )
 
 
@@ -208,6 +209,8 @@ class Solution:
         Names of the states.
     outputs : dict of str to ndarray, shape (n_points,)
         The outputs of the system at `t`, by name.
+    discrete : dict of str to ndarray, shape (n_points,)
+        The discrete states of the system at `t`, by name.
 
     Notes
     -----
@@ -370,6 +373,17 @@ class Solution:
         """Pieces of constant mode."""
         return SegmentTable(self._run.segments)
 
+    @cached_property
+    def discrete(self) -> dict[str, Array]:
+        """The discrete states of the system at `t`, by name."""
+        origin = self._origin
+        names = tuple(origin.system.discrete)
+        if isinstance(self._run, Run):
+            rows = self._run.discrete(np.ascontiguousarray(self.t), len(names), False)
+            return dict(zip(names, rows, strict=True))
+        values = origin.system.parameter_values(None) if origin.values is None else origin.values
+        return {name: np.full(len(self.t), values[name]) for name in names}
+
     def __getattr__(self, name: str) -> Any:
         raise AttributeError(f"{name!r}; the fields are {', '.join(_FIELDS)}")
 
@@ -438,7 +452,7 @@ class Solution:
         Parameters
         ----------
         name : str
-            One of `states`.
+            One of `states`, or of the discrete states.
 
         Returns
         -------
@@ -456,8 +470,11 @@ class Solution:
         >>> system.solve((0, 2), {"height": 0.0, "speed": 1.0}).state("speed")[-1].round(12)
         np.float64(-1.0)
         """
+        if name in self.discrete:
+            return self.discrete[name]
         if name not in self.states:
-            raise KeyError(f"no state {name!r}; the states are {', '.join(self.states)}")
+            known = (*self.states, *self.discrete)
+            raise KeyError(f"no state {name!r}; the states are {', '.join(known)}")
         values: Array = self.y[self.states.index(name)]
         return values
 
@@ -623,6 +640,7 @@ class Solution:
         """
         pandas = import_pandas()
         columns: dict[str, Any] = {name: self.y[i] for i, name in enumerate(self.states)}
+        columns.update(self.discrete)
         columns.update(self.outputs)
         if self.surfaces and len(self.segments):
             columns["mode"] = [str(mode) for mode in self._modes_at(self.t)]
@@ -640,7 +658,7 @@ class Solution:
         """
         xarray = import_xarray()
         variables: dict[str, Any] = {name: ("t", self.y[i]) for i, name in enumerate(self.states)}
-        variables.update((name, ("t", values)) for name, values in self.outputs.items())
+        variables.update((name, ("t", values)) for name, values in {**self.discrete, **self.outputs}.items())
         if self.surfaces and len(self.segments):
             variables["mode"] = ("t", as_texts(self._modes_at(self.t)))
         attributes = {"message": self.message, "status": self.status, "surfaces": "\n".join(self.surfaces)}

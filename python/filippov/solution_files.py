@@ -38,6 +38,7 @@ def write_solution(fields: Mapping[str, Any], path: str | os.PathLike[str]) -> N
         "error": None if fields["error"] is None else f"{type(fields['error']).__name__}: {fields['error']}",
         "n_events": None if fields["t_events"] is None else len(fields["t_events"]),
         "outputs": list(fields["outputs"]),
+        "discrete": list(fields["discrete"]),
         "switches": [
             [s.kind, list(s.surfaces), str(s.mode_before), str(s.mode_after), s.note, s.rule, s.is_kink]
             for s in switches
@@ -59,6 +60,7 @@ def write_solution(fields: Mapping[str, Any], path: str | os.PathLike[str]) -> N
         "segments_multipliers_start": np.array([segment.multipliers_start for segment in segments]),
         "segments_multipliers_end": np.array([segment.multipliers_end for segment in segments]),
         **{f"output_{k}": values for k, values in enumerate(fields["outputs"].values())},
+        **{f"discrete_{k}": values for k, values in enumerate(fields["discrete"].values())},
     }
     for k, (times, states) in enumerate(zip(fields["t_events"] or [], fields["y_events"] or [], strict=True)):
         arrays[f"event_{k}_t"], arrays[f"event_{k}_y"] = times, states
@@ -136,4 +138,5 @@ def _fields(text: dict[str, Any], arrays: dict[str, Any]) -> dict[str, Any]:
         "segments": SegmentTable(segments),
         "branches": None,
         "outputs": {name: arrays[f"output_{k}"] for k, name in enumerate(text["outputs"])},
+        "discrete": {name: arrays[f"discrete_{k}"] for k, name in enumerate(text.get("discrete", ()))},
     }

@@ -12,7 +12,7 @@ from filippov._core import Run
 from filippov.backward import reversed_source
 from filippov.caution import warn_user
 from filippov.errors import InputError, ModelError
-from filippov.events import accepted_names, default_parameters, function_name, names_argument
+from filippov.events import accepted_names, default_parameters, function_name, names_argument, selective
 from filippov.forms import Source, base_source, check_surfaces, fields_source, relay_source
 from filippov.options import (
     check_args,
@@ -21,7 +21,7 @@ from filippov.options import (
 from filippov.outputs import check_outputs
 from filippov.points import Points
 from filippov.prepare import Prepared, check_n, numbered_states, prepare
-from filippov.resets import check_resets
+from filippov.resets import check_resets, refuse_undeclared
 from filippov.saving import Saving
 from filippov.solution import Solution
 from filippov.trace.explain import deepest_user_line
@@ -63,6 +63,10 @@ class System(Points, Saving):
         Quantities of interest, ``{"u": lambda t, x, ...: ...}``: functions like those of `Solution.evaluate`,
         whose values every solution has in `Solution.outputs` and in its tables; sweeps and ensembles have
         them at the ends of the runs, sections at the returns.
+    discrete : dict of str to float, optional
+        Discrete states, ``{"gear": 1}``, with their values at the start: a gear, a phase, a counter, a held
+        sample. The functions of the system read them by name, and only a `Reset` with ``set={"gear": ...}``
+        changes them. The value at the start may be given at every run like that of a parameter.
 
     Raises
     ------
@@ -97,20 +101,32 @@ class System(Points, Saving):
         args: Any = (),
         resets: Any = None,
         outputs: Any = None,
+        discrete: Mapping[str, float] | None = None,
     ) -> None:
         if not callable(fun):
             raise InputError(f"fun: a function fun(t, x) is needed, not {type(fun).__name__}")
-        declared = surfaces is not None
+        named = check_params(discrete, "discrete")
         source = Source(
-            fun, check_surfaces(surfaces), check_args(args), black_box=declared, resets=check_resets(resets)
+            fun,
+            check_surfaces(surfaces),
+            check_args(args),
+            black_box=surfaces is not None,
+            resets=check_resets(resets),
+            discrete=tuple(named),
         )
+        refuse_undeclared(source.resets, source.discrete)
         if params is None:
-            params = default_parameters(fun, len(source.args))
-        self._setup(source, n, params, states)
-        self._outputs = check_outputs(outputs, self._states or ())
-        if not self._params:
+            defaults = default_parameters(fun, len(source.args))
+            params = {name: value for name, value in defaults.items() if name not in named}
+        params = check_params(params)
+        if named:
+            _refuse_names_given_twice(named, params, states)
+            source = source._replace(fun=selective(fun, {**params, **named}))
+        self._setup(source, n, {**params, **named}, states)
+        self._outputs = check_outputs(outputs, (*(self._states or ()), *named))
+        if not params:
             return
-        refused = set(self._params).difference(accepted_names(fun, self._params))
+        refused = set(params).difference(accepted_names(fun, params))
         if refused:
             names = ", ".join(map(repr, sorted(refused)))
             raise InputError(f"params: {function_name(fun, 'fun')}() has no parameter {names}")
@@ -243,6 +259,7 @@ class System(Points, Saving):
         self._params = check_params(params)
         self._states = tuple(str(name) for name in states) if states is not None else None
         self._n = check_n(n)
+        self._discrete = source.discrete
         self._prepared: Prepared | None = None
         self._outputs: dict[str, Callable[..., Any]] = {}
         self._calls: dict[Any, Any] = {}  # what earlier calls of `solve` need again, by their options
@@ -262,8 +279,13 @@ class System(Points, Saving):
 
     @property
     def params(self) -> dict[str, float]:
-        """Names and default values of the parameters (a copy)."""
+        """Names and default values of the parameters, discrete states at the start included (a copy)."""
         return dict(self._params)
+
+    @property
+    def discrete(self) -> dict[str, float]:
+        """Names of the discrete states and their values at the start (a copy)."""
+        return {name: self._params[name] for name in self._discrete}
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -494,3 +516,12 @@ class System(Points, Saving):
         if self._prepared is not None and self._prepared.core.n_states == n:
             return self._prepared
         return self.prepare(n, 0.0, None, self.parameter_values(None))
+
+
+def _refuse_names_given_twice(
+    discrete: Mapping[str, float], params: Mapping[str, float], states: Sequence[str] | None
+) -> None:
+    for name in discrete:
+        for given, role in ((params, "a parameter"), (states or (), "a state"), (("t", "mode"), "something")):
+            if name in given:
+                raise InputError(f"discrete: {name!r} is the name of {role} too")

@@ -12,6 +12,12 @@ impl Graph {
         self.facts(id).varies
     }
 
+    /// Whether one of the values contains the time.
+    pub fn depends_on_time(&self, roots: &[NodeId]) -> bool {
+        let below = self.all_below(roots);
+        below.iter().any(|&id| matches!(self.node(id), Node::Time))
+    }
+
     /// Whether the value contains a state variable.
     pub fn depends_on_state(&self, id: NodeId) -> bool {
         self.facts(id).has_state

@@ -79,6 +79,16 @@ impl SurfaceTable {
             .map(|known| known.1)
     }
 
+    /// Gives every surface its new number; `order` has the old ones in the new order.
+    pub fn renumber(&mut self, order: &[u32], number: &[u32]) {
+        let functions = order.iter().map(|&old| self.functions[old as usize]);
+        self.functions = functions.collect();
+        let forms = self.forms.values_mut().flatten().map(|(_, side)| side);
+        for side in self.switches.values_mut().chain(forms) {
+            side.0 = number[side.0 as usize];
+        }
+    }
+
     fn insert_form(&mut self, key: LinearKey, side: Side) {
         self.forms
             .entry(key.atoms.clone())

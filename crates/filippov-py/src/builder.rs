@@ -198,6 +198,11 @@ impl Builder {
         Ok(graph.is_affine(Self::node(&graph, a)?))
     }
 
+    /// Renumbers the surfaces: those that no motion crosses come last, but for those in `kept`. Returns the new numbers.
+    fn put_standing_surfaces_last(&self, kept: Vec<u32>) -> Vec<u32> {
+        self.graph().put_standing_surfaces_last(&kept)
+    }
+
     fn n_surfaces(&self) -> usize {
         self.graph().n_surfaces()
     }

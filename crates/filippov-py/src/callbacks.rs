@@ -136,16 +136,27 @@ impl PiecewiseSystem for Signed {
     }
 }
 
-/// The map of an action, (t, x) -> x+, as a Python callable.
-pub struct CalledMap(pub Py<PyAny>);
+/// The map of an action, (t, x) -> x+, as a Python callable. Named discrete states stand behind the states.
+pub struct CalledMap {
+    pub map: Py<PyAny>,
+    pub n_named: usize,
+}
 
 impl ActionMap for CalledMap {
-    fn apply(&self, t: f64, x: &mut [f64], _: &[f64], _: &mut [f64]) -> Result<(), FieldError> {
+    fn apply(&self, t: f64, x: &mut [f64], _: &[f64], q: &mut [f64]) -> Result<(), FieldError> {
+        let mut all = [&*x, &q[..self.n_named]].concat();
         Python::attach(|py| {
-            let value = self.0.bind(py).call1((t, PyArray1::from_slice(py, x)))?;
-            read_vector(&value, x, "the map of a reset")
+            let value = self
+                .map
+                .bind(py)
+                .call1((t, PyArray1::from_slice(py, &all)))?;
+            read_vector(&value, &mut all, "the map of a reset")
         })
-        .map_err(|e: PyErr| FieldError::new(e))
+        .map_err(|e: PyErr| FieldError::new(e))?;
+        let (states, named) = all.split_at(x.len());
+        x.copy_from_slice(states);
+        q[..self.n_named].copy_from_slice(named);
+        Ok(())
     }
 }
 

@@ -7,7 +7,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
-use crate::systems::{core_of, n_visible_of, raised};
+use crate::systems::{all_entries, core_of, n_visible_of, raised};
 
 type Array<'py> = PyReadonlyArray1<'py, f64>;
 type FieldAndMultipliers<'py> = (Bound<'py, PyArray1<f64>>, Vec<f64>);
@@ -26,12 +26,11 @@ pub fn intersection_field<'py>(
 ) -> PyResult<Option<FieldAndMultipliers<'py>>> {
     let x = x.as_slice()?;
     let (core, q) = core_of(system, p.as_slice()?, t, x)?;
-    let mut mode = mode;
     if x.len() != core.n_states() || mode.len() != n_visible_of(system, &*core) {
         return Err(PyValueError::new_err("x or mode has a wrong length"));
     }
-    mode.resize(core.n_surfaces(), 1);
-    let value = filippov::intersection_field(&*core, (t, x), &q, &Mode::new(mode), &near);
+    let mode = all_entries(system, (&*core, &q), t, x, mode)?;
+    let value = filippov::intersection_field(&*core, (t, x), &q, &mode, &near);
     let value = value.map_err(raised)?;
     Ok(value.map(|value| (PyArray1::from_vec(py, value.dx), value.multipliers)))
 }
@@ -61,10 +60,8 @@ pub fn classify<'py>(
     {
         return Err(PyValueError::new_err("before has a wrong length"));
     }
-    let before = before.map(|mut entries| {
-        entries.resize(core.n_surfaces(), 1);
-        Mode::new(entries)
-    });
+    let before = before.map(|entries| all_entries(system, (&*core, &q), t, x, entries));
+    let before = before.transpose()?;
     let how = Inspection {
         reach,
         kappa: &kappa,

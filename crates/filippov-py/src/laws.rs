@@ -16,6 +16,7 @@ pub fn read_law(graph: &Graph, (kind, nodes, numbers): &LawRow) -> PyResult<Law>
     let held = |argument, step| Law::Held { argument, step };
     Ok(match (kind.as_str(), &found?[..], &numbers[..]) {
         ("clock", &[argument], _) => Law::Clock { argument },
+        ("named", &[initial], _) => Law::Named { initial },
         ("held", &[argument], _) => held(argument, Step::Floor),
         ("sign", &[argument], _) => held(argument, Step::Sign),
         ("place", &[argument], knots) => held(argument, Step::Place(knots.into())),

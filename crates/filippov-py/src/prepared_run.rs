@@ -5,8 +5,8 @@ use std::sync::Arc;
 use filippov::action::{Action, ActionMap, Actions, Trigger};
 use filippov::section::Section;
 use filippov::{
-    replay_decision, DecisionOutcome, DecisionPoint, Error, FieldError, Kind, LawAction, Mode,
-    Options, Problem, Solution, TracedMap, UserEvent, UserFunction,
+    replay_decision, DecisionOutcome, DecisionPoint, Error, FieldError, Kind, LawAction, Options,
+    Problem, Solution, TracedMap, UserEvent, UserFunction,
 };
 use pyo3::prelude::*;
 
@@ -47,7 +47,8 @@ impl PreparedRun {
         let py = system.py();
         let traced = system.cast::<TracedSystem>().ok();
         let (mut laws, mut discrete, mut compiled) = (Vec::new(), Vec::new(), None);
-        let given = read_actions(py, actions, &p)?;
+        let n_named = traced.map_or(0, |traced| traced.get().laws.n_named());
+        let given = read_actions(py, actions, &p, n_named)?;
         let core = match traced {
             Some(traced) => {
                 let own = Arc::new(traced.get().with(&p));
@@ -91,8 +92,6 @@ impl PreparedRun {
         options: &Options,
         interrupt: &mut dyn FnMut(f64) -> bool,
     ) -> Result<Solution, Error> {
-        let completed = self.complete(options);
-        let options = completed.as_ref().unwrap_or(options);
         let events = self.events.iter();
         let events = events.map(|(function, direction, terminal)| UserEvent {
             function: &**function,
@@ -116,9 +115,8 @@ impl PreparedRun {
         section: &Section,
         interrupt: &mut dyn FnMut(f64) -> bool,
     ) -> Result<Solution, Error> {
-        let completed = self.complete(options);
         Problem::new(&*self.core, t_span, &self.y0)
-            .options(completed.as_ref().unwrap_or(options))
+            .options(options)
             .actions(&self.actions())
             .solve_to_section(section, interrupt)
     }
@@ -129,8 +127,6 @@ impl PreparedRun {
         options: &Options,
         point: &DecisionPoint,
     ) -> Result<DecisionOutcome, FieldError> {
-        let completed = self.complete(options);
-        let options = completed.as_ref().unwrap_or(options);
         replay_decision(&*self.core, &self.actions(), options, point)
     }
 
@@ -152,20 +148,6 @@ impl PreparedRun {
     /// How many of its surfaces a user sees.
     pub fn n_visible(&self) -> usize {
         self.n_visible
-    }
-
-    /// The options with choices for the surfaces too that a user does not see, if there are any.
-    fn complete(&self, options: &Options) -> Option<Options> {
-        let mut completed = None;
-        if !options.choices.is_empty() && self.n_visible < self.core.n_surfaces() {
-            let options = completed.insert(options.clone());
-            for choice in &mut options.choices {
-                let mut entries = choice.entries().to_vec();
-                entries.resize(self.core.n_surfaces(), 1);
-                *choice = Mode::new(entries);
-            }
-        }
-        completed
     }
 
     /// What the user gives comes first: a sample at a tick sees the ramp before it drops.
@@ -206,12 +188,16 @@ fn read_actions(
     py: Python<'_>,
     rows: &[ActionRow],
     p: &[f64],
+    n_named: usize,
 ) -> PyResult<Vec<(SharedMap, Trigger, String)>> {
     let read = |(when, numbers, map, name): &ActionRow| {
         let trigger = read_trigger(when, numbers)?;
         let map: SharedMap = match map.bind(py).cast::<TracedSystem>() {
             Ok(traced) => Box::new(TracedMap::new(traced.get().with(p))),
-            Err(_) => Box::new(CalledMap(map.clone_ref(py))),
+            Err(_) => Box::new(CalledMap {
+                map: map.clone_ref(py),
+                n_named,
+            }),
         };
         Ok((map, trigger, name.clone()))
     };

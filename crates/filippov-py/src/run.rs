@@ -519,6 +519,25 @@ impl Run {
         Ok(PyArray1::from_vec(py, row))
     }
 
+    /// The first `n` discrete states at the times `t`, shape (n, len(t)); those at the end if no segments are kept.
+    fn discrete<'py>(
+        &self,
+        py: Python<'py>,
+        t: PyReadonlyArray1<'py, f64>,
+        n: usize,
+        left: bool,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let solution = self.solution();
+        let mut out = Vec::new();
+        for &t in t.as_slice()? {
+            let segment = solution.segment_at(t, side_of(left));
+            let states = segment.map_or(&solution.discrete, |segment| &segment.discrete);
+            let named = states.get(..n);
+            out.extend(named.ok_or_else(|| PyValueError::new_err("n: too many"))?);
+        }
+        Ok(columns(py, &out, n))
+    }
+
     /// Multipliers at the times `t`, shape (n_surfaces, len(t)); NaN for surfaces not slid on.
     fn multipliers<'py>(
         &self,

@@ -260,11 +260,11 @@ impl PlaceSpec {
             "tangency" => {
                 let direction = item(given, "direction")?.extract()?;
                 let index: usize = item(given, "surface")?.extract()?;
-                let mut signs: Vec<f64> = item(given, "signs")?.extract()?;
+                let signs: Vec<f64> = item(given, "signs")?.extract()?;
                 let traced = traced.ok_or_else(|| refused("section: the system is not traced"))?;
                 let own = &traced.get().system;
                 let mut graph = own.graph().clone();
-                signs.resize(graph.n_surfaces(), 1.0);
+                // Those of surfaces that the user does not see follow from the discrete states.
                 let signs: Vec<Option<f64>> = signs.into_iter().map(Some).collect();
                 let h = graph.surface(index as u32);
                 let h = graph.at_signs(&[h], &signs)[0];

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use filippov::motion::{SlidingField, SmoothField};
 use filippov::{
-    Definition, Error, FieldError, Laws, PiecewiseSystem, Rules, Setting, SignStructure,
+    Definition, Error, FieldError, Laws, Mode, PiecewiseSystem, Rules, Setting, SignStructure,
 };
 use filippov_expr::{Backend, Names};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
@@ -64,6 +64,33 @@ pub fn n_visible_of(system: &Bound<'_, PyAny>, core: &dyn PiecewiseSystem) -> us
         Ok(traced) => traced.get().n_visible(),
         Err(_) => core.n_surfaces(),
     }
+}
+
+/// The signs of all surfaces at a place from those that a user sees.
+pub fn all_signs(
+    system: &Bound<'_, PyAny>,
+    (core, q): (&dyn PiecewiseSystem, &[f64]),
+    t: f64,
+    x: &[f64],
+    seen: &[f64],
+) -> PyResult<Vec<f64>> {
+    match system.cast::<TracedSystem>() {
+        Ok(traced) => traced.get().all_signs((core, q), t, x, seen),
+        Err(_) => Ok(seen.to_vec()),
+    }
+}
+
+/// The entries of a mode for all surfaces at a place from those that a user sees.
+pub fn all_entries(
+    system: &Bound<'_, PyAny>,
+    of: (&dyn PiecewiseSystem, &[f64]),
+    t: f64,
+    x: &[f64],
+    seen: Vec<i8>,
+) -> PyResult<Mode> {
+    let signs: Vec<f64> = seen.into_iter().map(f64::from).collect();
+    let all = all_signs(system, of, t, x, &signs)?;
+    Ok(Mode::new(all.into_iter().map(|sign| sign as i8).collect()))
 }
 
 pub fn field_of<'py>(
@@ -147,16 +174,20 @@ pub struct TracedSystem {
     rules: Rules,
     /// The laws of its discrete states, whose number is that of the last parameters' names.
     pub laws: Arc<Laws>,
+    n_visible: usize,
 }
 
 impl TracedSystem {
     pub fn build(definition: Definition) -> PyResult<Self> {
         let rules = definition.rules.clone();
+        definition.check().map_err(refused)?;
+        let n_visible = definition.n_visible();
         let (system, laws) = definition.build(Backend::Auto).map_err(refused)?;
         Ok(TracedSystem {
             system,
             laws: Arc::new(laws),
             rules,
+            n_visible,
         })
     }
 
@@ -165,7 +196,6 @@ impl TracedSystem {
         Definition::of(&self.system, &self.rules)
     }
 
-    /// The event with this handle.
     /// The system with these parameter values.
     pub fn with(&self, p: &[f64]) -> filippov::TracedSystem {
         self.system.with_parameters(p.to_vec())
@@ -187,15 +217,47 @@ impl TracedSystem {
         names[names.len() - self.rules.laws.len()..].to_vec()
     }
 
-    /// How many surfaces a user sees: those of the laws come after them.
+    /// How many surfaces a user sees: those that no motion crosses and those of the laws come after them.
     pub fn n_visible(&self) -> usize {
-        self.system.n_surfaces() - self.rules.n_hidden
+        self.n_visible
     }
 
-    /// Signs for all surfaces from those that a user sees.
-    fn all_signs<'py>(&self, py: Python<'py>, signs: &Array<'py>) -> PyResult<Array<'py>> {
-        let mut all = signs.as_slice()?.to_vec();
-        all.extend(vec![1.0; self.rules.n_hidden]);
+    /// The signs of all surfaces at a place from those that a user sees: those of laws are positive, and the others follow
+    /// from the discrete states.
+    fn all_signs(
+        &self,
+        (core, q): (&dyn PiecewiseSystem, &[f64]),
+        t: f64,
+        x: &[f64],
+        seen: &[f64],
+    ) -> PyResult<Vec<f64>> {
+        let (n, n_of_laws) = (core.n_surfaces(), self.rules.n_hidden);
+        let mut signs = seen.to_vec();
+        if signs.len() != self.n_visible || x.len() != core.n_states() {
+            return Ok(signs);
+        }
+        signs.resize(n, 1.0);
+        if self.n_visible < n - n_of_laws {
+            let mut h = vec![0.0; n];
+            let place = Setting::new(&signs, q).at(t, x);
+            core.surfaces(&place, &mut h).map_err(raised)?;
+            for j in self.n_visible..n - n_of_laws {
+                signs[j] = if h[j] < 0.0 { -1.0 } else { 1.0 };
+            }
+        }
+        Ok(signs)
+    }
+
+    /// The same as an array.
+    fn complete<'py>(
+        &self,
+        py: Python<'py>,
+        of: (&dyn PiecewiseSystem, &[f64]),
+        t: f64,
+        x: &Array<'py>,
+        seen: &Array<'py>,
+    ) -> PyResult<Array<'py>> {
+        let all = self.all_signs(of, t, x.as_slice()?, seen.as_slice()?)?;
         Ok(PyArray1::from_vec(py, all).readonly())
     }
 }
@@ -273,6 +335,11 @@ impl TracedSystem {
             .collect()
     }
 
+    /// The names of the discrete states that actions set.
+    fn discrete(&self) -> Vec<String> {
+        self.law_names()[..self.laws.n_named()].to_vec()
+    }
+
     fn field<'py>(
         &self,
         py: Python<'py>,
@@ -282,7 +349,8 @@ impl TracedSystem {
         p: Array<'py>,
     ) -> PyResult<Output<'py>> {
         let (system, q) = self.at(p.as_slice()?, t, x.as_slice()?)?;
-        field_of(py, (&system, &q), t, &x, &self.all_signs(py, &signs)?)
+        let signs = self.complete(py, (&system, &q), t, &x, &signs)?;
+        field_of(py, (&system, &q), t, &x, &signs)
     }
 
     fn surface_values<'py>(
@@ -294,7 +362,8 @@ impl TracedSystem {
         p: Array<'py>,
     ) -> PyResult<Output<'py>> {
         let (system, q) = self.at(p.as_slice()?, t, x.as_slice()?)?;
-        let all = surface_values_of(py, (&system, &q), t, &x, &self.all_signs(py, &signs)?)?;
+        let signs = self.complete(py, (&system, &q), t, &x, &signs)?;
+        let all = surface_values_of(py, (&system, &q), t, &x, &signs)?;
         let visible = all.readonly().as_slice()?[..self.n_visible()].to_vec();
         Ok(PyArray1::from_vec(py, visible))
     }
@@ -310,14 +379,8 @@ impl TracedSystem {
         surface: usize,
     ) -> PyResult<(Output<'py>, f64, f64)> {
         let (system, q) = self.at(p.as_slice()?, t, x.as_slice()?)?;
-        sliding_field_of(
-            py,
-            (&system, &q),
-            t,
-            &x,
-            &self.all_signs(py, &signs)?,
-            surface,
-        )
+        let signs = self.complete(py, (&system, &q), t, &x, &signs)?;
+        sliding_field_of(py, (&system, &q), t, &x, &signs, surface)
     }
 
     fn active(&self, signs: Array<'_>) -> PyResult<Vec<bool>> {

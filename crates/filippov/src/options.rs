@@ -145,7 +145,8 @@ pub struct Options {
     /// Policy at non-unique points.
     pub nonunique: NonUnique,
     /// The modes to take at the first non-unique points, in order; later points follow the policy. A mode that is
-    /// not among the candidates ends the run with [`crate::Stop::NonUnique`].
+    /// not among the candidates ends the run with [`crate::Stop::NonUnique`]. The last entries may be left out: any
+    /// candidate that begins so is meant.
     pub choices: Vec<Mode>,
     /// The sliding field where several surfaces meet.
     pub sliding: SlidingRule,

@@ -177,7 +177,7 @@ impl SavedSystem {
             self.check_trigger(&action.trigger)?;
             let Some(map) = &action.map else { continue };
             map.check()?;
-            if map.field.len() != definition.field.len() {
+            if map.field.len() != definition.field.len() + definition.n_named() {
                 return inconsistent("a map of another number of states");
             }
             let own = &map.names.parameters[..map.n_parameters()];

@@ -294,11 +294,13 @@ pub enum WarningCode {
     AgainstDirection,
     /// A start on a surface whose action is triggered from both sides, with no velocity that leads off to the side that is taken.
     UnknownSide,
+    /// The motion rests at a point where the fields are not regular.
+    AtRest,
 }
 
 impl WarningCode {
     /// All kinds, in an order that is part of the format of sweeps: only added to at the end.
-    pub const ALL: [WarningCode; 8] = [
+    pub const ALL: [WarningCode; 9] = [
         WarningCode::NonUnique,
         WarningCode::UndeclaredJump,
         WarningCode::NoSeries,
@@ -307,6 +309,7 @@ impl WarningCode {
         WarningCode::ZeroSurface,
         WarningCode::AgainstDirection,
         WarningCode::UnknownSide,
+        WarningCode::AtRest,
     ];
 
     /// The bit that stands for this kind in a set of kinds: that of its place among [`ALL`](Self::ALL).
@@ -325,6 +328,7 @@ impl WarningCode {
             WarningCode::ZeroSurface => "zero_surface",
             WarningCode::AgainstDirection => "against_direction",
             WarningCode::UnknownSide => "unknown_side",
+            WarningCode::AtRest => "at_rest",
         }
     }
 }

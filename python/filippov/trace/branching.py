@@ -97,6 +97,8 @@ class Tracer:
         Names of the states in messages.
     max_paths : int
         Largest number of combinations of answers.
+    discrete : sequence of str, optional
+        Parameters that are the initial values of discrete states of the same name.
     laws : Laws, optional
         Laws of the trace that this one continues.
     constants : ConstantsOfMotion, optional
@@ -124,6 +126,7 @@ class Tracer:
         parameters: dict[str, float],
         states: Sequence[str] | None,
         max_paths: int,
+        discrete: Sequence[str] = (),
         laws: Laws | None = None,
         constants: ConstantsOfMotion | None = None,
         stand_ins: StandIns | None = None,
@@ -155,6 +158,9 @@ class Tracer:
         self._answers: dict[int, float] = {}
         self._reached: dict[int, int] = {}
         self._lines: list[UserLine | None] | None = None
+        if laws is None:
+            for name in discrete:
+                self.laws.name(self, name, builder.parameter(self.parameters.index(name)))
 
     # ------------------------------------------------------------- the inputs
 
@@ -170,8 +176,10 @@ class Tracer:
         return x.view(TracedArray)
 
     def keywords(self) -> dict[str, Scalar]:
-        """Return the traced parameters by name."""
-        return {name: Scalar(self, self.builder.parameter(idx)) for idx, name in enumerate(self.parameters)}
+        """Return the traced parameters by name; of a discrete state what it is now."""
+        named = self.laws.named
+        nodes = (named.get(name, self.builder.parameter(idx)) for idx, name in enumerate(self.parameters))
+        return {name: Scalar(self, node) for name, node in zip(self.parameters, nodes, strict=True)}
 
     # ------------------------------------------------------------ expressions
 

@@ -1,4 +1,4 @@
-"""Laws with memory in a trace: floors, and relays with hysteresis, each with a discrete state of its own.
+"""Laws with memory in a trace: floors, relays, named numbers, each with a discrete state of its own.
 
 A discrete state is a number that the expressions read like a parameter and that changes in instants only. The
 core knows the rule by which it changes (``crates/filippov/src/system/laws.rs``).
@@ -7,6 +7,7 @@ core knows the rule by which it changes (``crates/filippov/src/system/laws.rs``)
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -41,6 +42,7 @@ _KINDS = {
     "clock": _Kind("whole", remembers=False),
     "level": _Kind("whole", remembers=False),
     "hysteresis": _Kind("side", remembers=True),
+    "named": _Kind("real", remembers=True),
 }
 
 # Their argument is constant between jumps.
@@ -74,11 +76,16 @@ class Laws:
         self.rows: list[tuple[str, list[int], list[float]]] = []
         self.n_guards = 0
         self.sticking: dict[int, int] = {}
+        self.named: dict[str, int] = {}
         self._laws: list[_Law] = []
         self._known: dict[_Law, int] = {}
         self._entries: dict[int, tuple[int, _Law]] = {}
         self._values: list[str] = []
         self._is_complete = False
+
+    def name(self, tracer: Tracer, name: str, initial: int) -> None:
+        """Add a discrete state that begins as an expression and that resets set; before all other laws."""
+        self.named[name] = self._state(tracer, _Law("named", (initial,), ()), name)
 
     def floor(self, tracer: Tracer, node: int) -> int:
         """Return the node of the floor of an expression."""
@@ -257,9 +264,20 @@ class Laws:
         """Return an expression of whole numbers moved off them, so that it is never zero."""
         return tracer.builder.binary("add", node, tracer.builder.constant(side * _BETWEEN))
 
-    def complete(self, tracer: Tracer) -> None:
-        """Declare the surfaces at which discrete states change; no law can be added after that."""
+    def complete(self, tracer: Tracer, kept: Sequence[int]) -> list[int]:
+        """Declare the surfaces at which discrete states change; no law can be added after that.
+
+        They come last. Before them come the surfaces that no motion crosses, as those of ``gear == 1``, but
+        for those in `kept`.
+
+        Returns
+        -------
+        list of int
+            The new number of each surface.
+        """
         builder = tracer.builder
+        order = builder.put_standing_surfaces_last(list(kept))
+        self.sticking = {order[surface]: ratio for surface, ratio in self.sticking.items()}
         half = builder.constant(0.5)
         before = builder.n_surfaces()
         # A table adds laws for the ends of its pieces.
@@ -284,6 +302,7 @@ class Laws:
             self.rows.append((law.kind, list(law.nodes), numbers))
         self.n_guards = builder.n_surfaces() - before
         self._is_complete = True
+        return order
 
     def _between(self, tracer: Tracer, law: _Law, piece: int) -> int:
         """Return what is positive between the knots around an expression, and zero at them."""
@@ -316,5 +335,6 @@ class Laws:
             self._known[law] = index
             self._laws.append(law)
             self._values.append(law.values)
-            self.names.append(name if name.endswith(")") else f"{name}({tracer.text(law.nodes[0])})")
+            is_whole_name = law.kind == "named" or name.endswith(")")
+            self.names.append(name if is_whole_name else f"{name}({tracer.text(law.nodes[0])})")
         return tracer.builder.parameter(self.first + index)

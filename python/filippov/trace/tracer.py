@@ -100,6 +100,7 @@ def trace(
     y0: NDArray[Any] | None,
     max_paths: int = 256,
     states: Sequence[str] | None = None,
+    discrete: Sequence[str] = (),
     is_field: bool = True,
 ) -> Trace:
     """Turn a right-hand side into expressions by calling it with traced values.
@@ -130,6 +131,8 @@ def trace(
         Largest number of combinations of answers to the function's ``if``.
     states : sequence of str, optional
         Names of the states.
+    discrete : sequence of str, optional
+        Parameters whose values are those at the start only, since resets may set them.
     is_field : bool, optional
         Whether the function is the rate of the state; it has constants of motion then.
 
@@ -162,8 +165,9 @@ def trace(
         )
         field = _explore(tracer, fun, args, "fun", n)
         watched = tuple(_watch(tracer, h, args, f"resets[{idx}].h") for idx, h in enumerate(triggers))
-        tracer.laws.complete(tracer)
-        return declared, field, watched
+        order = tracer.laws.complete(tracer, [*declared, *(surface for surface, _ in watched)])
+        new = tuple((order[surface], orientation) for surface, orientation in watched)
+        return tuple(order[surface] for surface in declared), field, new
 
     def new_tracer(constants: ConstantsOfMotion | None, stand_ins: StandIns | None = None) -> Tracer:
         return Tracer(
@@ -173,6 +177,7 @@ def trace(
             parameters=dict(parameters or {}),
             states=states,
             max_paths=max_paths,
+            discrete=discrete,
             constants=constants,
             stand_ins=stand_ins,
         )

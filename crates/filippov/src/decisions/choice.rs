@@ -5,9 +5,16 @@ use crate::mode::Mode;
 use crate::options::NonUnique;
 use crate::status::{Stop, Warning, WarningCode};
 
-/// The mode that [`crate::Options::choices`] asks for at the next non-unique point.
-pub(super) fn asked<'a>(at: &Point<'_, '_, 'a>, notes: &Notes) -> Option<&'a Mode> {
-    at.policy.choices.get(notes.n_choices)
+/// The candidate that [`crate::Options::choices`] asks for at the next non-unique point: none inside if it is not among
+/// them, none at all if no choice is left.
+pub(super) fn asked<'c>(
+    at: &Point,
+    notes: &Notes,
+    candidates: &'c [Mode],
+) -> Option<Option<&'c Mode>> {
+    let choice = at.policy.choices.get(notes.n_choices)?;
+    let is_meant = |candidate: &&Mode| candidate.entries().starts_with(choice.entries());
+    Some(candidates.iter().find(is_meant))
 }
 
 /// The continuation that is taken among several: the one asked for; else `preferred`, or none at all if the
@@ -19,12 +26,11 @@ pub(super) fn choose(
     preferred: Mode,
     candidates: Vec<Mode>,
 ) -> Result<Mode, Stop> {
-    let asked = asked(at, notes);
+    let asked = asked(at, notes, &candidates);
     notes.n_choices += 1;
     notes.candidates.clone_from(&candidates);
     let chosen = match asked {
-        Some(asked) if candidates.contains(asked) => Some(asked.clone()),
-        Some(_) => None,
+        Some(asked) => asked.cloned(),
         None if at.policy.nonunique == NonUnique::Error => None,
         None => Some(preferred),
     };

@@ -11,7 +11,7 @@ use crate::motion::Guard;
 use crate::motion::{first_nonzero, normal_component, Leading};
 use crate::switching::Arrival as SurfaceArrival;
 use crate::system::dot;
-use crate::system::{eval_on_side, surfaces_that_matter};
+use crate::system::{eval_on_side, surfaces_that_matter, BothSides};
 use crate::tolerances::{AT_SIDE, SURFACE_NOISE};
 
 /// The surfaces among the functions of an event, in order.
@@ -195,6 +195,9 @@ pub(super) fn touch(
     };
     let mode = meeting.mode;
     if let (&[j], []) = (meeting.fresh, at.arrival.sliding) {
+        if is_pressed(at, mode, j)? {
+            return Ok(None);
+        }
         if let Some(leading) = goes_on_beyond(at, mode, j, vanishing)? {
             let beyond = mode.with(j, -mode.entries()[j]);
             let candidates = vec![mode.clone(), beyond.clone()];
@@ -218,6 +221,20 @@ pub(super) fn touch(
         }
     }
     Ok(Some(Ok(Next::new(mode.clone(), left))))
+}
+
+/// Where the motion in `mode` seems to touch a surface of higher relative degree: does its field push it onto the surface? Then it
+/// arrives, at a rate that is as small as rounding makes that of a touch.
+fn is_pressed(at: &Point, mode: &Mode, j: usize) -> Result<bool, FieldError> {
+    let Some(reduced) = at.system.reduced(&[j]) else {
+        return Ok(false);
+    };
+    let mut sides = BothSides::new(at.x.len(), mode.entries().len());
+    reduced.both_sides(j, &at.place(&mode.signs()), &mut sides)?;
+    Ok(match mode.entries()[j] {
+        side if side > 0 => sides.normal_plus < 0.0,
+        _ => sides.normal_minus > 0.0,
+    })
 }
 
 /// Where the motion in `mode` touches surface j: the first derivative of h along the field beyond, if that

@@ -7,6 +7,7 @@ use super::consistency::{bends, with_those_that_jump};
 use super::first_order::hidden_limit;
 use super::leave_by_rule::slides_by_rule;
 use super::point::{Decided, Notes, Point};
+use super::rest::stay_if_nothing_leaves;
 use super::rule::{How, Meeting};
 use super::viable::{survey, Survey};
 use crate::error::FieldError;
@@ -71,7 +72,14 @@ pub(super) fn decide_undecided(
     reason: Option<Undecided>,
 ) -> Result<Decided, FieldError> {
     notes.leaf = "germs";
-    Ok(match decide_by_germs(at, notes, meeting)? {
+    let found = decide_by_germs(at, notes, meeting)?;
+    if found.is_err() {
+        if let Some(stays) = stay_if_nothing_leaves(at, notes, meeting)? {
+            notes.leaf = "rest";
+            return Ok(Ok(stays));
+        }
+    }
+    Ok(match found {
         Ok(decided) => decided,
         Err(found) if !found.between.is_empty() => Err(Stop::SlidesAcrossJump {
             surfaces: meeting.surfaces.to_vec(),

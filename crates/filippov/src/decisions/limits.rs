@@ -14,8 +14,8 @@ use crate::switch::Switch;
 use crate::switching::admissible_within;
 use crate::system::dot;
 use crate::tolerances::{
-    ACCUMULATION_AGREEMENT, LONGEST_TURN, MOST_MEETING, NEAREST_ACCUMULATION, SURFACE_NOISE,
-    UNRESOLVED_FLIGHT,
+    ACCUMULATION_AGREEMENT, LONGEST_TURN, MOST_MEETING, NEAREST_ACCUMULATION, SLOWEST_EXTRAPOLATED,
+    SURFACE_NOISE, UNRESOLVED_FLIGHT,
 };
 
 /// The limit of accumulating switches or impacts.
@@ -30,11 +30,11 @@ pub(crate) struct Limit {
 
 impl Limit {
     /// The limit of the rest of a series of which the last four members are known, if the two quotients of intervals agree with
-    /// one another, and with `others`: the rest is geometric, up to a multiple of the square of the last interval.
-    fn of(turns: [&Switch; 4], others: &[f64], surfaces: Vec<usize>) -> Option<Limit> {
+    /// one another: the rest is geometric, up to a multiple of the square of the last interval.
+    fn of(turns: [&Switch; 4], surfaces: Vec<usize>) -> Option<Limit> {
         let [before, last] = [turns[2], turns[3]];
         let [a, b, c] = [1, 2, 3].map(|k| turns[k].t - turns[k - 1].t);
-        let ratio = shrinks_by(&[&[b / a, c / b], others].concat())?;
+        let ratio = shrinks_by([b / a, c / b])?;
         let share = ratio / (1.0 - ratio);
         let states = last.y_after.iter().zip(&before.y_after);
         Some(Limit {
@@ -46,12 +46,12 @@ impl Limit {
     }
 }
 
-/// The second of these ratios, if all lie between 0 and 1 and agree with it.
-fn shrinks_by(ratios: &[f64]) -> Option<f64> {
-    let ratio = ratios[1];
-    let near = ACCUMULATION_AGREEMENT * ratio.min(1.0 - ratio);
-    let agrees = |&r: &f64| r > 0.0 && r < 1.0 && (r - ratio).abs() <= near;
-    ratios.iter().all(agrees).then_some(ratio)
+/// The second of these ratios, if both lie between 0 and 1 and agree.
+fn shrinks_by([first, second]: [f64; 2]) -> Option<f64> {
+    let near = ACCUMULATION_AGREEMENT * second.min(1.0 - second);
+    let is_between = |r: f64| r > 0.0 && r < 1.0;
+    let agree = is_between(first) && is_between(second) && (first - second).abs() <= near;
+    agree.then_some(second)
 }
 
 /// Does a later switch repeat an earlier one?
@@ -63,22 +63,78 @@ fn repeats(a: &Switch, b: &Switch) -> bool {
 /// an intersection than the one before by the same ratio (`docs/theory/intersections.md`).
 pub(crate) fn limit_of_switches(at: &Point) -> Result<Option<Limit>, FieldError> {
     let switches = at.arrival.switches;
+    if let Some(limit) = limit_of_unresolved_flights(at)? {
+        return Ok(Some(limit));
+    }
     let Some(turn) = turn_of(switches) else {
         return Ok(None);
     };
     let last = switches.len() - 1;
     let turns = [3, 2, 1, 0].map(|k| &switches[last - k * turn]);
-    let Some(meeting) = meeting_of(&switches[last + 1 - turn..]) else {
+    let Some(meeting) = meeting_of(at, &switches[last + 1 - turn..]) else {
         return Ok(None);
     };
     let mut distances = [0.0; 3];
     for (found, switch) in distances.iter_mut().zip(&turns[1..]) {
         *found = distance(at, &meeting, switch)?;
     }
+    // Time and distance may shrink by different powers of one ratio, as they do where a field is a root of the distance.
     let [a, b, c] = distances;
-    let limit = Limit::of(turns, &[b / a, c / b], meeting);
+    let limit = shrinks_by([b / a, c / b]).and_then(|_| Limit::of(turns, meeting));
     let Some(mut limit) = limit.filter(|limit| c < reach(at.scale, at.x) && limit.t > at.t) else {
         return Ok(None);
+    };
+    project(at, &mut limit)?;
+    Ok(is_on_all(at, &limit)?.then_some(limit))
+}
+
+/// The limit of crossings of one surface, to and fro, or of impacts there, at rates that shrink, where the last flight between
+/// two of them was shorter than the tolerance. Further flights would be rounding and error: they are as a geometric series
+/// would have them.
+pub(crate) fn limit_of_unresolved_flights(at: &Point) -> Result<Option<Limit>, FieldError> {
+    let [.., first, middle, last] = at.arrival.switches else {
+        return Ok(None);
+    };
+    let &[j] = &last.surfaces[..] else {
+        return Ok(None);
+    };
+    let is_same = |s: &&Switch| s.kind == last.kind && s.surfaces == last.surfaces;
+    if !matches!(last.kind, Kind::Crossing | Kind::Reset) || ![first, middle].iter().all(is_same) {
+        return Ok(None);
+    }
+    let Some(reduced) = at.system.reduced(&[j]) else {
+        return Ok(None);
+    };
+    let mut h = vec![0.0; at.system.n_surfaces()];
+    let mut rate = |s: &Switch| -> Result<f64, FieldError> {
+        let signs = s.mode_after.signs();
+        reduced.surfaces(&at.place_at(s.t, &s.y_after, &signs), &mut h)?;
+        Ok(h[j].abs())
+    };
+    let rates = [rate(first)?, rate(middle)?, rate(last)?];
+    let (a, b) = (middle.t - first.t, last.t - middle.t);
+    let mut gradient = vec![0.0; at.x.len()];
+    at.system
+        .gradient(j, &at.place(at.arrival.signs), &mut gradient)?;
+    let is_unresolved = rates[1] * b <= at.scale.along(&gradient, at.x);
+    let shrinks = rates[1] < rates[0] && rates[2] < rates[1] && b < a;
+    if !(is_unresolved && shrinks) {
+        return Ok(None);
+    }
+    reduced.gradient(j, &at.place(at.arrival.signs), &mut gradient)?;
+    let share = if rates[2] <= at.scale.along(&gradient, at.x) {
+        0.0
+    } else if b < SLOWEST_EXTRAPOLATED * a {
+        b / (a - b)
+    } else {
+        return Ok(None);
+    };
+    let states = last.y_after.iter().zip(&middle.y_after);
+    let mut limit = Limit {
+        t: last.t + share * b,
+        x: states.map(|(y, before)| y + share * (y - before)).collect(),
+        surfaces: vec![j],
+        is_rest: false,
     };
     project(at, &mut limit)?;
     Ok(is_on_all(at, &limit)?.then_some(limit))
@@ -124,9 +180,7 @@ pub(crate) fn limits_of_impacts(
         s.kind == last.kind && s.surfaces == last.surfaces && s.mode_after == last.mode_after
     };
     let series = match earlier {
-        [.., a, b, c] if [a, b, c].into_iter().all(same) => {
-            Limit::of([a, b, c, last], &[], vec![j])
-        }
+        [.., a, b, c] if [a, b, c].into_iter().all(same) => Limit::of([a, b, c, last], vec![j]),
         _ => None,
     };
     let here = is_unresolved.then(|| Limit {
@@ -150,27 +204,25 @@ pub(crate) fn limits_of_impacts(
 /// Moves the state of a limit onto its surfaces.
 fn project(at: &Point, limit: &mut Limit) -> Result<(), FieldError> {
     let mut projector = Projector::new(limit.x.len(), at.system.n_surfaces());
-    let signs = at.arrival.signs;
-    projector.project_onto(
-        at.system,
-        &limit.surfaces,
-        limit.t,
-        &mut limit.x,
-        at.setting(signs),
-    )
+    let setting = at.setting(at.arrival.signs);
+    for system in [Some(at.system), at.system.reduced(&limit.surfaces)] {
+        let Some(system) = system else { continue };
+        projector.project_onto(system, &limit.surfaces, limit.t, &mut limit.x, setting)?;
+    }
+    Ok(())
 }
 
 /// Do the surfaces meet at the limit? Three lines in a plane need not.
 fn is_on_all(at: &Point, limit: &Limit) -> Result<bool, FieldError> {
-    let (signs, mut h) = (at.arrival.signs, vec![0.0; at.system.n_surfaces()]);
-    at.system
-        .surfaces(&at.place_at(limit.t, &limit.x, signs), &mut h)?;
-    for &j in &limit.surfaces {
-        let size = at
-            .system
-            .surface_size(j, &at.place_at(limit.t, &limit.x, signs))?;
-        if h[j].abs() > SURFACE_NOISE * size {
-            return Ok(false);
+    let mut h = vec![0.0; at.system.n_surfaces()];
+    let place = at.place_at(limit.t, &limit.x, at.arrival.signs);
+    for system in [Some(at.system), at.system.reduced(&limit.surfaces)] {
+        let Some(system) = system else { continue };
+        system.surfaces(&place, &mut h)?;
+        for &j in &limit.surfaces {
+            if h[j].abs() > SURFACE_NOISE * system.surface_size(j, &place)? {
+                return Ok(false);
+            }
         }
     }
     Ok(true)
@@ -182,7 +234,7 @@ pub(crate) fn limit_here(at: &Point, meeting: &[usize]) -> Result<Option<Limit>,
     let switches = at.arrival.switches.iter().rev();
     let mut now = switches.take_while(|s| s.t == at.t);
     let only_crosses = now.all(|s| s.kind == Kind::Crossing);
-    if !only_crosses || !(2..=MOST_MEETING).contains(&meeting.len()) {
+    if !only_crosses || !may_be_limit(at, meeting) {
         return Ok(None);
     }
     let mut limit = Limit {
@@ -201,9 +253,18 @@ pub(super) fn stay_at_limit(
     notes: &mut Notes,
     meeting: &Meeting,
 ) -> Result<Option<Decided>, FieldError> {
-    if meeting.how != How::Limit {
+    if meeting.how != How::Limit || meeting.surfaces.len() == 1 {
         return Ok(None);
     }
+    stay_on_all(at, notes, meeting)
+}
+
+/// The motion that stays on all surfaces of a meeting, if there is one; why it cannot be known.
+pub(super) fn stay_on_all(
+    at: &Point,
+    notes: &mut Notes,
+    meeting: &Meeting,
+) -> Result<Option<Decided>, FieldError> {
     let (mode, meeting) = (meeting.mode, meeting.surfaces);
     let fields = at.corners(notes, meeting, mode)?;
     let telling = fields.telling();
@@ -258,23 +319,31 @@ fn stays_tangent(
     Ok(later.telling() == telling)
 }
 
-/// Distance of a switch to the intersection, h_j in units of its gradient.
+/// Distance of a switch to the intersection, h_j in units of its gradient, and the same of the rates that vanish there.
 fn distance(at: &Point, meeting: &[usize], switch: &Switch) -> Result<f64, FieldError> {
     let (signs, n) = (switch.mode_after.signs(), switch.y_after.len());
     let mut h = vec![0.0; at.system.n_surfaces()];
     let mut gradient = vec![0.0; n];
-    at.system
-        .surfaces(&at.place_at(switch.t, &switch.y_after, &signs), &mut h)?;
+    let place = at.place_at(switch.t, &switch.y_after, &signs);
     let mut square = 0.0;
-    for &j in meeting {
-        at.system.gradient(
-            j,
-            &at.place_at(switch.t, &switch.y_after, &signs),
-            &mut gradient,
-        )?;
-        square += h[j] * h[j] / dot(&gradient, &gradient);
+    for system in [Some(at.system), at.system.reduced(meeting)] {
+        let Some(system) = system else { continue };
+        system.surfaces(&place, &mut h)?;
+        for &j in meeting {
+            system.gradient(j, &place, &mut gradient)?;
+            square += h[j] * h[j] / dot(&gradient, &gradient);
+        }
     }
     Ok(square.sqrt())
+}
+
+/// Can switches of these surfaces accumulate where all of them meet? At one alone they can if its rate vanishes there too.
+fn may_be_limit(at: &Point, meeting: &[usize]) -> bool {
+    match meeting.len() {
+        0 => false,
+        1 => at.system.reduced(meeting).is_some(),
+        n => n <= MOST_MEETING,
+    }
 }
 
 /// Triggers that a jump to a limit passed.
@@ -344,8 +413,8 @@ fn turn_of(switches: &[Switch]) -> Option<usize> {
     (again(2) && again(3)).then_some(turn)
 }
 
-/// The surfaces of a turn, with those slid on all along; at least two, and not too many.
-fn meeting_of(turn: &[Switch]) -> Option<Vec<usize>> {
+/// The surfaces of a turn, with those slid on all along, if switches can accumulate there.
+fn meeting_of(at: &Point, turn: &[Switch]) -> Option<Vec<usize>> {
     let mut meeting: Vec<usize> = turn
         .iter()
         .flat_map(|s| s.surfaces.iter().copied())
@@ -355,9 +424,7 @@ fn meeting_of(turn: &[Switch]) -> Option<Vec<usize>> {
     meeting.extend(always.filter(|&j| rest.iter().all(|s| s.mode_after.entries()[j] == 0)));
     meeting.sort_unstable();
     meeting.dedup();
-    (2..=MOST_MEETING)
-        .contains(&meeting.len())
-        .then_some(meeting)
+    may_be_limit(at, &meeting).then_some(meeting)
 }
 
 #[cfg(test)]
@@ -366,11 +433,11 @@ mod tests {
 
     #[test]
     fn ratios_that_agree_are_a_limit() {
-        assert_eq!(shrinks_by(&[0.5, 0.51, 0.49]), Some(0.51));
-        assert_eq!(shrinks_by(&[0.5, 0.56]), None, "uneven");
-        assert_eq!(shrinks_by(&[1.1, 1.1]), None, "growing");
-        assert_eq!(shrinks_by(&[0.98, 0.981]), Some(0.981));
-        assert_eq!(shrinks_by(&[0.97, 0.98]), None, "the sum is not known");
-        assert_eq!(shrinks_by(&[f64::NAN, 0.5]), None);
+        assert_eq!(shrinks_by([0.5, 0.51]), Some(0.51));
+        assert_eq!(shrinks_by([0.5, 0.56]), None, "uneven");
+        assert_eq!(shrinks_by([1.1, 1.1]), None, "growing");
+        assert_eq!(shrinks_by([0.98, 0.981]), Some(0.981));
+        assert_eq!(shrinks_by([0.97, 0.98]), None, "the sum is not known");
+        assert_eq!(shrinks_by([f64::NAN, 0.5]), None);
     }
 }

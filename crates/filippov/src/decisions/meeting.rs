@@ -80,7 +80,7 @@ fn follow(
         candidates.extend(mode.filter(|mode| !candidates.contains(mode)));
     }
     let is_spiral = resolution.chosen == Continuation::OutwardSpiral;
-    let asked = asked(at, notes).filter(|asked| candidates.contains(asked));
+    let asked = asked(at, notes, &candidates).flatten();
     let (mut after, leap) = match &resolution.chosen {
         Continuation::Mode(chosen) => (on_all(chosen), None),
         Continuation::OutwardSpiral => match asked {

@@ -26,6 +26,7 @@ mod one_surface;
 mod placement;
 mod point;
 mod relay;
+mod rest;
 mod resting;
 pub(crate) mod root_ends;
 mod rule;

@@ -404,6 +404,8 @@ pub(crate) struct Start {
     pub is_located: bool,
     /// On one surface, the motion that slides from a two-fold.
     pub two_fold: Option<TwoFoldMotion>,
+    /// No motion leaves the point: the state stays as it is.
+    pub is_rest: bool,
     /// The motion begins with the laps of an outward spiral.
     pub leap: Option<Leap>,
     /// The state, where that is not the place of the decision.

@@ -2,7 +2,8 @@
 
 use crate::action::{identity, Instant};
 use crate::decisions::limits::{
-    limit_here, limit_of_switches, limits_of_impacts, passed_beside, Limit, Passed,
+    limit_here, limit_of_switches, limit_of_unresolved_flights, limits_of_impacts, passed_beside,
+    Limit, Passed,
 };
 use crate::decisions::{
     add_vanishing_surfaces, decide, differs_between_sides, end_of_sliding, goes_through, landing,
@@ -117,7 +118,8 @@ impl<'a> Integrator<'a> {
             vanishing: event.multiple.vanishing,
             at_two_fold,
         };
-        if let (&[j], true) = (self.run.motion.sliding(), n_ends > 0) {
+        let is_first_order = matches!(self.run.motion.field, ModeField::Sliding(_));
+        if let (&[j], true) = (self.run.motion.sliding(), n_ends > 0 && is_first_order) {
             let speed = self.stepper.end_derivative().iter();
             let speed = speed.fold(0.0_f64, |most, v| most.max(v.abs()));
             let may_lose = self.run.may_lose_multiplier(speed);
@@ -188,8 +190,9 @@ impl<'a> Integrator<'a> {
         }
         self.record(before, next.mode.clone(), &concerned, rule.name())?;
         if !matches!(rule, Rule::Touch | Rule::Contact | Rule::Triggers) {
-            // One surface meets no other.
-            if self.run.system.n_surfaces() > 1 {
+            // One surface meets no other, but perhaps its rate.
+            let is_of_higher_degree = |j: usize| self.run.system.reduced(&[j]).is_some();
+            if self.run.system.n_surfaces() > 1 || is_of_higher_degree(0) {
                 let limit = self.ask(Cause::Start, |at, _| limit_of_switches(at))?;
                 if let Some(limit) = limit.filter(|limit| limit.t <= self.horizon) {
                     return self.jump_to(limit, next.mode);
@@ -287,6 +290,9 @@ impl<'a> Integrator<'a> {
         let zeros = left.iter().filter_map(|left| left.deflation(t));
         let zeros: SmallVec<[_; 2]> = zeros.collect();
         self.run.motion.restart(self.run.system, t, mode, &zeros);
+        if start.as_ref().is_some_and(|start| start.is_rest) {
+            self.run.motion.rest(self.run.system);
+        }
         let zeros = self.run.motion.monitored.iter_mut();
         for zero in zeros.filter_map(|m| m.deflation.as_mut()) {
             zero.is_clean = !slid;
@@ -698,6 +704,10 @@ impl<'a> Integrator<'a> {
         let mut limits = limits.into_iter().flatten();
         if let Some(rest) = limits.find(|limit| limit.t <= self.horizon) {
             return self.jump_to(rest, next.mode);
+        }
+        let limit = self.ask(Cause::Start, |at, _| limit_of_unresolved_flights(at))?;
+        if let Some(limit) = limit.filter(|limit| limit.t <= self.horizon) {
+            return self.jump_to(limit, next.mode);
         }
         let t = self.run.t;
         let stop = self.begin(next, &Multiple::default())?;

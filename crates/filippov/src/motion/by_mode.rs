@@ -4,7 +4,10 @@ use std::ops::{Deref, DerefMut};
 
 use smallvec::SmallVec;
 
-use super::{ContactField, IntersectionField, Motion, RegionField, SlidingField, SmoothField};
+use super::{
+    ContactField, IntersectionField, Motion, ReducedField, RegionField, RestField, SlidingField,
+    SmoothField,
+};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::options::{Options, SlidingRule};
@@ -16,6 +19,8 @@ pub(crate) enum ModeField<'a> {
     Sliding(Box<SlidingField<'a>>),
     Intersection(Box<IntersectionField<'a>>),
     Contact(Box<ContactField<'a>>),
+    Reduced(Box<ReducedField<'a>>),
+    Rest(RestField),
 }
 
 /// How a motion slides where several surfaces meet.
@@ -71,6 +76,9 @@ impl<'a> ModeField<'a> {
         sliding: &[usize],
         setting: Setting<'_>,
     ) -> Self {
+        if let Some(field) = ReducedField::new(system, law, sliding, setting) {
+            return ModeField::Reduced(Box::new(field));
+        }
         match *sliding {
             [] => ModeField::Region(RegionField::new(system, setting)),
             [j] => {
@@ -104,6 +112,8 @@ impl ModeField<'_> {
             ModeField::Sliding(field) => field.set_discrete(q),
             ModeField::Intersection(field) => field.set_discrete(q),
             ModeField::Contact(field) => field.set_discrete(q),
+            ModeField::Reduced(field) => field.set_discrete(q),
+            ModeField::Rest(_) => {}
         }
     }
 }
@@ -118,6 +128,8 @@ impl<'a> Deref for ModeField<'a> {
             ModeField::Sliding(field) => &**field,
             ModeField::Intersection(field) => &**field,
             ModeField::Contact(field) => &**field,
+            ModeField::Reduced(field) => &**field,
+            ModeField::Rest(field) => field,
         }
     }
 }
@@ -130,6 +142,8 @@ impl DerefMut for ModeField<'_> {
             ModeField::Sliding(field) => &mut **field,
             ModeField::Intersection(field) => &mut **field,
             ModeField::Contact(field) => &mut **field,
+            ModeField::Reduced(field) => &mut **field,
+            ModeField::Rest(field) => field,
         }
     }
 }

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use smallvec::SmallVec;
 
 use super::{
-    AffineBounds, ContactField, Deflation, Guard, Law, ModeField, Monitored, SlidingSet, Triggers,
+    AffineBounds, ContactField, Deflation, Guard, Law, ModeField, Monitored, RestField, SlidingSet,
+    Triggers,
 };
 use crate::error::FieldError;
 use crate::mode::{Mode, Signs};
@@ -145,6 +146,10 @@ impl<'a> CurrentMotion<'a> {
             }
         }
         let setting = Setting::new(&self.signs, &self.discrete);
+        if !sliding.is_empty() && system.reduced(sliding).is_some() {
+            let field = ModeField::new(system, self.law, sliding, setting);
+            return self.replace_field(field);
+        }
         if self.field.restart(sliding, setting) {
             return;
         }
@@ -272,7 +277,7 @@ impl<'a> CurrentMotion<'a> {
 
     /// Do bounds of the multipliers hold for the exit functions?
     pub fn has_bounds(&self) -> bool {
-        !self.is_in_contact() && !self.sticks
+        !self.is_in_contact() && !self.is_of_higher_order() && !self.is_at_rest() && !self.sticks
     }
 
     /// Is it drawn back to the surfaces slid on, and not projected?
@@ -283,7 +288,7 @@ impl<'a> CurrentMotion<'a> {
     /// Is its field the multilinear combination of the fields around the surfaces slid on?
     pub fn has_canopy_field(&self) -> bool {
         match &self.field {
-            ModeField::Contact(_) => false,
+            ModeField::Contact(_) | ModeField::Reduced(_) | ModeField::Rest(_) => false,
             ModeField::Intersection(field) => field.rule() == SlidingRule::Canopy,
             ModeField::Region(_) | ModeField::Sliding(_) => true,
         }
@@ -304,9 +309,36 @@ impl<'a> CurrentMotion<'a> {
         matches!(self.field, ModeField::Contact(_))
     }
 
+    /// The system whose normal components end it: a reduced one on a surface of higher relative degree.
+    #[inline]
+    pub fn sliding_system(&self, system: &'a dyn PiecewiseSystem) -> &'a dyn PiecewiseSystem {
+        match &self.field {
+            ModeField::Reduced(field) => field.innermost(),
+            _ => system,
+        }
+    }
+
+    /// Rests in its mode from now on.
+    pub fn rest(&mut self, system: &dyn PiecewiseSystem) {
+        let field = ModeField::Rest(RestField::new(self.sliding.len()));
+        self.replace_field(field);
+        self.find_monitored(system, &[]);
+    }
+
+    /// Does it rest?
+    pub fn is_at_rest(&self) -> bool {
+        matches!(self.field, ModeField::Rest(_))
+    }
+
+    /// Does it slide on a surface of higher relative degree?
+    pub fn is_of_higher_order(&self) -> bool {
+        matches!(self.field, ModeField::Reduced(_))
+    }
+
     /// Does a guard end sliding on several surfaces, or contact?
     pub fn ends_root(&self, m: &Monitored) -> bool {
-        !m.guard.is_surface() && !matches!(self.field, ModeField::Sliding(_))
+        let is_one = self.sliding.len() == 1 && !self.is_in_contact();
+        !m.guard.is_surface() && !is_one
     }
 
     /// Bounds of the multipliers, if there are any.

@@ -68,6 +68,7 @@ impl Piece {
                 return Ok(self.with_signs(system, (t, &y), multipliers, contacts));
             }
         }
+        let system = system.reduced(&set).unwrap_or(system);
         let signs = mode.signs();
         let setting = Setting::new(&signs, q);
         let multipliers = match set.as_slice() {

@@ -152,7 +152,11 @@ impl Solution {
         if mode.codimension() > 0 && self.is_projected {
             let (set, signs) = (mode.sliding_set().collect::<Vec<_>>(), mode.signs());
             let setting = Setting::new(&signs, discrete);
-            Projector::new(n, system.n_surfaces()).project_onto(system, &set, t, y, setting)?;
+            let mut projector = Projector::new(n, system.n_surfaces());
+            projector.project_onto(system, &set, t, y, setting)?;
+            if let Some(reduced) = system.reduced(&set) {
+                projector.project_onto(reduced, &set, t, y, setting)?;
+            }
         }
         Ok(Some(mode))
     }

@@ -14,6 +14,7 @@ use super::affine_model::AffineModel;
 use super::both_sides::stretched;
 use super::jacobian::MotionJacobian;
 use super::jets::MotionJets;
+use super::reduction::{reduced, relative_degree};
 use super::tiered::{compile, Tiered, TieredProgram};
 use super::Word;
 
@@ -63,6 +64,9 @@ pub(super) struct Model {
     jacobians: Mutex<JacobianCache>,
     /// Active surfaces of the modes met so far; a zero entry is the surface slid on.
     activity: Mutex<FxHashMap<Entries, Vec<bool>>>,
+    relative_degrees: Vec<OnceLock<usize>>,
+    /// What is left of the system on surfaces of higher relative degree, by surfaces slid on.
+    reductions: Mutex<FxHashMap<SmallVec<[usize; 2]>, Option<Arc<Model>>>>,
     /// Whether something jumps at a surface, by surface and mode; found only where a function is zero along a motion.
     jumps: Mutex<FxHashMap<(usize, Entries), bool>>,
 }
@@ -155,6 +159,8 @@ impl Model {
             jacobians: Mutex::default(),
             activity: Mutex::default(),
             jumps: Mutex::default(),
+            relative_degrees: surfaces.iter().map(|_| OnceLock::new()).collect(),
+            reductions: Mutex::default(),
             rates_program: OnceLock::new(),
             affine_signs: OnceLock::new(),
             field_program,
@@ -164,6 +170,33 @@ impl Model {
             names,
             backend,
         })
+    }
+
+    /// Does one of these surfaces have a higher relative degree than 1?
+    pub fn is_reducible(&self, surfaces: &[usize]) -> bool {
+        surfaces.iter().any(|&j| {
+            let find = || relative_degree(&self.graph, &self.field, j);
+            *self.relative_degrees[j].get_or_init(find) > 1
+        })
+    }
+
+    /// What is left of the system where a motion slides on these surfaces, if one of them has a higher relative degree.
+    pub fn reduced(&self, surfaces: &[usize]) -> Option<Arc<Model>> {
+        let mut known = self
+            .reductions
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        let made = known.entry(SmallVec::from_slice(surfaces));
+        made.or_insert_with(|| {
+            let (graph, field) = reduced(&self.graph, &self.field, surfaces)?;
+            let model = Model::new(graph, field, self.names.clone(), self.backend);
+            let mut model = model.ok()?;
+            let ratios: Vec<_> = self.ratios.iter().map(|(&j, &node)| (j, node)).collect();
+            model.stick(&ratios);
+            model.watch(&self.watched);
+            Some(Arc::new(model))
+        })
+        .clone()
     }
 
     /// Gives surfaces a ratio of static to kinetic friction.

@@ -23,6 +23,7 @@ const SIGN: u8 = 4;
 const PIECE: u8 = 5;
 const ENTRY: u8 = 6;
 const PLACE: u8 = 7;
+const NAMED: u8 = 8;
 
 impl Definition {
     /// Writes the definition as the next sections of a container.
@@ -121,13 +122,14 @@ fn write_law(writer: &mut Writer, law: &Law) {
         },
         Law::Piece { .. } => PIECE,
         Law::Hysteresis { .. } => HYSTERESIS,
+        Law::Named { .. } => NAMED,
     };
     writer.byte(kind);
     for node in law.nodes() {
         writer.number(node.index());
     }
     match law {
-        Law::Clock { .. } => {}
+        Law::Clock { .. } | Law::Named { .. } => {}
         Law::Level {
             surface,
             orientation,
@@ -179,6 +181,9 @@ fn read_law(section: &mut Section, made: &[NodeId]) -> Result<Law, ExprError> {
             thresholds: [node(section, made)?, node(section, made)?],
             initial: section.float()?,
             guard: section.number()? as usize,
+        },
+        NAMED => Law::Named {
+            initial: node(section, made)?,
         },
         kind => Law::Held {
             argument: node(section, made)?,

@@ -2,8 +2,9 @@
 //! compiled.
 
 use filippov_expr::container::{Container, Tag, Writer};
-use filippov_expr::{Backend, Graph, Lengths, Names, NodeId};
+use filippov_expr::{Backend, Graph, Lengths, Names, Node, NodeId};
 
+use super::laws::n_named;
 use super::{Law, Laws, PiecewiseSystem, Step, TracedSystem};
 use crate::error::Error;
 
@@ -69,6 +70,21 @@ impl Definition {
     pub fn n_parameters(&self) -> usize {
         let n_laws = self.rules.laws.len();
         self.names.parameters.len().saturating_sub(n_laws)
+    }
+
+    /// How many surfaces a user sees. Those of laws come after them, and before these those that no motion crosses.
+    pub fn n_visible(&self) -> usize {
+        let n_moving = self.graph.n_surfaces() - self.rules.n_hidden;
+        let is_seen = |&j: &usize| {
+            let function = self.graph.surface(j as u32);
+            self.graph.depends_on_motion(function) || self.rules.watched.contains(&j)
+        };
+        (0..n_moving).rev().find(is_seen).map_or(0, |last| last + 1)
+    }
+
+    /// How many discrete states are named; the map of an action changes them with the states.
+    pub fn n_named(&self) -> usize {
+        n_named(&self.rules.laws)
     }
 
     /// The definition as a container. Equal definitions give equal bytes.
@@ -180,6 +196,15 @@ impl Definition {
                 let reads = graph.depends_on_parameters_from(argument, self.n_parameters() as u32);
                 if reads || graph.depends_on_state(argument) || !graph.is_affine(argument) {
                     return inconsistent("a clock whose argument is not affine in t alone");
+                }
+            }
+            Law::Named { initial } => {
+                let is_number =
+                    matches!(graph.node(initial), Node::Parameter(_) | Node::Constant(_));
+                if !is_number || index >= self.n_named() {
+                    return inconsistent(
+                        "a named discrete state that does not begin as a parameter, or behind a law",
+                    );
                 }
             }
             Law::Held { argument, .. } => {

@@ -7,6 +7,7 @@
 //! | held | a step function of a g that no motion changes | the state, or another discrete state, jumps |
 //! | hysteresis | +1 above `high`, -1 below `low`, between them as it was | h reaches `high` at -1, `low` at +1 |
 //! | piece | how many knots of a table are not above g | g reaches a knot: known times if g is affine in t |
+//! | named | g at the start, then as it was set | an action of the user sets it |
 //!
 //! The step functions are the floor, the sign (-1, 0 or +1), the place among the knots of a table, and the entry of a
 //! list. So a table is a polynomial whose coefficients are entries at its piece.
@@ -59,6 +60,11 @@ pub enum Law {
         knots: Arc<[f64]>,
         /// The surface that is positive between the knots around g; none if g is affine in t and contains no state.
         guard: Option<usize>,
+    },
+    /// A number that has a name of its own and that actions of the user set. These laws come before all others.
+    Named {
+        /// Its value at the start.
+        initial: NodeId,
     },
     /// A relay with two thresholds.
     Hysteresis {
@@ -117,7 +123,8 @@ impl Law {
             Law::Clock { argument }
             | Law::Level { argument, .. }
             | Law::Held { argument, .. }
-            | Law::Piece { argument, .. } => smallvec![argument],
+            | Law::Piece { argument, .. }
+            | Law::Named { initial: argument } => smallvec![argument],
             Law::Hysteresis {
                 argument,
                 thresholds: [low, high],
@@ -137,7 +144,8 @@ impl Law {
             } => [argument, graph.partial(argument, Wrt::Time), argument],
             Law::Level { argument, .. }
             | Law::Piece { argument, .. }
-            | Law::Held { argument, .. } => [argument; 3],
+            | Law::Held { argument, .. }
+            | Law::Named { initial: argument } => [argument; 3],
             Law::Hysteresis {
                 argument,
                 thresholds: [low, high],
@@ -154,6 +162,8 @@ pub struct Laws {
     program: Option<Program>,
     /// The parameter that the argument of a law is, if it is one.
     reads: Vec<Option<usize>>,
+    /// So many of the first are named.
+    n_named: usize,
 }
 
 /// What triggers a change of a discrete state, what it does, and how it is recorded.
@@ -201,6 +211,7 @@ impl Laws {
         });
         Ok(Laws {
             reads: reads.collect(),
+            n_named: n_named(&laws),
             laws,
             program,
         })
@@ -209,6 +220,11 @@ impl Laws {
     /// The laws.
     pub fn list(&self) -> &[Law] {
         &self.laws
+    }
+
+    /// How many discrete states are named: the first ones.
+    pub fn n_named(&self) -> usize {
+        self.n_named
     }
 
     fn eval(&self, t: f64, x: &[f64], signs: &[f64], parameters: &[f64], q: &[f64]) -> Vec<f64> {
@@ -245,6 +261,7 @@ impl Laws {
                     } => passed(knots, values[0], values[1]),
                     Law::Piece { knots, .. } => passed(knots, values[0], 1.0),
                     Law::Held { step, .. } => step.at(values[0]),
+                    Law::Named { .. } => values[0],
                     Law::Hysteresis { initial, .. } => relay(values, *initial),
                 };
             }
@@ -261,14 +278,18 @@ impl Laws {
     /// The actions that change the discrete states in a run with these parameters.
     pub fn actions(self: &Arc<Self>, n_states: usize, parameters: &[f64]) -> Vec<LawAction> {
         let mut actions = Vec::new();
-        // What reads one discrete state alone is brought up to date with that.
-        let follows_jumps = |(index, law): (usize, &Law)| {
-            matches!(law, Law::Held { .. }) && self.reads[index].is_none()
+        // What reads one discrete state of a law alone is brought up to date with that.
+        let follows_law = |index: usize| {
+            let read = self.reads[index].and_then(|p| p.checked_sub(parameters.len()));
+            read.is_some_and(|read| read >= self.n_named)
         };
+        let follows_jumps =
+            |(index, law): (usize, &Law)| matches!(law, Law::Held { .. }) && !follows_law(index);
         let first_held = self.laws.iter().enumerate().position(follows_jumps);
         for (index, law) in self.laws.iter().enumerate() {
             let mut step = 0.0;
             let (trigger, kind) = match *law {
+                Law::Named { .. } => continue,
                 // One action brings all of them up to date.
                 Law::Held { .. } => match Some(index) == first_held {
                     true => (Trigger::Jump, None),
@@ -363,6 +384,12 @@ impl Ticking {
     }
 }
 
+/// How many of the laws are named.
+pub(crate) fn n_named(laws: &[Law]) -> usize {
+    let is_named = |law: &&Law| matches!(law, Law::Named { .. });
+    laws.iter().filter(is_named).count()
+}
+
 /// How many knots are not above g, which moves in the direction of `rate`; one within rounding of g has been passed.
 fn passed(knots: &[f64], g: f64, rate: f64) -> f64 {
     let beside = WHOLE_NUMBER * (1.0 + g.abs()) * if rate < 0.0 { -1.0 } else { 1.0 };
@@ -432,7 +459,7 @@ impl ActionMap for LawMap {
         match &self.laws.laws[index] {
             Law::Clock { .. } => q[index] += self.step,
             Law::Hysteresis { .. } => q[index] = -q[index],
-            Law::Held { .. } => {}
+            Law::Held { .. } | Law::Named { .. } => {}
             Law::Piece { knots, guard, .. } => {
                 let out = self.laws.eval(t, x, signs, &self.parameters, q);
                 let g = out[3 * index];

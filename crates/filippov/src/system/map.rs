@@ -9,7 +9,8 @@ use crate::error::FieldError;
 use crate::system::ActionMap;
 
 /// A map x -> x+ given by expressions in (t, x, p): those of the field of a [`TracedSystem`]. Switching functions in
-/// them are evaluated at the state before.
+/// them are evaluated at the state before. If there are more expressions than states, the others are those of the
+/// named discrete states, which count as states here: (x, q) -> (x+, q+).
 pub struct TracedMap {
     expressions: TracedSystem,
     derivative: OnceLock<Option<Program>>,
@@ -22,6 +23,12 @@ impl TracedMap {
             expressions,
             derivative: OnceLock::new(),
         }
+    }
+
+    /// The states, with the named discrete states behind them if the map changes these.
+    fn with_named(&self, x: &[f64], q: &[f64]) -> Vec<f64> {
+        let n_named = self.expressions.n_states().saturating_sub(x.len());
+        x.iter().chain(q.iter().take(n_named)).copied().collect()
     }
 
     /// The sides on which a state is.
@@ -61,10 +68,16 @@ impl TracedMap {
 }
 
 impl ActionMap for TracedMap {
-    fn apply(&self, t: f64, x: &mut [f64], _: &[f64], _: &mut [f64]) -> Result<(), FieldError> {
-        let signs = self.signs(t, x)?;
-        let before = x.to_vec();
-        self.expressions.field(&Place::new(t, &before, &signs), x)
+    fn apply(&self, t: f64, x: &mut [f64], _: &[f64], q: &mut [f64]) -> Result<(), FieldError> {
+        let before = self.with_named(x, q);
+        let mut after = before.clone();
+        let signs = self.signs(t, &before)?;
+        let place = Place::new(t, &before, &signs);
+        self.expressions.field(&place, &mut after)?;
+        let (states, named) = after.split_at(x.len());
+        x.copy_from_slice(states);
+        q.iter_mut().zip(named).for_each(|(q, new)| *q = *new);
+        Ok(())
     }
 
     fn impulse(
@@ -73,17 +86,22 @@ impl ActionMap for TracedMap {
         x: &[f64],
         along: &[f64],
         _: &[f64],
-        _: &[f64],
+        q: &[f64],
         impulse: &mut [f64],
     ) -> Result<(), FieldError> {
-        let signs = self.signs(t, x)?;
-        match self.derivative() {
-            Some(program) => {
-                self.expressions
-                    .eval(program, &Place::new(t, x, &signs), along, impulse)
-            }
-            None => impulse.fill(f64::NAN),
-        }
+        let Some(program) = self.derivative() else {
+            impulse.fill(f64::NAN);
+            return Ok(());
+        };
+        let before = self.with_named(x, q);
+        let signs = self.signs(t, &before)?;
+        let (mut direction, mut change) = (before.clone(), before.clone());
+        direction.fill(0.0);
+        direction[..x.len()].copy_from_slice(along);
+        let place = Place::new(t, &before, &signs);
+        self.expressions
+            .eval(program, &place, &direction, &mut change);
+        impulse.copy_from_slice(&change[..x.len()]);
         Ok(())
     }
 }

@@ -28,6 +28,7 @@ mod linearisation;
 mod linearisations;
 mod map;
 mod place;
+mod reduction;
 mod sign_structure;
 mod taylor_series;
 mod tiered;
@@ -217,6 +218,18 @@ pub trait PiecewiseSystem: SignStructure + Sync {
 
     /// The derivatives of its motions by states and multipliers; if there are none, they are found by differences.
     fn linearisations(&self) -> Option<&dyn Linearisations> {
+        None
+    }
+
+    /// Do field or switching functions contain the time? Yes if nothing is known.
+    fn depends_on_time(&self) -> bool {
+        true
+    }
+
+    /// The system of the motions that stay on these surfaces, if both fields cross one of them at the same rate all over it: this
+    /// rate is in the place of its switching function there, and the field is that on the surfaces. `None` if a motion
+    /// that slides on them is one of this system.
+    fn reduced(&self, _surfaces: &[usize]) -> Option<&dyn PiecewiseSystem> {
         None
     }
 

@@ -10,6 +10,7 @@ use filippov_expr::{Backend, Enclosure, ExprError, Graph, Motion, Names, NodeId,
 use smallvec::SmallVec;
 
 use super::compiled::Model;
+use super::reduction::Reductions;
 use super::{
     AffineSigns, BothSides, Enclosures, LieDerivatives, LieValue, Linearisations, MotionJacobian,
     MotionJets, PiecewiseSystem, Place, RatePartials, Setting, SignStructure, TaylorSeries, Word,
@@ -36,6 +37,7 @@ pub struct TracedSystem {
     parameters: Vec<f64>,
     /// How many discrete states the functions read, behind the parameters.
     n_discrete: usize,
+    reductions: Reductions,
 }
 
 impl TracedSystem {
@@ -55,6 +57,7 @@ impl TracedSystem {
             model: Arc::new(model),
             parameters,
             n_discrete: 0,
+            reductions: Reductions::default(),
         })
     }
 
@@ -92,6 +95,17 @@ impl TracedSystem {
             model: Arc::clone(&self.model),
             parameters,
             n_discrete: self.n_discrete,
+            reductions: Reductions::default(),
+        }
+    }
+
+    /// The system of another model with these values of the same parameters.
+    pub(super) fn with_model(&self, model: Arc<Model>) -> Self {
+        TracedSystem {
+            model,
+            parameters: self.parameters.clone(),
+            n_discrete: self.n_discrete,
+            reductions: Reductions::default(),
         }
     }
 
@@ -345,6 +359,22 @@ impl PiecewiseSystem for TracedSystem {
 
     fn linearisations(&self) -> Option<&dyn Linearisations> {
         Some(self)
+    }
+
+    fn depends_on_time(&self) -> bool {
+        let graph = &self.model.graph;
+        let surfaces = (0..graph.n_surfaces()).map(|j| graph.surface(j as u32));
+        let all: Vec<NodeId> = surfaces.chain(self.model.field.iter().copied()).collect();
+        graph.depends_on_time(&all)
+    }
+
+    fn reduced(&self, surfaces: &[usize]) -> Option<&dyn PiecewiseSystem> {
+        if !self.model.is_reducible(surfaces) {
+            return None;
+        }
+        let find = || self.model.reduced(surfaces);
+        let reduced = self.reductions.get_or_make(surfaces, self, find);
+        reduced.map(|system| system as _)
     }
 
     fn surface_name(&self, j: usize) -> String {

@@ -132,6 +132,18 @@ pub const SPIRAL_START: f64 = 100.0;
 /// Switches in one turn of an accumulation at most: a turn around two surfaces has four.
 pub const LONGEST_TURN: usize = 32;
 
+/// Surfaces at whose intersection a motion may be found to rest, as all modes around it lead back: 3^m are tried.
+pub const MOST_AROUND_REST: usize = 3;
+
+/// How far beside such an intersection the modes are tried, in units of the tolerance: at its edge, and well inside.
+pub const PLACES_BESIDE_REST: [f64; 2] = [1.0, 1e-3];
+
+/// Newton steps that look for such a place.
+pub const STEPS_BESIDE_REST: usize = 6;
+
+/// Flights below the tolerance that do not shrink by this factor at least take long to end: their limit is not extrapolated.
+pub const SLOWEST_EXTRAPOLATED: f64 = 0.99;
+
 /// The square of the distance from which accumulating switches are extrapolated is at least this, also for a tolerance
 /// of zero.
 pub const NEAREST_ACCUMULATION: f64 = 1e-20;

@@ -139,9 +139,9 @@ pub fn impacts() -> SavedSystem {
     }
 }
 
-/// A clock, a floor of it, the nearest number to a state, and a relay with hysteresis.
+/// A number that nobody sets, a clock, a floor of it, the nearest number to a state, and a relay with hysteresis.
 pub fn laws() -> SavedSystem {
-    const FIRST: u32 = 2;
+    const FIRST: u32 = 3;
     let mut g = Graph::new();
     let (t, x, y) = (g.time(), g.state(0), g.state(1));
     let (gain, level) = (g.parameter(0), g.parameter(1));
@@ -152,7 +152,8 @@ pub fn laws() -> SavedSystem {
     let halved = g.mul(half, q[0]);
     let fine = g.mul(three, y);
 
-    let pull = g.mul(gain, q[3]);
+    let named = g.parameter(2);
+    let pull = g.mul(named, q[3]);
     let drive = g.sub(q[1], halved);
     let dx = g.sub(drive, pull);
 
@@ -177,6 +178,7 @@ pub fn laws() -> SavedSystem {
     let relay = g.declare_surface(band) as usize;
     let n_hidden = g.n_surfaces();
     let laws = vec![
+        Law::Named { initial: gain },
         Law::Clock { argument: ticks },
         Law::Held {
             argument: halved,
@@ -195,7 +197,13 @@ pub fn laws() -> SavedSystem {
             guard: relay,
         },
     ];
-    let law_names = ["floor(3*t)", "floor(q/2)", "nearest(3*y)", "hysteresis(x)"];
+    let law_names = [
+        "gear",
+        "floor(3*t)",
+        "floor(q/2)",
+        "nearest(3*y)",
+        "hysteresis(x)",
+    ];
     let parameters = [&["gain", "level"], &law_names[..]].concat();
     SavedSystem {
         definition: Definition {

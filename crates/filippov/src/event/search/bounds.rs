@@ -18,6 +18,8 @@ use crate::tolerances::{MOST_ENCLOSED, ROOT_BOXES};
 /// The continuous extension of a step, as far as it bounds what is monitored.
 pub(crate) struct BoundedCurve<'a> {
     pub system: &'a dyn PiecewiseSystem,
+    /// The system whose normal components end the motion: a reduced one on a surface of higher relative degree.
+    pub sliding_system: &'a dyn PiecewiseSystem,
     pub interpolant: &'a Interpolant,
     pub setting: Setting<'a>,
     pub sliding: &'a [usize],
@@ -107,9 +109,11 @@ impl BoundedCurve<'_> {
             let below = (0..m).filter(|i| pattern >> i & 1 == 0);
             for i in below {
                 let setting = self.setting.with_signs(&signs);
-                let sides =
-                    self.system
-                        .enclose_normal_components(self.sliding[i], &tube, setting)?;
+                let sides = self.sliding_system.enclose_normal_components(
+                    self.sliding[i],
+                    &tube,
+                    setting,
+                )?;
                 components[pattern * m + i] = sides[0].value;
                 components[(pattern | 1 << i) * m + i] = sides[1].value;
             }
@@ -123,7 +127,7 @@ impl BoundedCurve<'_> {
         }
         let tube = Tube::new(self.interpolant, (a, b), self.margin);
         let components = self
-            .system
+            .sliding_system
             .enclose_normal_components(j, &tube, self.setting)?;
         self.known_exits.borrow_mut().push((a, b, components));
         Some(components)
@@ -131,7 +135,7 @@ impl BoundedCurve<'_> {
 
     /// The multipliers on a piece, from boxes around their values at the ends of the step.
     fn enclosed_root(&self, a: f64, b: f64) -> Option<RootBounds> {
-        if let (Some(bounds), Some(affine)) = (self.affine, self.system.affine_signs()) {
+        if let (Some(bounds), Some(affine)) = (self.affine, self.sliding_system.affine_signs()) {
             let tube = Tube::new(self.interpolant, (a, b), self.margin);
             let exits = self.seen.chunks_exact(2).take(self.sliding.len());
             let middles = exits.map(|pair| 0.5 * (pair[0].start + pair[0].end) - 1.0);

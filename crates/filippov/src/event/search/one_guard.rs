@@ -243,6 +243,7 @@ impl StepSearch<'_, '_> {
         let setting = Setting::new(&self.run.motion.signs, &self.run.motion.discrete);
         let bounds = BoundedCurve {
             system: self.run.system,
+            sliding_system: self.run.motion.sliding_system(self.run.system),
             interpolant,
             setting,
             sliding: &self.run.motion.sliding,

@@ -256,6 +256,7 @@ impl StepSearch<'_, '_> {
         let m = self.run.motion.monitored[index];
         let curve = BoundedCurve {
             system: self.run.system,
+            sliding_system: self.run.motion.sliding_system(self.run.system),
             interpolant: self.stepper.interpolant(),
             setting: self.run.motion.setting(),
             sliding: self.run.motion.sliding(),

@@ -1,0 +1,145 @@
+//! Points that no motion leaves: the motion stays.
+
+use super::limits::stay_on_all;
+use super::point::{Lefts, Next, Notes, Point};
+use super::rule::Meeting;
+use crate::error::FieldError;
+use crate::mode::Mode;
+use crate::motion::{shares_of_rows, SmoothField};
+use crate::status::{Warning, WarningCode};
+use crate::tolerances::{MOST_AROUND_REST, PLACES_BESIDE_REST, STEPS_BESIDE_REST};
+
+/// The motion on all surfaces, where the motions of all other modes lead back to them: tried at points beside the surfaces, as
+/// far as the tolerance and nearer. On an isolated point of a system that does not depend on time it is rest, also
+/// where the fields are not finite at the point itself. `None` if a motion leaves, or if none is found on all surfaces.
+pub(super) fn stay_if_nothing_leaves(
+    at: &Point,
+    notes: &mut Notes,
+    meeting: &Meeting,
+) -> Result<Option<Next>, FieldError> {
+    let m = meeting.surfaces.len();
+    if m > MOST_AROUND_REST {
+        return Ok(None);
+    }
+    for distance in PLACES_BESIDE_REST {
+        for number in 0..3_usize.pow(m as u32) {
+            let digit = |k: usize| (number / 3_usize.pow(k as u32) % 3) as i8 - 1;
+            let entries: Vec<i8> = (0..m).map(digit).collect();
+            let is_all = entries.iter().all(|&entry| entry == 0);
+            if !is_all && leaves(at, notes, meeting, &Mode::new(entries), distance)? {
+                return Ok(None);
+            }
+        }
+    }
+    if let Some(Ok(stays)) = stay_on_all(at, notes, meeting)? {
+        return Ok(Some(stays));
+    }
+    let is_isolated = m >= at.x.len();
+    if !is_isolated || at.system.depends_on_time() {
+        return Ok(None);
+    }
+    warn_of_rest(at, notes, meeting);
+    let mut next = Next::new(meeting.on_all(&Mode::new(vec![0; m])), Lefts::new());
+    next.start_mut().is_rest = true;
+    Ok(Some(next))
+}
+
+/// Does a motion in the mode with these entries on the surfaces lead away from them, if it starts beside them?
+fn leaves(
+    at: &Point,
+    notes: &mut Notes,
+    meeting: &Meeting,
+    entries: &Mode,
+    distance: f64,
+) -> Result<bool, FieldError> {
+    let mode = meeting.on_all(entries);
+    let Some(mut x) = place_beside(at, meeting, entries, distance)? else {
+        return Ok(false);
+    };
+    let mut velocity = vec![0.0; x.len()];
+    let mut field = at.field_of(&mode, None);
+    field.eval(at.t, &mut x, &mut velocity)?;
+    notes.n_field_evaluations += field.n_evaluations();
+    let goes_on = |exit: &f64| *exit >= 0.0;
+    if !field.last_exits().iter().all(goes_on) || velocity.iter().any(|v| !v.is_finite()) {
+        return Ok(false);
+    }
+    let (beside, signs) = (at.moved(at.t, &x), mode.signs());
+    let mut is_leaving = false;
+    for (&j, &entry) in meeting.surfaces.iter().zip(entries.entries()) {
+        let rate = f64::from(entry) * beside.rate_of(j, &signs, &velocity)?.0;
+        if entry != 0 && !(rate >= 0.0) {
+            return Ok(false);
+        }
+        is_leaving |= rate > 0.0;
+    }
+    Ok(is_leaving)
+}
+
+/// A point at which the functions of the surfaces have the signs of these entries, and the size of this multiple of the
+/// tolerance; `None` if none is found.
+fn place_beside(
+    at: &Point,
+    meeting: &Meeting,
+    entries: &Mode,
+    distance: f64,
+) -> Result<Option<Vec<f64>>, FieldError> {
+    let (n, signs) = (at.x.len(), meeting.on_all(entries).signs());
+    let tolerances = at.x.iter().enumerate();
+    let tolerances = tolerances.map(|(i, x)| at.scale.tolerance(i, *x, *x));
+    let length = distance * tolerances.fold(f64::MIN_POSITIVE, f64::max);
+    let pairs = || meeting.surfaces.iter().zip(entries.entries());
+    let (mut x, mut row) = (at.x.to_vec(), vec![0.0; n]);
+    // A gradient may be infinite on a surface, and is finite beside it.
+    for (&j, &entry) in pairs() {
+        at.system
+            .gradient(j, &at.place_at(at.t, &x, &signs), &mut row)?;
+        let norm = row.iter().map(|g| g * g).sum::<f64>().sqrt();
+        if norm.is_finite() && norm > 0.0 {
+            let shift = f64::from(entry) * length / norm;
+            x.iter_mut().zip(&row).for_each(|(x, g)| *x += shift * g);
+        }
+    }
+    let mut h = vec![0.0; signs.len()];
+    for _ in 0..STEPS_BESIDE_REST {
+        let place = at.place_at(at.t, &x, &signs);
+        at.system.surfaces(&place, &mut h)?;
+        let mut rows = Vec::with_capacity(n * meeting.surfaces.len());
+        let mut differences = crate::cube::Vector::new();
+        for (&j, &entry) in pairs() {
+            at.system.gradient(j, &place, &mut row)?;
+            differences.push(h[j] - f64::from(entry) * length);
+            rows.extend_from_slice(&row);
+        }
+        let Some(shifts) = shares_of_rows(&rows, &differences) else {
+            return Ok(None);
+        };
+        for (row, shift) in rows.chunks_exact(n).zip(shifts) {
+            x.iter_mut().zip(row).for_each(|(x, g)| *x -= shift * g);
+        }
+    }
+    at.system.surfaces(&at.place_at(at.t, &x, &signs), &mut h)?;
+    let is_there = pairs().all(|(&j, &entry)| {
+        let difference = (h[j] - f64::from(entry) * length).abs();
+        difference <= 0.5 * length
+    });
+    Ok(is_there.then_some(x))
+}
+
+fn warn_of_rest(at: &Point, notes: &mut Notes, meeting: &Meeting) {
+    let names = meeting.surfaces.iter();
+    let names: Vec<String> = names.map(|&j| at.system.surface_name(j) + " = 0").collect();
+    let size = at.x.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    notes.warnings.push(Warning {
+        t: at.t,
+        code: WarningCode::AtRest,
+        surfaces: meeting.surfaces.to_vec(),
+        text: format!(
+            "the motion rests from here at the intersection of {}: the fields are not regular there, and every motion that \
+             was tried beside it leads back. The largest component of the state is {size:.1e}",
+            names.join(", ")
+        ),
+        candidates: Vec::new(),
+        rule: "",
+    });
+}

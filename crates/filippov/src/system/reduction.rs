@@ -1,0 +1,92 @@
+//! Systems on surfaces of higher relative degree. Both fields cross such a surface h = 0 at the same rate g: a motion that stays on
+//! it has g = 0 too. It slides on g = 0, as on any surface, with the field that there is on h = 0.
+//!
+//! The relative degree of a surface is the order of the first derivative of h that jumps on it; it is 1 where the fields
+//! themselves do. Reference: Levant, Higher-order sliding modes, Int. J. Control 76 (2003) 924.
+
+use std::sync::{Arc, OnceLock};
+
+use filippov_expr::{Graph, NodeId, RateOnSurface};
+use smallvec::SmallVec;
+
+use super::compiled::Model;
+use super::traced::TracedSystem;
+
+/// The graph and the field where each of these surfaces that has a higher relative degree is replaced by its rate; none if there
+/// is none of them, or if a rate is in the place of another of these surfaces.
+pub(super) fn reduced(
+    graph: &Graph,
+    field: &[NodeId],
+    surfaces: &[usize],
+) -> Option<(Graph, Vec<NodeId>)> {
+    let (mut graph, mut field) = (graph.clone(), field.to_vec());
+    let mut is_reduced = false;
+    for &j in surfaces {
+        if relative_degree(&graph, &field, j) == 1 {
+            continue;
+        }
+        let RateOnSurface::Same(rate, on_surface) = graph.rate_on_surface(&field, j as u32) else {
+            return None;
+        };
+        let mut others = surfaces.iter().filter(|k| **k != j);
+        if others.any(|&k| graph.is_multiple_of_surface(rate, k as u32)) {
+            return None;
+        }
+        (graph, field) = (graph.with_surface(j as u32, rate), on_surface);
+        is_reduced = true;
+    }
+    is_reduced.then_some((graph, field))
+}
+
+/// The relative degree of a surface; 1 also if no derivative of its function jumps.
+pub(super) fn relative_degree(graph: &Graph, field: &[NodeId], j: usize) -> usize {
+    let (mut graph, mut field) = (graph.clone(), field.to_vec());
+    for degree in 1..=field.len() {
+        match graph.rate_on_surface(&field, j as u32) {
+            RateOnSurface::Jumps => return degree,
+            RateOnSurface::Constant => break,
+            RateOnSurface::Same(rate, on_surface) => {
+                (graph, field) = (graph.with_surface(j as u32, rate), on_surface);
+            }
+        }
+    }
+    1
+}
+
+/// Reduced systems of a traced one, by the surfaces slid on: a list that grows at its end.
+#[derive(Clone, Default)]
+pub(super) struct Reductions(OnceLock<Box<Reduction>>);
+
+#[derive(Clone)]
+struct Reduction {
+    surfaces: SmallVec<[usize; 4]>,
+    system: Option<TracedSystem>,
+    next: Reductions,
+}
+
+impl Reductions {
+    /// The system for these surfaces, with the model that `find` has for them.
+    pub fn get_or_make(
+        &self,
+        surfaces: &[usize],
+        of: &TracedSystem,
+        find: impl FnOnce() -> Option<Arc<Model>>,
+    ) -> Option<&TracedSystem> {
+        let mut find = Some(find);
+        let mut list = self;
+        loop {
+            let entry = list.0.get_or_init(|| {
+                let model = find.take().and_then(|find| find());
+                Box::new(Reduction {
+                    surfaces: SmallVec::from_slice(surfaces),
+                    system: model.map(|model| of.with_model(model)),
+                    next: Reductions::default(),
+                })
+            });
+            if entry.surfaces.as_slice() == surfaces {
+                return entry.system.as_ref();
+            }
+            list = &entry.next;
+        }
+    }
+}
