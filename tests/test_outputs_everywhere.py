@@ -337,6 +337,11 @@ def test_outputs_are_drawn(system: fl.System) -> None:
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("x", "friction")
     copy = pickle.loads(pickle.dumps(sol))
     assert copy.plot(states="energy").get_ylabel() == "energy"
+    up = fl.Reset(times=[1.0, 2.0], set={"gear": lambda t, x, gear: gear + 1})
+    geared = fl.System(lambda t, x, gear: [gear], n=1, discrete={"gear": 1}, resets=up).solve((0, 3), [0.0])
+    for run in (geared, pickle.loads(pickle.dumps(geared))):
+        (line,) = run.plot(states="gear").lines[-1:]
+        assert set(line.get_ydata()) <= {1.0, 2.0, 3.0}
     with pytest.raises(ValueError, match="no state or output 'w'; the names are x, v, friction, energy"):
         sol.plot(states="w")
     pyplot.close("all")

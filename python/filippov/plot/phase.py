@@ -29,8 +29,8 @@ def phase(
     solution : Solution
         What to draw.
     i, j : int or str, optional
-        States on the horizontal and on the vertical axis, by number or name; or outputs of the system, by
-        name.
+        States on the horizontal and on the vertical axis, by number or name; or outputs and discrete states
+        of the system, by name.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure by default.
     dark : bool, optional
@@ -74,7 +74,7 @@ def phase3d(
     solution : Solution
         What to draw.
     i, j, k : int or str, optional
-        States on the three axes, by number or name; or outputs of the system, by name.
+        States on the three axes, by number or name; or outputs and discrete states of the system, by name.
     ax : mpl_toolkits.mplot3d.axes3d.Axes3D, optional
         Where to draw, an axes with ``projection="3d"``; a new figure by default.
     dark : bool, optional

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -47,7 +47,7 @@ def pieces(solution: Solution, shown: Curves) -> Iterator[tuple[Mode, Array, Arr
 
 
 class Curves(NamedTuple):
-    """What is drawn: states by their indices, and outputs by their names, in the order asked for."""
+    """What is drawn: states by their indices, discrete states and outputs by their names, as asked for."""
 
     places: tuple[int | str, ...]
     names: tuple[str, ...]
@@ -56,18 +56,18 @@ class Curves(NamedTuple):
         """Return the values at some times, shape (m, k); the solution is kept as a function."""
         assert solution.sol is not None
         states = solution.sol(times, side)
-        given = solution.output_functions
         rows = [
-            states[place] if isinstance(place, int) else solution.evaluate(given[place], times, side)
+            states[place]
+            if isinstance(place, int)
+            else solution.evaluate(_function(solution, place), times, side)
             for place in self.places
         ]
         return np.array(rows).reshape(len(rows), len(times))
 
     def kept(self, solution: Solution, inside: Any) -> Array:
         """Return the values at those of the times of the solution that are inside."""
-        rows = [
-            solution.y[place] if isinstance(place, int) else solution.outputs[place] for place in self.places
-        ]
+        named = {**solution.discrete, **solution.outputs}
+        rows = [solution.y[place] if isinstance(place, int) else named[place] for place in self.places]
         return np.array([row[inside] for row in rows]).reshape(len(rows), -1)
 
     def beside(self, solution: Solution, times: Array, states: Array) -> Array:
@@ -77,21 +77,27 @@ class Curves(NamedTuple):
             if isinstance(place, int):
                 rows.append(states[:, place])
             elif solution.sol is not None:
-                rows.append(solution.evaluate(solution.output_functions[place], times))
+                rows.append(solution.evaluate(_function(solution, place), times))
             else:
                 rows.append(np.full(len(times), np.nan))
         return np.array(rows).reshape(len(rows), len(times))
 
 
+def _function(solution: Solution, name: str) -> Callable[..., Any]:
+    """Return the function of an output, or one that reads a discrete state."""
+    known = solution.output_functions.get(name)
+    return (lambda t, x, *_, **values: values[name]) if known is None else known
+
+
 def curves_of(solution: Solution, wanted: Any) -> Curves:
-    """Return the states asked for, by number or name, and outputs, by name; ``None`` means all states.
+    """Return the states asked for, by number or name, discrete states and outputs; ``None`` is all states.
 
     Raises
     ------
     ValueError
         If there is none of that name or number.
     """
-    names, outputs = list(solution.states), list(solution.output_names)
+    names, outputs = list(solution.states), [*solution.discrete, *solution.output_names]
     if wanted is None:
         return Curves(tuple(range(len(names))), tuple(names))
     chosen = [wanted] if isinstance(wanted, (int, np.integer, str)) else list(wanted)

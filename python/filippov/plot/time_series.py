@@ -45,7 +45,7 @@ def time_series(solution: Solution, ax: Any = None, states: Any = None, dark: bo
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure by default.
     states : int, str, or a sequence of these, optional
-        Which states, and outputs of the system by their names; all states by default.
+        Which states, and outputs and discrete states of the system by their names; all states by default.
     dark : bool, optional
         Light lines on a dark ground; by default as the `style` around says.
 
