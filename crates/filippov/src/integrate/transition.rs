@@ -1,6 +1,6 @@
 //! From a located event, a limit or a start to the next motion: the decision is asked for, recorded and carried out.
 
-use crate::action::{identity, Instant};
+use crate::action::{identity, quiet_change, Instant};
 use crate::decisions::limits::{
     limit_here, limit_of_switches, limit_of_unresolved_flights, limits_of_impacts, passed_beside,
     Limit, Passed,
@@ -20,8 +20,8 @@ use crate::patience::Patience;
 use crate::record::decide_and_record;
 use crate::status::{is_named, Stop, WarningCode};
 use crate::switch::{Kind, Switch};
-use crate::system::{eval_on_side, PiecewiseSystem, Place, Setting};
-use crate::tolerances::{CLEAR_OF_SURFACE, DOUBTFUL, MOST_SWITCHES_AT_ONE_TIME};
+use crate::system::eval_on_side;
+use crate::tolerances::{DOUBTFUL, MOST_SWITCHES_AT_ONE_TIME};
 use smallvec::SmallVec;
 
 impl<'a> Integrator<'a> {
@@ -520,9 +520,23 @@ impl<'a> Integrator<'a> {
         self.horizon = self
             .timetable
             .horizon(self.run.actions, self.run.t, self.t_end);
-        if !due.is_empty() {
-            if let Some(done) = self.act_quietly(&due)? {
-                return Ok(done);
+        let is_watched = self.recorder.observed.is_some() || self.run.options.keep_decisions > 0;
+        if !due.is_empty() && !is_watched && self.run.t < self.t_end {
+            if let Some(q) = quiet_change(&self.run, &due)? {
+                self.run.stats.n_surface_evaluations += 2;
+                if !self.recorder.user_events.events.is_empty() {
+                    let (t, x) = (self.run.t, &self.run.x);
+                    if let Some(stop) = self.recorder.zeros_before_jump(t, x) {
+                        return Ok(Some(stop));
+                    }
+                    self.recorder.jump(t, x);
+                }
+                self.control.forget_steps();
+                self.run.motion.set_discrete(q);
+                self.run.residuals.clear();
+                self.run.passing.clear();
+                let next = Next::new(self.run.motion.mode.clone(), Lefts::new());
+                return self.begin(next, &Multiple::default());
             }
         }
         if !self.run.actions.list.is_empty() {
@@ -548,53 +562,6 @@ impl<'a> Integrator<'a> {
             return self.act(due);
         }
         Ok((self.run.t >= self.t_end).then_some(Stop::End))
-    }
-
-    /// Does these actions if they change nothing but discrete states of the field, as a knot of a table does, and no surface is
-    /// near: then the motion stays in its region, and no decision is needed. `None` if one is.
-    ///
-    /// The surfaces are looked at with the discrete states before and after: on the side of the mode, and clear of zero.
-    fn act_quietly(&mut self, due: &[usize]) -> Result<Option<Option<Stop>>, FieldError> {
-        let actions = self.run.actions;
-        let run = &mut self.run;
-        let is_quiet = |index: &usize| {
-            let action = &actions.list[*index];
-            action.kind.is_none() && !action.map.moves_state()
-        };
-        let is_watched = self.recorder.observed.is_some() || run.options.keep_decisions > 0;
-        let is_region = run.motion.mode.codimension() == 0 && run.motion.resting.is_empty();
-        if is_watched
-            || !is_region
-            || !due.iter().all(is_quiet)
-            || !actions.after_jumps().all(|index| is_quiet(&index))
-            || run.t >= self.t_end
-        {
-            return Ok(None);
-        }
-        let (mut x, mut q) = (run.x.clone(), run.motion.discrete.clone());
-        for index in due.iter().copied().chain(actions.after_jumps()) {
-            let map = actions.list[index].map;
-            map.apply(run.t, &mut x, &run.motion.signs, &mut q)?;
-        }
-        let before = run.motion.setting().at(run.t, &run.x);
-        let after = Setting::new(&run.motion.signs, &q).at(run.t, &run.x);
-        let n_surfaces = run.system.n_surfaces();
-        run.stats.n_surface_evaluations += 2;
-        if x != run.x || !is_clear_of_surfaces(run.system, n_surfaces, &before, &after)? {
-            return Ok(None);
-        }
-        self.control.forget_steps();
-        if !self.recorder.user_events.events.is_empty() {
-            if let Some(stop) = self.recorder.zeros_before_jump(run.t, &x) {
-                return Ok(Some(Some(stop)));
-            }
-            self.recorder.jump(run.t, &x);
-        }
-        run.motion.set_discrete(q);
-        run.residuals.clear();
-        run.passing.clear();
-        let next = Next::new(run.motion.mode.clone(), Lefts::new());
-        self.begin(next, &Multiple::default()).map(Some)
     }
 
     /// Does what an event triggers; `None` if that is nothing and the decision is an ordinary one.
@@ -880,36 +847,4 @@ impl<'a> Integrator<'a> {
         }
         Ok(stop)
     }
-}
-
-/// Are all switching functions at two places on the side that the signs say, by far more than rounding?
-fn is_clear_of_surfaces(
-    system: &dyn PiecewiseSystem,
-    n_surfaces: usize,
-    before: &Place<'_>,
-    after: &Place<'_>,
-) -> Result<bool, FieldError> {
-    let mut values: [SmallVec<[f64; 8]>; 2] = Default::default();
-    for (place, h) in [before, after].into_iter().zip(&mut values) {
-        h.resize(n_surfaces, f64::NAN);
-        system.surfaces(place, h)?;
-    }
-    for j in 0..n_surfaces {
-        let nearest =
-            values
-                .iter()
-                .map(|h| h[j] * after.signs[j])
-                .fold(f64::INFINITY, |least, h| {
-                    if h < least || h.is_nan() {
-                        h
-                    } else {
-                        least
-                    }
-                });
-        // Not so for what is not a number.
-        if !(nearest > CLEAR_OF_SURFACE * system.surface_size(j, after)?) {
-            return Ok(false);
-        }
-    }
-    Ok(true)
 }

@@ -1,6 +1,5 @@
 //! What holds a motion on its surfaces: multipliers of sliding, and the accelerations that contacts give.
 
-use super::{Side, Solution};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::{ContactField, IntersectionField, Motion, SlidingField, SmoothField};
@@ -141,63 +140,6 @@ impl Piece {
             }
         }
         Ok(lambda)
-    }
-}
-
-impl Solution {
-    /// The motion that `t` belongs to.
-    ///
-    /// # Errors
-    /// If a function of the user raises.
-    pub fn piece_at(
-        &self,
-        system: &dyn PiecewiseSystem,
-        t: f64,
-        side: Side,
-    ) -> Result<Option<Piece>, FieldError> {
-        let Some(index) = self.segment_index(t, side) else {
-            return Ok(None);
-        };
-        if self.y_end.is_some() && t == self.t_last && side == Side::Right {
-            return Ok(Some(self.last_piece()));
-        }
-        let segment = &self.segments[index];
-        let mut start = Vec::new();
-        if segment.mode.codimension() == 1 {
-            start.resize(self.n_states, 0.0);
-            self.evaluate(system, segment.t_start, Side::Right, &mut start)?;
-        }
-        Ok(Some(Piece {
-            mode: segment.mode.clone(),
-            discrete: segment.discrete.clone(),
-            sides: self.sides_before(index),
-            near: segment.multipliers.to_vec(),
-            start,
-        }))
-    }
-
-    /// The motion at the end of the run.
-    pub fn last_piece(&self) -> Piece {
-        let last = self.segments.last().filter(|last| last.mode == self.mode);
-        Piece {
-            mode: self.mode.clone(),
-            discrete: self.discrete.clone(),
-            sides: self.sides.clone(),
-            near: last.map_or_else(Vec::new, |last| last.multipliers.to_vec()),
-            start: Vec::new(),
-        }
-    }
-
-    /// The side on which the motion was last before a segment, for the surfaces that it stays on; 0 if on none, and for the others.
-    fn sides_before(&self, index: usize) -> Vec<i8> {
-        let mode = &self.segments[index].mode;
-        let mut sides = vec![0; mode.entries().len()];
-        for j in mode.sliding_set() {
-            let earlier = self.segments[..index].iter().rev();
-            let mut entries = earlier.map(|segment| segment.mode.entries()[j]);
-            sides[j] = entries.find(|&entry| entry != 0).unwrap_or(0);
-        }
-        sides
     }
 }
 
