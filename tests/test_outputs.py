@@ -85,6 +85,10 @@ def test_a_relay_in_an_output_remembers() -> None:
     [
         ({"u": lambda t, x: x[7]}, fl.ModelError, "the output 'u' raised IndexError"),
         ({"u": lambda t, x: x}, fl.ModelError, r"the output 'u' returned an array of shape \(2,\)"),
+        ({"u": lambda t, x: None}, fl.ModelError, r"the output 'u' returned None: is a `return` missing\?"),
+        ({"u": lambda t, x: 1j}, fl.ModelError, "the output 'u' raised TypeError"),
+        ({"u": lambda t: 1.0}, fl.ModelError, "the output 'u' raised TypeError"),
+        ({"u": lambda t, x: 1 / 0}, fl.ModelError, "the output 'u' raised ZeroDivisionError"),
         ({"u": 3}, fl.InputError, "'u' is a function"),
         ({"v": energy}, fl.InputError, "'v' is the name of something else"),
         ([energy], fl.InputError, "outputs: a mapping"),
@@ -93,6 +97,30 @@ def test_a_relay_in_an_output_remembers() -> None:
 def test_wrong_outputs_are_refused_by_name(outputs: Any, kind: type[Exception], message: str) -> None:
     with pytest.raises(kind, match=message):
         fl.System(block, states=("x", "v"), params={"F": 1.0}, outputs=outputs).solve((0, 1), [0.0, 0.0])
+
+
+def test_a_wrong_quantity_is_refused_by_name(system: fl.System) -> None:
+    sol = system.solve((0, 1), [0.0, 0.0])
+    with pytest.raises(fl.InputError, match="fun: a function"):
+        sol.evaluate(3)  # type: ignore[arg-type]
+    with pytest.raises(fl.ModelError, match="fun returned None"):
+        sol.evaluate(lambda t, x: None, 0.01)
+
+
+def test_an_output_that_raises_is_refused_before_the_first_step(system: fl.System) -> None:
+    calls = 0
+
+    def field(t: Any, x: Any) -> Any:
+        nonlocal calls
+        calls += 1
+        return [x[1].__float__(), 0.0]
+
+    broken = fl.System(field, n=2, surfaces=[], outputs={"u": lambda t, x: x[9]})
+    for run in (broken.solve, broken.ensemble):
+        calls = 0
+        with pytest.raises(fl.ModelError, match="the output 'u' raised IndexError"):
+            run((0, 1), [0.0, 1.0])
+        assert calls <= 5  # to look at the function, not to take a step
 
 
 def test_a_quantity_that_cannot_be_traced_is_called_where_nothing_slides(system: fl.System) -> None:

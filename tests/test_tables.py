@@ -138,12 +138,58 @@ def test_a_system_with_a_table_travels() -> None:
         (lambda t: np.interp(t, [0, 1, 2], [0, 1]), "xp has 3 numbers and fp has 2"),
         (lambda t: np.interp(t, [0, np.nan, 2], [0, 1, 2]), r"xp\[1\] is nan"),
         (lambda t: np.interp(t, [0, 1, 2], [0, np.inf, 2]), r"fp\[1\] is not finite"),
-        (lambda t: np.searchsorted([2, 1], t), "must increase"),
+        (lambda t: np.interp(t, [], []), r"xp: a list of numbers is needed, not an array of shape \(0,\)"),
+        (lambda t: np.interp(t, [0, 1], [0, 1j]), "np.interp: fp: real numbers are needed, not complex128"),
+        (lambda t: np.interp(t, ["a", "b"], [0, 1]), "np.interp: xp: real numbers are needed, not"),
+        (lambda t: np.interp(t, [0, 1], [None, 1]), "fp"),
+        (
+            lambda t: np.searchsorted([2, 1], t),
+            r"np.searchsorted: a must increase, and np.searchsorted: a\[1\]",
+        ),
+        (lambda t: np.searchsorted([0, np.nan], t), r"np.searchsorted: a\[1\] is nan"),
+        (lambda t: np.digitize(t, [0, 2, 1]), r"np.digitize: bins must increase"),
+        (lambda t: np.digitize(t, [2, 0, 1]), r"np.digitize: bins in reverse must increase"),
+        (lambda t: np.digitize(t, [0, np.inf, 2]), r"np.digitize: bins\[1\] is inf"),
     ],
 )
-def test_a_damaged_table_is_refused_by_name(table: Callable[..., Any], message: str) -> None:
-    with pytest.raises(fl.ModelError, match=message):
-        fl.solve_ivp(lambda t, x: [table(t)], (0, 1), [0.0])
+@pytest.mark.parametrize("of", ["time", "state"])
+def test_a_damaged_table_is_refused_by_name(table: Callable[..., Any], message: str, of: str) -> None:
+    """Before the first step: there is no solution, not even a part of one."""
+    with pytest.raises(fl.FilippovError, match=message) as caught:
+        fl.solve_ivp(lambda t, x: [table(t if of == "time" else x[0])], (0, 1), [0.0])
+    assert getattr(caught.value, "partial", None) is None
+
+
+def test_a_damaged_interpolant_is_refused_by_name() -> None:
+    interpolate = pytest.importorskip("scipy.interpolate")
+    places, values = np.linspace(0, 2, 9), np.arange(9.0)
+    broken = values.copy()
+    broken[4] = np.nan
+    cubic = interpolate.CubicSpline(places, values)
+    cubic.c[0, 3] = np.nan
+    smooth = interpolate.make_interp_spline(places, values)
+    smooth.c[2] = np.inf
+    for spline in (
+        cubic,
+        smooth,
+        interpolate.interp1d(places, broken),
+        interpolate.interp1d(places, broken, "next"),
+    ):
+        for fun in (lambda t, x, s=spline: [s(t)], lambda t, x, s=spline: [s(x[0])]):
+            with pytest.raises(fl.ModelError, match=f"{type(spline).__name__}: a number that it was made of"):
+                fl.solve_ivp(fun, (0, 1), [0.5])
+    bounded = interpolate.interp1d(places, values, bounds_error=False)  # beyond its ends it is no number
+    assert fl.solve_ivp(lambda t, x: [bounded(t)], (0, 2), [0.0]).y[0, -1] == pytest.approx(8.0)
+
+
+def test_an_entry_that_is_not_a_number_ends_the_run_where_it_is_read() -> None:
+    """An index need not meet it; a table of numbers with gaps is read between them."""
+    gaps = np.array([1.0, np.nan, 3.0])
+    stopped = fl.solve_ivp(lambda t, x: [gaps[int(t)]], (0, 2), [0.0])
+    assert not stopped.success
+    assert stopped.t[-1] == 1.0
+    assert "component 0 of the right-hand side is NaN" in stopped.message
+    assert fl.solve_ivp(lambda t, x: [gaps[2 * int(t)]], (0, 2), [0.0]).y[0, -1] == pytest.approx(4.0)
 
 
 def by_choices(x: Any, places: np.ndarray, values: np.ndarray) -> Any:

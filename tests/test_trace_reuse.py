@@ -14,6 +14,7 @@ import sys
 import types
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from typing import Any
 
 import filippov as fl
@@ -243,6 +244,164 @@ def test_method_of_an_object() -> None:
     for fun in (oscillator.field, oscillator):
         oscillator.slope = 1.0
         check_change(fun, lambda: setattr(oscillator, "slope", 2.0))
+
+
+@dataclass
+class Spring:
+    stiffness: float
+    rest: list[float]
+
+    def force(self, y: Any) -> Any:
+        return -self.stiffness * (y - self.rest[0]) * self.scale
+
+    @property
+    def scale(self) -> float:
+        return 1.0
+
+    def report(self) -> None:
+        print(self)
+
+
+@dataclass(frozen=True)
+class Frozen:
+    spring: Spring
+
+
+class Slots:
+    __slots__ = ("k",)
+
+    def __init__(self, k: float) -> None:
+        self.k = k
+
+    def __mul__(self, other: Any) -> Any:
+        return self.k * other
+
+
+class Soft(Spring):
+    def force(self, y: Any) -> Any:
+        return -0.1 * y
+
+
+def test_objects_of_plain_classes_are_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    spring = Spring(1.0, [0.0])
+    holder, slots, plain = Frozen(spring), Slots(1.0), types.SimpleNamespace(k=1.0)
+
+    def fun(t: Any, x: Any) -> Any:
+        return [slots * x[1] * plain.k, holder.spring.force(x[0])]
+
+    assert is_kept(fun)
+    for change in (
+        lambda: setattr(spring, "stiffness", 2.0),
+        lambda: spring.rest.append(0.0),
+        lambda: spring.rest.__setitem__(0, 0.5),
+        lambda: setattr(slots, "k", 2.0),
+        lambda: setattr(plain, "k", 2.0),
+        lambda: setattr(spring, "force", lambda y: -3.0 * y),
+        lambda: delattr(spring, "force"),
+        lambda: setattr(spring, "__class__", Soft),
+    ):
+        final(fun)
+        change()
+        assert final(fun) == fresh(fun)
+    spring.__class__ = Spring
+    check_change(fun, lambda: monkeypatch.setattr(Spring, "scale", 5.0))
+    monkeypatch.undo()
+    check_change(fun, lambda: monkeypatch.setattr(Spring, "force", lambda self, y: -7.0 * y))
+    monkeypatch.undo()
+    check_change(fun, lambda: monkeypatch.setattr(Slots, "__mul__", lambda self, other: 9.0 * other))
+
+
+def test_methods_and_callable_objects_are_traced_once() -> None:
+    class Oscillator:
+        def __init__(self, k: float) -> None:
+            self.k = k
+            self.calls: list[int] = []
+
+        def field(self, t: Any, x: Any) -> Any:
+            return [x[1], -self.k * x[0] - self.push(x)]
+
+        def push(self, x: Any) -> Any:
+            return 0.1 * np.sign(x[1])
+
+        __call__ = field
+
+        def counted(self, t: Any, x: Any) -> Any:
+            self.calls.append(1)
+            return self.field(t, x)
+
+    for fun in (Oscillator(1.0).field, Oscillator(1.0)):
+        assert is_kept(fun)
+    oscillator = Oscillator(1.0)
+    final(oscillator.counted)
+    n = len(oscillator.calls)
+    final(oscillator.counted)  # what it changes itself is not lost
+    assert len(oscillator.calls) > n
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: __import__("random").Random(1),
+        lambda: np.random.default_rng(1),
+        lambda: __import__("itertools").count(),
+        lambda: __import__("decimal").Decimal(1),
+        lambda: __import__("operator").itemgetter(0),
+        lambda: type("Meta", (type,), {})("Of", (), {})(),
+        lambda: type("Of", (dict,), {})(),
+        lambda: type("Of", (), {"cached": functools.cached_property(lambda self: 1.0)})(),
+        lambda: type("Of", (), {"__call__": lambda self, x: print(x)})(),
+    ],
+)
+def test_objects_with_more_than_attributes_are_unknown(make: Any) -> None:
+    thing = make()
+    assert fingerprint(lambda t, x: thing) is None
+
+
+def test_interpolants_and_sparse_matrices_are_read() -> None:
+    interpolate, sparse = pytest.importorskip("scipy.interpolate"), pytest.importorskip("scipy.sparse")
+    places, values = np.linspace(0, 2, 9), np.sin(np.linspace(0, 2, 9))
+    for make in (
+        interpolate.CubicSpline,
+        interpolate.PchipInterpolator,
+        interpolate.Akima1DInterpolator,
+        interpolate.make_interp_spline,
+        interpolate.interp1d,
+        lambda x, y: interpolate.interp1d(x, y, kind="cubic"),
+        lambda x, y: interpolate.interp1d(x, y, kind="previous"),
+        lambda x, y: interpolate.UnivariateSpline(x, y, s=0),
+    ):
+        one, same, other = make(places, values), make(places, values), make(places, 2 * values)
+        read = [fingerprint(lambda t, x, s=s: [x[1], s(t)]) for s in (one, one, same, other)]
+        assert None not in read
+        assert read[0] == read[1] != read[3]
+        if not isinstance(one, interpolate.UnivariateSpline):  # that keeps room which was never written to
+            assert read[0] == read[2]
+    spline = interpolate.CubicSpline(places, values)
+
+    def fun(t: Any, x: Any) -> Any:
+        return [x[1], spline(t)]
+
+    assert is_kept(fun)
+    check_change(fun, lambda: spline.c.__setitem__((3, 2), 5.0))
+    matrix = sparse.csr_array(np.array([[0.0, 1.0], [-1.0, 0.0]]))
+
+    def product(t: Any, x: Any) -> Any:
+        return matrix @ x
+
+    assert is_kept(product)
+    check_change(product, lambda: matrix.data.__setitem__(1, -2.0))
+    with_hidden_state = interpolate.LinearNDInterpolator([[0, 0], [1, 0], [0, 1]], [0.0, 1.0, 2.0])
+    assert fingerprint(lambda t, x: with_hidden_state) is None
+    subclass = type("Own", (interpolate.CubicSpline,), {})(places, values)
+    assert fingerprint(lambda t, x: subclass(t)) is None
+
+
+def test_functions_of_scipy_special_are_known() -> None:
+    special = pytest.importorskip("scipy.special")
+    expit = special.expit
+    assert is_kept(lambda t, x: [x[1], -expit(x[0])])
+    own = np.frompyfunc(lambda x: -x, 1, 1)
+    assert fingerprint(lambda t, x: own(x)) is None
 
 
 def test_attribute_of_a_function_changed() -> None:
@@ -511,9 +670,27 @@ def test_nothing_is_kept_beyond_the_limit() -> None:
     assert len(prepare._KEPT._values) == prepare._KEPT._size
 
 
-def test_large_data_are_not_compared() -> None:
-    for data in (np.zeros(100_000), [0.0] * 100_000, {k: 0.0 for k in range(100_000)}):
+def test_large_data_count_by_a_digest() -> None:
+    for data in (np.zeros(100_000), [0.0] * 100_000, (0.0,) * 100_000):
+        fun = lambda t, x, data=data: -x  # noqa: E731
+        read = fingerprint(fun)
+        assert read is not None
+        assert read == fingerprint(fun)
+        assert len(str(read)) < 4000
+    for data in ({k: 0.0 for k in range(100_000)}, [[0.0]] * 100_000):
         assert fingerprint(lambda t, x, data=data: -x) is None
+
+
+def test_an_entry_of_a_large_table_changed() -> None:
+    places, values = np.linspace(0.0, 2.0, 20_001), np.ones(20_001)
+    as_list = [1.0] * 20_001
+
+    def fun(t: Any, x: Any) -> Any:
+        return [x[1] + as_list[int(1e4 * t)], np.interp(t, places, values)]
+
+    assert is_kept(fun)
+    check_change(fun, lambda: values.__setitem__(slice(5000, 6000), 2.0))
+    check_change(fun, lambda: as_list.__setitem__(5000, 3.0))
 
 
 def test_threads() -> None:

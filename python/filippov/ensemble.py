@@ -18,6 +18,7 @@ from filippov.errors import InputError, Interrupted
 from filippov.events import EventSpec, normalise_events
 from filippov.notices import show_summary
 from filippov.options import OPTIONS, check_options, check_t_span, in_order
+from filippov.outputs import at_ends, refuse_outputs_that_fail
 from filippov.prepare import Prepared
 from filippov.sliding_policy import fit_kappa
 from filippov.solution import Solution
@@ -44,6 +45,8 @@ class Ensemble(Sequence[Solution]):
         Whether ``status >= 0``.
     n_warnings : ndarray of int, shape (n_members,)
         How many warnings each run has; `Solution.warnings` of a member has them.
+    outputs : dict of str to ndarray, shape (n_members,)
+        The outputs of the system at the ends of the runs, by name.
 
     An index gives the `Solution` of a member, with what `keep` left of it; its `message` says why it ended.
     """
@@ -107,6 +110,16 @@ class Ensemble(Sequence[Solution]):
         """How many warnings each run has, shape (n_members,)."""
         pairs = zip(self._runs, self._prepared, strict=False)  # an interrupted ensemble has fewer runs
         return np.array([run.n_warnings + len(prepared.warnings) for run, prepared in pairs], dtype=np.int64)
+
+    @cached_property
+    def outputs(self) -> dict[str, Array]:
+        """The outputs at the ends of the runs, by name, each of shape (n_members,)."""
+        rows = [dict(zip(self._parameters, row, strict=True)) for row in self._values.tolist()]
+        members = list(zip(self._prepared, self._runs, rows, strict=False))
+        given = self._system.outputs
+        return {
+            name: at_ends(self._system, fun, f"the output {name!r}", members) for name, fun in given.items()
+        }
 
     def __repr__(self) -> str:
         failed = int(np.count_nonzero(~self.success))
@@ -205,6 +218,8 @@ def _groups(
         values = dict(zip(names, table[start].tolist(), strict=True))
         prepared = system.prepare(states.shape[1], t0, states[start].copy(), values)
         events = core_events(specs, prepared, t0, states[start], (), values)
+        if start == 0 and system.outputs:
+            refuse_outputs_that_fail(system, prepared, t0, states[start].copy(), values)
         stop = count
         if prepared.pinned is not None or any(callable(event[0]) for event in events):
             differs = (table[start:] != table[start]).any(axis=1)

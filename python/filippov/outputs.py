@@ -1,26 +1,60 @@
-"""Quantities along a solution: what a function of the user is while the motion slides, too."""
+"""Quantities along a solution: what a function of the user is while the motion slides or is in contact, too.
+
+A function with an argument ``contact`` is handed the accelerations that contacts give, by the names of their
+resets. In a trace they stand behind the states.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from filippov._core import Run, TracedEvent
+from filippov._core import Run, TracedEvent, TracedSystem
 from filippov.errors import InputError, ModelError
-from filippov.events import accepted_names, function_name
-from filippov.prepare import parameter_vector
-from filippov.trace.tracer import trace_event
+from filippov.events import accepted_names, function_name, names_argument
+from filippov.modes import Mode
+from filippov.prepare import Prepared, parameter_vector
+from filippov.trace.tracer import trace_beside, trace_output
 
 if TYPE_CHECKING:
     from filippov.solution import Solution
     from filippov.system import System
 
-__all__ = ["along", "check_outputs", "refuse_outputs_that_fail"]
+__all__ = [
+    "CONTACT",
+    "Output",
+    "along",
+    "at_ends",
+    "check_outputs",
+    "contacts_of",
+    "refuse_outputs_that_fail",
+    "traced_outputs",
+]
 
 Array = npt.NDArray[np.float64]
+# The argument of a function that is handed the accelerations of contacts.
+CONTACT = "contact"
+
+
+class Output(NamedTuple):
+    """An output that is computed by the core alone.
+
+    Attributes
+    ----------
+    name : str
+    function : TracedSystem or bytes
+        A system whose first component is the output; as bytes where it travels.
+    contacts : tuple of int
+        The surfaces whose contact accelerations it reads behind the states.
+    """
+
+    name: str
+    function: TracedSystem | bytes
+    contacts: tuple[int, ...]
 
 
 def check_outputs(outputs: Any, reserved: tuple[str, ...]) -> dict[str, Callable[..., Any]]:
@@ -45,7 +79,9 @@ def check_outputs(outputs: Any, reserved: tuple[str, ...]) -> dict[str, Callable
     return dict(outputs)
 
 
-def refuse_outputs_that_fail(system: System, t: float, x: Array, values: dict[str, float]) -> None:
+def refuse_outputs_that_fail(
+    system: System, prepared: Prepared, t: float, x: Array, values: dict[str, float]
+) -> None:
     """Call every output at a point.
 
     Raises
@@ -54,7 +90,8 @@ def refuse_outputs_that_fail(system: System, t: float, x: Array, values: dict[st
         If one raises, or returns no number.
     """
     for name, fun in system.outputs.items():
-        _called(system, fun, f"the output {name!r}", t, x.copy(), values)
+        reads = _Reads(prepared, fun, values)
+        _called(system, reads.with_values(np.zeros(0)), f"the output {name!r}", t, x.copy(), values)
 
 
 def along(
@@ -65,20 +102,167 @@ def along(
         raise ValueError(f'side: "right" or "left" is needed, not {side!r}')
     system, prepared, run = origin.system, origin.prepared, solution._run
     values = system.parameter_values(None) if origin.values is None else origin.values
+    reads = _Reads(prepared, fun, values)
     assert solution.sol is not None
     states = solution.sol(times, side)
-    if prepared.trace is not None and isinstance(run, Run):
-        args = () if system._source is None else system._source.args
-        found = trace_event(prepared.trace, fun, args, t0=times[0], y0=states[:, 0], parameters=values)
+    if prepared.trace is not None and isinstance(run, Run) and len(times):
+        found, _ = _traced(system, prepared, reads, times[0], states[:, 0], values)
         if isinstance(found, TracedEvent):
-            return run.signal(found, np.ascontiguousarray(times), parameter_vector(values), side == "left")
-    if any(mode.is_sliding for mode in solution.mode_at(times)):
-        raise ModelError(
-            f"{role}: {function_name(fun, 'fun')} could not be traced beside the right-hand side, and the "
-            "motion slides: its signs have no values of their own there"
-        )
-    points = zip(times.tolist(), states.T.copy(), strict=True)
-    return np.array([_called(system, fun, role, t, x, values) for t, x in points])
+            p, is_left = parameter_vector(values), side == "left"
+            return run.signal(found, np.ascontiguousarray(times), p, is_left, list(reads.surfaces))
+    _refuse_sliding(prepared, role, fun, solution.mode_at(times))
+    contacts = np.zeros((len(times), len(reads.surfaces)))
+    if reads.surfaces and isinstance(run, Run):
+        contacts = run.contacts(np.ascontiguousarray(times), side == "left")[list(reads.surfaces)].T
+    points = zip(times.tolist(), states.T.copy(), contacts, strict=True)
+    known = _discrete_at(system, run, times, values, side == "left")
+    return np.array(
+        [
+            _called(system, reads.with_values(contact), role, t, x, {**values, **own})
+            for (t, x, contact), own in zip(points, known, strict=True)
+        ]
+    )
+
+
+def at_ends(
+    system: System,
+    fun: Callable[..., Any],
+    role: str,
+    members: Iterable[tuple[Prepared, Run, dict[str, float]]],
+) -> Array:
+    """Return the values of a function at the ends of runs, of which nothing else need be kept."""
+    known: dict[int, TracedEvent] = {}  # by the trace beside which it holds for all parameters
+    found = []
+    for prepared, run, values in members:
+        reads = _Reads(prepared, fun, values)
+        event: TracedEvent | str | None = known.get(id(prepared))
+        if event is None and prepared.trace is not None:
+            event, holds = _traced(system, prepared, reads, run.t_last, run.y_last, values)
+            if isinstance(event, TracedEvent) and holds:
+                known[id(prepared)] = event
+        if isinstance(event, TracedEvent):
+            found.append(run.signal_at_end(event, parameter_vector(values), list(reads.surfaces)))
+            continue
+        _refuse_sliding(prepared, role, fun, [Mode(run.mode_last)])
+        contacts = run.contacts_at_end()[list(reads.surfaces)]
+        (own,) = _discrete_at(system, run, np.array([run.t_last]), values, False)
+        called = reads.with_values(contacts)
+        found.append(_called(system, called, role, run.t_last, run.y_last, {**values, **own}))
+    return np.array(found)
+
+
+def traced_outputs(
+    system: System, prepared: Prepared, t0: float, y0: Array, values: dict[str, float]
+) -> tuple[tuple[Output, ...], tuple[str, ...]]:
+    """Return the outputs that the core can compute alone, and the names of the others."""
+    found, left = [], []
+    for name, fun in system.outputs.items():
+        reads = _Reads(prepared, fun, values)
+        traced: Any = ""
+        if prepared.trace is not None:
+            args = () if system._source is None else system._source.args
+            start = reads.extended(y0)
+            traced = trace_output(prepared.trace, reads.function, args, t0=t0, y0=start, parameters=values)
+        if isinstance(traced, TracedSystem):
+            found.append(Output(name, traced, reads.surfaces))
+        else:
+            left.append(name)
+    return tuple(found), tuple(left)
+
+
+def contacts_of(prepared: Prepared) -> dict[int, list[str]]:
+    """Return the surfaces at which bodies may stay in contact, with the names of their resets."""
+    found: dict[int, list[str]] = {}
+    for action in prepared.actions:
+        if action.when == "surface" and not prepared.core.switches_at(int(action.numbers[0])):
+            found.setdefault(int(action.numbers[0]), []).append(action.name)
+    return found
+
+
+class _Contact(dict[Any, Any]):
+    """What a function reads as ``contact``."""
+
+    def __missing__(self, key: Any) -> Any:
+        known = ", ".join(map(repr, self)) or "it has none"
+        raise ModelError(f"contact: the system has no reset with contact {key!r}; there is {known}")
+
+
+class _Reads:
+    """A function of the user, and the contacts whose accelerations it reads.
+
+    Attributes
+    ----------
+    surfaces : tuple of int
+        The surfaces of these contacts; empty if the function has no argument ``contact``.
+    function : callable
+        The function of a state behind which these accelerations stand.
+    """
+
+    def __init__(self, prepared: Prepared, fun: Callable[..., Any], values: Mapping[str, float]) -> None:
+        self._fun = fun
+        self._asks = names_argument(fun, CONTACT) and CONTACT not in values
+        known = contacts_of(prepared) if self._asks else {}
+        self.surfaces = tuple(known)
+        self._keys = [
+            [surface, *dict.fromkeys(names), prepared.surfaces[surface]] for surface, names in known.items()
+        ]
+        self._named = accepted_names(fun, dict(values))
+        self.function = self._extended if self._asks else fun
+
+    def extended(self, y0: Array) -> Array:
+        """Return a state with accelerations behind it, to trace the function at."""
+        return np.concatenate([y0, np.ones(len(self.surfaces))])
+
+    def with_values(self, accelerations: Array) -> Callable[..., Any]:
+        """Return the function of the state, for these accelerations; zeros if none are given."""
+        if not self._asks:
+            return self._fun
+        own = accelerations if len(accelerations) else np.zeros(len(self.surfaces))
+        return partial(self._fun, **{CONTACT: self._contact(own.tolist())})
+
+    def _contact(self, accelerations: Sequence[Any]) -> _Contact:
+        pairs = zip(self._keys, accelerations, strict=True)
+        return _Contact({key: value for keys, value in pairs for key in keys})
+
+    def _extended(self, t: Any, x: Any, *args: Any, **params: Any) -> Any:
+        n = len(x) - len(self.surfaces)
+        named = {name: params[name] for name in self._named if name in params}
+        contact = self._contact([x[n + k] for k in range(len(self.surfaces))])
+        return self._fun(t, x[:n], *args, **named, **{CONTACT: contact})
+
+
+def _discrete_at(
+    system: System, run: Any, times: Array, values: Mapping[str, float], is_left: bool
+) -> list[dict[str, float]]:
+    """Return the discrete states at some times by name; their values in `values` are those at the start."""
+    names = tuple(system.discrete)
+    if not names or not isinstance(run, Run):
+        return [{name: values[name] for name in names}] * len(times)
+    rows = run.discrete(np.ascontiguousarray(times), len(names), is_left)
+    return [dict(zip(names, column, strict=True)) for column in rows.T.tolist()]
+
+
+_NOT_TRACED = (
+    "{role}: {name} could not be traced beside the right-hand side, and the motion slides: its signs have no "
+    "values of their own there"
+)
+
+
+def _refuse_sliding(prepared: Prepared, role: str, fun: Callable[..., Any], modes: Sequence[Any]) -> None:
+    """Refuse a function that is called where the motion slides; contact takes no sign from it."""
+    contacts = contacts_of(prepared)
+    if any(j not in contacts for mode in dict.fromkeys(modes) for j in mode.sliding):
+        raise ModelError(_NOT_TRACED.format(role=role, name=function_name(fun, "fun")))
+
+
+def _traced(
+    system: System, prepared: Prepared, reads: _Reads, t: float, x: Array, values: dict[str, float]
+) -> tuple[TracedEvent | str, bool]:
+    """Return what a function was traced to, and whether it holds for all parameters."""
+    assert prepared.trace is not None
+    args = () if system._source is None else system._source.args
+    start = reads.extended(x)
+    return trace_beside(prepared.trace, reads.function, args, t0=t, y0=start, parameters=values)
 
 
 def _called(
@@ -87,7 +271,12 @@ def _called(
     args = () if system._source is None else system._source.args
     named = {name: values[name] for name in accepted_names(fun, values)}
     try:
-        value = np.asarray(fun(t, x, *args, **named), dtype=float)
+        found = fun(t, x, *args, **named)
+        if found is None:
+            raise ModelError(f"{role} returned None: is a `return` missing?")
+        value = np.asarray(found, dtype=float)
+    except ModelError:
+        raise
     except Exception as error:
         raise ModelError(f"{role} raised {type(error).__name__}: {error}") from error
     if value.size != 1:

@@ -6,7 +6,6 @@ import os
 from collections.abc import Callable, Iterator, KeysView
 from functools import cached_property
 from html import escape
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -15,11 +14,18 @@ import numpy.typing as npt
 from filippov._core import Run
 from filippov.arrays import real_array
 from filippov.backward import ReversedRun
-from filippov.errors import ModelError
+from filippov.errors import InputError, ModelError
 from filippov.modes import Mode
 from filippov.prepare import Prepared
 from filippov.start import StandingRun
-from filippov.switches import RunWarning, SegmentTable, SwitchTable, import_pandas
+from filippov.switches import (
+    RunWarning,
+    SegmentTable,
+    SwitchTable,
+    as_texts,
+    import_pandas,
+    import_xarray,
+)
 
 if TYPE_CHECKING:
     from filippov.branches import Branches
@@ -185,7 +191,7 @@ class Solution:
     success : bool
         ``status >= 0``.
     switches : SwitchTable
-        Every change of mode.
+        Every change of mode; its column ``is_kink`` tells those apart at which the field is continuous.
     segments : SegmentTable
         Pieces of constant mode.
     stats : dict
@@ -491,6 +497,54 @@ class Solution:
         """
         return self._kept_function().multipliers(self.t if t is None else t)
 
+    def contact_acceleration(self, t: npt.ArrayLike | None = None, side: str = "right") -> Array:
+        """Return what holds bodies apart that are in contact: the acceleration that each contact gives.
+
+        Contact at the surface h of a reset (mode entry 0 there) keeps ``h = h' = 0``. Its force changes h''
+        by this acceleration, at least 0 and away from the obstacle; times the mass of the body it is the
+        force.
+
+        Parameters
+        ----------
+        t : float or array_like, shape (k,), optional
+            Times; by default those of the field `t`.
+        side : {"right", "left"}, optional
+            Which limit is meant at a time at which it jumps.
+
+        Returns
+        -------
+        ndarray, shape (n_surfaces,) or (n_surfaces, k)
+            0 where there is no contact.
+
+        Raises
+        ------
+        ModelError
+            If the solution was not kept as a function.
+        ValueError
+            If a time is outside of the interval, or `side` is unknown.
+
+        Examples
+        --------
+        A body lies on the floor until it is pulled up:
+
+        >>> import filippov as fl
+        >>> floor = fl.Reset(lambda t, x: x[0], lambda t, x: [x[0], 0.0], name="floor")
+        >>> body = fl.System(lambda t, x: [x[1], t - 9.81], n=2, resets=floor)
+        >>> body.solve((0, 12), [0.0, 0.0]).contact_acceleration([0.0, 5.0, 11.0])[0].round(9).tolist()
+        [9.81, 4.81, 0.0]
+        """
+        known = self._kept_function()
+        times = real_array(self.t if t is None else t, "t", "a number or a one-dimensional array")
+        if side not in ("right", "left"):
+            raise ValueError(f'side: "right" or "left" is needed, not {side!r}')
+        flat = np.ascontiguousarray(np.atleast_1d(times))
+        known._check_range(flat)
+        if isinstance(self._run, Run):
+            values = self._run.contacts(flat, side == "left")
+        else:
+            values = np.zeros((len(self.surfaces), len(flat)))
+        return values if times.ndim else values[:, 0]
+
     def evaluate(self, fun: Callable[..., Any], t: npt.ArrayLike | None = None, side: str = "right") -> Array:
         """Return a quantity along the solution: a control, a force, an energy.
 
@@ -501,7 +555,8 @@ class Solution:
         ----------
         fun : callable
             ``fun(t, x, *args) -> float``, as the right-hand side of the system; parameters that its signature
-            names are handed over by name.
+            names are handed over by name. So is ``contact``: what `contact_acceleration` returns, by the name
+            of the reset, by the printed surface, or by its index.
         t : float or array_like, shape (k,), optional
             Times; by default those of the field `t`.
         side : {"right", "left"}, optional
@@ -513,9 +568,11 @@ class Solution:
 
         Raises
         ------
+        InputError
+            If `fun` is no function.
         ModelError
-            If the function raises, if it could not be traced and the motion slides, or if the solution was
-            not kept as a function.
+            If the function raises or returns no number, if it could not be traced and the motion slides, or
+            if the solution was not kept as a function.
 
         Examples
         --------
@@ -529,6 +586,8 @@ class Solution:
         from filippov.outputs import along
 
         self._kept_function()
+        if not callable(fun):
+            raise InputError(f"fun: a function fun(t, x) is needed, not {type(fun).__name__}")
         times = real_array(self.t if t is None else t, "t", "a number or a one-dimensional array")
         values = along(self, self._origin, fun, "fun", np.atleast_1d(times), side)
         return values if times.ndim else values[0]
@@ -543,8 +602,21 @@ class Solution:
     @cached_property
     def outputs(self) -> dict[str, Array]:
         """The outputs of the system at the times `t`, by name."""
-        given = self._origin.system.outputs if self._origin.dense_output else {}
-        return {name: self.evaluate(fun) for name, fun in given.items()}
+        return {name: self.evaluate(fun) for name, fun in self.output_functions.items()}
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """The names of the outputs that the solution has."""
+        if hasattr(self, "_origin"):
+            return tuple(self.output_functions)
+        return tuple(self.outputs)
+
+    @property
+    def output_functions(self) -> dict[str, Callable[..., Any]]:
+        """The functions of these outputs by name; none in a copy, which has their values alone."""
+        if not hasattr(self, "_origin") or not self._origin.dense_output:
+            return {}
+        return self._origin.system.outputs
 
     def _modes_at(self, times: Array) -> list[Mode]:
         starts, modes = self.segments.t_start, self.segments.mode
@@ -577,19 +649,18 @@ class Solution:
     def to_xarray(self) -> Any:
         """Return an `xarray.Dataset` with one variable per state over the dimension ``t``.
 
+        The switches have one of their own, `SwitchTable.to_xarray`.
+
         Raises
         ------
         ImportError
             If xarray is not installed.
         """
-        try:
-            xarray = import_module("xarray")
-        except ImportError as error:
-            raise ImportError("to_xarray() needs xarray: pip install xarray") from error
+        xarray = import_xarray()
         variables: dict[str, Any] = {name: ("t", self.y[i]) for i, name in enumerate(self.states)}
         variables.update((name, ("t", values)) for name, values in {**self.discrete, **self.outputs}.items())
         if self.surfaces and len(self.segments):
-            variables["mode"] = ("t", np.array([str(mode) for mode in self._modes_at(self.t)]))
+            variables["mode"] = ("t", as_texts(self._modes_at(self.t)))
         attributes = {"message": self.message, "status": self.status, "surfaces": "\n".join(self.surfaces)}
         return xarray.Dataset(variables, coords={"t": self.t}, attrs=attributes)
 
@@ -653,7 +724,7 @@ class Solution:
         ax : matplotlib.axes.Axes, optional
             Where to draw; a new figure by default.
         states : sequence of int or str, optional
-            Which states; all by default.
+            Which states and outputs; all states by default.
         dark : bool, optional
             Light lines on a dark ground; by default as `filippov.plot.style` around says.
 
@@ -672,6 +743,7 @@ class Solution:
 
     def __repr__(self) -> str:
         n_sliding = sum(mode.is_sliding for mode in self.segments.mode)
+        switches = _counted(self.switches)
         lines = [
             f"message:  {self.message}",
             f"success:  {self.success} (status {self.status})",
@@ -679,7 +751,7 @@ class Solution:
             + (f", {self.t[0]:.10g} ... {self.t[-1]:.10g}" if len(self.t) else ""),
             f"y:        shape {self.y.shape}" + (f", last {_short(self.y[:, -1])}" if self.y.size else ""),
             f"surfaces: {', '.join(self.surfaces) if self.surfaces else 'none'}",
-            f"switches: {len(self.switches)}; segments: {len(self.segments)}, {n_sliding} of them sliding",
+            f"switches: {switches}; segments: {len(self.segments)}, {n_sliding} of them sliding",
             f"nfev:     {self.nfev} ({self.stats.get('backend', '')})",
         ]
         if self.t_events is not None:
@@ -688,6 +760,13 @@ class Solution:
         if len(self.warnings) > 5:
             lines.append(f"          ... and {len(self.warnings) - 5} more in .warnings")
         return "\n".join(lines)
+
+
+def _counted(switches: SwitchTable) -> str:
+    """Return the number of switches, those that are kinks apart."""
+    n_kinks = int(switches.is_kink.sum())
+    kinks = f" and {n_kinks} kink{'s' if n_kinks > 1 else ''}" if n_kinks else ""
+    return f"{len(switches) - n_kinks}{kinks}"
 
 
 def _message(run: AnyRun) -> str:

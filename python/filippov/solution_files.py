@@ -40,7 +40,7 @@ def write_solution(fields: Mapping[str, Any], path: str | os.PathLike[str]) -> N
         "outputs": list(fields["outputs"]),
         "discrete": list(fields["discrete"]),
         "switches": [
-            [s.kind, list(s.surfaces), str(s.mode_before), str(s.mode_after), s.note, s.rule]
+            [s.kind, list(s.surfaces), str(s.mode_before), str(s.mode_after), s.note, s.rule, s.is_kink]
             for s in switches
         ],
         "segments": [str(mode) for mode in segments.mode],
@@ -98,8 +98,8 @@ def read_solution(path: str | os.PathLike[str]) -> dict[str, Any]:
 def _fields(text: dict[str, Any], arrays: dict[str, Any]) -> dict[str, Any]:
     states, surfaces = tuple(text["states"]), tuple(text["surfaces"])
     switches = [
-        (t, before, after, kind, tuple(met), Mode(mode_before), Mode(mode_after), note, rule)
-        for t, before, after, (kind, met, mode_before, mode_after, note, rule) in zip(
+        (t, before, after, kind, tuple(met), Mode(mode_before), Mode(mode_after), note, rule, is_kink)
+        for t, before, after, (kind, met, mode_before, mode_after, note, rule, is_kink) in zip(
             arrays["switches_t"].tolist(),
             arrays["switches_y_before"],
             arrays["switches_y_after"],

@@ -160,9 +160,10 @@ def solve_ivp(
     -----
     Backward time, ``t1 < t0``, is allowed only without surfaces: Filippov flow is not reversible.
 
-    A function that is solved again is not traced again if nothing that it reads has changed. For a method, or
-    a function that reads objects, this is not known: make a `System` of it, which is traced once. The `args`
-    are constants of the trace; one trace serves all values of `params`.
+    A function that is solved again is not traced again if nothing that it reads has changed. For one that
+    reads more than data, functions, interpolants and objects of plain classes this is not known: make a
+    `System` of it, which is traced once. The `args` and what a closure reads are constants of the trace; one
+    trace serves all values of `params`.
 
     References
     ----------
@@ -302,7 +303,7 @@ def _solve(
     prepared = system.prepare(n, t0, state, values)
     fit_kappa(options.sliding, prepared.surfaces)
     if system.outputs:
-        refuse_outputs_that_fail(system, t0, state, values)
+        refuse_outputs_that_fail(system, prepared, t0, state, values)
     functions = [(f"the event {spec.name!r}", spec.g) for spec in specs or []]
     if t1 < t0:
         prepared, specs = _backward(system, prepared, specs, state, values, t0)

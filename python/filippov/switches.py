@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from importlib import import_module
 from typing import Any, NamedTuple, overload
 
@@ -40,6 +40,9 @@ class Switch(NamedTuple):
     rule : str
         The rule of the decision that chose `mode_after`, as ``one_surface``, ``relay`` or ``first_order``
         (`docs/theory/order_of_outcomes.md` lists them); empty for a reset.
+    is_kink : bool
+        Whether the field is continuous at the switch, as that of ``abs`` or ``maximum`` is: the solution has
+        a kink in its derivative there, and nothing else happens.
     """
 
     t: float
@@ -51,6 +54,7 @@ class Switch(NamedTuple):
     mode_after: Mode
     note: str
     rule: str = ""
+    is_kink: bool = False
 
 
 class Segment(NamedTuple):
@@ -134,8 +138,9 @@ class SwitchTable(Sequence[Switch]):
     """The switches of a run in order of time: a sequence of `Switch` and a table with columns.
 
     Every attribute of `Switch` is also a column: ``table.t`` is an array of shape (k,), ``table.y_before``
-    one of shape (k, n), ``table.kind`` an array of str, the others are lists. A slice is a table again,
-    and so is a selection by a mask or an array of indices, ``table[table.kind == "crossing"]``.
+    one of shape (k, n), ``table.kind`` an array of str, ``table.is_kink`` one of bool, the others are lists.
+    A slice is a table again, and so is a selection by a mask or an array of indices,
+    ``table[table.kind == "crossing"]`` or ``table[~table.is_kink]``.
 
     Examples
     --------
@@ -215,6 +220,19 @@ class SwitchTable(Sequence[Switch]):
         """The rules of the decisions that chose the modes just after; empty for resets."""
         return [row[8] for row in self._rows]
 
+    @property
+    def is_kink(self) -> npt.NDArray[np.bool_]:
+        """Whether the field is continuous there, shape (k,); ``table[~table.is_kink]`` are the jumps."""
+        return np.array([row[9] for row in self._rows], dtype=np.bool_)
+
+    @property
+    def counted(self) -> str:
+        """How many there are, in words: the kinks are counted apart."""
+        n_kinks = int(self.is_kink.sum())
+        n = len(self) - n_kinks
+        switches = "no switches" if n == 0 else f"{n} switch{'es' if n > 1 else ''}"
+        return switches + (f" and {n_kinks} kink{'s' if n_kinks > 1 else ''}" if n_kinks else "")
+
     def surface_text(self, switch: Switch) -> str:
         """Return the printed switching functions that a switch concerns, separated by commas."""
         return ", ".join(
@@ -242,25 +260,51 @@ class SwitchTable(Sequence[Switch]):
             columns.update({f"{name}_{label}": values[:, i] for i, name in enumerate(self._states)})
         columns["note"] = self.note
         columns["rule"] = self.rule
+        columns["is_kink"] = self.is_kink
         return pandas.DataFrame(columns)
+
+    def to_xarray(self) -> Any:
+        """Return an `xarray.Dataset` over the dimension ``switch``, for NetCDF and Zarr.
+
+        It has the columns of the table; ``y_before`` and ``y_after`` have the dimension ``state`` too.
+
+        Raises
+        ------
+        ImportError
+            If xarray is not installed.
+        """
+        texts: dict[str, Any] = {
+            "kind": self.kind,
+            "surfaces": [self.surface_text(switch) for switch in self],
+            "mode_before": [str(mode) for mode in self.mode_before],
+            "mode_after": [str(mode) for mode in self.mode_after],
+            "note": self.note,
+            "rule": self.rule,
+        }
+        variables: dict[str, Any] = {"t": ("switch", self.t), "is_kink": ("switch", self.is_kink)}
+        variables.update((name, ("switch", as_texts(text))) for name, text in texts.items())
+        for name in ("y_before", "y_after"):
+            variables[name] = (("switch", "state"), getattr(self, name))
+        return import_xarray().Dataset(variables, coords={"state": as_texts(self._states)})
 
     def __repr__(self) -> str:
         count = len(self)
         if count == 0:
-            return "no switches"
+            return self.counted
         head = count if count <= _ROWS_SHOWN else _ROWS_SHOWN - 5
         cells = [("", "t", "kind", "modes", "surfaces", "note")]
         shown = [*range(head), *range(max(head, count - 4), count)]
         for index in shown:
             switch = self[index]
             change = f"{switch.mode_before} -> {switch.mode_after}"
+            kind = f"{switch.kind} (kink)" if switch.is_kink else switch.kind
             cells.append(
-                (str(index), f"{switch.t:.10g}", switch.kind, change, self.surface_text(switch), switch.note)
+                (str(index), f"{switch.t:.10g}", kind, change, self.surface_text(switch), switch.note)
             )
         lines = _aligned(cells)
         if head < count:
             lines.insert(head + 1, f"... {count - head - 4} more ...")
-        return "\n".join([f"{count} switch{'es' if count > 1 else ''}", *lines])
+        return "\n".join([self.counted, *lines])
 
     def _state_column(self, position: int) -> Array:
         if not self._rows:
@@ -345,9 +389,22 @@ def import_pandas() -> Any:
         raise ImportError("to_pandas() needs pandas: pip install filippov[pandas]") from error
 
 
+def import_xarray() -> Any:
+    """Import xarray, or say how to install it."""
+    try:
+        return import_module("xarray")
+    except ImportError as error:
+        raise ImportError("to_xarray() needs xarray: pip install xarray") from error
+
+
+def as_texts(texts: Iterable[Any]) -> npt.NDArray[Any]:
+    """Return texts as an array that NetCDF and Zarr both have a type for."""
+    return np.array(list(map(str, texts)), dtype=object)
+
+
 def _switch(row: tuple[Any, ...]) -> Switch:
-    t, y_before, y_after, kind, surfaces, before, after, note, rule = row
-    return Switch(t, y_before, y_after, kind, tuple(surfaces), Mode(before), Mode(after), note, rule)
+    t, y_before, y_after, kind, surfaces, before, after, note, rule, is_kink = row
+    return Switch(t, y_before, y_after, kind, tuple(surfaces), Mode(before), Mode(after), note, rule, is_kink)
 
 
 def _segment(row: tuple[Any, ...]) -> Segment:

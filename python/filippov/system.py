@@ -61,7 +61,8 @@ class System(Points, Saving):
         Jumps of the state.
     outputs : dict of str to callable, optional
         Quantities of interest, ``{"u": lambda t, x, ...: ...}``: functions like those of `Solution.evaluate`,
-        whose values every solution has in `Solution.outputs` and in its tables.
+        whose values every solution has in `Solution.outputs` and in its tables; sweeps and ensembles have
+        them at the ends of the runs, sections at the returns.
     discrete : dict of str to float, optional
         Discrete states, ``{"gear": 1}``, with their values at the start: a gear, a phase, a counter, a held
         sample. The functions of the system read them by name, and only a `Reset` with ``set={"gear": ...}``

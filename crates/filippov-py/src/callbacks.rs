@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use filippov::action::ActionMap;
 use filippov::{
-    AffinePart, FieldError, Mode, PiecewiseSystem, Place, Setting, SignStructure, SmoothParts,
-    TracedSystem, UserFunction,
+    AffinePart, FieldError, Held, Piece, PiecewiseSystem, Place, Setting, SignStructure,
+    SmoothParts, TracedSystem, UserFunction,
 };
 use filippov_expr::{
     Backend, Enclosure, EnclosureProgram, ExprError, Graph, Motion, NodeId, Program,
@@ -274,20 +274,28 @@ impl TracedEvent {
     }
 }
 
-impl TracedEvent {
-    /// The value in a mode. The surfaces slid on, with their multipliers, count with the weights of both of their sides.
-    pub fn along(
-        &self,
-        t: f64,
-        x: &[f64],
-        p: &[f64],
-        mode: &Mode,
-        multipliers: &[(usize, f64)],
-    ) -> f64 {
+/// An expression along a motion: a quantity that a user asks for.
+pub struct Signal<'a> {
+    pub expression: &'a EventExpression,
+    /// The surfaces whose contact accelerations it reads behind the states.
+    pub contacts: &'a [usize],
+}
+
+impl Signal<'_> {
+    /// The value at a point of a motion. The surfaces slid on, with their multipliers, count with the weights of both of their
+    /// sides; a surface in contact is zero.
+    pub fn value(&self, (t, y): (f64, &[f64]), p: &[f64], piece: &Piece, held: &Held) -> f64 {
+        let of_contact = |j: usize| held.contacts.iter().find(|(k, _)| *k == j);
+        let accelerations = self
+            .contacts
+            .iter()
+            .map(|&j| of_contact(j).map_or(0.0, |c| c.1));
+        let x: Vec<f64> = y.iter().copied().chain(accelerations).collect();
+        let p = [p, &piece.discrete].concat();
         let inside = &self.expression.surfaces;
         let slides = |(j, _): &&(usize, f64)| inside.contains(j);
         let sliding: SmallVec<[(usize, f64); 4]> =
-            multipliers.iter().filter(slides).copied().collect();
+            held.signs.iter().filter(slides).copied().collect();
         let mut total = 0.0;
         for corner in 0..1_u64 << sliding.len() {
             let above = |k: usize| corner >> k & 1 == 1;
@@ -298,13 +306,16 @@ impl TracedEvent {
             let (mut inner, mut out) = (Vec::new(), [0.0]);
             for part in &self.expression.parts {
                 let signs = self.expression.signs(&inner);
-                part.program.eval(t, x, &signs, p, &[], &mut out);
+                part.program.eval(t, &x, &signs, &p, &[], &mut out);
                 let Some(&j) = inside.get(inner.len()) else {
                     continue;
                 };
-                let own = if out[0] == 0.0 { 0.0 } else { out[0].signum() };
+                let own = match out[0] == 0.0 || of_contact(j).is_some() {
+                    true => 0.0,
+                    false => out[0].signum(),
+                };
                 let slid = sliding.iter().position(|s| s.0 == j).map(sign);
-                let entry = mode.entries().get(j).filter(|entry| **entry != 0);
+                let entry = piece.mode.entries().get(j).filter(|entry| **entry != 0);
                 inner.push(slid.or(entry.map(|&entry| f64::from(entry))).unwrap_or(own));
             }
             total += weight * out[0];

@@ -140,13 +140,18 @@ impl PreparedRun {
         &self.core
     }
 
+    /// Is its field native code?
+    pub fn is_native(&self) -> bool {
+        self.is_native
+    }
+
     /// How many of its surfaces a user sees.
     pub fn n_visible(&self) -> usize {
         self.n_visible
     }
 
     /// What the user gives comes first: a sample at a tick sees the ramp before it drops.
-    fn actions(&self) -> Actions<'_> {
+    pub fn actions(&self) -> Actions<'_> {
         let given = self.given.iter().map(|(map, trigger, name)| Action {
             kind: Some(match trigger {
                 Trigger::Surface { .. } => Kind::Reset,
@@ -168,9 +173,14 @@ impl PreparedRun {
         }
     }
 
-    /// The result of the run as a Python object.
-    pub fn result(self, solution: Solution) -> Run {
-        Run::new(self.core, solution, self.is_native, self.n_visible)
+    /// The result of the run as a Python object, which keeps of this what the forces of contacts follow from: the times of a table
+    /// are as many as its knots.
+    pub fn result(mut self, solution: Solution) -> Run {
+        let is_at_surface = |trigger: &Trigger| matches!(trigger, Trigger::Surface { .. });
+        self.given.retain(|(_, trigger, _)| is_at_surface(trigger));
+        self.laws.retain(|law| is_at_surface(&law.trigger));
+        self.events.clear();
+        Run::new(self, solution)
     }
 }
 

@@ -1,20 +1,21 @@
 //! What a run computed, as a Python object.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Mutex, PoisonError};
 
 use filippov::{
-    as_multiplier, not_finite, state_text, Method, Mode, PiecewiseSystem, Segment, Side, Solution,
-    Stats, Stop,
+    as_multiplier, not_finite, state_text, Held, Method, Mode, PiecewiseSystem, Segment, Side,
+    Solution, Stats, Stop,
 };
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
-use crate::callbacks::TracedEvent;
+use crate::callbacks::{Signal, TracedEvent};
 use crate::conversion::columns;
 use crate::decisions::record_as_pair;
-use crate::systems::raised;
+use crate::prepared_run::PreparedRun;
+use crate::systems::{raised, CoreSystem};
 
 type Vector<'py> = Bound<'py, PyArray1<f64>>;
 type SwitchRow<'py> = (
@@ -27,6 +28,7 @@ type SwitchRow<'py> = (
     Bound<'py, PyTuple>,
     String,
     &'static str,
+    bool,
 );
 type SegmentRow<'py> = (
     f64,
@@ -52,29 +54,27 @@ type WarningRow<'py> = (
 /// What a run computed.
 #[pyclass(frozen, module = "filippov._core")]
 pub struct Run {
-    system: Arc<dyn PiecewiseSystem + Send + Sync>,
+    /// What was run: evaluations ask it for the forces of its contacts.
+    prepared: PreparedRun,
     solution: Mutex<Solution>,
     error: Option<PyErr>,
-    is_native: bool,
     /// The surfaces that a user sees are the first so many.
     n_visible: usize,
 }
 
 impl Run {
-    pub fn new(
-        system: Arc<dyn PiecewiseSystem + Send + Sync>,
-        mut solution: Solution,
-        is_native: bool,
-        n_visible: usize,
-    ) -> Self {
+    pub fn new(prepared: PreparedRun, mut solution: Solution) -> Self {
         let error = take_error(&mut solution);
         Run {
-            system,
+            n_visible: prepared.n_visible(),
+            prepared,
             solution: Mutex::new(solution),
             error,
-            is_native,
-            n_visible,
         }
+    }
+
+    fn system(&self) -> &CoreSystem {
+        self.prepared.core()
     }
 
     fn solution(&self) -> std::sync::MutexGuard<'_, Solution> {
@@ -95,12 +95,23 @@ impl Run {
         modes.iter().map(|mode| self.mode(py, mode)).collect()
     }
 
+    /// The accelerations that contacts give, one per surface that a user sees.
+    fn contact_row(&self, held: &Held) -> Vec<f64> {
+        let mut row = vec![0.0; self.n_visible];
+        for &(j, value) in &held.contacts {
+            if let Some(entry) = row.get_mut(j) {
+                *entry = value;
+            }
+        }
+        row
+    }
+
     /// The multiplier vector at a time; NaN for surfaces not slid on.
     fn multiplier_vector(&self, solution: &Solution, t: f64, side: Side) -> PyResult<Vec<f64>> {
         let mut out = vec![f64::NAN; self.n_visible];
-        let values = solution
-            .multipliers(&*self.system, t, side)
-            .map_err(raised)?;
+        let actions = self.prepared.actions();
+        let held = solution.held(&**self.system(), &actions, t, side);
+        let values = held.map_err(raised)?.multipliers;
         for (j, value) in values.into_iter().filter(|(j, _)| *j < self.n_visible) {
             out[j] = value;
         }
@@ -204,6 +215,12 @@ impl Run {
         PyArray1::from_slice(py, self.solution().last_state())
     }
 
+    /// The mode at the end.
+    #[getter]
+    fn mode_last<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        self.mode(py, &self.solution().mode)
+    }
+
     #[getter]
     fn switches<'py>(&self, py: Python<'py>) -> PyResult<Vec<SwitchRow<'py>>> {
         // A crossing or a touch of surfaces without an entry in the mode is not told.
@@ -213,7 +230,8 @@ impl Run {
                 || s.surfaces.iter().any(|&j| j < self.n_visible)
                 || visible(&s.mode_before) != visible(&s.mode_after)
         };
-        self.solution()
+        let solution = self.solution();
+        solution
             .switches
             .iter()
             .filter(is_told)
@@ -230,6 +248,7 @@ impl Run {
                     self.mode(py, &s.mode_after)?,
                     s.note.clone(),
                     s.rule,
+                    solution.is_kink(&**self.system(), s).map_err(raised)?,
                 ))
             })
             .collect()
@@ -294,7 +313,7 @@ impl Run {
 
     #[getter]
     fn message(&self) -> String {
-        message_of(&*self.system, &self.solution(), self.n_visible)
+        message_of(&**self.system(), &self.solution(), self.n_visible)
     }
 
     /// Time and state where the field is not finite, if the run ended there.
@@ -306,7 +325,7 @@ impl Run {
         }
         let end = solution.last_state();
         let (t, q) = (solution.t_last, &solution.discrete);
-        let place = not_finite(&*self.system, t, end, q, &solution.mode)?;
+        let place = not_finite(&**self.system(), t, end, q, &solution.mode)?;
         Some((place.t, PyArray1::from_vec(py, place.x)))
     }
 
@@ -329,7 +348,7 @@ impl Run {
         if let Some(since) = stats.stiff_since {
             dict.set_item("stiff_since", since)?;
         }
-        dict.set_item("native", self.is_native)?;
+        dict.set_item("native", self.prepared.is_native())?;
         dict.set_item("nfev", stats.n_field_evaluations)?;
         dict.set_item("njev", stats.n_jacobians)?;
         dict.set_item("nlu", stats.n_factorisations)?;
@@ -397,7 +416,7 @@ impl Run {
         let times = t.as_slice()?;
         let mut out = vec![0.0; n * times.len()];
         for (&t, y) in times.iter().zip(out.chunks_exact_mut(n)) {
-            let found = solution.evaluate(&*self.system, t, side_of(left), y);
+            let found = solution.evaluate(&**self.system(), t, side_of(left), y);
             found
                 .map_err(raised)?
                 .ok_or_else(|| outside(&solution, t))?;
@@ -424,7 +443,7 @@ impl Run {
     }
 
     /// An expression along the solution, at the times `t`: while sliding the combination of its values on the sides of the
-    /// surfaces, by their multipliers.
+    /// surfaces, by their multipliers. Behind the states it reads the accelerations that the contacts at these surfaces give.
     fn signal<'py>(
         &self,
         py: Python<'py>,
@@ -432,25 +451,72 @@ impl Run {
         t: PyReadonlyArray1<'py, f64>,
         p: PyReadonlyArray1<'py, f64>,
         left: bool,
+        contacts: Vec<usize>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let (solution, side) = (self.solution(), side_of(left));
+        let (system, actions) = (&**self.system(), self.prepared.actions());
         let mut y = vec![0.0; solution.n_states];
         let mut out = Vec::new();
         for &t in t.as_slice()? {
-            let mode = solution
-                .evaluate(&*self.system, t, side, &mut y)
-                .map_err(raised)?
-                .ok_or_else(|| outside(&solution, t))?;
-            let known = solution
-                .multipliers(&*self.system, t, side)
-                .map_err(raised)?;
-            let discrete = solution
-                .segment_at(t, side)
-                .map_or(&[][..], |s| &s.discrete);
-            let parameters = [p.as_slice()?, discrete].concat();
-            out.push(expression.along(t, &y, &parameters, mode, &known));
+            let found = solution.evaluate(system, t, side, &mut y).map_err(raised)?;
+            found.ok_or_else(|| outside(&solution, t))?;
+            let piece = solution.piece_at(system, t, side).map_err(raised)?;
+            let piece = piece.unwrap_or_default();
+            let held = piece.held(system, &actions, solution.sliding, (t, &y));
+            let signal = Signal {
+                expression: &expression.expression,
+                contacts: &contacts,
+            };
+            out.push(signal.value((t, &y), p.as_slice()?, &piece, &held.map_err(raised)?));
         }
         Ok(PyArray1::from_vec(py, out))
+    }
+
+    /// The expression at the end of the run, which needs no continuous extension.
+    fn signal_at_end(
+        &self,
+        expression: &TracedEvent,
+        p: PyReadonlyArray1<'_, f64>,
+        contacts: Vec<usize>,
+    ) -> PyResult<f64> {
+        let solution = self.solution();
+        let piece = solution.last_piece();
+        let at = (solution.t_last, solution.last_state());
+        let actions = self.prepared.actions();
+        let held = piece.held(&**self.system(), &actions, solution.sliding, at);
+        let signal = Signal {
+            expression: &expression.expression,
+            contacts: &contacts,
+        };
+        Ok(signal.value(at, p.as_slice()?, &piece, &held.map_err(raised)?))
+    }
+
+    /// The accelerations of the switching functions that contacts give at the times `t`, shape (n_surfaces, len(t)); 0 without
+    /// contact.
+    fn contacts<'py>(
+        &self,
+        py: Python<'py>,
+        t: PyReadonlyArray1<'py, f64>,
+        left: bool,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let (solution, side) = (self.solution(), side_of(left));
+        let actions = self.prepared.actions();
+        let mut out = Vec::new();
+        for &t in t.as_slice()? {
+            let held = solution.held(&**self.system(), &actions, t, side);
+            out.extend(self.contact_row(&held.map_err(raised)?));
+        }
+        Ok(columns(py, &out, self.n_visible))
+    }
+
+    /// The same at the end of the run, which needs no continuous extension.
+    fn contacts_at_end<'py>(&self, py: Python<'py>) -> PyResult<Vector<'py>> {
+        let solution = self.solution();
+        let (piece, actions) = (solution.last_piece(), self.prepared.actions());
+        let at = (solution.t_last, solution.last_state());
+        let held = piece.held(&**self.system(), &actions, solution.sliding, at);
+        let row = self.contact_row(&held.map_err(raised)?);
+        Ok(PyArray1::from_vec(py, row))
     }
 
     /// The first `n` discrete states at the times `t`, shape (n, len(t)); those at the end if no segments are kept.

@@ -4,13 +4,15 @@ use std::sync::Arc;
 
 use filippov::action::Clock;
 use filippov::section::{Cycle, Place, Returns, Section};
-use filippov::{Error, Kind, Solution, Stop, UserFunction, Warning, WarningCode};
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
+use filippov::{
+    Error, Kind, Piece, SlidingRule, Solution, Stop, UserFunction, Warning, WarningCode,
+};
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2};
 use pyo3::exceptions::{PyException, PyKeyError, PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::callbacks::{CalledEvent, CompiledEvent, EventExpression};
+use crate::callbacks::{CalledEvent, CompiledEvent, EventExpression, Signal};
 use crate::prepared_run::{ActionRow, PreparedRun};
 use crate::run::{is_interruption, message_of, status_of, take_error};
 use crate::solve::RunOptions;
@@ -33,13 +35,21 @@ pub fn solve_points<'py>(
     options: &RunOptions,
     actions: Vec<ActionRow>,
     section: Option<Bound<'py, PyDict>>,
+    outputs: Vec<(Bound<'py, TracedSystem>, Vec<usize>)>,
     threads: usize,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (spans, y0, p) = (spans.as_array(), y0.as_array(), p.as_array());
     let section = section.map(|given| SectionSpec::read(&system, &given));
-    let section = section.transpose()?;
+    let mut section = section.transpose()?;
+    if let Some(section) = &mut section {
+        section.keeps_pieces = !outputs.is_empty();
+    }
+    let outputs = outputs
+        .iter()
+        .map(Output::read)
+        .collect::<PyResult<Vec<_>>>()?;
     let rows: Vec<usize> = (0..y0.nrows()).collect();
-    let mut points = Points::new(y0.ncols());
+    let mut points = Points::new(y0.ncols(), outputs.len());
     for chunk in rows.chunks(CHUNK_PER_THREAD * threads.max(1)) {
         let prepare = |&row: &usize| {
             let (y0, p) = (y0.row(row).to_vec(), p.row(row).to_vec());
@@ -60,8 +70,12 @@ pub fn solve_points<'py>(
             }
         };
         let done = py.detach(|| on_threads(&jobs, threads, go, is_interruption));
-        for ((run, _, span), outcome) in jobs.iter().zip(done.results) {
-            points.take(py, run, *span, outcome);
+        for (((run, _, span), outcome), row) in jobs.iter().zip(done.results).zip(chunk) {
+            let signals = Signals {
+                outputs: &outputs,
+                p: &p.row(*row).to_vec(),
+            };
+            points.take(py, run, &signals, *span, outcome);
         }
         let signalled = done.raised.or_else(|| py.check_signals().err());
         if let Some(raised) = signalled {
@@ -78,12 +92,64 @@ pub fn solve_points<'py>(
     points.into_dict(py)
 }
 
+/// A quantity that is wanted of every run.
+struct Output {
+    expression: EventExpression,
+    /// The surfaces whose contact accelerations it reads.
+    contacts: Vec<usize>,
+}
+
+impl Output {
+    /// The first component of the field of a system is the expression.
+    fn read((system, contacts): &(Bound<'_, TracedSystem>, Vec<usize>)) -> PyResult<Self> {
+        let own = &system.get().system;
+        let node = own.field_nodes().first();
+        let node = *node.ok_or_else(|| PyValueError::new_err("outputs: no expression"))?;
+        let expression = EventExpression::compile(own.graph(), node);
+        Ok(Output {
+            expression: expression.map_err(|e| PyValueError::new_err(e.to_string()))?,
+            contacts: contacts.clone(),
+        })
+    }
+}
+
+/// The outputs of one run.
+struct Signals<'a> {
+    outputs: &'a [Output],
+    p: &'a [f64],
+}
+
+impl Signals<'_> {
+    /// Their values at a point; NaN where a function of the user raises.
+    fn values(
+        &self,
+        run: &PreparedRun,
+        rule: SlidingRule,
+        (t, y): (f64, &[f64]),
+        piece: &Piece,
+    ) -> Vec<f64> {
+        let held = piece.held(&**run.core(), &run.actions(), rule, (t, y));
+        let value = |output: &Output| match &held {
+            Ok(held) => {
+                let signal = Signal {
+                    expression: &output.expression,
+                    contacts: &output.contacts,
+                };
+                signal.value((t, y), self.p, piece, held)
+            }
+            Err(_) => f64::NAN,
+        };
+        self.outputs.iter().map(value).collect()
+    }
+}
+
 /// A section as it comes from Python.
 struct SectionSpec {
     place: PlaceSpec,
     transient: u64,
     most: u64,
     cycle: Option<Cycle>,
+    keeps_pieces: bool,
 }
 
 enum PlaceSpec {
@@ -118,6 +184,7 @@ impl SectionSpec {
             transient: item(given, "transient")?.extract()?,
             most: item(given, "most")?.extract()?,
             cycle,
+            keeps_pieces: false,
         })
     }
 
@@ -158,6 +225,7 @@ impl SectionSpec {
             transient: self.transient,
             most: self.most,
             cycle: self.cycle.clone(),
+            keeps_pieces: self.keeps_pieces,
         }
     }
 }
@@ -263,6 +331,10 @@ pub fn warning_codes() -> Vec<&'static str> {
 struct Points {
     n_states: usize,
     n_surfaces: usize,
+    n_outputs: usize,
+    /// The outputs at the ends of the runs, and at the returns.
+    outputs_last: Vec<f64>,
+    outputs: Vec<f64>,
     status: Vec<i8>,
     reason: Vec<&'static str>,
     message: Vec<String>,
@@ -287,14 +359,22 @@ struct Points {
 }
 
 impl Points {
-    fn new(n_states: usize) -> Self {
+    fn new(n_states: usize, n_outputs: usize) -> Self {
         Points {
             n_states,
+            n_outputs,
             ..Points::default()
         }
     }
 
-    fn take(&mut self, py: Python<'_>, run: &PreparedRun, span: (f64, f64), outcome: Outcome) {
+    fn take(
+        &mut self,
+        py: Python<'_>,
+        run: &PreparedRun,
+        signals: &Signals,
+        span: (f64, f64),
+        outcome: Outcome,
+    ) {
         self.n_surfaces = run.n_visible();
         let mut solution = match outcome {
             Ok(solution) => solution,
@@ -319,10 +399,22 @@ impl Points {
         self.end(status, reason, message);
         self.t_last.push(solution.t_last);
         self.y_last.extend_from_slice(solution.last_state());
+        let returns = solution.returns.take().unwrap_or_default();
+        if self.n_outputs > 0 {
+            let end = (solution.t_last, solution.last_state());
+            let last = signals.values(run, solution.sliding, end, &solution.last_piece());
+            self.outputs_last.extend(last);
+            for kept in &returns.kept {
+                let at = (kept.t, &kept.y[..]);
+                let piece = kept.piece.as_deref().cloned().unwrap_or_default();
+                let values = signals.values(run, solution.sliding, at, &piece);
+                self.outputs.extend(values);
+            }
+        }
         let stats = &solution.stats;
         self.count(stats.n_steps as i64, stats.n_switches as i64);
         self.note_warnings(&solution.warnings);
-        self.returns(&solution.returns.take().unwrap_or_default());
+        self.returns(&returns);
     }
 
     /// A run that was not begun.
@@ -335,6 +427,8 @@ impl Points {
         self.t_last.push(t0);
         self.y_last
             .resize(self.y_last.len() + self.n_states, f64::NAN);
+        self.outputs_last
+            .resize(self.outputs_last.len() + self.n_outputs, f64::NAN);
         self.count(0, 0);
         self.note_warnings(&[]);
         self.returns(&Returns::default());
@@ -377,11 +471,15 @@ impl Points {
         let dict = PyDict::new(py);
         let n_kept = self.t.len();
         let n_pieces: i64 = self.n_pieces.iter().map(|&n| i64::from(n)).sum();
-        let table = |values: Vec<f64>, rows: usize| -> PyResult<Bound<'_, PyArray2<f64>>> {
-            PyArray1::from_vec(py, values).reshape([rows, self.n_states])
+        let n_points = self.status.len();
+        let table = |values: Vec<f64>, rows: usize, columns: usize| {
+            PyArray1::from_vec(py, values).reshape([rows, columns])
         };
-        dict.set_item("y_last", table(self.y_last, self.status.len())?)?;
-        dict.set_item("y", table(self.y, n_kept)?)?;
+        dict.set_item("y_last", table(self.y_last, n_points, self.n_states)?)?;
+        dict.set_item("y", table(self.y, n_kept, self.n_states)?)?;
+        let outputs_last = table(self.outputs_last, n_points, self.n_outputs)?;
+        dict.set_item("outputs_last", outputs_last)?;
+        dict.set_item("outputs", table(self.outputs, n_kept, self.n_outputs)?)?;
         let modes = PyArray1::from_vec(py, self.modes);
         dict.set_item(
             "modes",

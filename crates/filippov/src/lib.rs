@@ -114,8 +114,8 @@ pub use mode::{Mode, Signs};
 pub use options::{Keep, Method, NonUnique, Options, SlidingRule, Stabilization};
 pub use record::{
     as_multiplier, replay_decision, section, DecisionCause, DecisionOutcome, DecisionPoint,
-    DecisionRecord, Gradient, InstantRecord, ObservedStep, Observer, Segment, Side, Solution,
-    StartingZero,
+    DecisionRecord, Gradient, Held, InstantRecord, ObservedStep, Observer, Piece, Segment, Side,
+    Solution, StartingZero,
 };
 pub use saved::{RunnableSystem, SavedAction, SavedSystem};
 pub use stats::Stats;

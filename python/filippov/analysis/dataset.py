@@ -77,7 +77,7 @@ _TYPES: dict[str, Any] = {
 
 
 def variables_of(
-    grid: Grid, n_surfaces: int, has_section: bool, units: Mapping[str, str]
+    grid: Grid, n_surfaces: int, has_section: bool, units: Mapping[str, str], outputs: Sequence[str]
 ) -> Iterator[Variable]:
     """Yield the variables of a result."""
 
@@ -101,6 +101,9 @@ def variables_of(
     if not has_section:
         for i, name in enumerate(grid.states):
             yield Variable(name, "point", "y_last", i, attributes(f"{name} at the end", units.get(name)))
+        for i, name in enumerate(outputs):
+            text = f"{name} at the end"
+            yield Variable(name, "point", "outputs_last", i, attributes(text, units.get(name)))
         return
     yield Variable(
         "n_returns", "point", "n_returns", None, attributes("number of returns, those not kept included")
@@ -115,6 +118,8 @@ def variables_of(
     yield Variable("t", "obs", "t", None, attributes("time of the return", time))
     for i, name in enumerate(grid.states):
         yield Variable(name, "obs", "y", i, attributes(f"{name} at the return", units.get(name)))
+    for i, name in enumerate(outputs):
+        yield Variable(name, "obs", "outputs", i, attributes(f"{name} at the return", units.get(name)))
     yield Variable("return_time", "obs", "duration", None, attributes("time since the return before", time))
     yield Variable("sliding_time", "obs", "sliding", None, attributes("part of it spent sliding", time))
     yield Variable(
@@ -163,11 +168,12 @@ def dataset_of(
     has_section: bool,
     units: Mapping[str, str],
     attributes: Mapping[str, Any],
+    outputs: Sequence[str],
 ) -> Any:
     """Return a whole table as a Dataset."""
     xarray = need("xarray", "the result of a sweep")
     found = {}
-    for variable in variables_of(grid, len(surfaces), has_section, units):
+    for variable in variables_of(grid, len(surfaces), has_section, units, outputs):
         values = variable.values(table)
         shape = shape_of(variable, grid, len(values), len(surfaces))
         found[variable.name] = (dims_of(variable, grid), values.reshape(shape), variable.attributes)

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from filippov._core import TracedSystem
-from filippov.analysis.dataset import as_json
+from filippov.analysis.dataset import as_json, variables_of
 from filippov.analysis.grid import Grid
 from filippov.analysis.identity import identity_of
 from filippov.analysis.points import (
@@ -23,11 +23,13 @@ from filippov.analysis.points import (
     failed_table,
     groups_of,
     not_run,
+    outputs_for,
     run_task,
 )
 from filippov.analysis.sections import Phase, Place, clocks_of
 from filippov.errors import InputError, Interrupted
 from filippov.options import Options
+from filippov.outputs import Output, traced_outputs
 from filippov.prepare import Prepared
 
 if TYPE_CHECKING:
@@ -144,6 +146,8 @@ class Plan(NamedTuple):
     units : dict
     attributes : dict
         Attributes of the result.
+    outputs : tuple of Output
+        The outputs that the result has.
     """
 
     system: System
@@ -156,6 +160,12 @@ class Plan(NamedTuple):
     follows: bool
     units: Mapping[str, str]
     attributes: Mapping[str, Any]
+    outputs: tuple[Output, ...]
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """The names of the outputs that the result has."""
+        return tuple(output.name for output in self.outputs)
 
     @property
     def n_points(self) -> int:
@@ -205,12 +215,19 @@ class Plan(NamedTuple):
         t0 = self.t_span[0]
         for own, prepared in groups_of(self.system, self.prepared, t0, y0, self.grid.names, p):
             place: Place | None | Exception = self.place
+            outputs: tuple[Output, ...] | Exception = self.outputs
             if prepared is not self.prepared and not isinstance(prepared, Exception):
                 place = self._place_for(prepared, y0[own], p[own])
-            error = prepared if isinstance(prepared, Exception) else place
-            if isinstance(prepared, Exception) or isinstance(place, Exception):
+                if not isinstance(place, Exception):
+                    outputs = self._outputs_for(prepared, y0[own], p[own])
+            error = next((each for each in (prepared, place, outputs) if isinstance(each, Exception)), None)
+            if (
+                isinstance(prepared, Exception)
+                or isinstance(place, Exception)
+                or isinstance(outputs, Exception)
+            ):
                 failed = (str(error), "not_prepared", all_spans[own, 0], y0[own])
-                parts.append(failed_table(*failed, len(self.prepared.surfaces)))
+                parts.append(failed_table(*failed, len(self.prepared.surfaces), len(self.outputs)))
                 continue
             clocks, spans = all_clocks[own], all_spans[own]
             task = Task(
@@ -223,6 +240,7 @@ class Plan(NamedTuple):
                 p[own],
                 self.options,
                 limits,
+                outputs,
                 threads,
             )
             parts.append(task.travelling() if travels else task)
@@ -231,7 +249,9 @@ class Plan(NamedTuple):
     def left_out(self, piece: Piece) -> Table:
         """Return the table of a piece that was not begun."""
         y0, p, clocks, spans = self.points(piece.start, piece.stop)
-        task = Task(self.prepared, None, clocks, spans, y0, self.grid.names, p, self.options, (), 1)
+        task = Task(
+            self.prepared, None, clocks, spans, y0, self.grid.names, p, self.options, (), self.outputs, 1
+        )
         return not_run(task, len(self.prepared.surfaces))
 
     def _place_for(self, prepared: Prepared, y0: Array, p: Array) -> Place | None | Exception:
@@ -248,6 +268,14 @@ class Plan(NamedTuple):
             return section.place(prepared, self.grid.states, t0, y0[0].copy(), values)
         except InputError as error:
             return error
+
+    def _outputs_for(self, prepared: Prepared, y0: Array, p: Array) -> tuple[Output, ...] | Exception:
+        """Return the outputs beside a system that holds for some parameter values only."""
+        values = dict(zip(self.grid.names, p[0].tolist(), strict=True))
+        found, _ = traced_outputs(self.system, prepared, self.t_span[0], y0[0].copy(), values)
+        if tuple(output.name for output in found) != self.output_names:
+            return InputError("outputs: other ones can be traced for these parameter values")
+        return found
 
     def identity(self) -> dict[str, str]:
         """Return what the result follows from, as digests and text."""
@@ -284,6 +312,12 @@ class Plan(NamedTuple):
             "follow": str(self.follows),
             "options": self.attributes["options"],
             "units": as_json(dict(self.units)),
+            "outputs": as_json(
+                [
+                    [output.name, _digest_of_traced(output.function), output.contacts]
+                    for output in self.outputs
+                ]
+            ),
         }
 
 
@@ -308,8 +342,11 @@ def plan_of(
     """Return the plan of a sweep; all arguments are checked."""
     t0, t1 = t_span
     place = None
+    state, values = grid.first()
+    variables = variables_of(grid, len(prepared.surfaces), observed is not None, units, ())
+    taken = {*(variable.name for variable in variables), *grid.dims, *grid.names}
+    outputs = outputs_for(system, prepared, t0, state, values, taken)
     if observed is not None:
-        state, values = grid.first()
         place = observed.section.place(prepared, grid.states, t0, state, values)
     shown = {name: value for name, value in options.by_name().items() if name not in _NOT_SHOWN}
     attributes: dict[str, Any] = {
@@ -328,7 +365,7 @@ def plan_of(
             "periodicity": as_json(observed.cycle),
             "follow": grid.dims[-1] if follows else "",
         }
-    return Plan(system, grid, prepared, place, options, observed, t_span, follows, units, attributes)
+    return Plan(system, grid, prepared, place, options, observed, t_span, follows, units, attributes, outputs)
 
 
 _NOT_SHOWN = frozenset(("t_eval", "dense_output", "keep", "progress", "max_branches"))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -12,9 +12,11 @@ import numpy.typing as npt
 
 from filippov._core import TracedSystem, solve_points, warning_codes
 from filippov.analysis.sections import AnySection, Phase, Place
+from filippov.caution import warn_user
 from filippov.errors import FilippovError, InputError, Interrupted
 from filippov.events import bind_function, selective
 from filippov.options import Options
+from filippov.outputs import Output, traced_outputs
 from filippov.prepare import MEMORY, Prepared
 from filippov.saving import packed, unpacked
 
@@ -32,9 +34,9 @@ WARNINGS = (*warning_codes(), MEMORY)
 # The columns of a table, by what one row belongs to. Texts are lists.
 POINT_COLUMNS = (
     *("status", "reason", "message", "t_last", "y_last"),
-    *("n_steps", "n_switches", "n_warnings", "warnings", "n_returns", "period", "row_size"),
+    *("n_steps", "n_switches", "n_warnings", "warnings", "n_returns", "period", "row_size", "outputs_last"),
 )
-RETURN_COLUMNS = ("t", "y", "duration", "sliding", "n_pieces")
+RETURN_COLUMNS = ("t", "y", "duration", "sliding", "n_pieces", "outputs")
 PIECE_COLUMNS = ("modes",)
 COLUMNS = (*POINT_COLUMNS, *RETURN_COLUMNS, *PIECE_COLUMNS)
 
@@ -78,6 +80,8 @@ class Task(NamedTuple):
     options : Options
     limits : tuple
         Returns not kept, returns kept, and the test of periodicity.
+    outputs : tuple of Output
+        The outputs of the system that are wanted.
     threads : int
     """
 
@@ -90,6 +94,7 @@ class Task(NamedTuple):
     p: Array
     options: Options
     limits: tuple[Any, ...]
+    outputs: tuple[Output, ...]
     threads: int
 
     def rows(self, chosen: slice) -> Task:
@@ -106,7 +111,13 @@ class Task(NamedTuple):
         if isinstance(self.system, Prepared) and isinstance(self.system.core, TracedSystem):
             # The values come with each point; without any here all tasks of a sweep carry the same bytes.
             values = dict.fromkeys(self.names, 0.0)
-            return self._replace(system=pickle.dumps(packed(self.system, values)), place=place)
+            outputs = tuple(
+                output._replace(function=output.function.to_bytes())
+                for output in self.outputs
+                if isinstance(output.function, TracedSystem)
+            )
+            system = pickle.dumps(packed(self.system, values))
+            return self._replace(system=system, place=place, outputs=outputs)
         raise InputError(
             "executor: a system that cannot be traced cannot be sent to other processes; leave executor= "
             "away, or write the right-hand side with NumPy functions"
@@ -135,6 +146,11 @@ def run_task(task: Task) -> Table:
     place = task.place
     if place is not None and isinstance(place.function, bytes):
         place = place._replace(function=_function(place.function))
+    outputs = (
+        output._replace(function=_function(output.function)) if isinstance(output.function, bytes) else output
+        for output in task.outputs
+    )
+    task = task._replace(outputs=tuple(outputs))
     if place is None or not place.is_called:
         return _run(task, prepared, place)
     # A function that could not be traced is called; it may read the parameters of its point.
@@ -172,6 +188,7 @@ def _run(task: Task, prepared: Prepared, place: Place | None) -> Table:
         task.options.for_core(),
         list(prepared.actions),
         section,
+        [(output.function, list(output.contacts)) for output in task.outputs],  # type: ignore[misc]
         task.threads,
     )
     raised = table.pop("raised")
@@ -188,13 +205,13 @@ def _run(task: Task, prepared: Prepared, place: Place | None) -> Table:
 
 def not_run(task: Task, n_surfaces: int) -> Table:
     """Return the table of points that were not begun."""
-    return failed_table(_NOT_RUN, "not_run", task.spans[:, 0], task.y0, n_surfaces)
+    return failed_table(_NOT_RUN, "not_run", task.spans[:, 0], task.y0, n_surfaces, len(task.outputs))
 
 
 _NOT_RUN = "Not run: the sweep was interrupted."
 
 
-def failed_table(message: str, reason: str, t0: Array, y0: Array, n_surfaces: int) -> Table:
+def failed_table(message: str, reason: str, t0: Array, y0: Array, n_surfaces: int, n_outputs: int) -> Table:
     """Return the table of points that could not be run at all."""
     count, n = y0.shape
     zeros = np.zeros(count, dtype=np.int64)
@@ -204,12 +221,14 @@ def failed_table(message: str, reason: str, t0: Array, y0: Array, n_surfaces: in
         "message": [message] * count,
         "t_last": t0,
         "y_last": np.full((count, n), np.nan),
+        "outputs_last": np.full((count, n_outputs), np.nan),
         **{
             name: zeros for name in ("n_steps", "n_switches", "n_warnings", "n_returns", "period", "row_size")
         },
         "warnings": np.zeros(count, dtype=np.int32),
         **{name: np.empty(0) for name in ("t", "duration", "sliding")},
         "y": np.empty((0, n)),
+        "outputs": np.empty((0, n_outputs)),
         "n_pieces": np.empty(0, dtype=np.int32),
         "modes": np.empty((0, n_surfaces), dtype=np.int8),
     }
@@ -237,6 +256,35 @@ def prepare_for(system: System, t0: float, y0: Array, values: dict[str, float]) 
         if defaults == values:
             raise
         return system.prepare(len(y0), t0, None, defaults)
+
+
+def outputs_for(
+    system: System,
+    prepared: Prepared,
+    t0: float,
+    y0: Array,
+    values: dict[str, float],
+    taken: Collection[str] = (),
+) -> tuple[Output, ...]:
+    """Return the outputs of a system; those that cannot be traced are named in a warning.
+
+    Raises
+    ------
+    InputError
+        If the name of one is among those taken.
+    """
+    for name in system.outputs:
+        if name in taken:
+            raise InputError(f"outputs: {name!r} is the name of something else in the result; rename it")
+    found, left = traced_outputs(system, prepared, t0, y0, values)
+    if left:
+        warn_user(
+            [
+                f"outputs: {', '.join(map(repr, left))} could not be traced beside the right-hand side, and "
+                "the result does not have them"
+            ]
+        )
+    return found
 
 
 def groups_of(

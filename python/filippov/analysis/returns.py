@@ -12,7 +12,7 @@ from filippov.analysis.dataset import as_json, kinds_of
 from filippov.analysis.grid import grid_of
 from filippov.analysis.observe import check_keywords, check_system, observation_of, options_of, span_of
 from filippov.analysis.optional import need
-from filippov.analysis.points import Table, Task, end_times, prepare_for, run_task
+from filippov.analysis.points import Table, Task, end_times, outputs_for, prepare_for, run_task
 from filippov.analysis.sections import clocks_of
 from filippov.errors import InputError, Interrupted
 from filippov.modes import Mode
@@ -77,9 +77,10 @@ def poincare(
     Returns
     -------
     xarray.Dataset
-        Along the dimension ``obs``, one entry per return: its time ``t``, every state by its name, the
-        ``return_time`` since the return before (or the start), the ``sliding_time`` in it, and the modes in
-        between, as text in ``itinerary`` and as numbers in ``mode``, ``n_pieces`` rows of it per return. The
+        Along the dimension ``obs``, one entry per return: its time ``t``, every state and output by its name
+        (an output just before the return, where it jumps), the ``return_time`` since the return before (or
+        the start), the ``sliding_time`` in it, and the modes in between, as text in ``itinerary`` and as
+        numbers in ``mode``, ``n_pieces`` rows of it per return. The
         attributes have ``status, reason, message``, ``n_returns`` (all of them), ``period``, the number of
         returns after which the motion repeats, 0 if that was not found, and ``n_warnings`` with their kinds
         in ``warnings``.
@@ -156,6 +157,7 @@ def poincare(
     place = own.place(prepared, grid.states, span[0], state, values)
     clocks = clocks_of(own, grid.names, p_rows)
     ends = end_times(own, span, observed.transient + observed.n, clocks)
+    outputs = outputs_for(system, prepared, span[0], state, values, (*_OWN, *grid.names))
     task = Task(
         prepared,
         place,
@@ -166,15 +168,17 @@ def poincare(
         p_rows,
         checked,
         (observed.transient, observed.n, observed.cycle),
+        outputs,
         1,
     )
+    names = [output.name for output in outputs]
     given = {"section": repr(own), "params": as_json(values), "options": as_json(checked._asdict())}
     try:
         table = run_task(task)
     except Interrupted as cut:
-        partial = _dataset(cut.partial, grid.states, prepared.surfaces, units or {}, given)
+        partial = _dataset(cut.partial, grid.states, names, prepared.surfaces, units or {}, given)
         raise Interrupted(partial.attrs["message"], partial=partial) from None
-    found = _dataset(table, grid.states, prepared.surfaces, units or {}, given)
+    found = _dataset(table, grid.states, names, prepared.surfaces, units or {}, given)
     where = (
         "the attributes n_warnings and warnings of the result have their number and codes; "
         "a run with solve_ivp gives their messages"
@@ -183,9 +187,14 @@ def poincare(
     return found
 
 
+# The variables that every result has.
+_OWN = ("return_time", "sliding_time", "n_pieces", "itinerary", "mode", "surface")
+
+
 def _dataset(
     table: Table,
     states: Sequence[str],
+    outputs: Sequence[str],
     surfaces: Sequence[str],
     given: Mapping[str, str],
     described: Mapping[str, Any],
@@ -200,6 +209,8 @@ def _dataset(
     variables: dict[str, Any] = {"t": ("obs", table["t"], time)}
     for i, name in enumerate(states):
         variables[name] = ("obs", table["y"][:, i], attributes(name))
+    for i, name in enumerate(outputs):
+        variables[name] = ("obs", table["outputs"][:, i], attributes(name))
     variables["return_time"] = ("obs", table["duration"], time)
     variables["sliding_time"] = ("obs", table["sliding"], time)
     variables["n_pieces"] = ("obs", table["n_pieces"], {"sample_dimension": "piece"})

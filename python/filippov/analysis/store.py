@@ -40,7 +40,7 @@ from filippov.errors import InputError, Interrupted
 
 __all__ = ["Store", "open_sweep", "run_with_store"]
 
-_VERSION = 3
+_VERSION = 4
 # The attribute that has the digests of all files of the result, by name.
 _CHECKSUMS = "filippov_checksums"
 # Bytes of a digest, at the end of each chunk.
@@ -216,7 +216,7 @@ class Store:
         zarr = need("zarr", "store=")
         surfaces = plan.prepared.surfaces
         has_section = plan.observed is not None
-        variables = list(variables_of(plan.grid, len(surfaces), has_section, plan.units))
+        variables = list(variables_of(plan.grid, len(surfaces), has_section, plan.units, plan.output_names))
         sizes = {"point": plan.n_points, "obs": 0, "piece": 0}
         for index in range(count):
             table = self.read(index, "row_size", "n_pieces")

@@ -99,9 +99,10 @@ def sweep(
         The dimensions are those of the grid: first the parameters, then the initial states, that of `follow`
         last. Per point ``status`` (0: end of `t_span`, 1: stopped as asked, -1: failed), ``reason`` (a CF
         flag), ``message``, ``t_last``, ``n_steps``, ``n_switches``, ``n_warnings``, and ``warnings``, the
-        kinds of these (CF flags, one bit each). Without a section every state at the end.
+        kinds of these (CF flags, one bit each). Without a section every state and output at the end.
         With one ``n_returns``, ``period`` (0: none found), ``row_size``, and along ``obs`` the returns of all
         points one after the other (a contiguous ragged array as in the CF conventions): ``t``, every state,
+        every output (its value just before, where it jumps),
         ``return_time``, ``sliding_time``, ``n_pieces``; along ``piece`` the modes in between. ``None`` with
         `part` while other parts are missing.
 
@@ -292,7 +293,10 @@ def run_plan(
 def _dataset(plan: Plan, tables: list[Table | None]) -> Any:
     whole = concatenate([table for table in tables if table is not None])
     has_section = plan.observed is not None
-    return dataset_of(plan.grid, whole, plan.prepared.surfaces, has_section, plan.units, plan.attributes)
+    return dataset_of(
+        *(plan.grid, whole, plan.prepared.surfaces, has_section, plan.units, plan.attributes),
+        plan.output_names,
+    )
 
 
 def _followed(follow: str | bool, params: Any, y0: Any) -> str | None:

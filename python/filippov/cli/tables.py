@@ -66,6 +66,7 @@ def write_parquet(solution: Solution, path: Path, notes: dict[str, str]) -> None
 def _columns(solution: Solution) -> dict[str, list[Any]]:
     columns: dict[str, list[Any]] = {"t": solution.t.tolist()}
     columns |= {name: solution.y[k].tolist() for k, name in enumerate(solution.states)}
+    columns |= {name: values.tolist() for name, values in solution.outputs.items()}
     if solution.surfaces and len(solution.segments):
         starts = solution.segments.t_start
         modes = [str(mode) for mode in solution.segments.mode]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from filippov.plot.pieces import pieces, state_indices
+from filippov.plot.pieces import Curves, curves_of, pieces
 from filippov.plot.style import (
     SLIDING_WIDTH,
     SMOOTH_WIDTH,
@@ -29,7 +29,8 @@ def phase(
     solution : Solution
         What to draw.
     i, j : int or str, optional
-        States on the horizontal and on the vertical axis, by number or name.
+        States on the horizontal and on the vertical axis, by number or name; or outputs and discrete states
+        of the system, by name.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure by default.
     dark : bool, optional
@@ -52,7 +53,7 @@ def phase(
     >>> problem = fl.problems.get("dieci_lopez_6_1")
     >>> axes = fl.plot.phase(fl.solve_ivp(problem.fun, problem.t_span, problem.y0))  # doctest: +SKIP
     """
-    shown = state_indices(solution, [i, j])
+    shown = curves_of(solution, [i, j])
     ax = new_axes(ax, (5.6, 4.2), dark)
     _draw(ax, solution, shown, dark)
     return ax
@@ -73,7 +74,7 @@ def phase3d(
     solution : Solution
         What to draw.
     i, j, k : int or str, optional
-        States on the three axes, by number or name.
+        States on the three axes, by number or name; or outputs and discrete states of the system, by name.
     ax : mpl_toolkits.mplot3d.axes3d.Axes3D, optional
         Where to draw, an axes with ``projection="3d"``; a new figure by default.
     dark : bool, optional
@@ -99,27 +100,27 @@ def phase3d(
     >>> solution = fl.solve_ivp(problem.fun, problem.t_span, problem.y0, args=problem.args)
     >>> axes = fl.plot.phase3d(solution)  # doctest: +SKIP
     """
-    shown = state_indices(solution, [i, j, k])
+    shown = curves_of(solution, [i, j, k])
     ax = new_axes(ax, (6.4, 5.0), dark, projection="3d")
     _draw(ax, solution, shown, dark)
-    ax.set_zlabel(solution.states[shown[2]])
+    ax.set_zlabel(shown.names[2])
     for axis in "xyz":  # seen from the side, more numbers than this run into one another
         ax.locator_params(axis=axis, nbins=4)
     return ax
 
 
-def _draw(ax: Any, solution: Solution, shown: list[int], dark: bool | None) -> None:
+def _draw(ax: Any, solution: Solution, shown: Curves, dark: bool | None) -> None:
     chosen = theme(dark)
-    parts = list(pieces(solution))
+    parts = list(pieces(solution, shown))
     colours = mode_colours([mode for mode, _, _ in parts], dark)
     for mode, _, values in parts:
         width = SLIDING_WIDTH if mode.is_sliding else SMOOTH_WIDTH
         order = 2.2 if mode.is_sliding else 2.0
-        ax.plot(*values[shown], color=colours[mode], linewidth=width, zorder=order, solid_capstyle="butt")
+        ax.plot(*values, color=colours[mode], linewidth=width, zorder=order, solid_capstyle="butt")
     if len(solution.switches):
-        points = solution.switches.y_after[:, shown]
-        ax.plot(*points.T, ".", color=chosen.ink, markersize=3, linestyle="none", zorder=2.4)
+        points = shown.beside(solution, solution.switches.t, solution.switches.y_after)
+        ax.plot(*points, ".", color=chosen.ink, markersize=3, linestyle="none", zorder=2.4)
     if solution.surfaces:
         draw_legend(ax, mode_handles(colours), chosen)
-    ax.set_xlabel(solution.states[shown[0]])
-    ax.set_ylabel(solution.states[shown[1]])
+    ax.set_xlabel(shown.names[0])
+    ax.set_ylabel(shown.names[1])

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from filippov.modes import Mode
-from filippov.plot.pieces import pieces, state_indices
+from filippov.plot.pieces import Curves, curves_of, pieces
 from filippov.plot.style import (
     SLIDING_WIDTH,
     SMOOTH_WIDTH,
@@ -45,7 +45,7 @@ def time_series(solution: Solution, ax: Any = None, states: Any = None, dark: bo
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure by default.
     states : int, str, or a sequence of these, optional
-        Which states; all by default.
+        Which states, and outputs and discrete states of the system by their names; all states by default.
     dark : bool, optional
         Light lines on a dark ground; by default as the `style` around says.
 
@@ -58,7 +58,7 @@ def time_series(solution: Solution, ax: Any = None, states: Any = None, dark: bo
     ImportError
         If Matplotlib is not installed.
     ValueError
-        If a state does not exist.
+        If a state or output does not exist.
 
     Examples
     --------
@@ -66,21 +66,21 @@ def time_series(solution: Solution, ax: Any = None, states: Any = None, dark: bo
     >>> problem = fl.problems.get("dieci_lopez_6_1")
     >>> axes = fl.plot.time_series(fl.solve_ivp(problem.fun, problem.t_span, problem.y0))  # doctest: +SKIP
     """
-    indices = state_indices(solution, states)
+    shown = curves_of(solution, states)
     ax = new_axes(ax, (7.0, 3.6), dark)
     chosen = theme(dark)
-    parts = list(pieces(solution))
+    parts = list(pieces(solution, shown))
     colours = mode_colours([mode for mode, _, _ in parts], dark)
     if not solution.surfaces:  # nothing to tell apart by mode: then colour tells the states apart
-        _draw_smooth(ax, parts, indices, dark)
+        _draw_smooth(ax, parts, dark)
     else:
         for mode, times, values in parts:
-            for order, index in enumerate(indices):
+            for order, row in enumerate(values):
                 width = SLIDING_WIDTH if mode.is_sliding else SMOOTH_WIDTH
                 style = _line_style(order, width)
                 ax.plot(
                     times,
-                    values[index],
+                    row,
                     color=colours[mode],
                     linewidth=width,
                     linestyle=style,
@@ -88,8 +88,8 @@ def time_series(solution: Solution, ax: Any = None, states: Any = None, dark: bo
                 )
         _draw_ticks(ax, solution, chosen)
         _draw_strip(ax, parts, colours, chosen)
-    marked = _draw_events(ax, solution, indices, chosen)
-    names = [solution.states[index] for index in indices]
+    marked = _draw_events(ax, solution, shown, chosen)
+    names = list(shown.names)
     handles = mode_handles(colours) if solution.surfaces else []
     handles += _state_handles(names, chosen, None if solution.surfaces else palette(dark))
     draw_legend(ax, handles + marked, chosen)
@@ -109,11 +109,10 @@ def _line_style(order: int, width: float) -> Any:
     return offset, tuple(length * SMOOTH_WIDTH / width for length in dashes)
 
 
-def _draw_smooth(ax: Any, parts: list[tuple[Mode, Any, Any]], indices: list[int], dark: bool | None) -> None:
+def _draw_smooth(ax: Any, parts: list[tuple[Mode, Any, Any]], dark: bool | None) -> None:
     colours = palette(dark)
-    for order, index in enumerate(indices):
-        times = np.concatenate([part[1] for part in parts])
-        values = np.concatenate([part[2][index] for part in parts])
+    times = np.concatenate([part[1] for part in parts])
+    for order, values in enumerate(np.concatenate([part[2] for part in parts], axis=1)):
         style = _LINE_STYLES[order % len(_LINE_STYLES)]
         ax.plot(times, values, color=colours[order % len(colours)], linewidth=SMOOTH_WIDTH, linestyle=style)
 
@@ -163,7 +162,7 @@ def _draw_strip(ax: Any, parts: list[tuple[Mode, Any, Any]], colours: dict[Mode,
             )
 
 
-def _draw_events(ax: Any, solution: Solution, indices: list[int], chosen: Theme) -> list[Any]:
+def _draw_events(ax: Any, solution: Solution, shown: Curves, chosen: Theme) -> list[Any]:
     """Mark the events of the user on the curves; return the entries of the legend."""
     handles: list[Any] = []
     if solution.t_events is None or solution.y_events is None:
@@ -171,10 +170,10 @@ def _draw_events(ax: Any, solution: Solution, indices: list[int], chosen: Theme)
     for number, (times, states) in enumerate(zip(solution.t_events, solution.y_events, strict=True)):
         if not len(times):
             continue
-        for order, index in enumerate(indices):
+        for order, row in enumerate(shown.beside(solution, times, states)):
             (line,) = ax.plot(
                 times,
-                states[:, index],
+                row,
                 _EVENT_MARKERS[number % len(_EVENT_MARKERS)],
                 markersize=5,
                 markerfacecolor="none",

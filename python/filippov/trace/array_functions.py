@@ -16,7 +16,7 @@ from filippov.trace.array import TracedArray, by_element, multiply_matrices, num
 from filippov.trace.condition import Condition
 from filippov.trace.explain import MASK, NotTraceable
 from filippov.trace.scalar import Scalar
-from filippov.trace.tables import count, damaged, increasing, linear, lookup, polynomial
+from filippov.trace.tables import count, damaged, increasing, linear, lookup, polynomial, real
 from filippov.trace.ufuncs import ELEMENTS, choose, is_traced
 
 if TYPE_CHECKING:
@@ -277,13 +277,13 @@ def _interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None, perio
             "np.interp of values that depend on the state or on parameters",
             "write the pieces with np.where, or scale a table of numbers by a parameter",
         )
-    values = np.asarray(values, dtype=float)
+    values = real(values, "np.interp: fp")
     if not np.isfinite(values).all():
         raise damaged(f"np.interp: fp[{np.flatnonzero(~np.isfinite(values))[0]}] is not finite")
     if period is not None:
         # As NumPy has it: one period before the table and one behind it.
         x = x % period
-        places = np.asarray(places, dtype=float) % period
+        places = real(places, "np.interp: xp") % period
         order = np.argsort(places)
         places, values = places[order], values[order]
         places = np.concatenate([places[-1:] - period, places, places[:1] + period])
@@ -297,13 +297,18 @@ def _interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None, perio
 
 def _digitize(x: Any, bins: Any, right: bool = False) -> Any:
     bins = np.asarray(bins)
+    what = "np.digitize: bins"
     if bins.ndim == 1 and bins.size > 1 and bins[0] > bins[-1]:
-        return len(bins) - _searchsorted(bins[::-1], x, side="right" if right else "left")
-    return _searchsorted(bins, x, side="left" if right else "right")
+        return len(bins) - _sorted_place(bins[::-1], x, "right" if right else "left", f"{what} in reverse")
+    return _sorted_place(bins, x, "left" if right else "right", what)
 
 
 def _searchsorted(a: Any, v: Any, side: str = "left", sorter: Any = None) -> Any:
-    knots = increasing(a if sorter is None else np.asarray(a)[sorter], "the table")
+    return _sorted_place(a if sorter is None else np.asarray(a)[sorter], v, side, "np.searchsorted: a")
+
+
+def _sorted_place(a: Any, v: Any, side: str, what: str) -> Any:
+    knots = increasing(a, what)
     distinct, counts = np.unique(knots, return_counts=True)
     strictly = side == "left"
 

@@ -2,13 +2,16 @@
 
 A Python function reaches the rest of the program through the names, cells and constants of its code and
 through its arguments, and in no other way. So its fingerprint holds its code and, by value, everything that
-those resolve to now: numbers, strings, small arrays, containers of these, further Python functions with what
-they read, and functions of Python and NumPy that are known to depend on their arguments alone. What is none
-of these (an object of some class, a random generator, a file, an import inside of the function) makes the
-whole fingerprint ``None``: nothing can then be said, and the function is traced anew at every call.
+those resolve to now: numbers, strings, arrays, containers of these, further Python functions with what they
+read, objects of plain classes with their attributes and methods, interpolants and sparse matrices of SciPy,
+and functions of Python, NumPy and SciPy that are known to depend on their arguments alone. What is none of
+these (a random generator, a file, an import inside of the function) makes the whole fingerprint ``None``:
+nothing can then be said, and the function is traced anew at every call. Large data count by a cryptographic
+digest of their bytes.
 
 Names are looked up generously. The code does not say which object an attribute ``.k`` is read from, so ``k``
-is looked up in every module that is in reach; that can only make a fingerprint differ needlessly.
+is looked up in every module, and in the class of every object, that is in reach; that can only make a
+fingerprint differ needlessly.
 """
 
 from __future__ import annotations
@@ -18,11 +21,21 @@ import functools
 import marshal
 import math
 from collections.abc import Iterable, Iterator
-from types import CodeType, FunctionType, ModuleType, NoneType
+from hashlib import blake2b
+from types import CodeType, FunctionType, MethodType, ModuleType, NoneType
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 
+from filippov.trace.known_objects import (
+    Unreadable,
+    attributes_of,
+    entries_of_classes,
+    is_installed,
+    is_pure_ufunc,
+    is_readable,
+    is_scipys,
+)
 from filippov.trace.pure import PURE
 from filippov.trace.watch import MISSING, Watch
 
@@ -30,7 +43,7 @@ __all__ = ["Fingerprint", "fingerprint"]
 
 Fingerprint = tuple[Any, ...]
 
-_LARGEST_ARRAY = 1 << 16  # bytes, compared at every call
+_LARGEST_COMPARED = 1 << 16  # bytes of an array that are kept; of a larger one it is a digest
 _MOST_ITEMS = 2_000  # entries of a fingerprint; a larger one is no cheaper than a trace
 
 # Ways out of the names, cells, constants and arguments; and identity, which values do not have.
@@ -123,7 +136,7 @@ def fingerprint(*values: Any) -> Fingerprint | None:
             return tuple(_read(values).items)
         # Version 2: types and bits, and nothing that depends on who else holds the values.
         return (*_items_of(first), marshal.dumps(others, 2))
-    except (_Unknown, RecursionError):
+    except (_Unknown, Unreadable, RecursionError):
         return None
 
 
@@ -178,6 +191,7 @@ class _Reader:
         self.watch = Watch()
         self._objects: dict[int, int] = {}
         self._modules: dict[int, ModuleType] = {}
+        self._instances: dict[int, Any] = {}
         self._names: dict[str, None] = {}
         self._looked_up: set[tuple[int, str]] = set()
 
@@ -193,7 +207,8 @@ class _Reader:
         self.items.append(kind)
         size = len(value) if kind in (tuple, list, dict) else 0
         if len(self.items) + size > _MOST_ITEMS:
-            raise _Unknown
+            self._read_many(value, kind)
+            return
         if kind is float:
             self._read_float(value)
         elif kind in (int, bool, str, bytes, type(None)):
@@ -201,6 +216,8 @@ class _Reader:
         elif id(value) in PURE:
             self.items.append(value)
             self.watch.add_pure(PURE[id(value)])
+            # NumPy's functions call methods of their names.
+            self._names[value.__name__] = None
             if not PURE[id(value)].is_unchanged():
                 raise _Unknown
         elif kind is FunctionType:
@@ -225,6 +242,17 @@ class _Reader:
             self.watch.is_possible = False
             for part in (value.func, value.args, value.keywords, value.__dict__):
                 self.read(part)
+        elif kind is MethodType:
+            self.watch.is_possible = False
+            self.read(value.__func__)
+            self.read(value.__self__)
+        elif is_pure_ufunc(value):
+            self._names[value.__name__] = None
+            self.items.append(value)
+        elif is_scipys(value):
+            self._read_scipys(value)
+        elif is_readable(value):
+            self._read_instance(value)
         else:
             raise _Unknown
 
@@ -236,6 +264,9 @@ class _Reader:
             for module in list(self._modules.values()):
                 for name in list(self._names):
                     self._look_up(module, name)
+            for instance in list(self._instances.values()):
+                for name, entry in entries_of_classes(instance):
+                    self._look_up_entry(instance, name, entry)
 
     def _look_up(self, module: ModuleType, name: str) -> None:
         if (id(module), name) in self._looked_up:
@@ -246,6 +277,57 @@ class _Reader:
         if name in entries:
             self.items.append(name)
             self.read(entries[name])
+
+    def _look_up_entry(self, instance: Any, name: str, entry: Any) -> None:
+        """Read what a class has under a name, if code in reach may ask for it."""
+        is_asked = name in self._names or name.startswith("__")
+        if not is_asked or (id(instance), name) in self._looked_up:
+            return
+        self._looked_up.add((id(instance), name))
+        self.items.append(name)
+        self.read(entry)
+
+    def _read_instance(self, value: Any) -> None:
+        """Add an object of a plain class: its attributes now, of its class what is asked for later."""
+        self.watch.is_possible = False
+        if not self._is_new(value):
+            return
+        self._instances[id(value)] = value
+        for name, entry in attributes_of(value):
+            self.items.append(name)
+            self.read(entry)
+
+    def _read_scipys(self, value: Any) -> None:
+        self.watch.is_possible = False
+        if not self._is_new(value):
+            return
+        for name, entry in attributes_of(value):
+            self.items.append(name)
+            self._read_part(entry)
+
+    def _read_part(self, value: Any) -> None:
+        """Add a part of an object of SciPy, which nobody but the object writes to."""
+        if type(value) is np.ndarray and value.dtype.kind in "fiub":
+            self.items += (value.dtype.str, value.shape, _data_of(value))
+        elif type(value) is tuple:
+            self.items.append(len(value))
+            for entry in value:
+                self._read_part(entry)
+        elif isinstance(value, np.dtype):
+            self.items.append(value.str)
+        elif is_installed(value) and callable(value) and hasattr(value, "__qualname__"):
+            self.items.append(f"{value.__module__}.{value.__qualname__}")
+        else:
+            self.read(value)
+
+    def _read_many(self, value: Any, kind: type) -> None:
+        """Add a long tuple or list of numbers and texts, by a digest."""
+        self.watch.is_possible &= kind is tuple
+        if kind not in (tuple, list) or not set(map(type, value)) <= _PLAIN:
+            raise _Unknown
+        if kind is list and not self._is_new(value):
+            return
+        self.items += (len(value), blake2b(marshal.dumps(value, 2)).digest())
 
     def _is_new(self, value: Any) -> bool:
         """Whether an object is met for the first time; it has a number, so that two names of it show."""
@@ -267,13 +349,14 @@ class _Reader:
 
     def _read_array(self, value: Any) -> None:
         self.watch.is_possible = False
-        if value.dtype.kind not in "fiub" or value.nbytes > _LARGEST_ARRAY:
+        if value.dtype.kind not in "fiub":
             raise _Unknown
         if not self._is_new(value):
             return
         if value.base is not None and not self._is_new(value.base):  # two views of the same memory
             raise _Unknown
-        self.items += (value.dtype.str, value.shape, value.strides, value.flags.writeable, value.tobytes())
+        flags = (value.strides, value.flags.writeable)
+        self.items += (value.dtype.str, value.shape, *flags, _data_of(value))
 
     def _read_module(self, module: ModuleType) -> None:
         self.items.append(module)
@@ -319,6 +402,11 @@ class _Reader:
                 value = built_in[name]
             self.items.append(name)
             self.read(value)
+
+
+def _data_of(array: Any) -> bytes:
+    data: bytes = array.tobytes()
+    return data if len(data) <= _LARGEST_COMPARED else blake2b(data).digest()
 
 
 def _names_of(code: CodeType) -> _Names:

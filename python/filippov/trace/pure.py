@@ -28,7 +28,8 @@ _NUMPY = (
     "cross kron trace tensordot einsum sum prod mean max min amax amin any all cumsum cumprod diff "
     "count_nonzero concatenate stack vstack hstack column_stack append reshape ravel transpose squeeze "
     "expand_dims roll flip tile repeat meshgrid broadcast_to shape size ndim copy real imag interp sinc "
-    "isclose allclose bool_ float32 float64 int32 int64"
+    "isclose allclose digitize searchsorted nan_to_num choose take fix round around bool_ float32 float64 "
+    "int32 int64"
 )
 _LINALG = "norm solve inv det"
 

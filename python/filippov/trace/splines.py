@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from filippov.trace.array import by_element, wrap
 from filippov.trace.explain import NotTraceable
-from filippov.trace.tables import Table, polynomial
+from filippov.trace.tables import Table, damaged, polynomial
 
 __all__ = ["Spline", "is_spline"]
 
@@ -73,6 +73,7 @@ def _tables_of(
 ) -> tuple[tuple[int, ...], list[Table], tuple[float, float] | None]:
     """Return the shape of a value, the table of each of its components, and begin and length of a period."""
     interpolate = import_module("scipy.interpolate")
+    name = type(spline).__name__
     if isinstance(spline, interpolate.BSpline):
         spline = interpolate.PPoly.from_spline(spline)
     if not isinstance(spline, interpolate.PPoly):
@@ -80,6 +81,7 @@ def _tables_of(
     if extrapolate is None:
         extrapolate = spline.extrapolate
     places, rows = spline.x, spline.c[::-1]
+    _refuse_not_finite(name, places, rows)
     shape = rows.shape[2:]
     kept = np.diff(places) > 0.0  # a B-spline repeats its ends
     bases, ends = places[:-1][kept], places[1:][kept]
@@ -89,6 +91,12 @@ def _tables_of(
     if not extrapolate:
         knots, bases, rows = _bounded(bases[0], ends, bases, rows)
     return shape, [Table(knots, bases, tuple(rows[:, :, k])) for k in range(rows.shape[2])], period
+
+
+def _refuse_not_finite(name: str, places: NDArray[Any], numbers: NDArray[Any]) -> None:
+    """Refuse an interpolant with a piece that is nowhere a number."""
+    if not (np.isfinite(places).all() and np.isfinite(numbers).all()):
+        raise damaged(f"{name}: a number that it was made of is not finite")
 
 
 def _bounded(
@@ -116,6 +124,8 @@ def _sampled(spline: Any) -> tuple[tuple[int, ...], list[Table], None]:
     # Chebyshev's points, well inside of the pieces.
     nodes = 0.5 - 0.5 * np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
     samples = np.array([_value_or_nan(spline, bases + node * widths) for node in nodes])
+    # Beyond its ends an interpolant may be no number.
+    _refuse_not_finite(type(spline).__name__, places, samples[:, 1:-1])
     shape = samples.shape[2:]
     samples = samples.reshape(degree + 1, len(bases), -1)
     powers = np.linalg.inv(nodes[:, None] ** np.arange(degree + 1))

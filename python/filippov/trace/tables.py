@@ -72,6 +72,14 @@ def damaged(what: str) -> ModelError:
     return ModelError(f"{what}\n{line}" if line else what)
 
 
+def real(values: Any, what: str) -> Vector:
+    """Return the numbers of a table, which must be real."""
+    numbers = np.asarray(values)
+    if numbers.dtype.kind not in "fiub":
+        raise damaged(f"{what}: real numbers are needed, not {numbers.dtype.name}")
+    return np.asarray(numbers, dtype=float)
+
+
 def increasing(values: Any, what: str, *, strictly: bool = False) -> Vector:
     """Return the places of a table, which must be finite and increase."""
     places = np.asarray(values)
@@ -79,7 +87,7 @@ def increasing(values: Any, what: str, *, strictly: bool = False) -> Vector:
         raise NotTraceable(
             f"a table whose {what} depend on the state or on parameters", "write it with np.where"
         )
-    places = np.asarray(places, dtype=float)
+    places = real(places, what)
     if places.ndim != 1 or places.size == 0:
         raise damaged(f"{what}: a list of numbers is needed, not an array of shape {places.shape}")
     wrong = np.flatnonzero(~np.isfinite(places))

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from filippov.trace.explain import UserLine
     from filippov.trace.stand_ins import StandIns
 
-__all__ = ["Trace", "trace", "trace_event"]
+__all__ = ["Trace", "trace", "trace_beside", "trace_event", "trace_output"]
 
 # What a warning says of an event with a law that the field has not.
 OWN_LAW = "a floor, a relay or a table of its own"
@@ -239,6 +239,58 @@ def trace_event(
         The event. If `g` must be called as a Python function: what it has that was not traced, for a
         warning, or an empty text if it cannot be traced at all.
     """
+    found = _beside(traced, g, args, t0, y0, parameters)
+    return found if isinstance(found, str) else found[0]
+
+
+def trace_beside(
+    traced: Trace,
+    g: Callable[..., Any],
+    args: tuple[Any, ...] = (),
+    *,
+    t0: float,
+    y0: NDArray[Any],
+    parameters: Mapping[str, float],
+) -> tuple[TracedEvent | str, bool]:
+    """Return what `trace_event` returns, and whether it holds for all values of the parameters."""
+    found = _beside(traced, g, args, t0, y0, parameters)
+    return (found, False) if isinstance(found, str) else (found[0], not found[1].guards)
+
+
+def trace_output(
+    traced: Trace,
+    g: Callable[..., Any],
+    args: tuple[Any, ...] = (),
+    *,
+    t0: float | None = None,
+    y0: NDArray[Any] | None = None,
+    parameters: Mapping[str, float] | None = None,
+) -> TracedSystem | str:
+    """Turn a function into an expression beside an existing trace, as `trace_event` does, for all parameters.
+
+    It is returned in a form that can be written as bytes: the first component of the field of a system.
+    """
+    from filippov._core import TracedSystem
+
+    found = _beside(traced, g, args, t0, y0, parameters)
+    if isinstance(found, str):
+        return found
+    _, tracer, node = found
+    if tracer.guards:
+        return "a condition on parameters"
+    field = [node] + [tracer.builder.constant(0.0)] * (tracer.n_states - 1)
+    return TracedSystem(tracer.builder, field, tracer.n_states, tracer.names())
+
+
+def _beside(
+    traced: Trace,
+    g: Callable[..., Any],
+    args: tuple[Any, ...],
+    t0: float | None,
+    y0: NDArray[Any] | None,
+    parameters: Mapping[str, float] | None,
+) -> tuple[TracedEvent, Tracer, int] | str:
+    """Trace a function beside a trace; the event, its tracer and its node, or what kept it from that."""
     from filippov._core import TracedEvent
 
     own = traced.tracer
@@ -270,7 +322,7 @@ def trace_event(
         return OWN_LAW if isinstance(error.__cause__, NoSuchLaw) else ""
     except ModelError:
         return ""
-    return event
+    return event, tracer, node
 
 
 def _with_stand_ins(attempt: Callable[[StandIns | None], _T]) -> _T:

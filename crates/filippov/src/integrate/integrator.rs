@@ -396,9 +396,13 @@ impl<'a> Integrator<'a> {
     pub fn finish(mut self, stop: Stop) -> Solution {
         self.run.stats.n_field_evaluations += self.run.motion.field.n_evaluations();
         self.run.stats.stiff_since = self.control.stiff_since();
+        let sides = match self.run.actions.list.is_empty() {
+            true => Vec::new(),
+            false => self.run.motion.sides.to_vec(),
+        };
         self.recorder.finish(
             (self.run.t, &self.run.x, self.run.options),
-            (self.run.motion.mode, self.run.motion.discrete),
+            (self.run.motion.mode, self.run.motion.discrete, sides),
             stop,
             self.run.stats,
             self.warnings,

@@ -1,6 +1,6 @@
 //! From a located event, a limit or a start to the next motion: the decision is asked for, recorded and carried out.
 
-use crate::action::{identity, Instant};
+use crate::action::{identity, quiet_change, Instant};
 use crate::decisions::limits::{
     limit_here, limit_of_switches, limit_of_unresolved_flights, limits_of_impacts, passed_beside,
     Limit, Passed,
@@ -520,6 +520,25 @@ impl<'a> Integrator<'a> {
         self.horizon = self
             .timetable
             .horizon(self.run.actions, self.run.t, self.t_end);
+        let is_watched = self.recorder.observed.is_some() || self.run.options.keep_decisions > 0;
+        if !due.is_empty() && !is_watched && self.run.t < self.t_end {
+            if let Some(q) = quiet_change(&self.run, &due)? {
+                self.run.stats.n_surface_evaluations += 2;
+                if !self.recorder.user_events.events.is_empty() {
+                    let (t, x) = (self.run.t, &self.run.x);
+                    if let Some(stop) = self.recorder.zeros_before_jump(t, x) {
+                        return Ok(Some(stop));
+                    }
+                    self.recorder.jump(t, x);
+                }
+                self.control.forget_steps();
+                self.run.motion.set_discrete(q);
+                self.run.residuals.clear();
+                self.run.passing.clear();
+                let next = Next::new(self.run.motion.mode.clone(), Lefts::new());
+                return self.begin(next, &Multiple::default());
+            }
+        }
         if !self.run.actions.list.is_empty() {
             let (h, reached) = self.ask(Cause::Start, |at, notes| {
                 let h = at.surface_values(notes, at.arrival.signs)?;

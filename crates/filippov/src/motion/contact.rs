@@ -88,6 +88,12 @@ impl<'a> ContactField<'a> {
         self.contacts.iter().map(|(j, _)| *j)
     }
 
+    /// The surfaces in contact with the accelerations nu that hold the bodies, at the last evaluation.
+    pub fn accelerations(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let held = self.contacts().zip(&self.exits);
+        held.map(|(j, nu)| (j, *nu))
+    }
+
     /// How far from zero a guard with this index may be by rounding, at the last evaluation.
     pub fn noise_of_exit(&self, index: usize) -> f64 {
         match index.checked_sub(self.contacts.len()) {

@@ -1,6 +1,8 @@
 //! What is kept of a run: steps, segments, switches, decisions, returns to a section.
 
 mod decision_record;
+mod held;
+mod kinks;
 mod observer;
 mod recorder;
 pub mod section;
@@ -10,8 +12,9 @@ pub(crate) use decision_record::decide_and_record;
 pub use decision_record::{
     replay_decision, DecisionCause, DecisionOutcome, DecisionPoint, DecisionRecord, StartingZero,
 };
+pub use held::{as_multiplier, Held, Piece};
 pub(crate) use observer::Observed;
 pub use observer::{Gradient, InstantRecord, ObservedStep, Observer};
 pub(crate) use recorder::Recorder;
 pub(crate) use solution::Step;
-pub use solution::{as_multiplier, Segment, Side, Solution};
+pub use solution::{Segment, Side, Solution};

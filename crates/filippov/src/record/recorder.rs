@@ -186,6 +186,7 @@ impl<'a> Recorder<'a> {
     ) {
         if let Some(visits) = &mut self.visits {
             visits.begin(t, mode);
+            visits.set_piece(mode, &multipliers, discrete);
         }
         let step = self.steps.len();
         self.close_segment(t);
@@ -367,7 +368,7 @@ impl<'a> Recorder<'a> {
     pub fn finish(
         mut self,
         (t_last, x, options): (f64, &[f64], &Options),
-        (mode, discrete): (Mode, Vec<f64>),
+        (mode, discrete, sides): (Mode, Vec<f64>, Vec<i8>),
         stop: Stop,
         stats: Stats,
         warnings: Vec<Warning>,
@@ -398,6 +399,7 @@ impl<'a> Recorder<'a> {
             is_projected: options.stabilization == Stabilization::Projection,
             mode,
             discrete,
+            sides,
             stats,
             warnings,
             steps: self.steps,

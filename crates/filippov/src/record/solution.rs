@@ -5,16 +5,15 @@ use smallvec::SmallVec;
 use crate::error::FieldError;
 use crate::event::UserZero;
 use crate::mode::Mode;
-use crate::motion::{IntersectionField, Motion, Projector, SlidingField, SmoothField};
+use crate::motion::Projector;
 use crate::options::SlidingRule;
 use crate::record::section::Returns;
-use crate::record::DecisionRecord;
+use crate::record::{DecisionRecord, Held, Piece};
 use crate::stats::Stats;
 use crate::status::{Stop, Warning};
 use crate::stepper::Basis;
 use crate::switch::Switch;
-use crate::system::{dot_magnitude, PiecewiseSystem, Setting};
-use crate::tolerances::{AT_SIDE, TANGENT};
+use crate::system::{Actions, PiecewiseSystem, Setting};
 
 /// A piece of constant mode.
 #[derive(Clone, Debug, PartialEq)]
@@ -82,6 +81,8 @@ pub struct Solution {
     pub mode: Mode,
     /// The discrete states at the end.
     pub discrete: Vec<f64>,
+    /// The side of each surface on which the motion was last, if the run has actions.
+    pub(crate) sides: Vec<i8>,
     /// Counters.
     pub stats: Stats,
     /// Warnings.
@@ -189,14 +190,20 @@ impl Solution {
 
     /// The segment that `t` belongs to.
     pub fn segment_at(&self, t: f64, side: Side) -> Option<&Segment> {
+        self.segments.get(self.segment_index(t, side)?)
+    }
+
+    /// Its place among the segments.
+    pub(crate) fn segment_index(&self, t: f64, side: Side) -> Option<usize> {
         let before = match side {
             Side::Right => self.segments.partition_point(|s| s.t_start <= t),
             Side::Left => self.segments.partition_point(|s| s.t_start < t),
         };
-        self.segments.get(before.saturating_sub(1))
+        (!self.segments.is_empty()).then(|| before.saturating_sub(1))
     }
 
-    /// The surfaces slid on at `t` and their multipliers; none in a region.
+    /// The surfaces slid on at `t` and their multipliers, in a run without actions; none in a region. [`Solution::held`] is the
+    /// answer for any run.
     ///
     /// # Errors
     /// If a function of the user raises.
@@ -206,65 +213,28 @@ impl Solution {
         t: f64,
         side: Side,
     ) -> Result<Vec<(usize, f64)>, FieldError> {
+        Ok(self.held(system, &Actions::none(), t, side)?.multipliers)
+    }
+
+    /// What holds the motion on its surfaces at `t`: nothing in a region, and nothing outside of the span or without dense output.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn held(
+        &self,
+        system: &dyn PiecewiseSystem,
+        actions: &Actions<'_>,
+        t: f64,
+        side: Side,
+    ) -> Result<Held, FieldError> {
         let mut y = vec![0.0; self.n_states];
-        let Some(mode) = self.evaluate(system, t, side, &mut y)? else {
-            return Ok(Vec::new());
-        };
-        let set: Vec<usize> = mode.sliding_set().collect();
-        let segment = self.segment_at(t, side);
-        let near = segment.map_or(&[][..], |segment| &segment.multipliers);
-        let q = segment.map_or(&[][..], |segment| &segment.discrete);
-        if near.iter().any(|lambda| lambda.is_nan()) {
-            // Contact: the forces depend on the actions of the run.
-            return Ok(set.into_iter().zip(near.iter().copied()).collect());
+        if self.evaluate(system, t, side, &mut y)?.is_none() {
+            return Ok(Held::default());
         }
-        let system = system.reduced(&set).unwrap_or(system);
-        Ok(match set.as_slice() {
-            [] => Vec::new(),
-            &[j] => {
-                let mut field = SlidingField::new(system, j, Setting::new(&mode.signs(), q));
-                let components = field.normal_components(t, &mut y)?;
-                // At a two-fold from which sliding starts it is a quotient of two zeros, and known from the run.
-                let lambda = match (components.minus - components.plus, near) {
-                    (0.0, &[known, ..]) => known,
-                    _ => as_multiplier(components.multiplier()),
-                };
-                // Near a two-fold it is a quotient of rounding errors, which are those of the largest states on the way.
-                let share = (components.minus - components.plus).abs();
-                let beyond = 0.5 * (lambda.abs() - 1.0) * share;
-                if beyond > 0.0 {
-                    let (mut gradient, mut size, mut largest) = (y.clone(), 0.0, y.clone());
-                    if let Some(segment) = segment {
-                        self.evaluate(system, segment.t_start, Side::Right, &mut largest)?;
-                    }
-                    let pairs = largest.iter_mut().zip(&y);
-                    pairs.for_each(|(largest, y)| *largest = largest.abs().max(y.abs()));
-                    for side in [-1, 1] {
-                        let signs = mode.with(j, side).signs();
-                        let rate = system.rate_gradient(
-                            j,
-                            &Setting::new(&signs, q).at(t, &y),
-                            &mut gradient,
-                        )?;
-                        size += dot_magnitude(&gradient, &largest) + (rate.time * t).abs();
-                    }
-                    if beyond < TANGENT * size {
-                        return Ok(vec![(j, lambda.clamp(-1.0, 1.0))]);
-                    }
-                }
-                vec![(j, lambda)]
-            }
-            _ => {
-                // Of several roots that which the motion follows.
-                let signs = mode.signs();
-                let setting = Setting::new(&signs, q);
-                let field = IntersectionField::new(system, &set, setting, near);
-                let mut field = field.with_rule(self.sliding);
-                field.eval(t, &mut y, &mut vec![0.0; self.n_states])?;
-                let values = field.multipliers().into_iter().map(as_multiplier);
-                set.into_iter().zip(values).collect()
-            }
-        })
+        match self.piece_at(system, t, side)? {
+            Some(piece) => piece.held(system, actions, self.sliding, (t, &y)),
+            None => Ok(Held::default()),
+        }
     }
 
     /// Are the continuous extensions kept?
@@ -294,14 +264,59 @@ impl Solution {
     }
 }
 
-/// A multiplier as it is reported: at an exit it is one up to the rounding of the time, or up to what it may go beyond where
-/// forces balance. NaN where there is none, as where both fields are tangent.
-pub fn as_multiplier(lambda: f64) -> f64 {
-    if !lambda.is_finite() {
-        f64::NAN
-    } else if lambda.abs() < 1.0 + 2.0 * AT_SIDE {
-        lambda.clamp(-1.0, 1.0)
-    } else {
-        lambda
+impl Solution {
+    /// The motion that `t` belongs to.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn piece_at(
+        &self,
+        system: &dyn PiecewiseSystem,
+        t: f64,
+        side: Side,
+    ) -> Result<Option<Piece>, FieldError> {
+        let Some(index) = self.segment_index(t, side) else {
+            return Ok(None);
+        };
+        if self.y_end.is_some() && t == self.t_last && side == Side::Right {
+            return Ok(Some(self.last_piece()));
+        }
+        let segment = &self.segments[index];
+        let mut start = Vec::new();
+        if segment.mode.codimension() == 1 {
+            start.resize(self.n_states, 0.0);
+            self.evaluate(system, segment.t_start, Side::Right, &mut start)?;
+        }
+        Ok(Some(Piece {
+            mode: segment.mode.clone(),
+            discrete: segment.discrete.clone(),
+            sides: self.sides_before(index),
+            near: segment.multipliers.to_vec(),
+            start,
+        }))
+    }
+
+    /// The motion at the end of the run.
+    pub fn last_piece(&self) -> Piece {
+        let last = self.segments.last().filter(|last| last.mode == self.mode);
+        Piece {
+            mode: self.mode.clone(),
+            discrete: self.discrete.clone(),
+            sides: self.sides.clone(),
+            near: last.map_or_else(Vec::new, |last| last.multipliers.to_vec()),
+            start: Vec::new(),
+        }
+    }
+
+    /// The side on which the motion was last before a segment, for the surfaces that it stays on; 0 if on none, and for the others.
+    fn sides_before(&self, index: usize) -> Vec<i8> {
+        let mode = &self.segments[index].mode;
+        let mut sides = vec![0; mode.entries().len()];
+        for j in mode.sliding_set() {
+            let earlier = self.segments[..index].iter().rev();
+            let mut entries = earlier.map(|segment| segment.mode.entries()[j]);
+            sides[j] = entries.find(|&entry| entry != 0).unwrap_or(0);
+        }
+        sides
     }
 }

@@ -47,3 +47,7 @@ pub const TANGENTIAL_SPEED: f64 = 1e-5;
 
 /// Impulses that differ by more than this part are those of friction.
 pub const FRICTION_IN_MAP: f64 = 1e-3;
+
+/// A switching function above this share of the terms that it is made of is no zero by any rounding: where an action changes
+/// discrete states only, and all functions are, the motion stays in its region.
+pub const CLEAR_OF_SURFACE: f64 = 1e-9;

@@ -145,3 +145,16 @@ pub const SMALL_REST: f64 = 1e-5;
 
 /// The same where it is only asked whether there is a zero at all: terms that others may outweigh.
 pub const REST_BESIDE: f64 = 0.125;
+
+/// The fields of both sides of a switch are compared at its point, and what each changes by over this share of the size of the
+/// state into its own side tells how much of the difference is the rounding of the point.
+pub const KINK_OFFSET: f64 = 1e-6;
+
+/// A difference up to this share of that change is none. The point lies on the surface up to some units of rounding, 1e-9 of the
+/// offset; over them a square root changes by 3e-5 of what it changes by over the offset. A jump that is mistaken for a kink is
+/// below 1e-10 of what the field changes by over the size of the state.
+pub const JUMP_AT_KINK: f64 = 1e-4;
+
+/// While sliding on more surfaces than this the fields of all regions around them are not compared, and a switch counts as a jump unless
+/// the structure of the signs excludes one.
+pub const MOST_SLID_ON_AT_KINK: usize = 8;

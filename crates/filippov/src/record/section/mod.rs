@@ -49,4 +49,6 @@ pub struct Section<'a> {
     pub most: u64,
     /// When the returns count as periodic.
     pub cycle: Option<Cycle>,
+    /// Is the piece of motion that leads to each return kept with it?
+    pub keeps_pieces: bool,
 }

@@ -1,6 +1,7 @@
 //! What a run leaves at its section.
 
 use crate::mode::Mode;
+use crate::record::Piece;
 
 /// A return to the section.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -15,6 +16,8 @@ pub struct Return {
     pub sliding: f64,
     /// The modes of the pieces in between, in their order.
     pub modes: Vec<Mode>,
+    /// The piece that leads there, if pieces are kept.
+    pub piece: Option<Box<Piece>>,
 }
 
 /// What a run leaves at its section.

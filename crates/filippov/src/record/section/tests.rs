@@ -78,6 +78,7 @@ fn zeros_of_a_function_in_one_direction() {
             transient: 1,
             most: 3,
             cycle: None,
+            keeps_pieces: false,
         };
         let (solution, returns) = run(&circle(), &[1.0, 0.0], &section);
         assert!(matches!(solution.stop, Stop::Returned));
@@ -101,6 +102,7 @@ fn ticks_do_not_stop_the_motion() {
         transient: 0,
         most: 40,
         cycle: cycle(true),
+        keeps_pieces: false,
     };
     let (solution, returns) = run(&circle(), &[1.0, 0.0], &section);
     assert!(matches!(solution.stop, Stop::Periodic));
@@ -126,6 +128,7 @@ fn arrivals_at_a_surface_and_departures_from_it() {
         transient: 3,
         most: 2,
         cycle: None,
+        keeps_pieces: false,
     };
     let (leave, back) = ((1.0_f64 / 1.2).asin(), back());
     let system = pushed();
@@ -168,6 +171,7 @@ fn a_phase_counts_up_to_its_modulus() {
         transient: 0,
         most: 20,
         cycle,
+        keeps_pieces: false,
     };
     let (_, returns) = run(&drift, &[0.0, 0.3], &section(test.clone()));
     assert_eq!(returns.period, 0);

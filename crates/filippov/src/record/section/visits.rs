@@ -6,6 +6,7 @@ use super::cycle::Cycle;
 use super::returns::{Return, Returns};
 use super::{Place, Section};
 use crate::mode::Mode;
+use crate::record::Piece;
 use crate::status::Stop;
 use crate::switch::Kind;
 use crate::switch::Switch;
@@ -34,6 +35,8 @@ pub(crate) struct Visits {
     modes: Vec<Mode>,
     has_ended: bool,
     is_periodic: bool,
+    /// The present piece, if pieces are kept.
+    piece: Option<Piece>,
 }
 
 impl Visits {
@@ -68,6 +71,7 @@ impl Visits {
             modes: Vec::new(),
             has_ended: section.most == 0,
             is_periodic: false,
+            piece: section.keeps_pieces.then(Piece::default),
         }
     }
 
@@ -104,6 +108,21 @@ impl Visits {
         }
         self.since = t;
         self.slides = mode.codimension() > 0;
+    }
+
+    /// The piece that begins, if pieces are kept.
+    pub fn set_piece(&mut self, mode: &Mode, near: &[f64], discrete: &[f64]) {
+        let Some(piece) = &mut self.piece else {
+            return;
+        };
+        piece.sides.resize(mode.entries().len(), 0);
+        let entries = piece.sides.iter_mut().zip(mode.entries());
+        entries
+            .filter(|(_, &entry)| entry != 0)
+            .for_each(|(side, &entry)| *side = entry);
+        piece.mode = mode.clone();
+        piece.near = near.to_vec();
+        piece.discrete = discrete.to_vec();
     }
 
     /// A switch: a return, if it lies on the section.
@@ -150,6 +169,7 @@ impl Visits {
         found.t = t;
         found.y.clear();
         found.y.extend_from_slice(y);
+        found.piece = self.piece.clone().map(Box::new);
         found.duration = t - self.t_return;
         found.sliding = std::mem::take(&mut self.slid);
         std::mem::swap(&mut found.modes, &mut self.modes);
