@@ -1,8 +1,8 @@
 //! Contact: which bodies stay, which leave, and what slides beside them.
 
 use super::choice::choose;
-use super::look_ahead::{try_mode, Trial};
 use super::point::{Decided, Left, Lefts, Next, Notes, Point};
+use super::trial::{try_mode, Trial};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::{first_nonzero, Leading};

@@ -28,8 +28,6 @@ pub(crate) enum Rule {
     SlidingLaw,
     /// The relay problem of a field that is affine in the signs.
     Relay,
-    /// The signs of too many surfaces multiply one another.
-    TooMany,
     /// First-order data at an intersection: the attracting continuation, among several the limit of the hidden dynamics, and
     /// spirals. Germs decide where those do not.
     FirstOrder,
@@ -51,7 +49,6 @@ impl Rule {
             Rule::Germs => "germs",
             Rule::SlidingLaw => "sliding_rule",
             Rule::Relay => "relay",
-            Rule::TooMany => "too_many",
             Rule::FirstOrder => "first_order",
             Rule::Contact => "contact",
             Rule::Triggers => "triggers",

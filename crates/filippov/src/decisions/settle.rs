@@ -1,11 +1,11 @@
 //! Surfaces vanish together: the rules in their order, of which the first that applies answers.
 
-use super::departures::departures;
 use super::event::touch;
+use super::germ::surfaces_left;
 use super::germs::{decide_if_doubtful, decide_if_entangled};
 use super::leave_by_rule::leave_by_rule;
 use super::limits::stay_at_limit;
-use super::meeting::{resolve_first_order, too_many};
+use super::meeting::resolve_first_order;
 use super::one_surface::one_surface;
 use super::point::{Decided, Lefts, Next, Notes, Point};
 use super::relay::decide_by_relay;
@@ -18,7 +18,7 @@ use crate::switching::Arrival as SurfaceArrival;
 /// A rule: the motion that follows, or why the run ends; `None` where the rule does not apply.
 type Apply = fn(&Point, &mut Notes, &Meeting) -> Result<Option<Decided>, FieldError>;
 
-const RULES: [(Rule, Apply); 9] = [
+const RULES: [(Rule, Apply); 8] = [
     (Rule::Region, region),
     (Rule::Touch, touch),
     (Rule::Limit, stay_at_limit),
@@ -27,7 +27,6 @@ const RULES: [(Rule, Apply); 9] = [
     (Rule::SlidingLaw, leave_by_rule),
     (Rule::Relay, decide_by_relay),
     (Rule::Germs, decide_if_doubtful),
-    (Rule::TooMany, too_many),
 ];
 
 /// The answer of the first rule that applies, with its name; first-order data where none of the list does.
@@ -38,7 +37,7 @@ pub(super) fn settle(
 ) -> Result<(Rule, Decided), FieldError> {
     for (rule, apply) in RULES {
         if let Some(decided) = apply(at, notes, meeting)? {
-            let is_kinetic = matches!(rule, Rule::SlidingLaw | Rule::Relay | Rule::TooMany);
+            let is_kinetic = matches!(rule, Rule::SlidingLaw | Rule::Relay);
             return Ok(match is_kinetic {
                 true => (rule, with_kinetic_friction(at, notes, decided, meeting)?),
                 false => (rule, decided),
@@ -97,7 +96,7 @@ fn with_kinetic_friction(
     }
     match place_on(at, notes, &next.mode, &others, Some(&next.mode))? {
         (_, Ok(again)) if again.mode != next.mode => {
-            let left = departures(at, notes, &again.mode, meeting.surfaces, &[])?;
+            let left = surfaces_left(at, notes, &again.mode, meeting.surfaces, &[])?;
             Ok(Ok(Next::new(again.mode, left)))
         }
         _ => Ok(decided),

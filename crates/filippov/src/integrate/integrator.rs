@@ -15,7 +15,7 @@
 //! `docs/theory/order_of_outcomes.md` has all of it, with the tests.
 
 use crate::action::Timetable;
-use crate::decisions::{differs_between_sides, has_left_resting, root_ends, Cause};
+use crate::decisions::{differs_between_sides, has_left_zero_surface, lost_guards, Cause};
 use crate::error::{Error, FieldError};
 use crate::event::search::{Detector, StepSearch};
 use crate::event::{Event, Found, UserEvents, TICK};
@@ -23,7 +23,7 @@ use crate::integrate::problem::{check, Problem};
 use crate::integrate::progress::Progress;
 use crate::integrate::watch::Watch;
 use crate::mode::Mode;
-use crate::motion::{Guard, Run, SmoothField};
+use crate::motion::{Run, Slacks, SmoothField};
 use crate::record::{Observed, Observer, Recorder, Solution};
 use crate::status::{Stop, Warning};
 use crate::stepper::{Attempt, StepControl, Steppers, Stiff};
@@ -45,7 +45,7 @@ pub struct Integrator<'a> {
     pub(super) n_choices: usize,
     pub(super) progress: Progress,
     /// Guards of this mode whose multipliers were held at their ends, with what they may go beyond.
-    pub(super) slacks: Vec<(Guard, f64)>,
+    pub(super) slacks: Slacks,
     pub(super) watch: Watch<'a>,
 }
 
@@ -77,7 +77,7 @@ impl<'a> Integrator<'a> {
             warnings: Vec::new(),
             n_choices: 0,
             progress: Progress::default(),
-            slacks: Vec::new(),
+            slacks: Slacks::default(),
             watch: Watch::new(options),
         })
     }
@@ -208,7 +208,7 @@ impl<'a> Integrator<'a> {
             .next(&self.run.motion, room, self.run.options.max_step);
         let shortest = (SHORTEST_STEP * self.run.t.abs()).max(SHORTEST_STEP_AT_ZERO);
         if dt < shortest && dt < remaining {
-            let lost = self.ask(Cause::Start, root_ends::lost_functions)?;
+            let lost = self.ask(Cause::Start, lost_guards)?;
             if let Some(lost) = lost {
                 self.control.forget_proposal();
                 return self.switch(&Found::here(lost));
@@ -349,7 +349,9 @@ impl<'a> Integrator<'a> {
             if self.detector.accept(&mut self.run, dt) {
                 self.run.motion.note_departure();
             }
-            if !self.run.motion.resting.is_empty() && self.ask(Cause::Start, has_left_resting)? {
+            if !self.run.motion.resting.is_empty()
+                && self.ask(Cause::Start, has_left_zero_surface)?
+            {
                 return self.go_on_from_here(&[]);
             }
             if let Some(j) = zero {

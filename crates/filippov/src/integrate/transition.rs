@@ -6,15 +6,15 @@ use crate::decisions::limits::{
 };
 use crate::decisions::{
     add_vanishing_surfaces, decide, differs_between_sides, end_of_sliding, goes_through, landing,
-    located_surfaces, refusal, resting, root_ends, sides, triggers_reached, warn_against_direction,
-    warn_oscillation, warn_unknown_side, warn_zero_surface, Cause, Decision, EndOfSliding, Leap,
-    Left, Lefts, Next, Notes, Point, Reached, Rule, Scene, Sides, Values,
+    located_surfaces, refusal, sides, triggers_reached, warn_against_direction, warn_oscillation,
+    warn_unknown_side, warn_zero_surface, zero_surfaces, Cause, Decision, EndOfSliding, Leap, Left,
+    Lefts, Next, Notes, Point, Reached, Rule, Scene, Sides, Values,
 };
 use crate::error::FieldError;
 use crate::event::{Found, Multiple};
 use crate::integrate::integrator::Integrator;
 use crate::mode::Mode;
-use crate::motion::{Guard, Leading, ModeField, Projector, Seen, SlidingSet, SmoothField};
+use crate::motion::{Guard, Leading, ModeField, Projector, RootEnd, Seen, SlidingSet, SmoothField};
 use crate::patience::Patience;
 use crate::record::decide_and_record;
 use crate::status::{is_named, Stop, WarningCode};
@@ -175,14 +175,14 @@ impl<'a> Integrator<'a> {
                 // Stability is lost, and the motion stays all the same: it oscillates around the root from now on.
                 let sliding = self.run.motion.sliding().iter().copied();
                 let slides_on = next.mode.sliding_set().eq(sliding);
-                let field = &self.run.motion.field;
-                if slides_on && root_ends::loses_stability(field, &event.guards) {
+                let is_unstable = event.guards.contains(&Guard::Root(RootEnd::Stability));
+                if slides_on && is_unstable && next.mode.codimension() > 2 {
                     next.start_mut().oscillates = true;
                 }
-                if before == next.mode {
-                    root_ends::loosen(field, &event.guards, &mut self.slacks);
-                } else {
-                    self.slacks.clear();
+                let slides_on_several = next.mode.codimension() > 1;
+                match before == next.mode && slides_on_several {
+                    true => self.slacks.loosen(&event.guards),
+                    false => self.slacks.clear(),
                 }
             }
         }
@@ -281,7 +281,9 @@ impl<'a> Integrator<'a> {
         }
         self.run.motion.resting = match left.iter().all(|left| left.leading.order > 0) {
             true => SlidingSet::new(),
-            false => self.ask(Cause::Start, |at, notes| resting(at, notes, &mode, &left))?,
+            false => self.ask(Cause::Start, |at, notes| {
+                zero_surfaces(at, notes, &mode, &left)
+            })?,
         };
         let t = self.run.t;
         let zeros = left.iter().filter_map(|left| left.deflation(t));
@@ -302,9 +304,7 @@ impl<'a> Integrator<'a> {
                 if let Some(start) = start.filter(|start| start.is_given) {
                     field.hold_at_start(self.run.t, start.is_located);
                 }
-                for &(guard, slack) in &self.slacks {
-                    field.set_slack(guard, slack);
-                }
+                self.slacks.set(field);
             }
             ModeField::Sliding(field) => {
                 if let Some(motion) = start.and_then(|start| start.two_fold) {

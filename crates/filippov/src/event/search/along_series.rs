@@ -9,7 +9,7 @@ use crate::event::isolate::{is_steep, Bracket};
 use crate::event::series::Series;
 use crate::locate::refine;
 use crate::motion::Monitored;
-use crate::motion::{Guard, ModeField};
+use crate::motion::ModeField;
 use crate::stepper::{powers_of_nested, Basis, ExitSeries};
 use crate::system::Setting;
 use crate::tolerances::{EPS, SERIES_MARGIN};
@@ -105,8 +105,7 @@ impl StepSearch<'_, '_> {
     /// An exit function along the step, as far as its series describes it, into `rows`; `None` if there is none.
     fn exit_series(&self, m: &Monitored, rows: &mut [f64]) -> Option<ExitSeries> {
         let known = self.stepper.exit_series(m.exit()?, rows)?;
-        let own = |slack: &&(Guard, f64)| slack.0 == m.guard;
-        rows[0] += self.slacks.iter().find(own).map_or(0.0, |slack| slack.1);
+        rows[0] += self.slacks.of(m.guard);
         Some(known)
     }
 

@@ -1,7 +1,7 @@
-//! Try the modes for a moment if derivatives at the point do not decide.
+//! The trial: follow a mode for a moment if no germ of its guards is known.
 //!
-//! So it is where two surfaces touch one another: seen from the point they are one, and a moment later they are two, in an
-//! order that decides.
+//! So it is with functions that are called, and where two surfaces touch: seen from the point they are one, and a moment later
+//! they are two, in an order that decides.
 
 use super::point::{Left, Lefts, Next, Notes, Point};
 use crate::error::FieldError;
