@@ -15,7 +15,7 @@ use crate::motion::{shares_of_rows, ModeField, SmoothField};
 use crate::motion::{Guard, Leading, RootEnd, TwoFold, TwoFoldMotion};
 use crate::system::{dot, dot_magnitude};
 use crate::tolerances::{
-    ARRIVED, AT_FOLD, AT_TWO_FOLD, INSIDE_SHARES, MOST_HALVINGS, NEWTON_STEPS, TANGENT,
+    ARRIVED, AT_FOLD, ERRORS_OF_STEPS, INSIDE_SHARES, MOST_HALVINGS, NEWTON_STEPS, TANGENT,
 };
 
 /// A time and the state there.
@@ -139,7 +139,7 @@ pub(super) fn two_fold_here(at: &Point) -> Result<Option<TimeAndState>, FieldErr
     if distance.abs() <= components.rounding {
         return Ok(here);
     }
-    if distance.abs() > AT_TWO_FOLD * at.scale.along(&row[..n], &x) {
+    if distance.abs() > ERRORS_OF_STEPS * at.scale.along(&row[..n], &x) {
         return Ok(None);
     }
     let ahead = -distance / (row[n] + dot(&row[..n], &velocity));
@@ -153,7 +153,7 @@ pub(super) fn two_fold_here(at: &Point) -> Result<Option<TimeAndState>, FieldErr
         return Ok(None);
     };
     let is_near = |(i, (a, b)): (usize, (&f64, &f64))| {
-        (a - b).abs() <= 10.0 * AT_TWO_FOLD * at.scale.tolerance(i, *a, *b)
+        (a - b).abs() <= 10.0 * ERRORS_OF_STEPS * at.scale.tolerance(i, *a, *b)
     };
     if !end.iter().zip(at.x).enumerate().all(is_near) {
         return Ok(None);
@@ -175,7 +175,7 @@ pub(super) fn beyond_double_zero(
         return Ok(None);
     }
     let (difference, error) = Components::of(at, j, (at.t, at.x))?.difference();
-    if difference.abs() > AT_TWO_FOLD * error {
+    if difference.abs() > ERRORS_OF_STEPS * error {
         return Ok(None);
     }
     // The motion along which the components stay nearest to zero.
@@ -203,7 +203,7 @@ pub(super) fn beyond_double_zero(
             return Ok(None);
         };
         let (difference, error) = Components::of(at, j, (t, &end))?.difference();
-        let is_known = difference.abs() > AT_TWO_FOLD * error;
+        let is_known = difference.abs() > ERRORS_OF_STEPS * error;
         if is_known && difference.abs() > last.abs() {
             return Ok((difference > 0.0 && t > at.t).then_some((t, end)));
         }
@@ -249,7 +249,7 @@ fn settle_on_zeros(
             largest = largest.max(shift.abs());
             *x.get_mut(i).unwrap_or(&mut t) -= unit * shift;
         }
-        if largest > 10.0 * AT_TWO_FOLD {
+        if largest > 10.0 * ERRORS_OF_STEPS {
             return Ok(None);
         }
         if largest <= ARRIVED {

@@ -12,7 +12,7 @@ use crate::motion::{first_nonzero, normal_component, Leading};
 use crate::switching::Arrival as SurfaceArrival;
 use crate::system::dot;
 use crate::system::{eval_on_side, surfaces_that_matter};
-use crate::tolerances::{AT_SIDE, SURFACE_NOISE};
+use crate::tolerances::{AT_SIDE, ROUNDING};
 
 /// The surfaces among the functions of an event, in order.
 #[inline]
@@ -87,7 +87,7 @@ fn add_inactive_that_begin_to_matter(
             continue;
         }
         let size = at.system.surface_size(j, &at.place(&before.signs()))?;
-        if h.abs() <= SURFACE_NOISE * size {
+        if h.abs() <= ROUNDING * size {
             zeros.push(j);
         }
     }
@@ -139,7 +139,7 @@ pub(crate) fn add_vanishing_surfaces(
         let size = at.system.surface_size(j, &at.place(arrival.signs))?;
         // A surface that is being left tangentially stays near for long; one that was crossed at this very instant belongs
         // to the event.
-        if h.abs() <= SURFACE_NOISE * size && !arrival.departing.contains(&j) {
+        if h.abs() <= ROUNDING * size && !arrival.departing.contains(&j) {
             surfaces.push(j);
         }
     }

@@ -9,7 +9,7 @@ use crate::error::FieldError;
 use crate::mode::{Mode, Signs};
 use crate::motion::{first_nonzero, Leading};
 use crate::system::{dot, MotionJets};
-use crate::tolerances::{AT_SIDE, EPS, GERM_ORDER, MOST_MEETING, VANISHING_GERM};
+use crate::tolerances::{AT_SIDE, EPS, MAX_LIE_ORDER, MOST_MEETING, VANISHING_GERM};
 
 /// How a guard begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,7 +49,7 @@ impl MotionSeries {
     /// the rate at which the fields around the point change the state.
     pub fn of(at: &Point, mode: &Mode, multipliers: &[f64], pace: f64) -> Option<Self> {
         let sliding: Vec<usize> = mode.sliding_set().collect();
-        let jets = at.system.motion_jets(&sliding, GERM_ORDER)?;
+        let jets = at.system.motion_jets(&sliding, MAX_LIE_ORDER)?;
         let mut signs = mode.signs();
         for (&j, &multiplier) in sliding.iter().zip(multipliers) {
             signs[j] = multiplier;

@@ -14,7 +14,7 @@ use crate::switch::Switch;
 use crate::switching::admissible_within;
 use crate::system::dot;
 use crate::tolerances::{
-    ACCUMULATION_AGREEMENT, LONGEST_TURN, MOST_MEETING, NEAREST_ACCUMULATION, SURFACE_NOISE,
+    ACCUMULATION_AGREEMENT, LONGEST_TURN, MOST_MEETING, NEAREST_ACCUMULATION, ROUNDING,
     UNRESOLVED_FLIGHT,
 };
 
@@ -115,7 +115,7 @@ pub(crate) fn limits_of_impacts(
     }
     let height = 0.5 * rate.rate * rate.rate / falls.value.abs();
     let size = at.system.surface_size(j, &at.place(&signs))?;
-    let is_unresolved = height <= UNRESOLVED_FLIGHT * SURFACE_NOISE * size;
+    let is_unresolved = height <= UNRESOLVED_FLIGHT * ROUNDING * size;
     let distance = rate.rate.abs() / dot(&row, &row).sqrt();
     if !is_unresolved && distance >= reach(at.scale, at.x) {
         return Ok([None, None]);
@@ -169,7 +169,7 @@ fn is_on_all(at: &Point, limit: &Limit) -> Result<bool, FieldError> {
         let size = at
             .system
             .surface_size(j, &at.place_at(limit.t, &limit.x, signs))?;
-        if h[j].abs() > SURFACE_NOISE * size {
+        if h[j].abs() > ROUNDING * size {
             return Ok(false);
         }
     }

@@ -11,7 +11,7 @@ use crate::motion::{first_nonzero, Leading};
 use crate::motion::{ContactField, Projector, SmoothField};
 use crate::status::Stop;
 use crate::system::{dot, surfaces_that_matter, Action};
-use crate::tolerances::{AT_SIDE, FRICTION_IN_MAP, SLIPPED, SLOW, SURFACE_NOISE, TANGENTIAL_SPEED};
+use crate::tolerances::{AT_SIDE, ERRORS_OF_STEPS, FRICTION_IN_MAP, MOMENT, ROUNDING, SLOW};
 use smallvec::SmallVec;
 
 /// The sides that a point is on.
@@ -95,7 +95,7 @@ pub(crate) fn sides(
             }
             let size = at.system.surface_size(j, &at.place(&signs))?;
             let residual = at.arrival.residuals.get(j).copied().unwrap_or(0.0);
-            let noise = (SURFACE_NOISE * size).max(2.0 * residual);
+            let noise = (ROUNDING * size).max(2.0 * residual);
             on_surface[j] = h[j].abs() <= noise;
             let known = memory.map_or(0, |memory| memory.entries()[j]);
             if let Some(side) = slipped_through(at, j, h[j], &signs, memory)? {
@@ -145,7 +145,7 @@ fn slipped_through(
     let mut gradient = vec![0.0; at.x.len()];
     at.system.gradient(j, &at.place(signs), &mut gradient)?;
     let tolerance = at.scale.along(&gradient, at.x);
-    let is_near = h.abs() <= SLIPPED * tolerance;
+    let is_near = h.abs() <= ERRORS_OF_STEPS * tolerance;
     Ok((is_near && leaves_point_alone(at, j, signs)?).then_some(side))
 }
 
@@ -162,7 +162,7 @@ pub(super) fn leaves_point_alone(at: &Point, j: usize, signs: &[f64]) -> Result<
     at.system
         .surfaces(&at.place_at(at.t, &moved, signs), &mut h[1])?;
     let size = at.system.surface_size(j, &at.place(signs))?;
-    Ok((h[0][j] - h[1][j]).abs() <= SURFACE_NOISE * size)
+    Ok((h[0][j] - h[1][j]).abs() <= ROUNDING * size)
 }
 
 /// The point moved back onto the triggers that it slipped through, if there are any.
@@ -394,9 +394,9 @@ impl<'p, 'm, 'a> Impact<'p, 'm, 'a> {
         let signs = mode.signs();
         let mut normal = vec![0.0; at.x.len()];
         at.system.rate_gradient(j, &at.place(&signs), &mut normal)?;
-        let slow = TANGENTIAL_SPEED * (1.0 + dot(at.x, at.x).sqrt());
+        let slow = MOMENT * (1.0 + dot(at.x, at.x).sqrt());
         let size = dot(&normal, &normal).sqrt();
-        let approach = -f64::from(mode.entries()[j]) * TANGENTIAL_SPEED * slow / size;
+        let approach = -f64::from(mode.entries()[j]) * MOMENT * slow / size;
         Ok(Impact {
             at,
             action,
@@ -465,7 +465,7 @@ pub(crate) fn triggers_reached(at: &Point, h: &[f64]) -> Result<Vec<usize>, Fiel
     for j in (0..h.len()).filter(|&j| at.actions.at_surface(j).is_some()) {
         let size = at.system.surface_size(j, &at.place(at.arrival.signs))?;
         let approaches = rates[j] * f64::from(at.arrival.mode.entries()[j]) < 0.0;
-        if approaches && h[j].abs() <= SURFACE_NOISE * size {
+        if approaches && h[j].abs() <= ROUNDING * size {
             reached.push(j);
         }
     }

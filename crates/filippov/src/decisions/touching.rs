@@ -7,7 +7,7 @@ use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::{are_parallel, beside_on, in_the_place_of, normal};
 use crate::system::dot;
-use crate::tolerances::{DOUBTFUL, ONE_DIRECTION, SURFACE_NOISE};
+use crate::tolerances::{DOUBTFUL, ONE_DIRECTION, ROUNDING};
 
 /// Two surfaces, counted within a meeting, that touch one another: they have the same normal here, and are not in one place.
 pub(super) struct Touch {
@@ -53,7 +53,7 @@ impl Parallels {
                 found.coincide = true;
             } else if has_normal(k) {
                 let ratio = dot(one, other) / squares[i];
-                let noise = SURFACE_NOISE * squares[k].sqrt();
+                let noise = ROUNDING * squares[k].sqrt();
                 let mut pairs = other.iter().zip(one);
                 found.touching.push(Touch {
                     pair: [i, k],

@@ -7,7 +7,7 @@ use super::point::{Left, Lefts, Next, Notes, Point};
 use crate::error::FieldError;
 use crate::motion::{Guard, Leading, ModeField, SmoothField};
 use crate::system::dot;
-use crate::tolerances::{AT_SIDE, LONGER_TRIAL, MAX_LIE_ORDER, MOST_LENGTHENINGS, SURFACE_NOISE};
+use crate::tolerances::{AT_SIDE, LONGER_TRIAL, MAX_LIE_ORDER, MOST_LENGTHENINGS, ROUNDING};
 
 /// Follows a motion for a moment, and longer until it is clear of rounding: of `noise` times its way.
 pub(super) fn try_mode(
@@ -105,7 +105,7 @@ fn leaves_within(
             values[k] = value;
             at.system.gradient(j, &at.place(&signs), &mut gradient)?;
             let way = (dot(&gradient, &gradient) * dot(velocity, velocity)).sqrt() * moment;
-            if value.abs() <= SURFACE_NOISE * size + noise_of_way * way + start[j].abs() {
+            if value.abs() <= ROUNDING * size + noise_of_way * way + start[j].abs() {
                 is_clear = false;
             } else if value * f64::from(next.mode.entries()[j]) < 0.0 {
                 return Ok(Trial::Ends);

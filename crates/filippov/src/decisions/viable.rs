@@ -11,7 +11,7 @@ use super::trial::{try_mode, Trial};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::Guard;
-use crate::tolerances::{MOST_MEETING, SURFACE_NOISE};
+use crate::tolerances::{MOST_MEETING, ROUNDING};
 
 /// All modes at a point.
 #[derive(Clone, Debug, Default)]
@@ -132,16 +132,14 @@ pub(super) fn survey(
             Verdict::Viable(viable) => found.viable.push(viable),
             Verdict::Fails(guard) => found.failing.push((mode, guard)),
             Verdict::Untold => found.open.push(mode),
-            Verdict::Open(next) => {
-                match try_mode(at, notes, &next, meeting.surfaces, SURFACE_NOISE)? {
-                    Trial::Leaves(left) => {
-                        found.viable.push(Viable::strictly(Next { left, ..next }));
-                    }
-                    Trial::Ends => found.failing.push((mode.clone(), candidate.guard())),
-                    Trial::WithinRounding if is_beside => {}
-                    Trial::WithinRounding => found.open.push(mode),
+            Verdict::Open(next) => match try_mode(at, notes, &next, meeting.surfaces, ROUNDING)? {
+                Trial::Leaves(left) => {
+                    found.viable.push(Viable::strictly(Next { left, ..next }));
                 }
-            }
+                Trial::Ends => found.failing.push((mode.clone(), candidate.guard())),
+                Trial::WithinRounding if is_beside => {}
+                Trial::WithinRounding => found.open.push(mode),
+            },
         }
     }
     Ok(Some(found))

@@ -27,7 +27,7 @@ use crate::motion::{Run, Slacks, SmoothField};
 use crate::record::{Observed, Observer, Recorder, Solution};
 use crate::status::{Stop, Warning};
 use crate::stepper::{Attempt, StepControl, Steppers, Stiff};
-use crate::tolerances::{EPS, SHORTEST_STEP, SHORTEST_STEP_AT_ZERO};
+use crate::tolerances::{EPS, ROUNDING};
 
 /// An integration in progress.
 pub struct Integrator<'a> {
@@ -206,7 +206,7 @@ impl<'a> Integrator<'a> {
         let dt = self
             .control
             .next(&self.run.motion, room, self.run.options.max_step);
-        let shortest = (SHORTEST_STEP * self.run.t.abs()).max(SHORTEST_STEP_AT_ZERO);
+        let shortest = (ROUNDING * self.run.t.abs()).max(f64::MIN_POSITIVE);
         if dt < shortest && dt < remaining {
             let lost = self.ask(Cause::Start, lost_guards)?;
             if let Some(lost) = lost {
@@ -270,7 +270,7 @@ impl<'a> Integrator<'a> {
             }
             if let Some(stop) = differs_between_sides(self.run.system, (t, &end), &self.run.motion)?
             {
-                if dt < SHORTEST_STEP * self.run.t.abs().max(1.0) / EPS.sqrt() {
+                if dt < ROUNDING * self.run.t.abs().max(1.0) / EPS.sqrt() {
                     return Ok(Some(stop));
                 }
                 self.count_rejection(sliding);
@@ -293,7 +293,7 @@ impl<'a> Integrator<'a> {
         };
         // A switch at the end of the span, or at a known time, is there, and not a rounding before.
         let last = self.horizon;
-        let is_last = t_stop < last && last - t_stop < SHORTEST_STEP * last.abs();
+        let is_last = t_stop < last && last - t_stop < ROUNDING * last.abs();
         let t_stop = if is_last { last } else { t_stop };
         let Some(zeros) = self.find_user_zeros(theta, t_stop)? else {
             self.count_rejection(sliding);
