@@ -5,7 +5,7 @@
 
 use smallvec::{smallvec, SmallVec};
 
-use super::event::vanishing_surfaces;
+use super::event::Reached;
 use super::point::{Notes, Point};
 use super::surroundings::Surroundings;
 
@@ -104,7 +104,8 @@ pub(crate) fn end_of_sliding(
     (may_lose, approaches): (bool, bool),
     horizon: f64,
 ) -> Result<EndOfSliding, FieldError> {
-    let reached = vanishing_surfaces(at, notes)?;
+    let mut reached = Reached::default();
+    reached.find(at, notes)?;
     if !reached.surfaces.is_empty() {
         return Ok(EndOfSliding::Exit);
     }

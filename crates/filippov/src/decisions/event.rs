@@ -38,17 +38,17 @@ pub(crate) struct Reached {
     pub before: Mode,
 }
 
-/// What vanishes at the event.
-#[inline]
-pub(crate) fn vanishing_surfaces(at: &Point, notes: &mut Notes) -> Result<Reached, FieldError> {
-    let mut reached = Reached {
-        surfaces: located_surfaces(at.arrival.functions()),
-        before: at.arrival.mode.clone(),
-    };
-    if !only_located_matter(at.arrival, &reached.surfaces) {
-        look_at_all_surfaces(at, notes, &mut reached)?;
+impl Reached {
+    /// Finds what vanishes at the event.
+    #[inline]
+    pub fn find(&mut self, at: &Point, notes: &mut Notes) -> Result<(), FieldError> {
+        self.surfaces = located_surfaces(at.arrival.functions());
+        self.before.clone_from(at.arrival.mode);
+        match only_located_matter(at.arrival, &self.surfaces) {
+            true => Ok(()),
+            false => look_at_all_surfaces(at, notes, self),
+        }
     }
-    Ok(reached)
 }
 
 /// Adds to what was reached what else vanishes there, and gives surfaces that do not matter the sides of the place.

@@ -35,14 +35,14 @@ mod viable;
 mod zero_surfaces;
 
 pub(crate) use consistency::differs_between_sides;
-pub(crate) use decide::{decide, Decision};
+pub(crate) use decide::decide;
 pub(crate) use end_of_sliding::{end_of_sliding, lost_guards, EndOfSliding};
 pub(crate) use event::{add_vanishing_surfaces, located_surfaces, Reached};
 pub(crate) use leave_by_rule::refusal;
 pub(crate) use meeting::warn_oscillation;
 pub(crate) use placement::{goes_through, pushed_back, sides, triggers_reached, Sides};
 pub(crate) use point::{Arrival, Cause, Leap, Left, Lefts, Next, Notes, Point, Policy, Values};
-pub(crate) use rule::Rule;
+pub(crate) use rule::{Decision, Rule};
 pub(crate) use scene::Scene;
 pub(crate) use sides::{warn_against_direction, warn_unknown_side};
 pub(crate) use spiral::landing;

@@ -2,7 +2,7 @@
 
 use super::contact::place_in_contact;
 use super::point::{Decided, Left, Notes, Point};
-use super::rule::Rule;
+use super::rule::{Decision, Rule};
 use super::settle::place_on;
 
 use crate::error::FieldError;
@@ -28,9 +28,9 @@ pub(crate) fn place(
     at: &Point,
     notes: &mut Notes,
     memory: Option<&Mode>,
-) -> Result<(Rule, Decided), FieldError> {
+) -> Result<Decision, FieldError> {
     let Some(Sides { mode, on_surface }) = sides(at, notes, memory)? else {
-        return Ok((Rule::Region, Err(Stop::NotFinite)));
+        return Ok(Decision::by(Rule::Region, Err(Stop::NotFinite)));
     };
     // What only a law of the system sees has the side that is known: its action has been done, or will be.
     let zeros = (0..on_surface.len()).filter(|&j| on_surface[j] && !at.triggers().is_internal(j));
@@ -41,10 +41,11 @@ pub(crate) fn place(
     if !smooth.is_empty() {
         return place_on_triggers(at, notes, mode, &smooth, meeting, memory);
     }
-    let (rule, decided) = place_on(at, notes, &mode, &meeting, memory)?;
+    let Decision { rule, decided } = place_on(at, notes, &mode, &meeting, memory)?;
     let is_new = |j: &usize| memory.is_none_or(|memory| memory.entries()[*j] == 0);
     let inactive = zeros.into_iter().filter(|j| !meeting.contains(j));
-    Ok((rule, take_sides(at, decided, inactive.filter(is_new))?))
+    let decided = take_sides(at, decided, inactive.filter(is_new))?;
+    Ok(Decision::by(rule, decided))
 }
 
 /// Gives surfaces that do not matter the sides that a motion in a region moves to.
@@ -197,12 +198,12 @@ fn place_on_triggers(
     smooth: &[usize],
     meeting: Vec<usize>,
     memory: Option<&Mode>,
-) -> Result<(Rule, Decided), FieldError> {
+) -> Result<Decision, FieldError> {
     let mut touched = Vec::with_capacity(smooth.len());
     let mut contacts = Vec::new();
     for &j in smooth {
         if at.patience.is_over() {
-            return Ok((Rule::Triggers, Err(Stop::Interrupted)));
+            return Ok(Decision::by(Rule::Triggers, Err(Stop::Interrupted)));
         }
         let side = at.triggers().side(j, memory);
         mode.set(j, side);
@@ -219,7 +220,7 @@ fn place_on_triggers(
                 }
                 Touching::WithFriction(action) => {
                     let stop = Stop::FrictionInMap { surface: j, action };
-                    return Ok((Rule::Contact, Err(stop)));
+                    return Ok(Decision::by(Rule::Contact, Err(stop)));
                 }
                 Touching::NoContact => {}
             }
@@ -235,11 +236,11 @@ fn place_on_triggers(
         }
         touched.push((j, side, leading));
     }
-    let (rule, decided) = if contacts.is_empty() {
+    let Decision { rule, decided } = if contacts.is_empty() {
         place_on(at, notes, &mode, &meeting, memory)?
     } else {
         let decided = place_in_contact(at, notes, mode, &contacts, &meeting)?;
-        (Rule::Contact, decided)
+        Decision::by(Rule::Contact, decided)
     };
     let decided = decided.map(|mut next| {
         let departing = touched.into_iter().filter(|(j, side, leading)| {
@@ -250,7 +251,7 @@ fn place_on_triggers(
         next.left.extend(departing);
         next
     });
-    Ok((rule, decided))
+    Ok(Decision::by(rule, decided))
 }
 
 /// Does the motion lead from this side through a surface that the point lies on? A body that is pressed on
@@ -293,9 +294,9 @@ fn leading_along(
     if !meeting.is_empty() {
         // A trial: what is not unique is warned of when it is decided.
         let mut trial = notes.of_trial();
-        let (_, decided) = place_on(at, &mut trial, mode, meeting, memory)?;
+        let decision = place_on(at, &mut trial, mode, meeting, memory)?;
         notes.add_costs(&trial);
-        if let Ok(next) = decided {
+        if let Ok(next) = decision.decided {
             multipliers = next.multipliers().to_vec();
             after = next.mode;
         }

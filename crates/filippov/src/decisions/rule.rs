@@ -2,7 +2,7 @@
 
 use std::cell::OnceCell;
 
-use super::point::{Notes, Point};
+use super::point::{Decided, Notes, Point};
 use super::surroundings::Surroundings;
 use crate::error::FieldError;
 use crate::error::Undecided;
@@ -53,6 +53,18 @@ impl Rule {
             Rule::Contact => "contact",
             Rule::Triggers => "triggers",
         }
+    }
+}
+
+/// The result of a decision; [`Notes`] have what was found out beside it.
+pub(crate) struct Decision {
+    pub rule: Rule,
+    pub decided: Decided,
+}
+
+impl Decision {
+    pub fn by(rule: Rule, decided: Decided) -> Self {
+        Decision { rule, decided }
     }
 }
 

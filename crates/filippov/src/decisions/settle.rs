@@ -9,7 +9,7 @@ use super::meeting::resolve_first_order;
 use super::one_surface::one_surface;
 use super::point::{Decided, Lefts, Next, Notes, Point};
 use super::relay::decide_by_relay;
-use super::rule::{How, Meeting, Rule};
+use super::rule::{Decision, How, Meeting, Rule};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::status::Stop;
@@ -34,23 +34,24 @@ pub(super) fn settle(
     at: &Point,
     notes: &mut Notes,
     meeting: &Meeting,
-) -> Result<(Rule, Decided), FieldError> {
+) -> Result<Decision, FieldError> {
     for (rule, apply) in RULES {
         if let Some(decided) = apply(at, notes, meeting)? {
             let is_kinetic = matches!(rule, Rule::SlidingLaw | Rule::Relay);
-            return Ok(match is_kinetic {
-                true => (rule, with_kinetic_friction(at, notes, decided, meeting)?),
-                false => (rule, decided),
-            });
+            let decided = match is_kinetic {
+                true => with_kinetic_friction(at, notes, decided, meeting)?,
+                false => decided,
+            };
+            return Ok(Decision::by(rule, decided));
         }
     }
     // A rule of the list does not apply, or was interrupted. Of one or two surfaces none takes long.
     if meeting.surfaces.len() > 2 && at.patience.is_over() {
-        return Ok((Rule::FirstOrder, Err(Stop::Interrupted)));
+        return Ok(Decision::by(Rule::FirstOrder, Err(Stop::Interrupted)));
     }
     let decided = resolve_first_order(at, notes, meeting)?;
     let decided = with_kinetic_friction(at, notes, decided, meeting)?;
-    Ok((Rule::FirstOrder, decided))
+    Ok(Decision::by(Rule::FirstOrder, decided))
 }
 
 /// Rule: the region that the point is in.
@@ -66,7 +67,7 @@ pub(super) fn place_on(
     mode: &Mode,
     surfaces: &[usize],
     memory: Option<&Mode>,
-) -> Result<(Rule, Decided), FieldError> {
+) -> Result<Decision, FieldError> {
     // If one surface has several continuations, prefer the one on the side of the previous mode.
     let entry = match (surfaces, memory) {
         (&[j], Some(memory)) => memory.entries()[j],
@@ -94,8 +95,8 @@ fn with_kinetic_friction(
     if slipping.is_empty() || others.is_empty() {
         return Ok(decided);
     }
-    match place_on(at, notes, &next.mode, &others, Some(&next.mode))? {
-        (_, Ok(again)) if again.mode != next.mode => {
+    match place_on(at, notes, &next.mode, &others, Some(&next.mode))?.decided {
+        Ok(again) if again.mode != next.mode => {
             let left = surfaces_left(at, notes, &again.mode, meeting.surfaces, &[])?;
             Ok(Ok(Next::new(again.mode, left)))
         }

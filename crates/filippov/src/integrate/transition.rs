@@ -17,7 +17,7 @@ use crate::mode::Mode;
 use crate::motion::{Guard, Leading, ModeField, Projector, RootEnd, Seen, SlidingSet, SmoothField};
 use crate::patience::Patience;
 use crate::record::decide_and_record;
-use crate::status::{is_named, Stop, WarningCode};
+use crate::status::{is_named, Stop, Warning, WarningCode};
 use crate::switch::{Kind, Switch};
 use crate::system::eval_on_side;
 use crate::tolerances::{DOUBTFUL, MOST_SWITCHES_AT_ONE_TIME};
@@ -44,21 +44,25 @@ impl<'a> Integrator<'a> {
             ..Notes::default()
         };
         let answer = scene.ask(cause, &mut notes, question);
-        self.take_notes(notes);
+        self.take_notes(&mut notes);
         answer
     }
 
     /// Counts what questions cost, and keeps their warnings.
     #[inline(always)]
-    pub(super) fn take_notes(&mut self, notes: Notes) {
+    pub(super) fn take_notes(&mut self, notes: &mut Notes) {
         self.run.stats.n_field_evaluations += notes.n_field_evaluations;
         self.run.stats.n_surface_evaluations += notes.n_surface_evaluations;
         self.n_choices = notes.n_choices;
         // What an interrupted decision warns of need not hold.
-        if notes.warnings.is_empty() || self.watch.has_ended() {
-            return;
+        if !notes.warnings.is_empty() && !self.watch.has_ended() {
+            self.keep_warnings(std::mem::take(&mut notes.warnings));
         }
-        for warning in notes.warnings {
+    }
+
+    #[cold]
+    fn keep_warnings(&mut self, warnings: Vec<Warning>) {
+        for warning in warnings {
             let is_known = warning.code == WarningCode::ZeroSurface
                 && is_named(&self.warnings, warning.surfaces[0]);
             if !is_known {
@@ -78,17 +82,17 @@ impl<'a> Integrator<'a> {
             let kept = self.ask(cause, |at, notes| decide_and_record(at, notes, reached));
             let (decision, record) = kept?;
             // An interrupted decision depends on the computing time it was given: it is not recorded.
-            if self.watch.stop().is_none() {
+            if !self.watch.has_ended() {
                 self.recorder.decisions.push(record);
             }
-            decision
+            Ok(decision)
         } else {
-            self.ask(cause, |at, notes| decide(at, notes, reached))?
+            self.ask(cause, |at, notes| decide(at, notes, reached))
         };
-        if self.watch.has_ended() {
-            decision.decided = self.watch.stop().map_or(decision.decided, Err);
+        if let (Ok(decision), Some(stop)) = (&mut decision, self.watch.stop()) {
+            decision.decided = Err(stop);
         }
-        Ok(decision)
+        decision
     }
 
     /// Decides what follows the event and starts it.
@@ -685,7 +689,7 @@ impl<'a> Integrator<'a> {
         done.into_iter()
             .for_each(|switch| self.recorder.switch(switch));
         self.recorder.jump(t, &self.run.x);
-        self.take_notes(notes);
+        self.take_notes(&mut notes);
         stopped
     }
 
