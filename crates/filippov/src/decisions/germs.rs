@@ -56,9 +56,6 @@ pub(super) fn decide_if_doubtful(
     if around.has_silent(at) {
         return decide_undecided(at, notes, meeting, None).map(Some);
     }
-    if meeting.surfaces.iter().any(|&j| at.system.sticks_at(j)) {
-        return Ok(None);
-    }
     Ok(decide_by_germs(at, notes, meeting)?.ok())
 }
 

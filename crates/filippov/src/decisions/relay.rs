@@ -35,13 +35,11 @@ pub(super) fn decide_by_relay(
     if !is_event && surfaces.len() == 2 && !Parallels::of(at, surfaces, mode)?.are_any() {
         return Ok(None);
     }
-    let is_exit = |guard: &Guard| !guard.is_surface();
-    let is_late = is_event && at.arrival.functions().iter().any(is_exit);
-    let mut found = relay_at(at, notes, meeting, is_late)?;
+    let mut found = relay_at(at, notes, meeting, false)?;
     let is_open = |(found, _): &(RelaySolution, bool)| {
         !found.degenerate.is_empty() || !found.loops.is_empty()
     };
-    if is_event && !is_late && found.as_ref().is_some_and(is_open) {
+    if is_event && found.as_ref().is_some_and(is_open) {
         found = relay_at(at, notes, meeting, true)?;
     }
     let Some((mut found, may_be_tangent)) = found else {

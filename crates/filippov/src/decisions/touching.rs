@@ -110,9 +110,6 @@ pub(super) fn together(
     {
         return Ok(Together::Never);
     }
-    if ranges.iter().any(|[low, high]| high - low <= noise) {
-        return Ok(Together::Perhaps);
-    }
     let roots = roots_in_cube(&face);
     let has_field = |velocity: Vec<f64>| velocity.iter().all(|v| v.is_finite());
     Ok(match roots.complete && roots.points.is_empty() {

@@ -18,7 +18,7 @@ use crate::action::Timetable;
 use crate::decisions::{differs_between_sides, has_left_zero_surface, lost_guards, Cause};
 use crate::error::{Error, FieldError};
 use crate::event::search::{Detector, StepSearch};
-use crate::event::{Event, Found, UserEvents, TICK};
+use crate::event::{Event, Found};
 use crate::integrate::problem::{check, Problem};
 use crate::integrate::progress::Progress;
 use crate::integrate::watch::Watch;
@@ -231,12 +231,12 @@ impl<'a> Integrator<'a> {
         let dt = self.stepper.interpolant().dt;
         match attempt {
             Attempt::NotFinite => {
-                self.count_rejection(sliding);
+                self.run.stats.reject(sliding);
                 self.control.shorten_to_surface(dt, &self.run.motion);
                 Ok(None)
             }
             Attempt::Error(error) if error > 1.0 => {
-                self.count_rejection(sliding);
+                self.run.stats.reject(sliding);
                 self.control.reject(&self.stepper, dt, error);
                 Ok(None)
             }
@@ -257,7 +257,7 @@ impl<'a> Integrator<'a> {
             Event::None => None,
             Event::At(found) => Some(found),
             Event::Shorten(dt) => {
-                self.count_rejection(sliding);
+                self.run.stats.reject(sliding);
                 self.control.shorten(dt);
                 return Ok(None);
             }
@@ -273,7 +273,7 @@ impl<'a> Integrator<'a> {
                 if dt < ROUNDING * self.run.t.abs().max(1.0) / EPS.sqrt() {
                     return Ok(Some(stop));
                 }
-                self.count_rejection(sliding);
+                self.run.stats.reject(sliding);
                 self.control.shorten(0.5 * dt);
                 return Ok(None);
             }
@@ -295,8 +295,9 @@ impl<'a> Integrator<'a> {
         let last = self.horizon;
         let is_last = t_stop < last && last - t_stop < ROUNDING * last.abs();
         let t_stop = if is_last { last } else { t_stop };
-        let Some(zeros) = self.find_user_zeros(theta, t_stop)? else {
-            self.count_rejection(sliding);
+        let (mut search, recorder) = self.step_search();
+        let Some(zeros) = recorder.find_user_zeros(&mut search, theta, t_stop)? else {
+            self.run.stats.reject(sliding);
             self.control.shorten(0.5 * dt);
             return Ok(None);
         };
@@ -319,7 +320,8 @@ impl<'a> Integrator<'a> {
         }
         self.control.note_length(dt);
         let chatter = self.control.look_for_chatter(&self.stepper, dt);
-        if let Some(stop) = self.record_user_zeros(zeros, theta, t_stop)? {
+        let (mut search, recorder) = self.step_search();
+        if let Some(stop) = recorder.record_user_zeros(&mut search, zeros, (theta, t_stop))? {
             return Ok(Some(stop));
         }
         self.control.note_edge(longest, dt);
@@ -375,9 +377,9 @@ impl<'a> Integrator<'a> {
         self.switch(&event)
     }
 
-    /// The search of the step that was computed; and the user's functions.
+    /// The search of the step that was computed; and the record of what it finds.
     #[inline(always)]
-    pub(super) fn step_search(&mut self) -> (StepSearch<'_, 'a>, &UserEvents<'a>) {
+    pub(super) fn step_search(&mut self) -> (StepSearch<'_, 'a>, &mut Recorder<'a>) {
         let search = StepSearch {
             run: &mut self.run,
             stepper: &mut self.stepper,
@@ -386,12 +388,7 @@ impl<'a> Integrator<'a> {
             horizon: self.horizon,
             one_sided: self.control.is_one_sided(),
         };
-        (search, &self.recorder.user_events)
-    }
-
-    fn count_rejection(&mut self, sliding: bool) {
-        self.run.stats.n_rejected += 1;
-        self.run.stats.n_rejected_sliding += u64::from(sliding);
+        (search, &mut self.recorder)
     }
 
     /// Closes the books.
@@ -405,73 +402,5 @@ impl<'a> Integrator<'a> {
             self.run.stats,
             self.warnings,
         )
-    }
-
-    /// The zeros (theta, index) of the user's functions up to `theta`, in order; `None` if a shorter step
-    /// is needed to tell them apart.
-    pub(super) fn find_user_zeros(
-        &mut self,
-        theta: f64,
-        t_stop: f64,
-    ) -> Result<Option<Vec<(f64, usize)>>, FieldError> {
-        let visits = self.recorder.visits.as_ref();
-        let has_ticks = visits.is_some_and(|visits| visits.has_tick_up_to(t_stop));
-        if self.recorder.user_events.events.is_empty() && !has_ticks {
-            return Ok(Some(Vec::new()));
-        }
-        let (mut search, events) = self.step_search();
-        let mut found = search.user_zeros(events, theta, has_ticks)?;
-        if let Some(zeros) = &mut found {
-            zeros.extend(
-                self.recorder
-                    .ticks(self.stepper.interpolant(), theta, t_stop),
-            );
-            zeros.sort_by(|a, b| a.0.total_cmp(&b.0));
-        }
-        Ok(found)
-    }
-
-    /// Records zeros; at one that ends the run, accepts the step up to there and returns why.
-    pub(super) fn record_user_zeros(
-        &mut self,
-        zeros: Vec<(f64, usize)>,
-        theta: f64,
-        t_stop: f64,
-    ) -> Result<Option<Stop>, FieldError> {
-        if self.recorder.user_events.events.is_empty() && zeros.is_empty() {
-            return Ok(None);
-        }
-        let (t0, dt) = (self.stepper.interpolant().t0, self.stepper.interpolant().dt);
-        for (at, index) in zeros {
-            let t = match &mut self.recorder.visits {
-                Some(visits) if index == TICK => {
-                    let tick = visits.next_tick().unwrap_or(t_stop);
-                    visits.pass_tick();
-                    tick.min(t_stop)
-                }
-                _ if at == theta => t_stop,
-                _ => (t0 + at * dt).min(t_stop),
-            };
-            let mut y = vec![0.0; self.run.x.len()];
-            self.stepper.interpolant().at(at, &mut y);
-            self.run.motion.project(t, &mut y)?;
-            if let Some(stop) = self.recorder.zero(index, t, &y) {
-                let (stepper, motion) = (&mut self.stepper, &mut self.run.motion);
-                self.recorder.sample_step(t, &self.run.x, stepper, motion)?;
-                self.recorder.step(self.stepper.interpolant(), t, &y);
-                self.run.t = t;
-                self.run.x = y;
-                return Ok(Some(stop));
-            }
-        }
-        self.recorder.user_events.at_start = false;
-        self.recorder.user_events.accept_sides();
-        for k in 0..self.recorder.user_events.events.len() {
-            self.recorder.user_events.before[k] = self.recorder.user_events.left[k];
-            let function = self.recorder.user_events.events[k].function;
-            let (mut search, _) = self.step_search();
-            self.recorder.user_events.left[k] = search.user_value(function, theta)?;
-        }
-        Ok(None)
     }
 }
