@@ -101,16 +101,14 @@ impl Mode {
 
     /// The signs handed to the field: +1.0 or -1.0 per surface, a zero entry as +1.0.
     pub fn signs(&self) -> Signs {
-        let sign = |&entry: &i8| if entry < 0 { -1.0 } else { 1.0 };
-        match self.entries().len() {
-            n @ ..=FEW => {
-                let mut few = [1.0; FEW];
-                few.iter_mut()
-                    .zip(self.entries())
-                    .for_each(|(to, entry)| *to = sign(entry));
-                Signs::from_buf_and_len(few, n)
+        let sign = |entry: i8| if entry < 0 { -1.0 } else { 1.0 };
+        match &self.0 {
+            // As many at a time, which takes fewer instructions than to count them.
+            Entries::Short { length, entries } if usize::from(*length) <= FEW => {
+                let few = std::array::from_fn(|j| sign(entries[j]));
+                Signs::from_buf_and_len(few, usize::from(*length))
             }
-            _ => self.entries().iter().map(sign).collect(),
+            _ => self.entries().iter().map(|&entry| sign(entry)).collect(),
         }
     }
 

@@ -34,6 +34,12 @@ pub struct Stats {
 }
 
 impl Stats {
+    /// Counts a rejected step.
+    pub(crate) fn reject(&mut self, is_sliding: bool) {
+        self.n_rejected += 1;
+        self.n_rejected_sliding += u64::from(is_sliding);
+    }
+
     /// Accepted steps that this method took.
     pub fn n_steps_of(&self, method: Method) -> u64 {
         self.n_steps_by[method as usize]

@@ -22,7 +22,7 @@ use crate::patience::Patience;
 use crate::status::Stop;
 use crate::switch::Switch;
 use crate::system::{ActionMap, Trigger};
-use crate::tolerances::{MOST_ACTIONS_AT_ONE_TIME, PENETRATION, SURFACE_NOISE};
+use crate::tolerances::{AT_SIDE, MOST_ACTIONS_AT_ONE_TIME, ROUNDING};
 
 /// An instant in which actions are done: the place and the motion that ends there.
 pub(crate) struct Instant<'i, 'a> {
@@ -183,7 +183,7 @@ impl<'a> Instant<'_, 'a> {
                 .side(j, Some(before));
             let came_from = before.entries()[j] == side || before.entries()[j] == 0;
             let is_beyond = h[j] * f64::from(side) < 0.0 && came_from;
-            let has_jumped = (h[j] - start[j]).abs() > PENETRATION * h[j].abs();
+            let has_jumped = (h[j] - start[j]).abs() > AT_SIDE * h[j].abs();
             if !is_beyond || has_jumped {
                 continue;
             }
@@ -192,7 +192,7 @@ impl<'a> Instant<'_, 'a> {
             let setting = self.run.motion.setting().with_signs(&signs);
             let place = setting.at(self.run.t, &self.run.x);
             let size = self.run.system.surface_size(j, &place)?;
-            if h[j].abs() > (SURFACE_NOISE * size).max(known.min(PENETRATION * size)) {
+            if h[j].abs() > (ROUNDING * size).max(known.min(AT_SIDE * size)) {
                 return Ok(Some(j));
             }
         }

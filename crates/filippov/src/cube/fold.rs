@@ -2,7 +2,7 @@
 
 use super::normal_fields::NormalFields;
 use super::small_matrix::{Matrix, Vector};
-use crate::tolerances::{FOLD_REACH, NEWTON_DONE, NEWTON_STEPS};
+use crate::tolerances::{NEWTON_STEPS, ROOT_BOXES, SAME_NUMBER};
 
 /// Two roots as one, in equations that have been moved so that they meet.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,7 +22,7 @@ pub struct MergedRoot {
 /// ```
 ///
 /// with e and c near the left and the right null vector of G. Derivatives of G are exact: it is linear in each
-/// multiplier. `None` if there is no such point nearer than [`FOLD_REACH`].
+/// multiplier. `None` if there is no such point nearer than the first of [`ROOT_BOXES`].
 ///
 /// Reference: A. Griewank, G. W. Reddien, Characterization and computation of generalized turning points,
 /// *SIAM J. Numer. Anal.* 21 (1984).
@@ -45,11 +45,11 @@ pub fn merged_root(fields: &NormalFields, near: &[f64]) -> Option<MergedRoot> {
         if !lambda
             .iter()
             .zip(near)
-            .all(|(a, b)| (a - b).abs() <= FOLD_REACH)
+            .all(|(a, b)| (a - b).abs() <= ROOT_BOXES[0])
         {
             return None;
         }
-        if step.iter().all(|d| d.abs() <= NEWTON_DONE) {
+        if step.iter().all(|d| d.abs() <= SAME_NUMBER) {
             let residual = fields.interpolate(&lambda).into_vec();
             return Some(MergedRoot { lambda, residual });
         }

@@ -6,8 +6,8 @@ use super::small_matrix::{Matrix, Vector};
 use super::stability::is_scaling_stable;
 use crate::patience::Patience;
 use crate::tolerances::{
-    AT_SIDE, DOUBTFUL, FAR_FROM_THE_CUBE, INJECTIVE, MOST_BOXES, MOST_MEETING, NEWTON_DONE,
-    NEWTON_STEPS, SAME_ROOT,
+    AT_SIDE, DOUBTFUL, FAR_FROM_THE_CUBE, INJECTIVE, MOST_MEETING, MOST_WORK, NEWTON_STEPS,
+    SAME_NUMBER, SAME_ROOT,
 };
 
 /// The roots found in the cube.
@@ -66,7 +66,7 @@ fn search(fields: &NormalFields, patience: Patience) -> Roots {
         fields: fields.clone(),
     }];
     let few = MOST_MEETING.pow(3);
-    for _ in 0..MOST_BOXES * few / m.pow(3).max(few) {
+    for _ in 0..MOST_WORK * few / m.pow(3).max(few) {
         if patience.is_over() {
             break;
         }
@@ -188,7 +188,7 @@ fn iterate(start: &[f64], step: impl Fn(&[f64]) -> Option<Vector>) -> Option<Vec
             .iter_mut()
             .zip(&step)
             .for_each(|(value, d)| *value -= d);
-        if step.iter().all(|d| d.abs() <= NEWTON_DONE) {
+        if step.iter().all(|d| d.abs() <= SAME_NUMBER) {
             return Some(lambda);
         }
         if !lambda.iter().all(|v| v.abs() <= FAR_FROM_THE_CUBE) {

@@ -7,7 +7,7 @@ use crate::mode::Mode;
 use crate::motion::CurrentMotion;
 use crate::status::Stop;
 use crate::system::{PiecewiseSystem, Setting};
-use crate::tolerances::{BETWEEN_SIDES, EPS, MOST_MEETING, SURFACE_NOISE};
+use crate::tolerances::{DOUBTFUL, EPS, MOST_MEETING, ROUNDING};
 
 /// What the switching functions at a point say of a mode.
 pub(super) enum Consistency {
@@ -99,13 +99,13 @@ impl Known {
         let h = at.surface_values(notes, &meeting.mode.signs())?;
         let reached = meeting.fresh.iter().chain(at.arrival.sliding);
         let residual = reached.fold(0.0, |most, &j| h[j].abs().max(most));
-        let residual = SURFACE_NOISE / EPS * residual;
+        let residual = ROUNDING / EPS * residual;
         Ok(Known { h, residual })
     }
 
     fn noise(&self, at: &Point, j: usize, h: f64, region: &Mode) -> Result<f64, FieldError> {
         let size = at.system.surface_size(j, &at.place(&region.signs()))?;
-        Ok(SURFACE_NOISE * (size + self.h[j].abs() + h.abs()) + self.residual)
+        Ok(ROUNDING * (size + self.h[j].abs() + h.abs()) + self.residual)
     }
 
     /// Is this value of h_j in a region zero?
@@ -231,7 +231,7 @@ pub(crate) fn differs_between_sides(
         for k in (0..h.len()).filter(|k| !sliding.contains(k) && is_checked(*k)) {
             let beyond = -h[k] * f64::from(side.entries()[k]);
             let size = system.surface_size(k, &place)?;
-            if beyond > BETWEEN_SIDES * (1.0 + size) {
+            if beyond > DOUBTFUL * (1.0 + size) {
                 return Ok(Some(Stop::SlidesAcrossJump {
                     surfaces: sliding.to_vec(),
                     jumping: vec![k],

@@ -1,15 +1,15 @@
 //! Contact: which bodies stay, which leave, and what slides beside them.
 
 use super::choice::choose;
-use super::look_ahead::{try_mode, Trial};
 use super::point::{Decided, Left, Lefts, Next, Notes, Point};
+use super::trial::{try_mode, Trial};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::{first_nonzero, Leading};
 use crate::motion::{ModeField, SmoothField};
 use crate::status::Stop;
 use crate::system::dot;
-use crate::tolerances::{AT_SIDE, MOST_IN_CONTACT, NO_FORCE};
+use crate::tolerances::{AT_SIDE, MOST_MEETING, VANISHING_GERM};
 
 /// An event while bodies are in contact, that triggers no action: a body leaves, or a surface of another kind
 /// is reached or left. `surfaces` vanish at the event.
@@ -45,7 +45,7 @@ pub(super) fn place_in_contact(
     meeting: &[usize],
 ) -> Result<Decided, FieldError> {
     let all: Vec<usize> = contacts.iter().chain(meeting).copied().collect();
-    if all.len() > MOST_IN_CONTACT {
+    if all.len() > MOST_MEETING {
         return Ok(Err(Stop::Contact { surfaces: all }));
     }
     let mut modes = vec![mode];
@@ -120,7 +120,7 @@ fn begin(
     };
     // A surface that is reached tangentially is located to the square root of rounding.
     let rounding = match located {
-        [] => NO_FORCE,
+        [] => VANISHING_GERM,
         _ => AT_SIDE,
     };
     let mut is_clear = true;
@@ -129,7 +129,7 @@ fn begin(
             is_clear = false;
             continue;
         }
-        let noise = field.noise_of_exit(i) * rounding / NO_FORCE;
+        let noise = field.noise_of_exit(i) * rounding / VANISHING_GERM;
         if exit.is_nan() || *exit < -noise {
             return Ok(Trial::Ends);
         }

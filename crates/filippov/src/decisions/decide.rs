@@ -3,22 +3,16 @@
 use smallvec::SmallVec;
 
 use super::contact::decide_in_contact;
-use super::event::{arrival_at_surface, vanishing_surfaces, Reached};
+use super::event::{arrival_at_surface, Reached};
 use super::one_surface::one_surface;
 use super::placement::place;
-use super::point::{Cause, Decided, Notes, Point};
-use super::rule::{How, Meeting, Rule};
+use super::point::{Cause, Notes, Point};
+use super::rule::{Decision, How, Meeting, Rule};
 use super::settle::settle;
 
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::ModeField;
-
-/// The result of a decision; `Notes` have what was found out beside it.
-pub(crate) struct Decision {
-    pub decided: Decided,
-    pub rule: Rule,
-}
 
 /// Decides which motion follows at a point. After an event, `reached` is what vanishes there.
 pub(crate) fn decide(
@@ -26,22 +20,23 @@ pub(crate) fn decide(
     notes: &mut Notes,
     reached: &mut Reached,
 ) -> Result<Decision, FieldError> {
-    let (rule, decided) = match at.arrival.cause {
-        Cause::Start => place(at, notes, None)?,
-        Cause::Anew(memory) => place(at, notes, Some(memory))?,
+    let decision = match at.arrival.cause {
+        Cause::Start => place(at, notes, None),
+        Cause::Anew(memory) => place(at, notes, Some(memory)),
         Cause::Limit(meeting) => {
             let meeting = Meeting::new(at.arrival.mode, meeting, meeting, How::Limit);
-            settle(at, notes, &meeting)?
+            settle(at, notes, &meeting)
         }
         Cause::Event { .. } => {
-            *reached = vanishing_surfaces(at, notes)?;
-            after_event(at, notes, &reached.surfaces, &reached.before)?
+            reached.find(at, notes)?;
+            after_event(at, notes, &reached.surfaces, &reached.before)
         }
     };
-    for warning in &mut notes.warnings {
-        warning.rule = rule.name();
+    if let (Ok(decision), false) = (&decision, notes.warnings.is_empty()) {
+        let warnings = notes.warnings.iter_mut();
+        warnings.for_each(|warning| warning.rule = decision.rule.name());
     }
-    Ok(Decision { decided, rule })
+    decision
 }
 
 /// The motion after an event at which `surfaces` vanish beside those slid on.
@@ -50,14 +45,15 @@ fn after_event(
     notes: &mut Notes,
     fresh: &[usize],
     mode: &Mode,
-) -> Result<(Rule, Decided), FieldError> {
+) -> Result<Decision, FieldError> {
     let is_touch = matches!(at.arrival.cause, Cause::Event { touch: true, .. });
     if !is_touch && matches!(&**at.arrival.field.borrow(), ModeField::Contact(_)) {
-        return Ok((Rule::Contact, decide_in_contact(at, notes, fresh)?));
+        return decide_in_contact(at, notes, fresh)
+            .map(|decided| Decision::by(Rule::Contact, decided));
     }
     let is_trigger = |j: &usize| at.triggers().is_only_trigger(*j);
     if !is_touch && fresh.len() > 1 && fresh.iter().any(is_trigger) {
-        return Ok((Rule::Triggers, cross_beside_triggers(at, notes, fresh)?));
+        return cross_beside_triggers(at, notes, fresh);
     }
     let mut both = SmallVec::<[usize; 4]>::new();
     let surfaces = match (fresh, at.arrival.sliding, at.arrival.resting) {
@@ -79,7 +75,7 @@ fn after_event(
     if is_plain && !at.system.has_nested_signs() {
         // No rule before that of one surface applies: the list need not be asked.
         if let Some(decided) = one_surface(at, notes, &meeting)? {
-            return Ok((Rule::OneSurface, decided));
+            return Ok(Decision::by(Rule::OneSurface, decided));
         }
     }
     settle(at, notes, &meeting)
@@ -91,7 +87,7 @@ fn cross_beside_triggers(
     at: &Point,
     notes: &mut Notes,
     surfaces: &[usize],
-) -> Result<Decided, FieldError> {
+) -> Result<Decision, FieldError> {
     let before = at.arrival.mode;
     let mut mode = before.clone();
     for &j in surfaces
@@ -100,5 +96,6 @@ fn cross_beside_triggers(
     {
         mode.set(j, -before.entries()[j]);
     }
-    place(at, notes, Some(&mode)).map(|(_, decided)| decided)
+    let decision = place(at, notes, Some(&mode))?;
+    Ok(Decision::by(Rule::Triggers, decision.decided))
 }

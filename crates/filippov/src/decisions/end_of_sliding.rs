@@ -1,18 +1,21 @@
-//! Two-folds that a sliding motion runs into: points where both fields become tangent to the surface at once.
+//! Ends of sliding at which multipliers are lost: two-folds, double zeros, folds and jumps that vanish.
 //!
-//! Before it the motion is attracted from both sides, behind it from none. Near it the multiplier is the quotient of two
+//! A two-fold is a point where both fields become tangent to the surface at once. Before it the motion is attracted from both sides, behind it from none. Near it the multiplier is the quotient of two
 //! small numbers, which are known to the tolerance only: where both vanish within it, the motion has arrived.
 
-use super::event::vanishing_surfaces;
+use smallvec::{smallvec, SmallVec};
+
+use super::event::Reached;
 use super::point::{Notes, Point};
+use super::surroundings::Surroundings;
 
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::{shares_of_rows, ModeField, SmoothField};
-use crate::motion::{Leading, TwoFold, TwoFoldMotion};
+use crate::motion::{Guard, Leading, RootEnd, TwoFold, TwoFoldMotion};
 use crate::system::{dot, dot_magnitude};
 use crate::tolerances::{
-    ARRIVED, AT_TWO_FOLD, INSIDE_SHARES, MOST_HALVINGS, NEWTON_STEPS, TANGENT,
+    ARRIVED, AT_FOLD, ERRORS_OF_STEPS, INSIDE_SHARES, MOST_HALVINGS, NEWTON_STEPS, TANGENT,
 };
 
 /// A time and the state there.
@@ -101,7 +104,8 @@ pub(crate) fn end_of_sliding(
     (may_lose, approaches): (bool, bool),
     horizon: f64,
 ) -> Result<EndOfSliding, FieldError> {
-    let reached = vanishing_surfaces(at, notes)?;
+    let mut reached = Reached::default();
+    reached.find(at, notes)?;
     if !reached.surfaces.is_empty() {
         return Ok(EndOfSliding::Exit);
     }
@@ -136,7 +140,7 @@ pub(super) fn two_fold_here(at: &Point) -> Result<Option<TimeAndState>, FieldErr
     if distance.abs() <= components.rounding {
         return Ok(here);
     }
-    if distance.abs() > AT_TWO_FOLD * at.scale.along(&row[..n], &x) {
+    if distance.abs() > ERRORS_OF_STEPS * at.scale.along(&row[..n], &x) {
         return Ok(None);
     }
     let ahead = -distance / (row[n] + dot(&row[..n], &velocity));
@@ -150,7 +154,7 @@ pub(super) fn two_fold_here(at: &Point) -> Result<Option<TimeAndState>, FieldErr
         return Ok(None);
     };
     let is_near = |(i, (a, b)): (usize, (&f64, &f64))| {
-        (a - b).abs() <= 10.0 * AT_TWO_FOLD * at.scale.tolerance(i, *a, *b)
+        (a - b).abs() <= 10.0 * ERRORS_OF_STEPS * at.scale.tolerance(i, *a, *b)
     };
     if !end.iter().zip(at.x).enumerate().all(is_near) {
         return Ok(None);
@@ -172,7 +176,7 @@ pub(super) fn beyond_double_zero(
         return Ok(None);
     }
     let (difference, error) = Components::of(at, j, (at.t, at.x))?.difference();
-    if difference.abs() > AT_TWO_FOLD * error {
+    if difference.abs() > ERRORS_OF_STEPS * error {
         return Ok(None);
     }
     // The motion along which the components stay nearest to zero.
@@ -200,7 +204,7 @@ pub(super) fn beyond_double_zero(
             return Ok(None);
         };
         let (difference, error) = Components::of(at, j, (t, &end))?.difference();
-        let is_known = difference.abs() > AT_TWO_FOLD * error;
+        let is_known = difference.abs() > ERRORS_OF_STEPS * error;
         if is_known && difference.abs() > last.abs() {
             return Ok((difference > 0.0 && t > at.t).then_some((t, end)));
         }
@@ -246,7 +250,7 @@ fn settle_on_zeros(
             largest = largest.max(shift.abs());
             *x.get_mut(i).unwrap_or(&mut t) -= unit * shift;
         }
-        if largest > 10.0 * AT_TWO_FOLD {
+        if largest > 10.0 * ERRORS_OF_STEPS {
             return Ok(None);
         }
         if largest <= ARRIVED {
@@ -254,4 +258,38 @@ fn settle_on_zeros(
         }
     }
     Ok(None)
+}
+
+/// The functions that count as vanishing where steps of sliding shrink to nothing: the jump of the field across a surface has
+/// vanished, the multipliers have met a fold beyond which there are none, or both fields are tangent to the surface.
+pub(crate) fn lost_guards(
+    at: &Point,
+    notes: &mut Notes,
+) -> Result<Option<SmallVec<[Guard; 2]>>, FieldError> {
+    if at.arrival.slides_on_several() {
+        let around = Surroundings::of(at, notes, at.arrival.sliding, at.arrival.mode)?;
+        if around.is_ok_and(|around| around.has_silent(at)) {
+            return Ok(Some(smallvec![Guard::Root(RootEnd::Stability)]));
+        }
+        return Ok(has_lost_root(at)?.then(|| smallvec![Guard::Root(RootEnd::Fold)]));
+    }
+    let &[j] = at.arrival.sliding else {
+        return Ok(None);
+    };
+    let arrived = beyond_double_zero(at, notes, j)?.is_some() || two_fold_here(at)?.is_some();
+    Ok(arrived.then(|| Guard::ends(j).as_slice().into()))
+}
+
+/// Has sliding on several surfaces come to a fold of its multipliers?
+fn has_lost_root(at: &Point) -> Result<bool, FieldError> {
+    let mut field = at.arrival.field.borrow_mut();
+    let is_rootless = |field: &ModeField| matches!(field, ModeField::Intersection(f) if f.set().len() > 2 && f.is_rootless());
+    let was_rootless = is_rootless(&field);
+    let exits = field.exits(at.t, &mut at.x.to_vec())?;
+    // The evaluation here may be the first one without a root.
+    if was_rootless || is_rootless(&field) {
+        return Ok(true);
+    }
+    let mut ends = field.guards().into_iter().zip(exits);
+    Ok(ends.any(|(guard, exit)| guard == Guard::Root(RootEnd::Fold) && exit.abs() < AT_FOLD))
 }

@@ -12,7 +12,7 @@ use crate::motion::{first_nonzero, normal_component, Leading};
 use crate::switching::Arrival as SurfaceArrival;
 use crate::system::dot;
 use crate::system::{eval_on_side, surfaces_that_matter, BothSides};
-use crate::tolerances::{AT_SIDE, SURFACE_NOISE};
+use crate::tolerances::{AT_SIDE, ROUNDING};
 
 /// The surfaces among the functions of an event, in order.
 #[inline]
@@ -38,17 +38,17 @@ pub(crate) struct Reached {
     pub before: Mode,
 }
 
-/// What vanishes at the event.
-#[inline]
-pub(crate) fn vanishing_surfaces(at: &Point, notes: &mut Notes) -> Result<Reached, FieldError> {
-    let mut reached = Reached {
-        surfaces: located_surfaces(at.arrival.functions()),
-        before: at.arrival.mode.clone(),
-    };
-    if !only_located_matter(at.arrival, &reached.surfaces) {
-        look_at_all_surfaces(at, notes, &mut reached)?;
+impl Reached {
+    /// Finds what vanishes at the event.
+    #[inline]
+    pub fn find(&mut self, at: &Point, notes: &mut Notes) -> Result<(), FieldError> {
+        self.surfaces = located_surfaces(at.arrival.functions());
+        self.before.clone_from(at.arrival.mode);
+        match only_located_matter(at.arrival, &self.surfaces) {
+            true => Ok(()),
+            false => look_at_all_surfaces(at, notes, self),
+        }
     }
-    Ok(reached)
 }
 
 /// Adds to what was reached what else vanishes there, and gives surfaces that do not matter the sides of the place.
@@ -87,7 +87,7 @@ fn add_inactive_that_begin_to_matter(
             continue;
         }
         let size = at.system.surface_size(j, &at.place(&before.signs()))?;
-        if h.abs() <= SURFACE_NOISE * size {
+        if h.abs() <= ROUNDING * size {
             zeros.push(j);
         }
     }
@@ -139,7 +139,7 @@ pub(crate) fn add_vanishing_surfaces(
         let size = at.system.surface_size(j, &at.place(arrival.signs))?;
         // A surface that is being left tangentially stays near for long; one that was crossed at this very instant belongs
         // to the event.
-        if h.abs() <= SURFACE_NOISE * size && !arrival.departing.contains(&j) {
+        if h.abs() <= ROUNDING * size && !arrival.departing.contains(&j) {
             surfaces.push(j);
         }
     }

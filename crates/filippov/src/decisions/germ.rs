@@ -2,12 +2,14 @@
 
 use std::sync::Arc;
 
-use super::point::Point;
+use smallvec::smallvec;
+
+use super::point::{Left, Lefts, Notes, Point, Values};
 use crate::error::FieldError;
 use crate::mode::{Mode, Signs};
-use crate::motion::Leading;
+use crate::motion::{first_nonzero, Leading};
 use crate::system::{dot, MotionJets};
-use crate::tolerances::{EPS, GERM_ORDER, VANISHING_GERM};
+use crate::tolerances::{AT_SIDE, EPS, MAX_LIE_ORDER, MOST_MEETING, VANISHING_GERM};
 
 /// How a guard begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,7 +49,7 @@ impl MotionSeries {
     /// the rate at which the fields around the point change the state.
     pub fn of(at: &Point, mode: &Mode, multipliers: &[f64], pace: f64) -> Option<Self> {
         let sliding: Vec<usize> = mode.sliding_set().collect();
-        let jets = at.system.motion_jets(&sliding, GERM_ORDER)?;
+        let jets = at.system.motion_jets(&sliding, MAX_LIE_ORDER)?;
         let mut signs = mode.signs();
         for (&j, &multiplier) in sliding.iter().zip(multipliers) {
             signs[j] = multiplier;
@@ -140,4 +142,75 @@ impl MotionSeries {
         }
         Germ::Zero
     }
+}
+
+/// The surfaces of `meeting` that the motion in `after` leaves, with the leading derivatives of h.
+pub(crate) fn surfaces_left(
+    at: &Point,
+    notes: &mut Notes,
+    after: &Mode,
+    meeting: &[usize],
+    multipliers: &[f64],
+) -> Result<Lefts, FieldError> {
+    let mut left: Lefts = smallvec![];
+    let leaving: Vec<usize> = meeting
+        .iter()
+        .copied()
+        .filter(|&j| after.entries()[j] != 0)
+        .collect();
+    if leaving.is_empty() {
+        return Ok(left);
+    }
+    let signs = after.signs();
+    let velocity = at.velocity(notes, after, multipliers)?;
+    // At the exit of a multiplier all forces may balance, and nothing of the motion itself tells how large they are.
+    let mut around: Vec<usize> = leaving.iter().copied().chain(after.sliding_set()).collect();
+    around.sort_unstable();
+    let sizes = component_sizes(at, notes, after, &around)?;
+    for j in leaving {
+        let (value, size) = at.rate_of(j, &signs, &velocity)?;
+        let place = around.binary_search(&j).unwrap_or(0);
+        let leading = if value.abs() > AT_SIDE * size.max(sizes[place]) {
+            Leading { order: 1, value }
+        } else if after.codimension() == 0 {
+            let side = after.entries()[j];
+            first_nonzero(at.system, j, side, 1, &at.place(&signs))?
+        } else {
+            // The normal component vanishes at the exit of a multiplier: its rate along the new motion.
+            let dt = at.moment(notes, &signs, &velocity)?;
+            let x = at.along(&velocity, dt);
+            let later = at.moved(at.t + dt, &x);
+            let velocity = later.velocity(notes, after, multipliers)?;
+            let (then, _) = later.rate_of(j, &signs, &velocity)?;
+            let (order, value) = (2, (then - value) / dt);
+            Leading { order, value }
+        };
+        left.push(Left::beside(j, leading));
+    }
+    Ok(left)
+}
+
+/// The largest component normal to each of these surfaces among the fields around them, or a bound of it where the field is
+/// affine in their signs; 0 where the fields are too many to be looked at, or not finite.
+fn component_sizes(
+    at: &Point,
+    notes: &mut Notes,
+    mode: &Mode,
+    surfaces: &[usize],
+) -> Result<Values, FieldError> {
+    let affine = at.system.affine_signs();
+    let parts = affine.and_then(|affine| Some((affine, affine.affine_parts(surfaces)?)));
+    if let Some((affine, mut parts)) = parts {
+        notes.n_field_evaluations += parts.evaluate(affine, &at.place(&mode.signs()))?;
+        let spread = |row| parts.normal().row(row).map(|(_, n)| n.abs()).sum::<f64>();
+        let rows = parts.nu().into_iter().enumerate();
+        return Ok(rows.map(|(row, nu)| nu.abs() + spread(row)).collect());
+    }
+    let groups = at.system.sign_groups(surfaces);
+    if groups.iter().any(|group| group.len() > MOST_MEETING) {
+        return Ok(smallvec![0.0; surfaces.len()]);
+    }
+    let fields = at.corners(notes, surfaces, mode)?.normal_fields();
+    let size = |i| fields.as_ref().map_or(0.0, |fields| fields.row_size(i));
+    Ok((0..surfaces.len()).map(size).collect())
 }

@@ -2,13 +2,13 @@
 
 use super::candidate::Viable;
 use super::choice::choose;
-use super::coinciding::Parallels;
 use super::consistency::{bends, with_those_that_jump};
 use super::first_order::hidden_limit;
 use super::leave_by_rule::slides_by_rule;
 use super::point::{Decided, Notes, Point};
 use super::rest::stay_if_nothing_leaves;
 use super::rule::{How, Meeting};
+use super::touching::Parallels;
 use super::viable::{survey, Survey};
 use crate::error::FieldError;
 use crate::error::Undecided;
@@ -29,8 +29,7 @@ pub(super) fn decide_if_entangled(
     let wider = with_those_that_jump(at, notes, meeting)?;
     if wider.is_none() && !bends(at, meeting)? {
         // To rounding, surfaces that touch are one, and the rules for surfaces that cross may still apply.
-        let parallels = Parallels::of(at, meeting.surfaces, meeting.mode)?;
-        if parallels.coincide || !parallels.touching.is_empty() {
+        if Parallels::of(at, meeting.surfaces, meeting.mode)?.are_any() {
             return Ok(decide_by_germs(at, notes, meeting)?.ok());
         }
         return Ok(None);
@@ -57,9 +56,6 @@ pub(super) fn decide_if_doubtful(
     }
     if around.has_silent(at) {
         return decide_undecided(at, notes, meeting, None).map(Some);
-    }
-    if meeting.surfaces.iter().any(|&j| at.system.sticks_at(j)) {
-        return Ok(None);
     }
     Ok(decide_by_germs(at, notes, meeting)?.ok())
 }

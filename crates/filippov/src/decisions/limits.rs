@@ -15,7 +15,7 @@ use crate::switching::admissible_within;
 use crate::system::dot;
 use crate::tolerances::{
     ACCUMULATION_AGREEMENT, FAST_SHRINKING, LONGEST_TURN, MOST_MEETING, NEAREST_ACCUMULATION,
-    SURFACE_NOISE, UNRESOLVED_FLIGHT,
+    ROUNDING, UNRESOLVED_FLIGHT,
 };
 
 /// The limit of accumulating switches or impacts.
@@ -189,7 +189,7 @@ pub(crate) fn limits_of_impacts(
     }
     let height = 0.5 * rate.rate * rate.rate / falls.value.abs();
     let size = at.system.surface_size(j, &at.place(&signs))?;
-    let is_unresolved = height <= UNRESOLVED_FLIGHT * SURFACE_NOISE * size;
+    let is_unresolved = height <= UNRESOLVED_FLIGHT * ROUNDING * size;
     let distance = rate.rate.abs() / dot(&row, &row).sqrt();
     if !is_unresolved && distance >= reach(at.scale, at.x) {
         return Ok([None, None]);
@@ -238,7 +238,7 @@ fn is_on_all(at: &Point, limit: &Limit) -> Result<bool, FieldError> {
         let Some(system) = system else { continue };
         system.surfaces(&place, &mut h)?;
         for &j in &limit.surfaces {
-            if h[j].abs() > SURFACE_NOISE * system.surface_size(j, &place)? {
+            if h[j].abs() > ROUNDING * system.surface_size(j, &place)? {
                 return Ok(false);
             }
         }

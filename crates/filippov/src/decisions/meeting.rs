@@ -1,20 +1,19 @@
 //! Where surfaces meet: what follows at an intersection, from the switching stage.
 
 use super::choice::{asked, choose};
-use super::departures::departures;
 use super::first_order::resolution;
+use super::germ::surfaces_left;
 use super::germs::{decide_by_germs, decide_undecided};
 use super::point::{Decided, Lefts, Next, Notes, Point};
 use super::rule::Meeting;
 use super::spiral::outward_leap;
 use super::surroundings::Surroundings;
 use crate::cube::{stable_roots_with_border, NormalFields};
-use crate::error::FieldError;
-use crate::error::Undecided;
+use crate::error::{FieldError, Undecided};
 use crate::mode::Mode;
-use crate::status::Stop;
+use crate::motion::ModeField;
+use crate::status::{Stop, Warning, WarningCode};
 use crate::switching::{Continuation, Resolution};
-use crate::tolerances::MOST_MEETING;
 
 /// Rule: the first-order data of the fields around the point, for the way in which the motion arrives.
 pub(super) fn resolve_first_order(
@@ -28,25 +27,6 @@ pub(super) fn resolve_first_order(
     };
     let resolution = resolution(at, notes, meeting, around)?;
     follow(at, notes, meeting, around, resolution)
-}
-
-/// Rule: more surfaces whose signs multiply one another than all of whose fields can be looked at.
-pub(super) fn too_many(
-    at: &Point,
-    _: &mut Notes,
-    meeting: &Meeting,
-) -> Result<Option<Decided>, FieldError> {
-    let groups = at.system.sign_groups(meeting.surfaces).into_iter();
-    let largest = groups
-        .filter(|group| group.len() > MOST_MEETING)
-        .max_by_key(Vec::len);
-    Ok(largest.map(|surfaces| {
-        Err(Stop::Intersection {
-            reason: Undecided::TooMany { n: surfaces.len() },
-            surfaces,
-            failing: Vec::new(),
-        })
-    }))
 }
 
 /// Turns a resolution into the motion that follows. Where first-order data do not decide, the first
@@ -114,7 +94,7 @@ fn follow(
     let left = match &leap {
         // What it leaves is known at the end of the leap.
         Some(_) => Lefts::new(),
-        None => departures(at, notes, &after, meeting, multipliers)?,
+        None => surfaces_left(at, notes, &after, meeting, multipliers)?,
     };
     let mut next = Next::new(after, left);
     let oscillates = next.mode == preferred && resolution.oscillates;
@@ -132,4 +112,32 @@ fn has_root(fields: &NormalFields, resolution: &Resolution, at: &Point) -> bool 
     slides_on_two.is_none_or(|mode| {
         !stable_roots_with_border(&fields.restrict(mode.entries()), at.patience).is_empty()
     })
+}
+
+/// Warns where the motion goes on at a root around which the regularised motion oscillates.
+pub(crate) fn warn_oscillation(at: &Point, notes: &mut Notes) {
+    let field = at.arrival.field.borrow();
+    let ModeField::Intersection(field) = &**field else {
+        return;
+    };
+    if !field.oscillates() {
+        return;
+    }
+    let names = field
+        .set()
+        .iter()
+        .map(|&j| at.system.surface_name(j) + " = 0");
+    let names: Vec<String> = names.collect();
+    notes.warnings.push(Warning {
+        t: at.t,
+        code: WarningCode::Oscillation,
+        surfaces: field.set().to_vec(),
+        text: format!(
+            "sliding at the intersection of {} is not stable for this scaling of the surfaces: the regularised \
+             motion goes around it, with another mean, or away from it; another kappa= may be stable",
+            names.join(", ")
+        ),
+        candidates: Vec::new(),
+        rule: "",
+    });
 }

@@ -2,7 +2,7 @@
 
 use super::contact::place_in_contact;
 use super::point::{Decided, Left, Notes, Point};
-use super::rule::Rule;
+use super::rule::{Decision, Rule};
 use super::settle::place_on;
 
 use crate::error::FieldError;
@@ -11,7 +11,7 @@ use crate::motion::{first_nonzero, Leading};
 use crate::motion::{ContactField, Projector, SmoothField};
 use crate::status::Stop;
 use crate::system::{dot, surfaces_that_matter, Action};
-use crate::tolerances::{AT_SIDE, FRICTION_IN_MAP, SLIPPED, SLOW, SURFACE_NOISE, TANGENTIAL_SPEED};
+use crate::tolerances::{AT_SIDE, ERRORS_OF_STEPS, FRICTION_IN_MAP, MOMENT, ROUNDING, SLOW};
 use smallvec::SmallVec;
 
 /// The sides that a point is on.
@@ -28,9 +28,9 @@ pub(crate) fn place(
     at: &Point,
     notes: &mut Notes,
     memory: Option<&Mode>,
-) -> Result<(Rule, Decided), FieldError> {
+) -> Result<Decision, FieldError> {
     let Some(Sides { mode, on_surface }) = sides(at, notes, memory)? else {
-        return Ok((Rule::Region, Err(Stop::NotFinite)));
+        return Ok(Decision::by(Rule::Region, Err(Stop::NotFinite)));
     };
     // What only a law of the system sees has the side that is known: its action has been done, or will be.
     let zeros = (0..on_surface.len()).filter(|&j| on_surface[j] && !at.triggers().is_internal(j));
@@ -41,10 +41,11 @@ pub(crate) fn place(
     if !smooth.is_empty() {
         return place_on_triggers(at, notes, mode, &smooth, meeting, memory);
     }
-    let (rule, decided) = place_on(at, notes, &mode, &meeting, memory)?;
+    let Decision { rule, decided } = place_on(at, notes, &mode, &meeting, memory)?;
     let is_new = |j: &usize| memory.is_none_or(|memory| memory.entries()[*j] == 0);
     let inactive = zeros.into_iter().filter(|j| !meeting.contains(j));
-    Ok((rule, take_sides(at, decided, inactive.filter(is_new))?))
+    let decided = take_sides(at, decided, inactive.filter(is_new))?;
+    Ok(Decision::by(rule, decided))
 }
 
 /// Gives surfaces that do not matter the sides that a motion in a region moves to.
@@ -95,7 +96,7 @@ pub(crate) fn sides(
             }
             let size = at.system.surface_size(j, &at.place(&signs))?;
             let residual = at.arrival.residuals.get(j).copied().unwrap_or(0.0);
-            let noise = (SURFACE_NOISE * size).max(2.0 * residual);
+            let noise = (ROUNDING * size).max(2.0 * residual);
             on_surface[j] = h[j].abs() <= noise;
             let known = memory.map_or(0, |memory| memory.entries()[j]);
             if let Some(side) = slipped_through(at, j, h[j], &signs, memory)? {
@@ -145,7 +146,7 @@ fn slipped_through(
     let mut gradient = vec![0.0; at.x.len()];
     at.system.gradient(j, &at.place(signs), &mut gradient)?;
     let tolerance = at.scale.along(&gradient, at.x);
-    let is_near = h.abs() <= SLIPPED * tolerance;
+    let is_near = h.abs() <= ERRORS_OF_STEPS * tolerance;
     Ok((is_near && leaves_point_alone(at, j, signs)?).then_some(side))
 }
 
@@ -162,7 +163,7 @@ pub(super) fn leaves_point_alone(at: &Point, j: usize, signs: &[f64]) -> Result<
     at.system
         .surfaces(&at.place_at(at.t, &moved, signs), &mut h[1])?;
     let size = at.system.surface_size(j, &at.place(signs))?;
-    Ok((h[0][j] - h[1][j]).abs() <= SURFACE_NOISE * size)
+    Ok((h[0][j] - h[1][j]).abs() <= ROUNDING * size)
 }
 
 /// The point moved back onto the triggers that it slipped through, if there are any.
@@ -197,12 +198,12 @@ fn place_on_triggers(
     smooth: &[usize],
     meeting: Vec<usize>,
     memory: Option<&Mode>,
-) -> Result<(Rule, Decided), FieldError> {
+) -> Result<Decision, FieldError> {
     let mut touched = Vec::with_capacity(smooth.len());
     let mut contacts = Vec::new();
     for &j in smooth {
         if at.patience.is_over() {
-            return Ok((Rule::Triggers, Err(Stop::Interrupted)));
+            return Ok(Decision::by(Rule::Triggers, Err(Stop::Interrupted)));
         }
         let side = at.triggers().side(j, memory);
         mode.set(j, side);
@@ -219,7 +220,7 @@ fn place_on_triggers(
                 }
                 Touching::WithFriction(action) => {
                     let stop = Stop::FrictionInMap { surface: j, action };
-                    return Ok((Rule::Contact, Err(stop)));
+                    return Ok(Decision::by(Rule::Contact, Err(stop)));
                 }
                 Touching::NoContact => {}
             }
@@ -235,11 +236,11 @@ fn place_on_triggers(
         }
         touched.push((j, side, leading));
     }
-    let (rule, decided) = if contacts.is_empty() {
+    let Decision { rule, decided } = if contacts.is_empty() {
         place_on(at, notes, &mode, &meeting, memory)?
     } else {
         let decided = place_in_contact(at, notes, mode, &contacts, &meeting)?;
-        (Rule::Contact, decided)
+        Decision::by(Rule::Contact, decided)
     };
     let decided = decided.map(|mut next| {
         let departing = touched.into_iter().filter(|(j, side, leading)| {
@@ -250,7 +251,7 @@ fn place_on_triggers(
         next.left.extend(departing);
         next
     });
-    Ok((rule, decided))
+    Ok(Decision::by(rule, decided))
 }
 
 /// Does the motion lead from this side through a surface that the point lies on? A body that is pressed on
@@ -293,9 +294,9 @@ fn leading_along(
     if !meeting.is_empty() {
         // A trial: what is not unique is warned of when it is decided.
         let mut trial = notes.of_trial();
-        let (_, decided) = place_on(at, &mut trial, mode, meeting, memory)?;
+        let decision = place_on(at, &mut trial, mode, meeting, memory)?;
         notes.add_costs(&trial);
-        if let Ok(next) = decided {
+        if let Ok(next) = decision.decided {
             multipliers = next.multipliers().to_vec();
             after = next.mode;
         }
@@ -394,9 +395,9 @@ impl<'p, 'm, 'a> Impact<'p, 'm, 'a> {
         let signs = mode.signs();
         let mut normal = vec![0.0; at.x.len()];
         at.system.rate_gradient(j, &at.place(&signs), &mut normal)?;
-        let slow = TANGENTIAL_SPEED * (1.0 + dot(at.x, at.x).sqrt());
+        let slow = MOMENT * (1.0 + dot(at.x, at.x).sqrt());
         let size = dot(&normal, &normal).sqrt();
-        let approach = -f64::from(mode.entries()[j]) * TANGENTIAL_SPEED * slow / size;
+        let approach = -f64::from(mode.entries()[j]) * MOMENT * slow / size;
         Ok(Impact {
             at,
             action,
@@ -465,7 +466,7 @@ pub(crate) fn triggers_reached(at: &Point, h: &[f64]) -> Result<Vec<usize>, Fiel
     for j in (0..h.len()).filter(|&j| at.actions.at_surface(j).is_some()) {
         let size = at.system.surface_size(j, &at.place(at.arrival.signs))?;
         let approaches = rates[j] * f64::from(at.arrival.mode.entries()[j]) < 0.0;
-        if approaches && h[j].abs() <= SURFACE_NOISE * size {
+        if approaches && h[j].abs() <= ROUNDING * size {
             reached.push(j);
         }
     }

@@ -10,7 +10,7 @@ use crate::mode::Mode;
 use crate::motion::{Leading, Projector};
 use crate::switching::Arrival as SurfaceArrival;
 use crate::system::PiecewiseSystem;
-use crate::tolerances::SURFACE_NOISE;
+use crate::tolerances::ROUNDING;
 
 /// What is left of a meeting.
 pub(super) struct Reduced<'a> {
@@ -65,7 +65,7 @@ impl<'a> Reduced<'a> {
                 if system.reduced(&[j]).is_none() {
                     continue;
                 }
-                let (value, noise) = (h[j], SURFACE_NOISE * next.surface_size(j, &place)?);
+                let (value, noise) = (h[j], ROUNDING * next.surface_size(j, &place)?);
                 if !value.is_finite() {
                     return Ok(None);
                 }

@@ -1,13 +1,13 @@
 //! Meetings of surfaces where the field is affine in their signs: one relay problem, whatever their number.
 
 use super::choice::choose;
-use super::coinciding::have_parallels;
 use super::consistency::{consistency, Consistency};
-use super::departures::departures;
+use super::germ::surfaces_left;
 use super::germs::decide_undecided;
 use super::point::{Decided, Left, Lefts, Next, Notes, Point};
 use super::rule::{How, Meeting};
 use super::surroundings::Surroundings;
+use super::touching::Parallels;
 use crate::cube::{solve_relay_within, stay_together, RelayProblem, RelaySolution, Uniqueness};
 use crate::error::{FieldError, Undecided};
 use crate::mode::Mode;
@@ -32,16 +32,14 @@ pub(super) fn decide_by_relay(
     let (mode, surfaces) = (meeting.mode, meeting.surfaces);
     let is_event = matches!(meeting.how, How::Event(_));
     // From a start on two surfaces the motion may also spiral outwards: their trees know. Between parallel ones it cannot.
-    if !is_event && surfaces.len() == 2 && !have_parallels(at, surfaces, mode)? {
+    if !is_event && surfaces.len() == 2 && !Parallels::of(at, surfaces, mode)?.are_any() {
         return Ok(None);
     }
-    let is_exit = |guard: &Guard| !guard.is_surface();
-    let is_late = is_event && at.arrival.functions().iter().any(is_exit);
-    let mut found = relay_at(at, notes, meeting, is_late)?;
+    let mut found = relay_at(at, notes, meeting, false)?;
     let is_open = |(found, _): &(RelaySolution, bool)| {
         !found.degenerate.is_empty() || !found.loops.is_empty()
     };
-    if is_event && !is_late && found.as_ref().is_some_and(is_open) {
+    if is_event && found.as_ref().is_some_and(is_open) {
         found = relay_at(at, notes, meeting, true)?;
     }
     let Some((mut found, may_be_tangent)) = found else {
@@ -93,19 +91,19 @@ pub(super) fn decide_by_relay(
     let signs = found.signs.iter().zip(&found.modes);
     let sliding = signs.filter(|(_, &mode)| mode == 0);
     let multipliers: Vec<f64> = sliding.map(|(&sign, _)| sign).collect();
-    let left = departures_caught(at, notes, &mut after, surfaces, &multipliers)?;
+    let left = surfaces_left_or_caught(at, notes, &mut after, surfaces, &multipliers)?;
     Ok(Some(Ok(Next::new(after, left))))
 }
 
 /// What the motion in `after` leaves; surfaces that it would pass to the wrong side are slid on instead.
-fn departures_caught(
+fn surfaces_left_or_caught(
     at: &Point,
     notes: &mut Notes,
     after: &mut Mode,
     meeting: &[usize],
     multipliers: &[f64],
 ) -> Result<Lefts, FieldError> {
-    let mut left = departures(at, notes, after, meeting, multipliers)?;
+    let mut left = surfaces_left(at, notes, after, meeting, multipliers)?;
     for _ in meeting {
         let is_wrong = |left: &&Left| {
             let entry = left.surface().map_or(0, |j| after.entries()[j]);
@@ -117,7 +115,7 @@ fn departures_caught(
             break;
         }
         wrong.iter().for_each(|&j| after.set(j, 0));
-        left = departures(at, notes, after, meeting, &[])?;
+        left = surfaces_left(at, notes, after, meeting, &[])?;
     }
     Ok(left)
 }

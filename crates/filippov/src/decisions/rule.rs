@@ -2,7 +2,7 @@
 
 use std::cell::OnceCell;
 
-use super::point::{Notes, Point};
+use super::point::{Decided, Notes, Point};
 use super::surroundings::Surroundings;
 use crate::error::FieldError;
 use crate::error::Undecided;
@@ -28,8 +28,6 @@ pub(crate) enum Rule {
     SlidingLaw,
     /// The relay problem of a field that is affine in the signs.
     Relay,
-    /// The signs of too many surfaces multiply one another.
-    TooMany,
     /// First-order data at an intersection: the attracting continuation, among several the limit of the hidden dynamics, and
     /// spirals. Germs decide where those do not.
     FirstOrder,
@@ -51,11 +49,22 @@ impl Rule {
             Rule::Germs => "germs",
             Rule::SlidingLaw => "sliding_rule",
             Rule::Relay => "relay",
-            Rule::TooMany => "too_many",
             Rule::FirstOrder => "first_order",
             Rule::Contact => "contact",
             Rule::Triggers => "triggers",
         }
+    }
+}
+
+/// The result of a decision; [`Notes`] have what was found out beside it.
+pub(crate) struct Decision {
+    pub rule: Rule,
+    pub decided: Decided,
+}
+
+impl Decision {
+    pub fn by(rule: Rule, decided: Decided) -> Self {
+        Decision { rule, decided }
     }
 }
 

@@ -1,16 +1,16 @@
 //! Surfaces vanish together: the rules in their order, of which the first that applies answers.
 
-use super::departures::departures;
 use super::event::{touch, touches};
+use super::germ::surfaces_left;
 use super::germs::{decide_if_doubtful, decide_if_entangled};
 use super::leave_by_rule::leave_by_rule;
 use super::limits::stay_at_limit;
-use super::meeting::{resolve_first_order, too_many};
+use super::meeting::resolve_first_order;
 use super::one_surface::one_surface;
 use super::point::{Decided, Lefts, Next, Notes, Point};
 use super::reduction::Reduced;
 use super::relay::decide_by_relay;
-use super::rule::{How, Meeting, Rule};
+use super::rule::{Decision, How, Meeting, Rule};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::status::Stop;
@@ -19,7 +19,7 @@ use crate::switching::Arrival as SurfaceArrival;
 /// A rule: the motion that follows, or why the run ends; `None` where the rule does not apply.
 type Apply = fn(&Point, &mut Notes, &Meeting) -> Result<Option<Decided>, FieldError>;
 
-const RULES: [(Rule, Apply); 9] = [
+const RULES: [(Rule, Apply); 8] = [
     (Rule::Region, region),
     (Rule::Touch, touch),
     (Rule::Limit, stay_at_limit),
@@ -28,7 +28,6 @@ const RULES: [(Rule, Apply); 9] = [
     (Rule::SlidingLaw, leave_by_rule),
     (Rule::Relay, decide_by_relay),
     (Rule::Germs, decide_if_doubtful),
-    (Rule::TooMany, too_many),
 ];
 
 /// The answer of the first rule that applies, with its name; first-order data where none of the list does. Surfaces of higher
@@ -37,7 +36,7 @@ pub(super) fn settle(
     at: &Point,
     notes: &mut Notes,
     meeting: &Meeting,
-) -> Result<(Rule, Decided), FieldError> {
+) -> Result<Decision, FieldError> {
     if at.system.reduced(meeting.surfaces).is_some() && !touches(at, meeting)? {
         if let Some(left) = Reduced::of(at, notes, meeting)? {
             let point = Point {
@@ -45,8 +44,8 @@ pub(super) fn settle(
                 x: &left.x,
                 ..*at
             };
-            let (rule, decided) = settle_by_rules(&point, notes, &left.meeting())?;
-            return Ok((rule, left.lifted(decided)));
+            let Decision { rule, decided, .. } = settle_by_rules(&point, notes, &left.meeting())?;
+            return Ok(Decision::by(rule, left.lifted(decided)));
         }
     }
     settle_by_rules(at, notes, meeting)
@@ -56,23 +55,24 @@ fn settle_by_rules(
     at: &Point,
     notes: &mut Notes,
     meeting: &Meeting,
-) -> Result<(Rule, Decided), FieldError> {
+) -> Result<Decision, FieldError> {
     for (rule, apply) in RULES {
         if let Some(decided) = apply(at, notes, meeting)? {
-            let is_kinetic = matches!(rule, Rule::SlidingLaw | Rule::Relay | Rule::TooMany);
-            return Ok(match is_kinetic {
-                true => (rule, with_kinetic_friction(at, notes, decided, meeting)?),
-                false => (rule, decided),
-            });
+            let is_kinetic = matches!(rule, Rule::SlidingLaw | Rule::Relay);
+            let decided = match is_kinetic {
+                true => with_kinetic_friction(at, notes, decided, meeting)?,
+                false => decided,
+            };
+            return Ok(Decision::by(rule, decided));
         }
     }
     // A rule of the list does not apply, or was interrupted. Of one or two surfaces none takes long.
     if meeting.surfaces.len() > 2 && at.patience.is_over() {
-        return Ok((Rule::FirstOrder, Err(Stop::Interrupted)));
+        return Ok(Decision::by(Rule::FirstOrder, Err(Stop::Interrupted)));
     }
     let decided = resolve_first_order(at, notes, meeting)?;
     let decided = with_kinetic_friction(at, notes, decided, meeting)?;
-    Ok((Rule::FirstOrder, decided))
+    Ok(Decision::by(Rule::FirstOrder, decided))
 }
 
 /// Rule: the region that the point is in.
@@ -88,7 +88,7 @@ pub(super) fn place_on(
     mode: &Mode,
     surfaces: &[usize],
     memory: Option<&Mode>,
-) -> Result<(Rule, Decided), FieldError> {
+) -> Result<Decision, FieldError> {
     // If one surface has several continuations, prefer the one on the side of the previous mode.
     let entry = match (surfaces, memory) {
         (&[j], Some(memory)) => memory.entries()[j],
@@ -116,9 +116,9 @@ fn with_kinetic_friction(
     if slipping.is_empty() || others.is_empty() {
         return Ok(decided);
     }
-    match place_on(at, notes, &next.mode, &others, Some(&next.mode))? {
-        (_, Ok(again)) if again.mode != next.mode => {
-            let left = departures(at, notes, &again.mode, meeting.surfaces, &[])?;
+    match place_on(at, notes, &next.mode, &others, Some(&next.mode))?.decided {
+        Ok(again) if again.mode != next.mode => {
+            let left = surfaces_left(at, notes, &again.mode, meeting.surfaces, &[])?;
             Ok(Ok(Next::new(again.mode, left)))
         }
         _ => Ok(decided),

@@ -1,6 +1,6 @@
 //! Outward spirals: infinitely many laps from an intersection, started at a small distance.
 
-use super::departures::departures;
+use super::germ::surfaces_left;
 use super::point::{Leap, Lefts, Notes, Point};
 use super::surroundings::Surroundings;
 use crate::cube::Lap;
@@ -64,6 +64,6 @@ pub(crate) fn landing(
     let signs = leap.region.signs();
     let mut projector = Projector::new(x.len(), at.system.n_surfaces());
     projector.project(at.system, leap.border, t, &mut x, at.setting(&signs))?;
-    let left = departures(&at.moved(t, &x), notes, &leap.region, &[leap.border], &[])?;
+    let left = surfaces_left(&at.moved(t, &x), notes, &leap.region, &[leap.border], &[])?;
     Ok(Landing { t, x, left })
 }

@@ -6,7 +6,7 @@ use crate::error::FieldError;
 use crate::error::Undecided;
 use crate::mode::Mode;
 use crate::motion::MeetingFields;
-use crate::tolerances::{DOUBTFUL, TANGENT};
+use crate::tolerances::{DOUBTFUL, MOST_MEETING, TANGENT};
 
 /// The fields around the surfaces of a meeting.
 pub(super) struct Surroundings {
@@ -26,6 +26,11 @@ impl Surroundings {
         surfaces: &[usize],
         mode: &Mode,
     ) -> Result<Result<Self, Undecided>, FieldError> {
+        let groups = at.system.sign_groups(surfaces);
+        let largest = groups.iter().map(Vec::len).max().unwrap_or(0);
+        if largest > MOST_MEETING {
+            return Ok(Err(Undecided::TooMany { n: largest }));
+        }
         let corners = at.corners(notes, surfaces, mode)?;
         let fields = match corners.normal_fields() {
             Ok(fields) => fields,

@@ -1,18 +1,17 @@
 //! Which modes can follow at a point: those that are consistent with their own signs, and all of whose guards begin positive.
 
 use super::candidate::{Candidate, Verdict, Viable};
-use super::coinciding::{parting, Parallels, Touch};
 use super::consistency::{consistency, Consistency};
-use super::look_ahead::{try_mode, Trial};
 use super::point::{Cause, Lefts, Next, Notes, Point};
 use super::rule::Meeting;
 use super::surroundings::Surroundings;
+use super::touching::{together, Parallels, Together, Touch};
+use super::trial::{try_mode, Trial};
 
-use crate::cube::{roots_in_cube, NormalFields};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::Guard;
-use crate::tolerances::{DOUBTFUL, MOST_MEETING, ONE_DIRECTION, SURFACE_NOISE};
+use crate::tolerances::{MOST_MEETING, ROUNDING};
 
 /// All modes at a point.
 #[derive(Clone, Debug, Default)]
@@ -133,16 +132,14 @@ pub(super) fn survey(
             Verdict::Viable(viable) => found.viable.push(viable),
             Verdict::Fails(guard) => found.failing.push((mode, guard)),
             Verdict::Untold => found.open.push(mode),
-            Verdict::Open(next) => {
-                match try_mode(at, notes, &next, meeting.surfaces, SURFACE_NOISE)? {
-                    Trial::Leaves(left) => {
-                        found.viable.push(Viable::strictly(Next { left, ..next }));
-                    }
-                    Trial::Ends => found.failing.push((mode.clone(), candidate.guard())),
-                    Trial::WithinRounding if is_beside => {}
-                    Trial::WithinRounding => found.open.push(mode),
+            Verdict::Open(next) => match try_mode(at, notes, &next, meeting.surfaces, ROUNDING)? {
+                Trial::Leaves(left) => {
+                    found.viable.push(Viable::strictly(Next { left, ..next }));
                 }
-            }
+                Trial::Ends => found.failing.push((mode.clone(), candidate.guard())),
+                Trial::WithinRounding if is_beside => {}
+                Trial::WithinRounding => found.open.push(mode),
+            },
         }
     }
     Ok(Some(found))
@@ -152,63 +149,4 @@ pub(super) fn survey(
 fn has_ended(at: &Point, meeting: &Meeting, mode: &Mode) -> bool {
     let is_touch = matches!(at.arrival.cause, Cause::Event { touch: true, .. });
     meeting.is_exit() && !is_touch && mode == meeting.mode && !at.arrival.functions().is_empty()
-}
-
-/// Do multipliers hold a motion on two surfaces that touch?
-enum Together {
-    /// Whatever they are, it parts the surfaces.
-    Never,
-    Perhaps,
-    /// They do, and within rounding of the point the motion has no field: it divides by the power of the second surface.
-    Lost,
-    /// They solve the equations with these normal components: those of the second surface are divided by their power.
-    By(NormalFields),
-}
-
-/// Sliding on two surfaces that touch: to first order they are one, and the equation of the second is that of what they have
-/// in common beside the point.
-fn together(
-    at: &Point,
-    notes: &mut Notes,
-    candidate: &Candidate,
-    [i, k]: [usize; 2],
-) -> Result<Together, FieldError> {
-    let Candidate {
-        meeting,
-        entries,
-        mode,
-        ..
-    } = *candidate;
-    let pair = [i, k].map(|i| meeting.surfaces[i]);
-    let Some((normal, is_odd)) = parting(at, pair, mode)? else {
-        return Ok(Together::Perhaps);
-    };
-    let mut corners = at.corners(notes, meeting.surfaces, mode)?;
-    corners.set_normal(k, &normal);
-    let Ok(fields) = corners.normal_fields() else {
-        return Ok(Together::Perhaps);
-    };
-    let end = 1.0 + ONE_DIRECTION;
-    let face = fields.restrict(entries.entries());
-    let face = (0..face.m()).fold(face, |face, axis| face.on_range(axis, [-end, end]));
-    let noise = DOUBTFUL * face.size();
-    let ranges: Vec<[f64; 2]> = (0..face.m()).map(|row| face.row_range(row)).collect();
-    if ranges
-        .iter()
-        .any(|[low, high]| *low > noise || *high < -noise)
-    {
-        return Ok(Together::Never);
-    }
-    if ranges.iter().any(|[low, high]| high - low <= noise) {
-        return Ok(Together::Perhaps);
-    }
-    let roots = roots_in_cube(&face);
-    let has_field = |velocity: Vec<f64>| velocity.iter().all(|v| v.is_finite());
-    Ok(match roots.complete && roots.points.is_empty() {
-        true => Together::Never,
-        // After an even power no region lies between the surfaces on one side.
-        false if !is_odd => Together::Perhaps,
-        false if !has_field(at.velocity(notes, mode, &[])?) => Together::Lost,
-        false => Together::By(fields),
-    })
 }

@@ -70,32 +70,44 @@ pub(super) fn first_zero_between(
     noise: f64,
     halvings: u32,
 ) -> FirstZero {
-    if lo >= reach || b.iter().all(|&b| b > noise) {
+    if lo >= reach {
         return FirstZero::Nowhere;
     }
-    if let Some(found) = only_change(b, (lo, hi), noise) {
+    let positive = b.iter().take_while(|&&b| b > noise).count();
+    if positive == b.len() {
+        return FirstZero::Nowhere;
+    }
+    if positive == 0 {
+        return FirstZero::Unknown;
+    }
+    if let Some(found) = only_change(b, positive, (lo, hi), noise) {
         return found;
     }
-    if halvings == 0 || b[0] <= noise {
+    if halvings == 0 {
         return FirstZero::Unknown;
     }
     let mut first = NO_TERMS;
     let first = &mut first[..b.len()];
-    halve(b, first);
+    first.copy_from_slice(b);
+    halve(first);
     let middle = 0.5 * (lo + hi);
     match first_zero_between(first, (lo, middle), reach, noise, halvings - 1) {
-        FirstZero::Nowhere => first_zero_between(b, (middle, hi), reach, noise, halvings - 1),
+        FirstZero::Nowhere => {
+            b.reverse();
+            halve(b);
+            b.reverse();
+            first_zero_between(b, (middle, hi), reach, noise, halvings - 1)
+        }
         found => found,
     }
 }
 
-/// The zero of a polynomial with Bernstein coefficients `b` from `lo` to `hi`, if they change their sign once. One
-/// coefficient within `noise` of zero may be among those that do.
-fn only_change(b: &[f64], (lo, hi): (f64, f64), noise: f64) -> Option<FirstZero> {
+/// The zero of a polynomial with Bernstein coefficients `b` from `lo` to `hi`, the first `positive` of which are, if they change
+/// their sign once. One coefficient within `noise` of zero may be among those that do.
+fn only_change(b: &[f64], positive: usize, (lo, hi): (f64, f64), noise: f64) -> Option<FirstZero> {
     let degree = b.len() - 1;
-    let positive = b.iter().take_while(|&&b| b > noise).count();
     let negative = b.iter().rev().take_while(|&&b| b < -noise).count();
-    if positive == 0 || negative == 0 || positive + negative < degree {
+    if negative == 0 || positive + negative < degree {
         return None;
     }
     // Where the polygon of the coefficients falls through zero.
@@ -105,20 +117,12 @@ fn only_change(b: &[f64], (lo, hi): (f64, f64), noise: f64) -> Option<FirstZero>
     Some(FirstZero::Between { lo, hi, guess })
 }
 
-/// Makes Bernstein coefficients those of the second half, and `first` those of the first one: de Casteljau's means of
+/// Makes Bernstein coefficients those of the first half, and reversed ones those of the second: de Casteljau's means of
 /// neighbours, halved at the end.
-fn halve(b: &mut [f64], first: &mut [f64]) {
+fn halve(b: &mut [f64]) {
+    sum_binomially(b);
     let mut scale = 1.0;
-    for (end, first) in (1..=b.len()).rev().zip(first) {
-        *first = scale * b[0];
-        scale *= 0.5;
-        let row = &mut b[..end];
-        for i in 1..row.len() {
-            row[i - 1] += row[i];
-        }
-    }
-    scale = 1.0;
-    for b in b.iter_mut().rev() {
+    for b in b {
         *b *= scale;
         scale *= 0.5;
     }

@@ -1,19 +1,19 @@
 //! The cheap filter: can a step contain a zero at all?
 
-use crate::tolerances::{CUBIC_REMAINDER, STAGE_SPREAD};
+use crate::tolerances::{REMAINDER, STAGE_SPREAD};
 
 /// May a function with these end values and end slopes (times the step) vanish inside of the step?
 ///
 /// The cubic Hermite polynomial has Bernstein coefficients
 /// g0, g0 + g0'/3, g1 - g1'/3, g1; it is bounded by them, and its distance to the function is taken
-/// as at most a fixed part of their spread ([`CUBIC_REMAINDER`]). `g0 > 0` is the side of the mode.
+/// as at most a fixed part of their spread ([`REMAINDER`]). `g0 > 0` is the side of the mode.
 #[inline]
 pub fn may_vanish(g0: f64, slope0: f64, g1: f64, slope1: f64) -> bool {
     let b1 = g0 + slope0 / 3.0;
     let b2 = g1 - slope1 / 3.0;
     let low = g0.min(g1).min(b1).min(b2);
     let high = g0.max(g1).max(b1).max(b2);
-    let remainder = CUBIC_REMAINDER * (high - low);
+    let remainder = REMAINDER * (high - low);
     // Written so that a NaN asks for the search.
     let excluded = low > remainder && (g0 + slope0 + g1 + slope1).is_finite();
     !(excluded || stays_positive([g0, b1, b2, g1], remainder))
@@ -80,7 +80,6 @@ pub fn may_vanish_deflated(leading: f64, order: i32, g1: f64, slope1: f64) -> bo
     let middle = g1 - 0.5 * (slope1 - f64::from(order) * g1);
     let low = leading.min(g1).min(middle);
     let high = leading.max(g1).max(middle);
-    let excluded =
-        low > 2.0 * CUBIC_REMAINDER * (high - low) && (leading + g1 + slope1).is_finite();
+    let excluded = low > 2.0 * REMAINDER * (high - low) && (leading + g1 + slope1).is_finite();
     !excluded
 }

@@ -5,7 +5,7 @@ use crate::error::FieldError;
 pub use crate::locate::{is_steep, Bracket, Sampled};
 use crate::tolerances::{
     CANCELLED, FLAT_PIECE, HUGGING, MAX_DEPTH, MOST_OPEN, MOST_SAMPLES, MOST_UNPROVED, PROOF_DEPTH,
-    QUARTIC_REMAINDER,
+    REMAINDER,
 };
 
 /// The first zero, as far as it is known before it is refined.
@@ -196,8 +196,7 @@ impl Search<'_, '_> {
             }
             _ => false,
         };
-        let remainder =
-            QUARTIC_REMAINDER * (v[0] - 4.0 * v[1] + 6.0 * v[2] - 4.0 * v[3] + v[4]).abs();
+        let remainder = REMAINDER * (v[0] - 4.0 * v[1] + 6.0 * v[2] - 4.0 * v[3] + v[4]).abs();
         let lowest = coefficients.iter().copied().fold(f64::INFINITY, f64::min);
         if believed && lowest > remainder && self.agrees(a, b, &coefficients, lowest)? {
             return Ok(None);

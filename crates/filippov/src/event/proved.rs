@@ -4,7 +4,7 @@ use super::certificate::{Bound, Bounds, Verdict};
 use super::isolate::{Bracket, Sampled};
 use super::series::Near;
 use crate::error::FieldError;
-use crate::tolerances::PROVED_DEPTH;
+use crate::tolerances::BOUNDS_DEPTH;
 
 /// What bounds prove about the first zero of a function.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,7 +34,7 @@ pub fn first_zero_proved(
     if !is_decided {
         return Ok(Proved::Unknown);
     }
-    let proved = proved(g, bounds, piece, ends, noise, PROVED_DEPTH)?;
+    let proved = proved(g, bounds, piece, ends, noise, BOUNDS_DEPTH)?;
     Ok(match (proved, near) {
         (Proved::Single(bracket), Some(Near { theta, slope, .. }))
             if bracket.lo < theta && theta < bracket.hi && slope < 0.0 =>

@@ -3,7 +3,7 @@
 use filippov_expr::{Enclosure, Interval, Motion};
 
 use crate::stepper::Interpolant;
-use crate::tolerances::{EPS, MARGIN_SLOPE};
+use crate::tolerances::{EPS, PROBED};
 
 /// The states between two points of a step, as bounds of the continuous extension and of its rate.
 pub struct Tube<'a> {
@@ -45,7 +45,7 @@ impl Motion for Tube<'_> {
         if let Some(value) = self.interpolant.constant(index) {
             return Enclosure {
                 value: Interval::around(value, margin),
-                rate: Interval::around(0.0, MARGIN_SLOPE * margin).scaled(1.0 / dt),
+                rate: Interval::around(0.0, PROBED * margin).scaled(1.0 / dt),
             };
         }
         let d = self.interpolant.expanded(index, self.middle);
@@ -63,7 +63,7 @@ impl Motion for Tube<'_> {
             value: Interval::around(d[0], spread + 8.0 * EPS * size + margin),
             rate: Interval::around(
                 d.get(1).copied().unwrap_or(0.0),
-                slope_spread + 16.0 * EPS * size + MARGIN_SLOPE * margin,
+                slope_spread + 16.0 * EPS * size + PROBED * margin,
             )
             .scaled(1.0 / dt),
         }

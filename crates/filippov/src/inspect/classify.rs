@@ -19,7 +19,7 @@ use crate::switching::{decide as decide_at_surface, Arrival as SurfaceArrival};
 use crate::system::eval_on_side;
 use crate::system::Actions;
 use crate::system::{dot, surfaces_that_matter, PiecewiseSystem, Place, Setting};
-use crate::tolerances::{AT_SIDE, MOST_MEETING, SURFACE_NOISE};
+use crate::tolerances::{AT_SIDE, MOST_MEETING, ROUNDING};
 
 /// The kinds of point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -258,7 +258,7 @@ pub fn contradicts(
     system.surfaces(&place, &mut h)?;
     let residuals = residuals_within(system, &place, how.reach)?;
     for (j, &entry) in mode.entries().iter().enumerate() {
-        let noise = SURFACE_NOISE * system.surface_size(j, &place)?;
+        let noise = ROUNDING * system.surface_size(j, &place)?;
         let reach = residuals.get(j).map_or(0.0, |residual| 2.0 * residual);
         let is_beyond = match entry {
             0 => h[j].abs() > noise.max(reach),

@@ -15,19 +15,19 @@
 //! `docs/theory/order_of_outcomes.md` has all of it, with the tests.
 
 use crate::action::Timetable;
-use crate::decisions::{differs_between_sides, has_left_resting, root_ends, Cause};
+use crate::decisions::{differs_between_sides, has_left_zero_surface, lost_guards, Cause};
 use crate::error::{Error, FieldError};
 use crate::event::search::{Detector, StepSearch};
-use crate::event::{Event, Found, UserEvents, TICK};
+use crate::event::{Event, Found};
 use crate::integrate::problem::{check, Problem};
 use crate::integrate::progress::Progress;
 use crate::integrate::watch::Watch;
 use crate::mode::Mode;
-use crate::motion::{Guard, Run, SmoothField};
+use crate::motion::{Run, Slacks, SmoothField};
 use crate::record::{Observed, Observer, Recorder, Solution};
 use crate::status::{Stop, Warning};
 use crate::stepper::{Attempt, StepControl, Steppers, Stiff};
-use crate::tolerances::{EPS, SHORTEST_STEP, SHORTEST_STEP_AT_ZERO};
+use crate::tolerances::{EPS, ROUNDING};
 
 /// An integration in progress.
 pub struct Integrator<'a> {
@@ -45,7 +45,7 @@ pub struct Integrator<'a> {
     pub(super) n_choices: usize,
     pub(super) progress: Progress,
     /// Guards of this mode whose multipliers were held at their ends, with what they may go beyond.
-    pub(super) slacks: Vec<(Guard, f64)>,
+    pub(super) slacks: Slacks,
     pub(super) watch: Watch<'a>,
 }
 
@@ -77,7 +77,7 @@ impl<'a> Integrator<'a> {
             warnings: Vec::new(),
             n_choices: 0,
             progress: Progress::default(),
-            slacks: Vec::new(),
+            slacks: Slacks::default(),
             watch: Watch::new(options),
         })
     }
@@ -206,9 +206,9 @@ impl<'a> Integrator<'a> {
         let dt = self
             .control
             .next(&self.run.motion, room, self.run.options.max_step);
-        let shortest = (SHORTEST_STEP * self.run.t.abs()).max(SHORTEST_STEP_AT_ZERO);
+        let shortest = (ROUNDING * self.run.t.abs()).max(f64::MIN_POSITIVE);
         if dt < shortest && dt < remaining {
-            let lost = self.ask(Cause::Start, root_ends::lost_functions)?;
+            let lost = self.ask(Cause::Start, lost_guards)?;
             if let Some(lost) = lost {
                 self.control.forget_proposal();
                 return self.switch(&Found::here(lost));
@@ -231,12 +231,12 @@ impl<'a> Integrator<'a> {
         let dt = self.stepper.interpolant().dt;
         match attempt {
             Attempt::NotFinite => {
-                self.count_rejection(sliding);
+                self.run.stats.reject(sliding);
                 self.control.shorten_to_surface(dt, &self.run.motion);
                 Ok(None)
             }
             Attempt::Error(error) if error > 1.0 => {
-                self.count_rejection(sliding);
+                self.run.stats.reject(sliding);
                 self.control.reject(&self.stepper, dt, error);
                 Ok(None)
             }
@@ -257,7 +257,7 @@ impl<'a> Integrator<'a> {
             Event::None => None,
             Event::At(found) => Some(found),
             Event::Shorten(dt) => {
-                self.count_rejection(sliding);
+                self.run.stats.reject(sliding);
                 self.control.shorten(dt);
                 return Ok(None);
             }
@@ -270,10 +270,10 @@ impl<'a> Integrator<'a> {
             }
             if let Some(stop) = differs_between_sides(self.run.system, (t, &end), &self.run.motion)?
             {
-                if dt < SHORTEST_STEP * self.run.t.abs().max(1.0) / EPS.sqrt() {
+                if dt < ROUNDING * self.run.t.abs().max(1.0) / EPS.sqrt() {
                     return Ok(Some(stop));
                 }
-                self.count_rejection(sliding);
+                self.run.stats.reject(sliding);
                 self.control.shorten(0.5 * dt);
                 return Ok(None);
             }
@@ -293,10 +293,11 @@ impl<'a> Integrator<'a> {
         };
         // A switch at the end of the span, or at a known time, is there, and not a rounding before.
         let last = self.horizon;
-        let is_last = t_stop < last && last - t_stop < SHORTEST_STEP * last.abs();
+        let is_last = t_stop < last && last - t_stop < ROUNDING * last.abs();
         let t_stop = if is_last { last } else { t_stop };
-        let Some(zeros) = self.find_user_zeros(theta, t_stop)? else {
-            self.count_rejection(sliding);
+        let (mut search, recorder) = self.step_search();
+        let Some(zeros) = recorder.find_user_zeros(&mut search, theta, t_stop)? else {
+            self.run.stats.reject(sliding);
             self.control.shorten(0.5 * dt);
             return Ok(None);
         };
@@ -319,7 +320,8 @@ impl<'a> Integrator<'a> {
         }
         self.control.note_length(dt);
         let chatter = self.control.look_for_chatter(&self.stepper, dt);
-        if let Some(stop) = self.record_user_zeros(zeros, theta, t_stop)? {
+        let (mut search, recorder) = self.step_search();
+        if let Some(stop) = recorder.record_user_zeros(&mut search, zeros, (theta, t_stop))? {
             return Ok(Some(stop));
         }
         self.control.note_edge(longest, dt);
@@ -349,7 +351,9 @@ impl<'a> Integrator<'a> {
             if self.detector.accept(&mut self.run, dt) {
                 self.run.motion.note_departure();
             }
-            if !self.run.motion.resting.is_empty() && self.ask(Cause::Start, has_left_resting)? {
+            if !self.run.motion.resting.is_empty()
+                && self.ask(Cause::Start, has_left_zero_surface)?
+            {
                 return self.go_on_from_here(&[]);
             }
             if let Some(j) = zero {
@@ -373,9 +377,9 @@ impl<'a> Integrator<'a> {
         self.switch(&event)
     }
 
-    /// The search of the step that was computed; and the user's functions.
+    /// The search of the step that was computed; and the record of what it finds.
     #[inline(always)]
-    pub(super) fn step_search(&mut self) -> (StepSearch<'_, 'a>, &UserEvents<'a>) {
+    pub(super) fn step_search(&mut self) -> (StepSearch<'_, 'a>, &mut Recorder<'a>) {
         let search = StepSearch {
             run: &mut self.run,
             stepper: &mut self.stepper,
@@ -384,12 +388,7 @@ impl<'a> Integrator<'a> {
             horizon: self.horizon,
             one_sided: self.control.is_one_sided(),
         };
-        (search, &self.recorder.user_events)
-    }
-
-    fn count_rejection(&mut self, sliding: bool) {
-        self.run.stats.n_rejected += 1;
-        self.run.stats.n_rejected_sliding += u64::from(sliding);
+        (search, &mut self.recorder)
     }
 
     /// Closes the books.
@@ -407,73 +406,5 @@ impl<'a> Integrator<'a> {
             self.run.stats,
             self.warnings,
         )
-    }
-
-    /// The zeros (theta, index) of the user's functions up to `theta`, in order; `None` if a shorter step
-    /// is needed to tell them apart.
-    pub(super) fn find_user_zeros(
-        &mut self,
-        theta: f64,
-        t_stop: f64,
-    ) -> Result<Option<Vec<(f64, usize)>>, FieldError> {
-        let visits = self.recorder.visits.as_ref();
-        let has_ticks = visits.is_some_and(|visits| visits.has_tick_up_to(t_stop));
-        if self.recorder.user_events.events.is_empty() && !has_ticks {
-            return Ok(Some(Vec::new()));
-        }
-        let (mut search, events) = self.step_search();
-        let mut found = search.user_zeros(events, theta, has_ticks)?;
-        if let Some(zeros) = &mut found {
-            zeros.extend(
-                self.recorder
-                    .ticks(self.stepper.interpolant(), theta, t_stop),
-            );
-            zeros.sort_by(|a, b| a.0.total_cmp(&b.0));
-        }
-        Ok(found)
-    }
-
-    /// Records zeros; at one that ends the run, accepts the step up to there and returns why.
-    pub(super) fn record_user_zeros(
-        &mut self,
-        zeros: Vec<(f64, usize)>,
-        theta: f64,
-        t_stop: f64,
-    ) -> Result<Option<Stop>, FieldError> {
-        if self.recorder.user_events.events.is_empty() && zeros.is_empty() {
-            return Ok(None);
-        }
-        let (t0, dt) = (self.stepper.interpolant().t0, self.stepper.interpolant().dt);
-        for (at, index) in zeros {
-            let t = match &mut self.recorder.visits {
-                Some(visits) if index == TICK => {
-                    let tick = visits.next_tick().unwrap_or(t_stop);
-                    visits.pass_tick();
-                    tick.min(t_stop)
-                }
-                _ if at == theta => t_stop,
-                _ => (t0 + at * dt).min(t_stop),
-            };
-            let mut y = vec![0.0; self.run.x.len()];
-            self.stepper.interpolant().at(at, &mut y);
-            self.run.motion.project(t, &mut y)?;
-            if let Some(stop) = self.recorder.zero(index, t, &y) {
-                let (stepper, motion) = (&mut self.stepper, &mut self.run.motion);
-                self.recorder.sample_step(t, &self.run.x, stepper, motion)?;
-                self.recorder.step(self.stepper.interpolant(), t, &y);
-                self.run.t = t;
-                self.run.x = y;
-                return Ok(Some(stop));
-            }
-        }
-        self.recorder.user_events.at_start = false;
-        self.recorder.user_events.accept_sides();
-        for k in 0..self.recorder.user_events.events.len() {
-            self.recorder.user_events.before[k] = self.recorder.user_events.left[k];
-            let function = self.recorder.user_events.events[k].function;
-            let (mut search, _) = self.step_search();
-            self.recorder.user_events.left[k] = search.user_value(function, theta)?;
-        }
-        Ok(None)
     }
 }

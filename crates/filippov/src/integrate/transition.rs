@@ -7,18 +7,18 @@ use crate::decisions::limits::{
 };
 use crate::decisions::{
     add_vanishing_surfaces, decide, differs_between_sides, end_of_sliding, goes_through, landing,
-    located_surfaces, refusal, resting, root_ends, sides, triggers_reached, warn_against_direction,
-    warn_oscillation, warn_unknown_side, warn_zero_surface, Cause, Decision, EndOfSliding, Leap,
-    Left, Lefts, Next, Notes, Point, Reached, Rule, Scene, Sides, Values,
+    located_surfaces, refusal, sides, triggers_reached, warn_against_direction, warn_oscillation,
+    warn_unknown_side, warn_zero_surface, zero_surfaces, Cause, Decision, EndOfSliding, Leap, Left,
+    Lefts, Next, Notes, Point, Reached, Rule, Scene, Sides, Values,
 };
 use crate::error::FieldError;
 use crate::event::{Found, Multiple};
 use crate::integrate::integrator::Integrator;
 use crate::mode::Mode;
-use crate::motion::{Guard, Leading, ModeField, Projector, Seen, SlidingSet, SmoothField};
+use crate::motion::{Guard, Leading, ModeField, Projector, RootEnd, Seen, SlidingSet, SmoothField};
 use crate::patience::Patience;
 use crate::record::decide_and_record;
-use crate::status::{is_named, Stop, WarningCode};
+use crate::status::{is_named, Stop, Warning, WarningCode};
 use crate::switch::{Kind, Switch};
 use crate::system::eval_on_side;
 use crate::tolerances::{DOUBTFUL, MOST_SWITCHES_AT_ONE_TIME};
@@ -45,21 +45,25 @@ impl<'a> Integrator<'a> {
             ..Notes::default()
         };
         let answer = scene.ask(cause, &mut notes, question);
-        self.take_notes(notes);
+        self.take_notes(&mut notes);
         answer
     }
 
     /// Counts what questions cost, and keeps their warnings.
     #[inline(always)]
-    pub(super) fn take_notes(&mut self, notes: Notes) {
+    pub(super) fn take_notes(&mut self, notes: &mut Notes) {
         self.run.stats.n_field_evaluations += notes.n_field_evaluations;
         self.run.stats.n_surface_evaluations += notes.n_surface_evaluations;
         self.n_choices = notes.n_choices;
         // What an interrupted decision warns of need not hold.
-        if notes.warnings.is_empty() || self.watch.has_ended() {
-            return;
+        if !notes.warnings.is_empty() && !self.watch.has_ended() {
+            self.keep_warnings(std::mem::take(&mut notes.warnings));
         }
-        for warning in notes.warnings {
+    }
+
+    #[cold]
+    fn keep_warnings(&mut self, warnings: Vec<Warning>) {
+        for warning in warnings {
             let is_known = warning.code == WarningCode::ZeroSurface
                 && is_named(&self.warnings, warning.surfaces[0]);
             if !is_known {
@@ -79,17 +83,17 @@ impl<'a> Integrator<'a> {
             let kept = self.ask(cause, |at, notes| decide_and_record(at, notes, reached));
             let (decision, record) = kept?;
             // An interrupted decision depends on the computing time it was given: it is not recorded.
-            if self.watch.stop().is_none() {
+            if !self.watch.has_ended() {
                 self.recorder.decisions.push(record);
             }
-            decision
+            Ok(decision)
         } else {
-            self.ask(cause, |at, notes| decide(at, notes, reached))?
+            self.ask(cause, |at, notes| decide(at, notes, reached))
         };
-        if self.watch.has_ended() {
-            decision.decided = self.watch.stop().map_or(decision.decided, Err);
+        if let (Ok(decision), Some(stop)) = (&mut decision, self.watch.stop()) {
+            decision.decided = Err(stop);
         }
-        Ok(decision)
+        decision
     }
 
     /// Decides what follows the event and starts it.
@@ -177,14 +181,14 @@ impl<'a> Integrator<'a> {
                 // Stability is lost, and the motion stays all the same: it oscillates around the root from now on.
                 let sliding = self.run.motion.sliding().iter().copied();
                 let slides_on = next.mode.sliding_set().eq(sliding);
-                let field = &self.run.motion.field;
-                if slides_on && root_ends::loses_stability(field, &event.guards) {
+                let is_unstable = event.guards.contains(&Guard::Root(RootEnd::Stability));
+                if slides_on && is_unstable && next.mode.codimension() > 2 {
                     next.start_mut().oscillates = true;
                 }
-                if before == next.mode {
-                    root_ends::loosen(field, &event.guards, &mut self.slacks);
-                } else {
-                    self.slacks.clear();
+                let slides_on_several = next.mode.codimension() > 1;
+                match before == next.mode && slides_on_several {
+                    true => self.slacks.loosen(&event.guards),
+                    false => self.slacks.clear(),
                 }
             }
         }
@@ -284,7 +288,9 @@ impl<'a> Integrator<'a> {
         }
         self.run.motion.resting = match left.iter().all(|left| left.leading.order > 0) {
             true => SlidingSet::new(),
-            false => self.ask(Cause::Start, |at, notes| resting(at, notes, &mode, &left))?,
+            false => self.ask(Cause::Start, |at, notes| {
+                zero_surfaces(at, notes, &mode, &left)
+            })?,
         };
         let t = self.run.t;
         let zeros = left.iter().filter_map(|left| left.deflation(t));
@@ -308,9 +314,7 @@ impl<'a> Integrator<'a> {
                 if let Some(start) = start.filter(|start| start.is_given) {
                     field.hold_at_start(self.run.t, start.is_located);
                 }
-                for &(guard, slack) in &self.slacks {
-                    field.set_slack(guard, slack);
-                }
+                self.slacks.set(field);
             }
             ModeField::Sliding(field) => {
                 if let Some(motion) = start.and_then(|start| start.two_fold) {
@@ -714,7 +718,7 @@ impl<'a> Integrator<'a> {
         done.into_iter()
             .for_each(|switch| self.recorder.switch(switch));
         self.recorder.jump(t, &self.run.x);
-        self.take_notes(notes);
+        self.take_notes(&mut notes);
         stopped
     }
 

@@ -5,7 +5,7 @@ use crate::cube::{solve_relay, Matrix, RelayProblem, SharedLoad, SharedLoads};
 use crate::error::FieldError;
 use crate::sparse::SparseRows;
 use crate::system::{AffineParts, AffineSigns, OwnSetting, PiecewiseSystem, Setting};
-use crate::tolerances::{MOST_MEETING, SURFACE_NOISE};
+use crate::tolerances::{MOST_MEETING, ROUNDING};
 
 /// Sweeps over all surfaces of a projection; gradients that are orthogonal need one.
 const MOST_SWEEPS: usize = 50;
@@ -221,7 +221,7 @@ impl<'a> AffineLaw<'a> {
                 });
                 let h = self.h[j] + moved;
                 let square: f64 = gradients.row(row).map(|(_, g)| g * g).sum();
-                if square == 0.0 || h.abs() <= 0.25 * SURFACE_NOISE * gradients.magnitude(row, x) {
+                if square == 0.0 || h.abs() <= 0.25 * ROUNDING * gradients.magnitude(row, x) {
                     continue;
                 }
                 is_near = false;

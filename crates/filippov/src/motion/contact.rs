@@ -9,7 +9,7 @@ use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::system::Actions;
 use crate::system::{dot, eval_on_side, OwnSetting, PiecewiseSystem, Setting};
-use crate::tolerances::{DOUBTFUL, NO_FORCE, NO_IMPULSE, SURFACE_NOISE};
+use crate::tolerances::{DOUBTFUL, ROUNDING, VANISHING_GERM};
 
 /// The field of contact,
 ///
@@ -137,7 +137,7 @@ impl<'a> ContactField<'a> {
             }
             let strength = dot(row, &w);
             let size = (dot(row, row) * dot(&w, &w)).sqrt();
-            let scale = if strength.abs() > NO_IMPULSE * size {
+            let scale = if strength.abs() > DOUBTFUL * size {
                 side / strength
             } else {
                 f64::NAN
@@ -220,7 +220,7 @@ impl Motion for ContactField<'_> {
                 let rate = self
                     .system
                     .rate_gradient(j, &self.setting.at(t, x), &mut row)?;
-                is_still &= rate.rate.abs() <= SURFACE_NOISE * rate.magnitude;
+                is_still &= rate.rate.abs() <= ROUNDING * rate.magnitude;
                 rates.push(rate.rate);
                 rows.push(row);
             }
@@ -253,7 +253,7 @@ impl SmoothField for ContactField<'_> {
                 .rate_gradient(j, &self.setting.at(t, x), &mut row)?;
             rates.push(-(rate.time + dot(&row, &base)));
             let size = rate.time.abs() + (dot(&row, &row) * dot(&base, &base)).sqrt();
-            self.noise.push(NO_FORCE * size);
+            self.noise.push(VANISHING_GERM * size);
             rows.push(row);
         }
         let mut directions = self.impulses(t, x, &rows)?;

@@ -13,7 +13,7 @@ use crate::options::SlidingRule;
 use crate::patience::Patience;
 use crate::sparse::SparseRows;
 use crate::system::{OwnSetting, PiecewiseSystem, Setting};
-use crate::tolerances::{HELD_AFTER, JUST_AFTER, MOST_MEETING, MOST_TRACKED};
+use crate::tolerances::{AT_SIDE, HELD_AFTER, MOST_MEETING, MOST_TRACKED};
 
 /// Filippov's field on an intersection of m >= 2 surfaces: the multilinear combination ("canopy") of the
 /// fields around it with the multipliers lambda in [-1, 1]^m that make it tangent to all surfaces,
@@ -312,7 +312,7 @@ impl<'a> IntersectionField<'a> {
         let mut weights = Vec::new();
         around.fill_product_weights(&lambda, &mut weights);
         around.combine(&weights, dx);
-        let moment = JUST_AFTER * (1.0 + t.abs());
+        let moment = AT_SIDE * (1.0 + t.abs());
         let later: Vec<f64> = x.iter().zip(&*dx).map(|(x, v)| x + moment * v).collect();
         self.solve(t + moment, &later, &mut vec![0.0; x.len()])?;
         let ends = match self.exits[..] {

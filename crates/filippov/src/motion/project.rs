@@ -3,7 +3,7 @@
 use crate::cube::{Matrix, Vector};
 use crate::error::FieldError;
 use crate::system::{dot, dot_magnitude, PiecewiseSystem, Place, Setting};
-use crate::tolerances::SURFACE_NOISE;
+use crate::tolerances::ROUNDING;
 
 /// Scratch space of the projection.
 #[derive(Clone, Debug)]
@@ -53,7 +53,7 @@ impl Projector {
                 .zip(&*x)
                 .map(|(g, x)| (g * x).abs())
                 .sum();
-            if norm2 == 0.0 || h.abs() <= 0.25 * SURFACE_NOISE * size {
+            if norm2 == 0.0 || h.abs() <= 0.25 * ROUNDING * size {
                 break;
             }
             let shift = h / norm2;
@@ -89,7 +89,7 @@ impl Projector {
             let mut is_near = true;
             for (row, &j) in self.rows.chunks_exact_mut(n).zip(set) {
                 system.gradient(j, &place, row)?;
-                is_near &= self.h[j].abs() <= 0.25 * SURFACE_NOISE * dot_magnitude(row, x);
+                is_near &= self.h[j].abs() <= 0.25 * ROUNDING * dot_magnitude(row, x);
             }
             if is_near {
                 break;

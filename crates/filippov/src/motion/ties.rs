@@ -3,7 +3,7 @@
 use super::Projector;
 use crate::error::FieldError;
 use crate::system::{dot, PiecewiseSystem, Place};
-use crate::tolerances::{BESIDE, SURFACE_NOISE, TANGENT};
+use crate::tolerances::{BESIDE, ROUNDING, TANGENT};
 
 /// Two surfaces in one place: of the four regions around them two exist.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,7 +82,7 @@ fn let_others_jump(
         }
         system.surfaces(&place.with_signs(signs), &mut h)?;
         for i in (0..h.len()).filter(|i| !fixed.contains(i)) {
-            let noise = SURFACE_NOISE * system.surface_size(i, &place.with_signs(signs))?;
+            let noise = ROUNDING * system.surface_size(i, &place.with_signs(signs))?;
             if h[i] * signs[i] < 0.0 && h[i].abs() > noise {
                 signs[i] = -signs[i];
                 is_new = true;

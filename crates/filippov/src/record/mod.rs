@@ -7,6 +7,7 @@ mod observer;
 mod recorder;
 pub mod section;
 mod solution;
+mod user_zeros;
 
 pub(crate) use decision_record::decide_and_record;
 pub use decision_record::{

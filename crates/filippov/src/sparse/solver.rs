@@ -3,7 +3,7 @@
 use super::band::BandLu;
 use super::order::{components, Component};
 use super::rows::SparseRows;
-use crate::tolerances::{DEFINITE_PIVOT, NULL_VECTOR_ENTRY, PROPORTIONAL};
+use crate::tolerances::{AT_SIDE, DEFINITE_PIVOT, PROPORTIONAL};
 
 /// What couples the unknowns of a system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -225,7 +225,7 @@ fn blocks(mut components: Vec<Component>) -> Vec<Block> {
 fn determined_by<'a>(entries: impl Iterator<Item = (&'a usize, f64)> + Clone) -> Vec<usize> {
     let largest = entries.clone().fold(0.0_f64, |m, (_, v)| m.max(v.abs()));
     let mut unknowns: Vec<usize> = entries
-        .filter(|(_, v)| v.abs() >= NULL_VECTOR_ENTRY * largest)
+        .filter(|(_, v)| v.abs() >= AT_SIDE * largest)
         .map(|(&i, _)| i)
         .collect();
     unknowns.sort_unstable();

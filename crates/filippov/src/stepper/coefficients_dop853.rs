@@ -3,6 +3,9 @@
 //! Hairer, Norsett, Wanner (1993), section II.5 and the appendix; `tests/dop853.rs` checks the order conditions.
 #![allow(clippy::excessive_precision)]
 
+/// The product of step and rate at which stability limits the step (Hairer's choice).
+pub(super) const STABILITY_END: f64 = 6.1;
+
 /// Times of the stages; the last three are those of the extension.
 pub(super) const NODES: [f64; 16] = [
     0.0,

@@ -5,6 +5,10 @@
 //! (1990), JCAM 29, 91-100. `tests.rs` checks the order conditions of all of them.
 #![allow(clippy::excessive_precision)]
 
+/// The end of the region of stability on the negative axis: the product of step and rate at which stability limits the step
+/// (Hairer, Wanner 1996, section IV.2).
+pub(super) const STABILITY_END: f64 = 3.25;
+
 pub(super) const C: [f64; 7] = [0.0, 0.2, 0.3, 0.8, 8.0 / 9.0, 1.0, 1.0];
 
 pub(super) const A2: [f64; 1] = [0.2];

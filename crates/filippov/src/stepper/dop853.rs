@@ -1,12 +1,11 @@
 //! DOP853: one step, its error estimate and its continuous extension of order 7.
 
-use super::coefficients_dop853::{A, D, E3, E5, NODES};
+use super::coefficients_dop853::{A, D, E3, E5, NODES, STABILITY_END};
 use super::dopri5::{jumps_between, stiffness_of};
 use super::{Attempt, ErrorScale, Interpolant, Step, Stepper};
 use crate::error::FieldError;
 use crate::error_scale::root_mean_square;
 use crate::motion::{observer, Run, SmoothField};
-use crate::tolerances::STIFF_DOP853;
 
 /// The stages at which an observer is called.
 const OBSERVED: [usize; 5] = [3, 5, 8, 9, 10];
@@ -185,7 +184,7 @@ impl Stepper for Dop853 {
 
     fn is_limited_by_stability(&mut self, _: &mut Run) -> Result<Option<bool>, FieldError> {
         let product = self.stiffness();
-        Ok(Some(product.is_some_and(|product| product > STIFF_DOP853)))
+        Ok(Some(product.is_some_and(|product| product > STABILITY_END)))
     }
 }
 

@@ -1,10 +1,10 @@
 //! DOPRI5(4): one step, its error estimate and its continuous extensions.
 
-use super::coefficients_dopri5::{A2, A3, A4, A5, A6, A8, A9, B, C, C8, C9, D, E};
+use super::coefficients_dopri5::{A2, A3, A4, A5, A6, A8, A9, B, C, C8, C9, D, E, STABILITY_END};
 use super::{Attempt, ErrorScale, Interpolant, Step, Stepper};
 use crate::error::FieldError;
 use crate::motion::{observer, ModeField, Run, SlidingField, SmoothField};
-use crate::tolerances::{JUMP_SHARE, JUMP_SIZE, STIFF_DOPRI5};
+use crate::tolerances::{JUMP_SHARE, JUMP_SIZE};
 
 /// Number of states where it is not fixed at compile time.
 const ANY: usize = 0;
@@ -364,7 +364,7 @@ impl Stepper for Dopri5 {
 
     fn is_limited_by_stability(&mut self, _: &mut Run) -> Result<Option<bool>, FieldError> {
         let product = self.stiffness();
-        Ok(Some(product.is_some_and(|product| product > STIFF_DOPRI5)))
+        Ok(Some(product.is_some_and(|product| product > STABILITY_END)))
     }
 }
 

@@ -10,8 +10,8 @@ use crate::error::FieldError;
 use crate::motion::SmoothField;
 use crate::system::MotionJets;
 use crate::tolerances::{
-    TAYLOR_DEAR, TAYLOR_LARGEST_ORDER, TAYLOR_NOISE, TAYLOR_ORDER_CHEAP, TAYLOR_ORDER_DEAR,
-    TAYLOR_SHARE, TAYLOR_SLOW, WARY_GROWTH, WARY_POINTS, WARY_START,
+    ERRORS_OF_STEPS, TAYLOR_DEAR, TAYLOR_LARGEST_ORDER, TAYLOR_NOISE, TAYLOR_ORDER_CHEAP,
+    TAYLOR_ORDER_DEAR, TAYLOR_SLOW, WARY_GROWTH, WARY_POINTS, WARY_START,
 };
 
 /// The series of the present motion.
@@ -165,7 +165,7 @@ impl Taylor {
         {
             return f64::NAN;
         }
-        let size = |k: usize| TAYLOR_SHARE * scale.largest(self.row(k), y);
+        let size = |k: usize| ERRORS_OF_STEPS * scale.largest(self.row(k), y);
         let longest = reach([self.order, self.order - 1].map(|k| (size(k), k)));
         longest.min(self.wary.unwrap_or(f64::INFINITY))
     }

@@ -10,7 +10,7 @@ use super::surface_decision::{Arrival, Decision};
 use crate::error::FieldError;
 use crate::motion::{first_nonzero, Leading};
 use crate::system::{BothSides, PiecewiseSystem, Place};
-use crate::tolerances::NO_GAP;
+use crate::tolerances::AT_SIDE;
 
 /// What follows where the motion is on such a surface.
 pub(super) fn decide_sticking(
@@ -35,7 +35,7 @@ pub(super) fn decide_sticking(
         (first(sides.normal_minus), first(sides.normal_plus))
     } else {
         // Without a gap between static and kinetic friction the component vanishes where the motion breaks away.
-        let has_gap = system.stick_ratio(j, place) > 1.0 + NO_GAP;
+        let has_gap = system.stick_ratio(j, place) > 1.0 + AT_SIDE;
         let along = |side: i8, exit: Arrival| {
             let vanishing = usize::from(arrival == exit && !has_gap);
             first_nonzero(system, j, side, vanishing, place)

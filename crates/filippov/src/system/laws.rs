@@ -24,7 +24,7 @@ use super::{PiecewiseSystem, Setting, TracedSystem};
 use crate::error::FieldError;
 use crate::switch::Kind;
 use crate::system::{ActionMap, Clock, Trigger};
-use crate::tolerances::WHOLE_NUMBER;
+use crate::tolerances::SAME_NUMBER;
 
 /// What a discrete state follows; the expressions may contain discrete states of laws before it.
 #[derive(Clone, Debug, PartialEq)]
@@ -392,7 +392,7 @@ pub(crate) fn n_named(laws: &[Law]) -> usize {
 
 /// How many knots are not above g, which moves in the direction of `rate`; one within rounding of g has been passed.
 fn passed(knots: &[f64], g: f64, rate: f64) -> f64 {
-    let beside = WHOLE_NUMBER * (1.0 + g.abs()) * if rate < 0.0 { -1.0 } else { 1.0 };
+    let beside = SAME_NUMBER * (1.0 + g.abs()) * if rate < 0.0 { -1.0 } else { 1.0 };
     knots.partition_point(|&knot| knot <= g + beside) as f64
 }
 
@@ -442,7 +442,7 @@ fn sign(value: f64) -> f64 {
 /// The floor; a value within rounding of a whole number is that number.
 fn floor(value: f64) -> f64 {
     let nearest = value.round();
-    if (value - nearest).abs() <= WHOLE_NUMBER * (1.0 + value.abs()) {
+    if (value - nearest).abs() <= SAME_NUMBER * (1.0 + value.abs()) {
         nearest
     } else {
         value.floor()

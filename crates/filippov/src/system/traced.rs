@@ -17,7 +17,7 @@ use super::{
 };
 use crate::error::FieldError;
 use crate::system::Linearisation;
-use crate::tolerances::{MAX_LIE_ORDER, SURFACE_NOISE, TANGENT};
+use crate::tolerances::{MAX_LIE_ORDER, ROUNDING, TANGENT};
 
 /// Up to that many states both sides of a surface are compiled into one program; the programs of
 /// larger systems would take longer to compile than they save.
@@ -202,7 +202,7 @@ impl TracedSystem {
             return size;
         }
         // Terms may cancel where the gradient vanishes.
-        let size = size.max(self.rounding_of_surface(j, place) / SURFACE_NOISE);
+        let size = size.max(self.rounding_of_surface(j, place) / ROUNDING);
         if size.is_finite() {
             return size;
         }

@@ -1,13 +1,10 @@
 //! Thresholds of the event stage.
 
 /// The remainder of the cubic through end values and end slopes is taken as at most this fraction
-/// of the spread of its Bernstein coefficients. For a sinusoid stepped with two radians a step
-/// it is 3 %, and error control keeps steps below that.
-pub const CUBIC_REMAINDER: f64 = 0.25;
-
-/// The remainder of the quartic through five samples is taken as at most this multiple of the
-/// fourth difference; for a function whose fifth derivative is ten times its fourth, it is 0.08.
-pub const QUARTIC_REMAINDER: f64 = 0.25;
+/// of the spread of its Bernstein coefficients, that of the quartic through five samples as at most this multiple of the
+/// fourth difference. For a sinusoid stepped with two radians a step it is 3 %, and error control keeps steps below that; for a
+/// function whose fifth derivative is ten times its fourth, it is 0.08.
+pub const REMAINDER: f64 = 0.25;
 
 /// The exit functions are searched only if their smallest stage value is below this multiple of
 /// their spread over the stages.
@@ -33,12 +30,15 @@ pub const MOST_OPEN: u32 = 16;
 /// distances at the probes of the step ...
 pub const MARGIN: f64 = 2.0;
 
-/// ... and that distance changes over the step by at most this multiple of itself: as theta^2 (1-theta)^2
-/// it would be 5.
-pub const MARGIN_SLOPE: f64 = 8.0;
+/// What is measured at a few probes of a step is at most this multiple of it elsewhere. So is the change over the step of the
+/// distance of the motion on a curved surface from the continuous extension: as theta^2 (1-theta)^2 it would be 5. And so is the
+/// distance of a function from its series: the terms left out grow towards the end, and those next to the last that is kept may
+/// cancel at the probes.
+pub const PROBED: f64 = 8.0;
 
-/// Where no bounds exist after that many bisections (a root at the edge of its domain), samples decide.
-pub const UNBOUNDED_DEPTH: u32 = 6;
+/// Bisections of a piece in which bounds have to decide everything, and after which samples decide where there are no bounds (a
+/// root at the edge of its domain).
+pub const BOUNDS_DEPTH: u32 = 6;
 
 /// The same for multipliers on intersections, whose bounds prove something only on short pieces where the fields
 /// change fast.
@@ -59,15 +59,13 @@ pub const MAX_DEPTH: u32 = 48;
 /// fraction of its values over the step, it has a pole or a jump there and no zero.
 pub const POLE: f64 = 1e-3;
 
-/// Samples that one search may take; bisecting to one zero takes about four per level of depth.
+/// Samples that one search may take, and pieces that are cut in two because one of the user's functions is not finite in a part
+/// of them. Bisecting to one zero, or to one end of where a function is finite, takes about four per level of depth; with more
+/// the step is too long.
 pub const MOST_SAMPLES: u32 = 1000;
 
 /// Zeros of the user's functions in one step; with more the step is too long for them.
 pub const MOST_ZEROS: usize = 64;
-
-/// Pieces of a step that are cut in two because one of the user's functions is not finite in a part of them: about twenty
-/// ends of where it is finite, each found to rounding. With more the step is too long for it.
-pub const MOST_CUTS: u32 = 1000;
 
 /// A search that needed more bisections than this met a function that the step does not resolve;
 /// the step may not grow then.
@@ -127,16 +125,9 @@ pub const BEYOND_TOUCH: f64 = 0.02;
 /// found, and not far, so that bounds are narrow.
 pub const BEYOND_GUESS: f64 = 1.1;
 
-/// Halvings of a step whose bounds have to decide everything; beyond that samples help.
-pub const PROVED_DEPTH: u32 = 6;
-
 /// A series and a function agree at the ends of a step up to this share of the terms of the series: above what rounding
 /// does to sums of large terms, far below what another function would give.
 pub const SAME_VALUE: f64 = 1e-10;
-
-/// A function may lie beside its series by so many times what it does at both ends of the step and at a point within: the
-/// terms left out grow towards the end, and those next to the last that is kept may cancel there.
-pub const SERIES_MARGIN: f64 = 8.0;
 
 /// Terms of a series that together are below this share of the first one are left out where its zeros are told apart: the
 /// work grows with the square of their number. The larger the share, the more zeros are too close to others to be told apart

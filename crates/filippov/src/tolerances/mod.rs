@@ -15,9 +15,9 @@ pub use switching::*;
 /// Unit roundoff times two.
 pub const EPS: f64 = f64::EPSILON;
 
-/// A switching function counts as zero below this multiple of `EPS` times the sum of the
-/// magnitudes it is made of: the rounding of the state plus that of a few operations.
-pub const SURFACE_NOISE: f64 = 16.0 * EPS;
+/// A value counts as zero below this multiple of `EPS` times the sum of the magnitudes it is made of: the rounding of the
+/// state plus that of a few operations. Also the shortest step in units of the time: its ends are told apart.
+pub const ROUNDING: f64 = 16.0 * EPS;
 
 /// A Lie derivative counts as zero below this fraction of the sum of the magnitudes it is made of.
 /// Points handed in by a user or found as a root carry a few rounding errors, amplified by at most
@@ -25,26 +25,24 @@ pub const SURFACE_NOISE: f64 = 16.0 * EPS;
 /// indistinguishable from a tangency in the sense of every later comparison.
 pub const TANGENT: f64 = 1e-11;
 
-/// Highest order of the Taylor coefficients of a guard that are looked at before it counts as zero.
-pub const GERM_ORDER: usize = 6;
-
-/// A Taylor coefficient of a guard counts as zero below this fraction of what the sizes and rates of its terms allow.
+/// A Taylor coefficient of a guard counts as zero below this fraction of what the sizes and rates of its terms allow; of the
+/// force of a contact, which is a second derivative, of the accelerations around.
 pub const VANISHING_GERM: f64 = 1e-10;
 
 /// Newton's method for the multipliers of divided equations starts at all points of this grid.
 pub const BLOW_UP_STARTS: [f64; 4] = [-0.9, -0.3, 0.3, 0.9];
 
-/// Highest order of Lie derivative looked at before a point counts as undecided.
+/// Highest derivative of a guard that is looked at, as a Lie derivative or as a Taylor coefficient, before the guard counts
+/// as zero along the motion and the point as undecided.
 pub const MAX_LIE_ORDER: usize = 6;
-
-/// Shortest step in units of the rounding of time.
-pub const SHORTEST_STEP: f64 = 16.0 * EPS;
-
-/// Shortest step where the time is zero: below it numbers lose digits, and a step that is rounded to zero is no step.
-pub const SHORTEST_STEP_AT_ZERO: f64 = f64::MIN_POSITIVE;
 
 /// A point nearer than this fraction of the tolerance counts as reached: the limit of Newton's method.
 pub const ARRIVED: f64 = 1e-3;
+
+/// The errors of some steps together are at most this multiple of the tolerance: a body beyond a wall by less is on it, a sliding
+/// motion whose normal components differ by less may have reached a two-fold or a double zero (the multiplier, a quotient with
+/// this denominator, then consists mostly of errors), and the last terms of a Taylor step stay below the tolerance by this factor.
+pub const ERRORS_OF_STEPS: f64 = 10.0;
 
 /// Less than this, relative to the time, is no progress: bodies with the speed of rounding hit one another that often.
 pub const NO_PROGRESS: f64 = 32768.0 * EPS;

@@ -1,9 +1,9 @@
 //! Thresholds of steps and their lengths.
 
-use super::{EPS, SHORTEST_STEP_AT_ZERO};
+use super::EPS;
 
 /// The first guess of a step is no shorter than this: it may still be shortened by many factors before the time ends it.
-pub const SMALLEST_GUESS: f64 = SHORTEST_STEP_AT_ZERO / EPS;
+pub const SMALLEST_GUESS: f64 = f64::MIN_POSITIVE / EPS;
 
 /// A motion of that many times the last step shows which step suits its mode.
 pub const MANY: f64 = 8.0;
@@ -20,7 +20,8 @@ pub const SEVERAL: f64 = 3.0;
 pub const REACH: f64 = 1.25;
 
 /// A moment moves each component of the state by this part of its size: short against the time in which anything changes,
-/// and long enough for differences to be clear of rounding.
+/// and long enough for differences to be clear of rounding. To see whether an impulse depends on tangential velocities these are
+/// changed by as much, and the approach is slower by the same factor again.
 pub const MOMENT: f64 = 1e-5;
 
 /// A moment in which the field changes by more than this part of its size is shortened, to a change of about [`MOMENT`].
@@ -45,9 +46,6 @@ pub const MOST_AUTO_SERIES: usize = 5;
 
 /// Coefficients are dear from so many operations on: then they take longer than the rest of a step.
 pub const TAYLOR_DEAR: usize = 2000;
-
-/// The last terms of a Taylor step, times this, may be as large as the tolerance: errors of many steps add up.
-pub const TAYLOR_SHARE: f64 = 10.0;
 
 /// Pieces of a Taylor step in which a user's function without bounds is sampled: about as many steps would DOPRI5
 /// have made.

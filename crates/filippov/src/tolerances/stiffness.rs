@@ -5,14 +5,7 @@
 /// extension lies no farther from the manifold of the motion than rounding, also at a stiffness of 1e8.
 pub const AIM_MARGINS: [f64; 2] = [1e-3, 1e-7];
 
-/// The end of the region of stability of DOPRI5 on the negative axis: the product of step and rate at which stability
-/// limits the step (Hairer, Wanner 1996, section IV.2).
-pub const STIFF_DOPRI5: f64 = 3.25;
-
-/// That of DOP853 (Hairer's choice).
-pub const STIFF_DOP853: f64 = 6.1;
-
-/// That of a Taylor step whose velocity hardly changes: without a fast rate the product would be as small as that change.
+/// The product of step and rate at which stability limits a Taylor step whose velocity hardly changes: without a fast rate the product would be as small as that change.
 pub const STIFF_SERIES: f64 = 2.0;
 
 /// The velocity of a Taylor step hardly changes: its terms of higher order together are less than this share of it, ...

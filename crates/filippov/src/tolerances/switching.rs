@@ -3,7 +3,7 @@
 use super::EPS;
 
 /// Largest number of surfaces that meet and whose signs multiply one another: their 2^m fields are all evaluated, and
-/// all 3^m modes looked at.
+/// all 3^m modes looked at. Of surfaces in contact and slid on, all combinations are.
 pub const MOST_MEETING: usize = 6;
 
 /// Largest matrix whose principal minors are all computed, and whose characteristic polynomial is trusted: 256
@@ -19,13 +19,18 @@ pub const CAYLEY_SQUARINGS: u32 = 26;
 /// unknowns, a pivot of a linear system is that of a singular one.
 pub const PROPORTIONAL: f64 = 64.0 * EPS;
 
-/// Events are located to better than this: a multiplier counts as -1 or +1 at an exit within this distance, two multipliers as
-/// one, a root in a box of this width as multiple, and a normal component as zero below this fraction of its terms.
+/// Events are located to better than this, in time, state and multipliers. So a multiplier counts as -1 or +1 at an exit within
+/// this distance, two multipliers as one, and a root in a box of this width as multiple; a normal component, an entry of a null
+/// vector, and a gap of static friction above the kinetic one as none below this fraction of their terms; bodies that overlap by
+/// less than this fraction of their positions touch; and a motion is looked at this long after its start, where the equations of
+/// its multipliers vanish.
 pub const AT_SIDE: f64 = 1e-6;
 
 /// A sign that decided at an intersection is doubtful if its quantity is smaller than this fraction
-/// of its size: about the error of the fields at a located event, or at a limit of switches. The fields are perturbed by
-/// as much then.
+/// of its size: about the error of the fields at a located event, or at a limit of switches, and above that of differences of
+/// functions that are called (1e-10). The fields are perturbed by as much then. Components of the hidden dynamics that are
+/// slower rest: this is above the rounding of the field, and below the drift after an exit. A rest point lies within the root of
+/// it, or an eigenvalue is too small to tell it from its neighbours.
 pub const DOUBTFUL: f64 = 1e-8;
 
 /// Largest distance from a root that loses stability or meets another one at which the hidden
@@ -43,11 +48,12 @@ pub const AFTER_THE_EXIT: f64 = 1e-5;
 /// limit is then known to that share of the time until then.
 pub const ACCUMULATION_AGREEMENT: f64 = 0.1;
 
-/// Pieces that one run of the hidden dynamics may take, with the interval tests in the search for their ends: some tenths of
-/// a second. Of 830 000 random runs one did not end within, a fold passed at a ratio of scalings of 27; motions that stay within
-/// rounding of a border, as where two surfaces are in the same place, need thousands of tests for each piece. Of more than six
-/// surfaces as many fewer as a piece takes longer.
-pub const MOST_PIECES: usize = 100_000;
+/// Work that one decision may take, some tenths of a second: pieces of a run of the hidden dynamics, with the interval tests in
+/// the search for their ends, or boxes looked at for all roots in a cube. Of 830 000 random runs one did not end within, a fold
+/// passed at a ratio of scalings of 27; motions that stay within rounding of a border, as where two surfaces are in the same
+/// place, need thousands of tests for each piece. For three surfaces the search for roots ends within a millisecond, for six it
+/// can take seconds. Of more surfaces as many fewer as a piece, or a box, takes longer.
+pub const MOST_WORK: usize = 100_000;
 
 /// Interval tests in the search for the end of one piece: a zero needs as many as halvings isolate it,
 /// so that this leaves room for dozens of near misses.
@@ -71,19 +77,6 @@ pub const RETURNS_TO_A_CYCLE: usize = 400;
 /// factor gamma.
 pub const FAR_OUT: f64 = 1e5;
 
-/// The last terms of a step of the hidden dynamics, in units of the transition: far below what is doubtful, and below the
-/// difference of returns to a cycle.
-pub const HIDDEN_ERROR: f64 = 1e-12;
-
-/// Components of the hidden dynamics that are within the transition rest if they are slower than this fraction of the field:
-/// Newton's method then finds the rest point. Others leave for ever if they are faster: this is above the rounding of the
-/// field, and below the drift after an exit.
-pub const HIDDEN_REST: f64 = 1e-8;
-
-/// Distance within which it must lie. A rest point with an eigenvalue below `HIDDEN_REST` over this
-/// is not told from its neighbours.
-pub const HIDDEN_REST_REACH: f64 = 1e-4;
-
 /// First and last window of time, in units of 1/(size of the field), over which the range of an
 /// oscillation is compared: tens to thousands of oscillations.
 pub const FIRST_WATCH: f64 = 100.0;
@@ -96,16 +89,13 @@ pub const STEADY_CYCLE: f64 = 0.02;
 /// |I - G(middle)^-1 G| below this makes a box hold one root at most, and Newton's method converge in it.
 pub const INJECTIVE: f64 = 0.5;
 
-/// Boxes looked at in the search for all roots in a cube: for three surfaces it ends within a millisecond, for six it can
-/// take seconds. Of more as many fewer as a box takes longer, by products of matrices.
-pub const MOST_BOXES: usize = 100_000;
-
 /// Roots nearer together than this are one.
 pub const SAME_ROOT: f64 = 1e-9;
 
-/// Newton's method has converged: the next step would be below rounding. Zeros of a polynomial nearer together than this part
-/// of its interval are one touch.
-pub const NEWTON_DONE: f64 = 1e-12;
+/// Numbers of size 1 nearer together than this are the same, up to the rounding of what they were computed from: Newton's
+/// method has converged, zeros of a polynomial on an interval of size 1 are one touch, terms of the hidden dynamics are left
+/// out (far below what is doubtful, and below the difference of returns to a cycle), a value is a whole number.
+pub const SAME_NUMBER: f64 = 1e-12;
 
 /// Full Newton steps that a converging iteration can need.
 pub const NEWTON_STEPS: usize = 30;
@@ -117,10 +107,6 @@ pub const FAR_FROM_THE_CUBE: f64 = 10.0;
 /// that continues them; below 1 there is one root only, and steps are shortened until it is so. Towards a
 /// fold the distance to it shrinks by a factor of four at most from one evaluation to the next.
 pub const TRACKED_CHANGE: f64 = 0.75;
-
-/// Two roots that meet farther than this from the multipliers tracked last are others: these are known up to the square
-/// root of the last step.
-pub const FOLD_REACH: f64 = 0.2;
 
 /// Evaluations of which the multipliers are kept to track from: those of a step and its rejected attempts.
 pub const MOST_TRACKED: usize = 16;
@@ -155,10 +141,6 @@ pub const MOST_ENCLOSED: usize = 3;
 /// they may move; the smaller, the nearer another root may be.
 pub const ROOT_BOXES: [f64; 3] = [0.2, 0.02, 0.002];
 
-/// Unknowns with entries below this fraction of the largest have no part in a vector of the null space:
-/// rounding errors of elimination are far below it, genuine shares far above.
-pub const NULL_VECTOR_ENTRY: f64 = 1e-6;
-
 /// Most contacts that close loops with one another, as those of seven bodies in a row: up to 1716 facets are looked at in
 /// each evaluation.
 pub const MOST_IN_LOOP: usize = 13;
@@ -179,19 +161,11 @@ pub const AT_FOLD: f64 = 1e-2;
 /// they have changed by as much as rounding of the state changes the quotients, by about the root of rounding.
 pub const HELD_AFTER: f64 = 1e-8;
 
-/// Time, in units of 1 plus its size, after a start at which the equations of the multipliers vanish: how clear their root is
-/// there stands for the start. Components are clear of [`DOUBTFUL`], and little else has changed.
-pub const JUST_AFTER: f64 = 1e-6;
-
 /// Distance, in units of 1 plus the size of a component, at which two surfaces are compared: its square is far above rounding.
 pub const BESIDE: f64 = 1e-3;
 
 /// Surfaces that touch part in one direction if two places beside the point show the same to this, far above [`BESIDE`].
 pub const ONE_DIRECTION: f64 = 1e-2;
-
-/// Sliding may have reached a two-fold or a double zero if the difference of the normal components is at most this multiple
-/// of the tolerance. The multiplier, a quotient with this denominator, then consists mostly of the errors of some steps.
-pub const AT_TWO_FOLD: f64 = 10.0;
 
 /// A multiplier is not lost where the difference is above this multiple of the tolerance, relative to the speed: gradients of
 /// normal components a hundred times larger than what they are made of are not expected.

@@ -8,11 +8,11 @@ use crate::event::filter::may_vanish_between;
 use crate::event::isolate::{is_steep, Bracket};
 use crate::event::series::Series;
 use crate::locate::refine;
+use crate::motion::ModeField;
 use crate::motion::Monitored;
-use crate::motion::{Guard, ModeField};
 use crate::stepper::{powers_of_nested, Basis, ExitSeries};
 use crate::system::Setting;
-use crate::tolerances::{EPS, SERIES_MARGIN};
+use crate::tolerances::{EPS, PROBED};
 
 /// A guard along a step, as far as it is a polynomial.
 pub(super) enum Polynomial<'a> {
@@ -105,8 +105,7 @@ impl StepSearch<'_, '_> {
     /// An exit function along the step, as far as its series describes it, into `rows`; `None` if there is none.
     fn exit_series(&self, m: &Monitored, rows: &mut [f64]) -> Option<ExitSeries> {
         let known = self.stepper.exit_series(m.exit()?, rows)?;
-        let own = |slack: &&(Guard, f64)| slack.0 == m.guard;
-        rows[0] += self.slacks.iter().find(own).map_or(0.0, |slack| slack.1);
+        rows[0] += self.slacks.of(m.guard);
         Some(known)
     }
 
@@ -144,7 +143,7 @@ impl StepSearch<'_, '_> {
         let widest = gaps.into_iter().fold(0.0, |w: f64, gap| w.max(gap.abs()));
         let is_known = !gaps.iter().any(|gap| gap.is_nan());
         Ok(is_known.then_some(Likeness {
-            margin: SERIES_MARGIN * widest,
+            margin: PROBED * widest,
             is_exact: false,
         }))
     }
@@ -197,7 +196,7 @@ impl StepSearch<'_, '_> {
         if !likeness.is_exact {
             // One step of Newton's method with the slope of the series. What it errs by: by how far that may be off.
             let value = self.value_along(&m, theta)?;
-            let is_alike = SERIES_MARGIN * value.abs() <= doubt;
+            let is_alike = PROBED * value.abs() <= doubt;
             if !is_alike {
                 return Ok(None);
             }

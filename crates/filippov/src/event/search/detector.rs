@@ -6,7 +6,7 @@ use super::bounds::{Piece, RootPiece};
 use crate::error::FieldError;
 use crate::event::Multiple;
 use crate::motion::{Exits, Monitored, Run};
-use crate::tolerances::SURFACE_NOISE;
+use crate::tolerances::ROUNDING;
 
 /// A function is clear of a zero that was divided out beyond this multiple of its rounding.
 pub(super) const CLEAR_OF_NOISE: f64 = 1e3;
@@ -125,13 +125,13 @@ impl Detector {
         let Some(j) = m.surface() else {
             let seen = &run.seen;
             let noise = *self.exit_noise.get_or_insert_with(|| {
-                4.0 * SURFACE_NOISE * seen.iter().fold(0.0_f64, |m, seen| m.max(seen.size()))
+                4.0 * ROUNDING * seen.iter().fold(0.0_f64, |m, seen| m.max(seen.size()))
             });
             return Ok(noise);
         };
         let setting = run.motion.setting();
         let size = |x| run.system.surface_size(j, &setting.at(run.t, x));
         let size = size(end)?.max(size(&run.x)?);
-        Ok(SURFACE_NOISE * size)
+        Ok(ROUNDING * size)
     }
 }

@@ -13,7 +13,7 @@ mod user_piece;
 
 pub(crate) use detector::Detector;
 
-use crate::motion::{Guard, Run};
+use crate::motion::{Run, Slacks};
 use crate::stepper::Steppers;
 
 /// A step that was computed, and is searched before it is accepted.
@@ -24,7 +24,7 @@ pub(crate) struct StepSearch<'s, 'a> {
     pub stepper: &'s mut Steppers,
     pub detector: &'s mut Detector,
     /// What guards may go beyond zero.
-    pub slacks: &'s [(Guard, f64)],
+    pub slacks: &'s Slacks,
     /// No event is looked for behind this time.
     pub horizon: f64,
     /// The field ends near to the end of the step: a surface a little beyond that is looked for too.

@@ -17,8 +17,7 @@ use crate::locate::refine;
 use crate::motion::Guard;
 use crate::system::Setting;
 use crate::tolerances::{
-    BEYOND_GUESS, BEYOND_TOUCH, EPS, POLE, RESOLVED_DEPTH, SMALL_REST, UNBOUNDED_DEPTH,
-    UNPROVED_DEPTH,
+    BEYOND_GUESS, BEYOND_TOUCH, BOUNDS_DEPTH, EPS, POLE, RESOLVED_DEPTH, SMALL_REST, UNPROVED_DEPTH,
 };
 
 /// A piece of a step that was searched.
@@ -335,7 +334,7 @@ impl StepSearch<'_, '_> {
                 divided,
                 patience: match ends_root {
                     true => UNPROVED_DEPTH,
-                    false => UNBOUNDED_DEPTH,
+                    false => BOUNDS_DEPTH,
                 },
             },
             // Along the step an affine surface is a quintic; the quartic and its remainder describe it.

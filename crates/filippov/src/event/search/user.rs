@@ -11,7 +11,7 @@ use super::StepSearch;
 use crate::error::FieldError;
 use crate::event::{SmoothParts, UserEvent, UserEvents, UserFunction};
 use crate::mode::Signs;
-use crate::tolerances::{MOST_CUTS, MOST_ZEROS, PIECES_OF_SERIES, SURFACE_NOISE};
+use crate::tolerances::{MOST_SAMPLES, MOST_ZEROS, PIECES_OF_SERIES, ROUNDING};
 
 impl StepSearch<'_, '_> {
     /// The value of a user's function along the motion.
@@ -224,7 +224,7 @@ impl StepSearch<'_, '_> {
             true => along.value(self, to)?.abs().max(value.abs()),
             false => value.abs(),
         };
-        let noise = (SURFACE_NOISE * size).max(along.rounding(self, from));
+        let noise = (ROUNDING * size).max(along.rounding(self, from));
         let is_zero = before.is_known_zero || value.abs() <= noise;
         let sign = match is_zero {
             true if to == from => 0.0,
@@ -314,7 +314,7 @@ impl StepSearch<'_, '_> {
         };
         let mut n_cuts = 0;
         while let Some(&to) = ends.last() {
-            if n_cuts > MOST_CUTS {
+            if n_cuts > MOST_SAMPLES {
                 return Ok(false);
             }
             if start.divided {

@@ -16,7 +16,7 @@ use crate::mode::Signs;
 use crate::motion::CurrentMotion;
 use crate::stepper::{powers_of_nested, Basis, Interpolant};
 use crate::system::Setting;
-use crate::tolerances::{EPS, POLE, SURFACE_NOISE, UNBOUNDED_DEPTH};
+use crate::tolerances::{BOUNDS_DEPTH, EPS, POLE, ROUNDING};
 
 /// The value of a user's function along the motion.
 pub(super) fn value_along(
@@ -160,10 +160,10 @@ impl<'f> Along<'f> {
         let size: f64 = rows.iter().map(|c| c.abs()).sum();
         if start.divided {
             // The zero at the start of the search is the only one, or the function rises or falls throughout.
-            return start.from > 0.0 && series.has_one_zero(SURFACE_NOISE * size)
+            return start.from > 0.0 && series.has_one_zero(ROUNDING * size)
                 || !series.bound(start.from, to).slope.contains_zero();
         }
-        start.from == 0.0 && series.has_sign(start.sign, SURFACE_NOISE * size)
+        start.from == 0.0 && series.has_sign(start.sign, ROUNDING * size)
     }
 
     /// The only zero in the step, from its start on, if the series has one that is far from rounding.
@@ -172,7 +172,7 @@ impl<'f> Along<'f> {
         let signed: SmallVec<[f64; 32]> = rows.iter().map(|c| sign * c).collect();
         let series = Series::new(&signed);
         let size: f64 = rows.iter().map(|c| c.abs()).sum();
-        let noise = SURFACE_NOISE * size;
+        let noise = ROUNDING * size;
         let [left, right] = series.ends();
         if left <= noise || right >= -noise || !series.has_one_zero(noise) {
             return None;
@@ -271,11 +271,11 @@ impl StepSearch<'_, '_> {
         let evidence = Evidence::Bounds {
             bounds: &mut bounds,
             divided: i32::from(divided),
-            patience: UNBOUNDED_DEPTH,
+            patience: BOUNDS_DEPTH,
         };
         // Rounding of a function whose terms are not known: that of its values.
         let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-        let noise = (SURFACE_NOISE * largest).max(match divided {
+        let noise = (ROUNDING * largest).max(match divided {
             true => 0.0,
             false => rounding,
         });

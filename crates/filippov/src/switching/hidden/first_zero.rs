@@ -2,7 +2,7 @@
 
 use smallvec::{smallvec, SmallVec};
 
-use crate::tolerances::{NEWTON_DONE, ZERO_SEARCHES};
+use crate::tolerances::{SAME_NUMBER, ZERO_SEARCHES};
 
 /// The first time in (0, end] at which `p`, not negative at 0, becomes negative. A zero at 0 itself is
 /// divided out.
@@ -50,7 +50,7 @@ fn has_zero(p: &[f64], a: f64, b: f64, end: f64) -> Option<bool> {
         return Some(false);
     }
     let is_monotone = slope.abs() > bend * half;
-    (is_monotone || b - a <= NEWTON_DONE * end).then(|| value(p, b) < 0.0)
+    (is_monotone || b - a <= SAME_NUMBER * end).then(|| value(p, b) < 0.0)
 }
 
 /// The zero of a function that falls from `a` to `b`, from its values with their derivatives: Newton's steps that stay

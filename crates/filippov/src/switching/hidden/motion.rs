@@ -7,7 +7,7 @@ use super::{exact, Outcome};
 use crate::cube::{is_stable, newton, stable_roots_within, NormalFields};
 use crate::mode::Mode;
 use crate::patience::Patience;
-use crate::tolerances::{HIDDEN_REST, HIDDEN_REST_REACH, MOST_MEETING, MOST_PIECES};
+use crate::tolerances::{DOUBTFUL, MOST_MEETING, MOST_WORK};
 
 /// Follows the motion from u, piece by piece.
 ///
@@ -34,7 +34,7 @@ pub(super) fn limit(fields: &NormalFields, u: &[f64], patience: Patience) -> Out
     let section = around.as_ref().map(|around| (1, around.root[1]));
     let few = MOST_MEETING.pow(2);
     let mut work = 0;
-    while work < MOST_PIECES * few / (m * m).max(few) {
+    while work < MOST_WORK * few / (m * m).max(few) {
         work += 1;
         let lambda = clipped(&u);
         let velocity = fields.interpolate(&lambda);
@@ -113,8 +113,8 @@ fn rest_on_face(
     lambda: &[f64],
     velocity: &[f64],
 ) -> Option<Vec<f64>> {
-    let rests = |i: usize, v: f64| sides[i] != 0 || v.abs() <= HIDDEN_REST;
-    let leaves = |i: usize, v: f64| sides[i] == 0 || f64::from(sides[i]) * v > HIDDEN_REST;
+    let rests = |i: usize, v: f64| sides[i] != 0 || v.abs() <= DOUBTFUL;
+    let leaves = |i: usize, v: f64| sides[i] == 0 || f64::from(sides[i]) * v > DOUBTFUL;
     let stays = |v: &[f64]| (0..sides.len()).all(|i| rests(i, v[i]) && leaves(i, v[i]));
     if !stays(velocity) {
         return None;
@@ -126,7 +126,7 @@ fn rest_on_face(
     let near = root
         .iter()
         .zip(&here)
-        .all(|(a, b)| (a - b).abs() <= HIDDEN_REST_REACH && a.abs() <= 1.0);
+        .all(|(a, b)| (a - b).abs() <= DOUBTFUL.sqrt() && a.abs() <= 1.0);
     let mut full = lambda.to_vec();
     for (&i, &value) in free.iter().zip(&root) {
         full[i] = value;

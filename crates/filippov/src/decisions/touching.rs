@@ -1,11 +1,13 @@
-//! Surfaces with one normal at a point: are they in one place, or do they touch?
+//! Surfaces with one normal at a point: are they in one place, or do they touch? What holds a motion on two that touch?
 
-use super::point::{Point, Values};
+use super::candidate::Candidate;
+use super::point::{Notes, Point, Values};
+use crate::cube::{roots_in_cube, NormalFields};
 use crate::error::FieldError;
 use crate::mode::Mode;
-use crate::motion::{are_parallel, beside_on, in_the_place_of, normal, parallel};
+use crate::motion::{are_parallel, beside_on, in_the_place_of, normal};
 use crate::system::dot;
-use crate::tolerances::{ONE_DIRECTION, SURFACE_NOISE};
+use crate::tolerances::{DOUBTFUL, ONE_DIRECTION, ROUNDING};
 
 /// Two surfaces, counted within a meeting, that touch one another: they have the same normal here, and are not in one place.
 pub(super) struct Touch {
@@ -23,6 +25,11 @@ pub(super) struct Parallels {
 }
 
 impl Parallels {
+    /// Are two in one place, or do they touch?
+    pub fn are_any(&self) -> bool {
+        self.coincide || !self.touching.is_empty()
+    }
+
     /// Looks at all pairs.
     pub fn of(at: &Point, meeting: &[usize], mode: &Mode) -> Result<Self, FieldError> {
         let (signs, n) = (mode.signs(), at.x.len() + 1);
@@ -46,7 +53,7 @@ impl Parallels {
                 found.coincide = true;
             } else if has_normal(k) {
                 let ratio = dot(one, other) / squares[i];
-                let noise = SURFACE_NOISE * squares[k].sqrt();
+                let noise = ROUNDING * squares[k].sqrt();
                 let mut pairs = other.iter().zip(one);
                 found.touching.push(Touch {
                     pair: [i, k],
@@ -58,25 +65,65 @@ impl Parallels {
     }
 }
 
-/// Have two of the surfaces the same normal, or has one none?
-pub(super) fn have_parallels(
+/// Do multipliers hold a motion on two surfaces that touch?
+pub(super) enum Together {
+    /// Whatever they are, it parts the surfaces.
+    Never,
+    Perhaps,
+    /// They do, and within rounding of the point the motion has no field: it divides by the power of the second surface.
+    Lost,
+    /// They solve the equations with these normal components: those of the second surface are divided by their power.
+    By(NormalFields),
+}
+
+/// Sliding on two surfaces that touch: to first order they are one, and the equation of the second is that of what they have
+/// in common beside the point.
+pub(super) fn together(
     at: &Point,
-    meeting: &[usize],
-    mode: &Mode,
-) -> Result<bool, FieldError> {
-    let signs = mode.signs();
-    let rows = meeting
+    notes: &mut Notes,
+    candidate: &Candidate,
+    [i, k]: [usize; 2],
+) -> Result<Together, FieldError> {
+    let Candidate {
+        meeting,
+        entries,
+        mode,
+        ..
+    } = *candidate;
+    let pair = [i, k].map(|i| meeting.surfaces[i]);
+    let Some((normal, is_odd)) = parting(at, pair, mode)? else {
+        return Ok(Together::Perhaps);
+    };
+    let mut corners = at.corners(notes, meeting.surfaces, mode)?;
+    corners.set_normal(k, &normal);
+    let Ok(fields) = corners.normal_fields() else {
+        return Ok(Together::Perhaps);
+    };
+    let end = 1.0 + ONE_DIRECTION;
+    let face = fields.restrict(entries.entries());
+    let face = (0..face.m()).fold(face, |face, axis| face.on_range(axis, [-end, end]));
+    let noise = DOUBTFUL * face.size();
+    let ranges: Vec<[f64; 2]> = (0..face.m()).map(|row| face.row_range(row)).collect();
+    if ranges
         .iter()
-        .map(|&j| normal(at.system, &at.place(&signs), j));
-    let rows: Vec<Vec<f64>> = rows.collect::<Result<_, _>>()?;
-    let pairs = (0..rows.len()).flat_map(|j| (0..j).map(move |k| (j, k)));
-    let mut pairs = pairs.map(|(j, k)| parallel(&rows[j], &rows[k]));
-    Ok(pairs.any(|parallel| parallel))
+        .any(|[low, high]| *low > noise || *high < -noise)
+    {
+        return Ok(Together::Never);
+    }
+    let roots = roots_in_cube(&face);
+    let has_field = |velocity: Vec<f64>| velocity.iter().all(|v| v.is_finite());
+    Ok(match roots.complete && roots.points.is_empty() {
+        true => Together::Never,
+        // After an even power no region lies between the surfaces on one side.
+        false if !is_odd => Together::Perhaps,
+        false if !has_field(at.velocity(notes, mode, &[])?) => Together::Lost,
+        false => Together::By(fields),
+    })
 }
 
 /// Two surfaces that touch have functions that differ by a power of another one: its normal, along the surfaces, and whether
 /// the power is odd. `None` if what they differ by depends on where one looks beside the point.
-pub(super) fn parting(
+fn parting(
     at: &Point,
     [j, k]: [usize; 2],
     mode: &Mode,

@@ -4,27 +4,27 @@
 use super::point::{Left, Notes, Point};
 use crate::error::FieldError;
 use crate::mode::Mode;
-use crate::motion::{first_nonzero, ModeField, SlidingSet};
+use crate::motion::{first_nonzero, SlidingSet};
 use crate::status::{Warning, WarningCode};
 use crate::tolerances::LEFT_RESTING;
 
 /// The surfaces that a motion in `mode` does not leave. Warns of those that the field beyond would not leave either.
-pub(crate) fn resting(
+pub(crate) fn zero_surfaces(
     at: &Point,
     notes: &mut Notes,
     mode: &Mode,
     left: &[Left],
 ) -> Result<SlidingSet, FieldError> {
-    let resting = left.iter().filter(|left| left.leading.order == 0);
-    let resting: SlidingSet = resting.filter_map(Left::surface).collect();
-    for &j in &resting {
+    let zero = left.iter().filter(|left| left.leading.order == 0);
+    let zero: SlidingSet = zero.filter_map(Left::surface).collect();
+    for &j in &zero {
         let beyond = -mode.entries()[j];
         let leading = first_nonzero(at.system, j, beyond, 0, &at.place(&mode.signs()))?;
         if leading.order == 0 {
             warn_zero_surface(at, notes, j, mode);
         }
     }
-    Ok(resting)
+    Ok(zero)
 }
 
 /// Warns of a surface whose function is zero all along the motion in `mode`.
@@ -50,7 +50,7 @@ pub(crate) fn warn_zero_surface(at: &Point, notes: &mut Notes, j: usize, mode: &
 }
 
 /// Has the motion left a surface that it was to stay on, by more than the tolerance?
-pub(crate) fn has_left_resting(at: &Point, notes: &mut Notes) -> Result<bool, FieldError> {
+pub(crate) fn has_left_zero_surface(at: &Point, notes: &mut Notes) -> Result<bool, FieldError> {
     let signs = at.arrival.signs;
     let h = at.surface_values(notes, signs)?;
     let mut gradient = vec![0.0; at.x.len()];
@@ -67,32 +67,4 @@ pub(crate) fn has_left_resting(at: &Point, notes: &mut Notes) -> Result<bool, Fi
         }
     }
     Ok(false)
-}
-
-/// Warns where the motion goes on at a root around which the regularised motion oscillates.
-pub(crate) fn warn_oscillation(at: &Point, notes: &mut Notes) {
-    let field = at.arrival.field.borrow();
-    let ModeField::Intersection(field) = &**field else {
-        return;
-    };
-    if !field.oscillates() {
-        return;
-    }
-    let names = field
-        .set()
-        .iter()
-        .map(|&j| at.system.surface_name(j) + " = 0");
-    let names: Vec<String> = names.collect();
-    notes.warnings.push(Warning {
-        t: at.t,
-        code: WarningCode::Oscillation,
-        surfaces: field.set().to_vec(),
-        text: format!(
-            "sliding at the intersection of {} is not stable for this scaling of the surfaces: the regularised \
-             motion goes around it, with another mean, or away from it; another kappa= may be stable",
-            names.join(", ")
-        ),
-        candidates: Vec::new(),
-        rule: "",
-    });
 }
