@@ -12,13 +12,15 @@
 //!   includes `abs(v)` itself: it is positive on both sides of v = 0, so its sign switches nowhere, and no
 //!   second surface is created in the place of v;
 //! - what is made of a sign switches where that one does: `sign(v)`, `1 + sign(v)`, `sign(v)*exp(y)`;
-//! - a quotient or a tangent changes its sign at its poles too: `tan(v) - 1` switches as `cos(v)*(sin(v) - cos(v))`.
+//! - a quotient or a tangent changes its sign at its poles too: `tan(v) - 1` switches as `cos(v)*(sin(v) - cos(v))`;
+//! - a root moves to the other side as its inverse: `sqrt(abs(v)) - 2` switches as `abs(v) - 4`, `cbrt(v) - y` as `v - y**3`.
 //!
 //! Division by a parameter is not stripped, since its sign is not known.
 
 use rustc_hash::FxHashMap;
 
 use crate::graph::Graph;
+use crate::inverses::without_root;
 use crate::linear::{LinearForm, LinearKey};
 use crate::node::{Node, NodeId};
 use crate::op::{BinaryOp, UnaryOp};
@@ -147,6 +149,15 @@ impl Graph {
                 };
                 if let Some(cleared) = without_poles(self, spelling) {
                     let switching = self.switch(cleared).times(side);
+                    if let Switching::Surface { index, orientation } = switching {
+                        self.surfaces_mut()
+                            .switches
+                            .insert(id, (index, orientation));
+                    }
+                    return switching;
+                }
+                if let Some((rootless, sense)) = without_root(self, &form) {
+                    let switching = self.switch(rootless).times(side * sense);
                     if let Switching::Surface { index, orientation } = switching {
                         self.surfaces_mut()
                             .switches

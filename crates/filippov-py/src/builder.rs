@@ -111,6 +111,26 @@ impl Builder {
         Ok(graph.declare_surface(a))
     }
 
+    fn declare_not_negative(&self, a: u32) -> PyResult<()> {
+        let mut graph = self.graph();
+        let a = Self::node(&graph, a)?;
+        graph.declare_not_negative(a);
+        Ok(())
+    }
+
+    /// Whether an expression may bend or jump, or have a root: where a sign inside of it changes, or a domain ends.
+    fn has_kinks(&self, a: u32) -> PyResult<bool> {
+        let graph = self.graph();
+        let a = Self::node(&graph, a)?;
+        Ok(graph.has_signs(a) || !graph.is_analytic(&[a]))
+    }
+
+    /// The ends of an interval that an expression does not leave.
+    fn range(&self, a: u32) -> PyResult<(f64, f64)> {
+        let graph = self.graph();
+        Ok(graph.range(Self::node(&graph, a)?))
+    }
+
     fn switch(&self, a: u32) -> PyResult<(i64, f64)> {
         let mut graph = self.graph();
         let a = Self::node(&graph, a)?;

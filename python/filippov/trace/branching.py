@@ -149,6 +149,7 @@ class Tracer:
         self.unresolved: dict[int, None] = {}
         self.has_pieces = False
         self._pieces: dict[tuple[int, bool], Pieces | None] = {}
+        self._signs: dict[int, float] = {}
         self._continued: dict[int, int] = {}
         self._path: list[tuple[int, float]] = []
         self._flipped: list[bool] = []
@@ -230,7 +231,7 @@ class Tracer:
 
     def sign(self, node: int) -> int:
         """Return the node of the sign of an expression."""
-        known = self.known_sign(node) if self.parameters else None
+        known = self.sign_everywhere(node)
         if known is not None:
             return self.builder.constant(known)
         if self.is_constant_of_motion(node):
@@ -251,7 +252,7 @@ class Tracer:
 
     def absolute(self, node: int) -> int:
         """Return the node of the absolute value of an expression."""
-        known = self.known_sign(node) if self.parameters else None
+        known = self.sign_everywhere(node)
         if known is not None:
             return node if known >= 0.0 else self.builder.unary("negative", node)
         if self.is_constant_of_motion(node):
@@ -263,7 +264,7 @@ class Tracer:
     def extreme(self, first: int, second: int, *, largest: bool) -> int:
         """Return the node of the maximum or the minimum of two expressions."""
         difference = self.builder.binary("subtract", first, second)
-        known = self.known_sign(difference) if self.parameters else None
+        known = self.sign_everywhere(difference)
         if known is not None:
             return first if (known >= 0.0) == largest else second
         as_function = self.pieces(difference) is None and not self._continued
@@ -278,7 +279,7 @@ class Tracer:
 
     def compare(self, node: int, *, strict: bool) -> Condition | bool:
         """Return the condition ``expression > 0`` (``>= 0`` unless strict); its answer if it is known."""
-        known = self.known_sign(node) if self.parameters else None
+        known = self.sign_everywhere(node)
         if known is None:
             if self.is_constant_of_motion(node):
                 node = self.laws.sign(self, node)
@@ -297,6 +298,19 @@ class Tracer:
                 return Comparison(self, surface, orientation)
             known = orientation
         return known > 0.0 or (not strict and known == 0.0)
+
+    def sign_everywhere(self, node: int) -> float | None:
+        """Return the sign of an expression if it is the same at all points but single ones.
+
+        It is that of constants and parameters; or it follows in each region from the whole numbers around what a
+        floor is taken of, as of ``x - np.floor(x)``.
+        """
+        known = self.known_sign(node) if self.parameters else None
+        if known is None and self.laws.names and self.builder.has_signs(node):
+            self.pieces(node)
+            known = self._signs.get(node)
+            self.has_pieces |= known is not None
+        return known
 
     def equal(self, node: int) -> Condition | bool | None:
         """Return the condition ``expression == 0``; None if that is so at single points only."""
@@ -345,6 +359,8 @@ class Tracer:
                 self.unresolved[node] = None
             # An expression of one sign, zeros at single points aside, is left to its surface.
             is_whole = pieces is None or (not in_full and len(pieces) == 2 and pieces[1] != 0.0)
+            if is_whole and pieces is not None and isinstance(pieces[1], float):
+                self._signs[node] = pieces[1]
             self._pieces[node, in_full] = None if is_whole else pieces
         return self._pieces[node, in_full]
 

@@ -24,6 +24,13 @@ __all__ = ["Laws"]
 # Whole numbers are told apart by less.
 _BETWEEN = 1e-6
 
+# The whole number of a level is followed by the next one at this distance. A floor is right up to a distance of 1. At 1/2
+# quantities turn back that turn back at whole numbers, as the argument of `np.rint(np.abs(x))` does: not at the golden ratio.
+_REACH = 0.5 * (math.sqrt(5.0) - 1.0)
+
+# An end of a range counts as a whole number up to rounding.
+_WHOLE = 1e-9
+
 
 class _Kind(NamedTuple):
     """What the discrete state of a kind of law is, and whether it depends on the past beside the point."""
@@ -100,11 +107,35 @@ class Laws:
         node = tracer.as_surface(node)
         level = self._state(tracer, _Law("level", (node,), ()), "nearest")
         half = builder.constant(0.5)
-        distance = builder.binary("subtract", node, level)
         tracer.ask(node, "quantiser")
         # At a whole number the floor is that number itself.
-        step = tracer.choose(distance, half, builder.constant(-0.5))
-        return builder.binary("add", builder.binary("subtract", level, half), step)
+        step = tracer.choose(self._above(tracer, node, level), half, builder.constant(-0.5))
+        floor = builder.binary("add", builder.binary("subtract", level, half), step)
+        rest = builder.binary("subtract", node, floor)
+        for bound in (rest, builder.binary("subtract", builder.constant(1.0), rest)):
+            builder.declare_not_negative(bound)
+        return floor
+
+    def _above(self, tracer: Tracer, node: int, level: int) -> int:
+        """Return what is positive where an expression is above the whole number of its level.
+
+        An expression with kinks or roots does not cross the ends of its range: it turns back there, often where
+        another function vanishes. If such an end is a whole number, the difference is moved off zero at that.
+        """
+        builder = tracer.builder
+        distance = builder.binary("subtract", node, level)
+        if not builder.has_kinks(node):
+            return distance
+        low, high = (round(end) if abs(end - np.rint(end)) < _WHOLE else None for end in builder.range(node))
+        if low is None and high is None:
+            return distance
+        knots = [] if low is None else [low + 0.5]
+        offsets = [0.0] if low is None else [1.0, 0.0]
+        if high is not None and (low is None or high > low):
+            knots.append(high - 0.5)
+            offsets.append(-1.0)
+        place = self._state(tracer, _Law("place", (level,), tuple(knots)), "place")
+        return builder.binary("add", distance, self.entry(tracer, place, tuple(offsets), name="end"))
 
     def ceil(self, tracer: Tracer, node: int) -> int:
         """Return the node of the smallest whole number that is not below an expression."""
@@ -260,7 +291,7 @@ class Laws:
     def complete(self, tracer: Tracer) -> None:
         """Declare the surfaces at which discrete states change; no law can be added after that."""
         builder = tracer.builder
-        half = builder.constant(0.5)
+        half, reach = builder.constant(0.5), builder.constant(_REACH)
         before = builder.n_surfaces()
         # A table adds laws for the ends of its pieces.
         for index, law in enumerate(self._laws):
@@ -268,8 +299,10 @@ class Laws:
             numbers = list(law.numbers)
             if law.kind == "level":
                 distance = builder.binary("subtract", law.nodes[0], state)
-                surface, orientation = builder.switch(distance)
-                guard = builder.declare_surface(builder.binary("subtract", half, builder.abs(distance)))
+                above = self._above(tracer, law.nodes[0], state)
+                surface, orientation = builder.switch(above)
+                size = builder.binary("multiply", builder.sign(above), distance)
+                guard = builder.declare_surface(builder.binary("subtract", reach, size))
                 numbers = [float(surface), orientation, float(guard)]
             elif law.kind == "piece":
                 is_clock = self.is_clock(tracer, law.nodes[0])

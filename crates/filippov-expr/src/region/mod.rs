@@ -130,7 +130,7 @@ impl Regions {
         for at in (0..kept.len()).rev() {
             let mut flipped = kept.clone();
             flipped[at].1 = -flipped[at].1;
-            if !self.is_solvable(&flipped, true) {
+            if !self.is_solvable(&flipped, &[], true) {
                 kept.remove(at);
             }
         }
@@ -329,11 +329,18 @@ impl Regions {
         if let Some((value, side)) = also {
             sides.push((self.graph.at_signs(&[value], signs)[0], side));
         }
-        self.is_solvable(&sides, with_parameters)
+        let known = self.graph.not_negative.clone();
+        let known = self.graph.at_signs(&known, signs);
+        self.is_solvable(&sides, &known, with_parameters)
     }
 
-    /// Whether there may be a point at which all `side * value > 0` (side 0: value = 0).
-    fn is_solvable(&mut self, sides: &[(NodeId, f64)], with_parameters: bool) -> bool {
+    /// Whether there may be a point at which all `side * value > 0` (side 0: value = 0), where the known values are not negative.
+    fn is_solvable(
+        &mut self,
+        sides: &[(NodeId, f64)],
+        known: &[NodeId],
+        with_parameters: bool,
+    ) -> bool {
         let mut rows = Vec::new();
         for &(mut function, side) in sides {
             if with_parameters {
@@ -349,6 +356,18 @@ impl Regions {
         let mut atoms: Vec<NodeId> = rows.iter().flat_map(Inequality::atoms).collect();
         atoms.sort_unstable();
         atoms.dedup();
+        for &known in known {
+            let known = match with_parameters {
+                true => self.with_parameters(known),
+                false => known,
+            };
+            let form = LinearForm::of(&self.graph, known);
+            // Of other atoms nothing else is known.
+            let is_of_these = |term: &(NodeId, f64)| atoms.binary_search(&term.0).is_ok();
+            if form.terms.iter().all(is_of_these) {
+                rows.push(Inequality::new(&form, 1.0, false));
+            }
+        }
         for atom in atoms {
             if self.graph.facts(atom).nonnegative && !self.graph.facts(atom).has_sign {
                 rows.push(Inequality::bound(atom, 1.0, 0.0));

@@ -55,8 +55,9 @@ pub(super) struct Model {
     sticking: FxHashMap<usize, TieredProgram>,
     /// The nodes of these ratios.
     ratios: FxHashMap<usize, NodeId>,
-    /// Surfaces that are monitored in every mode.
+    /// Surfaces that trigger actions: monitored in every mode, but for those of followers.
     watched: Vec<usize>,
+    followers: Vec<Follower>,
     /// Surfaces whose sign something depends on: the field, or another surface that matters.
     switching: OnceLock<Vec<bool>>,
     jets: Mutex<JetsCache>,
@@ -65,6 +66,17 @@ pub(super) struct Model {
     activity: Mutex<FxHashMap<Entries, Vec<bool>>>,
     /// Whether something jumps at a surface, by surface and mode; found only where a function is zero along a motion.
     jumps: Mutex<FxHashMap<(usize, Entries), bool>>,
+}
+
+/// A discrete state that is a function of the point, and that need not be followed where nothing reads it. There the quantity
+/// that it follows may end, or jump.
+pub(super) struct Follower {
+    /// The parameter that it is.
+    pub parameter: u32,
+    /// The surface at which it changes; none of one that is made of others.
+    pub guard: Option<usize>,
+    /// What it follows.
+    pub argument: NodeId,
 }
 
 /// The entries of a mode: a sign per surface, 0 for one slid on.
@@ -148,6 +160,7 @@ impl Model {
             sticking: FxHashMap::default(),
             ratios: FxHashMap::default(),
             watched: Vec::new(),
+            followers: Vec::new(),
             switching: OnceLock::new(),
             lie: Mutex::new(LieCache::default()),
             second_lie: surfaces.iter().map(|_| Default::default()).collect(),
@@ -187,16 +200,17 @@ impl Model {
         self.sticking.get(&j).map(TieredProgram::program)
     }
 
-    /// Monitors these surfaces in every mode.
-    pub fn watch(&mut self, surfaces: &[usize]) {
+    /// Monitors these surfaces in every mode, but those of followers only where something reads their discrete states.
+    pub fn watch(&mut self, surfaces: &[usize], followers: Vec<Follower>) {
         self.watched = surfaces.to_vec();
+        self.followers = followers;
     }
 
     /// Does anything but the trigger of an action depend on the sign of surface `j`?
     pub fn switches_at(&self, j: usize) -> bool {
         // No sign is given: both branches of every choice count.
         self.switching.get_or_init(|| {
-            let mut depends = self.depend_on(&[], Vec::new());
+            let mut depends = self.depend_on(&[], Vec::new(), &[]);
             for &watched in &self.watched {
                 let others = self
                     .graph
@@ -427,17 +441,20 @@ impl Model {
 
     /// The surfaces that matter for one sign pattern.
     fn active_at(&self, signs: &[f64]) -> Vec<bool> {
-        self.depend_on(signs, self.watched.clone())
+        let is_free = |j: &usize| self.followers.iter().all(|one| one.guard != Some(*j));
+        let watched = self.watched.iter().copied().filter(is_free);
+        self.depend_on(signs, watched.collect(), &self.followers)
     }
 
-    /// The surfaces on which the field depends, or one of `also`, or one found so.
-    fn depend_on(&self, signs: &[f64], also: Vec<usize>) -> Vec<bool> {
+    /// The surfaces on which the field depends, or one of `also`, or one found so; and those of the followers that these read.
+    fn depend_on(&self, signs: &[f64], also: Vec<usize>, followers: &[Follower]) -> Vec<bool> {
         let mut active = vec![false; self.affine.len()];
         let mut outputs = self.field.clone();
         for j in also {
             active[j] = true;
             outputs.push(self.graph.surface(j as u32));
         }
+        let mut idle: Vec<&Follower> = followers.iter().collect();
         loop {
             let found = self.graph.sign_dependencies(&outputs, signs);
             let fresh: Vec<usize> = (0..found.len())
@@ -447,9 +464,26 @@ impl Model {
                 active[j] = true;
                 outputs.push(self.graph.surface(j as u32));
             }
-            if fresh.is_empty() {
+            if !fresh.is_empty() {
+                continue;
+            }
+            let read = match idle.is_empty() {
+                true => Vec::new(),
+                false => self.graph.parameters_read_at(&outputs, signs),
+            };
+            let is_read = |one: &&Follower| read.contains(&one.parameter);
+            let (needed, others): (Vec<_>, Vec<_>) = idle.into_iter().partition(is_read);
+            if needed.is_empty() {
                 return active;
             }
+            for follower in needed {
+                outputs.push(follower.argument);
+                if let Some(guard) = follower.guard {
+                    active[guard] = true;
+                    outputs.push(self.graph.surface(guard as u32));
+                }
+            }
+            idle = others;
         }
     }
 

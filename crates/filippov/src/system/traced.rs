@@ -9,7 +9,7 @@ use std::sync::Arc;
 use filippov_expr::{Backend, Enclosure, ExprError, Graph, Motion, Names, NodeId, Program};
 use smallvec::SmallVec;
 
-use super::compiled::Model;
+use super::compiled::{Follower, Model};
 use super::{
     AffineSigns, BothSides, Enclosures, LieDerivatives, LieValue, Linearisations, MotionJacobian,
     MotionJets, PiecewiseSystem, Place, RatePartials, Setting, SignStructure, TaylorSeries, Word,
@@ -61,9 +61,18 @@ impl TracedSystem {
     /// The same system with these surfaces monitored in every mode, whether the field depends on them or not:
     /// they trigger actions. For a system that was just made.
     #[must_use]
-    pub fn watching(mut self, surfaces: &[usize]) -> Self {
+    pub fn watching(self, surfaces: &[usize]) -> Self {
+        self.watching_with_followers(surfaces, Vec::new())
+    }
+
+    /// The same, some of them only where something reads the discrete state that changes there.
+    pub(super) fn watching_with_followers(
+        mut self,
+        surfaces: &[usize],
+        followers: Vec<Follower>,
+    ) -> Self {
         if let Some(model) = Arc::get_mut(&mut self.model) {
-            model.watch(surfaces);
+            model.watch(surfaces, followers);
         }
         self
     }
