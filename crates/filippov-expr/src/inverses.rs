@@ -42,9 +42,9 @@ pub(crate) fn without_root(graph: &mut Graph, form: &LinearForm) -> Option<(Node
     solved_for_a_root(graph, form, true)
 }
 
-/// An expression that vanishes where a sum with a root does; `None` if no root can be taken away.
-pub(crate) fn zeros_without_root(graph: &mut Graph, form: &LinearForm) -> Option<NodeId> {
-    solved_for_a_root(graph, form, false).map(|(node, _)| node)
+/// The same, with the sign of the sum where that is defined: beyond the domain of the root it may have another one.
+pub(crate) fn within_domain(graph: &mut Graph, form: &LinearForm) -> Option<(NodeId, f64)> {
+    solved_for_a_root(graph, form, false)
 }
 
 /// If `is_everywhere`, also beyond the domain of the root.
@@ -93,7 +93,12 @@ fn root_at(
         (Inverse::Cube, _) => argument,
         // Beyond the regions of the signs in it the root counts as 0.
         (_, Node::Unary(UnaryOp::NotNegative, inner)) => inner,
-        _ if graph.facts(argument).nonnegative || !is_everywhere => argument,
+        _ if !is_everywhere
+            || graph.facts(argument).nonnegative
+            || graph.range(argument).0 >= 0.0 =>
+        {
+            argument
+        }
         _ => return None,
     };
     // A logarithm of what has no kink has no pole that a motion passes.
@@ -239,3 +244,6 @@ fn sum_of(graph: &mut Graph, form: &LinearForm) -> NodeId {
     }
     sum
 }
+
+#[cfg(test)]
+mod tests;

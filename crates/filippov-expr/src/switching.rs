@@ -184,6 +184,15 @@ impl Graph {
         Switching::Surface { index, orientation }
     }
 
+    /// Lets an expression switch where another one does that has the same sign wherever both are defined: one with its roots
+    /// continued.
+    pub fn switch_as(&mut self, id: NodeId, other: NodeId) {
+        if let Switching::Surface { index, orientation } = self.switch(other) {
+            let side = (index, orientation);
+            self.surfaces_mut().switches.entry(id).or_insert(side);
+        }
+    }
+
     /// The surface of a function as it is spelled: a known one, or a new one. (A spelling can be known while
     /// its linear form is not: the terms of long sums are matched up to rounding, and can cancel.)
     fn surface_of_spelling(&mut self, function: NodeId) -> Side {
@@ -371,7 +380,7 @@ impl Graph {
 
     /// The surface on which an expression switches, if it is known already, also when what does not change
     /// the sign is stripped. No new nodes, no recursion.
-    fn known_switch(&self, id: NodeId) -> Option<Side> {
+    pub(crate) fn known_switch(&self, id: NodeId) -> Option<Side> {
         let mut current = id;
         let mut side = 1.0;
         loop {

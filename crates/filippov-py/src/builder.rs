@@ -118,7 +118,7 @@ impl Builder {
         Ok(())
     }
 
-    /// Whether an expression may bend or jump, or have a root: where a sign inside of it changes, or a domain ends.
+    /// Whether an expression may bend, jump or end: where a sign inside of it changes, or a root begins.
     fn has_kinks(&self, a: u32) -> PyResult<bool> {
         let graph = self.graph();
         let a = Self::node(&graph, a)?;
@@ -138,6 +138,14 @@ impl Builder {
             Switching::Constant(sign) => (-1, sign),
             Switching::Surface { index, orientation } => (i64::from(index), orientation),
         })
+    }
+
+    /// Lets an expression switch where another one does.
+    fn switch_as(&self, a: u32, other: u32) -> PyResult<()> {
+        let mut graph = self.graph();
+        let (a, other) = (Self::node(&graph, a)?, Self::node(&graph, other)?);
+        graph.switch_as(a, other);
+        Ok(())
     }
 
     fn select(&self, surface: u32, orientation: f64, plus: u32, minus: u32) -> PyResult<u32> {

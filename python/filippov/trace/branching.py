@@ -139,6 +139,7 @@ class Tracer:
         self.laws = Laws(len(parameters)) if laws is None else laws
         self.constants = constants
         self.stand_ins = stand_ins
+        self.laws_read: set[int] = set()
         self.asked: dict[int, None] = {}
         self.is_doubtful = False
         self.n_paths = 0
@@ -257,7 +258,8 @@ class Tracer:
             return node if known >= 0.0 else self.builder.unary("negative", node)
         if self.is_constant_of_motion(node):
             return self.builder.binary("multiply", self.laws.sign(self, node), node)
-        if self.pieces(node) is None:
+        if self.pieces(node) is None and not self.is_stepwise(node):
+            self.switch_as_surface(node)
             return self.builder.abs(node)
         return self.choose(node, node, self.builder.unary("negative", node))
 
@@ -267,8 +269,9 @@ class Tracer:
         known = self.sign_everywhere(difference)
         if known is not None:
             return first if (known >= 0.0) == largest else second
-        as_function = self.pieces(difference) is None and not self._continued
-        if as_function and not self.is_constant_of_motion(difference):
+        is_plain = self.pieces(difference) is None and not self.is_stepwise(difference)
+        if is_plain and not self.is_constant_of_motion(difference):
+            self.switch_as_surface(difference)
             return self.builder.maximum(first, second) if largest else self.builder.minimum(first, second)
         return self.choose(difference, first, second) if largest else self.choose(difference, second, first)
 
@@ -289,7 +292,7 @@ class Tracer:
             if pieces is not None:
                 self.has_pieces = True
                 return condition_of(self, pieces, strict=strict)
-            if self.builder.has_signs(node) and self.builder.is_stepwise(node):
+            if self.is_stepwise(node):
                 node = self.laws.beside(self, node, -1.0 if strict else 1.0)
             node = self.as_surface(node)
             self.ask(node, "comparison", is_strict=strict)
@@ -334,6 +337,10 @@ class Tracer:
         is_positive = self.compare(node, strict=True)
         is_negative = self.compare(self.builder.unary("negative", node), strict=True)
         return _opposite(is_positive) & _opposite(is_negative)
+
+    def is_stepwise(self, node: int) -> bool:
+        """Whether an expression contains signs and changes only where they or discrete states in it do."""
+        return self.builder.has_signs(node) and self.builder.is_stepwise(node)
 
     def is_constant_of_motion(self, node: int) -> bool:
         """Whether an expression is known to stay as it is along every motion."""
@@ -395,8 +402,19 @@ class Tracer:
         return self._continued[root] if self.jumps(argument) else root
 
     def as_surface(self, node: int) -> int:
-        """Return an expression as a switching function: with its roots continued."""
-        return self.builder.substituted(node, list(self._continued.items())) if self._continued else node
+        """Return an expression as a switching function: with its roots continued, those inside of others too."""
+        images = list(self._continued.items())
+        for _ in images:
+            before, node = node, self.builder.substituted(node, images)
+            if node == before:
+                break
+        return node
+
+    def switch_as_surface(self, node: int) -> None:
+        """Let an expression switch where it does with its roots continued."""
+        surface = self.as_surface(node)
+        if surface != node:
+            self.builder.switch_as(node, surface)
 
     def known_sign(self, node: int) -> float | None:
         """Return the sign of an expression of constants and parameters; None if it depends on the motion."""

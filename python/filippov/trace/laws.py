@@ -104,29 +104,28 @@ class Laws:
         if pieces is not None and (has_constant_part(tracer, pieces) or tracer.jumps(node)):
             # A level follows what moves continuously: each part has its own.
             return by_parts(tracer, pieces, lambda part, _: self.floor(tracer, part))
-        node = tracer.as_surface(node)
+        plain, node = node, tracer.as_surface(node)
         level = self._state(tracer, _Law("level", (node,), ()), "nearest")
         half = builder.constant(0.5)
         tracer.ask(node, "quantiser")
         # At a whole number the floor is that number itself.
         step = tracer.choose(self._above(tracer, node, level), half, builder.constant(-0.5))
         floor = builder.binary("add", builder.binary("subtract", level, half), step)
-        rest = builder.binary("subtract", node, floor)
-        for bound in (rest, builder.binary("subtract", builder.constant(1.0), rest)):
-            builder.declare_not_negative(bound)
+        for argument in {plain, node}:
+            rest = builder.binary("subtract", argument, floor)
+            builder.declare_not_negative(rest)
+            builder.declare_not_negative(builder.binary("subtract", builder.constant(1.0), rest))
         return floor
 
     def _above(self, tracer: Tracer, node: int, level: int) -> int:
         """Return what is positive where an expression is above the whole number of its level.
 
-        An expression with kinks or roots does not cross the ends of its range: it turns back there, often where
-        another function vanishes. If such an end is a whole number, the difference is moved off zero at that.
+        An expression does not cross the ends of its range: it turns back there, often where another function
+        vanishes. If such an end is a whole number, the difference is moved off zero at that.
         """
         builder = tracer.builder
         distance = builder.binary("subtract", node, level)
-        if not builder.has_kinks(node):
-            return distance
-        low, high = (round(end) if abs(end - np.rint(end)) < _WHOLE else None for end in builder.range(node))
+        low, high = (_whole_number(end) for end in builder.range(node))
         if low is None and high is None:
             return distance
         knots = [] if low is None else [low + 0.5]
@@ -284,6 +283,16 @@ class Laws:
         is_real = any(self._values[index] == "real" for index in self._read(tracer, node))
         return self.sign(tracer, node) if is_real else node
 
+    def may_be_idle(self, tracer: Tracer) -> bool:
+        """Whether a trace has read a discrete state that a run does not follow where its field does not read it.
+
+        So it is with a quantity that has kinks, jumps or roots: it may end where it does not count.
+        """
+        read = [self._laws[index] for index in tracer.laws_read]
+        is_followed = [law.kind not in ("level", "piece") for law in read]
+        kinks = [tracer.builder.has_kinks(law.nodes[0]) for law in read]
+        return any(kink and not followed for kink, followed in zip(kinks, is_followed, strict=True))
+
     def beside(self, tracer: Tracer, node: int, side: float) -> int:
         """Return an expression of whole numbers moved off them, so that it is never zero."""
         return tracer.builder.binary("add", node, tracer.builder.constant(side * _BETWEEN))
@@ -350,4 +359,10 @@ class Laws:
             self._laws.append(law)
             self._values.append(law.values)
             self.names.append(name if name.endswith(")") else f"{name}({tracer.text(law.nodes[0])})")
+        tracer.laws_read.add(index)
         return tracer.builder.parameter(self.first + index)
+
+
+def _whole_number(end: float) -> int | None:
+    """Return the end of a range if it is a whole number, else None."""
+    return round(end) if math.isfinite(end) and abs(end - round(end)) < _WHOLE else None

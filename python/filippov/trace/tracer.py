@@ -256,6 +256,8 @@ def trace_event(
     try:
         tracer, node = _with_stand_ins(attempt)
         builder = tracer.builder
+        if own.laws.may_be_idle(tracer):
+            return OWN_LAW
         check_questions(tracer, Roots([node]), "event")
         event = TracedEvent(builder, node)
         keywords = _named(g, dict(values), "event")

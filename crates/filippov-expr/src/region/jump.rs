@@ -2,7 +2,7 @@
 
 use rustc_hash::FxHashMap;
 
-use crate::inverses::zeros_without_root;
+use crate::inverses;
 use crate::linear::LinearForm;
 use crate::node::{Node, NodeId};
 use crate::op::{BinaryOp, UnaryOp};
@@ -96,7 +96,7 @@ impl Regions {
             }
         }
         // The surface of log(x) is x - 1.
-        if let Some(rootless) = zeros_without_root(&mut self.graph, &form) {
+        if let Some((rootless, _)) = inverses::within_domain(&mut self.graph, &form) {
             if self.vanishes_with(rootless, function) {
                 return true;
             }

@@ -17,6 +17,7 @@ pub use edge::Edge;
 pub use pieces::{PartSign, Pieces};
 
 use crate::graph::Graph;
+use crate::inverses;
 use crate::linear::LinearForm;
 use crate::node::{Node, NodeId};
 use crate::op::{BinaryOp, UnaryOp};
@@ -421,9 +422,18 @@ impl Regions {
             return (region, true);
         }
         let signs = region.signs.clone();
-        if self.possible(&signs, Some((value, -1.0))) != Possible::Yes {
+        // It may have the sign of a surface, as a cube root has that of its argument.
+        if let Some((index, orientation)) = self.graph.known_switch(value) {
+            if let Some(sign) = signs.get(index as usize).copied().flatten() {
+                region.kind = kind_of(orientation * sign);
+                return (region, true);
+            }
+        }
+        let rootless = inverses::within_domain(&mut self.graph, form);
+        let (value, sense) = rootless.unwrap_or((value, 1.0));
+        if self.possible(&signs, Some((value, -sense))) != Possible::Yes {
             region.kind = Kind::Positive;
-        } else if self.possible(&signs, Some((value, 1.0))) != Possible::Yes {
+        } else if self.possible(&signs, Some((value, sense))) != Possible::Yes {
             region.kind = Kind::Negative;
         }
         (region, true)

@@ -11,7 +11,7 @@ use super::surroundings::Surroundings;
 use crate::cube::{roots_in_cube, NormalFields};
 use crate::error::{FieldError, Undecided};
 use crate::mode::Mode;
-use crate::motion::Guard;
+use crate::motion::{normal_component, Guard};
 use crate::tolerances::{DOUBTFUL, MOST_MEETING, ONE_DIRECTION, SURFACE_NOISE};
 
 /// All modes at a point.
@@ -92,6 +92,10 @@ pub(super) fn survey(
                 Ok(fields) => {
                     others = fields;
                     &others
+                }
+                Err(Undecided::NotFinite) => {
+                    try_candidate(at, notes, meeting, (mode, &vanishing), &mut found)?;
+                    continue;
                 }
                 Err(_) => return Ok(None),
             },
@@ -194,6 +198,15 @@ fn try_candidate(
     if velocity.iter().any(|v| !v.is_finite()) {
         found.failing.push((mode, guard));
         return Ok(());
+    }
+    if let Some(j) = mode.sliding() {
+        let sides =
+            [-1, 1].map(|side| normal_component(at.system, j, j, side, &at.place(&mode.signs())));
+        let [minus, plus] = sides;
+        if !(minus?.value > 0.0 && plus?.value < 0.0) {
+            found.failing.push((mode, guard));
+            return Ok(());
+        }
     }
     let next = Next::new(mode.clone(), Lefts::new());
     let met = surfaces.zip(vanishing).filter(|(_, vanishes)| **vanishes);

@@ -474,7 +474,8 @@ impl ActionMap for LawMap {
             return;
         }
         match &self.laws.laws[index] {
-            Law::Level { .. } if (g - q[index]).abs() > 0.5 => q[index] = g.round(),
+            Law::Level { .. } if (g - q[index]).abs() <= 0.5 => return,
+            Law::Level { .. } => q[index] = g.round(),
             Law::Piece {
                 knots,
                 guard: Some(_),
