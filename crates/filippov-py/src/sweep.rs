@@ -168,7 +168,7 @@ impl PlaceSpec {
         let traced = system.cast::<TracedSystem>().ok();
         let refused = |text: &str| PyValueError::new_err(text.to_owned());
         let compiled = |graph: &filippov_expr::Graph, node| {
-            let expression = EventExpression::compile(graph, node);
+            let expression = EventExpression::compile(graph, node, &[], 0);
             expression.map_err(|e| PyValueError::new_err(e.to_string()))
         };
         match form.as_str() {

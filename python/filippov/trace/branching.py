@@ -108,6 +108,10 @@ class Tracer:
     ----------
     asked : dict of int to None
         Nodes whose sign was asked for, in a trace that does not know the constants of motion.
+    laws_read : set of int
+        Laws whose discrete states the trace has read.
+    own_levels : dict of int to None
+        What an event takes floors of that the field has not.
     is_doubtful : bool
         Whether such a trace answered a question that depends on them without an answer.
     """
@@ -140,6 +144,7 @@ class Tracer:
         self.constants = constants
         self.stand_ins = stand_ins
         self.laws_read: set[int] = set()
+        self.own_levels: dict[int, None] = {}
         self.asked: dict[int, None] = {}
         self.is_doubtful = False
         self.n_paths = 0

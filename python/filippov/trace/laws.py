@@ -98,14 +98,19 @@ class Laws:
             return builder.constant(whole)
         if not builder.depends_on_motion(node) or tracer.is_constant_of_motion(node):
             return self._state(tracer, _Law("held", (node,), ()), "floor")
-        if self.is_clock(tracer, node):
-            return self._state(tracer, _Law("clock", (node,), ()), "floor")
+        clock = _Law("clock", (node,), ())
+        if self.is_clock(tracer, node) and not (self._is_complete and clock not in self._known):
+            return self._state(tracer, clock, "floor")
         pieces = tracer.pieces(node, in_full=True)
         if pieces is not None and (has_constant_part(tracer, pieces) or tracer.jumps(node)):
             # A level follows what moves continuously: each part has its own.
             return by_parts(tracer, pieces, lambda part, _: self.floor(tracer, part))
         plain, node = node, tracer.as_surface(node)
-        level = self._state(tracer, _Law("level", (node,), ()), "nearest")
+        law = _Law("level", (node,), ())
+        # A run does not follow what its field does not read, nor everywhere what may end.
+        if self._is_complete and (law not in self._known or builder.has_kinks(node)):
+            return self._own_floor(tracer, node)
+        level = self._state(tracer, law, "nearest")
         half = builder.constant(0.5)
         tracer.ask(node, "quantiser")
         # At a whole number the floor is that number itself.
@@ -116,6 +121,22 @@ class Laws:
             builder.declare_not_negative(rest)
             builder.declare_not_negative(builder.binary("subtract", builder.constant(1.0), rest))
         return floor
+
+    def _own_floor(self, tracer: Tracer, node: int) -> int:
+        """Return the node of a floor that an event has and the field has not: that of the point, not of a run.
+
+        It is the even or the odd whole number beside the expression, by the sign of sin(pi g), which changes at all
+        whole numbers: `OwnLevel` in ``crates/filippov-py/src/callbacks.rs``.
+        """
+        builder = tracer.builder
+        if builder.is_stepwise(node):
+            raise NoSuchLaw("floor(...) of what changes by jumps, which the right-hand side does not have")
+        index = list(tracer.own_levels).index(node) if node in tracer.own_levels else len(tracer.own_levels)
+        tracer.own_levels[node] = None
+        even, odd = (builder.parameter(self.first + len(self.names) + 2 * index + k) for k in (0, 1))
+        wave = builder.unary("sin", builder.binary("multiply", builder.constant(math.pi), node))
+        surface, orientation = builder.switch(wave)
+        return builder.select(surface, orientation, even, odd)
 
     def _above(self, tracer: Tracer, node: int, level: int) -> int:
         """Return what is positive where an expression is above the whole number of its level.

@@ -259,7 +259,7 @@ def trace_event(
         if own.laws.may_be_idle(tracer):
             return OWN_LAW
         check_questions(tracer, Roots([node]), "event")
-        event = TracedEvent(builder, node)
+        event = TracedEvent(builder, node, list(tracer.own_levels), len(tracer.names()))
         keywords = _named(g, dict(values), "event")
         if not own.laws.names:
             verify_event(event, lambda t, x: g(t, x, *args, **keywords), tracer)

@@ -145,3 +145,11 @@ pub const SMALL_REST: f64 = 1e-5;
 
 /// The same where it is only asked whether there is a zero at all: terms that others may outweigh.
 pub const REST_BESIDE: f64 = 0.125;
+
+/// Where the sign of a user's function behind a zero is looked at, in shares of the piece that is searched: near, and farther
+/// from a double zero, where its values are within rounding for the square root of that.
+pub const SHARES_BEHIND_ZERO: [f64; 3] = [1e-7, 1e-5, 1e-3];
+
+/// Behind a touch the search goes on where a user's function is larger than its rounding by this factor: the touch is not
+/// found again.
+pub const BEHIND_TOUCH: f64 = 8.0;
