@@ -243,18 +243,22 @@ class Tracer:
         if self.is_constant_of_motion(node):
             return self.laws.sign(self, node)
         if self.laws.is_held(self, node):
-            node = self.laws.whole(self, node)
-            # Whole numbers may be zero for a while, where the sign is 0.
-            sides = [self.builder.sign(self.laws.beside(self, node, side)) for side in (-1.0, 1.0)]
-            both = self.builder.binary("add", *sides)
-            return self.builder.binary("multiply", self.builder.constant(0.5), both)
+            return self._sign_of_whole_number(self.laws.whole(self, node))
         pieces = self.pieces(node)
         if pieces is not None:
             self.has_pieces = True
             return sign_of(self, pieces)
+        if self.is_stepwise(node):
+            return self._sign_of_whole_number(node)
         node = self.as_surface(node)
         self.ask(node, "sign")
         return self.builder.sign(node)
+
+    def _sign_of_whole_number(self, node: int) -> int:
+        """Return the node of the sign of what may be zero for a while, where its sign is 0."""
+        sides = [self.builder.sign(self.laws.beside(self, node, side)) for side in (-1.0, 1.0)]
+        both = self.builder.binary("add", *sides)
+        return self.builder.binary("multiply", self.builder.constant(0.5), both)
 
     def absolute(self, node: int) -> int:
         """Return the node of the absolute value of an expression."""

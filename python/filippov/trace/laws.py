@@ -321,7 +321,7 @@ class Laws:
     def complete(self, tracer: Tracer) -> None:
         """Declare the surfaces at which discrete states change; no law can be added after that."""
         builder = tracer.builder
-        half, reach = builder.constant(0.5), builder.constant(_REACH)
+        half = builder.constant(0.5)
         before = builder.n_surfaces()
         # A table adds laws for the ends of its pieces.
         for index, law in enumerate(self._laws):
@@ -332,6 +332,7 @@ class Laws:
                 above = self._above(tracer, law.nodes[0], state)
                 surface, orientation = builder.switch(above)
                 size = builder.binary("multiply", builder.sign(above), distance)
+                reach = builder.constant(_REACH)
                 guard = builder.declare_surface(builder.binary("subtract", reach, size))
                 numbers = [float(surface), orientation, float(guard)]
             elif law.kind == "piece":
