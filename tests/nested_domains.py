@@ -149,8 +149,8 @@ def places(of: Callable[[Any], Any]) -> list[float]:
     """Return where a function of the time changes its sign, jumps through zero, or touches it on the way."""
     t = np.linspace(0.0, END, CELLS + 1)
     h = of(t)
-    # A dip towards zero between two points of the grid is looked at on a grid of its own, and is a place itself:
-    # a touch.
+    # A dip towards zero between two points of the grid is looked at on a grid of its own, and is a place
+    # itself: a touch.
     dips = np.flatnonzero((abs(h[1:-1]) <= abs(h[:-2])) & (abs(h[1:-1]) <= abs(h[2:])) & (h[:-2] * h[2:] > 0))
     found = touches(of, t[dips], t[dips + 2])
     fine = [np.linspace(t[k], t[k + 2], 257) for k in dips]

@@ -352,7 +352,11 @@ def test_a_quantiser_of_what_is_continuous_runs(quantised: Condition, exact: flo
         (lambda x: np.log10(np.abs(x)) > -1, lambda x: np.abs(x) > 0.1, 3.8),
         (lambda x: np.sqrt(np.abs(x)) > np.cbrt(x - 1), lambda x: abs(x) ** 1.5 > x - 1, 4.0),
         (lambda x: np.sqrt(np.abs(x)) < np.sqrt(np.abs(x - 1)), lambda x: x < 0.5, 2.5),
-        (lambda x: np.sqrt(np.abs(x)) > np.exp(-np.abs(x)), lambda x: abs(x) > 0.42630275100686, 3.14739449798628),
+        (
+            lambda x: np.sqrt(np.abs(x)) > np.exp(-np.abs(x)),
+            lambda x: abs(x) > 0.42630275100686,
+            3.14739449798628,
+        ),
     ],
 )
 def test_a_surface_with_a_root_that_ends_at_another_one(

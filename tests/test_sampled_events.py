@@ -1,4 +1,4 @@
-"""Events with a relay of their own, and sections with a floor, are said to be sampled; those with kinks are followed."""
+"""Events with a relay of their own, and sections with a floor, are said to be sampled."""
 
 from __future__ import annotations
 

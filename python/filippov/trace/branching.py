@@ -314,8 +314,8 @@ class Tracer:
     def sign_everywhere(self, node: int) -> float | None:
         """Return the sign of an expression if it is the same at all points but single ones.
 
-        It is that of constants and parameters; or it follows in each region from the whole numbers around what a
-        floor is taken of, as of ``x - np.floor(x)``.
+        It is that of constants and parameters; or it follows in each region from the whole numbers around
+        what a floor is taken of, as of ``x - np.floor(x)``.
         """
         known = self.known_sign(node) if self.parameters else None
         if known is None and self.laws.names and self.builder.has_signs(node):
@@ -411,7 +411,7 @@ class Tracer:
         return self._continued[root] if self.jumps(argument) else root
 
     def as_surface(self, node: int) -> int:
-        """Return an expression as a switching function: with its roots continued, those inside of others too."""
+        """Return an expression as a switching function: with its roots continued, also inside of others."""
         images = list(self._continued.items())
         for _ in images:
             before, node = node, self.builder.substituted(node, images)

@@ -24,8 +24,9 @@ __all__ = ["Laws"]
 # Whole numbers are told apart by less.
 _BETWEEN = 1e-6
 
-# The whole number of a level is followed by the next one at this distance. A floor is right up to a distance of 1. At 1/2
-# quantities turn back that turn back at whole numbers, as the argument of `np.rint(np.abs(x))` does: not at the golden ratio.
+# The whole number of a level is followed by the next one at this distance. A floor is right up to a distance
+# of 1. At 1/2 quantities turn back by design, as the argument of `np.rint(np.abs(x))` does, but not at the
+# golden ratio.
 _REACH = 0.5 * (math.sqrt(5.0) - 1.0)
 
 # An end of a range counts as a whole number up to rounding.
@@ -123,10 +124,10 @@ class Laws:
         return floor
 
     def _own_floor(self, tracer: Tracer, node: int) -> int:
-        """Return the node of a floor that an event has and the field has not: that of the point, not of a run.
+        """Return the node of a floor that an event has and the field has not: of the point, not of a run.
 
-        It is the even or the odd whole number beside the expression, by the sign of sin(pi g), which changes at all
-        whole numbers: `OwnLevel` in ``crates/filippov-py/src/callbacks.rs``.
+        It is the even or the odd whole number beside the expression, by the sign of sin(pi g), which changes
+        at all whole numbers: `OwnLevel` in ``crates/filippov-py/src/callbacks.rs``.
         """
         builder = tracer.builder
         if builder.is_stepwise(node):
@@ -305,7 +306,7 @@ class Laws:
         return self.sign(tracer, node) if is_real else node
 
     def may_be_idle(self, tracer: Tracer) -> bool:
-        """Whether a trace has read a discrete state that a run does not follow where its field does not read it.
+        """Whether a trace has read a discrete state that a run does not follow where nothing else reads it.
 
         So it is with a quantity that has kinks, jumps or roots: it may end where it does not count.
         """
