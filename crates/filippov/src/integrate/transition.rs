@@ -101,7 +101,7 @@ impl<'a> Integrator<'a> {
             return self.leave_without_progress(event);
         }
         if !self.run.actions.list.is_empty() {
-            self.follow_laws()?;
+            follow_laws(self)?;
             let h = self.ask(Cause::Start, |at, notes| {
                 at.surface_values(notes, at.arrival.signs)
             })?;
@@ -432,7 +432,7 @@ impl<'a> Integrator<'a> {
     ) -> Result<Option<Stop>, FieldError> {
         self.recorder.leave(&mut self.run, &[])?;
         if !self.run.actions.list.is_empty() {
-            self.follow_laws()?;
+            follow_laws(self)?;
         }
         let before = self.run.motion.mode.clone();
         let Decision { rule, decided } =
@@ -603,36 +603,6 @@ impl<'a> Integrator<'a> {
             self.run.residuals = self.run.motion.residuals(h, &surfaces);
         }
         Ok(None)
-    }
-
-    /// Brings the discrete states up to date that nothing read in the mode so far, before what follows is decided.
-    pub(super) fn follow_laws(&mut self) -> Result<(), FieldError> {
-        let (actions, active) = (self.run.actions, &self.run.motion.active);
-        let is_idle = |trigger: &Trigger| matches!(*trigger, Trigger::Surface { index, .. } if !active[index]);
-        let idle = actions
-            .list
-            .iter()
-            .filter(|action| is_idle(&action.trigger));
-        let idle: SmallVec<[&dyn ActionMap; 4]> = idle.map(|action| action.map).collect();
-        if idle.is_empty() {
-            return Ok(());
-        }
-        let mode = self.run.motion.mode.clone();
-        // They may read one another, also by signs.
-        for _ in 0..=idle.len() {
-            let sides = self.ask(Cause::Start, |at, notes| sides(at, notes, Some(&mode)))?;
-            let signs = sides.map_or_else(|| mode.signs(), |sides| sides.mode.signs());
-            let before = self.run.motion.discrete.clone();
-            let mut q = before.clone();
-            for map in &idle {
-                map.follow(self.run.t, &self.run.x, &signs, &mut q);
-            }
-            if q == before {
-                break;
-            }
-            self.run.motion.set_discrete(q);
-        }
-        Ok(())
     }
 
     /// Does these actions and those that they trigger, and goes on with the motion that follows.
@@ -852,4 +822,35 @@ impl<'a> Integrator<'a> {
         }
         Ok(stop)
     }
+}
+
+/// Brings the discrete states up to date that nothing read in the mode so far, before what follows is decided.
+fn follow_laws(integrator: &mut Integrator<'_>) -> Result<(), FieldError> {
+    let (actions, active) = (integrator.run.actions, &integrator.run.motion.active);
+    let is_idle =
+        |trigger: &Trigger| matches!(*trigger, Trigger::Surface { index, .. } if !active[index]);
+    let idle = actions
+        .list
+        .iter()
+        .filter(|action| is_idle(&action.trigger));
+    let idle: SmallVec<[&dyn ActionMap; 4]> = idle.map(|action| action.map).collect();
+    if idle.is_empty() {
+        return Ok(());
+    }
+    let mode = integrator.run.motion.mode.clone();
+    // They may read one another, also by signs.
+    for _ in 0..=idle.len() {
+        let sides = integrator.ask(Cause::Start, |at, notes| sides(at, notes, Some(&mode)))?;
+        let signs = sides.map_or_else(|| mode.signs(), |sides| sides.mode.signs());
+        let before = integrator.run.motion.discrete.clone();
+        let mut q = before.clone();
+        for map in &idle {
+            map.follow(integrator.run.t, &integrator.run.x, &signs, &mut q);
+        }
+        if q == before {
+            break;
+        }
+        integrator.run.motion.set_discrete(q);
+    }
+    Ok(())
 }
