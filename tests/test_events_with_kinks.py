@@ -139,3 +139,57 @@ def test_a_section_with_a_kink() -> None:
     returns = fl.poincare(system, lambda t, x: abs(x[0] - 0.3) - 1e-3, (0, 20 * np.pi), [1.0, 0.0])
     assert returns.sizes["obs"] == 40
     np.testing.assert_allclose(abs(returns["x[0]"] - 0.3), 1e-3, rtol=0, atol=1e-9)
+
+
+def changes(g: Callable[[Any], Any], end: float) -> list[float]:
+    """Return where a function of the time changes its sign, on a grid."""
+    t = np.linspace(1e-9, end, 400_001)
+    signs = np.sign([g(time) for time in t])
+    return list(t[np.flatnonzero(signs[1:] != signs[:-1])])
+
+
+# Functions of time and state: of an oscillator whose first state is sin(t).
+FLOORS: dict[str, Callable[[Any, Any], Any]] = {
+    "floor": lambda t, x: np.floor(3 * x) - 1.5,
+    "level that is reached": lambda t, x: np.floor(4 * x) - 0.5,
+    "of time": lambda t, x: np.floor(t + 0.3) % 2 - 0.5,
+    "remainder": lambda t, x: (x % 0.25) - 0.1,
+    "rounded": lambda t, x: np.rint(2 * abs(x)) - 0.5,
+    "of a root": lambda t, x: np.floor(3 * np.sqrt(abs(x))) - 1.5,
+    "sign of a rounded number": lambda t, x: np.sign(np.rint(1.7 * x)) - 0.5,
+    "inside": lambda t, x: np.where(np.floor(5 * x) > 1, 1.0, -1.0) * (x - 0.7),
+}
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("name", FLOORS)
+def test_a_floor_of_its_own_is_split_at_its_levels(name: str, method: str) -> None:
+    g = FLOORS[name]
+    sol = fl.solve_ivp(
+        oscillator,
+        (0, 9.9),
+        [0.0, 1.0],
+        method=method,
+        rtol=1e-9,
+        atol=1e-9,
+        events=lambda t, x: g(t, x[0]),
+    )
+    found = sol.t_events[0]
+    expected = changes(lambda t: g(t, np.sin(t)), 9.9)
+    for t in expected:
+        assert abs(found - t).min() < 1e-4
+    # Beside the top of the wave, which a level is at, the motion may pass it for a moment.
+    for t in found[found > 0.0]:
+        if min(abs(t - other) for other in expected) > 1e-4:
+            assert abs(np.cos(t)) < 1e-3
+            assert np.sum(abs(found - t) < 1e-3) % 2 == 0
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_zeros_behind_a_touch_in_the_same_step(method: str) -> None:
+    # At the top of the wave the function touches zero.
+    wave = lambda t, x: np.sin(3 * np.pi * x[0])  # noqa: E731
+    sol = fl.solve_ivp(oscillator, (0, 3), [0.0, 1.0], method=method, rtol=1e-10, atol=1e-10, events=wave)
+    rising = np.arcsin([0.0, 1 / 3, 2 / 3])
+    inside = sol.t_events[0][abs(sol.t_events[0] - np.pi / 2) > 1e-3]
+    np.testing.assert_allclose(inside, [*rising, np.pi - rising[2], np.pi - rising[1]], rtol=0, atol=1e-8)

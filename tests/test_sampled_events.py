@@ -1,4 +1,4 @@
-"""Events and sections with a floor of their own are said to be sampled; those with kinks are followed."""
+"""Events with a relay of their own, and sections with a floor, are said to be sampled."""
 
 from __future__ import annotations
 
@@ -16,14 +16,13 @@ def oscillator(t: float, x: Any) -> Any:
     return [x[1], -x[0]]
 
 
-def test_an_event_with_a_floor_of_its_own_is_said_to_be_sampled() -> None:
-    event = lambda t, x: np.floor(10 * x[0]) - 2.5  # noqa: E731
+def test_an_event_with_a_relay_of_its_own_is_said_to_be_sampled() -> None:
+    event = lambda t, x: fl.hysteresis(x[0], -0.3, 0.3) - 0.5  # noqa: E731
     for _ in range(2):
         with pytest.warns(fl.FilippovWarning, match=r"events: entry 0 \(.*\) is sampled") as caught:
-            sol = fl.solve_ivp(oscillator, (0, 3), [1.0, 0.0], events=event)
+            fl.solve_ivp(oscillator, (0, 3), [1.0, 0.0], events=event)
         assert len(caught) == 1
         assert caught[0].filename == __file__
-        np.testing.assert_allclose(sol.t_events[0], [np.arccos(0.3)], rtol=0, atol=1e-4)
 
 
 @pytest.mark.parametrize(

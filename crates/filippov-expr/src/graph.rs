@@ -27,6 +27,8 @@ pub struct Graph {
     /// Shared by copies, most of which add no surfaces.
     pub(crate) surfaces: Arc<SurfaceTable>,
     pub(crate) derivatives: DerivativeCache,
+    /// Expressions that are known not to be negative, by what the signs and discrete states in them are.
+    pub(crate) not_negative: Vec<NodeId>,
 }
 
 impl Graph {
@@ -136,6 +138,14 @@ impl Graph {
         match *self.node(id) {
             Node::State(index) => Some(index as usize),
             _ => None,
+        }
+    }
+
+    /// Makes known that an expression is not negative along motions, which does not follow from what it is made of: between
+    /// two whole numbers a quantity is within 1 of them. What an expression is in a region is found with it.
+    pub fn declare_not_negative(&mut self, id: NodeId) {
+        if !self.not_negative.contains(&id) {
+            self.not_negative.push(id);
         }
     }
 

@@ -47,6 +47,7 @@ pub mod enclosure;
 mod error;
 pub mod graph;
 pub mod interval;
+mod inverses;
 pub mod jet;
 mod linear;
 #[cfg(feature = "native")]
@@ -58,6 +59,7 @@ mod partition;
 mod poles;
 mod print;
 pub mod program;
+mod range;
 pub mod region;
 mod relative_degree;
 pub mod roots;

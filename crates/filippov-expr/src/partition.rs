@@ -38,6 +38,18 @@ impl Graph {
         parameters.collect()
     }
 
+    /// The indices of the parameters that some values contain where signs are as given: of a select only the branch taken
+    /// counts, as in [`sign_dependencies`](Self::sign_dependencies).
+    pub fn parameters_read_at(&self, roots: &[NodeId], signs: &[f64]) -> Vec<u32> {
+        let given = |surface: u32| signs.get(surface as usize).copied();
+        let nodes = self.reachable_by(roots.iter().copied(), |id| self.followed(id, given));
+        let parameters = nodes.into_iter().filter_map(|id| match *self.node(id) {
+            Node::Parameter(index) => Some(index),
+            _ => None,
+        });
+        parameters.collect()
+    }
+
     /// Whether the value contains a parameter with this index or a higher one.
     pub fn depends_on_parameters_from(&self, id: NodeId, first: u32) -> bool {
         self.parameters_read(id).iter().any(|&index| index >= first)

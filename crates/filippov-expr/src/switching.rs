@@ -12,13 +12,15 @@
 //!   includes `abs(v)` itself: it is positive on both sides of v = 0, so its sign switches nowhere, and no
 //!   second surface is created in the place of v;
 //! - what is made of a sign switches where that one does: `sign(v)`, `1 + sign(v)`, `sign(v)*exp(y)`;
-//! - a quotient or a tangent changes its sign at its poles too: `tan(v) - 1` switches as `cos(v)*(sin(v) - cos(v))`.
+//! - a quotient or a tangent changes its sign at its poles too: `tan(v) - 1` switches as `cos(v)*(sin(v) - cos(v))`;
+//! - a root moves to the other side as its inverse: `sqrt(abs(v)) - 2` switches as `abs(v) - 4`, `cbrt(v) - y` as `v - y**3`.
 //!
 //! Division by a parameter is not stripped, since its sign is not known.
 
 use rustc_hash::FxHashMap;
 
 use crate::graph::Graph;
+use crate::inverses::without_root;
 use crate::linear::{LinearForm, LinearKey};
 use crate::node::{Node, NodeId};
 use crate::op::{BinaryOp, UnaryOp};
@@ -164,6 +166,15 @@ impl Graph {
                     }
                     return switching;
                 }
+                if let Some((rootless, sense)) = without_root(self, &form) {
+                    let switching = self.switch(rootless).times(side * sense);
+                    if let Switching::Surface { index, orientation } = switching {
+                        self.surfaces_mut()
+                            .switches
+                            .insert(id, (index, orientation));
+                    }
+                    return switching;
+                }
                 let (index, orientation) = match self.surfaces.switch_of_form(&key) {
                     Some(known) => known,
                     None => {
@@ -181,6 +192,15 @@ impl Graph {
             .switches
             .insert(id, (index, orientation));
         Switching::Surface { index, orientation }
+    }
+
+    /// Lets an expression switch where another one does that has the same sign wherever both are defined: one with its roots
+    /// continued.
+    pub fn switch_as(&mut self, id: NodeId, other: NodeId) {
+        if let Switching::Surface { index, orientation } = self.switch(other) {
+            let side = (index, orientation);
+            self.surfaces_mut().switches.entry(id).or_insert(side);
+        }
     }
 
     /// The surface of a function as it is spelled: a known one, or a new one. (A spelling can be known while
@@ -370,7 +390,7 @@ impl Graph {
 
     /// The surface on which an expression switches, if it is known already, also when what does not change
     /// the sign is stripped. No new nodes, no recursion.
-    fn known_switch(&self, id: NodeId) -> Option<Side> {
+    pub(crate) fn known_switch(&self, id: NodeId) -> Option<Side> {
         let mut current = id;
         let mut side = 1.0;
         loop {

@@ -111,6 +111,26 @@ impl Builder {
         Ok(graph.declare_surface(a))
     }
 
+    fn declare_not_negative(&self, a: u32) -> PyResult<()> {
+        let mut graph = self.graph();
+        let a = Self::node(&graph, a)?;
+        graph.declare_not_negative(a);
+        Ok(())
+    }
+
+    /// Whether an expression may bend, jump or end: where a sign inside of it changes, or a root begins.
+    fn has_kinks(&self, a: u32) -> PyResult<bool> {
+        let graph = self.graph();
+        let a = Self::node(&graph, a)?;
+        Ok(graph.has_signs(a) || !graph.is_analytic(&[a]))
+    }
+
+    /// The ends of an interval that an expression does not leave.
+    fn range(&self, a: u32) -> PyResult<(f64, f64)> {
+        let graph = self.graph();
+        Ok(graph.range(Self::node(&graph, a)?))
+    }
+
     fn switch(&self, a: u32) -> PyResult<(i64, f64)> {
         let mut graph = self.graph();
         let a = Self::node(&graph, a)?;
@@ -118,6 +138,14 @@ impl Builder {
             Switching::Constant(sign) => (-1, sign),
             Switching::Surface { index, orientation } => (i64::from(index), orientation),
         })
+    }
+
+    /// Lets an expression switch where another one does.
+    fn switch_as(&self, a: u32, other: u32) -> PyResult<()> {
+        let mut graph = self.graph();
+        let (a, other) = (Self::node(&graph, a)?, Self::node(&graph, other)?);
+        graph.switch_as(a, other);
+        Ok(())
     }
 
     fn select(&self, surface: u32, orientation: f64, plus: u32, minus: u32) -> PyResult<u32> {

@@ -178,6 +178,26 @@ pub struct EventExpression {
     surfaces: Vec<usize>,
     /// How many signs the programs read at most.
     n_signs: usize,
+    /// What its own floors are taken of, each after those that it reads.
+    levels: Vec<OwnLevel>,
+    /// Parameters and discrete states of the system before those of the levels.
+    n_given: usize,
+}
+
+/// A floor that an event has and the field has not. It is read as two parameters, the even and the odd whole number beside the
+/// expression, and the sign of sin(pi g) says which of them is the floor.
+struct OwnLevel {
+    program: Program,
+    enclosing: EnclosureProgram,
+}
+
+impl OwnLevel {
+    /// The even whole number below g where floor(g) is even, and the odd one where it is odd; also a little beyond.
+    fn beside(g: f64) -> [f64; 2] {
+        let even = 2.0 * (0.5 * (g - 0.5)).round();
+        let odd = 2.0 * (0.5 * (g - 1.5)).round() + 1.0;
+        [even, odd]
+    }
 }
 
 struct EventPart {
@@ -187,7 +207,12 @@ struct EventPart {
 }
 
 impl EventExpression {
-    pub fn compile(graph: &Graph, node: NodeId) -> Result<Self, ExprError> {
+    pub fn compile(
+        graph: &Graph,
+        node: NodeId,
+        levels: &[NodeId],
+        n_given: usize,
+    ) -> Result<Self, ExprError> {
         let mut surfaces = Vec::new();
         add_inner(graph, node, &mut surfaces);
         let inner = surfaces.iter().map(|&k| graph.surface(k as u32));
@@ -197,7 +222,66 @@ impl EventExpression {
             parts: parts.collect::<Result<_, _>>()?,
             surfaces,
             n_signs: graph.n_surfaces(),
+            levels: levels
+                .iter()
+                .map(|&node| {
+                    Ok(OwnLevel {
+                        program: Program::compile(graph, &[node], Backend::Auto)?,
+                        enclosing: EnclosureProgram::compile(graph, &[node])?,
+                    })
+                })
+                .collect::<Result<_, ExprError>>()?,
+            n_given,
         })
+    }
+
+    /// Calls a function with the parameters, and behind them those of the levels at a place.
+    fn with_levels<R>(
+        &self,
+        (t, x, signs): (f64, &[f64], &[f64]),
+        p: &[f64],
+        f: impl FnOnce(&[f64]) -> R,
+    ) -> R {
+        if self.levels.is_empty() {
+            return f(p);
+        }
+        let mut all: SmallVec<[f64; 16]> = SmallVec::from_slice(p);
+        all.resize(self.n_given, 0.0);
+        for level in &self.levels {
+            let mut g = [0.0];
+            // It reads levels before it; the room behind them is not read.
+            let known = all.len();
+            all.resize(self.n_given + 2 * self.levels.len(), 0.0);
+            level.program.eval(t, x, signs, &all, &[], &mut g);
+            all.truncate(known);
+            all.extend(OwnLevel::beside(g[0]));
+        }
+        f(&all)
+    }
+
+    /// The same along a piece of motion. A whole number that changes in it is not a number: nothing is known of what reads it.
+    fn with_levels_along<R>(
+        &self,
+        (motion, signs): (&dyn Motion, &[f64]),
+        p: &[f64],
+        f: impl FnOnce(&[f64]) -> R,
+    ) -> R {
+        if self.levels.is_empty() {
+            return f(p);
+        }
+        let mut all: SmallVec<[f64; 16]> = SmallVec::from_slice(p);
+        all.resize(self.n_given, 0.0);
+        for level in &self.levels {
+            let mut g = [Enclosure::UNKNOWN];
+            let known = all.len();
+            all.resize(self.n_given + 2 * self.levels.len(), 0.0);
+            level.enclosing.eval(motion, signs, &all, &mut g);
+            all.truncate(known);
+            let [low, high] = [g[0].value.lo, g[0].value.hi].map(OwnLevel::beside);
+            let same = low.iter().zip(high);
+            all.extend(same.map(|(&low, high)| if low == high { low } else { f64::NAN }));
+        }
+        f(&all)
     }
 
     /// The signs that the programs read, from those of the inner parts.
@@ -246,10 +330,12 @@ pub struct TracedEvent {
 #[pymethods]
 impl TracedEvent {
     #[new]
-    fn new(builder: &Builder, node: u32) -> PyResult<Self> {
+    fn new(builder: &Builder, node: u32, levels: Vec<u32>, n_given: usize) -> PyResult<Self> {
         let graph = builder.graph();
         let root = Builder::node(&graph, node)?;
-        let expression = EventExpression::compile(&graph, root)
+        let levels = levels.into_iter().map(|id| Builder::node(&graph, id));
+        let levels = levels.collect::<PyResult<Vec<_>>>()?;
+        let expression = EventExpression::compile(&graph, root, &levels, n_given)
             .map_err(|e| PyValueError::new_err(e.to_string()))?;
         Ok(TracedEvent {
             expression: Arc::new(expression),
@@ -262,7 +348,10 @@ impl TracedEvent {
         let (mut inner, mut out) = (Vec::new(), [0.0]);
         for part in &self.expression.parts {
             let signs = self.expression.signs(&inner);
-            part.program.eval(t, &x, &signs, &p, &[], &mut out);
+            let place = (t, &x[..], &signs[..]);
+            self.expression.with_levels(place, &p, |p| {
+                part.program.eval(t, &x, &signs, p, &[], &mut out);
+            });
             if inner.len() < self.expression.surfaces.len() {
                 if out[0].abs() <= tiny {
                     return None;
@@ -306,7 +395,9 @@ impl Signal<'_> {
             let (mut inner, mut out) = (Vec::new(), [0.0]);
             for part in &self.expression.parts {
                 let signs = self.expression.signs(&inner);
-                part.program.eval(t, &x, &signs, &p, &[], &mut out);
+                self.expression.with_levels((t, &x, &signs), &p, |p| {
+                    part.program.eval(t, &x, &signs, p, &[], &mut out);
+                });
                 let Some(&j) = inside.get(inner.len()) else {
                     continue;
                 };
@@ -361,7 +452,10 @@ impl SmoothParts for CompiledEvent {
         let program = &self.expression.parts[part].program;
         let signs = self.expression.signs(place.signs);
         self.system.with_values(place.q, |p| {
-            program.eval(place.t, place.x, &signs, p, &[], &mut out);
+            let at = (place.t, place.x, &signs[..]);
+            self.expression.with_levels(at, p, |p| {
+                program.eval(place.t, place.x, &signs, p, &[], &mut out);
+            });
         });
         out[0]
     }
@@ -370,8 +464,11 @@ impl SmoothParts for CompiledEvent {
         let mut out = [Enclosure::UNKNOWN];
         let program = &self.expression.parts[part].enclosing;
         let signs = self.expression.signs(setting.signs);
-        self.system
-            .with_values(setting.q, |p| program.eval(motion, &signs, p, &mut out));
+        let along = (motion, &signs[..]);
+        self.system.with_values(setting.q, |p| {
+            self.expression
+                .with_levels_along(along, p, |p| program.eval(motion, &signs, p, &mut out));
+        });
         out[0]
     }
 

@@ -105,7 +105,7 @@ impl Output {
         let own = &system.get().system;
         let node = own.field_nodes().first();
         let node = *node.ok_or_else(|| PyValueError::new_err("outputs: no expression"))?;
-        let expression = EventExpression::compile(own.graph(), node);
+        let expression = EventExpression::compile(own.graph(), node, &[], 0);
         Ok(Output {
             expression: expression.map_err(|e| PyValueError::new_err(e.to_string()))?,
             contacts: contacts.clone(),
@@ -236,7 +236,7 @@ impl PlaceSpec {
         let traced = system.cast::<TracedSystem>().ok();
         let refused = |text: &str| PyValueError::new_err(text.to_owned());
         let compiled = |graph: &filippov_expr::Graph, node| {
-            let expression = EventExpression::compile(graph, node);
+            let expression = EventExpression::compile(graph, node, &[], 0);
             expression.map_err(|e| PyValueError::new_err(e.to_string()))
         };
         match form.as_str() {

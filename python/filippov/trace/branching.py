@@ -110,6 +110,10 @@ class Tracer:
     ----------
     asked : dict of int to None
         Nodes whose sign was asked for, in a trace that does not know the constants of motion.
+    laws_read : set of int
+        Laws whose discrete states the trace has read.
+    own_levels : dict of int to None
+        What an event takes floors of that the field has not.
     is_doubtful : bool
         Whether such a trace answered a question that depends on them without an answer.
     """
@@ -142,6 +146,8 @@ class Tracer:
         self.laws = Laws(len(parameters)) if laws is None else laws
         self.constants = constants
         self.stand_ins = stand_ins
+        self.laws_read: set[int] = set()
+        self.own_levels: dict[int, None] = {}
         self.asked: dict[int, None] = {}
         self.is_doubtful = False
         self.n_paths = 0
@@ -152,6 +158,7 @@ class Tracer:
         self.unresolved: dict[int, None] = {}
         self.has_pieces = False
         self._pieces: dict[tuple[int, bool], Pieces | None] = {}
+        self._signs: dict[int, float] = {}
         self._continued: dict[int, int] = {}
         self._path: list[tuple[int, float]] = []
         self._flipped: list[bool] = []
@@ -238,44 +245,50 @@ class Tracer:
 
     def sign(self, node: int) -> int:
         """Return the node of the sign of an expression."""
-        known = self.known_sign(node) if self.parameters else None
+        known = self.sign_everywhere(node)
         if known is not None:
             return self.builder.constant(known)
         if self.is_constant_of_motion(node):
             return self.laws.sign(self, node)
         if self.laws.is_held(self, node):
-            node = self.laws.whole(self, node)
-            # Whole numbers may be zero for a while, where the sign is 0.
-            sides = [self.builder.sign(self.laws.beside(self, node, side)) for side in (-1.0, 1.0)]
-            both = self.builder.binary("add", *sides)
-            return self.builder.binary("multiply", self.builder.constant(0.5), both)
+            return self._sign_of_whole_number(self.laws.whole(self, node))
         pieces = self.pieces(node)
         if pieces is not None:
             self.has_pieces = True
             return sign_of(self, pieces)
+        if self.is_stepwise(node):
+            return self._sign_of_whole_number(node)
         node = self.as_surface(node)
         self.ask(node, "sign")
         return self.builder.sign(node)
 
+    def _sign_of_whole_number(self, node: int) -> int:
+        """Return the node of the sign of what may be zero for a while, where its sign is 0."""
+        sides = [self.builder.sign(self.laws.beside(self, node, side)) for side in (-1.0, 1.0)]
+        both = self.builder.binary("add", *sides)
+        return self.builder.binary("multiply", self.builder.constant(0.5), both)
+
     def absolute(self, node: int) -> int:
         """Return the node of the absolute value of an expression."""
-        known = self.known_sign(node) if self.parameters else None
+        known = self.sign_everywhere(node)
         if known is not None:
             return node if known >= 0.0 else self.builder.unary("negative", node)
         if self.is_constant_of_motion(node):
             return self.builder.binary("multiply", self.laws.sign(self, node), node)
-        if self.pieces(node) is None:
+        if self.pieces(node) is None and not self.is_stepwise(node):
+            self.switch_as_surface(node)
             return self.builder.abs(node)
         return self.choose(node, node, self.builder.unary("negative", node))
 
     def extreme(self, first: int, second: int, *, largest: bool) -> int:
         """Return the node of the maximum or the minimum of two expressions."""
         difference = self.builder.binary("subtract", first, second)
-        known = self.known_sign(difference) if self.parameters else None
+        known = self.sign_everywhere(difference)
         if known is not None:
             return first if (known >= 0.0) == largest else second
-        as_function = self.pieces(difference) is None and not self._continued
-        if as_function and not self.is_constant_of_motion(difference):
+        is_plain = self.pieces(difference) is None and not self.is_stepwise(difference)
+        if is_plain and not self.is_constant_of_motion(difference):
+            self.switch_as_surface(difference)
             return self.builder.maximum(first, second) if largest else self.builder.minimum(first, second)
         return self.choose(difference, first, second) if largest else self.choose(difference, second, first)
 
@@ -286,7 +299,7 @@ class Tracer:
 
     def compare(self, node: int, *, strict: bool) -> Condition | bool:
         """Return the condition ``expression > 0`` (``>= 0`` unless strict); its answer if it is known."""
-        known = self.known_sign(node) if self.parameters else None
+        known = self.sign_everywhere(node)
         if known is None:
             if self.is_constant_of_motion(node):
                 node = self.laws.sign(self, node)
@@ -296,7 +309,7 @@ class Tracer:
             if pieces is not None:
                 self.has_pieces = True
                 return condition_of(self, pieces, strict=strict)
-            if self.builder.has_signs(node) and self.builder.is_stepwise(node):
+            if self.is_stepwise(node):
                 node = self.laws.beside(self, node, -1.0 if strict else 1.0)
             node = self.as_surface(node)
             self.ask(node, "comparison", is_strict=strict)
@@ -305,6 +318,19 @@ class Tracer:
                 return Comparison(self, surface, orientation)
             known = orientation
         return known > 0.0 or (not strict and known == 0.0)
+
+    def sign_everywhere(self, node: int) -> float | None:
+        """Return the sign of an expression if it is the same at all points but single ones.
+
+        It is that of constants and parameters; or it follows in each region from the whole numbers around
+        what a floor is taken of, as of ``x - np.floor(x)``.
+        """
+        known = self.known_sign(node) if self.parameters else None
+        if known is None and self.laws.names and self.builder.has_signs(node):
+            self.pieces(node)
+            known = self._signs.get(node)
+            self.has_pieces |= known is not None
+        return known
 
     def equal(self, node: int) -> Condition | bool | None:
         """Return the condition ``expression == 0``; None if that is so at single points only."""
@@ -328,6 +354,10 @@ class Tracer:
         is_positive = self.compare(node, strict=True)
         is_negative = self.compare(self.builder.unary("negative", node), strict=True)
         return _opposite(is_positive) & _opposite(is_negative)
+
+    def is_stepwise(self, node: int) -> bool:
+        """Whether an expression contains signs and changes only where they or discrete states in it do."""
+        return self.builder.has_signs(node) and self.builder.is_stepwise(node)
 
     def is_constant_of_motion(self, node: int) -> bool:
         """Whether an expression is known to stay as it is along every motion."""
@@ -353,6 +383,8 @@ class Tracer:
                 self.unresolved[node] = None
             # An expression of one sign, zeros at single points aside, is left to its surface.
             is_whole = pieces is None or (not in_full and len(pieces) == 2 and pieces[1] != 0.0)
+            if is_whole and pieces is not None and isinstance(pieces[1], float):
+                self._signs[node] = pieces[1]
             self._pieces[node, in_full] = None if is_whole else pieces
         return self._pieces[node, in_full]
 
@@ -387,8 +419,19 @@ class Tracer:
         return self._continued[root] if self.jumps(argument) else root
 
     def as_surface(self, node: int) -> int:
-        """Return an expression as a switching function: with its roots continued."""
-        return self.builder.substituted(node, list(self._continued.items())) if self._continued else node
+        """Return an expression as a switching function: with its roots continued, also inside of others."""
+        images = list(self._continued.items())
+        for _ in images:
+            before, node = node, self.builder.substituted(node, images)
+            if node == before:
+                break
+        return node
+
+    def switch_as_surface(self, node: int) -> None:
+        """Let an expression switch where it does with its roots continued."""
+        surface = self.as_surface(node)
+        if surface != node:
+            self.builder.switch_as(node, surface)
 
     def known_sign(self, node: int) -> float | None:
         """Return the sign of an expression of constants and parameters; None if it depends on the motion."""

@@ -25,6 +25,14 @@ __all__ = ["Laws"]
 # Whole numbers are told apart by less.
 _BETWEEN = 1e-6
 
+# The whole number of a level is followed by the next one at this distance. A floor is right up to a distance
+# of 1. At 1/2 quantities turn back by design, as the argument of `np.rint(np.abs(x))` does, but not at the
+# golden ratio.
+_REACH = 0.5 * (math.sqrt(5.0) - 1.0)
+
+# An end of a range counts as a whole number up to rounding.
+_WHOLE = 1e-9
+
 
 class _Kind(NamedTuple):
     """What the discrete state of a kind of law is, and whether it depends on the past beside the point."""
@@ -98,20 +106,64 @@ class Laws:
             return builder.constant(whole)
         if not builder.depends_on_motion(node) or tracer.is_constant_of_motion(node):
             return self._state(tracer, _Law("held", (node,), ()), "floor")
-        if self.is_clock(tracer, node):
-            return self._state(tracer, _Law("clock", (node,), ()), "floor")
+        clock = _Law("clock", (node,), ())
+        if self.is_clock(tracer, node) and not (self._is_complete and clock not in self._known):
+            return self._state(tracer, clock, "floor")
         pieces = tracer.pieces(node, in_full=True)
         if pieces is not None and (has_constant_part(tracer, pieces) or tracer.jumps(node)):
             # A level follows what moves continuously: each part has its own.
             return by_parts(tracer, pieces, lambda part, _: self.floor(tracer, part))
-        node = tracer.as_surface(node)
-        level = self._state(tracer, _Law("level", (node,), ()), "nearest")
+        plain, node = node, tracer.as_surface(node)
+        law = _Law("level", (node,), ())
+        # A run does not follow what its field does not read, nor everywhere what may end.
+        if self._is_complete and (law not in self._known or builder.has_kinks(node)):
+            return self._own_floor(tracer, node)
+        level = self._state(tracer, law, "nearest")
         half = builder.constant(0.5)
-        distance = builder.binary("subtract", node, level)
         tracer.ask(node, "quantiser")
         # At a whole number the floor is that number itself.
-        step = tracer.choose(distance, half, builder.constant(-0.5))
-        return builder.binary("add", builder.binary("subtract", level, half), step)
+        step = tracer.choose(self._above(tracer, node, level), half, builder.constant(-0.5))
+        floor = builder.binary("add", builder.binary("subtract", level, half), step)
+        for argument in {plain, node}:
+            rest = builder.binary("subtract", argument, floor)
+            builder.declare_not_negative(rest)
+            builder.declare_not_negative(builder.binary("subtract", builder.constant(1.0), rest))
+        return floor
+
+    def _own_floor(self, tracer: Tracer, node: int) -> int:
+        """Return the node of a floor that an event has and the field has not: of the point, not of a run.
+
+        It is the even or the odd whole number beside the expression, by the sign of sin(pi g), which changes
+        at all whole numbers: `OwnLevel` in ``crates/filippov-py/src/callbacks.rs``.
+        """
+        builder = tracer.builder
+        if builder.is_stepwise(node):
+            raise NoSuchLaw("floor(...) of what changes by jumps, which the right-hand side does not have")
+        index = list(tracer.own_levels).index(node) if node in tracer.own_levels else len(tracer.own_levels)
+        tracer.own_levels[node] = None
+        even, odd = (builder.parameter(self.first + len(self.names) + 2 * index + k) for k in (0, 1))
+        wave = builder.unary("sin", builder.binary("multiply", builder.constant(math.pi), node))
+        surface, orientation = builder.switch(wave)
+        return builder.select(surface, orientation, even, odd)
+
+    def _above(self, tracer: Tracer, node: int, level: int) -> int:
+        """Return what is positive where an expression is above the whole number of its level.
+
+        An expression does not cross the ends of its range: it turns back there, often where another function
+        vanishes. If such an end is a whole number, the difference is moved off zero at that.
+        """
+        builder = tracer.builder
+        distance = builder.binary("subtract", node, level)
+        low, high = (_whole_number(end) for end in builder.range(node))
+        if low is None and high is None:
+            return distance
+        knots = [] if low is None else [low + 0.5]
+        offsets = [0.0] if low is None else [1.0, 0.0]
+        if high is not None and (low is None or high > low):
+            knots.append(high - 0.5)
+            offsets.append(-1.0)
+        place = self._state(tracer, _Law("place", (level,), tuple(knots)), "place")
+        return builder.binary("add", distance, self.entry(tracer, place, tuple(offsets), name="end"))
 
     def ceil(self, tracer: Tracer, node: int) -> int:
         """Return the node of the smallest whole number that is not below an expression."""
@@ -260,6 +312,16 @@ class Laws:
         is_real = any(self._values[index] == "real" for index in self._read(tracer, node))
         return self.sign(tracer, node) if is_real else node
 
+    def may_be_idle(self, tracer: Tracer) -> bool:
+        """Whether a trace has read a discrete state that a run does not follow where nothing else reads it.
+
+        So it is with a quantity that has kinks, jumps or roots: it may end where it does not count.
+        """
+        read = [self._laws[index] for index in tracer.laws_read]
+        is_followed = [law.kind not in ("level", "piece") for law in read]
+        kinks = [tracer.builder.has_kinks(law.nodes[0]) for law in read]
+        return any(kink and not followed for kink, followed in zip(kinks, is_followed, strict=True))
+
     def beside(self, tracer: Tracer, node: int, side: float) -> int:
         """Return an expression of whole numbers moved off them, so that it is never zero."""
         return tracer.builder.binary("add", node, tracer.builder.constant(side * _BETWEEN))
@@ -286,8 +348,11 @@ class Laws:
             numbers = list(law.numbers)
             if law.kind == "level":
                 distance = builder.binary("subtract", law.nodes[0], state)
-                surface, orientation = builder.switch(distance)
-                guard = builder.declare_surface(builder.binary("subtract", half, builder.abs(distance)))
+                above = self._above(tracer, law.nodes[0], state)
+                surface, orientation = builder.switch(above)
+                size = builder.binary("multiply", builder.sign(above), distance)
+                reach = builder.constant(_REACH)
+                guard = builder.declare_surface(builder.binary("subtract", reach, size))
                 numbers = [float(surface), orientation, float(guard)]
             elif law.kind == "piece":
                 is_clock = self.is_clock(tracer, law.nodes[0])
@@ -337,4 +402,10 @@ class Laws:
             self._values.append(law.values)
             is_whole_name = law.kind == "named" or name.endswith(")")
             self.names.append(name if is_whole_name else f"{name}({tracer.text(law.nodes[0])})")
+        tracer.laws_read.add(index)
         return tracer.builder.parameter(self.first + index)
+
+
+def _whole_number(end: float) -> int | None:
+    """Return the end of a range if it is a whole number, else None."""
+    return round(end) if math.isfinite(end) and abs(end - round(end)) < _WHOLE else None

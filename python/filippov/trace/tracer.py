@@ -278,6 +278,8 @@ def trace_output(
     _, tracer, node = found
     if tracer.guards:
         return "a condition on parameters"
+    if tracer.own_levels:
+        return OWN_LAW
     field = [node] + [tracer.builder.constant(0.0)] * (tracer.n_states - 1)
     return TracedSystem(tracer.builder, field, tracer.n_states, tracer.names())
 
@@ -313,8 +315,10 @@ def _beside(
     try:
         tracer, node = _with_stand_ins(attempt)
         builder = tracer.builder
+        if own.laws.may_be_idle(tracer):
+            return OWN_LAW
         check_questions(tracer, Roots([node]), "event")
-        event = TracedEvent(builder, node)
+        event = TracedEvent(builder, node, list(tracer.own_levels), len(tracer.names()))
         keywords = _named(g, dict(values), "event")
         if not own.laws.names:
             verify_event(event, lambda t, x: g(t, x, *args, **keywords), tracer)

@@ -2,6 +2,7 @@
 
 use rustc_hash::FxHashMap;
 
+use crate::inverses;
 use crate::linear::LinearForm;
 use crate::node::{Node, NodeId};
 use crate::op::{BinaryOp, UnaryOp};
@@ -91,6 +92,12 @@ impl Regions {
         let of_function = LinearForm::of(&self.graph, function).key();
         if let (Some((own, _)), Some((other, _))) = (form.key(), &of_function) {
             if own.matches(other) {
+                return true;
+            }
+        }
+        // The surface of log(x) is x - 1.
+        if let Some((rootless, _)) = inverses::within_domain(&mut self.graph, &form) {
+            if self.vanishes_with(rootless, function) {
                 return true;
             }
         }

@@ -17,6 +17,7 @@ pub use edge::Edge;
 pub use pieces::{PartSign, Pieces};
 
 use crate::graph::Graph;
+use crate::inverses;
 use crate::linear::LinearForm;
 use crate::node::{Node, NodeId};
 use crate::op::{BinaryOp, UnaryOp};
@@ -130,7 +131,7 @@ impl Regions {
         for at in (0..kept.len()).rev() {
             let mut flipped = kept.clone();
             flipped[at].1 = -flipped[at].1;
-            if !self.is_solvable(&flipped, true) {
+            if !self.is_solvable(&flipped, &[], true) {
                 kept.remove(at);
             }
         }
@@ -329,11 +330,18 @@ impl Regions {
         if let Some((value, side)) = also {
             sides.push((self.graph.at_signs(&[value], signs)[0], side));
         }
-        self.is_solvable(&sides, with_parameters)
+        let known = self.graph.not_negative.clone();
+        let known = self.graph.at_signs(&known, signs);
+        self.is_solvable(&sides, &known, with_parameters)
     }
 
-    /// Whether there may be a point at which all `side * value > 0` (side 0: value = 0).
-    fn is_solvable(&mut self, sides: &[(NodeId, f64)], with_parameters: bool) -> bool {
+    /// Whether there may be a point at which all `side * value > 0` (side 0: value = 0), where the known values are not negative.
+    fn is_solvable(
+        &mut self,
+        sides: &[(NodeId, f64)],
+        known: &[NodeId],
+        with_parameters: bool,
+    ) -> bool {
         let mut rows = Vec::new();
         for &(mut function, side) in sides {
             if with_parameters {
@@ -349,6 +357,18 @@ impl Regions {
         let mut atoms: Vec<NodeId> = rows.iter().flat_map(Inequality::atoms).collect();
         atoms.sort_unstable();
         atoms.dedup();
+        for &known in known {
+            let known = match with_parameters {
+                true => self.with_parameters(known),
+                false => known,
+            };
+            let form = LinearForm::of(&self.graph, known);
+            // Of other atoms nothing else is known.
+            let is_of_these = |term: &(NodeId, f64)| atoms.binary_search(&term.0).is_ok();
+            if form.terms.iter().all(is_of_these) {
+                rows.push(Inequality::new(&form, 1.0, false));
+            }
+        }
         for atom in atoms {
             if self.graph.facts(atom).nonnegative && !self.graph.facts(atom).has_sign {
                 rows.push(Inequality::bound(atom, 1.0, 0.0));
@@ -402,9 +422,18 @@ impl Regions {
             return (region, true);
         }
         let signs = region.signs.clone();
-        if self.possible(&signs, Some((value, -1.0))) != Possible::Yes {
+        // It may have the sign of a surface, as a cube root has that of its argument.
+        if let Some((index, orientation)) = self.graph.known_switch(value) {
+            if let Some(sign) = signs.get(index as usize).copied().flatten() {
+                region.kind = kind_of(orientation * sign);
+                return (region, true);
+            }
+        }
+        let rootless = inverses::within_domain(&mut self.graph, form);
+        let (value, sense) = rootless.unwrap_or((value, 1.0));
+        if self.possible(&signs, Some((value, -sense))) != Possible::Yes {
             region.kind = Kind::Positive;
-        } else if self.possible(&signs, Some((value, 1.0))) != Possible::Yes {
+        } else if self.possible(&signs, Some((value, sense))) != Possible::Yes {
             region.kind = Kind::Negative;
         }
         (region, true)

@@ -68,7 +68,7 @@ fn leaves(
     let mut is_leaving = false;
     for (&j, &entry) in meeting.surfaces.iter().zip(entries.entries()) {
         let rate = f64::from(entry) * beside.rate_of(j, &signs, &velocity)?.0;
-        if entry != 0 && !(rate >= 0.0) {
+        if entry != 0 && (rate.is_nan() || rate < 0.0) {
             return Ok(false);
         }
         is_leaving |= rate > 0.0;

@@ -84,6 +84,8 @@ fn leaves_within(
             values[k] = value;
             at.system.gradient(j, &at.place(&signs), &mut gradient)?;
             let way = (dot(&gradient, &gradient) * dot(velocity, velocity)).sqrt() * moment;
+            // A root has no slope at the point.
+            let way = if way.is_finite() { way } else { 0.0 };
             if value.abs() <= ROUNDING * size + noise_of_way * way + start[j].abs() {
                 is_clear = false;
             } else if value * f64::from(next.mode.entries()[j]) < 0.0 {

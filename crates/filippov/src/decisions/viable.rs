@@ -8,9 +8,9 @@ use super::surroundings::Surroundings;
 use super::touching::{together, Parallels, Together, Touch};
 use super::trial::{try_mode, Trial};
 
-use crate::error::FieldError;
+use crate::error::{FieldError, Undecided};
 use crate::mode::Mode;
-use crate::motion::Guard;
+use crate::motion::{normal_component, Guard};
 use crate::tolerances::{MOST_MEETING, ROUNDING};
 
 /// All modes at a point.
@@ -45,13 +45,14 @@ pub(super) fn survey(
     if m > MOST_MEETING {
         return Ok(None);
     }
-    let Ok(Surroundings {
+    let Surroundings {
         corners,
         fields,
         noise,
-    }) = meeting.surroundings(at, notes)?
-    else {
-        return Ok(None);
+    } = match meeting.surroundings(at, notes)? {
+        Ok(around) => around,
+        Err(Undecided::NotFinite) => return by_trial(at, notes, meeting).map(Some),
+        Err(_) => return Ok(None),
     };
     let pace = corners.pace(|i| at.scale.size(i, at.x[i]));
     let touching = Parallels::of(at, meeting.surfaces, meeting.mode)?.touching;
@@ -90,6 +91,10 @@ pub(super) fn survey(
                 Ok(fields) => {
                     others = fields;
                     &others
+                }
+                Err(Undecided::NotFinite) => {
+                    try_candidate(at, notes, meeting, (mode, &vanishing), &mut found)?;
+                    continue;
                 }
                 Err(_) => return Ok(None),
             },
@@ -143,6 +148,72 @@ pub(super) fn survey(
         }
     }
     Ok(Some(found))
+}
+
+/// Looks at all modes where a field around the point, or the slope of a function, is not finite: of a logarithm beyond its end,
+/// in a region that is not there, or of a root. What agrees with its own signs, and has a field, is tried for a moment.
+fn by_trial(at: &Point, notes: &mut Notes, meeting: &Meeting) -> Result<Survey, FieldError> {
+    let m = meeting.surfaces.len();
+    let mut found = Survey::default();
+    for index in 0..3_usize.pow(m as u32) {
+        let entries = (0..m).map(|i| 1 - (index / 3_usize.pow(i as u32) % 3) as i8);
+        if at.patience.is_over() {
+            return Ok(Survey::default());
+        }
+        let entries = Mode::new(entries.collect());
+        match consistency(at, notes, meeting, &entries)? {
+            Consistency::Agrees { mode, vanishing } => {
+                try_candidate(at, notes, meeting, (mode, &vanishing), &mut found)?;
+            }
+            Consistency::Contradicts(j) => {
+                let guard = Guard::Surface(j);
+                found.failing.push((meeting.on_all(&entries), guard));
+            }
+            Consistency::Between(jumping) => {
+                found.between.push((meeting.on_all(&entries), jumping));
+            }
+        }
+    }
+    Ok(found)
+}
+
+/// Follows a mode that agrees with its own signs for a moment. Without a field it is no motion.
+fn try_candidate(
+    at: &Point,
+    notes: &mut Notes,
+    meeting: &Meeting,
+    (mode, vanishing): (Mode, &[bool]),
+    found: &mut Survey,
+) -> Result<(), FieldError> {
+    let velocity = at.velocity(notes, &mode, &[])?;
+    let surfaces = meeting.surfaces.iter().copied();
+    let mut guards = surfaces
+        .clone()
+        .filter(|&j| mode.entries()[j] == 0)
+        .chain(surfaces.clone());
+    let guard = Guard::Surface(guards.next().unwrap_or_default());
+    if velocity.iter().any(|v| !v.is_finite()) {
+        found.failing.push((mode, guard));
+        return Ok(());
+    }
+    if let Some(j) = mode.sliding() {
+        let sides =
+            [-1, 1].map(|side| normal_component(at.system, j, j, side, &at.place(&mode.signs())));
+        let [minus, plus] = sides;
+        if !(minus?.value > 0.0 && plus?.value < 0.0) {
+            found.failing.push((mode, guard));
+            return Ok(());
+        }
+    }
+    let next = Next::new(mode.clone(), Lefts::new());
+    let met = surfaces.zip(vanishing).filter(|(_, vanishes)| **vanishes);
+    let met: Vec<usize> = met.map(|(j, _)| j).collect();
+    match try_mode(at, notes, &next, &met, ROUNDING)? {
+        Trial::Leaves(left) => found.viable.push(Viable::strictly(Next { left, ..next })),
+        Trial::Ends => found.failing.push((mode, guard)),
+        Trial::WithinRounding => found.open.push(mode),
+    }
+    Ok(())
 }
 
 /// Is this the mode of a motion that one of its own exit functions has just ended?

@@ -20,7 +20,7 @@ use crate::patience::Patience;
 use crate::record::decide_and_record;
 use crate::status::{is_named, Stop, Warning, WarningCode};
 use crate::switch::{Kind, Switch};
-use crate::system::eval_on_side;
+use crate::system::{eval_on_side, ActionMap, Trigger};
 use crate::tolerances::{DOUBTFUL, MOST_SWITCHES_AT_ONE_TIME};
 use smallvec::SmallVec;
 
@@ -106,6 +106,7 @@ impl<'a> Integrator<'a> {
             return self.leave_without_progress(event);
         }
         if !self.run.actions.list.is_empty() {
+            follow_laws(self)?;
             let h = self.ask(Cause::Start, |at, notes| {
                 at.surface_values(notes, at.arrival.signs)
             })?;
@@ -440,6 +441,9 @@ impl<'a> Integrator<'a> {
         departing: &[(usize, f64)],
     ) -> Result<Option<Stop>, FieldError> {
         self.recorder.leave(&mut self.run, &[])?;
+        if !self.run.actions.list.is_empty() {
+            follow_laws(self)?;
+        }
         let before = self.run.motion.mode.clone();
         let Decision { rule, decided } =
             self.decide(Cause::Anew(&before), &mut Reached::default())?;
@@ -855,4 +859,35 @@ impl<'a> Integrator<'a> {
         }
         Ok(stop)
     }
+}
+
+/// Brings the discrete states up to date that nothing read in the mode so far, before what follows is decided.
+fn follow_laws(integrator: &mut Integrator<'_>) -> Result<(), FieldError> {
+    let (actions, active) = (integrator.run.actions, &integrator.run.motion.active);
+    let is_idle =
+        |trigger: &Trigger| matches!(*trigger, Trigger::Surface { index, .. } if !active[index]);
+    let idle = actions
+        .list
+        .iter()
+        .filter(|action| is_idle(&action.trigger));
+    let idle: SmallVec<[&dyn ActionMap; 4]> = idle.map(|action| action.map).collect();
+    if idle.is_empty() {
+        return Ok(());
+    }
+    let mode = integrator.run.motion.mode.clone();
+    // They may read one another, also by signs.
+    for _ in 0..=idle.len() {
+        let sides = integrator.ask(Cause::Start, |at, notes| sides(at, notes, Some(&mode)))?;
+        let signs = sides.map_or_else(|| mode.signs(), |sides| sides.mode.signs());
+        let before = integrator.run.motion.discrete.clone();
+        let mut q = before.clone();
+        for map in &idle {
+            map.follow(integrator.run.t, &integrator.run.x, &signs, &mut q);
+        }
+        if q == before {
+            break;
+        }
+        integrator.run.motion.set_discrete(q);
+    }
+    Ok(())
 }

@@ -61,7 +61,8 @@ impl Monitored {
     /// Predicted time to the next zero, from value, rate and curvature; infinite if none is ahead.
     pub fn time_to_zero(&self) -> f64 {
         let (value, rate, curvature) = (self.value, self.rate, self.curvature);
-        if !(rate < 0.0 && value > 0.0) {
+        // A root that begins here has no slope, and tells nothing.
+        if !(rate < 0.0 && value > 0.0 && rate.is_finite()) {
             return f64::INFINITY;
         }
         let discriminant = rate * rate - 2.0 * curvature * value;

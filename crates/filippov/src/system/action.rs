@@ -53,6 +53,9 @@ pub trait ActionMap: Sync {
         true
     }
 
+    /// Brings discrete states that are functions of the point up to date, which were not watched; nothing by default.
+    fn follow(&self, _t: f64, _x: &[f64], _signs: &[f64], _q: &mut [f64]) {}
+
     /// Writes the derivative of x+ - x in the direction `along`: the direction of the impulse, where the map
     /// leaves x alone at zero speed. By differences unless overridden.
     ///

@@ -61,6 +61,10 @@ fn moved_off<S: PiecewiseSystem + ?Sized>(
                 *entry = rate;
             }
             let norm2: f64 = gradient.iter().map(|g| g * g).sum();
+            // Where a root begins at another surface it has no slope: that one is moved off.
+            if !(norm2 + h).is_finite() {
+                continue;
+            }
             let wanted = offset * norm2.sqrt();
             let missing = wanted - signs[j] * h;
             // A curved surface makes the first step too long or too short; what is left is rounding.

@@ -56,8 +56,9 @@ pub(super) struct Model {
     sticking: FxHashMap<usize, TieredProgram>,
     /// The nodes of these ratios.
     ratios: FxHashMap<usize, NodeId>,
-    /// Surfaces that are monitored in every mode.
+    /// Surfaces that trigger actions: monitored in every mode, but for those of followers.
     watched: Vec<usize>,
+    followers: Vec<Follower>,
     /// Surfaces whose sign something depends on: the field, or another surface that matters.
     switching: OnceLock<Vec<bool>>,
     jets: Mutex<JetsCache>,
@@ -66,9 +67,21 @@ pub(super) struct Model {
     activity: Mutex<FxHashMap<Entries, Vec<bool>>>,
     relative_degrees: Vec<OnceLock<usize>>,
     /// What is left of the system on surfaces of higher relative degree, by surfaces slid on.
-    reductions: Mutex<FxHashMap<SmallVec<[usize; 2]>, Option<Arc<Model>>>>,
+    reductions: Mutex<ReductionCache>,
     /// Whether something jumps at a surface, by surface and mode; found only where a function is zero along a motion.
     jumps: Mutex<FxHashMap<(usize, Entries), bool>>,
+}
+
+/// A discrete state that is a function of the point, and that need not be followed where nothing reads it. There the quantity
+/// that it follows may end, or jump.
+#[derive(Clone)]
+pub(super) struct Follower {
+    /// The parameter that it is.
+    pub parameter: u32,
+    /// The surface at which it changes; none of one that is made of others.
+    pub guard: Option<usize>,
+    /// What it follows.
+    pub argument: NodeId,
 }
 
 /// The entries of a mode: a sign per surface, 0 for one slid on.
@@ -104,6 +117,9 @@ struct LieCache {
 
 /// Taylor coefficients of the motions met so far, by surfaces slid on and order.
 type JetsCache = FxHashMap<(SmallVec<[usize; 2]>, usize), Option<Arc<MotionJets>>>;
+
+/// Models of reduced systems, by surfaces slid on.
+type ReductionCache = FxHashMap<SmallVec<[usize; 2]>, Option<Arc<Model>>>;
 
 /// Derivatives of the fields of the motions met so far, by surfaces slid on.
 type JacobianCache = FxHashMap<SmallVec<[usize; 2]>, Option<Arc<MotionJacobian>>>;
@@ -152,6 +168,7 @@ impl Model {
             sticking: FxHashMap::default(),
             ratios: FxHashMap::default(),
             watched: Vec::new(),
+            followers: Vec::new(),
             switching: OnceLock::new(),
             lie: Mutex::new(LieCache::default()),
             second_lie: surfaces.iter().map(|_| Default::default()).collect(),
@@ -193,7 +210,7 @@ impl Model {
             let mut model = model.ok()?;
             let ratios: Vec<_> = self.ratios.iter().map(|(&j, &node)| (j, node)).collect();
             model.stick(&ratios);
-            model.watch(&self.watched);
+            model.watch(&self.watched, self.followers.clone());
             Some(Arc::new(model))
         })
         .clone()
@@ -220,16 +237,17 @@ impl Model {
         self.sticking.get(&j).map(TieredProgram::program)
     }
 
-    /// Monitors these surfaces in every mode.
-    pub fn watch(&mut self, surfaces: &[usize]) {
+    /// Monitors these surfaces in every mode, but those of followers only where something reads their discrete states.
+    pub fn watch(&mut self, surfaces: &[usize], followers: Vec<Follower>) {
         self.watched = surfaces.to_vec();
+        self.followers = followers;
     }
 
     /// Does anything but the trigger of an action depend on the sign of surface `j`?
     pub fn switches_at(&self, j: usize) -> bool {
         // No sign is given: both branches of every choice count.
         self.switching.get_or_init(|| {
-            let mut depends = self.depend_on(&[], Vec::new());
+            let mut depends = self.depend_on(&[], Vec::new(), &[]);
             for &watched in &self.watched {
                 let others = self
                     .graph
@@ -460,17 +478,20 @@ impl Model {
 
     /// The surfaces that matter for one sign pattern.
     fn active_at(&self, signs: &[f64]) -> Vec<bool> {
-        self.depend_on(signs, self.watched.clone())
+        let is_free = |j: &usize| self.followers.iter().all(|one| one.guard != Some(*j));
+        let watched = self.watched.iter().copied().filter(is_free);
+        self.depend_on(signs, watched.collect(), &self.followers)
     }
 
-    /// The surfaces on which the field depends, or one of `also`, or one found so.
-    fn depend_on(&self, signs: &[f64], also: Vec<usize>) -> Vec<bool> {
+    /// The surfaces on which the field depends, or one of `also`, or one found so; and those of the followers that these read.
+    fn depend_on(&self, signs: &[f64], also: Vec<usize>, followers: &[Follower]) -> Vec<bool> {
         let mut active = vec![false; self.affine.len()];
         let mut outputs = self.field.clone();
         for j in also {
             active[j] = true;
             outputs.push(self.graph.surface(j as u32));
         }
+        let mut idle: Vec<&Follower> = followers.iter().collect();
         loop {
             let found = self.graph.sign_dependencies(&outputs, signs);
             let fresh: Vec<usize> = (0..found.len())
@@ -480,9 +501,26 @@ impl Model {
                 active[j] = true;
                 outputs.push(self.graph.surface(j as u32));
             }
-            if fresh.is_empty() {
+            if !fresh.is_empty() {
+                continue;
+            }
+            let read = match idle.is_empty() {
+                true => Vec::new(),
+                false => self.graph.parameters_read_at(&outputs, signs),
+            };
+            let is_read = |one: &&Follower| read.contains(&one.parameter);
+            let (needed, others): (Vec<_>, Vec<_>) = idle.into_iter().partition(is_read);
+            if needed.is_empty() {
                 return active;
             }
+            for follower in needed {
+                outputs.push(follower.argument);
+                if let Some(guard) = follower.guard {
+                    active[guard] = true;
+                    outputs.push(self.graph.surface(guard as u32));
+                }
+            }
+            idle = others;
         }
     }
 

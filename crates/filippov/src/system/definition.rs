@@ -4,6 +4,7 @@
 use filippov_expr::container::{Container, Tag, Writer};
 use filippov_expr::{Backend, Graph, Lengths, Names, Node, NodeId};
 
+use super::compiled::Follower;
 use super::laws::n_named;
 use super::{Law, Laws, PiecewiseSystem, Step, TracedSystem};
 use crate::error::Error;
@@ -162,11 +163,14 @@ impl Definition {
             sticking,
         } = self.rules;
         let n_laws = laws.len();
+        let followers = followers(&self.graph, &laws, zeros.len());
         let laws = Laws::new(&self.graph, laws)?;
         let system = TracedSystem::new(self.graph, self.field, zeros, self.names, backend)?;
         let n_surfaces = system.n_surfaces();
         watched.extend(n_surfaces - n_hidden..n_surfaces);
-        let system = system.watching(&watched).sticking(&sticking);
+        let system = system
+            .watching_with_followers(&watched, followers)
+            .sticking(&sticking);
         Ok((system.with_discrete(n_laws), laws))
     }
 
@@ -278,6 +282,26 @@ fn check_sign(name: &'static str, value: f64) -> Result<(), Error> {
         value,
         requirement: "must be +1 or -1",
     })
+}
+
+/// The laws that are followed only where something reads them: those of quantities that may end or jump, and what is made of
+/// them. None if there are none of the first kind.
+fn followers(graph: &Graph, laws: &[Law], n_parameters: usize) -> Vec<Follower> {
+    let may_end = |node: NodeId| graph.has_signs(node) || !graph.is_analytic(&[node]);
+    let follower = |(index, law): (usize, &Law)| {
+        let (guard, argument) = (law.guard_without_memory(), law.nodes()[0]);
+        let is_one = matches!(law, Law::Held { .. }) || guard.is_some() && may_end(argument);
+        is_one.then_some(Follower {
+            parameter: (n_parameters + index) as u32,
+            guard,
+            argument,
+        })
+    };
+    let found: Vec<Follower> = laws.iter().enumerate().filter_map(follower).collect();
+    match found.iter().any(|follower| follower.guard.is_some()) {
+        true => found,
+        false => Vec::new(),
+    }
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 //! | law | q is | changes where |
 //! |---|---|---|
 //! | clock | the floor of a g that is affine in t | g is a whole number: known times |
-//! | level | the whole number nearest to g | \|g - q\| reaches 1/2 |
+//! | level | the whole number nearest to g | \|g - q\| reaches 0.618 |
 //! | held | a step function of a g that no motion changes | the state, or another discrete state, jumps |
 //! | hysteresis | +1 above `high`, -1 below `low`, between them as it was | h reaches `high` at -1, `low` at +1 |
 //! | piece | how many knots of a table are not above g | g reaches a knot: known times if g is affine in t |
@@ -42,7 +42,7 @@ pub enum Law {
         surface: usize,
         /// The sign by which the switching function of that surface differs from g - q.
         orientation: f64,
-        /// The surface 1/2 - |g - q| = 0.
+        /// The surface 0.618 - |g - q| = 0.
         guard: usize,
     },
     /// A step function of an expression of other discrete states, and of constants of motion.
@@ -130,6 +130,18 @@ impl Law {
                 thresholds: [low, high],
                 ..
             } => smallvec![argument, low, high],
+        }
+    }
+
+    /// The surface at which the discrete state changes, if it is a function of the point: it need not be watched where
+    /// nothing reads it.
+    pub(crate) fn guard_without_memory(&self) -> Option<usize> {
+        match *self {
+            Law::Level { guard, .. } => Some(guard),
+            Law::Piece { guard, .. } => guard,
+            Law::Clock { .. } | Law::Held { .. } | Law::Hysteresis { .. } | Law::Named { .. } => {
+                None
+            }
         }
     }
 
@@ -471,7 +483,7 @@ impl ActionMap for LawMap {
             Law::Level { .. } => {
                 let out = self.laws.eval(t, x, signs, &self.parameters, q);
                 let distance = out[3 * index] - q[index];
-                // At 1/2 exactly rounding may not move it.
+                // After a jump it may be at 1/2 exactly, where rounding may not move it.
                 let next = q[index] + distance.round();
                 q[index] = if next == q[index] {
                     q[index] + distance.signum()
@@ -480,6 +492,33 @@ impl ActionMap for LawMap {
                 };
             }
         }
+        self.bring_held_up_to_date(t, x, signs, q);
+        Ok(())
+    }
+
+    fn follow(&self, t: f64, x: &[f64], signs: &[f64], q: &mut [f64]) {
+        let index = self.index;
+        let g = self.laws.eval(t, x, signs, &self.parameters, q)[3 * index];
+        if g.is_nan() {
+            return;
+        }
+        match &self.laws.laws[index] {
+            Law::Level { .. } if (g - q[index]).abs() <= 0.5 => return,
+            Law::Level { .. } => q[index] = g.round(),
+            Law::Piece {
+                knots,
+                guard: Some(_),
+                ..
+            } => q[index] = passed(knots, g, 1.0),
+            _ => return,
+        }
+        self.bring_held_up_to_date(t, x, signs, q);
+    }
+}
+
+impl LawMap {
+    /// Brings what stands still between jumps up to date with what it reads.
+    fn bring_held_up_to_date(&self, t: f64, x: &[f64], signs: &[f64], q: &mut [f64]) {
         for (k, law) in self.laws.laws.iter().enumerate() {
             let Law::Held { step, .. } = law else {
                 continue;
@@ -491,6 +530,5 @@ impl ActionMap for LawMap {
             };
             q[k] = step.at(value);
         }
-        Ok(())
     }
 }

@@ -4,13 +4,10 @@
 //! The relative degree of a surface is the order of the first derivative of h that jumps on it; it is 1 where the fields
 //! themselves do. Reference: Levant, Higher-order sliding modes, Int. J. Control 76 (2003) 924.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::OnceLock;
 
 use filippov_expr::{Graph, NodeId, RateOnSurface};
 use smallvec::SmallVec;
-
-use super::compiled::Model;
-use super::traced::TracedSystem;
 
 /// The graph and the field where each of these surfaces that has a higher relative degree is replaced by its rate; none if there
 /// is none of them, or if a rate is in the place of another of these surfaces.
@@ -53,33 +50,33 @@ pub(super) fn relative_degree(graph: &Graph, field: &[NodeId], j: usize) -> usiz
     1
 }
 
-/// Reduced systems of a traced one, by the surfaces slid on: a list that grows at its end.
-#[derive(Clone, Default)]
-pub(super) struct Reductions(OnceLock<Box<Reduction>>);
+/// Reduced systems of one system, by the surfaces slid on: a list that grows at its end.
+#[derive(Clone)]
+pub(super) struct Reductions<S>(OnceLock<Box<Reduction<S>>>);
 
 #[derive(Clone)]
-struct Reduction {
+struct Reduction<S> {
     surfaces: SmallVec<[usize; 4]>,
-    system: Option<TracedSystem>,
-    next: Reductions,
+    system: Option<S>,
+    next: Reductions<S>,
 }
 
-impl Reductions {
-    /// The system for these surfaces, with the model that `find` has for them.
-    pub fn get_or_make(
-        &self,
-        surfaces: &[usize],
-        of: &TracedSystem,
-        find: impl FnOnce() -> Option<Arc<Model>>,
-    ) -> Option<&TracedSystem> {
-        let mut find = Some(find);
+impl<S> Default for Reductions<S> {
+    fn default() -> Self {
+        Reductions(OnceLock::new())
+    }
+}
+
+impl<S> Reductions<S> {
+    /// The system for these surfaces, made if it is not known.
+    pub fn get_or_make(&self, surfaces: &[usize], make: impl FnOnce() -> Option<S>) -> Option<&S> {
+        let mut make = Some(make);
         let mut list = self;
         loop {
             let entry = list.0.get_or_init(|| {
-                let model = find.take().and_then(|find| find());
                 Box::new(Reduction {
                     surfaces: SmallVec::from_slice(surfaces),
-                    system: model.map(|model| of.with_model(model)),
+                    system: make.take().and_then(|make| make()),
                     next: Reductions::default(),
                 })
             });

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use filippov_expr::{Backend, Enclosure, ExprError, Graph, Motion, Names, NodeId, Program};
 use smallvec::SmallVec;
 
-use super::compiled::Model;
+use super::compiled::{Follower, Model};
 use super::reduction::Reductions;
 use super::{
     AffineSigns, BothSides, Enclosures, LieDerivatives, LieValue, Linearisations, MotionJacobian,
@@ -37,7 +37,7 @@ pub struct TracedSystem {
     parameters: Vec<f64>,
     /// How many discrete states the functions read, behind the parameters.
     n_discrete: usize,
-    reductions: Reductions,
+    reductions: Reductions<TracedSystem>,
 }
 
 impl TracedSystem {
@@ -64,9 +64,18 @@ impl TracedSystem {
     /// The same system with these surfaces monitored in every mode, whether the field depends on them or not:
     /// they trigger actions. For a system that was just made.
     #[must_use]
-    pub fn watching(mut self, surfaces: &[usize]) -> Self {
+    pub fn watching(self, surfaces: &[usize]) -> Self {
+        self.watching_with_followers(surfaces, Vec::new())
+    }
+
+    /// The same, some of them only where something reads the discrete state that changes there.
+    pub(super) fn watching_with_followers(
+        mut self,
+        surfaces: &[usize],
+        followers: Vec<Follower>,
+    ) -> Self {
         if let Some(model) = Arc::get_mut(&mut self.model) {
-            model.watch(surfaces);
+            model.watch(surfaces, followers);
         }
         self
     }
@@ -372,8 +381,12 @@ impl PiecewiseSystem for TracedSystem {
         if !self.model.is_reducible(surfaces) {
             return None;
         }
-        let find = || self.model.reduced(surfaces);
-        let reduced = self.reductions.get_or_make(surfaces, self, find);
+        let make = || {
+            self.model
+                .reduced(surfaces)
+                .map(|model| self.with_model(model))
+        };
+        let reduced = self.reductions.get_or_make(surfaces, make);
         reduced.map(|system| system as _)
     }
 

@@ -149,3 +149,11 @@ pub const JUMP_AT_KINK: f64 = 1e-4;
 /// While sliding on more surfaces than this the fields of all regions around them are not compared, and a switch counts as a jump unless
 /// the structure of the signs excludes one.
 pub const MOST_SLID_ON_AT_KINK: usize = 8;
+
+/// Where the sign of a user's function behind a zero is looked at, in shares of the piece that is searched: near, and farther
+/// from a double zero, where its values are within rounding for the square root of that.
+pub const SHARES_BEHIND_ZERO: [f64; 3] = [1e-7, 1e-5, 1e-3];
+
+/// Behind a touch the search goes on where a user's function is larger than its rounding by this factor: the touch is not
+/// found again.
+pub const BEHIND_TOUCH: f64 = 8.0;

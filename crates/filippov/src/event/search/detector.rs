@@ -89,7 +89,13 @@ impl Detector {
         run.seen.iter_mut().for_each(|seen| seen.start = seen.end);
         let mut cleared = false;
         for (m, &(value, rate)) in run.motion.monitored.iter_mut().zip(&self.right) {
-            m.curvature = (rate - m.rate) / dt;
+            // Of a root that began at the start of the step nothing is known.
+            let curvature = (rate - m.rate) / dt;
+            m.curvature = if curvature.is_finite() {
+                curvature
+            } else {
+                0.0
+            };
             (m.value, m.rate) = (value, rate);
             // A zero that rounding still blurs stays divided out.
             if m.deflation.is_some() && value > CLEAR_OF_NOISE * m.noise {

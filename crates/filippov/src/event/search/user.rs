@@ -11,7 +11,7 @@ use super::StepSearch;
 use crate::error::FieldError;
 use crate::event::{SmoothParts, UserEvent, UserEvents, UserFunction};
 use crate::mode::Signs;
-use crate::tolerances::{MOST_SAMPLES, MOST_ZEROS, PIECES_OF_SERIES, ROUNDING};
+use crate::tolerances::{MOST_SAMPLES, MOST_ZEROS, PIECES_OF_SERIES, ROUNDING, SHARES_BEHIND_ZERO};
 
 impl StepSearch<'_, '_> {
     /// The value of a user's function along the motion.
@@ -318,11 +318,13 @@ impl StepSearch<'_, '_> {
                 return Ok(false);
             }
             if start.divided {
-                let probe = start.from + 1e-7 * (to - start.from);
-                start.sign = match sign_of(along.value(self, probe)?) {
-                    0.0 => start.sign,
-                    sign => sign,
-                };
+                let sign = self.sign_behind(along, start.from, to)?;
+                // A switching function that touches zero does not change its sign.
+                let is_here = |change: &Change| change.at == start.from && change.before == sign;
+                if along.is_inner() && changes.last().is_some_and(is_here) {
+                    changes.pop();
+                }
+                start.sign = if sign == 0.0 { start.sign } else { sign };
             }
             let is_last = ends.len() == 1 && to_end == theta && along.is_smooth();
             match self.search_user_piece(along, *start, to, is_last)? {
@@ -330,6 +332,14 @@ impl StepSearch<'_, '_> {
                 Outcome::Nothing => {
                     (start.from, start.divided) = (to, false);
                     ends.pop();
+                }
+                Outcome::Touch(at) => {
+                    n_cuts += 1;
+                    (start.from, start.divided) = (at, false);
+                    ends.retain(|end| *end > at);
+                    if ends.is_empty() {
+                        break;
+                    }
                 }
                 Outcome::NotFinite { everywhere } => {
                     let length = to - start.from;
@@ -381,6 +391,20 @@ impl StepSearch<'_, '_> {
             }
         }
         Ok(true)
+    }
+
+    /// The sign behind a zero, where it is clear of rounding: nearer to a multiple zero that decides.
+    fn sign_behind(&mut self, along: &Along, from: f64, to: f64) -> Result<f64, FieldError> {
+        let mut nearest = 0.0;
+        for share in SHARES_BEHIND_ZERO {
+            let at = from + share * (to - from);
+            let value = along.value(self, at)?;
+            if value.abs() > along.rounding(self, at) {
+                return Ok(sign_of(value));
+            }
+            nearest = if nearest == 0.0 { value } else { nearest };
+        }
+        Ok(sign_of(nearest))
     }
 
     /// The ends of the pieces that are searched one after the other, the first one last: a function without bounds is

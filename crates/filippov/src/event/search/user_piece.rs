@@ -16,7 +16,7 @@ use crate::mode::Signs;
 use crate::motion::CurrentMotion;
 use crate::stepper::{powers_of_nested, Basis, Interpolant};
 use crate::system::Setting;
-use crate::tolerances::{BOUNDS_DEPTH, EPS, POLE, ROUNDING};
+use crate::tolerances::{BEHIND_TOUCH, BOUNDS_DEPTH, EPS, POLE, ROUNDING};
 
 /// The value of a user's function along the motion.
 pub(super) fn value_along(
@@ -50,6 +50,8 @@ pub(super) enum Outcome {
     At(f64),
     /// The sign changes first where the function is infinite.
     Pole(f64),
+    /// The function comes within rounding of zero without a change of sign, and is clear of it from here on.
+    Touch(f64),
     /// The function is not finite at some of the points looked at, or at all of them.
     NotFinite { everywhere: bool },
     /// A shorter step is needed.
@@ -97,6 +99,11 @@ impl<'f> Along<'f> {
             Source::Sampled(_) => true,
             Source::Part(parts, _) => parts.n_inner() == 0,
         }
+    }
+
+    /// Is it a switching function inside of a user's function?
+    pub fn is_inner(&self) -> bool {
+        matches!(self.source, Source::Part(parts, part) if part < parts.n_inner())
     }
 
     /// The value in the step.
@@ -295,6 +302,15 @@ impl StepSearch<'_, '_> {
                 true => Outcome::Pole(zero.theta),
                 false => Outcome::At(zero.theta),
             });
+        }
+        if let Some(Zero::Touch(at)) = isolated.zero {
+            let mut width = beside.max(EPS * (to - from));
+            while at + width < to && g(at + width)?.abs() <= BEHIND_TOUCH * noise {
+                width *= 2.0;
+            }
+            if at + width < to {
+                return Ok(Outcome::Touch(at + width));
+            }
         }
         // Zero up to rounding where the motion may end, as a switching function at its switch.
         let ends_there = is_last && largest > 0.0 && values[4].abs() <= noise;

@@ -1,0 +1,249 @@
+//! Switching functions without roots: `sqrt(u) - c` has the sign of `u - c abs(c)`, which is smooth where u vanishes.
+//!
+//! A root begins with a vertical tangent, and a logarithm with a pole, where its argument vanishes: beside that place neither
+//! derivatives nor bounds of it say anything. The inverse function moves to the other side of the comparison:
+//!
+//! | term | beside c | compared instead |
+//! |---|---|---|
+//! | `cbrt(u)` | anything | u and c^3 |
+//! | `sqrt(u)` | a number, what no motion changes, or of known sign | u and c \|c\| |
+//! | `u**p` | the same | u and the power 1/p of \|c\|, with the sign of c |
+//! | `log(u)` | the same | u and exp(c) |
+//!
+//! The last three are looked at only where u is not negative by itself: elsewhere they end where u does, and so has the comparison to.
+
+use crate::graph::Graph;
+use crate::linear::LinearForm;
+use crate::node::{Node, NodeId};
+use crate::op::{BinaryOp, UnaryOp};
+use crate::switching::Switching;
+
+/// A function of one operand whose inverse is known.
+#[derive(Clone, Copy, PartialEq)]
+enum Inverse {
+    Cube,
+    /// This power.
+    Power(f64),
+    /// That of this base.
+    Exponential(f64),
+}
+
+/// A term of a sum: `coefficient * signs * function(argument)`.
+struct Term {
+    place: usize,
+    /// The signs in front, as a product; none if there are none.
+    sign: Option<NodeId>,
+    argument: NodeId,
+    inverse: Inverse,
+}
+
+/// An expression with the same sign as a sum, times `+-1`, in which one root less stands; `None` if no root can be taken away.
+pub(crate) fn without_root(graph: &mut Graph, form: &LinearForm) -> Option<(NodeId, f64)> {
+    solved_for_a_root(graph, form, true)
+}
+
+/// The same, with the sign of the sum where that is defined: beyond the domain of the root it may have another one.
+pub(crate) fn within_domain(graph: &mut Graph, form: &LinearForm) -> Option<(NodeId, f64)> {
+    solved_for_a_root(graph, form, false)
+}
+
+/// If `is_everywhere`, also beyond the domain of the root.
+fn solved_for_a_root(
+    graph: &mut Graph,
+    form: &LinearForm,
+    is_everywhere: bool,
+) -> Option<(NodeId, f64)> {
+    let mut terms: Vec<Term> = (0..form.terms.len())
+        .filter_map(|place| root_at(graph, form, place, is_everywhere))
+        .collect();
+    // A cube asks for nothing, and leaves other roots smoother than they were.
+    terms.sort_by_key(|term| term.inverse != Inverse::Cube);
+    for term in terms {
+        if let Some(found) = solved(graph, form, &term) {
+            return Some(found);
+        }
+    }
+    None
+}
+
+/// The root that a term of a sum is, if it is one whose argument may vanish.
+fn root_at(
+    graph: &mut Graph,
+    form: &LinearForm,
+    place: usize,
+    is_everywhere: bool,
+) -> Option<Term> {
+    let (sign, function) = signs_in_front(graph, form.terms[place].0);
+    let (argument, inverse) = match *graph.node(function) {
+        Node::Unary(UnaryOp::Cbrt, a) => (a, Inverse::Cube),
+        Node::Unary(UnaryOp::Sqrt, a) => (a, Inverse::Power(2.0)),
+        Node::Unary(UnaryOp::Log, a) => (a, Inverse::Exponential(std::f64::consts::E)),
+        Node::Unary(UnaryOp::Log2, a) => (a, Inverse::Exponential(2.0)),
+        Node::Unary(UnaryOp::Log10, a) => (a, Inverse::Exponential(10.0)),
+        Node::Binary(BinaryOp::Pow, a, p) => match graph.as_constant(p) {
+            Some(p) if p > 0.0 && p.fract() != 0.0 => (a, Inverse::Power(1.0 / p)),
+            _ => return None,
+        },
+        _ => return None,
+    };
+    if !graph.facts(argument).varies {
+        return None;
+    }
+    let argument = match (inverse, *graph.node(argument)) {
+        (Inverse::Cube, _) => argument,
+        // Beyond the regions of the signs in it the root counts as 0.
+        (_, Node::Unary(UnaryOp::NotNegative, inner)) => inner,
+        _ if !is_everywhere
+            || graph.facts(argument).nonnegative
+            || graph.range(argument).0 >= 0.0 =>
+        {
+            argument
+        }
+        _ => return None,
+    };
+    // A logarithm of what has no kink has no pole that a motion passes.
+    let is_log = matches!(inverse, Inverse::Exponential(_));
+    let passes_no_pole = is_everywhere && !graph.facts(argument).has_sign;
+    if is_log && (sign.is_some() || passes_no_pole) {
+        return None;
+    }
+    Some(Term {
+        place,
+        sign,
+        argument,
+        inverse,
+    })
+}
+
+/// The signs in front of a product, as a product, and the rest of it.
+fn signs_in_front(graph: &mut Graph, product: NodeId) -> (Option<NodeId>, NodeId) {
+    let (mut sign, mut rest) = (None, product);
+    while let Node::Binary(BinaryOp::Mul, left, right) = *graph.node(rest) {
+        if !matches!(*graph.node(left), Node::Sign(_)) {
+            break;
+        }
+        sign = Some(match sign {
+            Some(sign) => graph.mul(sign, left),
+            None => left,
+        });
+        rest = right;
+    }
+    (sign, rest)
+}
+
+/// `k s (f(u) + s R/k)`, with the other terms R and signs s, has the sign of `k (s u + g(R/k))`, where g is the inverse of f
+/// continued as an odd function; for a logarithm of `k (u - exp(-R/k))`.
+fn solved(graph: &mut Graph, form: &LinearForm, term: &Term) -> Option<(NodeId, f64)> {
+    let coefficient = form.terms[term.place].1;
+    let mut rest = LinearForm {
+        terms: form.terms.clone(),
+        constant: form.constant / coefficient,
+    };
+    rest.terms.remove(term.place);
+    rest.terms.iter_mut().for_each(|term| term.1 /= coefficient);
+    let sum = sum_of(graph, &rest);
+    let inverse = match term.inverse {
+        Inverse::Cube => match power_of_root(graph, &rest, 3.0) {
+            Some(power) => power,
+            None => {
+                let square = graph.mul(sum, sum);
+                graph.mul(square, sum)
+            }
+        },
+        // A power above 1 is smooth enough, and its inverse a root.
+        Inverse::Power(p) if p < 1.0 && graph.facts(sum).varies => return None,
+        Inverse::Power(p) => match power_of_root(graph, &rest, p) {
+            Some(power) => power,
+            None => odd_power(graph, &rest, sum, p)?,
+        },
+        Inverse::Exponential(base) => {
+            if graph.facts(sum).has_sign {
+                return None;
+            }
+            let exponent = graph.constant(-base.ln());
+            let exponent = graph.mul(exponent, sum);
+            let power = graph.unary(UnaryOp::Exp, exponent);
+            let is_lost = |value: f64| !value.is_normal();
+            if graph.as_constant(power).is_some_and(is_lost) {
+                return None;
+            }
+            graph.neg(power)
+        }
+    };
+    let argument = match term.sign {
+        Some(sign) => graph.mul(sign, term.argument),
+        None => term.argument,
+    };
+    Some((graph.add(argument, inverse), coefficient.signum()))
+}
+
+/// The odd power p of `k s v^q`, which is one root with signs s: `|k|^p s v^(pq)` with the sign of k.
+fn power_of_root(graph: &mut Graph, form: &LinearForm, p: f64) -> Option<NodeId> {
+    let (atom, k) = form.single_atom()?;
+    let (sign, function) = signs_in_front(graph, atom);
+    let (base, exponent) = match *graph.node(function) {
+        Node::Unary(UnaryOp::Cbrt, base) if p == 3.0 => (base, 1.0),
+        Node::Unary(UnaryOp::Sqrt, base) if graph.facts(base).nonnegative => (base, 0.5 * p),
+        Node::Binary(BinaryOp::Pow, base, q) if graph.facts(base).nonnegative => {
+            (base, p * graph.as_constant(q)?)
+        }
+        _ => return None,
+    };
+    let factor = graph.constant(k.abs().powf(p).copysign(k));
+    let power = match exponent == 1.0 {
+        true => base,
+        false => {
+            let exponent = graph.constant(exponent);
+            graph.pow(base, exponent)
+        }
+    };
+    let power = graph.mul(factor, power);
+    Some(match sign {
+        Some(sign) => graph.mul(sign, power),
+        None => power,
+    })
+}
+
+/// |c|^p with the sign of c; `None` if that may have a kink along a motion.
+fn odd_power(graph: &mut Graph, form: &LinearForm, c: NodeId, p: f64) -> Option<NodeId> {
+    if let Some(value) = graph.as_constant(c) {
+        return Some(graph.constant(value.abs().powf(p).copysign(value)));
+    }
+    if !graph.facts(c).varies {
+        // No motion changes it, and so it needs no surface for its sign.
+        if p <= 1.0 {
+            return None;
+        }
+        let (zero, exponent) = (graph.constant(0.0), graph.constant(p - 1.0));
+        let magnitude = graph.binary(BinaryOp::Hypot, c, zero);
+        let power = graph.pow(magnitude, exponent);
+        return Some(graph.mul(c, power));
+    }
+    let power = |graph: &mut Graph, base: NodeId| {
+        let p = graph.constant(p);
+        graph.pow(base, p)
+    };
+    match graph.known_sign(form)? {
+        Switching::Constant(1.0) => Some(power(graph, c)),
+        Switching::Constant(-1.0) => {
+            let opposite = graph.neg(c);
+            let power = power(graph, opposite);
+            Some(graph.neg(power))
+        }
+        _ => None,
+    }
+}
+
+/// The expression of a linear form.
+fn sum_of(graph: &mut Graph, form: &LinearForm) -> NodeId {
+    let mut sum = graph.constant(form.constant);
+    for &(atom, coefficient) in &form.terms {
+        let factor = graph.constant(coefficient);
+        let term = graph.mul(factor, atom);
+        sum = graph.add(sum, term);
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests;
