@@ -56,7 +56,9 @@ impl Problem<'_> {
     ///     |_t, x, h| h[0] = x[1],
     /// );
     /// let clock = Clock { period: 6.0 * std::f64::consts::PI, phase: 0.0 };
-    /// let section = Section { place: Place::Ticks(clock), transient: 20, most: 2, cycle: None };
+    /// let (transient, most) = (20, 2);
+    /// let place = Place::Ticks(clock);
+    /// let section = Section { place, transient, most, cycle: None, keeps_pieces: false };
     /// let problem = Problem::new(&oscillator, (0.0, 1e3), &[1.0, 2.0]);
     /// let solution = problem.solve_to_section(&section, &mut |_| false)?;
     /// let returns = solution.returns.expect("there is a section");
