@@ -1,8 +1,8 @@
 """Sliding of higher order: surfaces that both fields cross at the same rate; targets reached in finite time.
 
-The references are closed forms. For super-twisting control x' = -k1 sqrt(abs(x)) sign(x) + v, v' = -k2 sign(x), the change
-of time dt = sqrt(abs(x)) ds makes the motion between two zeros of x linear: there v shrinks by
-rho = exp(-k1 pi / (4 w)), w = sqrt(k2/2 - k1**2/16), and it takes (1 + rho) v / k2.
+The references are closed forms. For super-twisting control x' = -k1 sqrt(abs(x)) sign(x) + v,
+v' = -k2 sign(x), the change of time dt = sqrt(abs(x)) ds makes the motion between two zeros of x linear: v
+shrinks by rho = exp(-k1 pi / (4 w)), w = sqrt(k2/2 - k1**2/16), and it takes (1 + rho) v / k2.
 """
 
 from __future__ import annotations
@@ -11,10 +11,9 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+import filippov as fl
 import numpy as np
 import pytest
-
-import filippov as fl
 
 METHODS = ("auto", "Taylor", "DOPRI5", "DOP853", "Rodas5P")
 
@@ -79,7 +78,7 @@ def test_chain_of_three_integrators_rests_at_a_start_at_its_target() -> None:
 
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e3])
 def test_units_do_not_matter(scale: float) -> None:
-    """x in other units: the surface is a multiple of a sum of states, and the roots contain it in another spelling."""
+    """The surface is a sum of states in other units, and the roots contain it in another spelling."""
 
     def fun(t: float, z: Any) -> list[Any]:
         s = z[0] / scale - z[1]

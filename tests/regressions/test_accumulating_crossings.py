@@ -97,7 +97,7 @@ def test_lines_that_meet_at_an_instant_only_are_not_met_before(method: str, rtol
 @pytest.mark.filterwarnings("ignore:zero_surface:filippov.FilippovWarning")
 @pytest.mark.parametrize("method", ["auto", "DOPRI5", "DOP853", "Rodas5P"])
 def test_a_limit_where_the_rate_of_a_surface_vanishes_too_is_a_rest(method: str) -> None:
-    """All fields are tangent to the first surface there. Where its rate stays zero too, the motion has nowhere to go."""
+    """All fields are tangent to the first surface there. Where its rate stays zero too, nothing moves."""
 
     def fun(t: float, x: Any) -> list[Any]:
         above, side = np.heaviside(x[1] + 0.8, 0.5), np.sign(x[2] + 0.049)

@@ -69,7 +69,7 @@ def test_a_start_where_one_side_rests_and_the_other_turns_back_rests(is_turned: 
     fun = turned(f) if is_turned else f
     sol = fl.solve_ivp(fun, (0.0, 2.0), [0.0, 0.0], method=method)
     assert sol.success, sol.message
-    # The field below presses the motion onto the surface, and that above keeps it there: it slides with its share alone.
+    # The field below presses the motion onto the surface, and that above keeps it there, alone.
     assert [str(mode) for mode in sol.segments.mode] == ["0"]
     assert sol.multipliers(1.0) == pytest.approx([-1.0 if is_turned else 1.0])
     assert not sol.y.any()

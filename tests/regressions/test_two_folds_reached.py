@@ -59,7 +59,7 @@ def test_a_visible_two_fold_in_the_plane_of_a_surface() -> None:
 
 
 def test_what_is_said_about_a_point_agrees_with_the_run_from_there() -> None:
-    # Both fields turn back to x0 = 0 from the other side: the rate of x0 is kept at zero too, and the state rests.
+    # Both fields turn back to x0 = 0 from the other side: the rate of x0 stays zero too.
     system = fl.System(lambda t, x: [x[1] - x[0], 0.3 - x[1] - np.sign(x[0])], n=2)
     said = system.classify(0.0, [0.0, 0.0])
     assert said.mode == (0,)
