@@ -12,7 +12,7 @@ impl Recorder<'_> {
     ///
     /// # Errors
     /// If a function of the user raises.
-    #[inline]
+    #[inline(always)]
     pub fn find_user_zeros(
         &self,
         search: &mut StepSearch,
@@ -36,7 +36,7 @@ impl Recorder<'_> {
     ///
     /// # Errors
     /// If a function of the user raises.
-    #[inline]
+    #[inline(always)]
     pub fn record_user_zeros(
         &mut self,
         search: &mut StepSearch,
