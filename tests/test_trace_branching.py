@@ -270,10 +270,13 @@ def test_event_that_needs_python_leaves_the_builder_as_it_was(event: Callable[..
     assert traced.builder.n_surfaces() == 1
 
 
-def test_an_event_with_a_floor_of_its_own_is_told_apart() -> None:
+def test_an_event_with_a_relay_of_its_own_is_told_apart() -> None:
     traced = trace_two(lambda t, x: (x[1], np.floor(x[0])))
     assert isinstance(trace_event(traced, lambda t, x: np.floor(x[0]) - 0.5), TracedEvent)
-    assert "floor" in str(trace_event(traced, lambda t, x: np.floor(x[1]) - 0.5))
+    own = trace_event(traced, lambda t, x: np.floor(x[1]) - 0.5)
+    assert isinstance(own, TracedEvent)
+    assert [own.value(0.0, [0.0, v], [0.0]) for v in (-0.5, 0.5, 1.5)] == [-1.5, -0.5, 0.5]
+    assert "relay" in str(trace_event(traced, lambda t, x: fl.hysteresis(x[1], -1, 1)))
 
 
 # ---------------------------------------------------------------------- threads

@@ -61,8 +61,7 @@ impl Monitored {
     /// Predicted time to the next zero, from value, rate and curvature; infinite if none is ahead.
     pub fn time_to_zero(&self) -> f64 {
         let (value, rate, curvature) = (self.value, self.rate, self.curvature);
-        // A root that begins here has no slope, and tells nothing.
-        if !(rate < 0.0 && value > 0.0 && rate.is_finite()) {
+        if !(rate < 0.0 && value > 0.0) {
             return f64::INFINITY;
         }
         let discriminant = rate * rate - 2.0 * curvature * value;
@@ -76,7 +75,13 @@ impl Monitored {
                 -rate / curvature
             }
         } else {
-            2.0 * value / (-rate + discriminant.sqrt())
+            let time = 2.0 * value / (-rate + discriminant.sqrt());
+            // A root that begins here, or began at the start of the last step, has no slope there and tells nothing.
+            if time > 0.0 {
+                time
+            } else {
+                f64::INFINITY
+            }
         }
     }
 

@@ -149,7 +149,7 @@ pub fn shares_of_rows(rows: &[f64], values: &[f64]) -> Option<Vector> {
 mod tests {
     use super::*;
     use crate::TracedSystem;
-    use filippov_expr::{Backend, Graph, Names, UnaryOp};
+    use filippov_expr::{Backend, BinaryOp, Graph, Names};
 
     /// Beside the surface x^2 + y^2 = 0.64 the products of its gradient and that of hypot(x, y) - 0.8 are those of dependent
     /// vectors up to rounding, which must not decide how far a point is moved.
@@ -160,7 +160,7 @@ mod tests {
         let (xx, yy) = (g.mul(x, x), g.mul(y, y));
         let square = g.add(xx, yy);
         let (limit, radius) = (g.constant(0.64), g.constant(0.8));
-        let length = g.unary(UnaryOp::Sqrt, square);
+        let length = g.binary(BinaryOp::Hypot, x, y);
         let (h0, h1) = (g.sub(square, limit), g.sub(length, radius));
         let field = vec![g.sign(h0), g.sign(h1)];
         let names = Names::default();
