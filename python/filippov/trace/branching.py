@@ -40,6 +40,9 @@ MOST_COMBINATIONS = 1024
 MOST_AFTER_MANY = 32
 MANY = 3
 
+# An expression that jumps is taken apart into that many parts at most.
+MOST_JUMPING_PARTS = 8
+
 
 @dataclass(frozen=True)
 class Guard:
@@ -385,8 +388,23 @@ class Tracer:
             is_whole = pieces is None or (not in_full and len(pieces) == 2 and pieces[1] != 0.0)
             if is_whole and pieces is not None and isinstance(pieces[1], float):
                 self._signs[node] = pieces[1]
+            if is_whole and not in_full:
+                pieces = self._jumping_parts(node)
+                is_whole = pieces is None
             self._pieces[node, in_full] = None if is_whole else pieces
         return self._pieces[node, in_full]
+
+    def _jumping_parts(self, node: int) -> Pieces | None:
+        """Return the parts of an expression that jumps with a sign inside of it: each switches where it does.
+
+        So a motion slides where the inner sign changes between the fields that there are on its two sides:
+        ``np.sign(x + np.sign(y))`` is ``np.where(y > 0, np.sign(x + 1), np.sign(x - 1))``.
+        """
+        if not self.jumps(node):
+            return None
+        parts = self.pieces(node, in_full=True)
+        is_short = parts is not None and len(list(parts_of(parts))) <= MOST_JUMPING_PARTS
+        return parts if is_short else None
 
     def take_as_whole(self, node: int) -> None:
         """Leave an expression in one piece: where it would stand still, it is not asked for."""

@@ -34,7 +34,15 @@ pub(super) fn decide_if_entangled(
         }
         return Ok(None);
     }
+    let is_steep = wider.is_some() && !at.system.is_analytic();
     let surfaces = wider.unwrap_or_else(|| meeting.surfaces.to_vec());
+    if is_steep {
+        // A function that jumps here, or a root that is too steep to tell.
+        if let Some(stays) = stay_if_nothing_leaves(at, notes, &meeting.with_surfaces(&surfaces))? {
+            notes.leaf = "rest";
+            return Ok(Some(Ok(stays)));
+        }
+    }
     decide_undecided(at, notes, &meeting.with_surfaces(&surfaces), None).map(Some)
 }
 
@@ -60,8 +68,47 @@ pub(super) fn decide_if_doubtful(
     Ok(decide_by_germs(at, notes, meeting)?.ok())
 }
 
-/// What follows at an intersection of which first-order data do not decide; why, if that is known.
+/// What follows at an intersection of which first-order data do not decide; why, if that is known. Rest comes first where a
+/// field or a slope is not finite: it has no germ there.
 pub(super) fn decide_undecided(
+    at: &Point,
+    notes: &mut Notes,
+    meeting: &Meeting,
+    reason: Option<Undecided>,
+) -> Result<Decided, FieldError> {
+    if !is_finite(at, notes, meeting)? {
+        if let Some(stays) = stay_if_nothing_leaves(at, notes, meeting)? {
+            notes.leaf = "rest";
+            return Ok(Ok(stays));
+        }
+    }
+    let decided = by_viable_modes(at, notes, meeting, reason)?;
+    if let Err(Stop::Intersection { .. }) = decided {
+        if let Some(stays) = stay_if_nothing_leaves(at, notes, meeting)? {
+            notes.leaf = "rest";
+            return Ok(Ok(stays));
+        }
+    }
+    Ok(decided)
+}
+
+/// Are the fields of all regions and the slopes of the surfaces finite at the point?
+fn is_finite(at: &Point, notes: &mut Notes, meeting: &Meeting) -> Result<bool, FieldError> {
+    if matches!(meeting.surroundings(at, notes)?, Err(Undecided::NotFinite)) {
+        return Ok(false);
+    }
+    let (signs, mut row) = (meeting.mode.signs(), vec![0.0; at.x.len()]);
+    for &j in meeting.surfaces {
+        at.system.gradient(j, &at.place(&signs), &mut row)?;
+        if row.iter().any(|slope| !slope.is_finite()) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// The viable mode that follows.
+fn by_viable_modes(
     at: &Point,
     notes: &mut Notes,
     meeting: &Meeting,
@@ -69,12 +116,6 @@ pub(super) fn decide_undecided(
 ) -> Result<Decided, FieldError> {
     notes.leaf = "germs";
     let found = decide_by_germs(at, notes, meeting)?;
-    if found.as_ref().is_err_and(|found| found.between.is_empty()) {
-        if let Some(stays) = stay_if_nothing_leaves(at, notes, meeting)? {
-            notes.leaf = "rest";
-            return Ok(Ok(stays));
-        }
-    }
     Ok(match found {
         Ok(decided) => decided,
         Err(found) if !found.between.is_empty() => Err(Stop::SlidesAcrossJump {

@@ -9,8 +9,17 @@ use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::{Leading, Projector};
 use crate::switching::Arrival as SurfaceArrival;
-use crate::system::PiecewiseSystem;
-use crate::tolerances::ROUNDING;
+use crate::system::{BothSides, PiecewiseSystem, Place};
+use crate::tolerances::{DOUBTFUL, ROUNDING};
+
+/// Does a reduced system jump at a point of a surface, or is its rate reduced once more?
+fn jumps(system: &dyn PiecewiseSystem, j: usize, place: &Place<'_>) -> Result<bool, FieldError> {
+    let mut sides = BothSides::new(place.x.len(), place.signs.len());
+    system.both_sides(j, place, &mut sides)?;
+    let (minus, plus) = (sides.normal_minus, sides.normal_plus);
+    let is_clear = (minus - plus).abs() > DOUBTFUL * (minus.abs() + plus.abs());
+    Ok(is_clear || system.reduced(&[j]).is_some())
+}
 
 /// What is left of a meeting.
 pub(super) struct Reduced<'a> {
@@ -32,8 +41,8 @@ pub(super) struct Reduced<'a> {
 }
 
 impl<'a> Reduced<'a> {
-    /// What is left of a meeting with surfaces of higher degree; `None` if it has none, if a rate is not finite, or if one of them
-    /// is crossed and signs are nested.
+    /// What is left of a meeting with surfaces of higher degree; `None` if it has none, if a rate is not finite, if one that vanishes
+    /// does not jump at this point, or if a surface is crossed and signs are nested.
     pub fn of(
         at: &Point<'_, '_, 'a>,
         notes: &mut Notes,
@@ -70,6 +79,9 @@ impl<'a> Reduced<'a> {
                     return Ok(None);
                 }
                 let is_kept = at.arrival.sliding.contains(&j);
+                if value.abs() <= noise && !jumps(next, j, &place)? {
+                    return Ok(None);
+                }
                 if value.abs() > noise && !is_kept {
                     crossed.push(Left::beside(j, Leading { order, value }));
                 } else {

@@ -7,11 +7,11 @@ use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::{shares_of_rows, SmoothField};
 use crate::status::{Warning, WarningCode};
-use crate::tolerances::{MOST_AROUND_REST, PLACES_BESIDE_REST, STEPS_BESIDE_REST};
+use crate::tolerances::{AT_SIDE, MOST_AROUND_REST, PLACES_BESIDE_REST, STEPS_BESIDE_REST};
 
-/// The motion on all surfaces, where the motions of all other modes lead back to them: tried at points beside the surfaces, as
-/// far as the tolerance and nearer. On an isolated point of a system that does not depend on time it is rest, also
-/// where the fields are not finite at the point itself. `None` if a motion leaves, or if none is found on all surfaces.
+/// Rest, where the motions of all modes lead back to the surfaces: tried at points beside them, as far as the tolerance and
+/// nearer. Multipliers keep the state where it is; or the point is isolated, the system does not depend on time, and the
+/// fields are not finite at the point itself. `None` if a motion leaves.
 pub(super) fn stay_if_nothing_leaves(
     at: &Point,
     notes: &mut Notes,
@@ -32,7 +32,10 @@ pub(super) fn stay_if_nothing_leaves(
         }
     }
     if let Some(Ok(stays)) = stay_on_all(at, notes, meeting)? {
-        return Ok(Some(stays));
+        let velocity = at.velocity(notes, &stays.mode, &[])?;
+        let size = at.corners(notes, meeting.surfaces, meeting.mode)?.size();
+        let is_rest = velocity.iter().all(|v| v.abs() <= AT_SIDE * size);
+        return Ok(is_rest.then_some(stays));
     }
     let is_isolated = m >= at.x.len();
     if !is_isolated || at.system.depends_on_time() {

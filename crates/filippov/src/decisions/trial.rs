@@ -5,9 +5,9 @@
 
 use super::point::{Left, Lefts, Next, Notes, Point};
 use crate::error::FieldError;
-use crate::motion::{Leading, ModeField, SmoothField};
+use crate::motion::{Guard, Leading, ModeField, SmoothField};
 use crate::system::dot;
-use crate::tolerances::{LONGER_TRIAL, MAX_LIE_ORDER, MOST_LENGTHENINGS, ROUNDING};
+use crate::tolerances::{AT_SIDE, LONGER_TRIAL, MAX_LIE_ORDER, MOST_LENGTHENINGS, ROUNDING};
 
 /// Follows a motion for a moment, and longer until it is clear of rounding: of `noise` times its way.
 pub(super) fn try_mode(
@@ -24,17 +24,36 @@ pub(super) fn try_mode(
         .filter(|&j| entries[j] != 0)
         .collect();
     let velocity = at.velocity_from(notes, &next.mode, next.start.as_deref())?;
+    let ends = ends_reached(next);
     if velocity.iter().any(|v| !v.is_finite()) {
         return Ok(Trial::WithinRounding);
     }
     let mut moment = at.moment(notes, &next.mode.signs(), &velocity)?;
     for _ in 0..=MOST_LENGTHENINGS {
-        match leaves_within(at, notes, next, &leaving, &velocity, (moment, noise))? {
+        match leaves_within(
+            at,
+            notes,
+            next,
+            (&leaving, &ends),
+            &velocity,
+            (moment, noise),
+        )? {
             Trial::WithinRounding => moment *= LONGER_TRIAL,
             trial => return Ok(trial),
         }
     }
     Ok(Trial::WithinRounding)
+}
+
+/// The ends at which given multipliers begin, with their places among the exit functions.
+fn ends_reached(next: &Next) -> Vec<(usize, Guard)> {
+    let given = next.start.iter().filter(|start| start.is_given);
+    let multipliers = given.flat_map(|start| &start.multipliers);
+    let reserves = multipliers.flat_map(|l| [1.0 + l, 1.0 - l]);
+    let guards = next.mode.sliding_set().flat_map(Guard::ends);
+    let ends = guards.zip(reserves).enumerate();
+    let reached = ends.filter(|(_, (_, reserve))| *reserve <= AT_SIDE);
+    reached.map(|(place, (guard, _))| (place, guard)).collect()
 }
 
 /// What becomes of a motion within a short time.
@@ -51,7 +70,7 @@ fn leaves_within(
     at: &Point,
     notes: &mut Notes,
     next: &Next,
-    leaving: &[usize],
+    (leaving, ends): (&[usize], &[(usize, Guard)]),
     velocity: &[f64],
     (moment, noise_of_way): (f64, f64),
 ) -> Result<Trial, FieldError> {
@@ -71,11 +90,13 @@ fn leaves_within(
         notes.n_field_evaluations += field.n_evaluations();
         for (i, exit) in exits.iter().enumerate() {
             let noise = field.noise_of_exit(i);
-            if exit.is_nan() || *exit <= -noise {
+            let is_held = ends.iter().any(|(place, _)| *place == i);
+            if exit.is_nan() || *exit < -noise || (*exit == -noise && !is_held) {
                 return Ok(Trial::Ends);
             }
             is_clear &= *exit > noise;
         }
+        values.extend(ends.iter().map(|(place, _)| exits[*place]));
         at.system.surfaces(&at.place_at(t, &x, &signs), &mut h)?;
         for (k, &j) in leaving.iter().enumerate() {
             let size = at.system.surface_size(j, &at.place_at(t, &x, &signs))?;
@@ -97,15 +118,17 @@ fn leaves_within(
         return Ok(Trial::WithinRounding);
     }
     let [full, half] = values;
-    let left = leaving
-        .iter()
+    let guards = leaving.iter().map(|&j| Guard::Surface(j));
+    let guards = guards.chain(ends.iter().map(|(_, guard)| *guard));
+    let left = guards
         .zip(full.iter().zip(half))
-        .map(|(&j, (full, half))| {
+        .map(|(guard, (full, half))| {
             let order = (full / half).log2().round();
             let order = order.clamp(1.0, MAX_LIE_ORDER as f64) as usize;
             let factorial: f64 = (1..=order).map(|k| k as f64).product();
             let value = factorial * full / moment.powi(order as i32);
-            Left::beside(j, Leading { order, value })
+            let leading = Leading { order, value };
+            Left { guard, leading }
         });
     Ok(Trial::Leaves(left.collect()))
 }
