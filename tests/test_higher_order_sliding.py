@@ -8,7 +8,6 @@ shrinks by rho = exp(-k1 pi / (4 w)), w = sqrt(k2/2 - k1**2/16), and it takes (1
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -129,13 +128,13 @@ def test_terminal_sliding_rests_when_its_surface_has_led_to_the_target() -> None
         s = x[1] + np.abs(x[0]) ** 0.6 * np.sign(x[0])
         return [x[1], -0.6 * np.abs(x[0]) ** -0.4 * x[1] - 2 * np.sign(s)]
 
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", fl.FilippovWarning)
+    with pytest.warns(fl.FilippovWarning, match="rests from here"):
         sol = fl.solve_ivp(fun, (0, 10), [1.0, 0.5], rtol=1e-9, atol=1e-12)
     assert sol.success
     reached, rests = sol.switches
     # On the surface x' = -x**0.6, which takes x**0.4 / 0.4.
     assert rests.t == pytest.approx(reached.t + reached.y_before[0] ** 0.4 / 0.4, abs=1e-4)
+    assert sol.warnings[-1].code == "at_rest"
     assert np.abs(sol.y[:, -1]).max() < 1e-8
 
 
