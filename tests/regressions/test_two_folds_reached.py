@@ -80,7 +80,7 @@ def test_a_tangency_beside_another_surface_has_no_share() -> None:
         return [x[1] - x[0], 0.3 - x[1] - np.sign(x[0]) + 0.1 * np.sign(x[0] + t)]
 
     sol = fl.solve_ivp(f, (0.0, 1.0), [0.0, 0.0])
-    assert "the guard that fails in each mode" in sol.message or sol.success
+    assert sol.success, sol.message
     for segment in sol.segments:
         values = np.array([segment.multipliers_start, segment.multipliers_end])
         assert not (np.abs(values) > 1.0).any()
