@@ -117,7 +117,7 @@ def test_a_limit_where_the_rate_of_a_surface_vanishes_too_is_a_rest(method: str)
 @pytest.mark.parametrize("tolerance", [1e-6, 1e-9])
 @pytest.mark.parametrize("method", ["auto", "DOPRI5", "DOP853"])
 def test_sliding_on_nested_surfaces_follows_a_limit_of_crossings(method: str, tolerance: float) -> None:
-    """Seed 702170: the motion stays at the limit, as with tanh(h / 1e-4) in the place of the signs, to 3e-5."""
+    """Seed 702170: the motion stays at the limit, as it does with tanh(h / 1e-4) for the signs, to 3e-5."""
 
     def fun(t: float, x: Any) -> list[Any]:
         inside = x[0] ** 2 + x[1] ** 2 - 0.4

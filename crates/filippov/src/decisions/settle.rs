@@ -7,14 +7,16 @@ use super::leave_by_rule::leave_by_rule;
 use super::limits::stay_at_limit;
 use super::meeting::resolve_first_order;
 use super::one_surface::one_surface;
-use super::point::{Decided, Lefts, Next, Notes, Point};
+use super::point::{Decided, Left, Lefts, Next, Notes, Point};
 use super::reduction::Reduced;
 use super::relay::decide_by_relay;
 use super::rule::{Decision, How, Meeting, Rule};
 use crate::error::FieldError;
 use crate::mode::Mode;
+use crate::motion::Leading;
 use crate::status::Stop;
 use crate::switching::Arrival as SurfaceArrival;
+use crate::tolerances::DOUBTFUL;
 
 /// A rule: the motion that follows, or why the run ends; `None` where the rule does not apply.
 type Apply = fn(&Point, &mut Notes, &Meeting) -> Result<Option<Decided>, FieldError>;
@@ -38,6 +40,9 @@ pub(super) fn settle(
     meeting: &Meeting,
 ) -> Result<Decision, FieldError> {
     if at.system.reduced(meeting.surfaces).is_some() && !touches(at, meeting)? {
+        if let Some(next) = cross_alone(at, notes, meeting)? {
+            return Ok(Decision::by(Rule::OneSurface, Ok(next)));
+        }
         if let Some(left) = Reduced::of(at, notes, meeting)? {
             let point = Point {
                 system: left.system,
@@ -49,6 +54,32 @@ pub(super) fn settle(
         }
     }
     settle_by_rules(at, notes, meeting)
+}
+
+/// The motion after one surface of higher relative degree, where the first derivative of h along the fields of both sides tells that
+/// it is crossed.
+fn cross_alone(
+    at: &Point,
+    notes: &mut Notes,
+    meeting: &Meeting,
+) -> Result<Option<Next>, FieldError> {
+    let (&[j], How::Event(Some(SurfaceArrival::Region(side)))) = (meeting.surfaces, meeting.how)
+    else {
+        return Ok(None);
+    };
+    if at.system.has_nested_signs() {
+        // Other functions may jump with the sign that changes.
+        return Ok(None);
+    }
+    let (_, size) = at.rate_of(j, at.arrival.signs, at.arrival.velocity)?;
+    let is_clear = |left: &Left| {
+        let Leading { order, value } = left.leading;
+        left.surface() == Some(j) && order == 1 && value.abs() > DOUBTFUL * size
+    };
+    let crosses =
+        |next: &Next| next.mode.entries()[j] == -side && next.left.iter().all(is_clear);
+    let decided = one_surface(at, notes, meeting)?;
+    Ok(decided.and_then(Result::ok).filter(crosses))
 }
 
 fn settle_by_rules(
