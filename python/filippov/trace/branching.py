@@ -108,6 +108,8 @@ class Tracer:
         Constants of motion, known from a trace before; the first trace has none.
     stand_ins : StandIns, optional
         What stands in for the names that traced values cannot be handed to; by default nothing does.
+    may_slide : bool
+        Whether a motion may slide where an expression of the trace jumps; an event has no fields to slide between.
 
     Attributes
     ----------
@@ -137,8 +139,10 @@ class Tracer:
         laws: Laws | None = None,
         constants: ConstantsOfMotion | None = None,
         stand_ins: StandIns | None = None,
+        may_slide: bool = True,
     ) -> None:
         self.builder = builder
+        self.may_slide = may_slide
         self.t0 = t0
         self.y0 = y0
         self.n_states = len(y0)
@@ -388,7 +392,7 @@ class Tracer:
             is_whole = pieces is None or (not in_full and len(pieces) == 2 and pieces[1] != 0.0)
             if is_whole and pieces is not None and isinstance(pieces[1], float):
                 self._signs[node] = pieces[1]
-            if is_whole and not in_full:
+            if is_whole and not in_full and self.may_slide:
                 pieces = self._jumping_parts(node)
                 is_whole = pieces is None
             self._pieces[node, in_full] = None if is_whole else pieces
@@ -400,11 +404,12 @@ class Tracer:
         So a motion slides where the inner sign changes between the fields that there are on its two sides:
         ``np.sign(x + np.sign(y))`` is ``np.where(y > 0, np.sign(x + 1), np.sign(x - 1))``.
         """
-        if not self.jumps(node):
+        if self.laws.reads_any(self, node):
             return None
-        parts = self.pieces(node, in_full=True)
-        is_short = parts is not None and len(list(parts_of(parts))) <= MOST_JUMPING_PARTS
-        return parts if is_short else None
+        known = (self.values.tolist(), self.laws.discrete())
+        parts, for_these_values = self.builder.pieces(node, *known, MOST_JUMPING_PARTS, True)
+        # To ask whether it jumps takes long, where there are many signs.
+        return None if parts is None or for_these_values or not self.jumps(node) else parts
 
     def take_as_whole(self, node: int) -> None:
         """Leave an expression in one piece: where it would stand still, it is not asked for."""

@@ -298,9 +298,11 @@ class Laws:
 
     def is_held(self, tracer: Tracer, node: int) -> bool:
         """Whether an expression contains discrete states and is constant between their changes."""
-        return (
-            bool(self.names) and not tracer.builder.depends_on_motion(node) and bool(self._read(tracer, node))
-        )
+        return self.reads_any(tracer, node) and not tracer.builder.depends_on_motion(node)
+
+    def reads_any(self, tracer: Tracer, node: int) -> bool:
+        """Whether an expression contains discrete states."""
+        return bool(self.names) and bool(self._read(tracer, node))
 
     def is_clock(self, tracer: Tracer, node: int) -> bool:
         """Whether an expression is affine in time, with coefficients that no run changes."""

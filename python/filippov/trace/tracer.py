@@ -309,6 +309,7 @@ def _beside(
             laws=own.laws,
             constants=ConstantsOfMotion(traced.builder, traced.field),
             stand_ins=stand_ins,
+            may_slide=False,
         )
         return tracer, _explore(tracer, g, args, "event", None)[0]
 

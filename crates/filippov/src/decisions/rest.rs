@@ -7,11 +7,12 @@ use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::{shares_of_rows, SmoothField};
 use crate::status::{Warning, WarningCode};
+use crate::system::eval_on_side;
 use crate::tolerances::{AT_SIDE, MOST_AROUND_REST, PLACES_BESIDE_REST, STEPS_BESIDE_REST};
 
 /// Rest, where the motions of all modes lead back to the surfaces: tried at points beside them, as far as the tolerance and
-/// nearer. Multipliers keep the state where it is; or the point is isolated, the system does not depend on time, and the
-/// fields are not finite at the point itself. `None` if a motion leaves.
+/// nearer. Multipliers keep the state where it is; or the point is isolated, the system does not depend on time, and no
+/// component of the state grows, or falls, by the fields of all regions. `None` if a motion leaves.
 pub(super) fn stay_if_nothing_leaves(
     at: &Point,
     notes: &mut Notes,
@@ -38,13 +39,38 @@ pub(super) fn stay_if_nothing_leaves(
         return Ok(is_rest.then_some(stays));
     }
     let is_isolated = m >= at.x.len();
-    if !is_isolated || at.system.depends_on_time() {
+    if !is_isolated || at.system.depends_on_time() || moves_on(at, notes, meeting)? {
         return Ok(None);
     }
     warn_of_rest(at, notes, meeting);
     let mut next = Next::new(meeting.on_all(&Mode::new(vec![0; m])), Lefts::new());
     next.start_mut().is_rest = true;
     Ok(Some(next))
+}
+
+/// Does a component of the state grow, or fall, by the fields of all regions? Then zero is not among their combinations.
+fn moves_on(at: &Point, notes: &mut Notes, meeting: &Meeting) -> Result<bool, FieldError> {
+    let (n, m) = (at.x.len(), meeting.surfaces.len());
+    let (mut least, mut most) = (vec![f64::INFINITY; n], vec![f64::NEG_INFINITY; n]);
+    let mut field = vec![0.0; n];
+    for number in 0..1_usize << m {
+        let side = |k: usize| if number >> k & 1 == 1 { 1 } else { -1 };
+        let region = meeting.on_all(&Mode::new((0..m).map(side).collect()));
+        notes.n_field_evaluations +=
+            eval_on_side(at.system, &at.place(&region.signs()), &mut field)?;
+        // Outside its domain a field is not a number, and no field of the point.
+        for (i, v) in field.iter().enumerate().filter(|(_, v)| !v.is_nan()) {
+            least[i] = least[i].min(*v);
+            most[i] = most[i].max(*v);
+        }
+    }
+    let largest = |i: usize| least[i].abs().max(most[i].abs());
+    let is_known = |i: usize| least[i] <= most[i];
+    let is_one_sided = |i: usize| {
+        let noise = AT_SIDE * largest(i);
+        least[i] > noise || most[i] < -noise
+    };
+    Ok((0..n).any(|i| is_known(i) && is_one_sided(i)))
 }
 
 /// Does a motion in the mode with these entries on the surfaces lead away from them, if it starts beside them?
