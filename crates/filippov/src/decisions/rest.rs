@@ -64,13 +64,13 @@ fn moves_on(at: &Point, notes: &mut Notes, meeting: &Meeting) -> Result<bool, Fi
             most[i] = most[i].max(*v);
         }
     }
-    let largest = |i: usize| least[i].abs().max(most[i].abs());
-    let is_known = |i: usize| least[i] <= most[i];
+    let values = least.iter().chain(&most).map(|v| v.abs());
+    let size = values.filter(|v| v.is_finite()).fold(0.0, f64::max);
     let is_one_sided = |i: usize| {
-        let noise = AT_SIDE * largest(i);
-        least[i] > noise || most[i] < -noise
+        let is_known = least[i] <= most[i];
+        is_known && (least[i] > AT_SIDE * size || most[i] < -AT_SIDE * size)
     };
-    Ok((0..n).any(|i| is_known(i) && is_one_sided(i)))
+    Ok((0..n).any(is_one_sided))
 }
 
 /// Does a motion in the mode with these entries on the surfaces lead away from them, if it starts beside them?
