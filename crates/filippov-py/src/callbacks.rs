@@ -242,21 +242,12 @@ impl EventExpression {
         p: &[f64],
         f: impl FnOnce(&[f64]) -> R,
     ) -> R {
-        if self.levels.is_empty() {
-            return f(p);
-        }
-        let mut all: SmallVec<[f64; 16]> = SmallVec::from_slice(p);
-        all.resize(self.n_given, 0.0);
-        for level in &self.levels {
+        let level_at = |level: &OwnLevel, all: &[f64]| {
             let mut g = [0.0];
-            // It reads levels before it; the room behind them is not read.
-            let known = all.len();
-            all.resize(self.n_given + 2 * self.levels.len(), 0.0);
-            level.program.eval(t, x, signs, &all, &[], &mut g);
-            all.truncate(known);
-            all.extend(OwnLevel::beside(g[0]));
-        }
-        f(&all)
+            level.program.eval(t, x, signs, all, &[], &mut g);
+            OwnLevel::beside(g[0])
+        };
+        self.with_parameters(p, level_at, f)
     }
 
     /// The same along a piece of motion. A whole number that changes in it is not a number: nothing is known of what reads it.
@@ -266,20 +257,34 @@ impl EventExpression {
         p: &[f64],
         f: impl FnOnce(&[f64]) -> R,
     ) -> R {
+        let level_along = |level: &OwnLevel, all: &[f64]| {
+            let mut g = [Enclosure::UNKNOWN];
+            level.enclosing.eval(motion, signs, all, &mut g);
+            let (low, high) = (
+                OwnLevel::beside(g[0].value.lo),
+                OwnLevel::beside(g[0].value.hi),
+            );
+            [0, 1].map(|k| if low[k] == high[k] { low[k] } else { f64::NAN })
+        };
+        self.with_parameters(p, level_along, f)
+    }
+
+    /// What `f` tells of the given parameters and the two whole numbers of each level, which reads those before it.
+    fn with_parameters<R>(
+        &self,
+        p: &[f64],
+        beside: impl Fn(&OwnLevel, &[f64]) -> [f64; 2],
+        f: impl FnOnce(&[f64]) -> R,
+    ) -> R {
         if self.levels.is_empty() {
             return f(p);
         }
         let mut all: SmallVec<[f64; 16]> = SmallVec::from_slice(p);
-        all.resize(self.n_given, 0.0);
-        for level in &self.levels {
-            let mut g = [Enclosure::UNKNOWN];
-            let known = all.len();
-            all.resize(self.n_given + 2 * self.levels.len(), 0.0);
-            level.enclosing.eval(motion, signs, &all, &mut g);
-            all.truncate(known);
-            let [low, high] = [g[0].value.lo, g[0].value.hi].map(OwnLevel::beside);
-            let same = low.iter().zip(high);
-            all.extend(same.map(|(&low, high)| if low == high { low } else { f64::NAN }));
+        all.resize(self.n_given + 2 * self.levels.len(), 0.0);
+        for (k, level) in self.levels.iter().enumerate() {
+            let numbers = beside(level, &all);
+            let first = self.n_given + 2 * k;
+            all[first..first + 2].copy_from_slice(&numbers);
         }
         f(&all)
     }

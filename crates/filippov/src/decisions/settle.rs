@@ -76,8 +76,7 @@ fn cross_alone(
         let Leading { order, value } = left.leading;
         left.surface() == Some(j) && order == 1 && value.abs() > DOUBTFUL * size
     };
-    let crosses =
-        |next: &Next| next.mode.entries()[j] == -side && next.left.iter().all(is_clear);
+    let crosses = |next: &Next| next.mode.entries()[j] == -side && next.left.iter().all(is_clear);
     let decided = one_surface(at, notes, meeting)?;
     Ok(decided.and_then(Result::ok).filter(crosses))
 }

@@ -861,7 +861,7 @@ impl<'a> Integrator<'a> {
     }
 }
 
-/// Brings the discrete states up to date that nothing read in the mode so far, before what follows is decided.
+/// Updates the discrete states that the mode did not read. A decision may read them.
 fn follow_laws(integrator: &mut Integrator<'_>) -> Result<(), FieldError> {
     let (actions, active) = (integrator.run.actions, &integrator.run.motion.active);
     let is_idle =

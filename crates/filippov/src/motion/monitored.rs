@@ -76,7 +76,7 @@ impl Monitored {
             }
         } else {
             let time = 2.0 * value / (-rate + discriminant.sqrt());
-            // A root that begins here, or began at the start of the last step, has no slope there and tells nothing.
+            // A root that begins here, or began at the start of the last step, has an infinite slope: no time follows from it.
             if time > 0.0 {
                 time
             } else {

@@ -12,7 +12,7 @@ use crate::tolerances::{AT_SIDE, TANGENT};
 pub struct Held {
     /// The surfaces slid on, increasing, with their multipliers; NaN where there is none.
     pub multipliers: Vec<(usize, f64)>,
-    /// The surfaces slid on with the values that stand in the place of their signs: the multipliers, times the ratio of static to
+    /// The surfaces slid on. Each has a number that replaces its sign in the field: its multiplier, times the ratio of static to
     /// kinetic friction where the motion sticks.
     pub signs: Vec<(usize, f64)>,
     /// The surfaces in contact, increasing, with the acceleration h'' away from the body's obstacle that each contact gives. Times
@@ -73,7 +73,7 @@ impl Piece {
         let multipliers = match set.as_slice() {
             &[j] => vec![(j, self.on_one_surface(system, j, t, &mut y)?)],
             _ => {
-                // Of several roots that which the motion follows.
+                // The equations may have several roots: the motion follows one of them.
                 let field = IntersectionField::new(system, &set, setting, &self.near);
                 let mut field = field.with_rule(rule);
                 field.eval(t, &mut y, &mut vec![0.0; system.n_states()])?;
@@ -143,8 +143,8 @@ impl Piece {
     }
 }
 
-/// A multiplier as it is reported: at an exit it is one up to the rounding of the time, or up to what it may go beyond where
-/// forces balance. NaN where there is none, as where both fields are tangent.
+/// A multiplier as it is reported. At an exit rounding may carry it a little beyond one: it is reported as one. Where both
+/// fields are tangent there is no multiplier: it is reported as NaN.
 pub fn as_multiplier(lambda: f64) -> f64 {
     if !lambda.is_finite() {
         f64::NAN

@@ -226,9 +226,9 @@ pub trait PiecewiseSystem: SignStructure + Sync {
         true
     }
 
-    /// The system of the motions that stay on these surfaces, if both fields cross one of them at the same rate all over it: this
-    /// rate is in the place of its switching function there, and the field is that on the surfaces. `None` if a motion
-    /// that slides on them is one of this system.
+    /// The reduced system of these surfaces: its motions stay on a surface that both fields cross at the same rate. The rate
+    /// replaces the switching function of that surface. `None` if no surface is of this kind: a motion slides on them in
+    /// this system itself.
     fn reduced(&self, _surfaces: &[usize]) -> Option<&dyn PiecewiseSystem> {
         None
     }

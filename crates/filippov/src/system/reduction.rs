@@ -9,8 +9,8 @@ use std::sync::OnceLock;
 use filippov_expr::{Graph, NodeId, RateOnSurface};
 use smallvec::SmallVec;
 
-/// The graph and the field where each of these surfaces that has a higher relative degree is replaced by its rate; none if there
-/// is none of them, or if a rate is in the place of another of these surfaces.
+/// The graph and the field in which the rate of each surface of higher relative degree replaces its function. None if no surface
+/// has a higher degree, or if a rate would replace two of these surfaces.
 pub(super) fn reduced(
     graph: &Graph,
     field: &[NodeId],
