@@ -109,7 +109,7 @@ class Tracer:
     stand_ins : StandIns, optional
         What stands in for the names that traced values cannot be handed to; by default nothing does.
     may_slide : bool
-        Whether a motion may slide where an expression of the trace jumps; an event has no fields to slide between.
+        Whether a motion may slide where an expression jumps; no motion slides on an event.
 
     Attributes
     ----------
