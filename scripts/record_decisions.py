@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 import filippov
-from filippov._core import Run, RunOptions, replay_decision
+from filippov._core import Run, RunOptions
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tests"))
@@ -62,23 +62,22 @@ class Recorder:
         for point, outcome in decisions:
             kind = kind_of(point, outcome, known, bool(actions))
             outcome = json.loads(json.dumps(outcome))
-            look(kind, point, outcome, (core, p, options, known, actions))
+            look(kind, point, outcome, (core, p, known, actions))
 
     def _take_traced(self, kind: str, point: Dict, outcome: Dict, run: tuple[Any, ...]) -> None:
-        core, p, options, known, actions = run
+        core, p, known, actions = run
         alike = self.kept.setdefault(kind, [])
         if len(alike) >= KEPT_PER_KIND or any(entry.source == self.source for entry in alike):
             return
         self.counts["replayed"] += 1
-        wrong = list(differences(outcome, replay_decision(core, p, options, actions, point)))
-        if wrong:
-            self.not_reproduced.append(f"{self.source}: rule {outcome['rule']}; {'; '.join(wrong)}")
-            return
         atol = known["atol"] if isinstance(known["atol"], float) else list(known["atol"])
         options_kept = json.loads(json.dumps({**known, "atol": atol}))
-        alike.append(
-            Entry(self.source, Problem.of(core, list(actions)), list(p), options_kept, point, outcome)
-        )
+        entry = Entry(self.source, Problem.of(core, list(actions)), list(p), options_kept, point, outcome)
+        wrong = list(differences(outcome, entry.replay()))
+        if wrong:
+            self.not_reproduced.append(f"{self.source}: rule {outcome['rule']}; {'; '.join(wrong)}")
+        else:
+            alike.append(entry)
 
     def _take_black_box(self, kind: str, point: Dict, outcome: Dict, run: tuple[Any, ...]) -> None:
         self.counts["of black boxes"] += 1

@@ -228,6 +228,15 @@ def test_a_trigger_reached_in_the_other_direction_is_crossed():
     assert str(sol.switches[0].mode_after) == "+"
 
 
+@pytest.mark.filterwarnings("ignore:against_direction:filippov.FilippovWarning")
+def test_a_trigger_reached_in_the_other_direction_is_crossed_with_the_switch_reached_at_that_time():
+    wrap = fl.Reset(lambda t, x: x[0], lambda t, x: [5.0, 5.0], direction="up")
+    sol = fl.solve_ivp(lambda t, x: [-1.0, -2.0 - np.sign(x[1])], (0, 2), [1.0, 3.0], resets=wrap)
+    assert sol.switches.kind == ["crossing"]
+    assert sol.switches[0].t == pytest.approx(1.0, abs=1e-12)
+    np.testing.assert_allclose(sol.y[:, -1], [-1.0, -1.0], atol=1e-12)
+
+
 @pytest.mark.parametrize(("gravity", "mode"), [(-9.8, "0"), (9.8, "+")])
 def test_a_body_without_normal_velocity_stays_if_it_is_pressed_on(gravity, mode):
     stop = fl.Reset(lambda t, x: x[0], lambda t, x: [x[0], 0.0])

@@ -228,6 +228,20 @@ def test_forged_bytes_are_refused_or_can_be_solved() -> None:
     assert used > 50
 
 
+def test_a_function_that_reads_comparisons_of_a_floor_travels() -> None:
+    """The surfaces of these comparisons come after that of the function, as no motion crosses them."""
+    system = fl.System(
+        lambda t, x: [1.0, -0.5 * np.sign(x[1] - np.where(np.floor(x[0]) == 2, 1.0, 0.0))], n=2
+    )
+    assert len(system.surfaces) == 2
+    copy = fl.System.from_bytes(system.to_bytes())
+    assert copy.to_bytes() == system.to_bytes()
+    end = copy.solve((0, 3.7), [0.1, 0.0]).y[:, -1]
+    # Slides at zero, rises for a unit of time, and falls for 0.8.
+    np.testing.assert_allclose(end, [3.8, 0.1], atol=1e-9)
+    assert np.array_equal(system.solve((0, 3.7), [0.1, 0.0]).y[:, -1], end)
+
+
 def test_nodes_that_simplify_further_when_they_are_read_keep_their_meaning():
     """The product of a sign with itself is known to be 1 only once its surface is known."""
 

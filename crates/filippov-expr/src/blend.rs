@@ -279,10 +279,7 @@ impl<'g> Blender<'g> {
         let nodes = self.graph.reachable_by([root], operands);
         let mut signs: Vec<u32> = nodes
             .into_iter()
-            .filter_map(|id| match *self.graph.node(id) {
-                Node::Sign(j) | Node::Select { surface: j, .. } => Some(j),
-                _ => None,
-            })
+            .filter_map(|id| self.graph.node(id).surface())
             .filter(|&j| self.contains(j))
             .collect();
         signs.sort_unstable();

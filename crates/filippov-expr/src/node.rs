@@ -58,6 +58,14 @@ impl Node {
         a.into_iter().chain(b)
     }
 
+    /// The surface whose sign the node reads itself, not through an operand.
+    pub fn surface(&self) -> Option<u32> {
+        match *self {
+            Node::Sign(surface) | Node::Select { surface, .. } => Some(surface),
+            _ => None,
+        }
+    }
+
     /// A tag and two or three numbers that identify the node.
     fn key(&self) -> (u8, u64, u32) {
         match *self {

@@ -211,10 +211,9 @@ impl Graph {
             .copied()
             .filter(|&root| self.facts(root).has_sign);
         for id in self.reachable_by(signed, relevant) {
-            if let Node::Sign(j) | Node::Select { surface: j, .. } = *self.node(id) {
-                if let Some(entry) = depends.get_mut(j as usize) {
-                    *entry = true;
-                }
+            let surface = self.node(id).surface();
+            if let Some(entry) = surface.and_then(|j| depends.get_mut(j as usize)) {
+                *entry = true;
             }
         }
         depends

@@ -36,7 +36,8 @@ const TAG_BINARY: u8 = 128;
 impl Graph {
     /// The graph as bytes: nodes, surfaces and what is known about switching. Equal graphs give equal bytes.
     ///
-    /// A graph with signs of surfaces that it does not have ([`Graph::sign_of`]) is not read again.
+    /// A graph with signs of surfaces that it does not have, or that were made before their function
+    /// ([`Graph::sign_of`]), is not read again.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut writer = Writer::new(CONTENT);
         self.write_section(&mut writer);
@@ -47,8 +48,8 @@ impl Graph {
     ///
     /// # Errors
     /// Those of [`Container::open`] for anything else, and [`ExprError::Damaged`] for operands that do not come before
-    /// their node, unknown operations, equal nodes, surfaces that do not exist or depend on later ones, missing or
-    /// excess bytes.
+    /// their node, unknown operations, equal nodes, surfaces that do not exist, signs before the function of their surface,
+    /// missing or excess bytes.
     pub fn from_bytes(bytes: &[u8]) -> Result<Graph, ExprError> {
         let mut container = Container::open(bytes, CONTENT)?;
         let (graph, _) = Graph::read_section(&mut container)?;
@@ -232,30 +233,25 @@ fn read_node(section: &mut Section, k: usize) -> Result<Node, ExprError> {
     })
 }
 
-/// The nodes of the switching functions, each of which may contain the signs of those before it.
+/// The nodes of the switching functions. The sign of a surface comes after its function: no function contains its own sign,
+/// directly or through others.
 fn read_surfaces(section: &mut Section, nodes: &[Node]) -> Result<Vec<usize>, ExprError> {
-    // How many surfaces there must be for the signs in each node.
-    let mut needed: Vec<usize> = Vec::with_capacity(nodes.len());
-    for node in nodes {
-        let own = match *node {
-            Node::Sign(surface) | Node::Select { surface, .. } => surface as usize + 1,
-            _ => 0,
-        };
-        let operands = node.operands().map(|operand| needed[operand.index()]);
-        needed.push(operands.fold(own, usize::max));
-    }
     let n_surfaces = section.count(4)?;
-    if needed.iter().any(|&count| count > n_surfaces) {
-        return section.damaged("the sign of a surface that does not exist");
-    }
     let mut functions = Vec::with_capacity(n_surfaces);
-    for j in 0..n_surfaces {
-        let function = section.index(nodes.len(), "a surface whose function does not exist")?;
-        if needed[function] > j {
-            return section
-                .damaged("a surface that depends on its own sign, or on that of a later one");
+    for _ in 0..n_surfaces {
+        functions.push(section.index(nodes.len(), "a surface whose function does not exist")?);
+    }
+    for (id, node) in nodes.iter().enumerate() {
+        let function = node
+            .surface()
+            .map(|surface| functions.get(surface as usize));
+        match function {
+            Some(None) => return section.damaged("the sign of a surface that does not exist"),
+            Some(Some(&function)) if function >= id => {
+                return section.damaged("the sign of a surface before its function")
+            }
+            _ => {}
         }
-        functions.push(function);
     }
     Ok(functions)
 }

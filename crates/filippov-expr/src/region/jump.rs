@@ -38,11 +38,9 @@ impl Regions {
             if !self.graph.facts(id).has_sign {
                 continue;
             }
-            let mut candidates: Vec<u32> = match *self.graph.node(id) {
-                Node::Sign(k) | Node::Select { surface: k, .. } => vec![k],
-                _ => Vec::new(),
-            };
-            for operand in self.graph.node(id).operands() {
+            let node = self.graph.node(id);
+            let mut candidates: Vec<u32> = node.surface().into_iter().collect();
+            for operand in node.operands() {
                 candidates.extend(known.get(&operand).into_iter().flatten());
             }
             candidates.sort_unstable();

@@ -2,7 +2,7 @@
 
 use super::{CONTENT, NODES};
 use crate::container::Writer;
-use crate::{ExprError, Graph, Node, NodeId};
+use crate::{BinaryOp, ExprError, Graph, Node, NodeId};
 
 /// What is wrong with a graph whose section is written so.
 fn refused(write: impl Fn(&mut Writer)) -> &'static str {
@@ -58,7 +58,7 @@ fn large_indices_of_variables_are_refused() {
 }
 
 #[test]
-fn signs_are_those_of_surfaces_before() {
+fn signs_come_after_the_function_of_their_surface() {
     let one_sign = |n_surfaces: usize| {
         move |writer: &mut Writer| {
             writer.number(1);
@@ -75,8 +75,23 @@ fn signs_are_those_of_surfaces_before() {
     );
     assert_eq!(
         refused(one_sign(1)),
-        "a surface that depends on its own sign, or on that of a later one"
+        "the sign of a surface before its function"
     );
+}
+
+#[test]
+fn a_function_may_contain_the_sign_of_a_later_surface() {
+    let mut graph = Graph::new();
+    let gear = graph.parameter(0);
+    let of_gear = graph.sign(gear);
+    let x = graph.state(0);
+    let difference = graph.binary(BinaryOp::Sub, x, of_gear);
+    graph.sign(difference);
+    assert_eq!(graph.put_standing_surfaces_last(&[]), [1, 0]);
+    let bytes = graph.to_bytes();
+    let read = Graph::from_bytes(&bytes).unwrap();
+    assert_eq!(read.surface(0), difference);
+    assert_eq!(read.to_bytes(), bytes);
 }
 
 #[test]
