@@ -232,7 +232,7 @@ def test_a_trigger_reached_in_the_other_direction_is_crossed():
 def test_a_trigger_reached_in_the_other_direction_is_crossed_with_the_switch_reached_at_that_time():
     wrap = fl.Reset(lambda t, x: x[0], lambda t, x: [5.0, 5.0], direction="up")
     sol = fl.solve_ivp(lambda t, x: [-1.0, -2.0 - np.sign(x[1])], (0, 2), [1.0, 3.0], resets=wrap)
-    assert sol.switches.kind == ["crossing"]
+    assert sol.switches.kind.tolist() == ["crossing"]
     assert sol.switches[0].t == pytest.approx(1.0, abs=1e-12)
     np.testing.assert_allclose(sol.y[:, -1], [-1.0, -1.0], atol=1e-12)
 
