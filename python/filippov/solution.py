@@ -528,7 +528,7 @@ class Solution:
         A body lies on the floor until it is pulled up:
 
         >>> import filippov as fl
-        >>> floor = fl.Reset(lambda t, x: x[0], lambda t, x: [x[0], 0.0], name="floor")
+        >>> floor = fl.Reset(lambda t, x: x[0], lambda t, x: [x[0], 0.0], direction="down", name="floor")
         >>> body = fl.System(lambda t, x: [x[1], t - 9.81], n=2, resets=floor)
         >>> body.solve((0, 12), [0.0, 0.0]).contact_acceleration([0.0, 5.0, 11.0])[0].round(9).tolist()
         [9.81, 4.81, 0.0]
