@@ -153,6 +153,63 @@ def test_finite_time_controller_with_fractional_powers_rests() -> None:
     assert ends[0] == pytest.approx(ends[1], abs=1e-4)
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_cube_root_rests_at_its_zero(method: str) -> None:
+    sol = fl.solve_ivp(lambda t, x: [-np.cbrt(x[0])], (0, 3), [1.0], method=method, rtol=1e-9, atol=1e-12)
+    (rests,) = sol.switches
+    assert rests.kind == "enter_sliding"
+    # Below atol, 1.5 x^(2/3) is left until x = 0.
+    assert rests.t == pytest.approx(1.5, abs=3e-7)
+    assert sol.y[0, -1] == 0.0
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_cube_root_is_crossed_by_what_does_not_rest_there(method: str) -> None:
+    sol = fl.solve_ivp(lambda t, x: [1.0 - np.cbrt(x[0])], (0, 2), [-1.0], method=method, rtol=1e-9)
+    # With u = cbrt(x): t is the integral of 3 u^2 / (1 - u) from -1 to 0.
+    (crossing,) = sol.switches
+    assert (crossing.kind, crossing.t) == ("crossing", pytest.approx(3 * math.log(2) - 1.5, abs=1e-7))
+
+
+def tank(t: float, x: Any) -> list[Any]:
+    """Torricelli's law; the tank is filled again from t = 3 on."""
+    return [(0.5 if t > 3 else 0.0) - np.sqrt(x[0])]
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("fun", [tank, lambda t, x: [(0.5 if t > 3 else 0.0) - x[0] ** 0.5]])
+def test_tank_runs_empty_and_is_filled_again(fun: Any, method: str) -> None:
+    sol = fl.solve_ivp(fun, (0, 6), [1.0], method=method, rtol=1e-9, atol=1e-9)
+    assert sol.success
+    assert sol.sol(2.5)[0] == pytest.approx(0.0, abs=1e-8)
+    # From empty on: with u = sqrt(x), t - 3 = -2 u - log(1 - 2 u).
+    u = math.sqrt(sol.y[0, -1])
+    assert -2 * u - math.log(1 - 2 * u) == pytest.approx(3.0, abs=1e-4)
+
+
+def test_root_that_is_left_by_the_motion_ends_the_run() -> None:
+    """Where the motion goes on to where the root is no number, the run ends there, as Python's would."""
+    sol = fl.solve_ivp(lambda t, x: [-1.0 - np.sqrt(x[0])], (0, 3), [1.0])
+    assert not sol.success
+    # With u = sqrt(x): t is the integral of 2 u / (1 + u) from 0 to 1.
+    assert sol.t[-1] == pytest.approx(2 - 2 * math.log(2), abs=1e-6)
+    assert "np.sqrt(x[0])" in sol.message
+
+
+def test_root_that_is_not_read_may_be_left() -> None:
+    sol = fl.solve_ivp(lambda t, x: [-np.sqrt(x[0]) if t < 5 else -1.0], (0, 6), [1.0])
+    assert sol.y[0, -1] == pytest.approx(-1.0, abs=1e-6)
+
+
+def test_kept_system_goes_on_at_the_end_of_a_root_at_every_call() -> None:
+    system = fl.System(tank, n=1)
+    for _ in range(3):
+        sol = system.solve((0, 6), [1.0])
+        assert sol.success
+        assert sol.surfaces == ("t - 3", "x[0]")
+    assert system.solve((0, 1), [1.0]).surfaces == ("t - 3",)
+
+
 def rocking(t: float, x: Any, shake: float = 0.0) -> list[Any]:
     return [x[1], -4 * np.sin(0.25 * np.sign(x[0]) - x[0]) - shake * np.sin(5 * t)]
 

@@ -48,6 +48,8 @@ class Source(NamedTuple):
         Whether surfaces were declared, even none at all (``surfaces=[]``): `fun` may then be a black box.
     discrete : tuple of str
         Parameters that resets may set: their values are those at the start.
+    root_ends : bool
+        Whether roots in the field end where their argument vanishes, and are zero beyond.
     """
 
     fun: Callable[..., Any]
@@ -58,6 +60,7 @@ class Source(NamedTuple):
     black_box: bool = False
     resets: tuple[Reset, ...] = ()
     discrete: tuple[str, ...] = ()
+    root_ends: bool = False
 
     def named_functions(self) -> list[tuple[str, Any]]:
         """Return the functions with what they are called in messages; `fun` may call others of them."""

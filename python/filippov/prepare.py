@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from filippov._core import OpaqueSystem, SignedSystem, TracedSystem
+from filippov._core import OpaqueSystem, Run, SignedSystem, TracedSystem
 from filippov.errors import InputError, ModelError, TraceError
 from filippov.events import bind_function, check_scalar_function, function_name, selective
 from filippov.forms import Source
@@ -82,6 +82,19 @@ class Prepared(NamedTuple):
             "set={...}) changes"
         )
         return [(MEMORY, text)]
+
+    def stays_where_roots_are(self, run: Run) -> bool:
+        """Whether no root that the field reads along a run has a negative argument."""
+        ends = () if self.trace is None else self.trace.ends
+
+        def reads_beyond(mode: tuple[int, ...]) -> bool:
+            beyond = [surface for surface, orientation in ends if mode[surface] * orientation < 0]
+            if not beyond:
+                return False
+            is_read = self.core.active(np.array(mode, dtype=np.float64))
+            return any(is_read[surface] for surface in beyond)
+
+        return not any(reads_beyond(mode) for mode in {segment[2] for segment in run.segments})
 
     def is_valid_for(self, n: int, values: dict[str, float]) -> bool:
         """Whether this form holds for `n` states and these parameter values."""
@@ -200,7 +213,9 @@ def _key(
         return None
     resets = [reset.parts() for reset in source.resets]
     read = fingerprint(source.fun, source.args, source.surfaces, resets)
-    return None if read is None else (n, tuple(values), source.discrete, states and tuple(states), read)
+    if read is None:
+        return None
+    return n, tuple(values), source.discrete, source.root_ends, states and tuple(states), read
 
 
 def _point(values: dict[str, float], t0: float, y0: Array) -> Hashable:
@@ -227,6 +242,7 @@ def _trace(
         y0=y0,
         states=states,
         discrete=source.discrete,
+        root_ends=source.root_ends,
     )
 
 

@@ -241,8 +241,9 @@ def solve_prepared(
         prepared = call.prepared
         if t0 < t1 and len(state) == prepared.core.n_states:
             run = run_core(prepared.core, t0, t1, state, call.parameters, call.core_options, [], call.actions)
-            solution = _present(run, system, prepared, call.options, t0, call.states, False, None)
-            return _shown(solution) if run.n_warnings or prepared.warnings else solution
+            if run.reason != "field_not_finite":
+                solution = _present(run, system, prepared, call.options, t0, call.states, False, None)
+                return _shown(solution) if run.n_warnings or prepared.warnings else solution
     solution = _solve(system, t_span, y0, _changed(options), None, (), params, None, None)
     if key is not None and call is None and len(system._calls) < _MOST_CALLS:
         _keep_call(system, key, options, len(solution.states))
@@ -307,13 +308,22 @@ def _solve(
     functions = [(f"the event {spec.name!r}", spec.g) for spec in specs or []]
     if t1 < t0:
         prepared, specs = _backward(system, prepared, specs, state, values, t0)
-    found = core_events(specs or [], prepared, t0 if t1 >= t0 else -t0, state, constants, values)
 
     states = system.state_names(n)
 
+    def run_of(prepared: Prepared, choices: tuple[Mode, ...]) -> AnyRun:
+        found = core_events(specs or [], prepared, t0 if t1 >= t0 else -t0, state, constants, values)
+        return _run(prepared, t0, t1, state, values, options, found, choices)
+
     def follow(choices: tuple[Mode, ...]) -> Solution:
-        run = _run(prepared, t0, t1, state, values, options, found, choices)
-        return _present(run, system, prepared, options, t0, states, specs is not None, values, functions)
+        run, used = run_of(prepared, choices), prepared
+        if run.reason == "field_not_finite" and t0 < t1:
+            ended = system.prepare_with_ends_of_roots(prepared, n, t0, state, values)
+            if ended is not None:
+                beyond = run_of(ended, choices)
+                if ended.stays_where_roots_are(beyond):
+                    run, used = beyond, ended
+        return _present(run, system, used, options, t0, states, specs is not None, values, functions)
 
     solution = follow(())
     if options.nonunique == "branch":

@@ -483,6 +483,15 @@ class System(Points, Saving):
             self._n = n
         return prepared
 
+    def prepare_with_ends_of_roots(
+        self, prepared: Prepared, n: int, t0: float, y0: Array, values: dict[str, float]
+    ) -> Prepared | None:
+        """Return the system whose roots are zero beyond their end, a surface; None if it has none."""
+        if self._source is None or prepared.trace is None or not prepared.trace.has_roots:
+            return None
+        ended = prepare(self._source._replace(root_ends=True), n, values, self._states, t0, y0)
+        return ended if ended.trace is not None and ended.trace.ends else None
+
     def prepare_backward(self, n: int, s0: float, y0: Array, values: dict[str, float]) -> Prepared:
         """Return the system with time reversed, ``s = -t``; only for systems without surfaces.
 

@@ -209,7 +209,7 @@ impl Graph {
     }
 
     /// All nodes that the roots are made of, in increasing order.
-    pub(crate) fn all_below(&self, roots: &[NodeId]) -> Vec<NodeId> {
+    pub fn all_below(&self, roots: &[NodeId]) -> Vec<NodeId> {
         self.reachable_by(roots.iter().copied(), |id| {
             self.node(id).operands().collect::<Vec<_>>()
         })

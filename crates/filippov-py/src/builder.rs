@@ -215,6 +215,20 @@ impl Builder {
         Ok(graph.substituted(a, &images).0)
     }
 
+    /// Those of some expressions that others are made of.
+    fn occurring(&self, nodes: Vec<u32>, within: Vec<u32>) -> PyResult<Vec<u32>> {
+        let graph = self.graph();
+        let within = within.into_iter().map(|id| Self::node(&graph, id));
+        let below: Vec<u32> = graph
+            .all_below(&within.collect::<PyResult<Vec<_>>>()?)
+            .into_iter()
+            .map(|id| id.0)
+            .collect();
+        let mut nodes = nodes;
+        nodes.retain(|id| below.binary_search(id).is_ok());
+        Ok(nodes)
+    }
+
     /// Whether an expression changes only where signs or discrete states inside of it do.
     fn is_stepwise(&self, a: u32) -> PyResult<bool> {
         let graph = self.graph();

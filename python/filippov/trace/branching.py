@@ -167,6 +167,8 @@ class Tracer:
         self._pieces: dict[tuple[int, bool], Pieces | None] = {}
         self._signs: dict[int, float] = {}
         self._continued: dict[int, int] = {}
+        self.ends_of_roots: list[int] = []
+        self._roots: dict[int, tuple[int, Callable[[int], int] | None]] = {}
         self._path: list[tuple[int, float]] = []
         self._flipped: list[bool] = []
         self._answers: dict[int, float] = {}
@@ -433,6 +435,7 @@ class Tracer:
         sign of before is taken with the x of behind.
         """
         root = of(argument)
+        self._roots[root] = (argument, of)
         pieces = self.pieces(argument, in_full=True)
         if pieces is None or any(sign not in (0.0, 1.0) for _, sign in parts_of(pieces)):
             return root
@@ -440,6 +443,42 @@ class Tracer:
         for inner in [*parts, argument]:
             self._continued[of(inner)] = of(self.builder.unary("not negative", inner))
         return self._continued[root] if self.jumps(argument) else root
+
+    def cube_root(self, argument: int) -> int:
+        """Return the node of a cube root."""
+        root = self.builder.unary("cbrt", argument)
+        self._roots[root] = (argument, None)
+        return root
+
+    def with_ends_of_roots(self, field: list[int], root_ends: bool) -> list[int]:
+        """Return a field whose cube roots switch with the sign of their argument: at zero they have no slope.
+
+        With `root_ends` the other roots switch too, and are zero where their argument is negative.
+        """
+        builder = self.builder
+        images: list[tuple[int, int]] = []
+        for root in builder.occurring(list(self._roots), field):
+            argument, of = self._roots[root]
+            if not builder.depends_on_motion(argument):
+                continue
+            argument = builder.substituted(argument, images)
+            if of is None:
+                size = builder.binary("power", self.absolute(argument), builder.constant(1.0 / 3.0))
+                images.append((root, builder.binary("multiply", self.sign(argument), size)))
+            elif root_ends and self._switches_at(argument):
+                images.append((root, self.choose(argument, of(argument), builder.constant(0.0))))
+                self.ends_of_roots.append(argument)
+        return [builder.substituted(component, images) for component in field] if images else field
+
+    def _switches_at(self, node: int) -> bool:
+        """Whether the sign of an expression is that of one surface."""
+        if self.sign_everywhere(node) is not None or self.is_constant_of_motion(node):
+            return False
+        return not self.laws.is_held(self, node) and self.pieces(node) is None and not self.is_stepwise(node)
+
+    def has_roots(self, field: list[int]) -> bool:
+        """Whether a field contains a root that may end."""
+        return bool(self.builder.occurring([root for root, (_, of) in self._roots.items() if of], field))
 
     def as_surface(self, node: int) -> int:
         """Return an expression as a switching function: with its roots continued, also inside of others."""

@@ -66,6 +66,8 @@ class Scalar:
         tracer = self.tracer
         if op == "sqrt":
             return Scalar(tracer, tracer.root(self.node, lambda argument: tracer.builder.unary(op, argument)))
+        if op == "cbrt":
+            return Scalar(tracer, tracer.cube_root(self.node))
         return Scalar(tracer, tracer.builder.unary(op, self.node))
 
     def binary(self, op: str, other: Any) -> Any:

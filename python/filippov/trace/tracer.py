@@ -65,6 +65,10 @@ class Trace:
         What `trace_event` needs of the trace.
     doubts : tuple of str
         What may be wrong with the comparisons, for warnings.
+    has_roots : bool
+        Whether the field has a root that may end.
+    ends : tuple of (int, float)
+        For each end of a root that is a surface its index, and the sign of the side where the root is.
     events : Recent
         Events that were traced beside the field, and for others what kept them from it.
     """
@@ -80,6 +84,8 @@ class Trace:
     triggers: tuple[tuple[int, float], ...]
     tracer: Tracer
     doubts: tuple[str, ...] = ()
+    has_roots: bool = False
+    ends: tuple[tuple[int, float], ...] = ()
     events: Recent[TracedEvent | str] = member(default_factory=lambda: Recent(32))
 
     def is_exact_at_an_instant(self) -> tuple[bool, bool]:
@@ -102,6 +108,7 @@ def trace(
     states: Sequence[str] | None = None,
     discrete: Sequence[str] = (),
     is_field: bool = True,
+    root_ends: bool = False,
 ) -> Trace:
     """Turn a right-hand side into expressions by calling it with traced values.
 
@@ -135,6 +142,8 @@ def trace(
         Parameters whose values are those at the start only, since resets may set them.
     is_field : bool, optional
         Whether the function is the rate of the state; it has constants of motion then.
+    root_ends : bool, optional
+        Whether square roots and fractional powers are zero beyond their end, which is a surface then.
 
     Returns
     -------
@@ -164,6 +173,8 @@ def trace(
             _declare(tracer, surface, args, f"surfaces[{idx}]") for idx, surface in enumerate(surfaces or ())
         )
         field = _explore(tracer, fun, args, "fun", n)
+        if is_field:
+            field = tracer.with_ends_of_roots(field, root_ends)
         watched = tuple(_watch(tracer, h, args, f"resets[{idx}].h") for idx, h in enumerate(triggers))
         order = tracer.laws.complete(tracer, [*declared, *(surface for surface, _ in watched)])
         new = tuple((order[surface], orientation) for surface, orientation in watched)
@@ -207,6 +218,8 @@ def trace(
         triggers=watched,
         tracer=tracer,
         doubts=doubts,
+        has_roots=tracer.has_roots(field),
+        ends=tuple(tracer.builder.switch(argument) for argument in tracer.ends_of_roots),
     )
 
 
