@@ -321,7 +321,7 @@ def _solve(
             ended = system.prepare_with_ends_of_roots(prepared, n, t0, state, values)
             if ended is not None:
                 beyond = run_of(ended, choices)
-                if ended.stays_where_roots_are(beyond):
+                if isinstance(beyond, Run) and ended.stays_where_roots_are(beyond):
                     run, used = beyond, ended
         return _present(run, system, used, options, t0, states, specs is not None, values, functions)
 
