@@ -14,15 +14,18 @@ import numpy.typing as npt
 from filippov._core import Run
 from filippov.arrays import real_array
 from filippov.backward import ReversedRun
+from filippov.derivatives import Wanted
 from filippov.errors import InputError, ModelError
 from filippov.modes import Mode
 from filippov.prepare import Prepared
 from filippov.start import StandingRun
 from filippov.switches import (
+    NO_DERIVATIVES,
     RunWarning,
     SegmentTable,
     SwitchTable,
     as_texts,
+    at_switches,
     import_pandas,
     import_xarray,
 )
@@ -166,6 +169,7 @@ class _Origin(NamedTuple):
     states: tuple[str, ...]
     has_events: bool
     dense_output: bool
+    wanted: Wanted | None = None
 
 
 class Solution:
@@ -239,6 +243,7 @@ class Solution:
         states: tuple[str, ...],
         has_events: bool,
         dense_output: bool,
+        wanted: Wanted | None = None,
     ) -> Solution:
         """Present what the core computed. Every field is made when it is first asked for.
 
@@ -260,6 +265,8 @@ class Solution:
             Whether the caller gave events (else `t_events` is ``None``).
         dense_output : bool
             Whether `sol` is kept.
+        wanted : Wanted or None
+            By what the run was differentiated.
 
         Returns
         -------
@@ -267,7 +274,9 @@ class Solution:
         """
         solution = cls()
         solution._run = run
-        solution._origin = _Origin(system, prepared, values, t0, states, has_events, dense_output)
+        solution._origin = _Origin(
+            system, prepared, values, t0, states, has_events, dense_output, wanted
+        )
         return solution
 
     @cached_property
@@ -366,7 +375,68 @@ class Solution:
     @cached_property
     def switches(self) -> SwitchTable:
         """Every change of mode."""
-        return SwitchTable(self._run.switches, self.surfaces, self.states)
+        rows, derivatives = self._run.switches, None
+        if self._origin.wanted is not None and isinstance(self._run, Run):
+            derivatives = at_switches([row[0] for row in rows], self._run.instants())
+        return SwitchTable(rows, self.surfaces, self.states, derivatives)
+
+    @property
+    def wrt(self) -> tuple[str, ...]:
+        """The names of the columns of `derivative`; empty if no derivatives were followed."""
+        wanted = self._origin.wanted if hasattr(self, "_origin") else None
+        return () if wanted is None else wanted.names
+
+    def derivative(self, t: npt.ArrayLike | None = None, side: str = "right") -> Array:
+        """Return the derivative of the state by the start and parameters, as asked for with ``wrt=``.
+
+        Parameters
+        ----------
+        t : float or array_like, shape (k,), optional
+            Times, by default the end of the run.
+        side : {"right", "left"}, optional
+            Which limit is taken at a switch, where the derivative jumps.
+
+        Returns
+        -------
+        ndarray, shape (n, len(wrt)) or (n, len(wrt), k)
+            NaN from an instant on at which there is no derivative; ``sol.switches[i].derivative.lost`` says
+            why.
+
+        Raises
+        ------
+        ModelError
+            If no derivatives were followed; with other times than the end, if the solution was not kept as a
+            function.
+        ValueError
+            If a time is outside of the interval, or `side` is unknown.
+
+        References
+        ----------
+        Mueller, Chaos, Solitons & Fractals 5 (1995) 1671.
+
+        Examples
+        --------
+        >>> import numpy as np, filippov as fl
+        >>> stops = fl.System(lambda t, x, a: [-a * np.sign(x[0])], n=1, params={"a": 0.5})
+        >>> sol = stops.solve((0, 3), [1.0], wrt=["y0", "a"])
+        >>> sol.wrt, sol.derivative(1.0).round(12).tolist(), sol.derivative().tolist()
+        (('x[0]', 'a'), [[1.0, -1.0]], [[0.0, 0.0]])
+        >>> sol.switches.dt.round(12).tolist()
+        [[2.0, -4.0]]
+        """
+        if not self.wrt or not isinstance(self._run, Run):
+            raise ModelError(NO_DERIVATIVES)
+        if side not in ("right", "left"):
+            raise ValueError(f'side: "right" or "left" is needed, not {side!r}')
+        if t is None:
+            at_end = self._run.derivatives_at_end()
+            assert at_end is not None
+            return at_end
+        times = real_array(t, "t", "a number or a one-dimensional array")
+        flat = np.ascontiguousarray(np.atleast_1d(times))
+        self._kept_function()._check_range(flat)
+        found = np.stack(self._run.derivatives(flat, side == "left"), axis=-1)
+        return found if times.ndim else found[..., 0]
 
     @cached_property
     def segments(self) -> SegmentTable:

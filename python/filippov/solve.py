@@ -15,6 +15,7 @@ from filippov._core import solve as run_core
 from filippov.backward import ReversedRun, reversed_function
 from filippov.branches import explore
 from filippov.core_events import CoreEvent, core_events
+from filippov.derivatives import Wanted, check_wrt, refuse_without_derivatives
 from filippov.errors import InputError, Interrupted, NonUniqueError
 from filippov.events import EventSpec, normalise_events, raised_by
 from filippov.modes import Mode
@@ -65,6 +66,7 @@ def solve_ivp(
     max_steps: int = 10**8,
     max_wall_time: float | None = None,
     progress: bool | Callable[..., Any] = False,
+    wrt: str | Sequence[str] | None = None,
     **unknown: Any,
 ) -> Solution:
     """Solve an initial value problem of a piecewise-smooth system.
@@ -137,6 +139,10 @@ def solve_ivp(
     progress : bool or callable, optional
         Print how far the run is, or call a function of the time reached. What that raises ends the run, and
         is raised again with the solution up to there as `partial`.
+    wrt : str or sequence of str, optional
+        By what the solution is differentiated: ``"y0"``, ``"t0"``, names of parameters, ``"params"`` for all
+        of these, ``"all"`` for the states and them. `Solution.derivative` and ``sol.switches.dt`` are the
+        derivatives. Default: none are followed.
 
     Returns
     -------
@@ -198,6 +204,7 @@ def solve_ivp(
         "max_steps": max_steps,
         "max_wall_time": max_wall_time,
         "progress": progress,
+        "wrt": wrt,
     }
     solution = _solve(fun, t_span, y0, _changed(given), events, args, params, surfaces, resets)
     return _shown(solution)
@@ -297,6 +304,8 @@ def _solve(
     t0, t1 = check_t_span(t_span)
     state = check_y0(y0, states=fun._states if isinstance(fun, System) else None)
     n = len(state)
+    changed = dict(changed)
+    wrt = changed.pop("wrt", None)
     options = check_options(changed, (t0, t1), n)
     constants = check_args(args)
     specs = normalise_events(events)
@@ -310,10 +319,14 @@ def _solve(
         prepared, specs = _backward(system, prepared, specs, state, values, t0)
 
     states = system.state_names(n)
+    wanted = None
+    if wrt is not None:
+        wanted = check_wrt(wrt, states, values, system.discrete)
+        refuse_without_derivatives(prepared, system.discrete, (t0, t1))
 
     def run_of(prepared: Prepared, choices: tuple[Mode, ...]) -> AnyRun:
         found = core_events(specs or [], prepared, t0 if t1 >= t0 else -t0, state, constants, values)
-        return _run(prepared, t0, t1, state, values, options, found, choices)
+        return _run(prepared, t0, t1, state, values, options, found, choices, wanted)
 
     def follow(choices: tuple[Mode, ...]) -> Solution:
         run, used = run_of(prepared, choices), prepared
@@ -323,7 +336,8 @@ def _solve(
                 beyond = run_of(ended, choices)
                 if isinstance(beyond, Run) and ended.stays_where_roots_are(beyond):
                     run, used = beyond, ended
-        return _present(run, system, used, options, t0, states, specs is not None, values, functions)
+        has_events = specs is not None
+        return _present(run, system, used, options, t0, states, has_events, values, functions, wanted)
 
     solution = follow(())
     if options.nonunique == "branch":
@@ -341,6 +355,7 @@ def _present(
     has_events: bool,
     values: dict[str, float] | None,
     events: Sequence[tuple[str, Any]] = (),
+    wanted: Wanted | None = None,
 ) -> Solution:
     """Present what the core computed; raise what the options ask to raise."""
     dense_output = options.dense_output and options.keep == "steps"
@@ -353,6 +368,7 @@ def _present(
         states=states,
         has_events=has_events,
         dense_output=dense_output,
+        wanted=wanted,
     )
     if run.reason == "field_not_finite" and isinstance(run, Run):
         given = system.parameter_values(None) if values is None else values
@@ -446,13 +462,15 @@ def _run(
     options: Options,
     events: list[CoreEvent],
     choices: tuple[Mode, ...],
+    wanted: Wanted | None,
 ) -> AnyRun:
     p = parameter_vector(values)
     if t1 == t0:
         return StandingRun(t0, y0, len(prepared.surfaces), len(events), options.t_eval)
     if t1 > t0:
         core_options = options.for_core(choices)
-        return run_core(prepared.core, t0, t1, y0, p, core_options, events, list(prepared.actions))
+        asked = None if wanted is None else wanted.for_core()
+        return run_core(prepared.core, t0, t1, y0, p, core_options, events, list(prepared.actions), asked)
     if options.t_eval is not None:
         options = options._replace(t_eval=-options.t_eval)
     return ReversedRun(run_core(prepared.core, -t0, -t1, y0, p, options.for_core(), events))

@@ -9,13 +9,44 @@ from typing import Any, NamedTuple, overload
 import numpy as np
 import numpy.typing as npt
 
+from filippov.errors import ModelError
 from filippov.modes import Mode
 
-__all__ = ["RunWarning", "Segment", "SegmentTable", "Switch", "SwitchTable"]
+__all__ = ["InstantDerivative", "RunWarning", "Segment", "SegmentTable", "Switch", "SwitchTable"]
 
 Array = npt.NDArray[np.float64]
 
 _ROWS_SHOWN = 20
+NO_DERIVATIVES = 'no derivatives were followed: give wrt=[...] to the run, names of parameters, "y0" or "t0"'
+
+
+class InstantDerivative(NamedTuple):
+    """The derivatives of an instant, in which a motion ends and another one begins.
+
+    Attributes
+    ----------
+    t : float
+        The time.
+    dt : ndarray, shape (k,)
+        Its derivative by each column.
+    saltation : ndarray, shape (n, n)
+        The saltation matrix: the derivative of the state after by that before, at one time.
+    saltation_params : ndarray, shape (n, number of parameters)
+        What the instant adds to the columns of the parameters.
+    condition : float
+        By how much the instant magnifies errors: 1 / cos of the angle between the motion and the normal of
+        the surface, with time in units of the span and states in units of ``abs(x) + atol / rtol``.
+    lost : str
+        Why derivatives are not known from here on, empty if they are: ``"grazing"``, ``"one-sided"``,
+        ``"accumulation"``, ``"unsupported"`` (contact, sliding of higher order, rest) or ``"not_finite"``.
+    """
+
+    t: float
+    dt: Array
+    saltation: Array
+    saltation_params: Array
+    condition: float
+    lost: str
 
 
 class Switch(NamedTuple):
@@ -43,6 +74,9 @@ class Switch(NamedTuple):
     is_kink : bool
         Whether the field is continuous at the switch, as that of ``abs`` or ``maximum`` is: the solution has
         a kink in its derivative there, and nothing else happens.
+    derivative : InstantDerivative or None
+        With ``wrt=`` the derivatives of the instant; `dt`, `saltation`, `saltation_params` and `condition`
+        are read from it. Switches of one instant have the same.
     """
 
     t: float
@@ -55,6 +89,32 @@ class Switch(NamedTuple):
     note: str
     rule: str = ""
     is_kink: bool = False
+    derivative: InstantDerivative | None = None
+
+    @property
+    def dt(self) -> Array:
+        """Derivative of the time by the columns of `sol.wrt`, shape (k,)."""
+        return self._derivative().dt
+
+    @property
+    def saltation(self) -> Array:
+        """Derivative of the state after by that before, both at the time of the switch, shape (n, n)."""
+        return self._derivative().saltation
+
+    @property
+    def saltation_params(self) -> Array:
+        """What the instant adds to the columns of the parameters, shape (n, number of parameters)."""
+        return self._derivative().saltation_params
+
+    @property
+    def condition(self) -> float:
+        """By how much the instant magnifies errors, see `InstantDerivative`."""
+        return self._derivative().condition
+
+    def _derivative(self) -> InstantDerivative:
+        if self.derivative is None:
+            raise ModelError(NO_DERIVATIVES)
+        return self.derivative
 
 
 class Segment(NamedTuple):
@@ -150,12 +210,17 @@ class SwitchTable(Sequence[Switch]):
     ['enter_sliding']
     """
 
-    __slots__ = ("_rows", "_states", "_surfaces")
+    __slots__ = ("_derivatives", "_rows", "_states", "_surfaces")
 
     def __init__(
-        self, rows: Sequence[tuple[Any, ...]], surfaces: Sequence[str], states: Sequence[str]
+        self,
+        rows: Sequence[tuple[Any, ...]],
+        surfaces: Sequence[str],
+        states: Sequence[str],
+        derivatives: Sequence[InstantDerivative | None] | None = None,
     ) -> None:
         self._rows = rows
+        self._derivatives = derivatives
         self._surfaces = tuple(surfaces)
         self._states = tuple(states)
 
@@ -168,12 +233,27 @@ class SwitchTable(Sequence[Switch]):
     def __getitem__(self, index: slice | npt.NDArray[Any] | list[Any]) -> SwitchTable: ...
     def __getitem__(self, index: int | slice | npt.NDArray[Any] | list[Any]) -> Switch | SwitchTable:
         found = _selected(self._rows, index)
-        return (
-            _switch(found) if isinstance(found, tuple) else SwitchTable(found, self._surfaces, self._states)
-        )
+        known = self._derivatives
+        if isinstance(found, tuple):
+            return _switch(found, None if known is None else known[index])  # type: ignore[index]
+        derivatives = None if known is None else _selected(known, index)
+        return SwitchTable(found, self._surfaces, self._states, derivatives)
 
     def __iter__(self) -> Iterator[Switch]:
-        return map(_switch, self._rows)
+        return map(_switch, self._rows, self._derivatives or [None] * len(self._rows))
+
+    @property
+    def dt(self) -> Array:
+        """Derivatives of the times by the columns of `sol.wrt`, shape (n_switches, k); NaN where there is none.
+
+        It is a `ModelError` to ask for them of a run without ``wrt=``.
+        """
+        if self._derivatives is None:
+            raise ModelError(NO_DERIVATIVES)
+        known = [found for found in self._derivatives if found is not None]
+        width = len(known[0].dt) if known else 0
+        none = np.full(width, np.nan)
+        return np.array([none if d is None else d.dt for d in self._derivatives]).reshape(len(self), width)
 
     @property
     def t(self) -> Array:
@@ -402,9 +482,24 @@ def as_texts(texts: Iterable[Any]) -> npt.NDArray[Any]:
     return np.array(list(map(str, texts)), dtype=object)
 
 
-def _switch(row: tuple[Any, ...]) -> Switch:
+def _switch(row: tuple[Any, ...], derivative: InstantDerivative | None) -> Switch:
     t, y_before, y_after, kind, surfaces, before, after, note, rule, is_kink = row
-    return Switch(t, y_before, y_after, kind, tuple(surfaces), Mode(before), Mode(after), note, rule, is_kink)
+    modes = Mode(before), Mode(after)
+    return Switch(t, y_before, y_after, kind, tuple(surfaces), *modes, note, rule, is_kink, derivative)
+
+
+def at_switches(
+    times: Sequence[float], instants: Sequence[tuple[Any, ...]]
+) -> list[InstantDerivative | None]:
+    """Return the derivatives of the instants to which switches at these times belong, in their order."""
+    at_time: dict[float, list[InstantDerivative]] = {}
+    for row in instants:
+        at_time.setdefault(row[0], []).append(InstantDerivative(*row))
+    found: list[InstantDerivative | None] = []
+    for t in times:
+        known = at_time.get(t)
+        found.append(None if not known else known.pop(0) if len(known) > 1 else known[0])
+    return found
 
 
 def _segment(row: tuple[Any, ...]) -> Segment:

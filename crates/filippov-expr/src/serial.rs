@@ -95,18 +95,49 @@ impl Graph {
         let switches = read_switches(&mut section, nodes.len(), functions.len())?;
         let absolute = read_absolute_values(&mut section, &nodes)?;
         section.finish()?;
+        Ok(Graph::made_of(&nodes, &functions, &switches, &absolute))
+    }
 
+    /// The same graph with states in the place of some parameters, given as pairs, and the node that each of its nodes has become.
+    pub fn with_states_for(&self, parameters: &[(u32, u32)]) -> (Graph, Vec<NodeId>) {
+        let replaced = |node: &Node| match *node {
+            Node::Parameter(index) => {
+                let state = parameters.iter().find(|pair| pair.0 == index);
+                state.map_or(*node, |pair| Node::State(pair.1))
+            }
+            other => other,
+        };
+        let nodes: Vec<Node> = self.nodes.iter().map(replaced).collect();
+        let functions: Vec<usize> = self
+            .surfaces
+            .functions
+            .iter()
+            .map(|id| id.index())
+            .collect();
+        let switches = self.surfaces.switches.iter();
+        let switches: Vec<_> = switches.map(|(id, side)| (id.index(), *side)).collect();
+        let absolute = self.absolute_values().map(|id| id.index()).collect();
+        Graph::made_of(&nodes, &functions, &switches, &absolute)
+    }
+
+    /// The graph of these nodes, with these nodes as surfaces, known switches and absolute values.
+    fn made_of(
+        nodes: &[Node],
+        functions: &[usize],
+        switches: &[KnownSwitch],
+        absolute: &FxHashSet<usize>,
+    ) -> (Graph, Vec<NodeId>) {
         let mut graph = Graph::new();
-        let made = graph.build(&nodes, &absolute);
-        let surfaces = functions.into_iter().map(|function| made[function]);
+        let made = graph.build(nodes, absolute);
+        let surfaces = functions.iter().map(|&function| made[function]);
         graph.surfaces_mut().functions = surfaces.collect();
-        for (id, side) in switches {
+        for &(id, side) in switches {
             graph.surfaces_mut().switches.insert(made[id], side);
         }
         for index in 0..graph.n_surfaces() as u32 {
             graph.register_surface(index);
         }
-        Ok((graph, made))
+        (graph, made)
     }
 
     /// Makes nodes again, whose operands are numbers of nodes before them; their numbers here.

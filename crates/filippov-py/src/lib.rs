@@ -6,6 +6,7 @@ mod callbacks;
 mod clock;
 mod conversion;
 mod decisions;
+mod derivatives;
 mod inspect;
 mod laws;
 mod prepared_run;

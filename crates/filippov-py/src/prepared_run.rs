@@ -6,11 +6,12 @@ use filippov::action::{Action, ActionMap, Actions, Trigger};
 use filippov::section::Section;
 use filippov::{
     replay_decision, DecisionOutcome, DecisionPoint, Error, FieldError, Kind, LawAction, Options,
-    Problem, Solution, TracedMap, UserEvent, UserFunction,
+    Problem, Rules, Solution, TracedMap, UserEvent, UserFunction,
 };
 use pyo3::prelude::*;
 
 use crate::callbacks::{CalledEvent, CalledMap, CompiledEvent, TracedEvent};
+use crate::derivatives::{run_with_derivatives, Failure, RunDerivatives, Wanted};
 use crate::run::Run;
 use crate::saved::read_trigger;
 use crate::systems::{core_of, n_visible_of, raised, CoreSystem, TracedSystem};
@@ -92,19 +93,49 @@ impl PreparedRun {
         options: &Options,
         interrupt: &mut dyn FnMut(f64) -> bool,
     ) -> Result<Solution, Error> {
+        let (events, actions) = (self.user_events(), self.actions());
+        Problem::new(&*self.core, t_span, &self.y0)
+            .options(options)
+            .events(&events)
+            .actions(&actions)
+            .solve_interruptible(interrupt)
+    }
+
+    /// Runs, and follows derivatives.
+    pub fn run_with_derivatives(
+        &self,
+        t_span: (f64, f64),
+        options: &Options,
+        (rules, wanted): (&Rules, &Wanted),
+        interrupt: &mut dyn FnMut(f64) -> bool,
+    ) -> Result<(Solution, RunDerivatives), Failure> {
+        let Some(system) = &self.compiled else {
+            return Err(Failure::CalledMap);
+        };
+        let (events, actions) = (self.user_events(), self.actions());
+        let problem = Problem::new(&**system, t_span, &self.y0)
+            .options(options)
+            .events(&events)
+            .actions(&actions);
+        let span = t_span.1 - t_span.0;
+        run_with_derivatives(
+            problem,
+            (system, rules, &actions),
+            options,
+            span,
+            wanted,
+            interrupt,
+        )
+    }
+
+    fn user_events(&self) -> Vec<UserEvent<'_>> {
         let events = self.events.iter();
         let events = events.map(|(function, direction, terminal)| UserEvent {
             function: &**function,
             direction: *direction,
             terminal: *terminal,
         });
-        let events: Vec<UserEvent> = events.collect();
-        let actions = self.actions();
-        Problem::new(&*self.core, t_span, &self.y0)
-            .options(options)
-            .events(&events)
-            .actions(&actions)
-            .solve_interruptible(interrupt)
+        events.collect()
     }
 
     /// Runs from section to section; the events are those of the section.

@@ -14,6 +14,7 @@ use pyo3::types::{PyDict, PyTuple};
 use crate::callbacks::{Signal, TracedEvent};
 use crate::conversion::columns;
 use crate::decisions::record_as_pair;
+use crate::derivatives::{InstantRow, RunDerivatives};
 use crate::prepared_run::PreparedRun;
 use crate::systems::{raised, CoreSystem};
 
@@ -60,6 +61,7 @@ pub struct Run {
     error: Option<PyErr>,
     /// The surfaces that a user sees are the first so many.
     n_visible: usize,
+    derivatives: Option<RunDerivatives>,
 }
 
 impl Run {
@@ -70,7 +72,14 @@ impl Run {
             prepared,
             solution: Mutex::new(solution),
             error,
+            derivatives: None,
         }
+    }
+
+    /// The same with derivatives that were followed.
+    pub fn with_derivatives(mut self, derivatives: Option<RunDerivatives>) -> Self {
+        self.derivatives = derivatives;
+        self
     }
 
     fn system(&self) -> &CoreSystem {
@@ -517,6 +526,34 @@ impl Run {
         let held = piece.held(&**self.system(), &actions, solution.sliding, at);
         let row = self.contact_row(&held.map_err(raised)?);
         Ok(PyArray1::from_vec(py, row))
+    }
+
+    /// The derivatives of the state at the times `t`, each of shape (n, columns).
+    fn derivatives<'py>(
+        &self,
+        py: Python<'py>,
+        t: PyReadonlyArray1<'py, f64>,
+        left: bool,
+    ) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
+        let (Some(derivatives), Some(system)) = (&self.derivatives, self.prepared.traced()) else {
+            return Ok(Vec::new());
+        };
+        let when = (t.as_slice()?, side_of(left));
+        derivatives.at(py, system, &self.solution(), when)
+    }
+
+    /// The same at the end of the run.
+    fn derivatives_at_end<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
+        let n = self.solution().n_states;
+        let derivatives = self.derivatives.as_ref();
+        derivatives.map(|derivatives| derivatives.at_end(py, n))
+    }
+
+    /// The derivatives of all instants.
+    fn instants<'py>(&self, py: Python<'py>) -> Vec<InstantRow<'py>> {
+        let n = self.solution().n_states;
+        let derivatives = self.derivatives.as_ref();
+        derivatives.map_or_else(Vec::new, |derivatives| derivatives.instants(py, n))
     }
 
     /// The first `n` discrete states at the times `t`, shape (n, len(t)); those at the end if no segments are kept.

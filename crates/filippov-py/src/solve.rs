@@ -7,8 +7,10 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::clock::ManualClock;
+use crate::derivatives::{Failure, Wanted};
 use crate::prepared_run::{ActionRow, EventRow, PreparedRun};
 use crate::run::{is_interruption, Run};
+use crate::systems::{raised, TracedSystem};
 use crate::threads::{on_threads, CHUNK_PER_THREAD, POLL_EVERY};
 
 /// The options of a run, read once; `filippov.solve_ivp` checks them before.
@@ -29,7 +31,7 @@ impl RunOptions {
 
 /// Integrates a system; `filippov.solve_ivp` checks the arguments before.
 #[pyfunction]
-#[pyo3(signature = (system, t0, t1, y0, p, options, events, actions=Vec::new()))]
+#[pyo3(signature = (system, t0, t1, y0, p, options, events, actions=Vec::new(), wrt=None))]
 #[allow(clippy::too_many_arguments)]
 pub fn solve(
     py: Python<'_>,
@@ -41,11 +43,17 @@ pub fn solve(
     options: &RunOptions,
     events: Vec<EventRow>,
     actions: Vec<ActionRow>,
+    wrt: Option<Wanted>,
 ) -> PyResult<Run> {
     let (y0, p) = (y0.as_slice()?.to_vec(), p.as_slice()?.to_vec());
     let prepared = PreparedRun::new(&system, t0, y0, p, &events, &actions)?;
     let RunOptions { options, progress } = options;
-    let solution = py
+    let rules = system
+        .cast::<TracedSystem>()
+        .ok()
+        .map(|traced| traced.get().rules.clone());
+    let wanted = rules.as_ref().zip(wrt.as_ref());
+    let (solution, derivatives) = py
         .detach(|| {
             let mut asked = options.clock.now();
             let mut interrupt = |t: f64| {
@@ -59,10 +67,22 @@ pub fn solve(
                     py.check_signals().is_err() || matches!(reported, Some(Err(_)))
                 })
             };
-            prepared.run((t0, t1), options, &mut interrupt)
+            Ok(match wanted {
+                None => (prepared.run((t0, t1), options, &mut interrupt)?, None),
+                Some(wanted) => {
+                    let span = (t0, t1);
+                    let both =
+                        prepared.run_with_derivatives(span, options, wanted, &mut interrupt)?;
+                    (both.0, Some(both.1))
+                }
+            })
         })
-        .map_err(|e| PyValueError::new_err(e.to_string()))?;
-    Ok(prepared.result(solution))
+        .map_err(|failure| match failure {
+            Failure::Refused(error) => PyValueError::new_err(error.to_string()),
+            Failure::Raised(error) => raised(error),
+            Failure::CalledMap => PyValueError::new_err("wrt: the map of a reset is not traced"),
+        })?;
+    Ok(prepared.result(solution).with_derivatives(derivatives))
 }
 
 /// Integrates a system from many initial states, the rows of `y0`, with the parameters in the rows of `p`, on some

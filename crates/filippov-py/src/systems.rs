@@ -171,7 +171,7 @@ fn checked<'a>(
 pub struct TracedSystem {
     pub system: filippov::TracedSystem,
     /// What it has beside the field.
-    rules: Rules,
+    pub rules: Rules,
     /// The laws of its discrete states, whose number is that of the last parameters' names.
     pub laws: Arc<Laws>,
     n_visible: usize,

@@ -19,6 +19,7 @@ use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::Run;
 use crate::patience::Patience;
+use crate::record::Act;
 use crate::status::Stop;
 use crate::switch::Switch;
 use crate::system::{ActionMap, Trigger};
@@ -36,6 +37,8 @@ pub(crate) struct Instant<'i, 'a> {
     pub done: Vec<Switch>,
     /// The derivative of all maps so far by the state before, in rows, if it is wanted.
     pub derivative: Option<Vec<f64>>,
+    /// What was done on which state, if the derivative is wanted.
+    pub acts: Vec<Act>,
 }
 
 /// The surfaces in one instant, as far as they trigger actions.
@@ -208,6 +211,11 @@ impl<'a> Instant<'_, 'a> {
         if let Some(derivative) = &mut self.derivative {
             let place = (self.run.t, &self.run.x[..]);
             apply_derivative(action.map, place, signs, &q, derivative)?;
+            self.acts.push(Act {
+                index,
+                x: x.clone(),
+                discrete: q.clone(),
+            });
         }
         action.map.apply(self.run.t, &mut x, signs, &mut q)?;
         self.run.x = x;

@@ -4,7 +4,7 @@ use super::{Integrator, Problem};
 use crate::error::Error;
 use crate::event::UserEvent;
 use crate::record::section::{Place, Section};
-use crate::record::Solution;
+use crate::record::{Observer, Solution};
 use crate::status::Stop;
 
 impl Problem<'_> {
@@ -26,7 +26,31 @@ impl Problem<'_> {
         self,
         interrupt: &mut dyn FnMut(f64) -> bool,
     ) -> Result<Solution, Error> {
-        let mut solution = Integrator::new(self)?.interruptible(interrupt).solve();
+        self.solve_with(None, interrupt)
+    }
+
+    /// As [`solve_interruptible`](Self::solve_interruptible), with an observer of the steps and instants.
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    pub fn solve_observed(
+        self,
+        observer: &mut dyn Observer,
+        interrupt: &mut dyn FnMut(f64) -> bool,
+    ) -> Result<Solution, Error> {
+        self.solve_with(Some(observer), interrupt)
+    }
+
+    fn solve_with(
+        self,
+        observer: Option<&mut dyn Observer>,
+        interrupt: &mut dyn FnMut(f64) -> bool,
+    ) -> Result<Solution, Error> {
+        let mut integrator = Integrator::new(self)?;
+        if let Some(observer) = observer {
+            integrator = integrator.observed_by(observer);
+        }
+        let mut solution = integrator.interruptible(interrupt).solve();
         let wanted = self.options.t_eval.as_ref();
         let resampled = wanted
             .filter(|_| solution.is_dense())

@@ -710,13 +710,17 @@ impl<'a> Integrator<'a> {
             notes: &mut notes,
             done: Vec::new(),
             derivative: self.recorder.observed.is_some().then(|| identity(n)),
+            acts: Vec::new(),
         };
         let stopped = instant.act(due);
         let Instant {
-            done, derivative, ..
+            done,
+            derivative,
+            acts,
+            ..
         } = instant;
         if let Some(observed) = &mut self.recorder.observed {
-            observed.act(derivative);
+            observed.act(derivative, acts);
         }
         self.run.stats.n_switches += done.len() as u64;
         done.into_iter()

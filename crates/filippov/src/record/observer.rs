@@ -22,12 +22,14 @@ pub struct ObservedStep<'s> {
     pub t_end: f64,
     /// The state at its end.
     pub x_end: &'s [f64],
+    /// The discrete states.
+    pub discrete: &'s [f64],
     extension: &'s Interpolant,
 }
 
 impl<'s> ObservedStep<'s> {
     pub(crate) fn new(
-        mode: &'s Mode,
+        (mode, discrete): (&'s Mode, &'s [f64]),
         (t_end, x_end): (f64, &'s [f64]),
         extension: &'s Interpolant,
     ) -> Self {
@@ -35,6 +37,7 @@ impl<'s> ObservedStep<'s> {
             mode,
             t_end,
             x_end,
+            discrete,
             extension,
         }
     }
@@ -60,6 +63,17 @@ pub struct Gradient {
     pub state: Vec<f64>,
 }
 
+/// An action that is done in an instant, and what it is done on.
+#[derive(Clone, Debug)]
+pub struct Act {
+    /// The place of the action in the list.
+    pub index: usize,
+    /// The state before.
+    pub x: Vec<f64>,
+    /// The discrete states before.
+    pub discrete: Vec<f64>,
+}
+
 /// An instant in which a motion ends and another one starts. Pairs are before and after.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
@@ -80,6 +94,8 @@ pub struct InstantRecord<'i> {
     pub gradient: &'i Gradient,
     /// The derivative of the map of the actions by x, in rows; none where nothing was done.
     pub map: Option<&'i [f64]>,
+    /// The actions that are done, in their order.
+    pub acts: &'i [Act],
 }
 
 /// What watches a run.
@@ -106,6 +122,7 @@ pub(crate) struct Observed<'a> {
     guards: SmallVec<[Guard; 2]>,
     gradient: Gradient,
     map: Option<Vec<f64>>,
+    acts: Vec<Act>,
 }
 
 impl<'a> Observed<'a> {
@@ -121,6 +138,7 @@ impl<'a> Observed<'a> {
             guards: SmallVec::new(),
             gradient: Gradient::default(),
             map: None,
+            acts: Vec::new(),
         }
     }
 
@@ -145,6 +163,7 @@ impl<'a> Observed<'a> {
         self.mode = run.motion.mode.clone();
         self.guards = SmallVec::from_slice(guards);
         self.map = None;
+        self.acts.clear();
         let n = run.x.len();
         self.field.resize(n, 0.0);
         self.gradient.state.resize(n, 0.0);
@@ -163,8 +182,9 @@ impl<'a> Observed<'a> {
     }
 
     /// Actions with this derivative were done.
-    pub fn act(&mut self, derivative: Option<Vec<f64>>) {
+    pub fn act(&mut self, derivative: Option<Vec<f64>>, acts: Vec<Act>) {
         self.map = derivative.or(self.map.take());
+        self.acts.extend(acts);
     }
 
     /// The next motion has started with this velocity.
@@ -183,6 +203,7 @@ impl<'a> Observed<'a> {
             guards: &self.guards,
             gradient: &self.gradient,
             map: self.map.as_deref(),
+            acts: &self.acts,
         });
     }
 }

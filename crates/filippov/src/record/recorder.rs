@@ -260,7 +260,8 @@ impl<'a> Recorder<'a> {
     #[inline(never)]
     fn show_step(&mut self, interpolant: &Interpolant, t_stop: f64, y: &[f64]) {
         if let (Some(observed), Some(segment)) = (&mut self.observed, self.segments.last()) {
-            observed.step(&ObservedStep::new(&segment.mode, (t_stop, y), interpolant));
+            let motion = (&segment.mode, &segment.discrete[..]);
+            observed.step(&ObservedStep::new(motion, (t_stop, y), interpolant));
         }
     }
 

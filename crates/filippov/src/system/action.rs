@@ -8,7 +8,7 @@
 use super::Clock;
 use crate::error::FieldError;
 use crate::switch::Kind;
-use crate::system::dot;
+use crate::system::{dot, TracedMap};
 
 /// When an action happens.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,6 +51,11 @@ pub trait ActionMap: Sync {
     /// Does it change x? A map that says no changes discrete states only, so that its surface becomes positive again.
     fn moves_state(&self) -> bool {
         true
+    }
+
+    /// The expressions of the map, if it is traced.
+    fn traced(&self) -> Option<&TracedMap> {
+        None
     }
 
     /// Brings discrete states that are functions of the point up to date, which were not watched; nothing by default.

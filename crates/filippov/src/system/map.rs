@@ -31,8 +31,13 @@ impl TracedMap {
         x.iter().chain(q.iter().take(n_named)).copied().collect()
     }
 
+    /// The expressions of the new states, as the field of a system.
+    pub fn expressions(&self) -> &TracedSystem {
+        &self.expressions
+    }
+
     /// The sides on which a state is.
-    fn signs(&self, t: f64, x: &[f64]) -> Result<Vec<f64>, FieldError> {
+    pub(crate) fn signs(&self, t: f64, x: &[f64]) -> Result<Vec<f64>, FieldError> {
         let d = self.expressions.n_surfaces();
         let mut signs = vec![1.0; d];
         let mut h = vec![0.0; d];
@@ -68,6 +73,10 @@ impl TracedMap {
 }
 
 impl ActionMap for TracedMap {
+    fn traced(&self) -> Option<&TracedMap> {
+        Some(self)
+    }
+
     fn apply(&self, t: f64, x: &mut [f64], _: &[f64], q: &mut [f64]) -> Result<(), FieldError> {
         let before = self.with_named(x, q);
         let mut after = before.clone();

@@ -165,7 +165,7 @@ impl TracedSystem {
 
     /// Evaluates a program at a place, with a vector handed in.
     #[inline(always)]
-    pub(super) fn eval(&self, program: &Program, place: &Place<'_>, v: &[f64], out: &mut [f64]) {
+    pub(crate) fn eval(&self, program: &Program, place: &Place<'_>, v: &[f64], out: &mut [f64]) {
         self.with_values(place.q, |p| {
             program.eval(place.t, place.x, place.signs, p, v, out);
         });

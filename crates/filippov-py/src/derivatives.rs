@@ -1,0 +1,169 @@
+//! Derivatives of a run by what a user names.
+
+use filippov::derivative::{Column, Derivatives, Extended, Tangents};
+use filippov::{Error, FieldError, Options, PiecewiseSystem, Problem, Rules, Side, Solution};
+use numpy::{PyArray1, PyArray2};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+/// The columns, each a kind (0: a component of the initial state, 1: the initial time, 2: a parameter) with a place, and the
+/// parameters by which is differentiated.
+pub type Wanted = (Vec<(u8, usize)>, Vec<usize>);
+
+/// Time, derivative of the time, saltation matrix, its part by parameters, condition, and why derivatives end there.
+pub type InstantRow<'py> = (
+    f64,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    f64,
+    &'static str,
+);
+
+/// The derivatives of a run, and what they are continued with between steps.
+pub struct RunDerivatives {
+    found: Derivatives,
+    kinds: Vec<Column>,
+    parameters: Vec<usize>,
+    rules: Rules,
+    options: Options,
+}
+
+/// Runs a traced system, and follows its derivatives.
+pub fn run_with_derivatives(
+    problem: Problem<'_>,
+    (system, rules, actions): (
+        &filippov::TracedSystem,
+        &Rules,
+        &filippov::action::Actions<'_>,
+    ),
+    options: &Options,
+    span: f64,
+    (kinds, parameters): &Wanted,
+    interrupt: &mut dyn FnMut(f64) -> bool,
+) -> Result<(Solution, RunDerivatives), Failure> {
+    let kinds: Vec<Column> = kinds
+        .iter()
+        .map(|&(kind, place)| column(kind, place))
+        .collect();
+    let extended = Extended::new(system, rules, actions, parameters)?;
+    let extended = extended.ok_or(Failure::CalledMap)?;
+    let mut tangents = Tangents::new(&extended, kinds.clone(), options, span);
+    let solution = problem.solve_observed(&mut tangents, interrupt)?;
+    let found = tangents.finish()?;
+    Ok((
+        solution,
+        RunDerivatives {
+            found,
+            kinds,
+            parameters: parameters.clone(),
+            rules: rules.clone(),
+            options: options.clone(),
+        },
+    ))
+}
+
+/// Why there are no derivatives.
+#[derive(Debug)]
+pub enum Failure {
+    /// The arguments of the run are wrong.
+    Refused(Error),
+    /// A function raised.
+    Raised(FieldError),
+    /// The map of a reset is called, not traced.
+    CalledMap,
+}
+
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
+        Failure::Refused(error)
+    }
+}
+
+impl From<FieldError> for Failure {
+    fn from(error: FieldError) -> Self {
+        Failure::Raised(error)
+    }
+}
+
+fn column(kind: u8, place: usize) -> Column {
+    match kind {
+        0 => Column::State(place),
+        1 => Column::Start,
+        _ => Column::Parameter(place),
+    }
+}
+
+impl RunDerivatives {
+    /// The derivative of the state at these times, n rows of one entry per column for each.
+    pub fn at<'py>(
+        &self,
+        py: Python<'py>,
+        system: &filippov::TracedSystem,
+        solution: &Solution,
+        (times, side): (&[f64], Side),
+    ) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
+        let none = filippov::action::Actions::default();
+        let extended = Extended::new(system, &self.rules, &none, &self.parameters);
+        let extended = extended.map_err(|e| PyValueError::new_err(e.to_string()))?;
+        let extended = extended.ok_or_else(|| PyValueError::new_err("maps that are not traced"))?;
+        let own: &dyn PiecewiseSystem = system;
+        let at = |&t: &f64| {
+            let known = (&extended, &self.kinds[..]);
+            let found = self
+                .found
+                .at(known, (own, &self.options), solution, (t, side));
+            let values = found.map_err(crate::systems::raised)?;
+            let outside = || PyValueError::new_err(format!("t = {t} has no derivative here"));
+            let values = values.ok_or_else(outside)?;
+            Ok(transposed(py, &values, self.kinds.len(), solution.n_states))
+        };
+        times.iter().map(at).collect()
+    }
+
+    /// The derivative of the state at the end.
+    pub fn at_end<'py>(&self, py: Python<'py>, n: usize) -> Bound<'py, PyArray2<f64>> {
+        let size = n * self.kinds.len();
+        let last = self.found.values.len().saturating_sub(size);
+        transposed(py, &self.found.values[last..], self.kinds.len(), n)
+    }
+
+    /// The derivatives of all instants.
+    pub fn instants<'py>(&self, py: Python<'py>, n: usize) -> Vec<InstantRow<'py>> {
+        let m = self.parameters.len();
+        let rows = |values: &[f64], width: usize| {
+            let rows: Vec<Vec<f64>> = (0..n)
+                .map(|r| values[r * width..(r + 1) * width].to_vec())
+                .collect();
+            PyArray2::from_vec2(py, &rows)
+                .unwrap_or_else(|_| PyArray2::zeros(py, [n, width], false))
+        };
+        let instants = self.found.instants.iter();
+        instants
+            .map(|found| {
+                (
+                    found.t,
+                    PyArray1::from_slice(py, &found.dt),
+                    rows(&found.saltation, n),
+                    rows(&found.by_parameters, m),
+                    found.condition,
+                    found.lost.map_or("", filippov::derivative::Lost::name),
+                )
+            })
+            .collect()
+    }
+}
+
+/// Columns of n states that stand one after the other, as an array of n rows.
+fn transposed<'py>(
+    py: Python<'py>,
+    values: &[f64],
+    k: usize,
+    n: usize,
+) -> Bound<'py, PyArray2<f64>> {
+    let rows: Vec<Vec<f64>> = (0..n)
+        .map(|r| (0..k).map(|c| values[c * n + r]).collect())
+        .collect();
+    let empty = || PyArray2::zeros(py, [n, k], false);
+    PyArray2::from_vec2(py, &rows).unwrap_or_else(|_| empty())
+}

@@ -1,0 +1,160 @@
+//! A traced system in which parameters are states that rest.
+
+use filippov_expr::{Backend, Names, NodeId, Program};
+
+use super::tangents::Column;
+use crate::error::{Error, FieldError};
+use crate::system::{Actions, Definition, PiecewiseSystem, Place, Rules, TracedMap, TracedSystem};
+
+/// A system with some of its parameters as further states behind those that it has, and the maps of its actions likewise.
+pub struct Extended<'a> {
+    pub(super) system: TracedSystem,
+    /// How many states the system has itself.
+    pub(super) n: usize,
+    /// The values of the parameters that have become states.
+    pub(super) values: Vec<f64>,
+    /// The map of each action; none where it leaves the states as they are.
+    pub(super) maps: Vec<Option<ExtendedMap<'a>>>,
+}
+
+impl<'a> Extended<'a> {
+    /// The extension of a system by these parameters, with the actions of a run; `None` if the map of an action is not traced.
+    ///
+    /// # Errors
+    /// If an expression cannot be compiled.
+    pub fn new(
+        system: &TracedSystem,
+        rules: &Rules,
+        actions: &'a Actions,
+        parameters: &[usize],
+    ) -> Result<Option<Self>, Error> {
+        let n = system.n_states();
+        let pairs = pairs(parameters, n);
+        let extended = Definition::of(system, rules).extended(&pairs)?;
+        let mut maps = Vec::with_capacity(actions.list.len());
+        for action in &actions.list {
+            if !action.map.moves_state() {
+                maps.push(None);
+                continue;
+            }
+            let Some(traced) = action.map.traced() else {
+                return Ok(None);
+            };
+            maps.push(Some(ExtendedMap::new(traced, parameters, n)?));
+        }
+        Ok(Some(Extended {
+            values: parameters.iter().map(|&i| system.parameters()[i]).collect(),
+            system: extended.with_parameters(system.parameters().to_vec()),
+            n,
+            maps,
+        }))
+    }
+
+    /// How many parameters have become states.
+    pub(super) fn n_parameters(&self) -> usize {
+        self.values.len()
+    }
+
+    /// The derivative of the state by this, with the shares of the parameters behind it.
+    pub(super) fn column(&self, kind: Column, states: &[f64]) -> Vec<f64> {
+        let mut column = states.to_vec();
+        column.resize(self.n + self.values.len(), 0.0);
+        if let Column::Parameter(p) = kind {
+            column[self.n + p] = 1.0;
+        }
+        column
+    }
+
+    /// The state with the parameters behind it.
+    pub(super) fn state(&self, x: &[f64]) -> Vec<f64> {
+        [x, &self.values].concat()
+    }
+}
+
+/// Parameters with the states that they become, behind n others.
+fn pairs(parameters: &[usize], n: usize) -> Vec<(u32, u32)> {
+    let states = (n as u32)..;
+    let parameters = parameters.iter().map(|&index| index as u32);
+    parameters.zip(states).collect()
+}
+
+impl Definition {
+    /// The system with states in the place of some parameters, given as pairs, that rest. Its laws change nothing: the discrete
+    /// states are given.
+    fn extended(&self, parameters: &[(u32, u32)]) -> Result<TracedSystem, Error> {
+        let (mut graph, made) = self.graph.with_states_for(parameters);
+        let still = graph.constant(0.0);
+        let mut field: Vec<NodeId> = self.field.iter().map(|id| made[id.index()]).collect();
+        field.resize(field.len() + parameters.len(), still);
+        let ratios = self.rules.sticking.iter();
+        let ratios: Vec<_> = ratios.map(|&(j, id)| (j, made[id.index()])).collect();
+        let names = Names {
+            states: Vec::new(),
+            parameters: self.names.parameters.clone(),
+        };
+        let values = vec![0.0; self.n_parameters()];
+        let system = TracedSystem::new(graph, field, values, names, Backend::Native)?;
+        let system = system.watching(&self.rules.watched).sticking(&ratios);
+        Ok(system.with_discrete(self.rules.laws.len()))
+    }
+}
+
+/// The derivative of the map of an action.
+pub(super) struct ExtendedMap<'a> {
+    map: &'a TracedMap,
+    /// The new states in a direction of (x, q, p), then by the time.
+    derivative: Program,
+    n: usize,
+}
+
+impl<'a> ExtendedMap<'a> {
+    fn new(map: &'a TracedMap, parameters: &[usize], n: usize) -> Result<Self, Error> {
+        let expressions = map.expressions();
+        let n_all = expressions.n_states();
+        let pairs = pairs(parameters, n_all);
+        let (mut graph, made) = expressions.graph().with_states_for(&pairs);
+        let inputs = 0..(n_all + parameters.len()) as u32;
+        let along: Vec<NodeId> = inputs.map(|i| graph.input(i)).collect();
+        let still = vec![graph.constant(0.0); along.len()];
+        let (mut outputs, mut by_time) = (Vec::with_capacity(2 * n), Vec::with_capacity(n));
+        for id in &expressions.field_nodes()[..n] {
+            let value = made[id.index()];
+            let total = graph.directional(value, &along);
+            let time = graph.directional(value, &still);
+            outputs.push(graph.sub(total, time));
+            by_time.push(time);
+        }
+        outputs.extend(by_time);
+        Ok(ExtendedMap {
+            map,
+            derivative: Program::compile(&graph, &outputs, Backend::Interpreter)?,
+            n,
+        })
+    }
+
+    /// The derivatives of the new state at a place: along each of the columns, of n states and the shares of the parameters, and
+    /// by the time.
+    pub fn apply(
+        &self,
+        (t, x, q): (f64, &[f64], &[f64]),
+        values: &[f64],
+        columns: &[Vec<f64>],
+    ) -> Result<(Vec<Vec<f64>>, Vec<f64>), FieldError> {
+        let expressions = self.map.expressions();
+        let n_named = expressions.n_states() - self.n;
+        let before: Vec<f64> = x.iter().chain(q.iter().take(n_named)).copied().collect();
+        let signs = self.map.signs(t, &before)?;
+        let z = [&before[..], values].concat();
+        let place = Place::new(t, &z, &signs);
+        let (mut images, mut by_time) = (Vec::with_capacity(columns.len()), Vec::new());
+        for column in columns {
+            let (states, shares) = column.split_at(self.n);
+            let direction = [states, &vec![0.0; n_named], shares].concat();
+            let mut out = vec![0.0; 2 * self.n];
+            expressions.eval(&self.derivative, &place, &direction, &mut out);
+            by_time = out.split_off(self.n);
+            images.push(out);
+        }
+        Ok((images, by_time))
+    }
+}

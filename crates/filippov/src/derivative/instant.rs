@@ -1,0 +1,370 @@
+//! The saltation matrix: what an instant makes of a change of the state.
+
+use super::extended::Extended;
+use super::piece::{dot, remove_along, Piece};
+use crate::error::FieldError;
+use crate::motion::{Guard, ModeField};
+use crate::record::InstantRecord;
+use crate::system::{PiecewiseSystem, SignStructure};
+use crate::tolerances::{AT_SIDE, EPS};
+
+/// Why derivatives are not known from an instant on: they are NaN.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Lost {
+    /// The motion touches the surface that ends it: its time has no derivative.
+    Grazing,
+    /// Several guards vanish at once, and the order in which they do so counts.
+    OneSided,
+    /// Infinitely many switches were jumped over.
+    Accumulation,
+    /// Contact, sliding of higher order, or rest begins.
+    Unsupported,
+    /// A derivative is not finite.
+    NotFinite,
+}
+
+impl Lost {
+    /// The name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Lost::Grazing => "grazing",
+            Lost::OneSided => "one-sided",
+            Lost::Accumulation => "accumulation",
+            Lost::Unsupported => "unsupported",
+            Lost::NotFinite => "not_finite",
+        }
+    }
+}
+
+/// The derivatives of an instant: of its time, and of the state behind it by the state before.
+#[derive(Clone, Debug)]
+pub struct InstantDerivative {
+    /// The time.
+    pub t: f64,
+    /// The derivative of the time by each column; NaN where it is not known.
+    pub dt: Vec<f64>,
+    /// The saltation matrix, n rows of n entries.
+    pub saltation: Vec<f64>,
+    /// What parameters add to their own columns, n rows of one entry for each of them.
+    pub by_parameters: Vec<f64>,
+    /// 1 / c with the cosine c = |dg . F| / (|dg| |F|) of the angle between motion and normal, F = (1, f) the motion before, in
+    /// which time is measured by the span of the run and each state by rtol |x| + atol, both over rtol.
+    pub condition: f64,
+    /// Why the derivatives end here, if they do.
+    pub lost: Option<Lost>,
+}
+
+/// By what time and states are measured in the condition of an instant.
+pub(super) struct Weights {
+    pub span: f64,
+    pub rtol: f64,
+    pub atol: Vec<f64>,
+}
+
+impl Weights {
+    fn of(&self, i: usize, x: f64) -> f64 {
+        let atol = self.atol.get(i).or(self.atol.first()).copied();
+        x.abs() + atol.unwrap_or(0.0) / self.rtol
+    }
+
+    /// 1 / |cos| of the angle between a gradient and a motion.
+    fn condition(&self, x: &[f64], (by_time, gradient): (f64, &[f64]), field: &[f64]) -> f64 {
+        let rate = by_time + dot(gradient, field);
+        let (mut normal, mut speed) = ((by_time * self.span).powi(2), self.span.powi(-2));
+        for (i, x) in x.iter().enumerate() {
+            let weight = self.of(i, *x);
+            normal += (gradient[i] * weight).powi(2);
+            if field[i] != 0.0 {
+                speed += (field[i] / weight).powi(2);
+            }
+        }
+        (normal * speed).sqrt() / rate.abs()
+    }
+}
+
+/// A function that fixes the time of an instant: its derivatives by time and by the extended state.
+struct Clockwork {
+    time: f64,
+    state: Vec<f64>,
+}
+
+/// What becomes of some columns, and the derivatives of the time along them.
+struct Passage {
+    columns: Vec<Vec<f64>>,
+    dt: Vec<f64>,
+}
+
+/// An instant with the motions around it.
+pub(super) struct Instant<'i, 'a> {
+    pub extended: &'a Extended<'a>,
+    pub record: &'i InstantRecord<'i>,
+    pub before: &'i mut Piece<'a>,
+    pub after: &'i mut Piece<'a>,
+}
+
+impl Instant<'_, '_> {
+    /// The derivatives of the instant, and the columns after it.
+    pub fn pass(
+        &mut self,
+        weights: &Weights,
+        columns: &mut Vec<Vec<f64>>,
+    ) -> Result<InstantDerivative, FieldError> {
+        let (n, m) = (self.extended.n, self.extended.n_parameters());
+        let mut found = InstantDerivative {
+            t: self.record.t[0],
+            dt: vec![f64::NAN; columns.len()],
+            saltation: vec![f64::NAN; n * n],
+            by_parameters: vec![f64::NAN; n * m],
+            condition: f64::NAN,
+            lost: None,
+        };
+        let units: Vec<Vec<f64>> = (0..n + m).map(|i| unit(n + m, i)).collect();
+        let all: Vec<Vec<f64>> = columns.iter().chain(&units).cloned().collect();
+        let passage = match self.passage(weights, all, &mut found.condition)? {
+            Ok(passage) => passage,
+            Err(lost) => {
+                found.lost = Some(lost);
+                return Ok(found);
+            }
+        };
+        let k = columns.len();
+        found.dt.copy_from_slice(&passage.dt[..k]);
+        for (i, image) in passage.columns[k..].iter().enumerate() {
+            for r in 0..n {
+                match i.checked_sub(n) {
+                    None => found.saltation[r * n + i] = image[r],
+                    Some(p) => found.by_parameters[r * m + p] = image[r],
+                }
+            }
+        }
+        columns.clone_from_slice(&passage.columns[..k]);
+        let is_finite = columns.iter().flatten().all(|v| v.is_finite());
+        found.lost = (!is_finite).then_some(Lost::NotFinite);
+        Ok(found)
+    }
+
+    fn passage(
+        &mut self,
+        weights: &Weights,
+        columns: Vec<Vec<f64>>,
+        condition: &mut f64,
+    ) -> Result<Result<Passage, Lost>, FieldError> {
+        let record = self.record;
+        if record.t[0] != record.t[1] {
+            return Ok(Err(Lost::Accumulation));
+        }
+        let kinds = [&self.before.field, &self.after.field];
+        let is_plain = |field: &&ModeField| !matches!(field, ModeField::Reduced(_));
+        let is_switching = |j: &usize| self.extended.system.switches_at(*j);
+        let slides = self.before.sliding.iter().chain(&self.after.sliding);
+        if !kinds.iter().all(is_plain) || !slides.clone().all(is_switching) {
+            return Ok(Err(Lost::Unsupported));
+        }
+        let zero = Clockwork {
+            time: 1.0,
+            state: vec![0.0; self.extended.n + self.extended.n_parameters()],
+        };
+        let clockwork = match record.guards {
+            [] => zero,
+            [guard, ..] => self.clockwork(*guard)?,
+        };
+        let field = record.field[0];
+        let n = self.extended.n;
+        let rate = clockwork.time + dot(&clockwork.state, field);
+        *condition = match record.guards.is_empty() {
+            true => 1.0,
+            false => weights.condition(record.x[0], (clockwork.time, &clockwork.state[..n]), field),
+        };
+        // The order of the others is that of the guard that they are found with.
+        if !(*condition < 1.0 / AT_SIDE) || rate == 0.0 {
+            return Ok(Err(Lost::Grazing));
+        }
+        let shift = |column: &Vec<f64>| -dot(&clockwork.state, column) / rate;
+        let dt: Vec<f64> = columns.iter().map(shift).collect();
+        if self.leaves_as_it_is() {
+            return Ok(Ok(Passage { columns, dt }));
+        }
+        if let Some(columns) = self.entry(&columns)? {
+            return Ok(Ok(Passage { columns, dt }));
+        }
+        if record.guards.len() > 1 {
+            return Ok(Err(Lost::OneSided));
+        }
+        let (mut images, by_time) = self.mapped(&columns, record.field[0])?;
+        let after = record.field[1];
+        for ((image, column), dt) in images.iter_mut().zip(&columns).zip(&dt) {
+            for r in 0..n {
+                image[r] += (by_time[r] - after[r]) * dt;
+            }
+            image.extend_from_slice(&column[n..]);
+        }
+        let z = self.extended.state(record.x[1]);
+        self.after.project(record.t[1], &z, &mut images)?;
+        Ok(Ok(Passage {
+            columns: images,
+            dt,
+        }))
+    }
+
+    /// The gradient of a guard of the motion before.
+    fn clockwork(&mut self, guard: Guard) -> Result<Clockwork, FieldError> {
+        let (t, z) = (self.record.t[0], self.extended.state(self.record.x[0]));
+        let mut state = vec![0.0; z.len()];
+        let system = &self.extended.system;
+        match guard {
+            Guard::Surface(j) => {
+                let time = system.gradient(j, &self.before.at(t, &z), &mut state)?;
+                return Ok(Clockwork { time, state });
+            }
+            Guard::Multiplier { surface, .. } if !system.sticks_at(surface) => {
+                if let Some((time, state)) = self.before.multiplier_slopes(surface, t, &z)? {
+                    return Ok(Clockwork { time, state });
+                }
+            }
+            _ => {}
+        }
+        self.clockwork_by_differences(guard, t, &z)
+    }
+
+    fn clockwork_by_differences(
+        &mut self,
+        guard: Guard,
+        t: f64,
+        z: &[f64],
+    ) -> Result<Clockwork, FieldError> {
+        let field = &mut self.before.field;
+        let place = field.guards().iter().position(|g| *g == guard);
+        let mut value = |t: f64, z: &[f64]| -> Result<f64, FieldError> {
+            let exits = field.exits_at(t, &mut z.to_vec())?;
+            Ok(place.map_or(f64::NAN, |place| exits[place]))
+        };
+        let reach = |v: f64| EPS.cbrt() * (1.0 + v.abs());
+        let mut state = vec![0.0; z.len()];
+        for (i, entry) in state.iter_mut().enumerate() {
+            let d = reach(z[i]);
+            let mut moved = z.to_vec();
+            moved[i] = z[i] + d;
+            let above = value(t, &moved)?;
+            moved[i] = z[i] - d;
+            *entry = (above - value(t, &moved)?) / (2.0 * d);
+        }
+        let d = reach(t);
+        let time = (value(t + d, z)? - value(t - d, z)?) / (2.0 * d);
+        Ok(Clockwork { time, state })
+    }
+
+    /// Does the same field go on? So it is at the end of a multiplier where nothing else changes.
+    fn leaves_as_it_is(&self) -> bool {
+        let record = self.record;
+        if !record.acts.is_empty() {
+            return false;
+        }
+        let same = |except: Option<usize>| {
+            let entries = record.mode.map(|mode| mode.entries());
+            let mut all = entries[0].iter().zip(entries[1]).enumerate();
+            all.all(|(j, (a, b))| a == b || Some(j) == except)
+        };
+        match *record.guards {
+            [Guard::Multiplier { surface, end }] => {
+                !self.extended.system.sticks_at(surface)
+                    && record.mode[1].entries()[surface] == end
+                    && same(Some(surface))
+            }
+            [Guard::Surface(_)] => same(None) && record.field[0] == record.field[1],
+            _ => false,
+        }
+    }
+
+    /// The columns after an entry: what leads off the surfaces slid on is taken from them along the jumps of the field. `None` if
+    /// it is another kind of instant, or if the field is not affine in the signs.
+    fn entry(&self, columns: &[Vec<f64>]) -> Result<Option<Vec<Vec<f64>>>, FieldError> {
+        let record = self.record;
+        let entries = record.mode.map(|mode| mode.entries());
+        let enters = |j: usize| entries[1][j] == 0 && record.guards.contains(&Guard::Surface(j));
+        let is_entry = !record.guards.is_empty()
+            && record.acts.is_empty()
+            && record.guards.iter().all(|guard| guard.is_surface())
+            && (0..entries[0].len()).all(|j| entries[0][j] == entries[1][j] || enters(j))
+            && record
+                .guards
+                .iter()
+                .all(|g| matches!(g, Guard::Surface(j) if enters(*j)));
+        if !is_entry {
+            return Ok(None);
+        }
+        let z = self.extended.state(record.x[1]);
+        entered(self.extended, self.after, record.t[1], &z, columns)
+    }
+
+    /// The columns behind the maps of the actions, and what becomes of the field before, R_x f + R_t.
+    fn mapped(
+        &self,
+        columns: &[Vec<f64>],
+        field: &[f64],
+    ) -> Result<(Vec<Vec<f64>>, Vec<f64>), FieldError> {
+        let (n, m) = (self.extended.n, self.extended.n_parameters());
+        let mut images: Vec<Vec<f64>> = columns.to_vec();
+        let mut along = field.to_vec();
+        along.resize(n + m, 0.0);
+        for act in self.record.acts {
+            let Some(map) = self.extended.maps.get(act.index).and_then(Option::as_ref) else {
+                continue;
+            };
+            let mut all = images.clone();
+            all.push(along.clone());
+            let place = (self.record.t[0], &act.x[..], &act.discrete[..]);
+            let (mut mapped, by_time) = map.apply(place, &self.extended.values, &all)?;
+            let moved = mapped.pop().unwrap_or_default();
+            for (image, mapped) in images.iter_mut().zip(mapped) {
+                image[..n].copy_from_slice(&mapped);
+            }
+            for r in 0..n {
+                along[r] = moved[r] + by_time[r];
+            }
+        }
+        images.iter_mut().for_each(|image| image.truncate(n));
+        along.truncate(n);
+        Ok((images, along))
+    }
+}
+
+/// What is left of the columns of a point that comes to the surfaces which a motion slides on, from any side.
+pub(super) fn entered(
+    extended: &Extended,
+    sliding: &Piece,
+    t: f64,
+    z: &[f64],
+    columns: &[Vec<f64>],
+) -> Result<Option<Vec<Vec<f64>>>, FieldError> {
+    let n = extended.n;
+    let is_affine = extended
+        .system
+        .affine_signs()
+        .is_some_and(|affine| affine.affine_parts(&sliding.sliding).is_some());
+    if !is_affine || matches!(sliding.field, ModeField::Reduced(_)) {
+        return Ok(None);
+    }
+    let mut jumps = Vec::with_capacity(sliding.sliding.len());
+    for &j in &sliding.sliding {
+        let above = sliding.corner(t, z, &[(j, 1.0)])?;
+        let below = sliding.corner(t, z, &[(j, -1.0)])?;
+        jumps.push(
+            above
+                .iter()
+                .zip(&below)
+                .map(|(a, b)| a - b)
+                .collect::<Vec<f64>>(),
+        );
+    }
+    let directions: Vec<&[f64]> = jumps.iter().map(|jump| &jump[..n]).collect();
+    let mut columns = columns.to_vec();
+    remove_along(&directions, &sliding.normals(t, z)?, &mut columns);
+    Ok(Some(columns))
+}
+
+fn unit(size: usize, i: usize) -> Vec<f64> {
+    let mut unit = vec![0.0; size];
+    unit[i] = 1.0;
+    unit
+}

@@ -1,0 +1,20 @@
+//! Derivatives of runs by the start, the initial time and parameters: an observer of accepted steps and instants.
+//!
+//! Between instants the derivative M of the state solves M' = Df M + D_p f along the motion ([`Tangents`], `piece.rs`). At an
+//! instant fixed by a guard g the saltation matrix S = DR + (F+ - DR F-) dg / (dg . F-) maps a change before to the change after
+//! (`instant.rs`). Both are those of the extended state (t, x, p): parameters by which is differentiated are states that rest
+//! (`extended.rs`).
+//!
+//! References: P. C. Mueller, Calculation of Lyapunov exponents for dynamic systems with discontinuities, *Chaos, Solitons &
+//! Fractals* 5 (1995) 1671; E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II* (1996), section IV.5.
+
+mod between;
+mod extended;
+mod instant;
+mod piece;
+mod radau;
+mod tangents;
+
+pub use extended::Extended;
+pub use instant::{InstantDerivative, Lost};
+pub use tangents::{Column, Derivatives, Tangents};

@@ -1,0 +1,225 @@
+//! The derivatives of a run, as its observer.
+
+use super::extended::Extended;
+use super::instant::{entered, Instant, InstantDerivative, Lost, Weights};
+use super::piece::Piece;
+use crate::error::FieldError;
+use crate::mode::Mode;
+use crate::motion::{Law, SmoothField};
+use crate::options::Options;
+use crate::record::{InstantRecord, ObservedStep, Observer};
+
+/// By what is differentiated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Column {
+    /// A component of the initial state.
+    State(usize),
+    /// The initial time.
+    Start,
+    /// A parameter, by its place among those that the extended system has as states.
+    Parameter(usize),
+}
+
+/// The derivatives of a run.
+#[derive(Clone, Debug, Default)]
+pub struct Derivatives {
+    /// The times of the steps, the start included; a time at which an instant lies occurs twice.
+    pub t: Vec<f64>,
+    /// The derivative of the state at each of them, a column after the other.
+    pub values: Vec<f64>,
+    /// Those of all instants.
+    pub instants: Vec<InstantDerivative>,
+}
+
+/// Follows the derivatives of a run, step by step and through its instants. Where they end they are NaN.
+///
+/// # Example
+///
+/// ```
+/// use filippov::derivative::{Column, Extended, Tangents};
+/// use filippov::expr::{Backend, Graph, Names};
+/// use filippov::{Integrator, Options, Problem, Rules, TracedSystem};
+///
+/// // x' = -a sign(x) from x = 1: zero is reached at t = 1 / a.
+/// let mut graph = Graph::new();
+/// let (x, a) = (graph.state(0), graph.parameter(0));
+/// let sign = graph.sign(x);
+/// let pull = graph.mul(a, sign);
+/// let field = vec![graph.neg(pull)];
+/// let names = Names { states: Vec::new(), parameters: vec!["a".into()] };
+/// let system = TracedSystem::new(graph, field, vec![2.0], names, Backend::Interpreter)?;
+///
+/// let problem = Problem::new(&system, (0.0, 1.0), &[1.0]);
+/// let extended = Extended::new(&system, &Rules::default(), &Default::default(), &[0])?.unwrap();
+/// let options = Options::default();
+/// let mut tangents = Tangents::new(&extended, vec![Column::State(0), Column::Parameter(0)], &options, 1.0);
+/// Integrator::new(problem)?.observed_by(&mut tangents).solve();
+/// let derivatives = tangents.finish()?;
+/// let entry = &derivatives.instants[0];
+/// assert!((entry.dt[0] - 0.5).abs() < 1e-12 && (entry.dt[1] + 0.25).abs() < 1e-12);
+/// assert!(derivatives.values.ends_with(&[0.0, 0.0]));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Tangents<'a> {
+    extended: &'a Extended<'a>,
+    law: Law<'a>,
+    weights: Weights,
+    kinds: Vec<Column>,
+    /// For each column the derivative of the state, and its shares of the parameters behind it.
+    columns: Vec<Vec<f64>>,
+    piece: Option<Piece<'a>>,
+    has_started: bool,
+    lost: Option<Lost>,
+    found: Derivatives,
+    raised: Option<FieldError>,
+}
+
+impl<'a> Tangents<'a> {
+    /// The derivatives by these columns of a run over `span` units of time.
+    pub fn new(
+        extended: &'a Extended<'a>,
+        kinds: Vec<Column>,
+        options: &'a Options,
+        span: f64,
+    ) -> Self {
+        Tangents {
+            extended,
+            law: Law::from(options),
+            weights: Weights {
+                span,
+                rtol: options.rtol,
+                atol: options.atol.clone(),
+            },
+            columns: Vec::new(),
+            kinds,
+            piece: None,
+            has_started: false,
+            lost: None,
+            found: Derivatives::default(),
+            raised: None,
+        }
+    }
+
+    /// The derivatives.
+    ///
+    /// # Errors
+    /// What a function of the user raised.
+    pub fn finish(self) -> Result<Derivatives, FieldError> {
+        match self.raised {
+            Some(raised) => Err(raised),
+            None => Ok(self.found),
+        }
+    }
+
+    fn start(&mut self, t: f64, x: &[f64], mode: &Mode, q: &[f64]) -> Result<(), FieldError> {
+        self.has_started = true;
+        let (n, m) = (self.extended.n, self.extended.n_parameters());
+        let z = self.extended.state(x);
+        let mut piece = Piece::new(self.extended, self.law, mode, q);
+        let mut field = vec![0.0; n + m];
+        piece
+            .field
+            .eval_unprojected(t, &mut z.clone(), &mut field)?;
+        for kind in &self.kinds {
+            let mut states = vec![0.0; n];
+            match *kind {
+                Column::State(i) => states[i] = 1.0,
+                Column::Start => (0..n).for_each(|r| states[r] = -field[r]),
+                Column::Parameter(_) => {}
+            }
+            self.columns.push(self.extended.column(*kind, &states));
+        }
+        if !piece.sliding.is_empty() {
+            // A start beside the surfaces comes to them at once.
+            match entered(self.extended, &piece, t, &z, &self.columns)? {
+                Some(columns) => self.columns = columns,
+                None => piece.project(t, &z, &mut self.columns)?,
+            }
+        }
+        self.piece = Some(piece);
+        self.keep(t);
+        Ok(())
+    }
+
+    fn keep(&mut self, t: f64) {
+        self.found.t.push(t);
+        for column in &self.columns {
+            let states = &column[..self.extended.n];
+            self.found.values.extend_from_slice(states);
+        }
+    }
+
+    fn lose(&mut self, lost: Lost) {
+        self.lost = Some(lost);
+        self.columns
+            .iter_mut()
+            .for_each(|column| column.fill(f64::NAN));
+    }
+
+    /// Makes sure that the motion at hand is the one of this mode.
+    fn take_piece(&mut self, mode: &Mode, q: &[f64]) -> Piece<'a> {
+        let piece = self.piece.take().filter(|piece| piece.is_of(mode, q));
+        piece.unwrap_or_else(|| Piece::new(self.extended, self.law, mode, q))
+    }
+
+    fn follow(&mut self, step: &ObservedStep) -> Result<(), FieldError> {
+        let t0 = step.t_start();
+        if !self.has_started {
+            let mut x = vec![0.0; self.extended.n];
+            step.at(t0, &mut x);
+            self.start(t0, &x, step.mode, step.discrete)?;
+        }
+        if self.lost.is_none() {
+            let mut piece = self.take_piece(step.mode, step.discrete);
+            let along = |t: f64, x: &mut [f64]| {
+                step.at(t, x);
+                Ok(())
+            };
+            piece.advance(along, (t0, step.t_end), &mut self.columns)?;
+            let z = self.extended.state(step.x_end);
+            piece.project(step.t_end, &z, &mut self.columns)?;
+            self.piece = Some(piece);
+            if self.columns.iter().flatten().any(|v| !v.is_finite()) {
+                self.lose(Lost::NotFinite);
+            }
+        }
+        self.keep(step.t_end);
+        Ok(())
+    }
+
+    fn pass(&mut self, record: &InstantRecord) -> Result<(), FieldError> {
+        if !self.has_started {
+            self.start(record.t[0], record.x[0], record.mode[0], record.discrete[0])?;
+        }
+        let mut before = self.take_piece(record.mode[0], record.discrete[0]);
+        let mut after = Piece::new(self.extended, self.law, record.mode[1], record.discrete[1]);
+        let mut instant = Instant {
+            extended: self.extended,
+            record,
+            before: &mut before,
+            after: &mut after,
+        };
+        let mut found = instant.pass(&self.weights, &mut self.columns)?;
+        let lost = self.lost.or(found.lost);
+        found.lost = lost;
+        lost.into_iter().for_each(|lost| self.lose(lost));
+        self.found.instants.push(found);
+        self.piece = Some(after);
+        self.keep(record.t[1]);
+        Ok(())
+    }
+}
+
+impl Observer for Tangents<'_> {
+    fn step(&mut self, step: &ObservedStep) {
+        if self.raised.is_none() {
+            self.raised = self.follow(step).err();
+        }
+    }
+
+    fn instant(&mut self, instant: &InstantRecord) {
+        if self.raised.is_none() {
+            self.raised = self.pass(instant).err();
+        }
+    }
+}

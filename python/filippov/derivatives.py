@@ -1,0 +1,116 @@
+"""Derivatives of a run by its start and its parameters: what is asked for, and what is read of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from filippov._core import TracedSystem
+from filippov.errors import InputError
+from filippov.prepare import Prepared
+from filippov.unknown import did_you_mean
+
+__all__ = ["Wanted", "check_wrt", "refuse_without_derivatives"]
+
+_STATE, _START, _PARAMETER = 0, 1, 2
+
+
+class Wanted(NamedTuple):
+    """By what is differentiated.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The names of the columns.
+    columns : list of (int, int)
+        Each column as the core takes it: a kind, and a place.
+    parameters : list of int
+        The places of the parameters among all of the system.
+    """
+
+    names: tuple[str, ...]
+    columns: list[tuple[int, int]]
+    parameters: list[int]
+
+    def for_core(self) -> tuple[list[tuple[int, int]], list[int]]:
+        """Return what the core takes."""
+        return self.columns, self.parameters
+
+
+def check_wrt(
+    wrt: Any, states: Sequence[str], params: Mapping[str, float], discrete: Sequence[str]
+) -> Wanted:
+    """Return by what is differentiated.
+
+    Parameters
+    ----------
+    wrt : str or sequence of str
+        ``"y0"`` (all initial states), ``"t0"``, names of parameters, ``"params"`` (all of them), ``"all"``
+        (both).
+    states : sequence of str
+        Names of the states.
+    params : mapping of str to float
+        The parameters of the system, its discrete states among them.
+    discrete : sequence of str
+        Those that are discrete states.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, or nothing is asked for.
+    """
+    names = [wrt] if isinstance(wrt, str) else wrt
+    if not isinstance(names, Sequence) or not names or not all(isinstance(name, str) for name in names):
+        raise InputError(
+            f'wrt: "y0", "t0", "params", "all", or a list of these and of names of parameters is needed, not {wrt!r}'
+        )
+    places = {name: place for place, name in enumerate(params) if name not in discrete}
+    found: dict[str, tuple[int, int]] = {}
+    asked: dict[str, int] = {}
+    for name in names:
+        if name in ("y0", "all"):
+            found.update((state, (_STATE, i)) for i, state in enumerate(states))
+        if name in ("params", "all"):
+            own = list(places)
+        elif name in places:
+            own = [name]
+        else:
+            own = []
+            if name == "t0":
+                found["t0"] = (_START, 0)
+            elif name != "y0":
+                known = ", ".join(map(repr, places)) if places else "none"
+                hint = did_you_mean(name, ["y0", "t0", "params", "all", *places])
+                raise InputError(
+                    f'wrt: {name!r} is none of "y0", "t0", "params" and "all", and no parameter{hint}; '
+                    f"parameters: {known}"
+                )
+        for parameter in own:
+            place = asked.setdefault(parameter, len(asked))
+            found[parameter] = (_PARAMETER, place)
+    if not found:
+        raise InputError(f"wrt: {wrt!r} names nothing: the system has no parameters")
+    return Wanted(tuple(found), list(found.values()), [places[name] for name in asked])
+
+
+def refuse_without_derivatives(prepared: Prepared, discrete: Sequence[str], t_span: tuple[float, float]) -> None:
+    """Refuse derivatives of what has none.
+
+    Raises
+    ------
+    InputError
+        For a black box, a reset whose map is not traced, named discrete states, and time that runs backward.
+    """
+    if not isinstance(prepared.core, TracedSystem):
+        raise InputError(
+            f"wrt: derivatives are those of a traced function, and this one is called: {prepared.why_opaque}"
+        )
+    for action in prepared.actions:
+        if not isinstance(action.map, TracedSystem):
+            raise InputError(
+                f"wrt: the map of the reset {action.name!r} is not traced, so that its derivative is not known"
+            )
+    if discrete:
+        raise InputError(f"wrt: no derivatives pass through discrete states, here {', '.join(discrete)}")
+    if t_span[1] < t_span[0]:
+        raise InputError("wrt: derivatives are followed forward in time only")
