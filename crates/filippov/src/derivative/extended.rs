@@ -4,7 +4,9 @@ use filippov_expr::{Backend, Names, NodeId, Program};
 
 use super::tangents::Column;
 use crate::error::{Error, FieldError};
-use crate::system::{Actions, Definition, PiecewiseSystem, Place, Rules, TracedMap, TracedSystem};
+use crate::system::{
+    Actions, Definition, PiecewiseSystem, Place, Rules, TracedMap, TracedSystem, Trigger,
+};
 
 /// A system with some of its parameters as further states behind those that it has, and the maps of its actions likewise.
 pub struct Extended<'a> {
@@ -15,6 +17,8 @@ pub struct Extended<'a> {
     pub(super) values: Vec<f64>,
     /// The map of each action; none where it leaves the states as they are.
     pub(super) maps: Vec<Option<ExtendedMap<'a>>>,
+    /// For each action at the known times of a law the derivatives of what the law reads: by the time, then by the parameters.
+    clocks: Vec<Option<Program>>,
 }
 
 impl<'a> Extended<'a> {
@@ -30,9 +34,17 @@ impl<'a> Extended<'a> {
     ) -> Result<Option<Self>, Error> {
         let n = system.n_states();
         let pairs = pairs(parameters, n);
-        let extended = Definition::of(system, rules).extended(&pairs)?;
+        let (extended, made) = Definition::of(system, rules).extended(&pairs)?;
         let mut maps = Vec::with_capacity(actions.list.len());
+        let mut clocks = Vec::with_capacity(actions.list.len());
         for action in &actions.list {
+            let is_timed = !matches!(action.trigger, Trigger::Surface { .. } | Trigger::Jump);
+            let law = action.map.law().filter(|_| is_timed);
+            let argument = law.and_then(|law| rules.laws[law].nodes().first().copied());
+            clocks.push(match argument {
+                Some(argument) => Some(clock_of(&extended, made[argument.index()], &pairs)?),
+                None => None,
+            });
             if !action.map.moves_state() {
                 maps.push(None);
                 continue;
@@ -47,12 +59,23 @@ impl<'a> Extended<'a> {
             system: extended.with_parameters(system.parameters().to_vec()),
             n,
             maps,
+            clocks,
         }))
     }
 
     /// How many parameters have become states.
     pub(super) fn n_parameters(&self) -> usize {
         self.values.len()
+    }
+
+    /// The derivatives of the clock whose tick an action is, by the time and by the extended state; `None` if it ticks whatever the
+    /// parameters.
+    pub(super) fn clock(&self, index: usize, place: &Place) -> Option<(f64, Vec<f64>)> {
+        let program = self.clocks.get(index)?.as_ref()?;
+        let mut out = vec![0.0; 1 + self.values.len()];
+        self.system.eval(program, place, &[], &mut out);
+        let state = [&vec![0.0; self.n], &out[1..]].concat();
+        Some((out[0], state))
     }
 
     /// The derivative of the state by this, with the shares of the parameters behind it.
@@ -71,6 +94,24 @@ impl<'a> Extended<'a> {
     }
 }
 
+/// The derivatives of the argument of a clock, by the time and by parameters that have become states.
+fn clock_of(
+    extended: &TracedSystem,
+    argument: NodeId,
+    pairs: &[(u32, u32)],
+) -> Result<Program, Error> {
+    let mut graph = extended.graph().clone();
+    let gradient = graph.gradient(argument);
+    let zero = graph.constant(0.0);
+    let by_state = |&(_, state): &(u32, u32)| {
+        let found = gradient.states.iter().find(|entry| entry.0 == state);
+        found.map_or(zero, |entry| entry.1)
+    };
+    let mut outputs = vec![gradient.time];
+    outputs.extend(pairs.iter().map(by_state));
+    Ok(Program::compile(&graph, &outputs, Backend::Interpreter)?)
+}
+
 /// Parameters with the states that they become, behind n others.
 fn pairs(parameters: &[usize], n: usize) -> Vec<(u32, u32)> {
     let states = (n as u32)..;
@@ -79,9 +120,9 @@ fn pairs(parameters: &[usize], n: usize) -> Vec<(u32, u32)> {
 }
 
 impl Definition {
-    /// The system with states in the place of some parameters, given as pairs, that rest. Its laws change nothing: the discrete
-    /// states are given.
-    fn extended(&self, parameters: &[(u32, u32)]) -> Result<TracedSystem, Error> {
+    /// The system with states in the place of some parameters, given as pairs, that rest, and what each node has become. Its laws
+    /// change nothing: the discrete states are given.
+    fn extended(&self, parameters: &[(u32, u32)]) -> Result<(TracedSystem, Vec<NodeId>), Error> {
         let (mut graph, made) = self.graph.with_states_for(parameters);
         let still = graph.constant(0.0);
         let mut field: Vec<NodeId> = self.field.iter().map(|id| made[id.index()]).collect();
@@ -95,7 +136,7 @@ impl Definition {
         let values = vec![0.0; self.n_parameters()];
         let system = TracedSystem::new(graph, field, values, names, Backend::Native)?;
         let system = system.watching(&self.rules.watched).sticking(&ratios);
-        Ok(system.with_discrete(self.rules.laws.len()))
+        Ok((system.with_discrete(self.rules.laws.len()), made))
     }
 }
 

@@ -161,12 +161,8 @@ impl Instant<'_, '_> {
         if !kinds.iter().all(is_plain) || !slides.clone().all(is_switching) {
             return Ok(Err(Lost::Unsupported));
         }
-        let zero = Clockwork {
-            time: 1.0,
-            state: vec![0.0; self.extended.n + self.extended.n_parameters()],
-        };
         let clockwork = match record.guards {
-            [] => zero,
+            [] => self.known_time(),
             [guard, ..] => self.clockwork(*guard)?,
         };
         let field = record.field[0];
@@ -205,6 +201,16 @@ impl Instant<'_, '_> {
             columns: images,
             dt,
         }))
+    }
+
+    /// What fixes a known time: the clock that ticks, or the time alone.
+    fn known_time(&self) -> Clockwork {
+        let (t, z) = (self.record.t[0], self.extended.state(self.record.x[0]));
+        let place = self.before.at(t, &z);
+        let mut acts = self.record.acts.iter();
+        let clock = acts.find_map(|act| self.extended.clock(act.index, &place));
+        let (time, state) = clock.unwrap_or_else(|| (1.0, vec![0.0; z.len()]));
+        Clockwork { time, state }
     }
 
     /// The gradient of a guard of the motion before.

@@ -58,6 +58,11 @@ pub trait ActionMap: Sync {
         None
     }
 
+    /// The law whose discrete state it changes, if it is the action of a law.
+    fn law(&self) -> Option<usize> {
+        None
+    }
+
     /// Brings discrete states that are functions of the point up to date, which were not watched; nothing by default.
     fn follow(&self, _t: f64, _x: &[f64], _signs: &[f64], _q: &mut [f64]) {}
 

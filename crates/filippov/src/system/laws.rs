@@ -462,6 +462,10 @@ fn floor(value: f64) -> f64 {
 }
 
 impl ActionMap for LawMap {
+    fn law(&self) -> Option<usize> {
+        Some(self.index)
+    }
+
     fn moves_state(&self) -> bool {
         false
     }
