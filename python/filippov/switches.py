@@ -38,7 +38,7 @@ class InstantDerivative(NamedTuple):
         the surface, with time in units of the span and states in units of ``abs(x) + atol / rtol``.
     lost : str
         Why derivatives are not known from here on, empty if they are: ``"grazing"``, ``"one-sided"``,
-        ``"accumulation"``, ``"unsupported"`` (contact, sliding of higher order, rest) or ``"not_finite"``.
+        ``"accumulation"``, ``"unsupported"`` (sliding of higher order, rest) or ``"not_finite"``.
     """
 
     t: float

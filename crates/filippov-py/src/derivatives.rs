@@ -48,7 +48,8 @@ pub fn run_with_derivatives(
         .collect();
     let extended = Extended::new(system, rules, actions, parameters)?;
     let extended = extended.ok_or(Failure::CalledMap)?;
-    let mut tangents = Tangents::new(&extended, kinds.clone(), options, span);
+    let impacts = extended.impacts();
+    let mut tangents = Tangents::new(&extended, &impacts, kinds.clone(), options, span);
     let solution = problem.solve_observed(&mut tangents, interrupt)?;
     let found = tangents.finish()?;
     Ok((

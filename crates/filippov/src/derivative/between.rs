@@ -1,7 +1,7 @@
 //! The derivative of the state at any time of a run.
 
 use super::extended::Extended;
-use super::piece::Piece;
+use super::piece::{Piece, Surroundings};
 use super::tangents::{Column, Derivatives};
 use crate::error::FieldError;
 use crate::motion::Law;
@@ -17,7 +17,7 @@ impl Derivatives {
     /// If a function of the user raises.
     pub fn at(
         &self,
-        (extended, kinds): (&Extended, &[Column]),
+        (extended, kinds): (&Extended<'_>, &[Column]),
         (system, options): (&dyn PiecewiseSystem, &Options),
         solution: &Solution,
         (t, side): (f64, Side),
@@ -45,8 +45,19 @@ impl Derivatives {
         let mut columns: Vec<Vec<f64>> = columns
             .map(|(kind, states)| extended.column(*kind, states))
             .collect();
-        let law = Law::from(options);
-        let mut piece = Piece::new(extended, law, &segment.mode, &segment.discrete);
+        let impacts = extended.impacts();
+        let mut around = Surroundings {
+            extended,
+            impacts: &impacts,
+            law: Law::from(options),
+            sides: impacts.sides_at_start(system.n_surfaces()).collect(),
+        };
+        let earlier = solution
+            .segments
+            .iter()
+            .take_while(|s| s.t_start <= segment.t_start);
+        earlier.for_each(|earlier| around.take_sides(&earlier.mode));
+        let mut piece = Piece::new(&around, &segment.mode, &segment.discrete);
         let path = |t: f64, x: &mut [f64]| match solution.evaluate(system, t, side, x)? {
             Some(_) => Ok(()),
             None => {

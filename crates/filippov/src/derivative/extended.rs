@@ -5,7 +5,7 @@ use filippov_expr::{Backend, Names, NodeId, Program};
 use super::tangents::Column;
 use crate::error::{Error, FieldError};
 use crate::system::{
-    Actions, Definition, PiecewiseSystem, Place, Rules, TracedMap, TracedSystem, Trigger,
+    Action, Actions, Definition, PiecewiseSystem, Place, Rules, TracedMap, TracedSystem, Trigger,
 };
 
 /// A system with some of its parameters as further states behind those that it has, and the maps of its actions likewise.
@@ -17,6 +17,7 @@ pub struct Extended<'a> {
     pub(super) values: Vec<f64>,
     /// The map of each action; none where it leaves the states as they are.
     pub(super) maps: Vec<Option<ExtendedMap<'a>>>,
+    triggers: Vec<Trigger>,
     /// For each action at the known times of a law the derivatives of what the law reads: by the time, then by the parameters.
     clocks: Vec<Option<Program>>,
 }
@@ -59,8 +60,31 @@ impl<'a> Extended<'a> {
             system: extended.with_parameters(system.parameters().to_vec()),
             n,
             maps,
+            triggers: actions
+                .list
+                .iter()
+                .map(|action| action.trigger.clone())
+                .collect(),
             clocks,
         }))
+    }
+
+    /// The actions that may be impacts, with maps of the extended state: those of contacts.
+    pub fn impacts(&self) -> Actions<'_> {
+        let all = self.maps.iter().zip(&self.triggers);
+        let impacts = all.filter_map(|(map, trigger)| {
+            let map = &map.as_ref()?.extended;
+            matches!(trigger, Trigger::Surface { .. }).then(|| Action {
+                trigger: trigger.clone(),
+                map,
+                name: String::new(),
+                kind: None,
+            })
+        });
+        Actions {
+            list: impacts.collect(),
+            discrete: Vec::new(),
+        }
     }
 
     /// How many parameters have become states.
@@ -145,6 +169,8 @@ pub(super) struct ExtendedMap<'a> {
     map: &'a TracedMap,
     /// The new states in a direction of (x, q, p), then by the time.
     derivative: Program,
+    /// The map of the extended state.
+    extended: TracedMap,
     n: usize,
 }
 
@@ -166,9 +192,20 @@ impl<'a> ExtendedMap<'a> {
             by_time.push(time);
         }
         outputs.extend(by_time);
+        let derivative = Program::compile(&graph, &outputs, Backend::Interpreter)?;
+        let values = expressions.field_nodes().iter();
+        let mut field: Vec<NodeId> = values.map(|id| made[id.index()]).collect();
+        field.extend(pairs.iter().map(|pair| graph.state(pair.1)));
+        let names = Names {
+            states: Vec::new(),
+            parameters: expressions.names().parameters.clone(),
+        };
+        let values = expressions.parameters().to_vec();
+        let extended = TracedSystem::new(graph, field, values, names, Backend::Interpreter)?;
         Ok(ExtendedMap {
             map,
-            derivative: Program::compile(&graph, &outputs, Backend::Interpreter)?,
+            derivative,
+            extended: TracedMap::new(extended),
             n,
         })
     }

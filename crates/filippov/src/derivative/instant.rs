@@ -6,7 +6,7 @@ use crate::error::FieldError;
 use crate::motion::{Guard, ModeField};
 use crate::record::InstantRecord;
 use crate::system::{PiecewiseSystem, SignStructure};
-use crate::tolerances::{AT_SIDE, EPS};
+use crate::tolerances::{AT_SIDE, EPS, ROUNDING};
 
 /// Why derivatives are not known from an instant on: they are NaN.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,7 +18,7 @@ pub enum Lost {
     OneSided,
     /// Infinitely many switches were jumped over.
     Accumulation,
-    /// Contact, sliding of higher order, or rest begins.
+    /// Sliding of higher order, or rest, begins or ends.
     Unsupported,
     /// A derivative is not finite.
     NotFinite,
@@ -53,6 +53,20 @@ pub struct InstantDerivative {
     pub condition: f64,
     /// Why the derivatives end here, if they do.
     pub lost: Option<Lost>,
+}
+
+impl InstantDerivative {
+    /// An instant at this time of which nothing is known.
+    pub(super) fn unknown(t: f64, n_columns: usize, (n, m): (usize, usize)) -> Self {
+        InstantDerivative {
+            t,
+            dt: vec![f64::NAN; n_columns],
+            saltation: vec![f64::NAN; n * n],
+            by_parameters: vec![f64::NAN; n * m],
+            condition: f64::NAN,
+            lost: None,
+        }
+    }
 }
 
 /// By what time and states are measured in the condition of an instant.
@@ -111,14 +125,7 @@ impl Instant<'_, '_> {
         columns: &mut Vec<Vec<f64>>,
     ) -> Result<InstantDerivative, FieldError> {
         let (n, m) = (self.extended.n, self.extended.n_parameters());
-        let mut found = InstantDerivative {
-            t: self.record.t[0],
-            dt: vec![f64::NAN; columns.len()],
-            saltation: vec![f64::NAN; n * n],
-            by_parameters: vec![f64::NAN; n * m],
-            condition: f64::NAN,
-            lost: None,
-        };
+        let mut found = InstantDerivative::unknown(self.record.t[0], columns.len(), (n, m));
         let units: Vec<Vec<f64>> = (0..n + m).map(|i| unit(n + m, i)).collect();
         let all: Vec<Vec<f64>> = columns.iter().chain(&units).cloned().collect();
         let passage = match self.passage(weights, all, &mut found.condition)? {
@@ -151,33 +158,17 @@ impl Instant<'_, '_> {
         condition: &mut f64,
     ) -> Result<Result<Passage, Lost>, FieldError> {
         let record = self.record;
-        if record.t[0] != record.t[1] {
-            return Ok(Err(Lost::Accumulation));
-        }
-        let kinds = [&self.before.field, &self.after.field];
-        let is_plain = |field: &&ModeField| !matches!(field, ModeField::Reduced(_));
-        let is_switching = |j: &usize| self.extended.system.switches_at(*j);
-        let slides = self.before.sliding.iter().chain(&self.after.sliding);
-        if !kinds.iter().all(is_plain) || !slides.clone().all(is_switching) {
+        let dt = match self.times(weights, &columns, condition)? {
+            Ok((_, dt)) => dt,
+            Err(lost) => return Ok(Err(lost)),
+        };
+        let fields = [&self.before.field, &self.after.field];
+        if fields
+            .iter()
+            .any(|field| matches!(field, ModeField::Reduced(_) | ModeField::Rest(_)))
+        {
             return Ok(Err(Lost::Unsupported));
         }
-        let clockwork = match record.guards {
-            [] => self.known_time(),
-            [guard, ..] => self.clockwork(*guard)?,
-        };
-        let field = record.field[0];
-        let n = self.extended.n;
-        let rate = clockwork.time + dot(&clockwork.state, field);
-        *condition = match record.guards.is_empty() {
-            true => 1.0,
-            false => weights.condition(record.x[0], (clockwork.time, &clockwork.state[..n]), field),
-        };
-        // The order of the others is that of the guard that they are found with.
-        if !(*condition < 1.0 / AT_SIDE) || rate == 0.0 {
-            return Ok(Err(Lost::Grazing));
-        }
-        let shift = |column: &Vec<f64>| -dot(&clockwork.state, column) / rate;
-        let dt: Vec<f64> = columns.iter().map(shift).collect();
         if self.leaves_as_it_is() {
             return Ok(Ok(Passage { columns, dt }));
         }
@@ -188,7 +179,7 @@ impl Instant<'_, '_> {
             return Ok(Err(Lost::OneSided));
         }
         let (mut images, by_time) = self.mapped(&columns, record.field[0])?;
-        let after = record.field[1];
+        let (n, after) = (self.extended.n, record.field[1]);
         for ((image, column), dt) in images.iter_mut().zip(&columns).zip(&dt) {
             for r in 0..n {
                 image[r] += (by_time[r] - after[r]) * dt;
@@ -201,6 +192,47 @@ impl Instant<'_, '_> {
             columns: images,
             dt,
         }))
+    }
+
+    /// What fixes the time, and its derivative by each column.
+    fn times(
+        &mut self,
+        weights: &Weights,
+        columns: &[Vec<f64>],
+        condition: &mut f64,
+    ) -> Result<Result<(Clockwork, Vec<f64>), Lost>, FieldError> {
+        let record = self.record;
+        let clockwork = match record.guards {
+            [] => self.known_time(),
+            [guard, ..] => self.clockwork(*guard)?,
+        };
+        let field = record.field[0];
+        let states = &clockwork.state[..self.extended.n];
+        if !record.guards.is_empty() {
+            *condition = weights.condition(record.x[0], (clockwork.time, states), field);
+        } else {
+            *condition = 1.0;
+        }
+        let rate = clockwork.time + dot(&clockwork.state, field);
+        // Where the motion is tangent the time has no derivative. A touch is located to the square root of rounding.
+        let touches = record.acts.is_empty() && record.mode[0] == record.mode[1];
+        let most = if touches { AT_SIDE } else { ROUNDING };
+        if !(*condition < 1.0 / most) || rate == 0.0 {
+            return Ok(Err(Lost::Grazing));
+        }
+        let shift = |column: &Vec<f64>| -dot(&clockwork.state, column) / rate;
+        let dt = columns.iter().map(shift).collect();
+        Ok(Ok((clockwork, dt)))
+    }
+
+    /// The derivatives of the time by the columns; `None` where there are none.
+    pub fn time_by(
+        &mut self,
+        weights: &Weights,
+        columns: &[Vec<f64>],
+    ) -> Result<Option<Vec<f64>>, FieldError> {
+        let found = self.times(weights, columns, &mut 0.0)?;
+        Ok(found.ok().map(|(_, dt)| dt))
     }
 
     /// What fixes a known time: the clock that ticks, or the time alone.
@@ -277,6 +309,9 @@ impl Instant<'_, '_> {
                     && record.mode[1].entries()[surface] == end
                     && same(Some(surface))
             }
+            [Guard::Force(surface)] => {
+                record.mode[1].entries()[surface] != 0 && same(Some(surface))
+            }
             [Guard::Surface(_)] => same(None) && record.field[0] == record.field[1],
             _ => false,
         }
@@ -348,7 +383,7 @@ pub(super) fn entered(
         .system
         .affine_signs()
         .is_some_and(|affine| affine.affine_parts(&sliding.sliding).is_some());
-    if !is_affine || matches!(sliding.field, ModeField::Reduced(_)) {
+    if !is_affine || matches!(sliding.field, ModeField::Reduced(_) | ModeField::Contact(_)) {
         return Ok(None);
     }
     let mut jumps = Vec::with_capacity(sliding.sliding.len());

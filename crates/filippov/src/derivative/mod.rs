@@ -11,6 +11,7 @@
 mod between;
 mod extended;
 mod instant;
+mod limit;
 mod piece;
 mod radau;
 mod tangents;

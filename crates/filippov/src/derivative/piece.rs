@@ -8,17 +8,39 @@ use super::radau::{NODES, STAGES, WEIGHTS};
 use crate::cube::Matrix;
 use crate::error::FieldError;
 use crate::mode::Mode;
-use crate::motion::{Law, ModeField, SmoothField};
+use crate::motion::{ContactField, Law, ModeField, SmoothField};
 use crate::options::SlidingRule;
 use crate::sparse::{SparseRows, SparseSolver};
 use crate::system::{
-    Linearisation, Linearisations, MotionJacobian, PiecewiseSystem, Place, Setting, SignStructure,
+    Actions, LieDerivatives, Linearisation, Linearisations, MotionJacobian, PiecewiseSystem, Place,
+    Setting, SignStructure,
 };
 use crate::tolerances::EPS;
 
 /// Largest part of a step, in units of 1 / |Df|; stiff steps are not divided into more than so many parts.
 const LONGEST_PART: f64 = 1.0;
 const MOST_PARTS: f64 = 16.0;
+
+/// What a motion follows from, beside its mode and discrete states.
+#[derive(Clone)]
+pub(super) struct Surroundings<'a> {
+    pub extended: &'a Extended<'a>,
+    /// The impacts of its contacts.
+    pub impacts: &'a Actions<'a>,
+    pub law: Law<'a>,
+    /// The side of each surface on which the motion is, or was last.
+    pub sides: Vec<i8>,
+}
+
+impl Surroundings<'_> {
+    /// Takes the sides of a mode.
+    pub fn take_sides(&mut self, mode: &Mode) {
+        let known = self.sides.iter_mut().zip(mode.entries());
+        known
+            .filter(|(_, entry)| **entry != 0)
+            .for_each(|(side, entry)| *side = *entry);
+    }
+}
 
 /// A motion of the extended system in one mode.
 pub(super) struct Piece<'a> {
@@ -27,6 +49,8 @@ pub(super) struct Piece<'a> {
     pub q: Vec<f64>,
     /// The surfaces slid on.
     pub sliding: Vec<usize>,
+    /// The surfaces in contact.
+    contacts: Vec<usize>,
     signs: Vec<f64>,
     pub field: ModeField<'a>,
     /// The derivatives of its field, if the graph has them.
@@ -43,10 +67,29 @@ struct Slopes {
 }
 
 impl<'a> Piece<'a> {
-    pub fn new(extended: &'a Extended<'a>, law: Law<'a>, mode: &Mode, q: &[f64]) -> Self {
-        let sliding: Vec<usize> = mode.sliding_set().collect();
+    pub fn new(around: &Surroundings<'a>, mode: &Mode, q: &[f64]) -> Self {
+        let Surroundings {
+            extended,
+            impacts,
+            law,
+            ref sides,
+        } = *around;
         let system: &dyn PiecewiseSystem = &extended.system;
-        let field = ModeField::of(&extended.system, law, mode, q);
+        let contact = match impacts.list.is_empty() {
+            true => None,
+            false => ContactField::new(&extended.system, impacts, mode, sides, q),
+        };
+        let contacts: Vec<usize> = contact.iter().flat_map(ContactField::contacts).collect();
+        let zeros = mode.sliding_set();
+        let sliding: Vec<usize> = zeros.filter(|j| !contacts.contains(j)).collect();
+        let field = match contact {
+            Some(contact) => ModeField::Contact(Box::new(contact)),
+            None => ModeField::of(&extended.system, law, mode, q),
+        };
+        let mut signs = mode.signs();
+        for &j in &contacts {
+            signs[j] = f64::from(impacts.trigger_side(j, sides[j]));
+        }
         let by_graph = match &field {
             ModeField::Region(_) | ModeField::Sliding(_) => true,
             ModeField::Intersection(field) => field.rule() == SlidingRule::Canopy,
@@ -57,7 +100,8 @@ impl<'a> Piece<'a> {
             extended,
             mode: mode.clone(),
             q: q.to_vec(),
-            signs: mode.signs().to_vec(),
+            signs: signs.to_vec(),
+            contacts,
             field,
             jacobian: linearisations.and_then(|l| l.motion_jacobian(&sliding)),
             sliding,
@@ -305,7 +349,7 @@ impl<'a> Piece<'a> {
         Ok(Some((time, state)))
     }
 
-    /// The gradients of the surfaces slid on by the extended state.
+    /// The gradients of the surfaces slid on and of those in contact by the extended state.
     pub fn normals(&self, t: f64, z: &[f64]) -> Result<Vec<Vec<f64>>, FieldError> {
         let gradient = |&j: &usize| {
             let mut row = vec![0.0; z.len()];
@@ -313,12 +357,29 @@ impl<'a> Piece<'a> {
             self.extended.system.gradient(j, &place, &mut row)?;
             Ok(row)
         };
-        self.sliding.iter().map(gradient).collect()
+        self.sliding
+            .iter()
+            .chain(&self.contacts)
+            .map(gradient)
+            .collect()
     }
 
-    /// Takes from the columns what leads off the surfaces slid on.
+    /// The gradients of the rates of the surfaces in contact.
+    fn rate_normals(&self, t: f64, z: &[f64]) -> Result<Vec<Vec<f64>>, FieldError> {
+        let gradient = |&j: &usize| {
+            let mut row = vec![0.0; z.len()];
+            self.extended
+                .system
+                .rate_gradient(j, &self.at(t, z), &mut row)?;
+            Ok(row)
+        };
+        self.contacts.iter().map(gradient).collect()
+    }
+
+    /// Takes from the columns what leads off the surfaces slid on, and off those in contact and their rates.
     pub fn project(&self, t: f64, z: &[f64], columns: &mut [Vec<f64>]) -> Result<(), FieldError> {
-        let normals = self.normals(t, z)?;
+        let mut normals = self.normals(t, z)?;
+        normals.extend(self.rate_normals(t, z)?);
         let n = self.extended.n;
         let of_states: Vec<&[f64]> = normals.iter().map(|row| &row[..n]).collect();
         remove_along(&of_states, &normals, columns);

@@ -2,12 +2,14 @@
 
 use super::extended::Extended;
 use super::instant::{entered, Instant, InstantDerivative, Lost, Weights};
-use super::piece::Piece;
+use super::limit::{at_its_time, History, Past};
+use super::piece::{Piece, Surroundings};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::{Law, SmoothField};
 use crate::options::Options;
 use crate::record::{InstantRecord, ObservedStep, Observer};
+use crate::system::{Actions, PiecewiseSystem};
 
 /// By what is differentiated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,7 +54,8 @@ pub struct Derivatives {
 /// let problem = Problem::new(&system, (0.0, 1.0), &[1.0]);
 /// let extended = Extended::new(&system, &Rules::default(), &Default::default(), &[0])?.unwrap();
 /// let options = Options::default();
-/// let mut tangents = Tangents::new(&extended, vec![Column::State(0), Column::Parameter(0)], &options, 1.0);
+/// let impacts = extended.impacts();
+/// let mut tangents = Tangents::new(&extended, &impacts, vec![Column::State(0), Column::Parameter(0)], &options, 1.0);
 /// Integrator::new(problem)?.observed_by(&mut tangents).solve();
 /// let derivatives = tangents.finish()?;
 /// let entry = &derivatives.instants[0];
@@ -61,13 +64,13 @@ pub struct Derivatives {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Tangents<'a> {
-    extended: &'a Extended<'a>,
-    law: Law<'a>,
+    around: Surroundings<'a>,
     weights: Weights,
     kinds: Vec<Column>,
     /// For each column the derivative of the state, and its shares of the parameters behind it.
     columns: Vec<Vec<f64>>,
     piece: Option<Piece<'a>>,
+    history: History,
     has_started: bool,
     lost: Option<Lost>,
     found: Derivatives,
@@ -78,13 +81,20 @@ impl<'a> Tangents<'a> {
     /// The derivatives by these columns of a run over `span` units of time.
     pub fn new(
         extended: &'a Extended<'a>,
+        impacts: &'a Actions<'a>,
         kinds: Vec<Column>,
         options: &'a Options,
         span: f64,
     ) -> Self {
         Tangents {
-            extended,
-            law: Law::from(options),
+            around: Surroundings {
+                extended,
+                impacts,
+                law: Law::from(options),
+                sides: impacts
+                    .sides_at_start(extended.system.n_surfaces())
+                    .collect(),
+            },
             weights: Weights {
                 span,
                 rtol: options.rtol,
@@ -93,6 +103,7 @@ impl<'a> Tangents<'a> {
             columns: Vec::new(),
             kinds,
             piece: None,
+            history: History::default(),
             has_started: false,
             lost: None,
             found: Derivatives::default(),
@@ -113,9 +124,10 @@ impl<'a> Tangents<'a> {
 
     fn start(&mut self, t: f64, x: &[f64], mode: &Mode, q: &[f64]) -> Result<(), FieldError> {
         self.has_started = true;
-        let (n, m) = (self.extended.n, self.extended.n_parameters());
-        let z = self.extended.state(x);
-        let mut piece = Piece::new(self.extended, self.law, mode, q);
+        self.around.take_sides(mode);
+        let (n, m) = (self.around.extended.n, self.around.extended.n_parameters());
+        let z = self.around.extended.state(x);
+        let mut piece = Piece::new(&self.around, mode, q);
         let mut field = vec![0.0; n + m];
         piece
             .field
@@ -127,11 +139,12 @@ impl<'a> Tangents<'a> {
                 Column::Start => (0..n).for_each(|r| states[r] = -field[r]),
                 Column::Parameter(_) => {}
             }
-            self.columns.push(self.extended.column(*kind, &states));
+            self.columns
+                .push(self.around.extended.column(*kind, &states));
         }
         if !piece.sliding.is_empty() {
             // A start beside the surfaces comes to them at once.
-            match entered(self.extended, &piece, t, &z, &self.columns)? {
+            match entered(self.around.extended, &piece, t, &z, &self.columns)? {
                 Some(columns) => self.columns = columns,
                 None => piece.project(t, &z, &mut self.columns)?,
             }
@@ -144,7 +157,7 @@ impl<'a> Tangents<'a> {
     fn keep(&mut self, t: f64) {
         self.found.t.push(t);
         for column in &self.columns {
-            let states = &column[..self.extended.n];
+            let states = &column[..self.around.extended.n];
             self.found.values.extend_from_slice(states);
         }
     }
@@ -159,13 +172,13 @@ impl<'a> Tangents<'a> {
     /// Makes sure that the motion at hand is the one of this mode.
     fn take_piece(&mut self, mode: &Mode, q: &[f64]) -> Piece<'a> {
         let piece = self.piece.take().filter(|piece| piece.is_of(mode, q));
-        piece.unwrap_or_else(|| Piece::new(self.extended, self.law, mode, q))
+        piece.unwrap_or_else(|| Piece::new(&self.around, mode, q))
     }
 
     fn follow(&mut self, step: &ObservedStep) -> Result<(), FieldError> {
         let t0 = step.t_start();
         if !self.has_started {
-            let mut x = vec![0.0; self.extended.n];
+            let mut x = vec![0.0; self.around.extended.n];
             step.at(t0, &mut x);
             self.start(t0, &x, step.mode, step.discrete)?;
         }
@@ -176,7 +189,7 @@ impl<'a> Tangents<'a> {
                 Ok(())
             };
             piece.advance(along, (t0, step.t_end), &mut self.columns)?;
-            let z = self.extended.state(step.x_end);
+            let z = self.around.extended.state(step.x_end);
             piece.project(step.t_end, &z, &mut self.columns)?;
             self.piece = Some(piece);
             if self.columns.iter().flatten().any(|v| !v.is_finite()) {
@@ -192,21 +205,78 @@ impl<'a> Tangents<'a> {
             self.start(record.t[0], record.x[0], record.mode[0], record.discrete[0])?;
         }
         let mut before = self.take_piece(record.mode[0], record.discrete[0]);
-        let mut after = Piece::new(self.extended, self.law, record.mode[1], record.discrete[1]);
+        self.around.take_sides(record.mode[0]);
+        let mut after = Piece::new(&self.around, record.mode[1], record.discrete[1]);
         let mut instant = Instant {
-            extended: self.extended,
+            extended: self.around.extended,
             record,
             before: &mut before,
             after: &mut after,
         };
-        let mut found = instant.pass(&self.weights, &mut self.columns)?;
-        let lost = self.lost.or(found.lost);
-        found.lost = lost;
-        lost.into_iter().for_each(|lost| self.lose(lost));
-        self.found.instants.push(found);
+        if record.t[0] != record.t[1] {
+            let dt = instant.time_by(&self.weights, &self.columns)?;
+            self.jump(record, dt, &after)?;
+        } else {
+            let columns = self.columns.clone();
+            let mut found = instant.pass(&self.weights, &mut self.columns)?;
+            found.lost = self.lost.or(found.lost);
+            self.history.push(past(record, &columns, found.dt.clone()));
+            found.lost.into_iter().for_each(|lost| self.lose(lost));
+            self.found.instants.push(found);
+        }
         self.piece = Some(after);
         self.keep(record.t[1]);
         Ok(())
+    }
+}
+
+impl Tangents<'_> {
+    /// Goes to the limit of infinitely many switches.
+    fn jump(
+        &mut self,
+        record: &InstantRecord,
+        dt: Option<Vec<f64>>,
+        after: &Piece,
+    ) -> Result<(), FieldError> {
+        let extended = self.around.extended;
+        let (n, sizes) = (extended.n, (extended.n, extended.n_parameters()));
+        let unknown = |t: f64| InstantDerivative::unknown(t, self.kinds.len(), sizes);
+        let [mut last, mut limit] = record.t.map(unknown);
+        let found = dt.and_then(|dt| {
+            last.dt.clone_from(&dt);
+            self.history.push(past(record, &self.columns, dt));
+            self.history.limit()
+        });
+        match found.filter(|_| self.lost.is_none()) {
+            None => {
+                limit.lost = self.lost.or(Some(Lost::Accumulation));
+                limit.lost.into_iter().for_each(|lost| self.lose(lost));
+            }
+            Some(found) => {
+                for ((column, dx), dt) in self.columns.iter_mut().zip(&found.dx).zip(&found.dt) {
+                    for r in 0..n {
+                        column[r] = dx[r] - record.field[1][r] * dt;
+                    }
+                }
+                let z = extended.state(record.x[1]);
+                after.project(record.t[1], &z, &mut self.columns)?;
+                limit.dt = found.dt;
+            }
+        }
+        self.found.instants.extend([last, limit]);
+        Ok(())
+    }
+}
+
+/// An instant as the limit of many sees it.
+fn past(record: &InstantRecord, columns: &[Vec<f64>], dt: Vec<f64>) -> Past {
+    Past {
+        t: record.t[0],
+        x: record.x[0].to_vec(),
+        guards: record.guards.into(),
+        mode: record.mode[0].clone(),
+        dx: at_its_time(columns, record.field[0], &dt),
+        dt,
     }
 }
 

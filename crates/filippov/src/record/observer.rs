@@ -142,9 +142,11 @@ impl<'a> Observed<'a> {
         }
     }
 
-    /// A step was accepted.
+    /// A step was accepted. The straight line to the limit of infinitely many switches is part of their instant.
     pub fn step(&mut self, step: &ObservedStep) {
-        self.observer.step(step);
+        if !self.has_ended {
+            self.observer.step(step);
+        }
     }
 
     /// A motion ends where these guards vanish, or at a known time.
