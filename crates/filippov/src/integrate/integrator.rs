@@ -393,6 +393,9 @@ impl<'a> Integrator<'a> {
 
     /// Closes the books.
     pub fn finish(mut self, stop: Stop) -> Solution {
+        if let Some(observed) = &mut self.recorder.observed {
+            observed.end(&mut self.run);
+        }
         self.run.stats.n_field_evaluations += self.run.motion.field.n_evaluations();
         self.run.stats.stiff_since = self.control.stiff_since();
         let sides = match self.run.actions.list.is_empty() {

@@ -518,6 +518,7 @@ impl<'a> Integrator<'a> {
             .restart(self.run.system, self.run.t, mode, &[]);
         due.sort_unstable();
         due.dedup();
+        self.recorder.leave(&mut self.run, &[])?;
         self.act(due)
     }
 

@@ -189,6 +189,18 @@ impl<'a> Observed<'a> {
         self.acts.extend(acts);
     }
 
+    /// The run ends. In an instant no motion follows: that of the mode before stands for it.
+    pub fn end(&mut self, run: &mut Run) {
+        if self.has_ended {
+            let mut velocity = vec![f64::NAN; run.x.len()];
+            let field = &mut run.motion.field;
+            if field.eval_unprojected(run.t, &mut run.x, &mut velocity).is_err() {
+                velocity.fill(f64::NAN);
+            }
+            self.arrive(run, &velocity);
+        }
+    }
+
     /// The next motion has started with this velocity.
     #[cold]
     #[inline(never)]
