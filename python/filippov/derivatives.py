@@ -62,7 +62,8 @@ def check_wrt(
     names = [wrt] if isinstance(wrt, str) else wrt
     if not isinstance(names, Sequence) or not names or not all(isinstance(name, str) for name in names):
         raise InputError(
-            f'wrt: "y0", "t0", "params", "all", or a list of these and of names of parameters is needed, not {wrt!r}'
+            'wrt: "y0", "t0", "params", "all", or a list of these and of names of parameters is needed, '
+            f"not {wrt!r}"
         )
     places = {name: place for place, name in enumerate(params) if name not in discrete}
     found: dict[str, tuple[int, int]] = {}
@@ -93,7 +94,9 @@ def check_wrt(
     return Wanted(tuple(found), list(found.values()), [places[name] for name in asked])
 
 
-def refuse_without_derivatives(prepared: Prepared, discrete: Sequence[str], t_span: tuple[float, float]) -> None:
+def refuse_without_derivatives(
+    prepared: Prepared, discrete: Sequence[str], t_span: tuple[float, float]
+) -> None:
     """Refuse derivatives of what has none.
 
     Raises
@@ -108,7 +111,7 @@ def refuse_without_derivatives(prepared: Prepared, discrete: Sequence[str], t_sp
     for action in prepared.actions:
         if not isinstance(action.map, TracedSystem):
             raise InputError(
-                f"wrt: the map of the reset {action.name!r} is not traced, so that its derivative is not known"
+                f"wrt: the map of the reset {action.name!r} is not traced: its derivative is not known"
             )
     if discrete:
         raise InputError(f"wrt: no derivatives pass through discrete states, here {', '.join(discrete)}")

@@ -26,6 +26,7 @@ from filippov.switches import (
     SwitchTable,
     as_texts,
     at_switches,
+    derivative_warnings,
     import_pandas,
     import_xarray,
 )
@@ -350,7 +351,10 @@ class Solution:
         """What deserves a look; most of it is shown as a `FilippovWarning` too."""
         found = [RunWarning.from_row(row, self.surfaces) for row in self._run.warnings]
         origin = self._origin
-        return found + [RunWarning(origin.t0, code, text, ()) for code, text in origin.prepared.warnings]
+        found += [RunWarning(origin.t0, code, text, ()) for code, text in origin.prepared.warnings]
+        if origin.wanted is not None and isinstance(self._run, Run):
+            found += derivative_warnings(self._run, origin.t0, self.surfaces)
+        return found
 
     @cached_property
     def branches(self) -> Branches | None:

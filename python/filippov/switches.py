@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, overload
 import numpy as np
 import numpy.typing as npt
 
+from filippov._core import Run
 from filippov.errors import ModelError
 from filippov.modes import Mode
 
@@ -159,7 +160,8 @@ class RunWarning(NamedTuple):
         ``"stiff"`` (stability limits the steps of an explicit method), ``"oscillation"`` (sliding on three or
         more surfaces at a root that is not stable for the given ``kappa``), ``"against_direction"`` (the
         surface of a reset was crossed against its direction), ``"unknown_side"`` (a start on the surface of
-        a reset without a direction), ``"memory"`` (the function assigns values that other calls may read) or
+        a reset without a direction), ``"one_sided"`` and ``"no_derivative"`` (about derivatives), ``"memory"``
+        (the function assigns values that other calls may read) or
         ``"max_branches"``.
     message : str
         What was found, in words.
@@ -244,7 +246,7 @@ class SwitchTable(Sequence[Switch]):
 
     @property
     def dt(self) -> Array:
-        """Derivatives of the times by the columns of `sol.wrt`, shape (n_switches, k); NaN where there is none.
+        """Derivatives of the times by the columns of `sol.wrt`, shape (n_switches, k); NaN for none.
 
         It is a `ModelError` to ask for them of a run without ``wrt=``.
         """
@@ -486,6 +488,30 @@ def _switch(row: tuple[Any, ...], derivative: InstantDerivative | None) -> Switc
     t, y_before, y_after, kind, surfaces, before, after, note, rule, is_kink = row
     modes = Mode(before), Mode(after)
     return Switch(t, y_before, y_after, kind, tuple(surfaces), *modes, note, rule, is_kink, derivative)
+
+
+_WHY_LOST = {
+    "grazing": "the motion touches the surface that ends it, and the time of that has no derivative",
+    "one-sided": "several switches come at one time, and their order decides what follows",
+    "accumulation": "the switches before the limit make no rounds that could be extrapolated",
+    "unsupported": "sliding of higher order, or rest, begins or ends",
+    "not_finite": "a derivative is not finite",
+}
+
+
+def derivative_warnings(run: Run, t0: float, names: Sequence[str]) -> list[RunWarning]:
+    """Return what a run with ``wrt=`` met that its derivatives do not pass, or have on one side only."""
+    found = []
+    left = tuple(names[j] for j in run.starts_on() if j < len(names))
+    if left:
+        text = f"the run starts on {', '.join(left)} = 0: derivatives by the start are those of one side"
+        found.append(RunWarning(t0, "one_sided", text, (), left))
+    lost = next(((row[0], row[5]) for row in run.instants() if row[5]), None)
+    if lost is not None:
+        t, why = lost
+        text = f"derivatives are not known from t = {t:.10g} on: {_WHY_LOST[why]}"
+        found.append(RunWarning(t, "no_derivative", text))
+    return found
 
 
 def at_switches(

@@ -129,6 +129,11 @@ impl RunDerivatives {
         transposed(py, &self.found.values[last..], self.kinds.len(), n)
     }
 
+    /// The surfaces on which the run starts and that it leaves.
+    pub fn starts_on(&self) -> &[usize] {
+        &self.found.starts_on
+    }
+
     /// The derivatives of all instants.
     pub fn instants<'py>(&self, py: Python<'py>, n: usize) -> Vec<InstantRow<'py>> {
         let m = self.parameters.len();

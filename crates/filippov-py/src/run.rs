@@ -549,6 +549,12 @@ impl Run {
         derivatives.map(|derivatives| derivatives.at_end(py, n))
     }
 
+    /// The surfaces on which the run starts and that it leaves: the derivatives are those of one side.
+    fn starts_on(&self) -> Vec<usize> {
+        let derivatives = self.derivatives.as_ref();
+        derivatives.map_or_else(Vec::new, |derivatives| derivatives.starts_on().to_vec())
+    }
+
     /// The derivatives of all instants.
     fn instants<'py>(&self, py: Python<'py>) -> Vec<InstantRow<'py>> {
         let n = self.solution().n_states;

@@ -122,7 +122,7 @@ impl Instant<'_, '_> {
     pub fn pass(
         &mut self,
         weights: &Weights,
-        columns: &mut Vec<Vec<f64>>,
+        columns: &mut [Vec<f64>],
     ) -> Result<InstantDerivative, FieldError> {
         let (n, m) = (self.extended.n, self.extended.n_parameters());
         let mut found = InstantDerivative::unknown(self.record.t[0], columns.len(), (n, m));
@@ -138,10 +138,10 @@ impl Instant<'_, '_> {
         let k = columns.len();
         found.dt.copy_from_slice(&passage.dt[..k]);
         for (i, image) in passage.columns[k..].iter().enumerate() {
-            for r in 0..n {
+            for (r, entry) in image.iter().enumerate().take(n) {
                 match i.checked_sub(n) {
-                    None => found.saltation[r * n + i] = image[r],
-                    Some(p) => found.by_parameters[r * m + p] = image[r],
+                    None => found.saltation[r * n + i] = *entry,
+                    Some(p) => found.by_parameters[r * m + p] = *entry,
                 }
             }
         }
@@ -187,7 +187,13 @@ impl Instant<'_, '_> {
             image.extend_from_slice(&column[n..]);
         }
         let z = self.extended.state(record.x[1]);
-        self.after.project(record.t[1], &z, &mut images)?;
+        // What is new is held exactly; the columns of the run keep to the other surfaces by themselves.
+        let kept = match record.acts.is_empty() {
+            true => &self.before.sliding[..],
+            false => &[],
+        };
+        self.after
+            .project_beside(kept, record.t[1], &z, &mut images)?;
         Ok(Ok(Passage {
             columns: images,
             dt,
@@ -217,7 +223,8 @@ impl Instant<'_, '_> {
         // Where the motion is tangent the time has no derivative. A touch is located to the square root of rounding.
         let touches = record.acts.is_empty() && record.mode[0] == record.mode[1];
         let most = if touches { AT_SIDE } else { ROUNDING };
-        if !(*condition < 1.0 / most) || rate == 0.0 {
+        let is_regular = *condition < 1.0 / most && rate != 0.0;
+        if !is_regular {
             return Ok(Err(Lost::Grazing));
         }
         let shift = |column: &Vec<f64>| -dot(&clockwork.state, column) / rate;
@@ -335,7 +342,14 @@ impl Instant<'_, '_> {
             return Ok(None);
         }
         let z = self.extended.state(record.x[1]);
-        entered(self.extended, self.after, record.t[1], &z, columns)
+        let slid_on = &self.before.sliding;
+        entered(
+            self.extended,
+            self.after,
+            slid_on,
+            (record.t[1], &z),
+            columns,
+        )
     }
 
     /// The columns behind the maps of the actions, and what becomes of the field before, R_x f + R_t.
@@ -370,12 +384,16 @@ impl Instant<'_, '_> {
     }
 }
 
-/// What is left of the columns of a point that comes to the surfaces which a motion slides on, from any side.
+/// What is left of the columns of a point that comes to the surfaces which a motion slides on, from any side of those that it did
+/// not slide on before. `None` if the field is not affine in their signs.
+///
+/// With the jumps B of the field at all these surfaces and their gradients dH it is I - B' (dH' B')^-1 dH', where dH' are the gradients
+/// of the new ones, and B' their jumps less what keeps the motion on the others.
 pub(super) fn entered(
     extended: &Extended,
     sliding: &Piece,
-    t: f64,
-    z: &[f64],
+    slid_on: &[usize],
+    (t, z): (f64, &[f64]),
     columns: &[Vec<f64>],
 ) -> Result<Option<Vec<Vec<f64>>>, FieldError> {
     let n = extended.n;
@@ -386,22 +404,33 @@ pub(super) fn entered(
     if !is_affine || matches!(sliding.field, ModeField::Reduced(_) | ModeField::Contact(_)) {
         return Ok(None);
     }
-    let mut jumps = Vec::with_capacity(sliding.sliding.len());
-    for &j in &sliding.sliding {
+    let normals = sliding.normals(t, z)?;
+    let (mut kept, mut new) = (Sheaf::default(), Sheaf::default());
+    for (&j, normal) in sliding.sliding.iter().zip(normals) {
         let above = sliding.corner(t, z, &[(j, 1.0)])?;
         let below = sliding.corner(t, z, &[(j, -1.0)])?;
-        jumps.push(
-            above
-                .iter()
-                .zip(&below)
-                .map(|(a, b)| a - b)
-                .collect::<Vec<f64>>(),
-        );
+        let jump = above.iter().zip(&below).map(|(a, b)| a - b).collect();
+        let sheaf = if slid_on.contains(&j) {
+            &mut kept
+        } else {
+            &mut new
+        };
+        sheaf.jumps.push(jump);
+        sheaf.normals.push(normal);
     }
-    let directions: Vec<&[f64]> = jumps.iter().map(|jump| &jump[..n]).collect();
+    let along_kept: Vec<&[f64]> = kept.jumps.iter().map(|jump| &jump[..n]).collect();
+    remove_along(&along_kept, &kept.normals, &mut new.jumps);
+    let directions: Vec<&[f64]> = new.jumps.iter().map(|jump| &jump[..n]).collect();
     let mut columns = columns.to_vec();
-    remove_along(&directions, &sliding.normals(t, z)?, &mut columns);
+    remove_along(&directions, &new.normals, &mut columns);
     Ok(Some(columns))
+}
+
+/// Surfaces with the jumps of the field there.
+#[derive(Default)]
+struct Sheaf {
+    jumps: Vec<Vec<f64>>,
+    normals: Vec<Vec<f64>>,
 }
 
 fn unit(size: usize, i: usize) -> Vec<f64> {

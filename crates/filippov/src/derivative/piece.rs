@@ -15,7 +15,7 @@ use crate::system::{
     Actions, LieDerivatives, Linearisation, Linearisations, MotionJacobian, PiecewiseSystem, Place,
     Setting, SignStructure,
 };
-use crate::tolerances::EPS;
+use crate::tolerances::{EPS, ROUNDING};
 
 /// Largest part of a step, in units of 1 / |Df|; stiff steps are not divided into more than so many parts.
 const LONGEST_PART: f64 = 1.0;
@@ -364,6 +364,25 @@ impl<'a> Piece<'a> {
             .collect()
     }
 
+    /// The surfaces through a point that the motion leaves, where the field jumps.
+    pub fn left_at_once(&self, t: f64, z: &[f64]) -> Result<Vec<usize>, FieldError> {
+        let (system, place) = (&self.extended.system, self.at(t, z));
+        let mut h = vec![0.0; system.n_surfaces()];
+        system.surfaces(&place, &mut h)?;
+        let mut found = Vec::new();
+        for (j, h) in h
+            .iter()
+            .enumerate()
+            .filter(|(j, _)| self.mode.entries()[*j] != 0)
+        {
+            let is_there = h.abs() <= ROUNDING * system.surface_size(j, &place)?;
+            if is_there && system.jumps_across(j, &self.signs, &self.sliding) {
+                found.push(j);
+            }
+        }
+        Ok(found)
+    }
+
     /// The gradients of the rates of the surfaces in contact.
     fn rate_normals(&self, t: f64, z: &[f64]) -> Result<Vec<Vec<f64>>, FieldError> {
         let gradient = |&j: &usize| {
@@ -378,7 +397,23 @@ impl<'a> Piece<'a> {
 
     /// Takes from the columns what leads off the surfaces slid on, and off those in contact and their rates.
     pub fn project(&self, t: f64, z: &[f64], columns: &mut [Vec<f64>]) -> Result<(), FieldError> {
-        let mut normals = self.normals(t, z)?;
+        self.project_beside(&[], t, z, columns)
+    }
+
+    /// The same, but for some surfaces.
+    pub fn project_beside(
+        &self,
+        kept: &[usize],
+        t: f64,
+        z: &[f64],
+        columns: &mut [Vec<f64>],
+    ) -> Result<(), FieldError> {
+        let surfaces = self.sliding.iter().chain(&self.contacts);
+        let normals = surfaces.zip(self.normals(t, z)?);
+        let mut normals: Vec<Vec<f64>> = normals
+            .filter(|(j, _)| !kept.contains(j))
+            .map(|(_, normal)| normal)
+            .collect();
         normals.extend(self.rate_normals(t, z)?);
         let n = self.extended.n;
         let of_states: Vec<&[f64]> = normals.iter().map(|row| &row[..n]).collect();

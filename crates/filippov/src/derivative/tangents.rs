@@ -31,6 +31,9 @@ pub struct Derivatives {
     pub values: Vec<f64>,
     /// Those of all instants.
     pub instants: Vec<InstantDerivative>,
+    /// Surfaces on which the run starts and that it leaves, where the field jumps: the derivatives by the start are those of one
+    /// side.
+    pub starts_on: Vec<usize>,
 }
 
 /// Follows the derivatives of a run, step by step and through its instants. Where they end they are NaN.
@@ -144,11 +147,12 @@ impl<'a> Tangents<'a> {
         }
         if !piece.sliding.is_empty() {
             // A start beside the surfaces comes to them at once.
-            match entered(self.around.extended, &piece, t, &z, &self.columns)? {
+            match entered(self.around.extended, &piece, &[], (t, &z), &self.columns)? {
                 Some(columns) => self.columns = columns,
                 None => piece.project(t, &z, &mut self.columns)?,
             }
         }
+        self.found.starts_on = piece.left_at_once(t, &z)?;
         self.piece = Some(piece);
         self.keep(t);
         Ok(())

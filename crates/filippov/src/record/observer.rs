@@ -194,7 +194,10 @@ impl<'a> Observed<'a> {
         if self.has_ended {
             let mut velocity = vec![f64::NAN; run.x.len()];
             let field = &mut run.motion.field;
-            if field.eval_unprojected(run.t, &mut run.x, &mut velocity).is_err() {
+            if field
+                .eval_unprojected(run.t, &mut run.x, &mut velocity)
+                .is_err()
+            {
                 velocity.fill(f64::NAN);
             }
             self.arrive(run, &velocity);
