@@ -1,10 +1,14 @@
 //! Derivatives of a run by what a user names.
 
-use filippov::derivative::{Column, Derivatives, Extended, Tangents};
-use filippov::{Error, FieldError, Options, PiecewiseSystem, Problem, Rules, Side, Solution};
+use filippov::derivative::{
+    Column, Derivatives, Differentiated, EventGradient, Extended, Tangents,
+};
+use filippov::{Error, FieldError, Options, Problem, Rules, Side, Solution};
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+
+use crate::systems::raised;
 
 /// The columns, each a kind (0: a component of the initial state, 1: the initial time, 2: a parameter) with a place, and the
 /// parameters by which is differentiated.
@@ -87,6 +91,10 @@ impl From<FieldError> for Failure {
     }
 }
 
+fn unknown(t: f64) -> PyErr {
+    PyValueError::new_err(format!("t = {t} has no derivative here"))
+}
+
 fn column(kind: u8, place: usize) -> Column {
     match kind {
         0 => Column::State(place),
@@ -104,22 +112,52 @@ impl RunDerivatives {
         solution: &Solution,
         (times, side): (&[f64], Side),
     ) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
+        self.with(system, solution, |run| {
+            let at = |&t: &f64| {
+                let values = run.at(t, side).map_err(raised)?;
+                let values = values.ok_or_else(|| unknown(t))?;
+                Ok(transposed(py, &values, self.kinds.len(), solution.n_states))
+            };
+            times.iter().map(at).collect()
+        })
+    }
+
+    /// The derivatives of the times of zeros of a function, the first component of a system: a row for each.
+    pub fn of_zeros(
+        &self,
+        system: &filippov::TracedSystem,
+        solution: &Solution,
+        function: &filippov::TracedSystem,
+        times: &[f64],
+    ) -> PyResult<Vec<Vec<f64>>> {
+        let gradient = EventGradient::new(function, &self.rules, &self.parameters);
+        let gradient = gradient.map_err(|e| PyValueError::new_err(e.to_string()))?;
+        self.with(system, solution, |run| {
+            let of_zero = |&t: &f64| {
+                let found = run.time_of_zero(&gradient, t).map_err(raised)?;
+                found.ok_or_else(|| unknown(t))
+            };
+            times.iter().map(of_zero).collect()
+        })
+    }
+
+    fn with<R>(
+        &self,
+        system: &filippov::TracedSystem,
+        solution: &Solution,
+        ask: impl FnOnce(&Differentiated) -> PyResult<R>,
+    ) -> PyResult<R> {
         let none = filippov::action::Actions::default();
         let extended = Extended::new(system, &self.rules, &none, &self.parameters);
         let extended = extended.map_err(|e| PyValueError::new_err(e.to_string()))?;
         let extended = extended.ok_or_else(|| PyValueError::new_err("maps that are not traced"))?;
-        let own: &dyn PiecewiseSystem = system;
-        let at = |&t: &f64| {
-            let known = (&extended, &self.kinds[..]);
-            let found = self
-                .found
-                .at(known, (own, &self.options), solution, (t, side));
-            let values = found.map_err(crate::systems::raised)?;
-            let outside = || PyValueError::new_err(format!("t = {t} has no derivative here"));
-            let values = values.ok_or_else(outside)?;
-            Ok(transposed(py, &values, self.kinds.len(), solution.n_states))
-        };
-        times.iter().map(at).collect()
+        ask(&Differentiated {
+            solution,
+            found: &self.found,
+            kinds: &self.kinds,
+            systems: (system, &extended),
+            options: &self.options,
+        })
     }
 
     /// The derivative of the state at the end.

@@ -16,7 +16,7 @@ use crate::conversion::columns;
 use crate::decisions::record_as_pair;
 use crate::derivatives::{InstantRow, RunDerivatives};
 use crate::prepared_run::PreparedRun;
-use crate::systems::{raised, CoreSystem};
+use crate::systems::{raised, CoreSystem, TracedSystem};
 
 type Vector<'py> = Bound<'py, PyArray1<f64>>;
 type SwitchRow<'py> = (
@@ -540,6 +540,29 @@ impl Run {
         };
         let when = (t.as_slice()?, side_of(left));
         derivatives.at(py, system, &self.solution(), when)
+    }
+
+    /// The derivatives of the times of zeros of a function, the first component of a system, shape (zeros, columns).
+    fn zero_derivatives<'py>(
+        &self,
+        py: Python<'py>,
+        function: &TracedSystem,
+        t: PyReadonlyArray1<'py, f64>,
+    ) -> PyResult<Vec<Vector<'py>>> {
+        let (Some(derivatives), Some(system)) = (&self.derivatives, self.prepared.traced()) else {
+            return Ok(Vec::new());
+        };
+        let (solution, times) = (self.solution(), t.as_slice()?);
+        let found = derivatives.of_zeros(
+            system,
+            &solution,
+            &function.with(system.parameters()),
+            times,
+        )?;
+        Ok(found
+            .into_iter()
+            .map(|row| PyArray1::from_vec(py, row))
+            .collect())
     }
 
     /// The same at the end of the run.

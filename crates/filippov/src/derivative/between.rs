@@ -1,79 +1,185 @@
-//! The derivative of the state at any time of a run.
+//! The derivatives of a run at any of its times, and of the zeros of functions along it.
 
-use super::extended::Extended;
-use super::piece::{Piece, Surroundings};
+use super::extended::{extended_system, Extended};
+use super::piece::{dot, Piece, Surroundings};
 use super::tangents::{Column, Derivatives};
-use crate::error::FieldError;
-use crate::motion::Law;
+use crate::error::{Error, FieldError};
+use crate::motion::{Law, SmoothField};
 use crate::options::Options;
 use crate::record::{Side, Solution};
-use crate::system::PiecewiseSystem;
+use crate::system::{Actions, PiecewiseSystem, Rules, Setting, TracedSystem};
 
-impl Derivatives {
+/// A run with its derivatives.
+pub struct Differentiated<'r> {
+    /// The run.
+    pub solution: &'r Solution,
+    /// The derivatives at its steps.
+    pub found: &'r Derivatives,
+    /// By what was differentiated.
+    pub kinds: &'r [Column],
+    /// The system, and its extension by the parameters among these.
+    pub systems: (&'r TracedSystem, &'r Extended<'r>),
+    /// The options of the run.
+    pub options: &'r Options,
+}
+
+impl Differentiated<'_> {
     /// The derivative of the state at a time, a column of n states after the other, found from that at the last step before;
     /// `None` outside of the run, or if its continuous extension was not kept.
     ///
     /// # Errors
     /// If a function of the user raises.
-    pub fn at(
+    pub fn at(&self, t: f64, side: Side) -> Result<Option<Vec<f64>>, FieldError> {
+        let (columns, n) = (self.columns(t, side)?, self.systems.1.n);
+        let states = |columns: Vec<Vec<f64>>| {
+            let columns = columns.into_iter();
+            columns
+                .flat_map(|column| column.into_iter().take(n))
+                .collect()
+        };
+        Ok(columns.map(states))
+    }
+
+    /// The derivatives of the time of a zero of g, by the columns; `None` as for [`at`](Self::at). The first component of the
+    /// field of `function` is g.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn time_of_zero(
         &self,
-        (extended, kinds): (&Extended<'_>, &[Column]),
-        (system, options): (&dyn PiecewiseSystem, &Options),
-        solution: &Solution,
-        (t, side): (f64, Side),
+        function: &EventGradient,
+        t: f64,
     ) -> Result<Option<Vec<f64>>, FieldError> {
-        let (n, size) = (extended.n, extended.n * kinds.len());
+        let side = Side::Left;
+        let Some(columns) = self.columns(t, side)? else {
+            return Ok(None);
+        };
+        let (system, extended) = self.systems;
+        let impacts = extended.impacts();
+        let Some(mut piece) = self.piece(&impacts, t, side) else {
+            return Ok(None);
+        };
+        let mut x = vec![0.0; extended.n];
+        self.solution.evaluate(system, t, side, &mut x)?;
+        let z = extended.state(&x);
+        let mut field = vec![0.0; z.len()];
+        piece
+            .field
+            .eval_unprojected(t, &mut z.clone(), &mut field)?;
+        let (time, gradient) = function.at(t, &z, &piece.q)?;
+        let rate = time + dot(&gradient, &field);
+        let shift = |column: &Vec<f64>| -dot(&gradient, column) / rate;
+        Ok(Some(columns.iter().map(shift).collect()))
+    }
+
+    /// The derivative of the state, with the shares of the parameters behind each column.
+    fn columns(&self, t: f64, side: Side) -> Result<Option<Vec<Vec<f64>>>, FieldError> {
+        let (system, extended) = self.systems;
+        let Derivatives {
+            t: times, values, ..
+        } = self.found;
+        let (n, size) = (extended.n, extended.n * self.kinds.len());
         let is_known = |&known: &f64| match side {
             Side::Left => known < t,
             Side::Right => known <= t,
         };
-        let next = self.t.partition_point(is_known);
-        if side == Side::Left && self.t.get(next) == Some(&t) {
-            return Ok(Some(self.values[next * size..][..size].to_vec()));
-        }
-        let Some(index) = next.checked_sub(1) else {
+        let next = times.partition_point(is_known);
+        let is_at_next = side == Side::Left && times.get(next) == Some(&t);
+        let Some(index) = (if is_at_next {
+            Some(next)
+        } else {
+            next.checked_sub(1)
+        }) else {
             return Ok(None);
         };
-        let known = &self.values[index * size..][..size];
-        if self.t[index] == t {
-            return Ok(Some(known.to_vec()));
-        }
-        let Some(segment) = solution.segment_at(t, side).filter(|_| solution.is_dense()) else {
-            return Ok(None);
-        };
-        let columns = kinds.iter().zip(known.chunks_exact(n));
+        let known = values[index * size..][..size].chunks_exact(n);
+        let columns = self.kinds.iter().zip(known);
         let mut columns: Vec<Vec<f64>> = columns
             .map(|(kind, states)| extended.column(*kind, states))
             .collect();
+        if times[index] == t {
+            return Ok(Some(columns));
+        }
         let impacts = extended.impacts();
+        let Some(mut piece) = self.piece(&impacts, t, side) else {
+            return Ok(None);
+        };
+        let mut x = vec![0.0; n];
+        let path = |t: f64, x: &mut [f64]| {
+            let mode = self.solution.evaluate(system, t, side, x)?;
+            if mode.is_none() {
+                x.fill(f64::NAN);
+            }
+            Ok(())
+        };
+        piece.advance(path, (times[index], t), &mut columns)?;
+        path(t, &mut x)?;
+        piece.project(t, &extended.state(&x), &mut columns)?;
+        Ok(Some(columns))
+    }
+
+    /// The motion of the extended system at a time.
+    fn piece<'p>(&'p self, impacts: &'p Actions<'p>, t: f64, side: Side) -> Option<Piece<'p>> {
+        let (system, extended) = self.systems;
+        let segments = self.solution.segments.iter();
+        let segment = self.solution.segment_at(t, side);
+        let segment = segment.filter(|_| self.solution.is_dense())?;
         let mut around = Surroundings {
             extended,
-            impacts: &impacts,
-            law: Law::from(options),
+            impacts,
+            law: Law::from(self.options),
             sides: impacts.sides_at_start(system.n_surfaces()).collect(),
         };
-        let earlier = solution
-            .segments
-            .iter()
-            .take_while(|s| s.t_start <= segment.t_start);
-        earlier.for_each(|earlier| around.take_sides(&earlier.mode));
-        let mut piece = Piece::new(&around, &segment.mode, &segment.discrete);
-        let path = |t: f64, x: &mut [f64]| match solution.evaluate(system, t, side, x)? {
-            Some(_) => Ok(()),
-            None => {
-                x.fill(f64::NAN);
-                Ok(())
-            }
+        let so_far = segments.take_while(|earlier| earlier.t_start <= segment.t_start);
+        so_far.for_each(|earlier| around.take_sides(&earlier.mode));
+        Some(Piece::new(&around, &segment.mode, &segment.discrete))
+    }
+}
+
+/// The gradient of a function by time, states and parameters.
+pub struct EventGradient {
+    /// A system whose first component is the function.
+    extended: TracedSystem,
+}
+
+impl EventGradient {
+    /// Of the first component of a system with these rules, by the states and these parameters.
+    ///
+    /// # Errors
+    /// If an expression cannot be compiled.
+    pub fn new(
+        function: &TracedSystem,
+        rules: &Rules,
+        parameters: &[usize],
+    ) -> Result<Self, Error> {
+        let extended = extended_system(function, rules, parameters)?;
+        Ok(EventGradient { extended })
+    }
+
+    /// The derivatives by the time and by the extended state on the side that the point lies on; NaN where there are none.
+    fn at(&self, t: f64, z: &[f64], q: &[f64]) -> Result<(f64, Vec<f64>), FieldError> {
+        let system = &self.extended;
+        let mut signs = vec![1.0; system.n_surfaces()];
+        let mut h = signs.clone();
+        // Switching functions may contain signs of others.
+        for _ in 0..signs.len() {
+            system.surfaces(&Setting::new(&signs, q).at(t, z), &mut h)?;
+            signs = h
+                .iter()
+                .map(|h| if *h < 0.0 { -1.0 } else { 1.0 })
+                .collect();
+        }
+        let linearisations = system.linearisations();
+        let known = linearisations.and_then(|known| Some((known, known.motion_jacobian(&[])?)));
+        let Some((known, jacobian)) = known else {
+            return Ok((f64::NAN, vec![f64::NAN; z.len()]));
         };
-        piece.advance(path, (self.t[index], t), &mut columns)?;
-        let mut x = vec![0.0; n];
-        solution.evaluate(system, t, side, &mut x)?;
-        piece.project(t, &extended.state(&x), &mut columns)?;
-        Ok(Some(
-            columns
-                .into_iter()
-                .flat_map(|column| column.into_iter().take(n))
-                .collect(),
-        ))
+        let mut slopes = jacobian.linearisation();
+        known.eval_jacobian(&jacobian, &Setting::new(&signs, q).at(t, z), &mut slopes);
+        let mut gradient = vec![0.0; z.len()];
+        for (column, value) in slopes.shifted(0.0).row(0) {
+            gradient[column] = -value;
+        }
+        Ok((slopes.time()[0], gradient))
     }
 }

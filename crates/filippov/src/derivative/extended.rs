@@ -118,6 +118,17 @@ impl<'a> Extended<'a> {
     }
 }
 
+/// The system with these parameters as states that rest, behind its own.
+pub(super) fn extended_system(
+    system: &TracedSystem,
+    rules: &Rules,
+    parameters: &[usize],
+) -> Result<TracedSystem, Error> {
+    let pairs = pairs(parameters, system.n_states());
+    let (extended, _) = Definition::of(system, rules).extended(&pairs)?;
+    Ok(extended.with_parameters(system.parameters().to_vec()))
+}
+
 /// The derivatives of the argument of a clock, by the time and by parameters that have become states.
 fn clock_of(
     extended: &TracedSystem,

@@ -16,6 +16,7 @@ mod piece;
 mod radau;
 mod tangents;
 
+pub use between::{Differentiated, EventGradient};
 pub use extended::Extended;
 pub use instant::{InstantDerivative, Lost};
 pub use tangents::{Column, Derivatives, Tangents};
