@@ -116,3 +116,231 @@ def test_monodromy_of_the_drill_string(u: int) -> None:
     system = fl.System(drill_string.rhs, n=3, params={"u": float(u)})
     sol = system.solve((0, float(case["period"])), y0, wrt="y0", **TIGHT)
     np.testing.assert_allclose(sol.derivative(), numbers(case["monodromy"]), rtol=0, atol=1e-8)
+
+
+def instant(name: str) -> tuple[list[float], Any]:
+    """Return the values of the variables, and the Jacobian of the outputs."""
+    case = INSTANTS[name]
+    return [float(text) for text in case["values"]], numbers(case["jacobian"])
+
+
+def test_thresholds_of_a_relay_with_memory_are_parameters() -> None:
+    (x, v, low, high, c), exact = instant("hysteresis")
+
+    def fun(t: float, x: Any, low: float, high: float, c: float) -> list[Any]:
+        return [x[1], -0.3 * x[1] - x[0] - c * fl.hysteresis(x[0], low, high)]
+
+    system = fl.System(fun, n=2, params={"low": low, "high": high, "c": c})
+    sol = system.solve((0, 6), [x, v], wrt=["y0", "low", "high", "c"], **TIGHT)
+    np.testing.assert_allclose(np.vstack([sol.derivative(), sol.switches.dt]), exact, atol=1e-12)
+
+
+def test_period_of_a_clock_is_a_parameter() -> None:
+    (x, v, period, a), exact = instant("clock")
+
+    def fun(t: float, x: Any, T: float, a: float) -> list[Any]:
+        return [x[1], -x[0] + a * (1 - 2 * (np.floor(t / T) % 2))]
+
+    system = fl.System(fun, n=2, params={"T": period, "a": a})
+    sol = system.solve((0, 1), [x, v], wrt=["y0", "T", "a"], **TIGHT)
+    np.testing.assert_allclose(sol.derivative(), exact, atol=1e-12)
+    np.testing.assert_allclose(sol.switches.dt[:, 2], [1, 2, 3], atol=1e-12)
+
+
+def ball(**params: float) -> fl.System:
+    """A ball on a floor; s is the integral of its height."""
+    bounce = fl.Reset(
+        lambda t, x, wall: x[0] - wall, lambda t, x, r: [x[0], -r * x[1], x[2]], direction="down"
+    )
+    params = {"wall": 0.0, **params}
+    return fl.System(lambda t, x, g, r, wall: [x[1], -g, x[0]], n=3, params=params, resets=bounce)
+
+
+def test_impact_on_a_wall_whose_place_is_a_parameter() -> None:
+    (x, v, r, g, wall), exact = instant("impact")
+    wrt = ["y0", "r", "g", "wall"]
+    sol = ball(r=r, g=g, wall=wall).solve((0, 0.6), [x, v, 0.0], wrt=wrt, **TIGHT)
+    found = np.vstack([sol.derivative()[:2], sol.switches.dt])
+    np.testing.assert_allclose(np.delete(found, 2, axis=1), exact, atol=1e-12)
+
+
+def test_impacts_that_accumulate() -> None:
+    (x, v, s, r, g), exact = instant("accumulation")
+    sol = ball(r=r, g=g).solve((0, 2.5), [x, v, s], wrt=["y0", "r", "g"], **TIGHT)
+    assert sol.switches[-1].kind == "accumulation"
+    np.testing.assert_allclose(sol.switches.dt[-1], exact[0], rtol=1e-7, atol=1e-12)
+    np.testing.assert_allclose(sol.derivative()[2], exact[1], rtol=1e-9)
+    # At rest on the floor nothing depends on how it came there.
+    assert np.array_equal(sol.derivative()[:2], np.zeros((2, 5)))
+
+
+def test_departure_of_a_body_from_a_table_that_shakes() -> None:
+    """It leaves where a w^2 sin(w t) = g, whatever it did before."""
+    a, w, g = 0.2, 10.0, 9.8
+    map_ = lambda t, x, a, w, r: [x[0], a * w * np.cos(w * t) - r * (x[1] - a * w * np.cos(w * t))]  # noqa: E731
+    table = fl.Reset(lambda t, x, a, w: x[0] - a * np.sin(w * t), map_, direction="down")
+    params = {"a": a, "w": w, "g": g, "r": 0.0}
+    system = fl.System(lambda t, x, a, w, g, r: [x[1], -g], n=2, params=params, resets=table)
+    start = [0.01 + a * math.sin(-0.5), a * w * math.cos(-0.5) - 1.5]
+    sol = system.solve((-0.05, 0.3), start, wrt=["y0", "a", "w", "g"], rtol=1e-11, atol=1e-11)
+    lift = next(switch for switch in sol.switches if switch.mode_before.sliding and not switch.mode_after.sliding)
+    leaves = math.asin(g / (a * w**2)) / w
+    assert lift.t == pytest.approx(leaves, abs=1e-9)
+    slope = 1 / (w * math.cos(w * leaves))
+    exact = [0.0, 0.0, -slope * g / (a * w) ** 2, -leaves / w - slope * 2 * g / (a * w**3), slope / (a * w**2)]
+    np.testing.assert_allclose(lift.dt, exact, atol=2e-8)
+    assert np.abs(sol.derivative()[:, :2]).max() < 1e-8
+
+
+def test_flow_goes_over_into_itself_at_every_instant() -> None:
+    """S F- = F+, and det S = a+ / a- at crossings."""
+    case = RUNS["friction_transient"]
+    system = system_of(case)
+    sol = system.solve((0, 14), [1.0, 2.0], wrt="y0", **TIGHT)
+    for switch in sol.switches:
+        before, after = (
+            system.field(switch.t, switch.y_before, mode) for mode in (switch.mode_before, switch.mode_after)
+        )
+        # Time is measured along: the column by t of S is what the gradient by t has; here h = v.
+        np.testing.assert_allclose(switch.saltation @ before, after, atol=1e-11)
+        if switch.kind == "crossing":
+            assert np.linalg.det(switch.saltation) == pytest.approx(after[1] / before[1], abs=1e-12)
+
+
+def test_times_of_events_and_derivatives_by_the_initial_time() -> None:
+    system = system_of(RUNS["friction_transient"])
+    events = [lambda t, x: x[0] - 1.5, lambda t, x, F: x[1] - F]
+
+    def times(t0: float = 0.0, y: float = 1.0, F: float = 0.4) -> Any:
+        return fl.solve_ivp(system, (t0, 14), [y, 2.0], events=events, params={"F": F}, **TIGHT)
+
+    sol = fl.solve_ivp(system, (0, 14), [1.0, 2.0], events=events, wrt=["t0", "y0", "F"], **TIGHT)
+    d = 1e-5
+    for column, name in ((0, "t0"), (1, "y"), (3, "F")):
+        above, below = (times(**{name: {"t0": 0.0, "y": 1.0, "F": 0.4}[name] + s * d}) for s in (1, -1))
+        for found, more, less in zip(sol.dt_events, above.t_events, below.t_events, strict=True):
+            np.testing.assert_allclose(found[:, column], (more - less) / (2 * d), rtol=2e-7, atol=1e-7)
+        ends = (above.y[:, -1] - below.y[:, -1]) / (2 * d)
+        np.testing.assert_allclose(sol.derivative()[:, column], ends, atol=1e-7)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_derivatives_between_steps_are_those_of_runs_that_end_there(method: str) -> None:
+    system = system_of(RUNS["curved_surface"])
+    options = {"wrt": ["y0", "a"], "method": method, "rtol": 1e-10, "atol": 1e-10}
+    sol = system.solve((0, 4.4), [0.0, 0.6, 0.3], **options)
+    assert sol.wrt == ("x[0]", "x[1]", "x[2]", "a")
+    times = [0.5, 0.98, 1.7, 3.1]
+    found = sol.derivative(times)
+    for k, t in enumerate(times):
+        end = system.solve((0, t), [0.0, 0.6, 0.3], **options).derivative()
+        np.testing.assert_allclose(found[..., k], end, atol=1e-7)
+    switch = sol.switches[0]
+    sides = [sol.derivative(switch.t, side) for side in ("left", "right")]
+    x_part, p_part = switch.saltation @ sides[0], switch.saltation_params @ np.array([[0, 0, 0, 1.0]])
+    np.testing.assert_allclose(x_part + p_part, sides[1], atol=1e-10)
+    last = system.solve((0, 4.4), [0.0, 0.6, 0.3], keep="last", **options)
+    assert np.array_equal(last.derivative(), sol.derivative())
+
+
+def touch(t: float, x: Any) -> Any:
+    """Comes to y = 0 from above as (t - 1)^2 / 2 + y(0) - 1/2; below it is drawn back."""
+    return np.where(x[1] > 0, [1.0, x[0], 2.0], [1.0, 1.0, 0.5])
+
+
+def test_where_derivatives_end_is_named() -> None:
+    with pytest.warns(fl.FilippovWarning, match="no_derivative: derivatives are not known from t = 1 on"):
+        sol = fl.solve_ivp(touch, (0, 2), [-1.0, 0.5, 0.0], wrt="y0", **TIGHT)
+    assert np.isnan(sol.derivative()).all()
+    assert np.isfinite(sol.derivative(0.9)).all()
+    assert sol.switches[0].derivative.lost == "grazing"
+
+
+def test_start_on_a_surface_is_named() -> None:
+    with pytest.warns(fl.FilippovWarning, match=r"one_sided: the run starts on x\[0\] = 0"):
+        fl.solve_ivp(lambda t, x: [2.0 + np.sign(x[0])], (0, 2), [0.0], wrt="y0")
+
+
+@pytest.mark.parametrize(
+    ("wrt", "text"),
+    [
+        ("forse", "wrt: 'forse' is none of .* and no parameter; did you mean 'force'"),
+        ([], "wrt: .* is needed, not \\[\\]"),
+        (3, "wrt: .* is needed, not 3"),
+        (["y0", 2], "wrt: .* is needed"),
+    ],
+)
+def test_wrong_names_are_refused(wrt: Any, text: str) -> None:
+    system = fl.System(lambda t, x, force: [-force * np.sign(x[0])], n=1, params={"force": 0.5})
+    with pytest.raises(fl.InputError, match=text):
+        system.solve((0, 1), [1.0], wrt=wrt)
+
+
+def test_what_has_no_derivatives_is_refused() -> None:
+    def called(t: float, x: Any) -> list[float]:
+        return [float(str(float(x[0])))]
+
+    with pytest.raises(fl.InputError, match="wrt: derivatives are those of a traced function"):
+        fl.solve_ivp(called, (0, 1), [1.0], surfaces=[], wrt="y0")
+    smooth = fl.System(lambda t, x: [-x[0]], n=1)
+    with pytest.raises(fl.InputError, match="wrt: .* names nothing"):
+        smooth.solve((0, 1), [1.0], wrt="params")
+    with pytest.raises(fl.InputError, match="wrt: derivatives are followed forward"):
+        smooth.solve((1, 0), [1.0], wrt="y0")
+    with pytest.raises(fl.InputError, match="wrt: derivatives are those of single runs"):
+        smooth.ensemble((0, 1), [[1.0]], wrt="y0")
+    with pytest.raises(fl.ModelError, match="no derivatives were followed"):
+        smooth.solve((0, 1), [1.0]).derivative()
+    kept = pickle.loads(pickle.dumps(smooth.solve((0, 1), [1.0], wrt="y0")))
+    with pytest.raises(fl.ModelError, match="no derivatives were followed"):
+        kept.derivative()
+
+
+def differences(run: Callable[[Any, float], fl.Solution], y0: Any, column: int, d: float) -> list[Any]:
+    """Return the one-sided difference quotients of the end by a component of the start, or the parameter."""
+    found = []
+    for side in (1, -1):
+        start, a = np.array(y0, dtype=float), 0.0
+        if column < len(start):
+            start[column] += side * d
+        else:
+            a = side * d
+        found.append(run(start, a).y[:, -1])
+    middle = run(np.array(y0, dtype=float), 0.0).y[:, -1]
+    return [(found[0] - middle) / d, (middle - found[1]) / d]
+
+
+@pytest.mark.parametrize("first", range(0, 120, 30))
+@pytest.mark.filterwarnings("ignore::filippov.FilippovWarning")
+def test_random_systems_against_differences(first: int) -> None:
+    from fuzz.systems import build, random_case
+
+    compared = 0
+    for seed in range(first, first + 30):
+        problem = build(random_case(seed).source)
+        options = {"rtol": 1e-11, "atol": 1e-11, "max_events": 2000, "max_steps": 20_000}
+
+        def fun(t: float, x: Any, a: float = 0.0, problem: Any = problem) -> list[Any]:
+            rates = problem.rhs(t, x)
+            return [rates[0] + a, *rates[1:]]
+
+        system = fl.System(fun, n=len(problem.y0), params={"a": 0.0}, resets=problem.resets or None)
+
+        def run(start: Any, a: float, system: Any = system, end: float = problem.t_end) -> fl.Solution:
+            return system.solve((0, end), start, params={"a": a}, **options)  # noqa: B023
+
+        sol = system.solve((0, problem.t_end), problem.y0, wrt=["y0", "a"], **options)
+        named = {"one_sided", "no_derivative", "non_unique"} & {warning.code for warning in sol.warnings}
+        if not sol.success or named:
+            continue
+        for column in range(len(problem.y0) + 1):
+            right, left = differences(run, problem.y0, column, 2e-6)
+            middle = 0.5 * (right + left)
+            size = 1 + np.abs(middle).max()
+            # Near a grazing the difference crosses into another itinerary: nothing is compared.
+            if np.abs(right - left).max() < 1e-3 * size:
+                np.testing.assert_allclose(
+                    sol.derivative()[:, column], middle, atol=1e-3 * size, err_msg=f"seed {seed}"
+                )
+                compared += 1
+    assert compared > 60

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from filippov._core import TracedSystem
@@ -38,7 +38,7 @@ class Wanted(NamedTuple):
 
 
 def check_wrt(
-    wrt: Any, states: Sequence[str], params: Mapping[str, float], discrete: Sequence[str]
+    wrt: Any, states: Sequence[str], params: Mapping[str, float], discrete: Collection[str]
 ) -> Wanted:
     """Return by what is differentiated.
 
@@ -51,7 +51,7 @@ def check_wrt(
         Names of the states.
     params : mapping of str to float
         The parameters of the system, its discrete states among them.
-    discrete : sequence of str
+    discrete : collection of str
         Those that are discrete states.
 
     Raises
@@ -95,7 +95,7 @@ def check_wrt(
 
 
 def refuse_without_derivatives(
-    prepared: Prepared, discrete: Sequence[str], t_span: tuple[float, float]
+    prepared: Prepared, discrete: Collection[str], t_span: tuple[float, float]
 ) -> None:
     """Refuse derivatives of what has none.
 

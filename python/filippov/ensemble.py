@@ -17,7 +17,7 @@ from filippov.core_events import CoreEvent, core_events
 from filippov.errors import InputError, Interrupted
 from filippov.events import EventSpec, normalise_events
 from filippov.notices import show_summary
-from filippov.options import OPTIONS, check_options, check_t_span, in_order
+from filippov.options import NOT_FOR_MANY, OPTIONS, check_options, check_t_span, in_order
 from filippov.outputs import at_ends, refuse_outputs_that_fail
 from filippov.prepare import Prepared
 from filippov.sliding_policy import fit_kappa
@@ -236,6 +236,8 @@ def _known(options: Mapping[str, Any], system: System) -> dict[str, Any]:
     for name in ("fun", "surfaces", "args", "resets"):
         if options.get(name) is not None:
             raise InputError(f"{name}: belongs to the System; pass it to fl.System, not to the ensemble")
+    if options.get("wrt") is not None:
+        raise InputError(NOT_FOR_MANY)
     for name in ("nonunique", "progress"):
         if options.get(name) in ("branch", True) or callable(options.get(name)):
             raise InputError(f"{name}: {options[name]!r} is not for an ensemble")

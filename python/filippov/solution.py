@@ -16,6 +16,7 @@ from filippov.arrays import real_array
 from filippov.backward import ReversedRun
 from filippov.derivatives import Wanted
 from filippov.errors import InputError, ModelError
+from filippov.events import EventSpec, selective
 from filippov.modes import Mode
 from filippov.prepare import Prepared
 from filippov.start import StandingRun
@@ -30,6 +31,8 @@ from filippov.switches import (
     import_pandas,
     import_xarray,
 )
+
+from filippov.trace.tracer import trace_output
 
 if TYPE_CHECKING:
     from filippov.branches import Branches
@@ -171,6 +174,8 @@ class _Origin(NamedTuple):
     has_events: bool
     dense_output: bool
     wanted: Wanted | None = None
+    events: tuple[EventSpec, ...] = ()
+    args: tuple[Any, ...] = ()
 
 
 class Solution:
@@ -389,6 +394,27 @@ class Solution:
         """The names of the columns of `derivative`; empty if no derivatives were followed."""
         wanted = self._origin.wanted if hasattr(self, "_origin") else None
         return () if wanted is None else wanted.names
+
+    @property
+    def dt_events(self) -> list[Array]:
+        """Derivatives of the times of every event by the columns of `wrt`, each of shape (k, len(wrt)).
+
+        NaN for an event that is called and not traced. It is a `ModelError` to ask for them of a run without
+        ``wrt=``.
+        """
+        if not self.wrt or not isinstance(self._run, Run):
+            raise ModelError(NO_DERIVATIVES)
+        self._kept_function()
+        origin = self._origin
+        assert origin.prepared.trace is not None
+        found = []
+        for spec, times in zip(origin.events, self._run.t_events, strict=True):
+            g = selective(spec.g, origin.values or {})
+            function = trace_output(origin.prepared.trace, g, origin.args)
+            rows = [] if isinstance(function, str) else self._run.zero_derivatives(function, times)
+            unknown = np.full((len(times), len(self.wrt)), np.nan)
+            found.append(np.array(rows) if len(rows) else unknown)
+        return found
 
     def derivative(self, t: npt.ArrayLike | None = None, side: str = "right") -> Array:
         """Return the derivative of the state by the start and parameters, as asked for with ``wrt=``.

@@ -337,7 +337,10 @@ def _solve(
                 if isinstance(beyond, Run) and ended.stays_where_roots_are(beyond):
                     run, used = beyond, ended
         has_events = specs is not None
-        return _present(run, system, used, options, t0, states, has_events, values, functions, wanted)
+        solution = _present(run, system, used, options, t0, states, has_events, values, functions, wanted)
+        if wanted is not None:
+            solution._origin = solution._origin._replace(events=tuple(specs or ()), args=constants)
+        return solution
 
     solution = follow(())
     if options.nonunique == "branch":

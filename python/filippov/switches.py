@@ -455,7 +455,7 @@ class SegmentTable(Sequence[Segment]):
         return "\n".join([f"{count} segment{'' if count == 1 else 's'}", *lines])
 
 
-def _selected(rows: Sequence[tuple[Any, ...]], index: Any) -> Any:
+def _selected(rows: Sequence[Any], index: Any) -> Any:
     """Return one row, or those of a slice, of a mask, or of an array of indices."""
     if isinstance(index, (np.ndarray, list)):
         places = np.arange(len(rows))[np.asarray(index, dtype=None if len(index) else int)]
