@@ -19,6 +19,7 @@ MOST_METHODS, MOST_FILES = 35, 2  # of the integrator
 ROOMS = (
     ("inspect", "saved"),
     ("integrate",),
+    ("derivative",),
     ("record",),
     ("action",),
     ("event",),

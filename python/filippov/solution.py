@@ -31,7 +31,6 @@ from filippov.switches import (
     import_pandas,
     import_xarray,
 )
-
 from filippov.trace.tracer import trace_output
 
 if TYPE_CHECKING:
@@ -280,9 +279,7 @@ class Solution:
         """
         solution = cls()
         solution._run = run
-        solution._origin = _Origin(
-            system, prepared, values, t0, states, has_events, dense_output, wanted
-        )
+        solution._origin = _Origin(system, prepared, values, t0, states, has_events, dense_output, wanted)
         return solution
 
     @cached_property

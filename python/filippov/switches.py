@@ -160,9 +160,8 @@ class RunWarning(NamedTuple):
         ``"stiff"`` (stability limits the steps of an explicit method), ``"oscillation"`` (sliding on three or
         more surfaces at a root that is not stable for the given ``kappa``), ``"against_direction"`` (the
         surface of a reset was crossed against its direction), ``"unknown_side"`` (a start on the surface of
-        a reset without a direction), ``"one_sided"`` and ``"no_derivative"`` (about derivatives), ``"memory"``
-        (the function assigns values that other calls may read) or
-        ``"max_branches"``.
+        a reset without a direction), ``"one_sided"`` and ``"no_derivative"`` (about derivatives),
+        ``"memory"`` (the function assigns values that other calls may read) or ``"max_branches"``.
     message : str
         What was found, in words.
     candidates : tuple of Mode
@@ -492,7 +491,7 @@ def _switch(row: tuple[Any, ...], derivative: InstantDerivative | None) -> Switc
 
 _WHY_LOST = {
     "grazing": "the motion touches the surface that ends it, and the time of that has no derivative",
-    "one-sided": "several switches come at one time, and their order decides what follows",
+    "one-sided": "several switches come at one time, and their order may decide what follows",
     "accumulation": "the switches before the limit make no rounds that could be extrapolated",
     "unsupported": "sliding of higher order, or rest, begins or ends",
     "not_finite": "a derivative is not finite",
