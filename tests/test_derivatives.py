@@ -286,7 +286,7 @@ def test_what_has_no_derivatives_is_refused() -> None:
     with pytest.raises(fl.InputError, match="wrt: derivatives are those of a traced function"):
         fl.solve_ivp(called, (0, 1), [1.0], surfaces=[], wrt="y0")
     smooth = fl.System(lambda t, x: [-x[0]], n=1)
-    with pytest.raises(fl.InputError, match="wrt: .* names nothing"):
+    with pytest.raises(fl.InputError, match=r"wrt: .* names nothing"):
         smooth.solve((0, 1), [1.0], wrt="params")
     with pytest.raises(fl.InputError, match="wrt: derivatives are followed forward"):
         smooth.solve((1, 0), [1.0], wrt="y0")
