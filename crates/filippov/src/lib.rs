@@ -114,7 +114,7 @@ pub use integrate::{Integrator, Problem};
 pub use mode::{Mode, Signs};
 pub use options::{Keep, Method, NonUnique, Options, SlidingRule, Stabilization};
 pub use record::{
-    as_multiplier, replay_decision, section, Act, DecisionCause, DecisionOutcome, DecisionPoint,
+    as_multiplier, replay_decision, section, DecisionCause, DecisionOutcome, DecisionPoint,
     DecisionRecord, Gradient, Held, InstantRecord, ObservedStep, Observer, Piece, Segment, Side,
     Solution, StartingZero,
 };

@@ -19,10 +19,9 @@ use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::Run;
 use crate::patience::Patience;
-use crate::record::Act;
 use crate::status::Stop;
 use crate::switch::Switch;
-use crate::system::{ActionMap, Trigger};
+use crate::system::{Act, ActionMap, Trigger};
 use crate::tolerances::{AT_SIDE, MOST_ACTIONS_AT_ONE_TIME, ROUNDING};
 
 /// An instant in which actions are done: the place and the motion that ends there.

@@ -8,4 +8,4 @@ pub(crate) use instant::{identity, Instant};
 pub(crate) use quiet::quiet_change;
 pub(crate) use timetable::Timetable;
 
-pub use crate::system::{Action, ActionMap, Actions, Clock, Trigger};
+pub use crate::system::{Act, Action, ActionMap, Actions, Clock, Trigger};

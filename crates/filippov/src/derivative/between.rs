@@ -1,8 +1,8 @@
 //! The derivatives of a run at any of its times, and of the zeros of functions along it.
 
-use super::extended::{extended_system, Extended};
+use super::extended::{extended_system, Column, Extended};
 use super::piece::{dot, Piece, Surroundings};
-use super::tangents::{Column, Derivatives};
+use super::tangents::Derivatives;
 use crate::error::{Error, FieldError};
 use crate::motion::{Law, SmoothField};
 use crate::options::Options;

@@ -2,11 +2,22 @@
 
 use filippov_expr::{Backend, Names, NodeId, Program};
 
-use super::tangents::Column;
 use crate::error::{Error, FieldError};
 use crate::system::{
-    Action, Actions, Definition, PiecewiseSystem, Place, Rules, TracedMap, TracedSystem, Trigger,
+    sides_of, Action, Actions, Definition, PiecewiseSystem, Place, Rules, TracedMap, TracedSystem,
+    Trigger,
 };
+
+/// By what is differentiated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Column {
+    /// A component of the initial state.
+    State(usize),
+    /// The initial time.
+    Start,
+    /// A parameter, by its place among those that the extended system has as states.
+    Parameter(usize),
+}
 
 /// A system with some of its parameters as further states behind those that it has, and the maps of its actions likewise.
 pub struct Extended<'a> {
@@ -50,7 +61,7 @@ impl<'a> Extended<'a> {
                 maps.push(None);
                 continue;
             }
-            let Some(traced) = action.map.traced() else {
+            let Some(traced) = action.map.expressions() else {
                 return Ok(None);
             };
             maps.push(Some(ExtendedMap::new(traced, parameters, n)?));
@@ -177,7 +188,7 @@ impl Definition {
 
 /// The derivative of the map of an action.
 pub(super) struct ExtendedMap<'a> {
-    map: &'a TracedMap,
+    expressions: &'a TracedSystem,
     /// The new states in a direction of (x, q, p), then by the time.
     derivative: Program,
     /// The map of the extended state.
@@ -186,8 +197,7 @@ pub(super) struct ExtendedMap<'a> {
 }
 
 impl<'a> ExtendedMap<'a> {
-    fn new(map: &'a TracedMap, parameters: &[usize], n: usize) -> Result<Self, Error> {
-        let expressions = map.expressions();
+    fn new(expressions: &'a TracedSystem, parameters: &[usize], n: usize) -> Result<Self, Error> {
         let n_all = expressions.n_states();
         let pairs = pairs(parameters, n_all);
         let (mut graph, made) = expressions.graph().with_states_for(&pairs);
@@ -214,7 +224,7 @@ impl<'a> ExtendedMap<'a> {
         let values = expressions.parameters().to_vec();
         let extended = TracedSystem::new(graph, field, values, names, Backend::Interpreter)?;
         Ok(ExtendedMap {
-            map,
+            expressions,
             derivative,
             extended: TracedMap::new(extended),
             n,
@@ -229,10 +239,10 @@ impl<'a> ExtendedMap<'a> {
         values: &[f64],
         columns: &[Vec<f64>],
     ) -> Result<(Vec<Vec<f64>>, Vec<f64>), FieldError> {
-        let expressions = self.map.expressions();
+        let expressions = self.expressions;
         let n_named = expressions.n_states() - self.n;
         let before: Vec<f64> = x.iter().chain(q.iter().take(n_named)).copied().collect();
-        let signs = self.map.signs(t, &before)?;
+        let signs = sides_of(expressions, t, &before)?;
         let z = [&before[..], values].concat();
         let place = Place::new(t, &z, &signs);
         let (mut images, mut by_time) = (Vec::with_capacity(columns.len()), Vec::new());

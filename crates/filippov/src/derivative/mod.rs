@@ -17,6 +17,6 @@ mod radau;
 mod tangents;
 
 pub use between::{Differentiated, EventGradient};
-pub use extended::Extended;
+pub use extended::{Column, Extended};
 pub use instant::{InstantDerivative, Lost};
-pub use tangents::{Column, Derivatives, Tangents};
+pub use tangents::{Derivatives, Tangents};

@@ -1,6 +1,6 @@
 //! The derivatives of a run, as its observer.
 
-use super::extended::Extended;
+use super::extended::{Column, Extended};
 use super::instant::{entered, Instant, InstantDerivative, Lost, Weights};
 use super::limit::{at_its_time, History, Past};
 use super::piece::{Piece, Surroundings};
@@ -10,17 +10,6 @@ use crate::motion::{Law, SmoothField};
 use crate::options::Options;
 use crate::record::{InstantRecord, ObservedStep, Observer};
 use crate::system::{Actions, PiecewiseSystem};
-
-/// By what is differentiated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Column {
-    /// A component of the initial state.
-    State(usize),
-    /// The initial time.
-    Start,
-    /// A parameter, by its place among those that the extended system has as states.
-    Parameter(usize),
-}
 
 /// The derivatives of a run.
 #[derive(Clone, Debug, Default)]
@@ -42,7 +31,7 @@ pub struct Derivatives {
 ///
 /// ```
 /// use filippov::derivative::{Column, Extended, Tangents};
-/// use filippov::expr::{Backend, Graph, Names};
+/// use filippov_expr::{Backend, Graph, Names};
 /// use filippov::{Integrator, Options, Problem, Rules, TracedSystem};
 ///
 /// // x' = -a sign(x) from x = 1: zero is reached at t = 1 / a.
@@ -55,7 +44,8 @@ pub struct Derivatives {
 /// let system = TracedSystem::new(graph, field, vec![2.0], names, Backend::Interpreter)?;
 ///
 /// let problem = Problem::new(&system, (0.0, 1.0), &[1.0]);
-/// let extended = Extended::new(&system, &Rules::default(), &Default::default(), &[0])?.unwrap();
+/// let none = filippov::action::Actions::none();
+/// let extended = Extended::new(&system, &Rules::default(), &none, &[0])?.expect("no map is called");
 /// let options = Options::default();
 /// let impacts = extended.impacts();
 /// let mut tangents = Tangents::new(&extended, &impacts, vec![Column::State(0), Column::Parameter(0)], &options, 1.0);

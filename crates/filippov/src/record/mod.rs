@@ -15,7 +15,7 @@ pub use decision_record::{
 };
 pub use held::{as_multiplier, Held, Piece};
 pub(crate) use observer::Observed;
-pub use observer::{Act, Gradient, InstantRecord, ObservedStep, Observer};
+pub use observer::{Gradient, InstantRecord, ObservedStep, Observer};
 pub(crate) use recorder::Recorder;
 pub(crate) use solution::Step;
 pub use solution::{Segment, Side, Solution};

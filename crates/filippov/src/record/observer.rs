@@ -11,6 +11,7 @@ use crate::error::FieldError;
 use crate::mode::{Mode, Signs};
 use crate::motion::{Guard, Run, SmoothField};
 use crate::stepper::Interpolant;
+use crate::system::Act;
 use crate::tolerances::EPS;
 
 /// An accepted step, or its part before an event.
@@ -61,17 +62,6 @@ pub struct Gradient {
     pub time: f64,
     /// Its derivatives by the states.
     pub state: Vec<f64>,
-}
-
-/// An action that is done in an instant, and what it is done on.
-#[derive(Clone, Debug)]
-pub struct Act {
-    /// The place of the action in the list.
-    pub index: usize,
-    /// The state before.
-    pub x: Vec<f64>,
-    /// The discrete states before.
-    pub discrete: Vec<f64>,
 }
 
 /// An instant in which a motion ends and another one starts. Pairs are before and after.

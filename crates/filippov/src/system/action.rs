@@ -8,7 +8,7 @@
 use super::Clock;
 use crate::error::FieldError;
 use crate::switch::Kind;
-use crate::system::{dot, TracedMap};
+use crate::system::{dot, TracedSystem};
 
 /// When an action happens.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,8 +53,8 @@ pub trait ActionMap: Sync {
         true
     }
 
-    /// The expressions of the map, if it is traced.
-    fn traced(&self) -> Option<&TracedMap> {
+    /// The expressions of the new state, as the field of a system, if the map is traced.
+    fn expressions(&self) -> Option<&TracedSystem> {
         None
     }
 
@@ -128,6 +128,17 @@ pub struct Action<'a> {
     /// How it is recorded: [`Kind::Reset`] or [`Kind::Clock`]; an action that changes nothing but the way
     /// in which the same field is written is not recorded.
     pub kind: Option<Kind>,
+}
+
+/// An action that is done in an instant, and what it is done on.
+#[derive(Clone, Debug)]
+pub struct Act {
+    /// The place of the action in the list.
+    pub index: usize,
+    /// The state before.
+    pub x: Vec<f64>,
+    /// The discrete states before.
+    pub discrete: Vec<f64>,
 }
 
 /// The actions of a run, and the discrete states at its start.

@@ -31,26 +31,6 @@ impl TracedMap {
         x.iter().chain(q.iter().take(n_named)).copied().collect()
     }
 
-    /// The expressions of the new states, as the field of a system.
-    pub fn expressions(&self) -> &TracedSystem {
-        &self.expressions
-    }
-
-    /// The sides on which a state is.
-    pub(crate) fn signs(&self, t: f64, x: &[f64]) -> Result<Vec<f64>, FieldError> {
-        let d = self.expressions.n_surfaces();
-        let mut signs = vec![1.0; d];
-        let mut h = vec![0.0; d];
-        // Switching functions may contain signs of others.
-        for _ in 0..d {
-            self.expressions
-                .surfaces(&Place::new(t, x, &signs), &mut h)?;
-            let sides = h.iter().map(|&h| if h < 0.0 { -1.0 } else { 1.0 });
-            signs = sides.collect();
-        }
-        Ok(signs)
-    }
-
     /// The derivative of x+ - x in a direction that is handed in.
     fn derivative(&self) -> Option<&Program> {
         let made = self.derivative.get_or_init(|| {
@@ -72,15 +52,33 @@ impl TracedMap {
     }
 }
 
+/// The sides of its surfaces on which a state is.
+pub(crate) fn sides_of(
+    expressions: &TracedSystem,
+    t: f64,
+    x: &[f64],
+) -> Result<Vec<f64>, FieldError> {
+    let d = expressions.n_surfaces();
+    let mut signs = vec![1.0; d];
+    let mut h = vec![0.0; d];
+    // Switching functions may contain signs of others.
+    for _ in 0..d {
+        expressions.surfaces(&Place::new(t, x, &signs), &mut h)?;
+        let sides = h.iter().map(|&h| if h < 0.0 { -1.0 } else { 1.0 });
+        signs = sides.collect();
+    }
+    Ok(signs)
+}
+
 impl ActionMap for TracedMap {
-    fn traced(&self) -> Option<&TracedMap> {
-        Some(self)
+    fn expressions(&self) -> Option<&TracedSystem> {
+        Some(&self.expressions)
     }
 
     fn apply(&self, t: f64, x: &mut [f64], _: &[f64], q: &mut [f64]) -> Result<(), FieldError> {
         let before = self.with_named(x, q);
         let mut after = before.clone();
-        let signs = self.signs(t, &before)?;
+        let signs = sides_of(&self.expressions, t, &before)?;
         let place = Place::new(t, &before, &signs);
         self.expressions.field(&place, &mut after)?;
         let (states, named) = after.split_at(x.len());
@@ -103,7 +101,7 @@ impl ActionMap for TracedMap {
             return Ok(());
         };
         let before = self.with_named(x, q);
-        let signs = self.signs(t, &before)?;
+        let signs = sides_of(&self.expressions, t, &before)?;
         let (mut direction, mut change) = (before.clone(), before.clone());
         direction.fill(0.0);
         direction[..x.len()].copy_from_slice(along);

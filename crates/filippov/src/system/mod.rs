@@ -35,7 +35,7 @@ mod tiered;
 mod traced;
 
 pub(crate) use crate::vectors::{dot, dot_magnitude};
-pub use action::{Action, ActionMap, Actions, Trigger};
+pub use action::{Act, Action, ActionMap, Actions, Trigger};
 pub(crate) use activity::surfaces_that_matter;
 pub use affine::{AffineParts, AffineSigns, SingularSliding};
 pub use beside::{eval_off_surface, eval_on_side, move_inside, side_offsets};
@@ -51,6 +51,7 @@ pub use laws::{Law, LawAction, LawMap, Laws, Step};
 pub use lie_derivatives::{LieDerivatives, LieValue, RatePartials, Word};
 pub use linearisation::Linearisation;
 pub use linearisations::Linearisations;
+pub(crate) use map::sides_of;
 pub use map::TracedMap;
 pub(crate) use place::OwnSetting;
 pub use place::{Place, Setting};
