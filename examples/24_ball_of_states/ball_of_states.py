@@ -4,7 +4,7 @@
 
 To first order the ball becomes an ellipse, the image of the circle under the derivative of the state by the
 start. At a crossing the saltation matrix bends it; where the motion begins to stick it loses a dimension: all
-that is left is a line, and behind it every start of the ball moves along one curve. The distance of the states
+that is left is a line, and behind it every start moves along one curve. The distance of the states
 from their ellipse is of second order: it falls by four when the radius is halved.
 
 Run it with ``python examples/24_ball_of_states/ball_of_states.py [picture.png]``.

@@ -1,9 +1,11 @@
 //! Derivatives of a run by what a user names.
 
+use std::sync::Arc;
+
 use filippov::derivative::{
-    Column, Derivatives, Differentiated, EventGradient, Extended, Tangents,
+    Column, Derivatives, Differentiated, EventGradient, Extension, Tangents,
 };
-use filippov::{Error, FieldError, Options, Problem, Rules, Side, Solution};
+use filippov::{Error, FieldError, Options, Problem, Side, Solution};
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -29,16 +31,16 @@ pub struct RunDerivatives {
     found: Derivatives,
     kinds: Vec<Column>,
     parameters: Vec<usize>,
-    rules: Rules,
+    extension: Arc<Extension>,
     options: Options,
 }
 
 /// Runs a traced system, and follows its derivatives.
 pub fn run_with_derivatives(
     problem: Problem<'_>,
-    (system, rules, actions): (
+    (system, extension, actions): (
         &filippov::TracedSystem,
-        &Rules,
+        &Arc<Extension>,
         &filippov::action::Actions<'_>,
     ),
     options: &Options,
@@ -50,7 +52,7 @@ pub fn run_with_derivatives(
         .iter()
         .map(|&(kind, place)| column(kind, place))
         .collect();
-    let extended = Extended::new(system, rules, actions, parameters)?;
+    let extended = extension.at(system.parameters(), actions)?;
     let extended = extended.ok_or(Failure::CalledMap)?;
     let impacts = extended.impacts();
     let mut tangents = Tangents::new(&extended, &impacts, kinds.clone(), options, span);
@@ -62,7 +64,7 @@ pub fn run_with_derivatives(
             found,
             kinds,
             parameters: parameters.clone(),
-            rules: rules.clone(),
+            extension: Arc::clone(extension),
             options: options.clone(),
         },
     ))
@@ -130,7 +132,7 @@ impl RunDerivatives {
         function: &filippov::TracedSystem,
         times: &[f64],
     ) -> PyResult<Vec<Vec<f64>>> {
-        let gradient = EventGradient::new(function, &self.rules, &self.parameters);
+        let gradient = EventGradient::new(function, self.extension.rules(), &self.parameters);
         let gradient = gradient.map_err(|e| PyValueError::new_err(e.to_string()))?;
         self.with(system, solution, |run| {
             let of_zero = |&t: &f64| {
@@ -148,7 +150,7 @@ impl RunDerivatives {
         ask: impl FnOnce(&Differentiated) -> PyResult<R>,
     ) -> PyResult<R> {
         let none = filippov::action::Actions::default();
-        let extended = Extended::new(system, &self.rules, &none, &self.parameters);
+        let extended = self.extension.at(system.parameters(), &none);
         let extended = extended.map_err(|e| PyValueError::new_err(e.to_string()))?;
         let extended = extended.ok_or_else(|| PyValueError::new_err("maps that are not traced"))?;
         ask(&Differentiated {

@@ -3,10 +3,11 @@
 use std::sync::Arc;
 
 use filippov::action::{Action, ActionMap, Actions, Trigger};
+use filippov::derivative::Extension;
 use filippov::section::Section;
 use filippov::{
     replay_decision, DecisionOutcome, DecisionPoint, Error, FieldError, Kind, LawAction, Options,
-    Problem, Rules, Solution, TracedMap, UserEvent, UserFunction,
+    Problem, Solution, TracedMap, UserEvent, UserFunction,
 };
 use pyo3::prelude::*;
 
@@ -106,7 +107,7 @@ impl PreparedRun {
         &self,
         t_span: (f64, f64),
         options: &Options,
-        (rules, wanted): (&Rules, &Wanted),
+        (extension, wanted): (&Arc<Extension>, &Wanted),
         interrupt: &mut dyn FnMut(f64) -> bool,
     ) -> Result<(Solution, RunDerivatives), Failure> {
         let Some(system) = &self.compiled else {
@@ -120,7 +121,7 @@ impl PreparedRun {
         let span = t_span.1 - t_span.0;
         run_with_derivatives(
             problem,
-            (system, rules, &actions),
+            (system, extension, &actions),
             options,
             span,
             wanted,

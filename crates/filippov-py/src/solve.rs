@@ -48,11 +48,12 @@ pub fn solve(
     let (y0, p) = (y0.as_slice()?.to_vec(), p.as_slice()?.to_vec());
     let prepared = PreparedRun::new(&system, t0, y0, p, &events, &actions)?;
     let RunOptions { options, progress } = options;
-    let rules = system
-        .cast::<TracedSystem>()
-        .ok()
-        .map(|traced| traced.get().rules.clone());
-    let wanted = rules.as_ref().zip(wrt.as_ref());
+    let traced = system.cast::<TracedSystem>().ok();
+    let extension = match (&wrt, traced) {
+        (Some(wanted), Some(traced)) => Some(traced.get().extension(&wanted.1)?),
+        _ => None,
+    };
+    let wanted = extension.as_ref().zip(wrt.as_ref());
     let (solution, derivatives) = py
         .detach(|| {
             let mut asked = options.clock.now();

@@ -1,7 +1,8 @@
 //! The systems as Python objects.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
+use filippov::derivative::Extension;
 use filippov::motion::{SlidingField, SmoothField};
 use filippov::{
     Definition, Error, FieldError, Laws, Mode, PiecewiseSystem, Rules, Setting, SignStructure,
@@ -166,12 +167,17 @@ fn checked<'a>(
     Ok((x, signs))
 }
 
+/// Extensions of a system that are remembered.
+const MOST_EXTENSIONS: usize = 8;
+
 /// A system given by a traced expression graph.
 #[pyclass(frozen, module = "filippov._core")]
 pub struct TracedSystem {
     pub system: filippov::TracedSystem,
     /// What it has beside the field.
-    pub rules: Rules,
+    rules: Rules,
+    /// Its extensions by parameters, those asked for last.
+    extensions: Mutex<Vec<(Vec<usize>, Arc<Extension>)>>,
     /// The laws of its discrete states, whose number is that of the last parameters' names.
     pub laws: Arc<Laws>,
     n_visible: usize,
@@ -187,8 +193,27 @@ impl TracedSystem {
             system,
             laws: Arc::new(laws),
             rules,
+            extensions: Mutex::default(),
             n_visible,
         })
+    }
+
+    /// The system with these parameters as further states; made once.
+    pub fn extension(&self, parameters: &[usize]) -> PyResult<Arc<Extension>> {
+        let mut known = self
+            .extensions
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, found)) = known.iter().find(|entry| entry.0 == parameters) {
+            return Ok(Arc::clone(found));
+        }
+        let made = Extension::new(&self.system, &self.rules, parameters).map_err(refused)?;
+        let made = Arc::new(made);
+        if known.len() == MOST_EXTENSIONS {
+            known.remove(0);
+        }
+        known.push((parameters.to_vec(), Arc::clone(&made)));
+        Ok(made)
     }
 
     /// Everything that it was made of.

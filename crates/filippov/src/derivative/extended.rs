@@ -19,7 +19,99 @@ pub enum Column {
     Parameter(usize),
 }
 
-/// A system with some of its parameters as further states behind those that it has, and the maps of its actions likewise.
+/// A system with some of its parameters as further states behind those that it has, for all values of them.
+pub struct Extension {
+    system: TracedSystem,
+    rules: Rules,
+    /// How many states the system has itself.
+    n: usize,
+    parameters: Vec<usize>,
+    /// What each node of the system has become.
+    made: Vec<NodeId>,
+}
+
+impl Extension {
+    /// The extension of a system by these parameters.
+    ///
+    /// # Errors
+    /// If an expression cannot be compiled.
+    pub fn new(system: &TracedSystem, rules: &Rules, parameters: &[usize]) -> Result<Self, Error> {
+        let n = system.n_states();
+        let definition = Definition::of(system, rules);
+        let (system, made) = definition.extended(&pairs(parameters, n))?;
+        Ok(Extension {
+            system,
+            rules: rules.clone(),
+            n,
+            parameters: parameters.to_vec(),
+            made,
+        })
+    }
+
+    /// What the system has beside its field.
+    pub fn rules(&self) -> &Rules {
+        &self.rules
+    }
+
+    /// With the values of all parameters of the system, and the actions of a run; `None` if the map of one is not traced.
+    ///
+    /// # Errors
+    /// If an expression cannot be compiled.
+    pub fn at<'a>(
+        &self,
+        values: &[f64],
+        actions: &'a Actions,
+    ) -> Result<Option<Extended<'a>>, Error> {
+        let mut maps = Vec::with_capacity(actions.list.len());
+        let mut clocks = Vec::with_capacity(actions.list.len());
+        for action in &actions.list {
+            let is_timed = !matches!(action.trigger, Trigger::Surface { .. } | Trigger::Jump);
+            let law = action.map.law().filter(|_| is_timed);
+            clocks.push(match law {
+                Some(law) => self.clock_of(law)?,
+                None => None,
+            });
+            if !action.map.moves_state() {
+                maps.push(None);
+                continue;
+            }
+            let Some(traced) = action.map.expressions() else {
+                return Ok(None);
+            };
+            maps.push(Some(ExtendedMap::new(traced, &self.parameters, self.n)?));
+        }
+        let triggers = actions.list.iter().map(|action| action.trigger.clone());
+        Ok(Some(Extended {
+            values: self.parameters.iter().map(|&i| values[i]).collect(),
+            system: self.system.with_parameters(values.to_vec()),
+            n: self.n,
+            maps,
+            triggers: triggers.collect(),
+            clocks,
+        }))
+    }
+
+    /// The derivatives of what a law reads, by the time and by the parameters that have become states.
+    fn clock_of(&self, law: usize) -> Result<Option<Program>, Error> {
+        let Some(&argument) = self.rules.laws[law].nodes().first() else {
+            return Ok(None);
+        };
+        let mut graph = self.system.graph().clone();
+        let gradient = graph.gradient(self.made[argument.index()]);
+        let zero = graph.constant(0.0);
+        let by_state = |state: u32| {
+            let found = gradient.states.iter().find(|entry| entry.0 == state);
+            found.map_or(zero, |entry| entry.1)
+        };
+        let mut outputs = vec![gradient.time];
+        let states = pairs(&self.parameters, self.n);
+        outputs.extend(states.into_iter().map(|(_, state)| by_state(state)));
+        let program = Program::compile(&graph, &outputs, Backend::Interpreter)?;
+        Ok(Some(program))
+    }
+}
+
+/// An extended system with the values of a run, and the maps of its actions.
 pub struct Extended<'a> {
     pub(super) system: TracedSystem,
     /// How many states the system has itself.
@@ -33,53 +125,7 @@ pub struct Extended<'a> {
     clocks: Vec<Option<Program>>,
 }
 
-impl<'a> Extended<'a> {
-    /// The extension of a system by these parameters, with the actions of a run; `None` if the map of an action is not traced.
-    ///
-    /// # Errors
-    /// If an expression cannot be compiled.
-    pub fn new(
-        system: &TracedSystem,
-        rules: &Rules,
-        actions: &'a Actions,
-        parameters: &[usize],
-    ) -> Result<Option<Self>, Error> {
-        let n = system.n_states();
-        let pairs = pairs(parameters, n);
-        let (extended, made) = Definition::of(system, rules).extended(&pairs)?;
-        let mut maps = Vec::with_capacity(actions.list.len());
-        let mut clocks = Vec::with_capacity(actions.list.len());
-        for action in &actions.list {
-            let is_timed = !matches!(action.trigger, Trigger::Surface { .. } | Trigger::Jump);
-            let law = action.map.law().filter(|_| is_timed);
-            let argument = law.and_then(|law| rules.laws[law].nodes().first().copied());
-            clocks.push(match argument {
-                Some(argument) => Some(clock_of(&extended, made[argument.index()], &pairs)?),
-                None => None,
-            });
-            if !action.map.moves_state() {
-                maps.push(None);
-                continue;
-            }
-            let Some(traced) = action.map.expressions() else {
-                return Ok(None);
-            };
-            maps.push(Some(ExtendedMap::new(traced, parameters, n)?));
-        }
-        Ok(Some(Extended {
-            values: parameters.iter().map(|&i| system.parameters()[i]).collect(),
-            system: extended.with_parameters(system.parameters().to_vec()),
-            n,
-            maps,
-            triggers: actions
-                .list
-                .iter()
-                .map(|action| action.trigger.clone())
-                .collect(),
-            clocks,
-        }))
-    }
-
+impl Extended<'_> {
     /// The actions that may be impacts, with maps of the extended state: those of contacts.
     pub fn impacts(&self) -> Actions<'_> {
         let all = self.maps.iter().zip(&self.triggers);
@@ -138,24 +184,6 @@ pub(super) fn extended_system(
     let pairs = pairs(parameters, system.n_states());
     let (extended, _) = Definition::of(system, rules).extended(&pairs)?;
     Ok(extended.with_parameters(system.parameters().to_vec()))
-}
-
-/// The derivatives of the argument of a clock, by the time and by parameters that have become states.
-fn clock_of(
-    extended: &TracedSystem,
-    argument: NodeId,
-    pairs: &[(u32, u32)],
-) -> Result<Program, Error> {
-    let mut graph = extended.graph().clone();
-    let gradient = graph.gradient(argument);
-    let zero = graph.constant(0.0);
-    let by_state = |&(_, state): &(u32, u32)| {
-        let found = gradient.states.iter().find(|entry| entry.0 == state);
-        found.map_or(zero, |entry| entry.1)
-    };
-    let mut outputs = vec![gradient.time];
-    outputs.extend(pairs.iter().map(by_state));
-    Ok(Program::compile(&graph, &outputs, Backend::Interpreter)?)
 }
 
 /// Parameters with the states that they become, behind n others.

@@ -17,6 +17,6 @@ mod radau;
 mod tangents;
 
 pub use between::{Differentiated, EventGradient};
-pub use extended::{Column, Extended};
+pub use extended::{Column, Extended, Extension};
 pub use instant::{InstantDerivative, Lost};
 pub use tangents::{Derivatives, Tangents};

@@ -30,7 +30,7 @@ pub struct Derivatives {
 /// # Example
 ///
 /// ```
-/// use filippov::derivative::{Column, Extended, Tangents};
+/// use filippov::derivative::{Column, Extension, Tangents};
 /// use filippov_expr::{Backend, Graph, Names};
 /// use filippov::{Integrator, Options, Problem, Rules, TracedSystem};
 ///
@@ -45,7 +45,8 @@ pub struct Derivatives {
 ///
 /// let problem = Problem::new(&system, (0.0, 1.0), &[1.0]);
 /// let none = filippov::action::Actions::none();
-/// let extended = Extended::new(&system, &Rules::default(), &none, &[0])?.expect("no map is called");
+/// let extension = Extension::new(&system, &Rules::default(), &[0])?;
+/// let extended = extension.at(system.parameters(), &none)?.expect("no map is called");
 /// let options = Options::default();
 /// let impacts = extended.impacts();
 /// let mut tangents = Tangents::new(&extended, &impacts, vec![Column::State(0), Column::Parameter(0)], &options, 1.0);
