@@ -18,7 +18,7 @@ use crate::system::{
 use crate::tolerances::{EPS, ROUNDING};
 
 /// Largest part of a step, in units of 1 / |Df|; stiff steps are not divided into more than so many parts.
-const LONGEST_PART: f64 = 1.0;
+const LONGEST_PART: f64 = 2.0;
 const MOST_PARTS: f64 = 16.0;
 
 /// What a motion follows from, beside its mode and discrete states.
@@ -142,18 +142,13 @@ impl<'a> Piece<'a> {
         (t0, t1): (f64, f64),
         columns: &mut [Vec<f64>],
     ) -> Result<(), FieldError> {
-        let whole = self.slopes_at_nodes(&mut path, t0, t1)?;
-        let n = self.extended.n;
-        let steepest = whole
-            .iter()
-            .map(|slopes| slopes.norm(n))
-            .fold(0.0, f64::max);
-        let parts = ((t1 - t0) * steepest / LONGEST_PART)
-            .ceil()
-            .clamp(1.0, MOST_PARTS);
-        if parts == 1.0 || !parts.is_finite() {
-            return self.step(&whole, t1 - t0, columns);
-        }
+        let middle = 0.5 * (t0 + t1);
+        let mut z = self.extended.state(&vec![0.0; self.extended.n]);
+        path(middle, &mut z[..self.extended.n])?;
+        let steepest = self.slopes(middle, &z)?.norm(self.extended.n);
+        let parts = ((t1 - t0) * steepest / LONGEST_PART).ceil();
+        // NaN becomes one part, and stays NaN.
+        let parts = parts.clamp(1.0, MOST_PARTS).max(1.0);
         let dt = (t1 - t0) / parts;
         for part in 0..parts as usize {
             let start = t0 + part as f64 * dt;
