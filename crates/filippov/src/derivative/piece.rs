@@ -18,7 +18,7 @@ use crate::system::{
 use crate::tolerances::{EPS, ROUNDING};
 
 /// Largest part of a step, in units of 1 / |Df|; stiff steps are not divided into more than so many parts.
-const LONGEST_PART: f64 = 2.0;
+const LONGEST_PART: f64 = 1.0;
 const MOST_PARTS: f64 = 16.0;
 
 /// What a motion follows from, beside its mode and discrete states.
