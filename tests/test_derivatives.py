@@ -195,6 +195,28 @@ def test_departure_of_a_body_from_a_table_that_shakes() -> None:
     assert np.abs(sol.derivative()[:, :2]).max() < 1e-8
 
 
+def test_static_friction_breaks_away_with_a_jump() -> None:
+    """Arrival is an entry; at the break-away the field jumps, so that the saltation matrix is not the identity."""
+
+    def fun(t: float, x: Any, mu: float, ratio: float, v: float) -> list[Any]:
+        return [x[1], -x[0] - mu * fl.stick(x[1] - v, ratio)]
+
+    values = {"mu": 0.5, "ratio": 1.6, "v": 0.3}
+    system = fl.System(fun, n=2, params=values)
+    sol = system.solve((0, 14), [1.4, 0.1], wrt="all", rtol=1e-11, atol=1e-11)
+    assert sol.switches.kind.tolist() == ["enter_sliding", "exit_sliding", "enter_sliding"]
+    assert np.abs(sol.switches[1].saltation - np.eye(2)).max() > 0.1
+    # At the break-away x = -mu ratio.
+    assert sol.switches[1].y_before[0] == pytest.approx(-0.8, abs=1e-9)
+    for name, start in values.items():
+        above, below = (
+            system.solve((0, 14), [1.4, 0.1], params={name: start + d}, rtol=1e-11, atol=1e-11).y[:, -1]
+            for d in (1e-6, -1e-6)
+        )
+        column = sol.derivative()[:, sol.wrt.index(name)]
+        np.testing.assert_allclose(column, (above - below) / 2e-6, atol=1e-7)
+
+
 def test_flow_goes_over_into_itself_at_every_instant() -> None:
     """S F- = F+, and det S = a+ / a- at crossings."""
     case = RUNS["friction_transient"]

@@ -98,7 +98,7 @@ impl Weights {
 }
 
 /// A function that fixes the time of an instant: its derivatives by time and by the extended state.
-struct Clockwork {
+struct Timing {
     time: f64,
     state: Vec<f64>,
 }
@@ -206,20 +206,20 @@ impl Instant<'_, '_> {
         weights: &Weights,
         columns: &[Vec<f64>],
         condition: &mut f64,
-    ) -> Result<Result<(Clockwork, Vec<f64>), Lost>, FieldError> {
+    ) -> Result<Result<(Timing, Vec<f64>), Lost>, FieldError> {
         let record = self.record;
-        let clockwork = match record.guards {
+        let timing = match record.guards {
             [] => self.known_time(),
-            [guard, ..] => self.clockwork(*guard)?,
+            [guard, ..] => self.timing(*guard)?,
         };
         let field = record.field[0];
-        let states = &clockwork.state[..self.extended.n];
+        let states = &timing.state[..self.extended.n];
         if !record.guards.is_empty() {
-            *condition = weights.condition(record.x[0], (clockwork.time, states), field);
+            *condition = weights.condition(record.x[0], (timing.time, states), field);
         } else {
             *condition = 1.0;
         }
-        let rate = clockwork.time + dot(&clockwork.state, field);
+        let rate = timing.time + dot(&timing.state, field);
         // Where the motion is tangent the time has no derivative. A touch is located to the square root of rounding.
         let touches = record.acts.is_empty() && record.mode[0] == record.mode[1];
         let most = if touches { AT_SIDE } else { ROUNDING };
@@ -227,9 +227,9 @@ impl Instant<'_, '_> {
         if !is_regular {
             return Ok(Err(Lost::Grazing));
         }
-        let shift = |column: &Vec<f64>| -dot(&clockwork.state, column) / rate;
+        let shift = |column: &Vec<f64>| -dot(&timing.state, column) / rate;
         let dt = columns.iter().map(shift).collect();
-        Ok(Ok((clockwork, dt)))
+        Ok(Ok((timing, dt)))
     }
 
     /// The derivatives of the time by the columns; `None` where there are none.
@@ -243,41 +243,41 @@ impl Instant<'_, '_> {
     }
 
     /// What fixes a known time: the clock that ticks, or the time alone.
-    fn known_time(&self) -> Clockwork {
+    fn known_time(&self) -> Timing {
         let (t, z) = (self.record.t[0], self.extended.state(self.record.x[0]));
         let place = self.before.at(t, &z);
         let mut acts = self.record.acts.iter();
         let clock = acts.find_map(|act| self.extended.clock(act.index, &place));
         let (time, state) = clock.unwrap_or_else(|| (1.0, vec![0.0; z.len()]));
-        Clockwork { time, state }
+        Timing { time, state }
     }
 
     /// The gradient of a guard of the motion before.
-    fn clockwork(&mut self, guard: Guard) -> Result<Clockwork, FieldError> {
+    fn timing(&mut self, guard: Guard) -> Result<Timing, FieldError> {
         let (t, z) = (self.record.t[0], self.extended.state(self.record.x[0]));
         let mut state = vec![0.0; z.len()];
         let system = &self.extended.system;
         match guard {
             Guard::Surface(j) => {
                 let time = system.gradient(j, &self.before.at(t, &z), &mut state)?;
-                return Ok(Clockwork { time, state });
+                return Ok(Timing { time, state });
             }
             Guard::Multiplier { surface, .. } if !system.sticks_at(surface) => {
                 if let Some((time, state)) = self.before.multiplier_slopes(surface, t, &z)? {
-                    return Ok(Clockwork { time, state });
+                    return Ok(Timing { time, state });
                 }
             }
             _ => {}
         }
-        self.clockwork_by_differences(guard, t, &z)
+        self.timing_by_differences(guard, t, &z)
     }
 
-    fn clockwork_by_differences(
+    fn timing_by_differences(
         &mut self,
         guard: Guard,
         t: f64,
         z: &[f64],
-    ) -> Result<Clockwork, FieldError> {
+    ) -> Result<Timing, FieldError> {
         let field = &mut self.before.field;
         let place = field.guards().iter().position(|g| *g == guard);
         let mut value = |t: f64, z: &[f64]| -> Result<f64, FieldError> {
@@ -296,7 +296,7 @@ impl Instant<'_, '_> {
         }
         let d = reach(t);
         let time = (value(t + d, z)? - value(t - d, z)?) / (2.0 * d);
-        Ok(Clockwork { time, state })
+        Ok(Timing { time, state })
     }
 
     /// Does the same field go on? So it is at the end of a multiplier where nothing else changes.
@@ -405,22 +405,22 @@ pub(super) fn entered(
         return Ok(None);
     }
     let normals = sliding.normals(t, z)?;
-    let (mut kept, mut new) = (Sheaf::default(), Sheaf::default());
+    let (mut kept, mut new) = (Jumps::default(), Jumps::default());
     for (&j, normal) in sliding.sliding.iter().zip(normals) {
         let above = sliding.corner(t, z, &[(j, 1.0)])?;
         let below = sliding.corner(t, z, &[(j, -1.0)])?;
         let jump = above.iter().zip(&below).map(|(a, b)| a - b).collect();
-        let sheaf = if slid_on.contains(&j) {
+        let side = if slid_on.contains(&j) {
             &mut kept
         } else {
             &mut new
         };
-        sheaf.jumps.push(jump);
-        sheaf.normals.push(normal);
+        side.changes.push(jump);
+        side.normals.push(normal);
     }
-    let along_kept: Vec<&[f64]> = kept.jumps.iter().map(|jump| &jump[..n]).collect();
-    remove_along(&along_kept, &kept.normals, &mut new.jumps);
-    let directions: Vec<&[f64]> = new.jumps.iter().map(|jump| &jump[..n]).collect();
+    let along_kept: Vec<&[f64]> = kept.changes.iter().map(|jump| &jump[..n]).collect();
+    remove_along(&along_kept, &kept.normals, &mut new.changes);
+    let directions: Vec<&[f64]> = new.changes.iter().map(|jump| &jump[..n]).collect();
     let mut columns = columns.to_vec();
     remove_along(&directions, &new.normals, &mut columns);
     Ok(Some(columns))
@@ -428,8 +428,8 @@ pub(super) fn entered(
 
 /// Surfaces with the jumps of the field there.
 #[derive(Default)]
-struct Sheaf {
-    jumps: Vec<Vec<f64>>,
+struct Jumps {
+    changes: Vec<Vec<f64>>,
     normals: Vec<Vec<f64>>,
 }
 
