@@ -491,7 +491,7 @@ def _switch(row: tuple[Any, ...], derivative: InstantDerivative | None) -> Switc
 
 _WHY_LOST = {
     "grazing": "the motion touches the surface that ends it, and the time of that has no derivative",
-    "one-sided": "several switches come at one time, and their order may decide what follows",
+    "one-sided": "several switches come at one time, and the derivative depends on their order",
     "accumulation": "the switches before the limit make no rounds that could be extrapolated",
     "unsupported": "sliding of higher order, or rest, begins or ends",
     "not_finite": "a derivative is not finite",

@@ -98,7 +98,8 @@ impl Graph {
         Ok(Graph::made_of(&nodes, &functions, &switches, &absolute))
     }
 
-    /// The same graph with states in the place of some parameters, given as pairs, and the node that each of its nodes has become.
+    /// Makes the graph again. The second number of each pair is the state that replaces the parameter with the first number. Returns the
+    /// new graph, and for each old node the new one.
     pub fn with_states_for(&self, parameters: &[(u32, u32)]) -> (Graph, Vec<NodeId>) {
         let replaced = |node: &Node| match *node {
             Node::Parameter(index) => {

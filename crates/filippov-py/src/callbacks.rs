@@ -269,7 +269,7 @@ impl EventExpression {
         self.with_parameters(p, level_along, f)
     }
 
-    /// What `f` tells of the given parameters and the two whole numbers of each level, which reads those before it.
+    /// Calls `f` with the given parameters and, behind them, the two whole numbers of each level. A level reads those before it.
     fn with_parameters<R>(
         &self,
         p: &[f64],

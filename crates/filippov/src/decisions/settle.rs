@@ -56,8 +56,8 @@ pub(super) fn settle(
     settle_by_rules(at, notes, meeting)
 }
 
-/// The motion after one surface of higher relative degree, where the first derivative of h along the fields of both sides tells that
-/// it is crossed.
+/// The motion after one surface of higher relative degree. The motion crosses it if h has a first derivative of the same sign along the
+/// fields of both sides.
 fn cross_alone(
     at: &Point,
     notes: &mut Notes,

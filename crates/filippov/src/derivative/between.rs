@@ -7,7 +7,7 @@ use crate::error::{Error, FieldError};
 use crate::motion::{Law, SmoothField};
 use crate::options::Options;
 use crate::record::{Side, Solution};
-use crate::system::{Actions, PiecewiseSystem, Rules, Setting, TracedSystem};
+use crate::system::{sides_of, Actions, PiecewiseSystem, Rules, Setting, TracedSystem};
 
 /// A run with its derivatives.
 pub struct Differentiated<'r> {
@@ -159,16 +159,7 @@ impl EventGradient {
     /// The derivatives by the time and by the extended state on the side that the point lies on; NaN where there are none.
     fn at(&self, t: f64, z: &[f64], q: &[f64]) -> Result<(f64, Vec<f64>), FieldError> {
         let system = &self.extended;
-        let mut signs = vec![1.0; system.n_surfaces()];
-        let mut h = signs.clone();
-        // Switching functions may contain signs of others.
-        for _ in 0..signs.len() {
-            system.surfaces(&Setting::new(&signs, q).at(t, z), &mut h)?;
-            signs = h
-                .iter()
-                .map(|h| if *h < 0.0 { -1.0 } else { 1.0 })
-                .collect();
-        }
+        let signs = sides_of(system, (t, z), q)?;
         let linearisations = system.linearisations();
         let known = linearisations.and_then(|known| Some((known, known.motion_jacobian(&[])?)));
         let Some((known, jacobian)) = known else {

@@ -194,8 +194,8 @@ fn pairs(parameters: &[usize], n: usize) -> Vec<(u32, u32)> {
 }
 
 impl Definition {
-    /// The system with states in the place of some parameters, given as pairs, that rest, and what each node has become. Its laws
-    /// change nothing: the discrete states are given.
+    /// Makes a system in which the second number of each pair is a state that rests, and replaces the parameter with the first number.
+    /// Returns it with the new node for each old one. It has no laws: the caller hands in the discrete states.
     fn extended(&self, parameters: &[(u32, u32)]) -> Result<(TracedSystem, Vec<NodeId>), Error> {
         let (mut graph, made) = self.graph.with_states_for(parameters);
         let still = graph.constant(0.0);
@@ -270,7 +270,7 @@ impl<'a> ExtendedMap<'a> {
         let expressions = self.expressions;
         let n_named = expressions.n_states() - self.n;
         let before: Vec<f64> = x.iter().chain(q.iter().take(n_named)).copied().collect();
-        let signs = sides_of(expressions, t, &before)?;
+        let signs = sides_of(expressions, (t, &before), &[])?;
         let z = [&before[..], values].concat();
         let place = Place::new(t, &z, &signs);
         let (mut images, mut by_time) = (Vec::with_capacity(columns.len()), Vec::new());

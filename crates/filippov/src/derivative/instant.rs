@@ -6,7 +6,7 @@ use crate::error::FieldError;
 use crate::motion::{Guard, ModeField};
 use crate::record::InstantRecord;
 use crate::system::{PiecewiseSystem, SignStructure};
-use crate::tolerances::{AT_SIDE, EPS, ROUNDING};
+use crate::tolerances::{AT_SIDE, ROUNDING};
 
 /// Why derivatives are not known from an instant on: they are NaN.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -269,33 +269,7 @@ impl Instant<'_, '_> {
             }
             _ => {}
         }
-        self.timing_by_differences(guard, t, &z)
-    }
-
-    fn timing_by_differences(
-        &mut self,
-        guard: Guard,
-        t: f64,
-        z: &[f64],
-    ) -> Result<Timing, FieldError> {
-        let field = &mut self.before.field;
-        let place = field.guards().iter().position(|g| *g == guard);
-        let mut value = |t: f64, z: &[f64]| -> Result<f64, FieldError> {
-            let exits = field.exits_at(t, &mut z.to_vec())?;
-            Ok(place.map_or(f64::NAN, |place| exits[place]))
-        };
-        let reach = |v: f64| EPS.cbrt() * (1.0 + v.abs());
-        let mut state = vec![0.0; z.len()];
-        for (i, entry) in state.iter_mut().enumerate() {
-            let d = reach(z[i]);
-            let mut moved = z.to_vec();
-            moved[i] = z[i] + d;
-            let above = value(t, &moved)?;
-            moved[i] = z[i] - d;
-            *entry = (above - value(t, &moved)?) / (2.0 * d);
-        }
-        let d = reach(t);
-        let time = (value(t + d, z)? - value(t - d, z)?) / (2.0 * d);
+        let time = self.before.field.gradient_of(guard, t, &z, &mut state)?;
         Ok(Timing { time, state })
     }
 

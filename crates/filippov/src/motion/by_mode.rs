@@ -6,7 +6,7 @@ use std::ops::{Deref, DerefMut};
 use smallvec::SmallVec;
 
 use super::duties::Exits;
-use super::guard::Guards;
+use super::guard::{Guard, Guards};
 use super::{
     ContactField, IntersectionField, Motion, Projector, RegionField, RestField, SlidingField,
     SmoothField,
@@ -15,6 +15,7 @@ use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::options::{Options, SlidingRule};
 use crate::system::{OwnSetting, PiecewiseSystem, Setting};
+use crate::tolerances::EPS;
 
 /// The motion of a mode, whatever its kind.
 pub(crate) enum ModeField<'a> {
@@ -108,6 +109,38 @@ impl<'a> ModeField<'a> {
 }
 
 impl ModeField<'_> {
+    /// The gradient of a guard by central differences: writes its derivatives by the states, and returns that by time. NaN if the
+    /// motion has no such guard.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub(crate) fn gradient_of(
+        &mut self,
+        guard: Guard,
+        t: f64,
+        x: &[f64],
+        state: &mut [f64],
+    ) -> Result<f64, FieldError> {
+        let place = self.guards().iter().position(|g| *g == guard);
+        let mut value = |t: f64, x: &[f64]| -> Result<f64, FieldError> {
+            let exits = self.exits_at(t, &mut x.to_vec())?;
+            Ok(place.map_or(f64::NAN, |place| exits[place]))
+        };
+        let reach = |v: f64| EPS.cbrt() * (1.0 + v.abs());
+        let mut moved = x.to_vec();
+        for (i, entry) in state.iter_mut().enumerate() {
+            let d = reach(x[i]);
+            moved[i] = x[i] + d;
+            let above = value(t, &moved)?;
+            moved[i] = x[i] - d;
+            let below = value(t, &moved)?;
+            moved[i] = x[i];
+            *entry = (above - below) / (2.0 * d);
+        }
+        let d = reach(t);
+        Ok((value(t + d, x)? - value(t - d, x)?) / (2.0 * d))
+    }
+
     /// Takes over the discrete states that an action left.
     pub(crate) fn set_discrete(&mut self, q: &[f64]) {
         match self {

@@ -12,7 +12,6 @@ use crate::mode::{Mode, Signs};
 use crate::motion::{Guard, Run, SmoothField};
 use crate::stepper::Interpolant;
 use crate::system::Act;
-use crate::tolerances::EPS;
 
 /// An accepted step, or its part before an event.
 #[derive(Clone, Copy, Debug)]
@@ -229,34 +228,8 @@ fn gradient_of(run: &mut Run, guard: Guard, state: &mut [f64]) -> Result<f64, Fi
             let rate = system.rate_gradient(j, &place.with_signs(&side), state)?;
             (-f64::from(end), rate.time)
         }
-        _ => return gradient_by_differences(run, guard, state),
+        _ => return run.motion.field.gradient_of(guard, run.t, &run.x, state),
     };
     state.iter_mut().for_each(|entry| *entry *= sense);
     Ok(sense * time)
-}
-
-/// The same by central differences.
-fn gradient_by_differences(
-    run: &mut Run,
-    guard: Guard,
-    state: &mut [f64],
-) -> Result<f64, FieldError> {
-    let (t, mut x, field) = (run.t, run.x.clone(), &mut run.motion.field);
-    let place = field.guards().iter().position(|g| *g == guard);
-    let mut value = |t: f64, x: &mut [f64]| -> Result<f64, FieldError> {
-        let exits = field.exits_at(t, x)?;
-        Ok(place.map_or(f64::NAN, |place| exits[place]))
-    };
-    let reach = |v: f64| EPS.cbrt() * (1.0 + v.abs());
-    for (i, entry) in state.iter_mut().enumerate() {
-        let (centre, d) = (x[i], reach(x[i]));
-        x[i] = centre + d;
-        let above = value(t, &mut x)?;
-        x[i] = centre - d;
-        let below = value(t, &mut x)?;
-        x[i] = centre;
-        *entry = (above - below) / (2.0 * d);
-    }
-    let d = reach(t);
-    Ok((value(t + d, &mut x)? - value(t - d, &mut x)?) / (2.0 * d))
 }

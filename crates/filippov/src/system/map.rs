@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use filippov_expr::{Backend, NodeId, Program};
 
-use super::{PiecewiseSystem, Place, TracedSystem};
+use super::{PiecewiseSystem, Place, Setting, TracedSystem};
 use crate::error::FieldError;
 use crate::system::ActionMap;
 
@@ -55,15 +55,15 @@ impl TracedMap {
 /// The sides of its surfaces on which a state is.
 pub(crate) fn sides_of(
     expressions: &TracedSystem,
-    t: f64,
-    x: &[f64],
+    (t, x): (f64, &[f64]),
+    q: &[f64],
 ) -> Result<Vec<f64>, FieldError> {
     let d = expressions.n_surfaces();
     let mut signs = vec![1.0; d];
     let mut h = vec![0.0; d];
     // Switching functions may contain signs of others.
     for _ in 0..d {
-        expressions.surfaces(&Place::new(t, x, &signs), &mut h)?;
+        expressions.surfaces(&Setting::new(&signs, q).at(t, x), &mut h)?;
         let sides = h.iter().map(|&h| if h < 0.0 { -1.0 } else { 1.0 });
         signs = sides.collect();
     }
@@ -78,7 +78,7 @@ impl ActionMap for TracedMap {
     fn apply(&self, t: f64, x: &mut [f64], _: &[f64], q: &mut [f64]) -> Result<(), FieldError> {
         let before = self.with_named(x, q);
         let mut after = before.clone();
-        let signs = sides_of(&self.expressions, t, &before)?;
+        let signs = sides_of(&self.expressions, (t, &before), &[])?;
         let place = Place::new(t, &before, &signs);
         self.expressions.field(&place, &mut after)?;
         let (states, named) = after.split_at(x.len());
@@ -101,7 +101,7 @@ impl ActionMap for TracedMap {
             return Ok(());
         };
         let before = self.with_named(x, q);
-        let signs = sides_of(&self.expressions, t, &before)?;
+        let signs = sides_of(&self.expressions, (t, &before), &[])?;
         let (mut direction, mut change) = (before.clone(), before.clone());
         direction.fill(0.0);
         direction[..x.len()].copy_from_slice(along);

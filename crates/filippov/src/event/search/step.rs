@@ -173,7 +173,7 @@ impl StepSearch<'_, '_> {
             let place = self.run.motion.setting().at(self.run.t, &self.run.x);
             self.run.system.gradient(j, &place, &mut gradient)?;
             let tolerance = self.run.scale.along(&gradient, &self.run.x);
-            // Where a root begins, its slope is infinite: the tolerance tells nothing there.
+            // Where a root begins, its slope is infinite, and so is the tolerance: then nothing counts as near.
             let is_near = tolerance.is_finite() && m.value <= tolerance;
             if m.rate < 0.0 && is_near {
                 return Ok(Some(Found::here(smallvec![m.guard])));
