@@ -23,13 +23,14 @@ def test_the_code_of_a_page_runs_and_prints_what_stands_there(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pyplot = pytest.importorskip("matplotlib.pyplot")
-    for library in ("scipy", "pandas", "xarray"):
+    text = page.read_text(encoding="utf-8")
+    for library in ("scipy", "pandas", "xarray", *(["jax"] if "import jax" in text else [])):
         pytest.importorskip(library)
     pyplot.switch_backend("Agg")
     run_blocks(page, tmp_path)
     pyplot.close("all")
     drawn = {path.name for path in tmp_path.glob("*.png")}
-    shown = set(re.findall(r"!\[[^]]*\]\(([^)/]*\.png)\)", page.read_text(encoding="utf-8")))
+    shown = set(re.findall(r"!\[[^]]*\]\(([^)/]*\.png)\)", text))
     assert drawn == shown
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -226,7 +227,7 @@ def test_a_sweep_has_outputs_at_the_ends(system: fl.System) -> None:
 def test_outputs_travel_to_other_processes(system: fl.System) -> None:
     pytest.importorskip("xarray")
     here = fl.sweep(system, (0, 2), [0.0, 0.0], {"F": FORCES})
-    with ProcessPoolExecutor(1) as executor:
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as executor:
         there = fl.sweep(system, (0, 2), [0.0, 0.0], {"F": FORCES}, executor=executor)
     assert here.identical(there)
 

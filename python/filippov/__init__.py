@@ -28,6 +28,7 @@ from filippov.errors import (
     TraceError,
 )
 from filippov.events import Event
+from filippov.gradient import gradient
 from filippov.laws import Hysteresis, Stick, hysteresis, sawtooth, square, stick
 from filippov.loading import load
 from filippov.modes import Mode
@@ -88,6 +89,7 @@ __all__ = [
     "analysis",
     "basins",
     "bifurcation_diagram",
+    "gradient",
     "hidden_dynamics",
     "hysteresis",
     "load",

@@ -10,7 +10,7 @@ from filippov.errors import InputError
 from filippov.prepare import Prepared
 from filippov.unknown import did_you_mean
 
-__all__ = ["Wanted", "check_wrt", "refuse_without_derivatives"]
+__all__ = ["Back", "Wanted", "check_wrt", "refuse_without_derivatives"]
 
 _STATE, _START, _PARAMETER = 0, 1, 2
 
@@ -26,15 +26,30 @@ class Wanted(NamedTuple):
         Each column as the core takes it: a kind, and a place.
     parameters : list of int
         The places of the parameters among all of the system.
+    goes_back : bool
+        Whether the run is kept for gradients of costs, instead of derivatives that are followed forward.
     """
 
     names: tuple[str, ...]
     columns: list[tuple[int, int]]
     parameters: list[int]
+    goes_back: bool = False
 
-    def for_core(self) -> tuple[list[tuple[int, int]], list[int]]:
+    def for_core(self) -> tuple[list[tuple[int, int]], list[int], bool]:
         """Return what the core takes."""
-        return self.columns, self.parameters
+        return self.columns, self.parameters, self.goes_back
+
+
+class Back(NamedTuple):
+    """``wrt=`` of a run that is kept for gradients of costs.
+
+    Attributes
+    ----------
+    wrt : str or sequence of str
+        By what is differentiated.
+    """
+
+    wrt: Any
 
 
 def check_wrt(
@@ -44,7 +59,7 @@ def check_wrt(
 
     Parameters
     ----------
-    wrt : str or sequence of str
+    wrt : str, sequence of str, or Back
         ``"y0"`` (all initial states), ``"t0"``, names of parameters, ``"params"`` (all of them), ``"all"``
         (both).
     states : sequence of str
@@ -59,6 +74,8 @@ def check_wrt(
     InputError
         If a name is unknown, or nothing is asked for.
     """
+    if isinstance(wrt, Back):
+        return check_wrt(wrt.wrt, states, params, discrete)._replace(goes_back=True)
     names = [wrt] if isinstance(wrt, str) else wrt
     if not isinstance(names, Sequence) or not names or not all(isinstance(name, str) for name in names):
         raise InputError(

@@ -384,7 +384,7 @@ class Solution:
         rows, derivatives = self._run.switches, None
         if self._origin.wanted is not None and isinstance(self._run, Run):
             derivatives = at_switches([row[0] for row in rows], self._run.instants())
-        return SwitchTable(rows, self.surfaces, self.states, derivatives)
+        return SwitchTable(rows, self.surfaces, self.states, derivatives, self.wrt)
 
     @property
     def wrt(self) -> tuple[str, ...]:
@@ -746,7 +746,9 @@ class Solution:
     def to_xarray(self) -> Any:
         """Return an `xarray.Dataset` with one variable per state over the dimension ``t``.
 
-        The switches have one of their own, `SwitchTable.to_xarray`.
+        Of a run with ``wrt=`` that was kept as a function it has ``derivative`` with the dimensions
+        ``state``, ``wrt`` and ``t``: the right limits, as those of the states. The switches have a Dataset of
+        their own, `SwitchTable.to_xarray`.
 
         Raises
         ------
@@ -758,8 +760,12 @@ class Solution:
         variables.update((name, ("t", values)) for name, values in {**self.discrete, **self.outputs}.items())
         if self.surfaces and len(self.segments):
             variables["mode"] = ("t", as_texts(self._modes_at(self.t)))
+        coords: dict[str, Any] = {"t": self.t}
+        if self.wrt and isinstance(self._run, Run) and self.sol is not None:
+            variables["derivative"] = (("state", "wrt", "t"), self.derivative(self.t))
+            coords.update(state=as_texts(self.states), wrt=as_texts(self.wrt))
         attributes = {"message": self.message, "status": self.status, "surfaces": "\n".join(self.surfaces)}
-        return xarray.Dataset(variables, coords={"t": self.t}, attrs=attributes)
+        return xarray.Dataset(variables, coords=coords, attrs=attributes)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the solution to a file, from which `filippov.load` makes it again.

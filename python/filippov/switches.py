@@ -211,7 +211,7 @@ class SwitchTable(Sequence[Switch]):
     ['enter_sliding']
     """
 
-    __slots__ = ("_derivatives", "_rows", "_states", "_surfaces")
+    __slots__ = ("_derivatives", "_rows", "_states", "_surfaces", "_wrt")
 
     def __init__(
         self,
@@ -219,9 +219,11 @@ class SwitchTable(Sequence[Switch]):
         surfaces: Sequence[str],
         states: Sequence[str],
         derivatives: Sequence[InstantDerivative | None] | None = None,
+        wrt: Sequence[str] = (),
     ) -> None:
         self._rows = rows
         self._derivatives = derivatives
+        self._wrt = tuple(wrt)
         self._surfaces = tuple(surfaces)
         self._states = tuple(states)
 
@@ -238,7 +240,7 @@ class SwitchTable(Sequence[Switch]):
         if isinstance(found, tuple):
             return _switch(found, None if known is None else known[index])  # type: ignore[index]
         derivatives = None if known is None else _selected(known, index)
-        return SwitchTable(found, self._surfaces, self._states, derivatives)
+        return SwitchTable(found, self._surfaces, self._states, derivatives, self._wrt)
 
     def __iter__(self) -> Iterator[Switch]:
         return map(_switch, self._rows, self._derivatives or [None] * len(self._rows))
@@ -251,8 +253,7 @@ class SwitchTable(Sequence[Switch]):
         """
         if self._derivatives is None:
             raise ModelError(NO_DERIVATIVES)
-        known = [found for found in self._derivatives if found is not None]
-        width = len(known[0].dt) if known else 0
+        width = len(self._wrt)
         none = np.full(width, np.nan)
         return np.array([none if d is None else d.dt for d in self._derivatives]).reshape(len(self), width)
 
@@ -347,7 +348,8 @@ class SwitchTable(Sequence[Switch]):
     def to_xarray(self) -> Any:
         """Return an `xarray.Dataset` over the dimension ``switch``, for NetCDF and Zarr.
 
-        It has the columns of the table; ``y_before`` and ``y_after`` have the dimension ``state`` too.
+        It has the columns of the table; ``y_before`` and ``y_after`` have the dimension ``state`` too. Of a
+        run with ``wrt=`` it has ``dt`` with the dimensions ``switch`` and ``wrt``.
 
         Raises
         ------
@@ -366,7 +368,11 @@ class SwitchTable(Sequence[Switch]):
         variables.update((name, ("switch", as_texts(text))) for name, text in texts.items())
         for name in ("y_before", "y_after"):
             variables[name] = (("switch", "state"), getattr(self, name))
-        return import_xarray().Dataset(variables, coords={"state": as_texts(self._states)})
+        coords = {"state": as_texts(self._states)}
+        if self._derivatives is not None:
+            variables["dt"] = (("switch", "wrt"), self.dt)
+            coords["wrt"] = as_texts(self._wrt)
+        return import_xarray().Dataset(variables, coords=coords)
 
     def __repr__(self) -> str:
         count = len(self)

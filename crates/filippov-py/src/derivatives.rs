@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use filippov::derivative::{
-    Column, Derivatives, Differentiated, EventGradient, Extension, Tangents,
+    Column, Derivatives, Differentiated, EventGradient, Extension, Tangents, Term, Trail, WayBack,
+    When,
 };
 use filippov::{Error, FieldError, Options, Problem, Side, Solution};
 use numpy::{PyArray1, PyArray2};
@@ -12,9 +13,9 @@ use pyo3::prelude::*;
 
 use crate::systems::raised;
 
-/// The columns, each a kind (0: a component of the initial state, 1: the initial time, 2: a parameter) with a place, and the
-/// parameters by which is differentiated.
-pub type Wanted = (Vec<(u8, usize)>, Vec<usize>);
+/// The columns, each a kind (0: a component of the initial state, 1: the initial time, 2: a parameter) with a place; the parameters by
+/// which is differentiated; and whether the run is kept for gradients of costs, instead of derivatives that are followed.
+pub type Wanted = (Vec<(u8, usize)>, Vec<usize>, bool);
 
 /// Time, derivative of the time, saltation matrix, its part by parameters, condition, and why derivatives end there.
 pub type InstantRow<'py> = (
@@ -26,14 +27,25 @@ pub type InstantRow<'py> = (
     &'static str,
 );
 
-/// The derivatives of a run, and what they are continued with between steps.
+/// The derivatives of a run, or what they need on the way back; and what they are continued with between steps.
 pub struct RunDerivatives {
     found: Derivatives,
+    trail: Option<Trail>,
     kinds: Vec<Column>,
     parameters: Vec<usize>,
     extension: Arc<Extension>,
     options: Options,
+    span: f64,
 }
+
+/// A term of a cost: the function, the time at which it counts, or else the surface at whose switches it does, and the function
+/// whose zero is at that time, if one is.
+pub type TermRow<'py> = (
+    Bound<'py, crate::systems::TracedSystem>,
+    Option<f64>,
+    usize,
+    Option<Bound<'py, crate::systems::TracedSystem>>,
+);
 
 /// Runs a traced system, and follows its derivatives.
 pub fn run_with_derivatives(
@@ -45,7 +57,7 @@ pub fn run_with_derivatives(
     ),
     options: &Options,
     span: f64,
-    (kinds, parameters): &Wanted,
+    (kinds, parameters, goes_back): &Wanted,
     interrupt: &mut dyn FnMut(f64) -> bool,
 ) -> Result<(Solution, RunDerivatives), Failure> {
     let kinds: Vec<Column> = kinds
@@ -55,13 +67,21 @@ pub fn run_with_derivatives(
     let extended = extension.at(system.parameters(), actions)?;
     let extended = extended.ok_or(Failure::CalledMap)?;
     let impacts = extended.impacts();
-    let mut tangents = Tangents::new(&extended, &impacts, kinds.clone(), options, span);
-    let solution = problem.solve_observed(&mut tangents, interrupt)?;
-    let found = tangents.finish()?;
+    let (solution, found, trail) = if *goes_back {
+        let mut trail = Trail::default();
+        let solution = problem.solve_observed(&mut trail, interrupt)?;
+        (solution, Derivatives::default(), Some(trail))
+    } else {
+        let mut tangents = Tangents::new(&extended, &impacts, kinds.clone(), options, span);
+        let solution = problem.solve_observed(&mut tangents, interrupt)?;
+        (solution, tangents.finish()?, None)
+    };
     Ok((
         solution,
         RunDerivatives {
             found,
+            trail,
+            span,
             kinds,
             parameters: parameters.clone(),
             extension: Arc::clone(extension),
@@ -160,6 +180,51 @@ impl RunDerivatives {
             systems: (system, &extended),
             options: &self.options,
         })
+    }
+
+    /// The gradient of a sum of terms, an entry for each column; and where and why there is none, if so.
+    pub fn gradient(
+        &self,
+        system: &filippov::TracedSystem,
+        (solution, actions): (&Solution, &filippov::action::Actions<'_>),
+        terms: &[TermRow<'_>],
+    ) -> PyResult<(Vec<f64>, Option<(f64, &'static str)>)> {
+        let wrong = |e: Error| PyValueError::new_err(e.to_string());
+        let trail = self.trail.as_ref();
+        let trail = trail.ok_or_else(|| PyValueError::new_err("the run has no trail"))?;
+        let extended = self.extension.at(system.parameters(), actions);
+        let extended = extended.map_err(wrong)?;
+        let extended = extended.ok_or_else(|| PyValueError::new_err("maps that are not traced"))?;
+        let gradient_of = |function: &Bound<'_, crate::systems::TracedSystem>| {
+            let function = function.get().with(system.parameters());
+            EventGradient::new(&function, self.extension.rules(), &self.parameters)
+        };
+        let mut functions = Vec::with_capacity(terms.len());
+        for (cost, _, _, zero) in terms {
+            let zero = zero.as_ref().map(gradient_of).transpose().map_err(wrong)?;
+            functions.push((gradient_of(cost).map_err(wrong)?, zero));
+        }
+        let rows = terms.iter().zip(&functions);
+        let terms: Vec<Term> = rows
+            .map(|((_, t, surface, _), (cost, zero))| Term {
+                cost,
+                at: match (t, zero) {
+                    (Some(t), Some(zero)) => When::Zero(*t, zero),
+                    (Some(t), None) => When::Time(*t),
+                    (None, _) => When::Surface(*surface),
+                },
+            })
+            .collect();
+        let way = WayBack {
+            solution,
+            trail,
+            systems: (system, &extended),
+            options: &self.options,
+            span: self.span,
+        };
+        let found = way.gradient(&terms).map_err(raised)?;
+        let entries = self.kinds.iter().map(|&kind| found.by(kind)).collect();
+        Ok((entries, found.lost))
     }
 
     /// The derivative of the state at the end.

@@ -14,7 +14,7 @@ use pyo3::types::{PyDict, PyTuple};
 use crate::callbacks::{Signal, TracedEvent};
 use crate::conversion::columns;
 use crate::decisions::record_as_pair;
-use crate::derivatives::{InstantRow, RunDerivatives};
+use crate::derivatives::{InstantRow, RunDerivatives, TermRow};
 use crate::prepared_run::PreparedRun;
 use crate::systems::{raised, CoreSystem, TracedSystem};
 
@@ -563,6 +563,20 @@ impl Run {
             .into_iter()
             .map(|row| PyArray1::from_vec(py, row))
             .collect())
+    }
+
+    /// The gradient of a cost, a sum of terms; and at which time and why there is none, if so.
+    fn cost_gradient<'py>(
+        &self,
+        py: Python<'py>,
+        terms: Vec<TermRow<'py>>,
+    ) -> PyResult<(Vector<'py>, Option<(f64, &'static str)>)> {
+        let (Some(derivatives), Some(system)) = (&self.derivatives, self.prepared.traced()) else {
+            return Err(PyValueError::new_err("the run has no derivatives"));
+        };
+        let run = (&*self.solution(), &self.prepared.actions());
+        let (entries, lost) = derivatives.gradient(system, run, &terms)?;
+        Ok((PyArray1::from_vec(py, entries), lost))
     }
 
     /// The same at the end of the run.

@@ -29,7 +29,7 @@ pub use roots::{
     stable_roots_with_border, stable_roots_within, zero_between, Roots,
 };
 pub use shared_load::{stay_together, SharedLoad, SharedLoads, Uniqueness};
-pub(crate) use small_matrix::invert;
+pub(crate) use small_matrix::{invert, Elimination};
 pub use small_matrix::{Matrix, Vector};
 pub use stability::{
     has_one_mode_only, is_scaling_stable, is_stable, is_stable_for, scaling_margin,

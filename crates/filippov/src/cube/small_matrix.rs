@@ -44,12 +44,13 @@ impl Matrix {
 
     /// The determinant; 1 for a matrix without rows.
     pub fn determinant(&self) -> f64 {
-        Elimination::of(self).determinant()
+        Elimination::of(self.clone()).determinant()
     }
 
     /// Solves A x = b; `None` if a pivot vanishes.
     pub fn solve(&self, b: &[f64]) -> Option<Vector> {
-        Elimination::of(self).solve(b)
+        let x = Elimination::of(self.clone()).solve(b);
+        x.iter().all(|v| v.is_finite()).then_some(x)
     }
 
     /// Solves A x = b for the matrix of inner products of some vectors. Those that depend on earlier ones, up to rounding,
@@ -245,16 +246,16 @@ impl IndexMut<(usize, usize)> for Matrix {
 }
 
 /// Gaussian elimination with row pivoting: factors below and above the diagonal, row order, sign.
-struct Elimination {
+pub(crate) struct Elimination {
     factors: Matrix,
     order: SmallVec<[usize; 4]>,
     sign: f64,
 }
 
 impl Elimination {
-    fn of(matrix: &Matrix) -> Self {
-        let n = matrix.n;
-        let mut a = matrix.clone();
+    /// Of a square matrix, with the largest pivot of each column.
+    pub fn of(mut a: Matrix) -> Self {
+        let n = a.n;
         let mut order: SmallVec<[usize; 4]> = (0..n).collect();
         let mut sign = 1.0;
         for k in 0..n {
@@ -276,13 +277,13 @@ impl Elimination {
             if a[(k, k)] == 0.0 {
                 continue;
             }
-            for i in k + 1..n {
-                let factor = a[(i, k)] / a[(k, k)];
-                a[(i, k)] = factor;
-                for j in k + 1..n {
-                    let update = factor * a[(k, j)];
-                    a[(i, j)] -= update;
-                }
+            let (above, below) = a.entries.split_at_mut((k + 1) * n);
+            let row = &above[k * n + k..];
+            for other in below.chunks_exact_mut(n) {
+                let factor = other[k] / row[0];
+                other[k] = factor;
+                let entries = other[k + 1..].iter_mut().zip(&row[1..]);
+                entries.for_each(|(entry, value)| *entry -= factor * value);
             }
         }
         Elimination {
@@ -297,23 +298,57 @@ impl Elimination {
         self.sign * diagonal.product::<f64>()
     }
 
-    fn solve(&self, b: &[f64]) -> Option<Vector> {
+    /// Solves A x = b; the solution is not finite if a pivot vanishes.
+    pub fn solve(&self, b: &[f64]) -> Vector {
         let (a, n) = (&self.factors, self.factors.n);
         let mut x: Vector = self.order.iter().map(|&row| b[row]).collect();
         for i in 0..n {
-            x[i] -= (0..i).map(|j| a[(i, j)] * x[j]).sum::<f64>();
+            let row = &a.entries[i * n..][..i];
+            x[i] -= row.iter().zip(&x).map(|(a, x)| a * x).sum::<f64>();
         }
         for i in (0..n).rev() {
-            let rest: f64 = (i + 1..n).map(|j| a[(i, j)] * x[j]).sum();
-            x[i] = (x[i] - rest) / a[(i, i)];
+            let row = &a.entries[i * n + i..][..n - i];
+            let rest: f64 = row[1..].iter().zip(&x[i + 1..]).map(|(a, x)| a * x).sum();
+            x[i] = (x[i] - rest) / row[0];
         }
-        x.iter().all(|v| v.is_finite()).then_some(x)
+        x
+    }
+
+    /// Solves A^T x = b.
+    pub fn solve_transposed(&self, b: &[f64]) -> Vector {
+        let (a, n) = (&self.factors, self.factors.n);
+        let mut y = Vector::from_slice(b);
+        for i in 0..n {
+            let row = &a.entries[i * n + i..][..n - i];
+            let value = y[i] / row[0];
+            y[i] = value;
+            let later = y[i + 1..].iter_mut().zip(&row[1..]);
+            later.for_each(|(y, a)| *y -= a * value);
+        }
+        for i in (0..n).rev() {
+            let (earlier, value) = y.split_at_mut(i);
+            let row = &a.entries[i * n..][..i];
+            let entries = earlier.iter_mut().zip(row);
+            entries.for_each(|(y, a)| *y -= a * value[0]);
+        }
+        let mut x = Vector::from_elem(0.0, n);
+        self.order.iter().zip(&y).for_each(|(&row, &y)| x[row] = y);
+        x
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_transposed_equations_are_solved_with_the_same_factors() {
+        let a = Matrix::of(3, |i, j| [[0.0, 2.0, 1.0], [3.0, -1.0, 4.0], [1.0, 5.0, -2.0]][i][j]);
+        let found = Elimination::of(a.clone()).solve_transposed(&[1.0, -2.0, 3.0]);
+        for (entry, exact) in a.transposed().apply(&found).iter().zip([1.0, -2.0, 3.0]) {
+            assert!((entry - exact).abs() < 1e-14);
+        }
+    }
 
     #[test]
     fn a_vector_that_depends_on_others_has_no_share() {

@@ -4,7 +4,7 @@ use super::extended::{extended_system, Column, Extended};
 use super::piece::{dot, Piece, Surroundings};
 use super::tangents::Derivatives;
 use crate::error::{Error, FieldError};
-use crate::motion::{Law, SmoothField};
+use crate::motion::SmoothField;
 use crate::options::Options;
 use crate::record::{Side, Solution};
 use crate::system::{sides_of, Actions, PiecewiseSystem, Rules, Setting, TracedSystem};
@@ -120,16 +120,11 @@ impl Differentiated<'_> {
 
     /// The motion of the extended system at a time.
     fn piece<'p>(&'p self, impacts: &'p Actions<'p>, t: f64, side: Side) -> Option<Piece<'p>> {
-        let (system, extended) = self.systems;
+        let (_, extended) = self.systems;
         let segments = self.solution.segments.iter();
         let segment = self.solution.segment_at(t, side);
         let segment = segment.filter(|_| self.solution.is_dense())?;
-        let mut around = Surroundings {
-            extended,
-            impacts,
-            law: Law::from(self.options),
-            sides: impacts.sides_at_start(system.n_surfaces()).collect(),
-        };
+        let mut around = Surroundings::at_start(extended, impacts, self.options);
         let so_far = segments.take_while(|earlier| earlier.t_start <= segment.t_start);
         so_far.for_each(|earlier| around.take_sides(&earlier.mode));
         Some(Piece::new(&around, &segment.mode, &segment.discrete))
@@ -157,7 +152,12 @@ impl EventGradient {
     }
 
     /// The derivatives by the time and by the extended state on the side that the point lies on; NaN where there are none.
-    fn at(&self, t: f64, z: &[f64], q: &[f64]) -> Result<(f64, Vec<f64>), FieldError> {
+    pub(super) fn at(
+        &self,
+        t: f64,
+        z: &[f64],
+        q: &[f64],
+    ) -> Result<(f64, Vec<f64>), FieldError> {
         let system = &self.extended;
         let signs = sides_of(system, (t, z), q)?;
         let linearisations = system.linearisations();
@@ -168,7 +168,7 @@ impl EventGradient {
         let mut slopes = jacobian.linearisation();
         known.eval_jacobian(&jacobian, &Setting::new(&signs, q).at(t, z), &mut slopes);
         let mut gradient = vec![0.0; z.len()];
-        for (column, value) in slopes.shifted(0.0).row(0) {
+        for (column, value) in slopes.rows().row(0) {
             gradient[column] = -value;
         }
         Ok((slopes.time()[0], gradient))

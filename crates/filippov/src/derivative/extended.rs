@@ -217,7 +217,9 @@ impl Definition {
 /// The derivative of the map of an action.
 pub(super) struct ExtendedMap<'a> {
     expressions: &'a TracedSystem,
-    /// The new states in a direction of (x, q, p), then by the time.
+    /// The entries of its rows that may differ from zero: row and column.
+    entries: Vec<(usize, usize)>,
+    /// Their values, then the derivatives by the time.
     derivative: Program,
     /// The map of the extended state.
     extended: TracedMap,
@@ -229,16 +231,19 @@ impl<'a> ExtendedMap<'a> {
         let n_all = expressions.n_states();
         let pairs = pairs(parameters, n_all);
         let (mut graph, made) = expressions.graph().with_states_for(&pairs);
-        let inputs = 0..(n_all + parameters.len()) as u32;
-        let along: Vec<NodeId> = inputs.map(|i| graph.input(i)).collect();
-        let still = vec![graph.constant(0.0); along.len()];
-        let (mut outputs, mut by_time) = (Vec::with_capacity(2 * n), Vec::with_capacity(n));
-        for id in &expressions.field_nodes()[..n] {
-            let value = made[id.index()];
-            let total = graph.directional(value, &along);
-            let time = graph.directional(value, &still);
-            outputs.push(graph.sub(total, time));
-            by_time.push(time);
+        let (mut entries, mut outputs, mut by_time) = (Vec::new(), Vec::new(), Vec::new());
+        for (r, id) in expressions.field_nodes()[..n].iter().enumerate() {
+            let gradient = graph.gradient(made[id.index()]);
+            by_time.push(gradient.time);
+            for (input, node) in gradient.states {
+                let input = input as usize;
+                // Named discrete states stand between the states and the parameters.
+                if input < n || input >= n_all {
+                    let behind = input.checked_sub(n_all).map(|p| n + p);
+                    entries.push((r, behind.unwrap_or(input)));
+                    outputs.push(node);
+                }
+            }
         }
         outputs.extend(by_time);
         let derivative = Program::compile(&graph, &outputs, Backend::Interpreter)?;
@@ -253,35 +258,32 @@ impl<'a> ExtendedMap<'a> {
         let extended = TracedSystem::new(graph, field, values, names, Backend::Interpreter)?;
         Ok(ExtendedMap {
             expressions,
+            entries,
             derivative,
             extended: TracedMap::new(extended),
             n,
         })
     }
 
-    /// The derivatives of the new state at a place: along each of the columns, of n states and the shares of the parameters, and
-    /// by the time.
-    pub fn apply(
+    /// The derivatives of the new state at a place: n rows by the states and the parameters, and by the time.
+    pub fn derivative(
         &self,
         (t, x, q): (f64, &[f64], &[f64]),
         values: &[f64],
-        columns: &[Vec<f64>],
     ) -> Result<(Vec<Vec<f64>>, Vec<f64>), FieldError> {
         let expressions = self.expressions;
         let n_named = expressions.n_states() - self.n;
         let before: Vec<f64> = x.iter().chain(q.iter().take(n_named)).copied().collect();
         let signs = sides_of(expressions, (t, &before), &[])?;
         let z = [&before[..], values].concat();
+        let mut out = vec![0.0; self.entries.len() + self.n];
         let place = Place::new(t, &z, &signs);
-        let (mut images, mut by_time) = (Vec::with_capacity(columns.len()), Vec::new());
-        for column in columns {
-            let (states, shares) = column.split_at(self.n);
-            let direction = [states, &vec![0.0; n_named], shares].concat();
-            let mut out = vec![0.0; 2 * self.n];
-            expressions.eval(&self.derivative, &place, &direction, &mut out);
-            by_time = out.split_off(self.n);
-            images.push(out);
+        expressions.eval(&self.derivative, &place, &[], &mut out);
+        let by_time = out.split_off(self.entries.len());
+        let mut rows = vec![vec![0.0; self.n + values.len()]; self.n];
+        for (&(r, c), value) in self.entries.iter().zip(out) {
+            rows[r][c] = value;
         }
-        Ok((images, by_time))
+        Ok((rows, by_time))
     }
 }

@@ -1,7 +1,8 @@
 //! The saltation matrix: what an instant makes of a change of the state.
 
+use super::change::Change;
 use super::extended::Extended;
-use super::piece::{dot, remove_along, Piece};
+use super::piece::{dot, Piece};
 use crate::error::FieldError;
 use crate::motion::{Guard, ModeField};
 use crate::record::InstantRecord;
@@ -103,18 +104,20 @@ struct Timing {
     state: Vec<f64>,
 }
 
-/// What becomes of some columns, and the derivatives of the time along them.
-struct Passage {
-    columns: Vec<Vec<f64>>,
-    dt: Vec<f64>,
-}
-
 /// An instant with the motions around it.
 pub(super) struct Instant<'i, 'a> {
     pub extended: &'a Extended<'a>,
     pub record: &'i InstantRecord<'i>,
     pub before: &'i mut Piece<'a>,
     pub after: &'i mut Piece<'a>,
+}
+
+/// What an instant does to changes of the extended state.
+pub(super) struct Passage {
+    /// The derivative of the time, a row.
+    pub time: Vec<f64>,
+    /// What becomes of a change, one after the other.
+    pub changes: Vec<Change>,
 }
 
 impl Instant<'_, '_> {
@@ -126,40 +129,43 @@ impl Instant<'_, '_> {
     ) -> Result<InstantDerivative, FieldError> {
         let (n, m) = (self.extended.n, self.extended.n_parameters());
         let mut found = InstantDerivative::unknown(self.record.t[0], columns.len(), (n, m));
-        let units: Vec<Vec<f64>> = (0..n + m).map(|i| unit(n + m, i)).collect();
-        let all: Vec<Vec<f64>> = columns.iter().chain(&units).cloned().collect();
-        let passage = match self.passage(weights, all, &mut found.condition)? {
+        let Passage { time, changes } = match self.passage(weights, &mut found.condition)? {
             Ok(passage) => passage,
             Err(lost) => {
                 found.lost = Some(lost);
                 return Ok(found);
             }
         };
-        let k = columns.len();
-        found.dt.copy_from_slice(&passage.dt[..k]);
-        for (i, image) in passage.columns[k..].iter().enumerate() {
-            for (r, entry) in image.iter().enumerate().take(n) {
+        let dt = found.dt.iter_mut().zip(&*columns);
+        dt.for_each(|(dt, column)| *dt = dot(&time, column));
+        let through = |column: &mut [f64]| changes.iter().for_each(|one| one.apply(n, column));
+        columns.iter_mut().for_each(|column| through(column));
+        let mut unit = vec![0.0; n + m];
+        for i in 0..n + m {
+            unit.fill(0.0);
+            unit[i] = 1.0;
+            through(&mut unit);
+            for (r, entry) in unit.iter().enumerate().take(n) {
                 match i.checked_sub(n) {
                     None => found.saltation[r * n + i] = *entry,
                     Some(p) => found.by_parameters[r * m + p] = *entry,
                 }
             }
         }
-        columns.clone_from_slice(&passage.columns[..k]);
         let is_finite = columns.iter().flatten().all(|v| v.is_finite());
         found.lost = (!is_finite).then_some(Lost::NotFinite);
         Ok(found)
     }
 
-    fn passage(
+    /// What the instant does.
+    pub fn passage(
         &mut self,
         weights: &Weights,
-        columns: Vec<Vec<f64>>,
         condition: &mut f64,
     ) -> Result<Result<Passage, Lost>, FieldError> {
         let record = self.record;
-        let dt = match self.times(weights, &columns, condition)? {
-            Ok((_, dt)) => dt,
+        let time = match self.time(weights, condition)? {
+            Ok(time) => time,
             Err(lost) => return Ok(Err(lost)),
         };
         let fields = [&self.before.field, &self.after.field];
@@ -169,44 +175,42 @@ impl Instant<'_, '_> {
         {
             return Ok(Err(Lost::Unsupported));
         }
+        let mut changes = Vec::new();
         if self.leaves_as_it_is() {
-            return Ok(Ok(Passage { columns, dt }));
+            return Ok(Ok(Passage { time, changes }));
         }
-        if let Some(columns) = self.entry(&columns)? {
-            return Ok(Ok(Passage { columns, dt }));
+        if let Some(entry) = self.entry()? {
+            changes.push(entry);
+            return Ok(Ok(Passage { time, changes }));
         }
         if record.guards.len() > 1 {
             return Ok(Err(Lost::OneSided));
         }
-        let (mut images, by_time) = self.mapped(&columns, record.field[0])?;
-        let (n, after) = (self.extended.n, record.field[1]);
-        for ((image, column), dt) in images.iter_mut().zip(&columns).zip(&dt) {
-            for r in 0..n {
-                image[r] += (by_time[r] - after[r]) * dt;
-            }
-            image.extend_from_slice(&column[n..]);
-        }
+        let (map, mut moved) = self.mapped()?;
+        let after = record.field[1].iter();
+        moved.iter_mut().zip(after).for_each(|(f, after)| *f -= after);
+        changes.push(Change {
+            map,
+            directions: vec![moved],
+            rows: vec![time.clone()],
+            is_projection: false,
+        });
         let z = self.extended.state(record.x[1]);
         // What is new is held exactly; the columns of the run keep to the other surfaces by themselves.
         let kept = match record.acts.is_empty() {
             true => &self.before.sliding[..],
             false => &[],
         };
-        self.after
-            .project_beside(kept, record.t[1], &z, &mut images)?;
-        Ok(Ok(Passage {
-            columns: images,
-            dt,
-        }))
+        changes.extend(self.after.projection(kept, record.t[1], &z)?);
+        Ok(Ok(Passage { time, changes }))
     }
 
-    /// What fixes the time, and its derivative by each column.
-    fn times(
+    /// The derivative of the time, a row, from what fixes it.
+    pub fn time(
         &mut self,
         weights: &Weights,
-        columns: &[Vec<f64>],
         condition: &mut f64,
-    ) -> Result<Result<(Timing, Vec<f64>), Lost>, FieldError> {
+    ) -> Result<Result<Vec<f64>, Lost>, FieldError> {
         let record = self.record;
         let timing = match record.guards {
             [] => self.known_time(),
@@ -214,11 +218,10 @@ impl Instant<'_, '_> {
         };
         let field = record.field[0];
         let states = &timing.state[..self.extended.n];
-        if !record.guards.is_empty() {
-            *condition = weights.condition(record.x[0], (timing.time, states), field);
-        } else {
-            *condition = 1.0;
-        }
+        *condition = match record.guards {
+            [] => 1.0,
+            _ => weights.condition(record.x[0], (timing.time, states), field),
+        };
         let rate = timing.time + dot(&timing.state, field);
         // Where the motion is tangent the time has no derivative. A touch is located to the square root of rounding.
         let touches = record.acts.is_empty() && record.mode[0] == record.mode[1];
@@ -227,19 +230,7 @@ impl Instant<'_, '_> {
         if !is_regular {
             return Ok(Err(Lost::Grazing));
         }
-        let shift = |column: &Vec<f64>| -dot(&timing.state, column) / rate;
-        let dt = columns.iter().map(shift).collect();
-        Ok(Ok((timing, dt)))
-    }
-
-    /// The derivatives of the time by the columns; `None` where there are none.
-    pub fn time_by(
-        &mut self,
-        weights: &Weights,
-        columns: &[Vec<f64>],
-    ) -> Result<Option<Vec<f64>>, FieldError> {
-        let found = self.times(weights, columns, &mut 0.0)?;
-        Ok(found.ok().map(|(_, dt)| dt))
+        Ok(Ok(timing.state.iter().map(|g| -g / rate).collect()))
     }
 
     /// What fixes a known time: the clock that ticks, or the time alone.
@@ -298,68 +289,60 @@ impl Instant<'_, '_> {
         }
     }
 
-    /// The columns after an entry: what leads off the surfaces slid on is taken from them along the jumps of the field. `None` if
-    /// it is another kind of instant, or if the field is not affine in the signs.
-    fn entry(&self, columns: &[Vec<f64>]) -> Result<Option<Vec<Vec<f64>>>, FieldError> {
+    /// What an entry does: what leads off the surfaces slid on is taken from a change along the jumps of the field. `None` if it is
+    /// another kind of instant, or if the field is not affine in the signs.
+    fn entry(&self) -> Result<Option<Change>, FieldError> {
         let record = self.record;
         let entries = record.mode.map(|mode| mode.entries());
         let enters = |j: usize| entries[1][j] == 0 && record.guards.contains(&Guard::Surface(j));
+        let mut guards = record.guards.iter();
         let is_entry = !record.guards.is_empty()
             && record.acts.is_empty()
-            && record.guards.iter().all(|guard| guard.is_surface())
-            && (0..entries[0].len()).all(|j| entries[0][j] == entries[1][j] || enters(j))
-            && record
-                .guards
-                .iter()
-                .all(|g| matches!(g, Guard::Surface(j) if enters(*j)));
+            && guards.all(|g| matches!(g, Guard::Surface(j) if enters(*j)))
+            && (0..entries[0].len()).all(|j| entries[0][j] == entries[1][j] || enters(j));
         if !is_entry {
             return Ok(None);
         }
         let z = self.extended.state(record.x[1]);
         let slid_on = &self.before.sliding;
-        entered(
-            self.extended,
-            self.after,
-            slid_on,
-            (record.t[1], &z),
-            columns,
-        )
+        entered(self.extended, self.after, slid_on, (record.t[1], &z))
     }
 
-    /// The columns behind the maps of the actions, and what becomes of the field before, R_x f + R_t.
-    fn mapped(
-        &self,
-        columns: &[Vec<f64>],
-        field: &[f64],
-    ) -> Result<(Vec<Vec<f64>>, Vec<f64>), FieldError> {
-        let (n, m) = (self.extended.n, self.extended.n_parameters());
-        let mut images: Vec<Vec<f64>> = columns.to_vec();
-        let mut along = field.to_vec();
-        along.resize(n + m, 0.0);
+    /// The derivative of the maps of the actions, if they move the state, and what becomes of the field before, R_x f + R_t.
+    fn mapped(&self) -> Result<(Option<Vec<Vec<f64>>>, Vec<f64>), FieldError> {
+        let (n, values) = (self.extended.n, &self.extended.values);
+        let mut total: Option<Vec<Vec<f64>>> = None;
+        let mut along = self.record.field[0].to_vec();
         for act in self.record.acts {
             let Some(map) = self.extended.maps.get(act.index).and_then(Option::as_ref) else {
                 continue;
             };
-            let mut all = images.clone();
-            all.push(along.clone());
             let place = (self.record.t[0], &act.x[..], &act.discrete[..]);
-            let (mut mapped, by_time) = map.apply(place, &self.extended.values, &all)?;
-            let moved = mapped.pop().unwrap_or_default();
-            for (image, mapped) in images.iter_mut().zip(mapped) {
-                image[..n].copy_from_slice(&mapped);
-            }
-            for r in 0..n {
-                along[r] = moved[r] + by_time[r];
-            }
+            let (rows, by_time) = map.derivative(place, values)?;
+            let moved = rows.iter().zip(&by_time);
+            along = moved.map(|(row, by_time)| dot(&row[..n], &along) + by_time).collect();
+            total = Some(match total {
+                None => rows,
+                Some(earlier) => rows.iter().map(|row| chained(n, row, &earlier)).collect(),
+            });
         }
-        images.iter_mut().for_each(|image| image.truncate(n));
-        along.truncate(n);
-        Ok((images, along))
+        Ok((total, along))
     }
 }
 
-/// What is left of the columns of a point that comes to the surfaces which a motion slides on, from any side of those that it did
-/// not slide on before. `None` if the field is not affine in their signs.
+/// A row of the derivative of a map behind another one.
+fn chained(n: usize, row: &[f64], earlier: &[Vec<f64>]) -> Vec<f64> {
+    let mut product = row.to_vec();
+    product[..n].fill(0.0);
+    for (share, earlier) in row.iter().zip(earlier) {
+        let entries = product.iter_mut().zip(earlier);
+        entries.for_each(|(entry, value)| *entry += share * value);
+    }
+    product
+}
+
+/// What becomes of a change at a point that comes to the surfaces which a motion slides on, from any side of those that it did not
+/// slide on before. `None` if the field is not affine in their signs.
 ///
 /// With the jumps B of the field at all these surfaces and their gradients dH it is I - B' (dH' B')^-1 dH', where dH' are the gradients
 /// of the new ones, and B' their jumps less what keeps the motion on the others.
@@ -368,8 +351,7 @@ pub(super) fn entered(
     sliding: &Piece,
     slid_on: &[usize],
     (t, z): (f64, &[f64]),
-    columns: &[Vec<f64>],
-) -> Result<Option<Vec<Vec<f64>>>, FieldError> {
+) -> Result<Option<Change>, FieldError> {
     let n = extended.n;
     let is_affine = extended
         .system
@@ -392,12 +374,13 @@ pub(super) fn entered(
         side.changes.push(jump);
         side.normals.push(normal);
     }
-    let along_kept: Vec<&[f64]> = kept.changes.iter().map(|jump| &jump[..n]).collect();
-    remove_along(&along_kept, &kept.normals, &mut new.changes);
-    let directions: Vec<&[f64]> = new.changes.iter().map(|jump| &jump[..n]).collect();
-    let mut columns = columns.to_vec();
-    remove_along(&directions, &new.normals, &mut columns);
-    Ok(Some(columns))
+    if !kept.normals.is_empty() {
+        let onto_kept = kept.taken_out(n);
+        new.changes
+            .iter_mut()
+            .for_each(|jump| onto_kept.apply(n, jump));
+    }
+    Ok(Some(new.taken_out(n)))
 }
 
 /// Surfaces with the jumps of the field there.
@@ -407,8 +390,10 @@ struct Jumps {
     normals: Vec<Vec<f64>>,
 }
 
-fn unit(size: usize, i: usize) -> Vec<f64> {
-    let mut unit = vec![0.0; size];
-    unit[i] = 1.0;
-    unit
+impl Jumps {
+    /// What takes from a change its parts off the surfaces, along the jumps.
+    fn taken_out(&self, n: usize) -> Change {
+        let directions: Vec<&[f64]> = self.changes.iter().map(|jump| &jump[..n]).collect();
+        Change::normal_to(&self.normals, &directions)
+    }
 }

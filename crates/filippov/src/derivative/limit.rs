@@ -5,8 +5,10 @@
 
 use smallvec::SmallVec;
 
+use super::piece::dot;
 use crate::mode::Mode;
 use crate::motion::Guard;
+use crate::record::InstantRecord;
 
 /// Instants that are remembered: two rounds of up to so many and the last one.
 const MOST_REMEMBERED: usize = 17;
@@ -26,6 +28,68 @@ pub(super) struct Past {
 impl Past {
     fn is_like(&self, other: &Past) -> bool {
         self.guards == other.guards && self.mode == other.mode
+    }
+}
+
+/// Do two instants end the same motion in the same way?
+pub(super) fn is_like(one: &InstantRecord, other: &InstantRecord) -> bool {
+    one.guards == other.guards && one.mode[0] == other.mode[0]
+}
+
+/// How fast the times between rounds shrink.
+struct Rounds {
+    ratio: f64,
+    late: f64,
+    early: f64,
+}
+
+impl Rounds {
+    /// From the times of three instants, the latest first; `None` if they do not shrink.
+    fn of([now, before, first]: [f64; 3]) -> Option<Self> {
+        let (late, early) = (now - before, before - first);
+        let ratio = late / early;
+        (ratio > 0.0 && ratio < 1.0).then_some(Rounds { ratio, late, early })
+    }
+
+    /// r / (1 - r).
+    fn share(&self) -> f64 {
+        self.ratio / (1.0 - self.ratio)
+    }
+
+    /// The derivative of r / (1 - r) by the length of the later round.
+    fn slope(&self) -> f64 {
+        1.0 / self.early / (1.0 - self.ratio).powi(2)
+    }
+}
+
+/// What a function of the limit takes from an instant before: by its time, and by the state at that time.
+pub(super) struct Shares {
+    pub instant: usize,
+    pub by_time: f64,
+    pub by_state: Vec<f64>,
+}
+
+impl Shares {
+    /// From the last instants of three rounds, the latest first, with their numbers: `w` is the gradient of the function by the state
+    /// behind the limit, which is also the later end of the first record. The transpose of [`History::limit`].
+    pub fn of(numbers: [usize; 3], records: [InstantRecord; 3], w: &[f64]) -> Option<[Shares; 3]> {
+        let rounds = Rounds::of(records.map(|record| record.t[0]))?;
+        let (share, slope) = (rounds.share(), rounds.slope());
+        let by_limit = -dot(w, records[0].field[1]);
+        let moved = records[0].x[0].iter().zip(records[1].x[0]);
+        let moved: f64 = w.iter().zip(moved).map(|(w, (x, before))| w * (x - before)).sum();
+        let by_share = (moved + by_limit * rounds.late) * slope;
+        let scaled = |factor: f64| w.iter().map(|w| factor * w).collect();
+        let of = |k: usize, by_time: f64, factor: f64| Shares {
+            instant: numbers[k],
+            by_time,
+            by_state: scaled(factor),
+        };
+        Some([
+            of(0, by_limit * (1.0 + share) + by_share, 1.0 + share),
+            of(1, -by_limit * share - by_share * (1.0 + rounds.ratio), -share),
+            of(2, by_share * rounds.ratio, 0.0),
+        ])
     }
 }
 
@@ -50,22 +114,18 @@ impl History {
     /// The limit of the rounds, if the latest instants make any.
     pub fn limit(&self) -> Option<Limit> {
         let last = self.0.len().checked_sub(1)?;
-        let rounds = (1..=last / 2).find(|round| {
+        let round = (1..=last / 2).find(|round| {
             let earlier = [last - round, last - 2 * round];
             earlier.iter().all(|&k| self.0[k].is_like(&self.0[last]))
         })?;
-        let [now, before, first] = [0, rounds, 2 * rounds].map(|back| &self.0[last - back]);
-        let (late, early) = (now.t - before.t, before.t - first.t);
-        let ratio = late / early;
-        if !(ratio > 0.0 && ratio < 1.0) {
-            return None;
-        }
-        let share = ratio / (1.0 - ratio);
+        let [now, before, first] = [0, round, 2 * round].map(|back| &self.0[last - back]);
+        let rounds = Rounds::of([now.t, before.t, first.t])?;
+        let (share, slope) = (rounds.share(), rounds.slope());
         let (mut dt, mut dx) = (Vec::new(), Vec::new());
         for c in 0..now.dt.len() {
             let (d_late, d_early) = (now.dt[c] - before.dt[c], before.dt[c] - first.dt[c]);
-            let d_share = (d_late - ratio * d_early) / early / (1.0 - ratio).powi(2);
-            dt.push(now.dt[c] + d_late * share + late * d_share);
+            let d_share = (d_late - rounds.ratio * d_early) * slope;
+            dt.push(now.dt[c] + d_late * share + rounds.late * d_share);
             let states = now.dx[c].iter().zip(&before.dx[c]);
             let moved = now.x.iter().zip(&before.x);
             let limit = states.zip(moved).map(|((now, before), (x, x_before))| {

@@ -8,7 +8,10 @@
 //! References: P. C. Mueller, Calculation of Lyapunov exponents for dynamic systems with discontinuities, *Chaos, Solitons &
 //! Fractals* 5 (1995) 1671; E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II* (1996), section IV.5.
 
+mod adjoint;
 mod between;
+mod change;
+mod collocation;
 mod extended;
 mod instant;
 mod limit;
@@ -16,6 +19,7 @@ mod piece;
 mod radau;
 mod tangents;
 
+pub use adjoint::{CostGradient, Term, Trail, WayBack, When};
 pub use between::{Differentiated, EventGradient};
 pub use extended::{Column, Extended, Extension};
 pub use instant::{InstantDerivative, Lost};

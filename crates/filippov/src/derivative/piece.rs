@@ -3,23 +3,31 @@
 
 use std::sync::Arc;
 
+use smallvec::SmallVec;
+
+use super::change::Change;
+use super::collocation::Collocation;
 use super::extended::Extended;
-use super::radau::{NODES, STAGES, WEIGHTS};
+use super::radau::{NODES, STAGES};
 use crate::cube::Matrix;
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::{ContactField, Law, ModeField, SmoothField};
-use crate::options::SlidingRule;
-use crate::sparse::{SparseRows, SparseSolver};
+use crate::options::{Options, SlidingRule};
+use crate::sparse::SparseRows;
 use crate::system::{
     Actions, LieDerivatives, Linearisation, Linearisations, MotionJacobian, PiecewiseSystem, Place,
     Setting, SignStructure,
 };
 use crate::tolerances::{EPS, ROUNDING};
 
-/// Largest part of a step, in units of 1 / |Df|; stiff steps are not divided into more than so many parts.
-const LONGEST_PART: f64 = 1.0;
+/// Stiff steps are not divided into more than so many parts.
 const MOST_PARTS: f64 = 16.0;
+
+/// How long a part of a step may be, in units of 1 / |Df|: one of length z has the relative error 7e-15 z^14.
+fn longest_part(rtol: f64) -> f64 {
+    (rtol / 1e-12).powf(1.0 / 14.0).max(1.0)
+}
 
 /// What a motion follows from, beside its mode and discrete states.
 #[derive(Clone)]
@@ -30,9 +38,27 @@ pub(super) struct Surroundings<'a> {
     pub law: Law<'a>,
     /// The side of each surface on which the motion is, or was last.
     pub sides: Vec<i8>,
+    /// How long a part of a step may be, in units of 1 / |Df|.
+    longest: f64,
 }
 
-impl Surroundings<'_> {
+impl<'a> Surroundings<'a> {
+    /// Those of the start of a run.
+    pub fn at_start(
+        extended: &'a Extended<'a>,
+        impacts: &'a Actions<'a>,
+        options: &'a Options,
+    ) -> Self {
+        let sides = impacts.sides_at_start(extended.system.n_surfaces());
+        Surroundings {
+            extended,
+            impacts,
+            law: Law::from(options),
+            sides: sides.collect(),
+            longest: longest_part(options.rtol),
+        }
+    }
+
     /// Takes the sides of a mode.
     pub fn take_sides(&mut self, mode: &Mode) {
         let known = self.sides.iter_mut().zip(mode.entries());
@@ -44,7 +70,7 @@ impl Surroundings<'_> {
 
 /// A motion of the extended system in one mode.
 pub(super) struct Piece<'a> {
-    extended: &'a Extended<'a>,
+    pub extended: &'a Extended<'a>,
     pub mode: Mode,
     pub q: Vec<f64>,
     /// The surfaces slid on.
@@ -55,15 +81,15 @@ pub(super) struct Piece<'a> {
     pub field: ModeField<'a>,
     /// The derivatives of its field, if the graph has them.
     jacobian: Option<Arc<MotionJacobian>>,
-    solver: SparseSolver,
-}
-
-/// The derivatives of the field at a point, without the rows of the parameters.
-struct Slopes {
-    /// -F_x, -F_p and -F_l, then G_x, G_p and G_l, in rows.
-    rows: SparseRows,
-    /// F_t, then -G_t.
-    time: Vec<f64>,
+    /// How long a part of a step may be, in units of 1 / |Df|.
+    longest: f64,
+    collocation: Collocation,
+    /// The derivatives of the field at the nodes of a part.
+    nodes: Vec<Linearisation>,
+    /// A point, the signs and multipliers there, and the rates.
+    point: Vec<f64>,
+    node_signs: Vec<f64>,
+    rates: Vec<f64>,
 }
 
 impl<'a> Piece<'a> {
@@ -73,6 +99,7 @@ impl<'a> Piece<'a> {
             impacts,
             law,
             ref sides,
+            ..
         } = *around;
         let system: &dyn PiecewiseSystem = &extended.system;
         let contact = match impacts.list.is_empty() {
@@ -96,16 +123,27 @@ impl<'a> Piece<'a> {
             _ => false,
         };
         let linearisations = system.linearisations().filter(|_| by_graph);
+        let jacobian = linearisations.and_then(|l| l.motion_jacobian(&sliding));
+        let z = extended.state(&vec![0.0; extended.n]);
+        let space = match &jacobian {
+            Some(jacobian) => jacobian.linearisation(),
+            None => Linearisation::dense(z.len()),
+        };
         Piece {
             extended,
             mode: mode.clone(),
             q: q.to_vec(),
+            node_signs: signs.to_vec(),
             signs: signs.to_vec(),
             contacts,
             field,
-            jacobian: linearisations.and_then(|l| l.motion_jacobian(&sliding)),
+            jacobian,
             sliding,
-            solver: SparseSolver::for_all_pivots(),
+            longest: around.longest,
+            collocation: Collocation::new(extended.n, extended.n_parameters()),
+            nodes: vec![space; STAGES],
+            rates: vec![0.0; z.len()],
+            point: z,
         }
     }
 
@@ -142,170 +180,108 @@ impl<'a> Piece<'a> {
         (t0, t1): (f64, f64),
         columns: &mut [Vec<f64>],
     ) -> Result<(), FieldError> {
-        let middle = 0.5 * (t0 + t1);
-        let mut z = self.extended.state(&vec![0.0; self.extended.n]);
-        path(middle, &mut z[..self.extended.n])?;
-        let steepest = self.slopes(middle, &z)?.norm(self.extended.n);
-        let parts = ((t1 - t0) * steepest / LONGEST_PART).ceil();
-        // NaN becomes one part, and stays NaN.
-        let parts = parts.clamp(1.0, MOST_PARTS).max(1.0);
-        let dt = (t1 - t0) / parts;
-        for part in 0..parts as usize {
-            let start = t0 + part as f64 * dt;
-            let slopes = self.slopes_at_nodes(&mut path, start, start + dt)?;
-            self.step(&slopes, dt, columns)?;
+        let (parts, dt) = self.parts(&mut path, (t0, t1))?;
+        for part in 0..parts {
+            self.take(&mut path, t0 + part as f64 * dt, dt, false)?;
+            self.collocation.carry(columns);
         }
         Ok(())
     }
 
-    /// One step of the collocation method.
-    fn step(
+    /// Takes the gradient of a function of the state at the end of a step back to its start, and adds to the shares of the
+    /// parameters behind it.
+    pub fn pull_back(
         &mut self,
-        slopes: &[Slopes],
-        dt: f64,
-        columns: &mut [Vec<f64>],
+        mut path: impl FnMut(f64, &mut [f64]) -> Result<(), FieldError>,
+        (t0, t1): (f64, f64),
+        gradient: &mut [f64],
     ) -> Result<(), FieldError> {
-        let (n, m, l) = (
-            self.extended.n,
-            self.extended.n_parameters(),
-            self.n_multipliers(),
-        );
-        let block = n + l;
-        let mut matrix = SparseRows::new(STAGES * block);
-        for (i, slopes) in slopes.iter().enumerate() {
-            for (r, weights) in (0..n).map(|r| (r, &WEIGHTS[i])) {
-                let mut row = Vec::with_capacity(STAGES + block);
-                for (j, weight) in weights.iter().enumerate() {
-                    if i != j {
-                        row.push((j * block + r, *weight));
-                        continue;
-                    }
-                    let mut has_own = false;
-                    for (column, value) in slopes.rows.row(r) {
-                        let own = if column == r { *weight } else { 0.0 };
-                        has_own |= column == r;
-                        if column < n {
-                            row.push((i * block + column, own + dt * value));
-                        } else if column >= n + m {
-                            row.push((i * block + column - m, dt * value));
-                        }
-                    }
-                    debug_assert!(has_own, "the pattern has the diagonal");
-                }
-                matrix.push_row(row);
-            }
-            for c in 0..l {
-                let of_states = |(column, value)| match column {
-                    column if column < n => Some((i * block + column, value)),
-                    column if column >= n + m => Some((i * block + column - m, value)),
-                    _ => None,
-                };
-                matrix.push_row(slopes.rows.row(n + m + c).filter_map(of_states));
-            }
-        }
-        let is_regular = matrix.is_finite() && self.solver.factor(&matrix).is_ok();
-        for column in columns {
-            if !is_regular {
-                column[..n].fill(f64::NAN);
-                continue;
-            }
-            let mut right = vec![0.0; STAGES * block];
-            for (i, slopes) in slopes.iter().enumerate() {
-                let sum: f64 = WEIGHTS[i].iter().sum();
-                let by_parameters = |r: usize| -> f64 {
-                    let entries = slopes.rows.row(r).filter(|(c, _)| (n..n + m).contains(c));
-                    entries.map(|(c, value)| value * column[c]).sum()
-                };
-                for r in 0..n {
-                    right[i * block + r] = sum * column[r] - dt * by_parameters(r);
-                }
-                for c in 0..l {
-                    right[i * block + n + c] = -by_parameters(n + m + c);
-                }
-            }
-            self.solver.solve(&mut right);
-            column[..n].copy_from_slice(&right[(STAGES - 1) * block..][..n]);
+        let (parts, dt) = self.parts(&mut path, (t0, t1))?;
+        for part in (0..parts).rev() {
+            self.take(&mut path, t0 + part as f64 * dt, dt, true)?;
+            self.collocation.pull_back(gradient);
         }
         Ok(())
     }
 
-    fn n_multipliers(&self) -> usize {
-        match &self.jacobian {
-            Some(_) => self.sliding.len(),
-            None => 0,
-        }
-    }
-
-    fn slopes_at_nodes(
+    /// Into how many parts a step is divided, and their length.
+    fn parts(
         &mut self,
         path: &mut impl FnMut(f64, &mut [f64]) -> Result<(), FieldError>,
-        t0: f64,
-        t1: f64,
-    ) -> Result<Vec<Slopes>, FieldError> {
-        let mut z = self.extended.state(&vec![0.0; self.extended.n]);
-        let mut all = Vec::with_capacity(STAGES);
-        for node in NODES {
-            let t = t0 + node * (t1 - t0);
-            path(t, &mut z[..self.extended.n])?;
-            all.push(self.slopes(t, &z)?);
-        }
-        Ok(all)
+        (t0, t1): (f64, f64),
+    ) -> Result<(usize, f64), FieldError> {
+        let n = self.extended.n;
+        path(0.5 * (t0 + t1), &mut self.point[..n])?;
+        self.slopes(0, 0.5 * (t0 + t1))?;
+        let steepest = norm(self.nodes[0].rows(), n);
+        // NaN becomes one part, and stays NaN.
+        let parts = ((t1 - t0) * steepest / self.longest).ceil();
+        let parts = parts.clamp(1.0, MOST_PARTS).max(1.0);
+        Ok((parts as usize, (t1 - t0) / parts))
     }
 
-    fn slopes(&mut self, t: f64, z: &[f64]) -> Result<Slopes, FieldError> {
-        let Some(jacobian) = self.jacobian.clone() else {
-            return self.slopes_by_differences(t, z);
+    /// Takes the derivatives of the field at the nodes of a part.
+    fn take(
+        &mut self,
+        path: &mut impl FnMut(f64, &mut [f64]) -> Result<(), FieldError>,
+        start: f64,
+        dt: f64,
+        is_pulled_back: bool,
+    ) -> Result<(), FieldError> {
+        for (i, node) in NODES.iter().enumerate() {
+            let t = start + node * dt;
+            path(t, &mut self.point[..self.extended.n])?;
+            self.slopes(i, t)?;
+        }
+        self.collocation.take(&self.nodes, dt, is_pulled_back);
+        Ok(())
+    }
+
+    /// Finds the derivatives of the field at the point, for one of the nodes.
+    fn slopes(&mut self, node: usize, t: f64) -> Result<(), FieldError> {
+        let Some(jacobian) = &self.jacobian else {
+            return self.slopes_by_differences(node, t);
         };
-        let mut signs = self.signs.clone();
+        self.node_signs.copy_from_slice(&self.signs);
         if !self.sliding.is_empty() {
-            let (mut point, mut rates) = (z.to_vec(), vec![0.0; z.len()]);
-            self.field.eval_unprojected(t, &mut point, &mut rates)?;
-            let multipliers = self.field.multipliers();
+            let (z, system) = (&mut self.point, &self.extended.system);
             let place = Setting::new(&self.signs, &self.q).at(t, z);
-            for (k, &j) in self.sliding.iter().enumerate() {
-                let ratio = self.extended.system.stick_ratio(j, &place);
-                signs[j] = ratio * multipliers.get(k).copied().unwrap_or(f64::NAN);
+            let ratios = self.sliding.iter().map(|&j| system.stick_ratio(j, &place));
+            let ratios: SmallVec<[f64; 4]> = ratios.collect();
+            self.field.eval_unprojected(t, z, &mut self.rates)?;
+            let multipliers = self.field.multipliers();
+            for (k, (&j, ratio)) in self.sliding.iter().zip(ratios).enumerate() {
+                self.node_signs[j] = ratio * multipliers.get(k).copied().unwrap_or(f64::NAN);
             }
         }
-        let mut linearisation: Linearisation = jacobian.linearisation();
-        let place = Setting::new(&signs, &self.q).at(t, z);
-        self.extended
-            .system
-            .eval_jacobian(&jacobian, &place, &mut linearisation);
-        Ok(Slopes {
-            time: linearisation.time().to_vec(),
-            rows: linearisation.shifted(0.0).clone(),
-        })
+        let place = Setting::new(&self.node_signs, &self.q).at(t, &self.point);
+        let system = &self.extended.system;
+        system.eval_jacobian(jacobian, &place, &mut self.nodes[node]);
+        Ok(())
     }
 
     /// The same by central differences of the natural extension of the field.
-    fn slopes_by_differences(&mut self, t: f64, z: &[f64]) -> Result<Slopes, FieldError> {
-        let size = z.len();
-        let mut dense = vec![vec![0.0; size]; size];
-        let mut value = |z: &[f64]| -> Result<Vec<f64>, FieldError> {
-            let (mut point, mut rates) = (z.to_vec(), vec![0.0; size]);
-            self.field.eval_unprojected(t, &mut point, &mut rates)?;
-            Ok(rates)
-        };
+    fn slopes_by_differences(&mut self, node: usize, t: f64) -> Result<(), FieldError> {
+        let size = self.point.len();
+        let mut dense = vec![0.0; size * size];
+        let mut moved = self.point.clone();
+        let (mut above, mut below) = (vec![0.0; size], vec![0.0; size]);
         for c in 0..size {
-            let d = EPS.cbrt() * (1.0 + z[c].abs());
-            let mut moved = z.to_vec();
-            moved[c] = z[c] + d;
-            let above = value(&moved)?;
-            moved[c] = z[c] - d;
-            let below = value(&moved)?;
-            for (row, (above, below)) in dense.iter_mut().zip(above.iter().zip(&below)) {
-                row[c] = -(above - below) / (2.0 * d);
+            let d = EPS.cbrt() * (1.0 + self.point[c].abs());
+            for (side, rates) in [(d, &mut above), (-d, &mut below)] {
+                moved.copy_from_slice(&self.point);
+                moved[c] += side;
+                self.field.eval_unprojected(t, &mut moved, rates)?;
+            }
+            for (r, (above, below)) in above.iter().zip(&below).enumerate() {
+                dense[r * size + c] = -(above - below) / (2.0 * d);
             }
         }
-        let mut rows = SparseRows::new(size);
-        for row in dense {
-            rows.push_row(row.into_iter().enumerate());
-        }
-        Ok(Slopes {
-            rows,
-            time: vec![f64::NAN; size],
-        })
+        self.nodes[node].fill(|values, time| {
+            values.copy_from_slice(&dense);
+            time.fill(f64::NAN);
+        });
+        Ok(())
     }
 
     /// The derivatives of the multiplier of a surface slid on, by the time and by the extended state; `None` where the graph has
@@ -320,12 +296,14 @@ impl<'a> Piece<'a> {
         let (Some(place), Some(_)) = (place, &self.jacobian) else {
             return Ok(None);
         };
-        let slopes = self.slopes(t, z)?;
+        self.point.copy_from_slice(z);
+        self.slopes(0, t)?;
+        let slopes = &self.nodes[0];
         let (size, l) = (z.len(), self.sliding.len());
         // dlambda_j = -w . dG with G_l^T w = e_j.
         let mut transposed = Matrix::zeros(l);
         for c in 0..l {
-            for (column, value) in slopes.rows.row(size + c).filter(|(k, _)| *k >= size) {
+            for (column, value) in slopes.rows().row(size + c).filter(|(k, _)| *k >= size) {
                 transposed[(column - size, c)] = value;
             }
         }
@@ -336,8 +314,8 @@ impl<'a> Piece<'a> {
         };
         let (mut time, mut state) = (0.0, vec![0.0; size]);
         for (c, weight) in weights.iter().enumerate() {
-            time += weight * slopes.time[size + c];
-            for (column, value) in slopes.rows.row(size + c).filter(|(k, _)| *k < size) {
+            time += weight * slopes.time()[size + c];
+            for (column, value) in slopes.rows().row(size + c).filter(|(k, _)| *k < size) {
                 state[column] -= weight * value;
             }
         }
@@ -392,17 +370,21 @@ impl<'a> Piece<'a> {
 
     /// Takes from the columns what leads off the surfaces slid on, and off those in contact and their rates.
     pub fn project(&self, t: f64, z: &[f64], columns: &mut [Vec<f64>]) -> Result<(), FieldError> {
-        self.project_beside(&[], t, z, columns)
+        if let Some(projection) = self.projection(&[], t, z)? {
+            columns
+                .iter_mut()
+                .for_each(|column| projection.apply(self.extended.n, column));
+        }
+        Ok(())
     }
 
-    /// The same, but for some surfaces.
-    pub fn project_beside(
+    /// What takes from a change its parts off the surfaces slid on but for some, and off those in contact and their rates.
+    pub fn projection(
         &self,
         kept: &[usize],
         t: f64,
         z: &[f64],
-        columns: &mut [Vec<f64>],
-    ) -> Result<(), FieldError> {
+    ) -> Result<Option<Change>, FieldError> {
         let surfaces = self.sliding.iter().chain(&self.contacts);
         let normals = surfaces.zip(self.normals(t, z)?);
         let mut normals: Vec<Vec<f64>> = normals
@@ -411,49 +393,18 @@ impl<'a> Piece<'a> {
             .collect();
         normals.extend(self.rate_normals(t, z)?);
         let n = self.extended.n;
-        let of_states: Vec<&[f64]> = normals.iter().map(|row| &row[..n]).collect();
-        remove_along(&of_states, &normals, columns);
-        Ok(())
+        let directions: Vec<&[f64]> = normals.iter().map(|row| &row[..n]).collect();
+        Ok((!normals.is_empty()).then(|| Change::normal_to(&normals, &directions)))
     }
 }
 
-impl Slopes {
-    /// The largest sum of the absolute values of a row of F_x.
-    fn norm(&self, n: usize) -> f64 {
-        let row = |r: usize| {
-            let entries = self.rows.row(r).filter(|(c, _)| *c < n);
-            entries.map(|(_, value)| value.abs()).sum::<f64>()
-        };
-        (0..n).map(row).fold(0.0, f64::max)
-    }
-}
-
-/// Takes from every column its part along some directions of the states, so that it is normal to these gradients.
-pub(super) fn remove_along(directions: &[&[f64]], normals: &[Vec<f64>], columns: &mut [Vec<f64>]) {
-    let count = normals.len();
-    if count == 0 {
-        return;
-    }
-    let mut products = Matrix::zeros(count);
-    for (i, normal) in normals.iter().enumerate() {
-        for (k, direction) in directions.iter().enumerate() {
-            products[(i, k)] = dot(normal, direction);
-        }
-    }
-    for column in columns {
-        // Twice: what is left after the first time is rounding.
-        for _ in 0..2 {
-            let rates: Vec<f64> = normals.iter().map(|normal| dot(normal, column)).collect();
-            let Some(shares) = products.solve(&rates) else {
-                column.fill(f64::NAN);
-                break;
-            };
-            for (share, direction) in shares.iter().zip(directions) {
-                let entries = column.iter_mut().zip(*direction);
-                entries.for_each(|(entry, d)| *entry -= share * d);
-            }
-        }
-    }
+/// The largest sum of the absolute values of a row of F_x.
+fn norm(rows: &SparseRows, n: usize) -> f64 {
+    let row = |r: usize| {
+        let entries = rows.row(r).filter(|(c, _)| *c < n);
+        entries.map(|(_, value)| value.abs()).sum::<f64>()
+    };
+    (0..n).map(row).fold(0.0, f64::max)
 }
 
 /// The product of as many entries as both have.

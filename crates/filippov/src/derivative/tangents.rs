@@ -3,13 +3,13 @@
 use super::extended::{Column, Extended};
 use super::instant::{entered, Instant, InstantDerivative, Lost, Weights};
 use super::limit::{at_its_time, History, Past};
-use super::piece::{Piece, Surroundings};
+use super::piece::{dot, Piece, Surroundings};
 use crate::error::FieldError;
 use crate::mode::Mode;
-use crate::motion::{Law, SmoothField};
+use crate::motion::SmoothField;
 use crate::options::Options;
 use crate::record::{InstantRecord, ObservedStep, Observer};
-use crate::system::{Actions, PiecewiseSystem};
+use crate::system::Actions;
 
 /// The derivatives of a run.
 #[derive(Clone, Debug, Default)]
@@ -81,14 +81,7 @@ impl<'a> Tangents<'a> {
         span: f64,
     ) -> Self {
         Tangents {
-            around: Surroundings {
-                extended,
-                impacts,
-                law: Law::from(options),
-                sides: impacts
-                    .sides_at_start(extended.system.n_surfaces())
-                    .collect(),
-            },
+            around: Surroundings::at_start(extended, impacts, options),
             weights: Weights {
                 span,
                 rtol: options.rtol,
@@ -138,8 +131,8 @@ impl<'a> Tangents<'a> {
         }
         if !piece.sliding.is_empty() {
             // A start beside the surfaces comes to them at once.
-            match entered(self.around.extended, &piece, &[], (t, &z), &self.columns)? {
-                Some(columns) => self.columns = columns,
+            match entered(self.around.extended, &piece, &[], (t, &z))? {
+                Some(entry) => self.columns.iter_mut().for_each(|c| entry.apply(n, c)),
                 None => piece.project(t, &z, &mut self.columns)?,
             }
         }
@@ -209,8 +202,8 @@ impl<'a> Tangents<'a> {
             after: &mut after,
         };
         if record.t[0] != record.t[1] {
-            let dt = instant.time_by(&self.weights, &self.columns)?;
-            self.jump(record, dt, &after)?;
+            let time = instant.time(&self.weights, &mut 0.0)?.ok();
+            self.jump(record, time, &after)?;
         } else {
             let columns = self.columns.clone();
             let mut found = instant.pass(&self.weights, &mut self.columns)?;
@@ -230,14 +223,15 @@ impl Tangents<'_> {
     fn jump(
         &mut self,
         record: &InstantRecord,
-        dt: Option<Vec<f64>>,
+        time: Option<Vec<f64>>,
         after: &Piece,
     ) -> Result<(), FieldError> {
         let extended = self.around.extended;
         let (n, sizes) = (extended.n, (extended.n, extended.n_parameters()));
         let unknown = |t: f64| InstantDerivative::unknown(t, self.kinds.len(), sizes);
         let [mut last, mut limit] = record.t.map(unknown);
-        let found = dt.and_then(|dt| {
+        let found = time.and_then(|time| {
+            let dt: Vec<f64> = self.columns.iter().map(|c| dot(&time, c)).collect();
             last.dt.clone_from(&dt);
             self.history.push(past(record, &self.columns, dt));
             self.history.limit()

@@ -87,6 +87,52 @@ pub struct InstantRecord<'i> {
     pub acts: &'i [Act],
 }
 
+/// The record of an instant, for later.
+#[derive(Clone, Debug)]
+pub(crate) struct KeptInstant {
+    t: [f64; 2],
+    x: [Vec<f64>; 2],
+    discrete: [Vec<f64>; 2],
+    mode: [Mode; 2],
+    field: [Vec<f64>; 2],
+    guards: SmallVec<[Guard; 2]>,
+    gradient: Gradient,
+    map: Option<Vec<f64>>,
+    acts: Vec<Act>,
+}
+
+impl KeptInstant {
+    /// What is kept of a record.
+    pub fn of(record: &InstantRecord) -> Self {
+        KeptInstant {
+            t: record.t,
+            x: record.x.map(<[f64]>::to_vec),
+            discrete: record.discrete.map(<[f64]>::to_vec),
+            mode: record.mode.map(Mode::clone),
+            field: record.field.map(<[f64]>::to_vec),
+            guards: record.guards.into(),
+            gradient: record.gradient.clone(),
+            map: record.map.map(<[f64]>::to_vec),
+            acts: record.acts.to_vec(),
+        }
+    }
+
+    /// The record.
+    pub fn record(&self) -> InstantRecord<'_> {
+        InstantRecord {
+            t: self.t,
+            x: [&self.x[0], &self.x[1]],
+            discrete: [&self.discrete[0], &self.discrete[1]],
+            mode: [&self.mode[0], &self.mode[1]],
+            field: [&self.field[0], &self.field[1]],
+            guards: &self.guards,
+            gradient: &self.gradient,
+            map: self.map.as_deref(),
+            acts: &self.acts,
+        }
+    }
+}
+
 /// What watches a run.
 pub trait Observer {
     /// A step was accepted.

@@ -31,6 +31,14 @@ impl SparseRows {
         matrix
     }
 
+    /// Takes all rows out, and keeps their space.
+    pub fn clear(&mut self, n_columns: usize) {
+        self.starts.truncate(1);
+        self.columns.clear();
+        self.values.clear();
+        self.n_columns = n_columns;
+    }
+
     /// Adds a row, its columns in increasing order.
     pub fn push_row(&mut self, entries: impl IntoIterator<Item = (usize, f64)>) {
         for (column, value) in entries {

@@ -75,7 +75,8 @@ impl MotionJacobian {
 
     /// Evaluates the derivatives; entries of `signs` on the surfaces slid on are their multipliers.
     pub(super) fn eval(&self, place: &Place<'_>, p: &[f64], out: &mut Linearisation) {
-        let mut outputs = vec![0.0; self.n_outputs];
+        let mut outputs = std::mem::take(&mut out.computed);
+        outputs.resize(self.n_outputs, 0.0);
         let program = self.program.program();
         program.eval(place.t, place.x, place.signs, p, &[], &mut outputs);
         out.fill(|values, time| {
@@ -90,6 +91,7 @@ impl MotionJacobian {
                 *to = if i < self.n_states { *value } else { -value };
             }
         });
+        out.computed = outputs;
     }
 }
 

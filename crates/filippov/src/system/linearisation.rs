@@ -27,6 +27,8 @@ pub struct Linearisation {
     /// Are these the derivatives of the field beside the surfaces too, and not those of the field at the projection
     /// of a point?
     is_exact: bool,
+    /// The values that a program computes, before they are in their places.
+    pub(super) computed: Vec<f64>,
 }
 
 impl Linearisation {
@@ -47,6 +49,7 @@ impl Linearisation {
             matrix,
             diagonal,
             is_exact,
+            computed: Vec::new(),
         }
     }
 
@@ -92,6 +95,11 @@ impl Linearisation {
         for (own, &place) in self.own.iter().zip(&self.diagonal) {
             self.matrix.values_mut()[place] = c + own;
         }
+        &self.matrix
+    }
+
+    /// The matrix as it was filled, or with what was put on its diagonal last.
+    pub fn rows(&self) -> &SparseRows {
         &self.matrix
     }
 

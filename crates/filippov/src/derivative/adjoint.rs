@@ -1,0 +1,390 @@
+//! Gradients of costs of a run, from its end back to its start.
+//!
+//! The gradient w of the cost by the state solves w' = -Df^T w between instants, and at an instant it is multiplied by the transposed
+//! saltation matrix. What the parameters have in it is collected on the way. The path is that of the continuous extension of the run;
+//! steps are taken back by the transpose of the equations that carry changes forward, so that the product of w with a change is the
+//! same at all times, to rounding.
+
+use super::between::EventGradient;
+use super::extended::{Column, Extended};
+use super::instant::{entered, Instant, Passage, Weights};
+use super::limit::{is_like, Shares};
+use super::piece::{dot, Piece, Surroundings};
+use crate::error::FieldError;
+use crate::mode::Mode;
+use crate::motion::{Guard, SmoothField};
+use crate::options::Options;
+use crate::record::{InstantRecord, KeptInstant, ObservedStep, Observer, Side, Solution};
+use crate::system::{Actions, TracedSystem};
+
+/// The instants of a run and the times of its steps, for the way back. An observer.
+#[derive(Clone, Debug, Default)]
+pub struct Trail {
+    start: Option<Start>,
+    /// The ends of the steps, and how many instants were before.
+    steps: Vec<(f64, usize)>,
+    instants: Vec<KeptInstant>,
+}
+
+#[derive(Clone, Debug)]
+struct Start {
+    t: f64,
+    x: Vec<f64>,
+    mode: Mode,
+    q: Vec<f64>,
+}
+
+impl Trail {
+    fn begin(&mut self, t: f64, x: &[f64], mode: &Mode, q: &[f64]) {
+        self.start.get_or_insert_with(|| Start {
+            t,
+            x: x.to_vec(),
+            mode: mode.clone(),
+            q: q.to_vec(),
+        });
+    }
+}
+
+impl Observer for Trail {
+    fn step(&mut self, step: &ObservedStep) {
+        if self.start.is_none() {
+            let mut x = vec![0.0; step.x_end.len()];
+            step.at(step.t_start(), &mut x);
+            self.begin(step.t_start(), &x, step.mode, step.discrete);
+        }
+        self.steps.push((step.t_end, self.instants.len()));
+    }
+
+    fn instant(&mut self, record: &InstantRecord) {
+        self.begin(record.t[0], record.x[0], record.mode[0], record.discrete[0]);
+        self.instants.push(KeptInstant::of(record));
+    }
+}
+
+/// A term of a cost: a function of time, state and parameters at one or more instants.
+pub struct Term<'c> {
+    /// The function.
+    pub cost: &'c EventGradient,
+    /// When it counts.
+    pub at: When<'c>,
+}
+
+/// The instants at which a term of a cost counts: the state is that before.
+#[derive(Clone, Copy)]
+pub enum When<'c> {
+    /// At a time that does not depend on anything.
+    Time(f64),
+    /// At a zero of a function of time, state and parameters, at this time.
+    Zero(f64, &'c EventGradient),
+    /// At every instant that these surfaces end a motion at.
+    Surface(usize),
+}
+
+/// The gradient of a cost by the start, the initial time and the parameters.
+#[derive(Clone, Debug)]
+pub struct CostGradient {
+    by_state: Vec<f64>,
+    by_parameters: Vec<f64>,
+    by_start: f64,
+    /// The time of an instant at which there is no derivative: the gradient is NaN.
+    pub lost: Option<(f64, &'static str)>,
+}
+
+impl CostGradient {
+    /// The entry of a column.
+    pub fn by(&self, column: Column) -> f64 {
+        match column {
+            Column::State(i) => self.by_state[i],
+            Column::Start => self.by_start,
+            Column::Parameter(p) => self.by_parameters[p],
+        }
+    }
+}
+
+/// A run, with what its gradients need.
+pub struct WayBack<'r> {
+    /// The run, kept as a function.
+    pub solution: &'r Solution,
+    /// Its instants.
+    pub trail: &'r Trail,
+    /// The system, and its extension by the parameters.
+    pub systems: (&'r TracedSystem, &'r Extended<'r>),
+    /// The options of the run.
+    pub options: &'r Options,
+    /// The length of its span of time.
+    pub span: f64,
+}
+
+/// The gradient on its way back.
+struct Walk<'w> {
+    run: &'w WayBack<'w>,
+    /// By the state, with the shares of the parameters behind it.
+    w: Vec<f64>,
+    terms: Vec<(f64, &'w Term<'w>)>,
+    /// What the limits of infinitely many switches owe to earlier instants.
+    owed: Vec<Shares>,
+}
+
+impl WayBack<'_> {
+    /// The gradient of a sum of terms.
+    ///
+    /// # Errors
+    /// What a function of the user raised.
+    pub fn gradient<'t>(&'t self, terms: &'t [Term<'t>]) -> Result<CostGradient, FieldError> {
+        let extended = self.systems.1;
+        let (n, m) = (extended.n, extended.n_parameters());
+        let mut timed: Vec<(f64, &Term)> = Vec::new();
+        for term in terms {
+            if let When::Time(t) | When::Zero(t, _) = term.at {
+                timed.push((t, term));
+            }
+        }
+        timed.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut walk = Walk {
+            run: self,
+            w: vec![0.0; n + m],
+            terms: timed,
+            owed: Vec::new(),
+        };
+        let impacts = extended.impacts();
+        let lost = walk.back(terms, &impacts)?;
+        let mut found = CostGradient {
+            by_parameters: walk.w.split_off(n),
+            by_state: walk.w,
+            by_start: f64::NAN,
+            lost,
+        };
+        if found.lost.is_some() {
+            found.by_state.fill(f64::NAN);
+            found.by_parameters.fill(f64::NAN);
+        } else if let Some(start) = &self.trail.start {
+            let mut around = Surroundings::at_start(extended, &impacts, self.options);
+            around.take_sides(&start.mode);
+            let mut piece = Piece::new(&around, &start.mode, &start.q);
+            let z = extended.state(&start.x);
+            let mut field = vec![0.0; n + m];
+            piece.field.eval_unprojected(start.t, &mut z.clone(), &mut field)?;
+            if !piece.sliding.is_empty() {
+                let mut whole = [&found.by_state[..], &found.by_parameters].concat();
+                let entry = entered(extended, &piece, &[], (start.t, &z))?;
+                let entry = match entry {
+                    Some(entry) => Some(entry),
+                    None => piece.projection(&[], start.t, &z)?,
+                };
+                entry.iter().for_each(|entry| entry.pull_back(n, &mut whole));
+                found.by_parameters = whole.split_off(n);
+                found.by_start = -dot(&whole, &field);
+                found.by_state = whole;
+            } else {
+                found.by_start = -dot(&found.by_state, &field);
+            }
+        }
+        Ok(found)
+    }
+}
+
+impl<'w> Walk<'w> {
+    /// From the end to the start; where it was lost, if it was.
+    fn back(
+        &mut self,
+        terms: &[Term],
+        impacts: &Actions,
+    ) -> Result<Option<(f64, &'static str)>, FieldError> {
+        let trail = self.run.trail;
+        let Some(start) = &trail.start else {
+            return Ok(None);
+        };
+        let pieces = self.surroundings(impacts);
+        let mut steps = trail.steps.iter().rev().peekable();
+        for number in (0..=trail.instants.len()).rev() {
+            let around = &pieces[number];
+            let (mode, q) = match number.checked_sub(1) {
+                None => (&start.mode, &start.q[..]),
+                Some(earlier) => {
+                    let record = trail.instants[earlier].record();
+                    (record.mode[1], record.discrete[1])
+                }
+            };
+            let mut piece = Piece::new(around, mode, q);
+            while let Some(&(end, _)) = steps.next_if(|step| step.1 == number) {
+                let before = steps.peek().map_or(start.t, |step| step.0);
+                let begin = match number.checked_sub(1) {
+                    Some(earlier) => trail.instants[earlier].record().t[1].max(before),
+                    None => before,
+                };
+                self.step(&mut piece, (begin, end))?;
+            }
+            let Some(earlier) = number.checked_sub(1) else {
+                self.terms_at(&mut piece, start.t)?;
+                break;
+            };
+            let record = trail.instants[earlier].record();
+            let mut before = Piece::new(&pieces[earlier], record.mode[0], record.discrete[0]);
+            if let Some(lost) = self.pass(earlier, &record, (&mut before, &mut piece), terms)? {
+                return Ok(Some((record.t[0], lost)));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The surroundings of the pieces, in order.
+    fn surroundings<'s>(&self, impacts: &'s Actions<'s>) -> Vec<Surroundings<'s>>
+    where
+        'w: 's,
+    {
+        let run = self.run;
+        let mut around = Surroundings::at_start(run.systems.1, impacts, run.options);
+        if let Some(start) = &run.trail.start {
+            around.take_sides(&start.mode);
+        }
+        let mut all = vec![around.clone()];
+        for instant in &run.trail.instants {
+            let record = instant.record();
+            around.take_sides(record.mode[0]);
+            all.push(around.clone());
+        }
+        all
+    }
+
+    /// Takes the gradient back over a step, and adds the terms in it.
+    fn step(&mut self, piece: &mut Piece, (begin, end): (f64, f64)) -> Result<(), FieldError> {
+        let mut at = end;
+        loop {
+            self.terms_at(piece, at)?;
+            let next = self.terms.last().map_or(begin, |term| term.0.max(begin));
+            if at <= begin {
+                return Ok(());
+            }
+            let run = self.run;
+            let path = |t: f64, x: &mut [f64]| {
+                // The continuous extension of this step, also at its end.
+                let side = if t >= end { Side::Left } else { Side::Right };
+                let mode = run.solution.evaluate(run.systems.0, t, side, x)?;
+                if mode.is_none() {
+                    x.fill(f64::NAN);
+                }
+                Ok(())
+            };
+            let mut x = vec![0.0; run.systems.1.n];
+            path(at, &mut x)?;
+            let z = run.systems.1.state(&x);
+            if let Some(projection) = piece.projection(&[], at, &z)? {
+                projection.pull_back(run.systems.1.n, &mut self.w);
+            }
+            piece.pull_back(path, (next, at), &mut self.w)?;
+            at = next;
+            if at <= begin {
+                return Ok(());
+            }
+        }
+    }
+
+    /// Adds the terms at a time and later, of the motion before.
+    fn terms_at(&mut self, piece: &mut Piece, t: f64) -> Result<(), FieldError> {
+        while let Some((at, term)) = self.terms.pop_if(|term| term.0 >= t) {
+            let extended = self.run.systems.1;
+            let mut x = vec![0.0; extended.n];
+            let systems = self.run.systems.0;
+            self.run.solution.evaluate(systems, at, Side::Left, &mut x)?;
+            let z = extended.state(&x);
+            let (by_time, gradient) = term.cost.at(at, &z, &piece.q)?;
+            add(&mut self.w, 1.0, &gradient);
+            if let When::Zero(_, function) = term.at {
+                let mut field = vec![0.0; z.len()];
+                piece.field.eval_unprojected(at, &mut z.clone(), &mut field)?;
+                let (time, normal) = function.at(at, &z, &piece.q)?;
+                let rate = time + dot(&normal, &field);
+                let moved = by_time + dot(&gradient[..extended.n], &field);
+                add(&mut self.w, -moved / rate, &normal);
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes the gradient back through an instant.
+    fn pass<'p>(
+        &mut self,
+        number: usize,
+        record: &InstantRecord,
+        (before, after): (&mut Piece<'p>, &mut Piece<'p>),
+        terms: &[Term],
+    ) -> Result<Option<&'static str>, FieldError> {
+        let extended = before.extended;
+        let n = extended.n;
+        let options = self.run.options;
+        let weights = Weights {
+            span: self.run.span,
+            rtol: options.rtol,
+            atol: options.atol.clone(),
+        };
+        let is_limit = record.t[0] != record.t[1];
+        let mut instant = Instant {
+            extended,
+            record,
+            before,
+            after,
+        };
+        let time = if is_limit {
+            match instant.time(&weights, &mut 0.0)? {
+                Ok(time) => time,
+                Err(lost) => return Ok(Some(lost.name())),
+            }
+        } else {
+            match instant.passage(&weights, &mut 0.0)? {
+                Ok(Passage { time, changes }) => {
+                    let changes = changes.iter().rev();
+                    changes.for_each(|change| change.pull_back(n, &mut self.w));
+                    time
+                }
+                Err(lost) => return Ok(Some(lost.name())),
+            }
+        };
+        if is_limit {
+            let z = extended.state(record.x[1]);
+            if let Some(projection) = instant.after.projection(&[], record.t[1], &z)? {
+                projection.pull_back(n, &mut self.w);
+            }
+            let Some(shares) = self.shares(number, record) else {
+                return Ok(Some("accumulation"));
+            };
+            self.w[..n].fill(0.0);
+            self.owed.extend(shares);
+        }
+        for owed in std::mem::take(&mut self.owed) {
+            if owed.instant != number {
+                self.owed.push(owed);
+                continue;
+            }
+            add(&mut self.w[..n], 1.0, &owed.by_state);
+            let moved = dot(&owed.by_state, record.field[0]) + owed.by_time;
+            add(&mut self.w, moved, &time);
+        }
+        for term in terms {
+            let ends_at = |j: usize| record.guards.first() == Some(&Guard::Surface(j));
+            if matches!(term.at, When::Surface(j) if ends_at(j)) {
+                let z = extended.state(record.x[0]);
+                let (by_time, gradient) = term.cost.at(record.t[0], &z, record.discrete[0])?;
+                add(&mut self.w, 1.0, &gradient);
+                let moved = by_time + dot(&gradient[..n], record.field[0]);
+                add(&mut self.w, moved, &time);
+            }
+        }
+        let is_finite = self.w.iter().all(|value| value.is_finite());
+        Ok((!is_finite).then_some("not_finite"))
+    }
+
+    /// What the limit of infinitely many switches takes from the instants before.
+    fn shares(&self, number: usize, record: &InstantRecord) -> Option<[Shares; 3]> {
+        let instants = &self.run.trail.instants[..=number];
+        let like = |k: usize| is_like(&instants[k].record(), record);
+        let round = (1..=number / 2).find(|r| like(number - r) && like(number - 2 * r))?;
+        let of = |k: usize| instants[k].record();
+        let all = [number, number - round, number - 2 * round];
+        Shares::of(all, all.map(of), &self.w[..record.x[1].len()])
+    }
+}
+
+fn add(to: &mut [f64], factor: f64, row: &[f64]) {
+    let entries = to.iter_mut().zip(row);
+    entries.for_each(|(entry, value)| *entry += factor * value);
+}
