@@ -27,7 +27,7 @@ from pathlib import Path
 import filippov as fl
 import numpy as np
 from matplotlib import pyplot
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 from scipy.stats import t as student
 
 MASS, STIFFNESS, DAMPING, V_BELT = 1.0, 100.0, 1.0, 0.1  # kg, N/m, N s/m, m/s
@@ -54,7 +54,7 @@ runs: Counter[str] = Counter()
 
 def run(p: np.ndarray, wrt: tuple[str, ...] | None = None) -> fl.Solution:
     """Return the motion from rest with the parameters `p`, and count the run."""
-    runs["plain" if wrt is None else "with derivatives"] += 1
+    runs["without derivatives" if wrt is None else "with derivatives"] += 1
     params = dict(zip(NAMES, p, strict=True))
     return block.solve((0.0, TIMES[-1]), [0.0, 0.0], params, wrt=wrt, rtol=1e-10, atol=1e-12)
 
@@ -64,7 +64,7 @@ def sensitivities(p: np.ndarray) -> np.ndarray:
     return run(p, wrt=NAMES).derivative(TIMES)[0].T
 
 
-def fit(measured: np.ndarray, *, exact: bool):
+def fit(measured: np.ndarray, *, exact: bool) -> OptimizeResult:
     """Return the fit to the record, which starts from fits to its first parts; print the cost."""
     runs.clear()
     began, p = time.perf_counter(), GUESS
@@ -74,10 +74,8 @@ def fit(measured: np.ndarray, *, exact: bool):
         bounds = ([0.1, 0.1, 0.01], [20.0, 20.0, 1.0])
         found = least_squares(residuals, p, jacobian, bounds, x_scale=(1.0, 1.0, 0.02), xtol=1e-10)
         p = found.x
-    counted = ", ".join(f"{count} {kind}" for kind, count in runs.items())
-    print(
-        f"{'exact Jacobian' if exact else 'differences'}: {time.perf_counter() - began:.2f} s, runs: {counted}"
-    )
+    counted = ", ".join(f"{count} runs {kind}" for kind, count in runs.items())
+    print(f"{'exact Jacobian' if exact else 'differences'}: {time.perf_counter() - began:.2f} s, {counted}")
     return found
 
 
@@ -92,12 +90,11 @@ def draw(path: Path, measured: np.ndarray, p: np.ndarray, covariance: np.ndarray
     panels = [["record", "law"], ["residuals", "law"], ["part", "width"]]
     ratios = {"width_ratios": (1.6, 1.0), "height_ratios": (2.0, 1.0, 2.0)}
     figure, axes = pyplot.subplot_mosaic(panels, figsize=(11.0, 7.2), layout="constrained", **ratios)
-    fitted, sensitivity = run(p), sensitivities(p)
+    fitted, scaled = run(p), sensitivities(p) * p  # by relative changes of the parameters
     t = np.linspace(0.0, TIMES[-1], 2000)
     axes["record"].plot(t, 1e3 * fitted.sol(t)[0], color=COLOURS[0], linewidth=1.2, label="fit")
     axes["record"].plot(TIMES, 1e3 * measured, ".", color="k", markersize=3.5, label="measured")
     axes["residuals"].plot(TIMES, 1e3 * (measured - fitted.sol(TIMES)[0]), ".", color="k", markersize=3.5)
-    scaled = sensitivity * p  # by relative changes of the parameters
     for k, (name, colour, style) in enumerate(zip(NAMES, COLOURS, STYLES, strict=True)):
         line = {"color": colour, "linestyle": style, "linewidth": 1.5, "label": name}
         axes["part"].plot(TIMES, 10.0 * scaled[:, k], **line)

@@ -226,6 +226,7 @@ class _Call(NamedTuple):
     parameters: Array
     actions: list[Any]
     states: tuple[str, ...]
+    wanted: Wanted | None
 
 
 _MOST_CALLS = 64
@@ -241,20 +242,37 @@ def solve_prepared(
     """Solve as `solve_ivp` does, sooner if only options are given, most of all those of an earlier call."""
     if not options.keys() <= _OPTIONS:
         return solve_ivp(system, t_span, y0, params=params, **options)
-    key = None if params else repeatable_key(options)
+    key = None if params else _key_of(options)
     call = None if key is None else system._calls.get(key)
     if call is not None:
         (t0, t1), state = check_t_span(t_span), check_y0(y0, states=system._states)
         prepared = call.prepared
         if t0 < t1 and len(state) == prepared.core.n_states:
-            run = run_core(prepared.core, t0, t1, state, call.parameters, call.core_options, [], call.actions)
+            wanted = call.wanted
+            asked = None if wanted is None else wanted.for_core()
+            core_options, actions = call.core_options, call.actions
+            run = run_core(prepared.core, t0, t1, state, call.parameters, core_options, [], actions, asked)
             if run.reason != "field_not_finite":
-                solution = _present(run, system, prepared, call.options, t0, call.states, False, None)
-                return _shown(solution) if run.n_warnings or prepared.warnings else solution
+                solution = _present(
+                    run, system, prepared, call.options, t0, call.states, False, None, (), wanted
+                )
+                warns = run.n_warnings or prepared.warnings or (wanted is not None and run.warns_of_derivatives)
+                return _shown(solution) if warns else solution
     solution = _solve(system, t_span, y0, _changed(options), None, (), params, None, None)
     if key is not None and call is None and len(system._calls) < _MOST_CALLS:
         _keep_call(system, key, options, len(solution.states))
     return _shown(solution)
+
+
+def _key_of(options: Mapping[str, Any]) -> Hashable | None:
+    """Return what tells these options from others, if that is known."""
+    if "wrt" not in options:
+        return repeatable_key(options)
+    others = dict(options)
+    names = others.pop("wrt")
+    key = repeatable_key(others)
+    is_plain = isinstance(names, (str, list, tuple)) and all(isinstance(name, str) for name in names)
+    return None if key is None or not is_plain else (key, names if isinstance(names, str) else tuple(names))
 
 
 def _shown(solution: Solution) -> Solution:
@@ -269,7 +287,10 @@ def _shown(solution: Solution) -> Solution:
 
 def _keep_call(system: System, key: Hashable, given: Mapping[str, Any], n: int) -> None:
     values = system.parameter_values(None)
-    options = check_options(_changed(given), (0.0, 1.0), n)
+    changed = _changed(given)
+    wrt = changed.pop("wrt", None)
+    options = check_options(changed, (0.0, 1.0), n)
+    states = system.state_names(n)
     if options.nonunique != "branch":
         prepared = system.prepare(n, 0.0, None, values)
         if prepared.doubts:  # warned of at every call
@@ -280,7 +301,8 @@ def _keep_call(system: System, key: Hashable, given: Mapping[str, Any], n: int) 
             options.for_core(),
             parameter_vector(values),
             list(prepared.actions),
-            system.state_names(n),
+            states,
+            None if wrt is None else check_wrt(wrt, states, values, system.discrete),
         )
 
 

@@ -511,7 +511,7 @@ def derivative_warnings(run: Run, t0: float, names: Sequence[str]) -> list[RunWa
     if left:
         text = f"the run starts on {', '.join(left)} = 0: derivatives by the start are those of one side"
         found.append(RunWarning(t0, "one_sided", text, (), left))
-    lost = next(((row[0], row[5]) for row in run.instants() if row[5]), None)
+    lost = run.derivatives_lost()
     if lost is not None:
         t, why = lost
         text = f"derivatives are not known from t = {t:.10g} on: {_WHY_LOST[why]}"

@@ -239,6 +239,12 @@ impl RunDerivatives {
         &self.found.starts_on
     }
 
+    /// Where derivatives end, and why.
+    pub fn lost(&self) -> Option<(f64, &'static str)> {
+        let mut instants = self.found.instants.iter();
+        instants.find_map(|found| Some((found.t, found.lost?.name())))
+    }
+
     /// The derivatives of all instants.
     pub fn instants<'py>(&self, py: Python<'py>, n: usize) -> Vec<InstantRow<'py>> {
         let m = self.parameters.len();

@@ -592,6 +592,18 @@ impl Run {
         derivatives.map_or_else(Vec::new, |derivatives| derivatives.starts_on().to_vec())
     }
 
+    /// Do derivatives end, or are they those of one side?
+    #[getter]
+    fn warns_of_derivatives(&self) -> bool {
+        let derivatives = self.derivatives.as_ref();
+        derivatives.is_some_and(|found| found.lost().is_some() || !found.starts_on().is_empty())
+    }
+
+    /// The time at which derivatives end, and why.
+    fn derivatives_lost(&self) -> Option<(f64, &'static str)> {
+        self.derivatives.as_ref()?.lost()
+    }
+
     /// The derivatives of all instants.
     fn instants<'py>(&self, py: Python<'py>) -> Vec<InstantRow<'py>> {
         let n = self.solution().n_states;

@@ -1,7 +1,7 @@
 //! What an instant makes of a change of the extended state.
 
 use super::piece::dot;
-use crate::cube::{Elimination, Matrix};
+use crate::cube::{Elimination, Matrix, Vector};
 
 /// A linear map of changes (x, p) of the extended state, which leaves p as it is: x goes to R (x, p) + sum_i d_i (g_i . (x, p)).
 #[derive(Clone, Debug, Default)]
@@ -24,7 +24,7 @@ impl Change {
         let width = normals.first().map_or(0, Vec::len);
         let mut rows = vec![vec![0.0; width]; normals.len()];
         for c in 0..width {
-            let column: Vec<f64> = normals.iter().map(|normal| normal[c]).collect();
+            let column: Vector = normals.iter().map(|normal| normal[c]).collect();
             let shares = factors.solve(&column);
             rows.iter_mut().zip(shares).for_each(|(row, v)| row[c] = -v);
         }
@@ -52,7 +52,7 @@ impl Change {
     }
 
     fn apply_once(&self, n: usize, column: &mut [f64]) {
-        let shares: Vec<f64> = self.rows.iter().map(|row| dot(row, column)).collect();
+        let shares: Vector = self.rows.iter().map(|row| dot(row, column)).collect();
         if let Some(map) = &self.map {
             let image: Vec<f64> = map.iter().map(|row| dot(row, column)).collect();
             column[..n].copy_from_slice(&image);
@@ -72,7 +72,7 @@ impl Change {
 
     fn pull_back_once(&self, n: usize, gradient: &mut [f64]) {
         let products = |d: &Vec<f64>| dot(d, &gradient[..n]);
-        let shares: Vec<f64> = self.directions.iter().map(products).collect();
+        let shares: Vector = self.directions.iter().map(products).collect();
         if let Some(map) = &self.map {
             let behind = gradient[..n].to_vec();
             gradient[..n].fill(0.0);

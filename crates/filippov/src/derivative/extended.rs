@@ -1,7 +1,12 @@
 //! A traced system in which parameters are states that rest.
 
-use filippov_expr::{Backend, Names, NodeId, Program};
+use std::sync::{Arc, Mutex, PoisonError};
 
+use filippov_expr::{Backend, Names, NodeId, Program};
+use rustc_hash::FxHashMap;
+use smallvec::SmallVec;
+
+use super::series::ChangeSeries;
 use crate::error::{Error, FieldError};
 use crate::system::{
     sides_of, Action, Actions, Definition, PiecewiseSystem, Place, Rules, TracedMap, TracedSystem,
@@ -28,7 +33,12 @@ pub struct Extension {
     parameters: Vec<usize>,
     /// What each node of the system has become.
     made: Vec<NodeId>,
+    series: Arc<SeriesCache>,
 }
+
+/// The series of changes, by the surfaces slid on and the order.
+type SeriesCache = Mutex<FxHashMap<(Surfaces, usize), Option<Arc<ChangeSeries>>>>;
+type Surfaces = SmallVec<[usize; 2]>;
 
 impl Extension {
     /// The extension of a system by these parameters.
@@ -45,6 +55,7 @@ impl Extension {
             n,
             parameters: parameters.to_vec(),
             made,
+            series: Arc::default(),
         })
     }
 
@@ -88,6 +99,7 @@ impl Extension {
             maps,
             triggers: triggers.collect(),
             clocks,
+            series: Arc::clone(&self.series),
         }))
     }
 
@@ -123,9 +135,18 @@ pub struct Extended<'a> {
     triggers: Vec<Trigger>,
     /// For each action at the known times of a law the derivatives of what the law reads: by the time, then by the parameters.
     clocks: Vec<Option<Program>>,
+    series: Arc<SeriesCache>,
 }
 
 impl Extended<'_> {
+    /// The series of the changes of the motions on these surfaces, if they have any.
+    pub(super) fn series(&self, sliding: &[usize], order: usize) -> Option<Arc<ChangeSeries>> {
+        let mut known = self.series.lock().unwrap_or_else(PoisonError::into_inner);
+        let made = known.entry((SmallVec::from_slice(sliding), order));
+        let make = || ChangeSeries::new(&self.system, sliding, order).map(Arc::new);
+        made.or_insert_with(make).clone()
+    }
+
     /// The actions that may be impacts, with maps of the extended state: those of contacts.
     pub fn impacts(&self) -> Actions<'_> {
         let all = self.maps.iter().zip(&self.triggers);

@@ -353,11 +353,7 @@ pub(super) fn entered(
     (t, z): (f64, &[f64]),
 ) -> Result<Option<Change>, FieldError> {
     let n = extended.n;
-    let is_affine = extended
-        .system
-        .affine_signs()
-        .is_some_and(|affine| affine.affine_parts(&sliding.sliding).is_some());
-    if !is_affine || matches!(sliding.field, ModeField::Reduced(_) | ModeField::Contact(_)) {
+    if !sliding.is_affine || matches!(sliding.field, ModeField::Reduced(_) | ModeField::Contact(_)) {
         return Ok(None);
     }
     let normals = sliding.normals(t, z)?;

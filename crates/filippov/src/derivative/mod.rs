@@ -17,6 +17,7 @@ mod instant;
 mod limit;
 mod piece;
 mod radau;
+mod series;
 mod tangents;
 
 pub use adjoint::{CostGradient, Term, Trail, WayBack, When};

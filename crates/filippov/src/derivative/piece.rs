@@ -8,16 +8,18 @@ use smallvec::SmallVec;
 use super::change::Change;
 use super::collocation::Collocation;
 use super::extended::Extended;
-use super::radau::{NODES, STAGES};
+use super::radau::NODES;
+use super::series::{ChangeSeries, Coefficients};
 use crate::cube::Matrix;
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::{ContactField, Law, ModeField, SmoothField};
 use crate::options::{Options, SlidingRule};
 use crate::sparse::SparseRows;
+use crate::stepper::Taylor;
 use crate::system::{
     Actions, LieDerivatives, Linearisation, Linearisations, MotionJacobian, PiecewiseSystem, Place,
-    Setting, SignStructure,
+    Setting, SignStructure, TracedSystem,
 };
 use crate::tolerances::{EPS, ROUNDING};
 
@@ -38,8 +40,9 @@ pub(super) struct Surroundings<'a> {
     pub law: Law<'a>,
     /// The side of each surface on which the motion is, or was last.
     pub sides: Vec<i8>,
-    /// How long a part of a step may be, in units of 1 / |Df|.
-    longest: f64,
+    rtol: f64,
+    /// The order of Taylor series.
+    order: usize,
 }
 
 impl<'a> Surroundings<'a> {
@@ -55,7 +58,8 @@ impl<'a> Surroundings<'a> {
             impacts,
             law: Law::from(options),
             sides: sides.collect(),
-            longest: longest_part(options.rtol),
+            rtol: options.rtol,
+            order: Taylor::order_for(options.rtol, |_| None),
         }
     }
 
@@ -77,10 +81,18 @@ pub(super) struct Piece<'a> {
     pub sliding: Vec<usize>,
     /// The surfaces in contact.
     contacts: Vec<usize>,
+    sides: Vec<i8>,
     signs: Vec<f64>,
     pub field: ModeField<'a>,
     /// The derivatives of its field, if the graph has them.
     jacobian: Option<Arc<MotionJacobian>>,
+    /// Is the field affine in the signs of the surfaces slid on?
+    pub is_affine: bool,
+    /// The series of its changes, if it has any.
+    series: Option<Arc<ChangeSeries>>,
+    coefficients: Coefficients,
+    carried: Vec<Vec<f64>>,
+    rtol: f64,
     /// How long a part of a step may be, in units of 1 / |Df|.
     longest: f64,
     collocation: Collocation,
@@ -125,10 +137,6 @@ impl<'a> Piece<'a> {
         let linearisations = system.linearisations().filter(|_| by_graph);
         let jacobian = linearisations.and_then(|l| l.motion_jacobian(&sliding));
         let z = extended.state(&vec![0.0; extended.n]);
-        let space = match &jacobian {
-            Some(jacobian) => jacobian.linearisation(),
-            None => Linearisation::dense(z.len()),
-        };
         Piece {
             extended,
             mode: mode.clone(),
@@ -136,20 +144,30 @@ impl<'a> Piece<'a> {
             node_signs: signs.to_vec(),
             signs: signs.to_vec(),
             contacts,
+            sides: sides.clone(),
             field,
             jacobian,
-            sliding,
-            longest: around.longest,
+            is_affine: is_affine(&extended.system, &sliding),
+            series: match by_graph {
+                true => extended.series(&sliding, around.order),
+                false => None,
+            },
+            coefficients: Coefficients::default(),
+            carried: Vec::new(),
+            rtol: around.rtol,
+            longest: longest_part(around.rtol),
             collocation: Collocation::new(extended.n, extended.n_parameters()),
-            nodes: vec![space; STAGES],
+            nodes: Vec::new(),
             rates: vec![0.0; z.len()],
             point: z,
+            sliding,
         }
     }
 
-    /// Does this motion have these mode and discrete states?
-    pub fn is_of(&self, mode: &Mode, q: &[f64]) -> bool {
-        self.mode == *mode && self.q == q
+    /// Does this motion have these mode and discrete states, in these surroundings?
+    pub fn is_of(&self, around: &Surroundings, mode: &Mode, q: &[f64]) -> bool {
+        let is_same = || self.contacts.is_empty() || self.sides == around.sides;
+        self.mode == *mode && self.q == q && is_same()
     }
 
     /// A point of the extended system in this motion.
@@ -180,12 +198,45 @@ impl<'a> Piece<'a> {
         (t0, t1): (f64, f64),
         columns: &mut [Vec<f64>],
     ) -> Result<(), FieldError> {
+        if self.advance_by_series(&mut path, (t0, t1), columns)? {
+            return Ok(());
+        }
         let (parts, dt) = self.parts(&mut path, (t0, t1))?;
         for part in 0..parts {
             self.take(&mut path, t0 + part as f64 * dt, dt, false)?;
             self.collocation.carry(columns);
         }
         Ok(())
+    }
+
+    /// The same by Taylor series, if they are long enough.
+    fn advance_by_series(
+        &mut self,
+        path: &mut impl FnMut(f64, &mut [f64]) -> Result<(), FieldError>,
+        (t0, t1): (f64, f64),
+        columns: &mut [Vec<f64>],
+    ) -> Result<bool, FieldError> {
+        let Some(series) = &self.series else {
+            return Ok(false);
+        };
+        let (n, system) = (self.extended.n, &self.extended.system);
+        self.carried.resize_with(columns.len(), Vec::new);
+        for (carried, column) in self.carried.iter_mut().zip(&*columns) {
+            carried.clone_from(column);
+            let (mut t, mut left) = (t0, t1 - t0);
+            while left > 0.0 {
+                path(t, &mut self.point[..n])?;
+                let place = Setting::new(&self.signs, &self.q).at(t, &self.point);
+                let motion = (system, &place);
+                let size = (n, self.rtol);
+                match series.carry(motion, size, left, carried, &mut self.coefficients) {
+                    Some(rest) => (t, left) = (t1 - rest, rest),
+                    None => return Ok(false),
+                }
+            }
+        }
+        columns.swap_with_slice(&mut self.carried);
+        Ok(true)
     }
 
     /// Takes the gradient of a function of the state at the end of a step back to its start, and adds to the shares of the
@@ -239,6 +290,12 @@ impl<'a> Piece<'a> {
 
     /// Finds the derivatives of the field at the point, for one of the nodes.
     fn slopes(&mut self, node: usize, t: f64) -> Result<(), FieldError> {
+        while self.nodes.len() <= node {
+            self.nodes.push(match &self.jacobian {
+                Some(jacobian) => jacobian.linearisation(),
+                None => Linearisation::dense(self.point.len()),
+            });
+        }
         let Some(jacobian) = &self.jacobian else {
             return self.slopes_by_differences(node, t);
         };
@@ -396,6 +453,11 @@ impl<'a> Piece<'a> {
         let directions: Vec<&[f64]> = normals.iter().map(|row| &row[..n]).collect();
         Ok((!normals.is_empty()).then(|| Change::normal_to(&normals, &directions)))
     }
+}
+
+fn is_affine(system: &TracedSystem, sliding: &[usize]) -> bool {
+    let known = system.affine_signs();
+    known.is_some_and(|affine| affine.affine_parts(sliding).is_some())
 }
 
 /// The largest sum of the absolute values of a row of F_x.

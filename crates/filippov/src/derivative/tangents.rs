@@ -11,6 +11,9 @@ use crate::options::Options;
 use crate::record::{InstantRecord, ObservedStep, Observer};
 use crate::system::Actions;
 
+/// So many motions are kept, in case that they come again.
+const MOST_PIECES: usize = 16;
+
 /// The derivatives of a run.
 #[derive(Clone, Debug, Default)]
 pub struct Derivatives {
@@ -63,7 +66,8 @@ pub struct Tangents<'a> {
     kinds: Vec<Column>,
     /// For each column the derivative of the state, and its shares of the parameters behind it.
     columns: Vec<Vec<f64>>,
-    piece: Option<Piece<'a>>,
+    /// Motions that were met, the latest last.
+    pieces: Vec<Box<Piece<'a>>>,
     history: History,
     has_started: bool,
     lost: Option<Lost>,
@@ -89,7 +93,7 @@ impl<'a> Tangents<'a> {
             },
             columns: Vec::new(),
             kinds,
-            piece: None,
+            pieces: Vec::new(),
             history: History::default(),
             has_started: false,
             lost: None,
@@ -137,7 +141,7 @@ impl<'a> Tangents<'a> {
             }
         }
         self.found.starts_on = piece.left_at_once(t, &z)?;
-        self.piece = Some(piece);
+        self.put_back(Box::new(piece));
         self.keep(t);
         Ok(())
     }
@@ -157,10 +161,20 @@ impl<'a> Tangents<'a> {
             .for_each(|column| column.fill(f64::NAN));
     }
 
-    /// Makes sure that the motion at hand is the one of this mode.
-    fn take_piece(&mut self, mode: &Mode, q: &[f64]) -> Piece<'a> {
-        let piece = self.piece.take().filter(|piece| piece.is_of(mode, q));
-        piece.unwrap_or_else(|| Piece::new(&self.around, mode, q))
+    /// The motion of this mode, to be put back.
+    fn take_piece(&mut self, mode: &Mode, q: &[f64]) -> Box<Piece<'a>> {
+        let is_known = |piece: &Box<Piece>| piece.is_of(&self.around, mode, q);
+        match self.pieces.iter().rposition(is_known) {
+            Some(place) => self.pieces.remove(place),
+            None => Box::new(Piece::new(&self.around, mode, q)),
+        }
+    }
+
+    fn put_back(&mut self, piece: Box<Piece<'a>>) {
+        if self.pieces.len() == MOST_PIECES {
+            self.pieces.remove(0);
+        }
+        self.pieces.push(piece);
     }
 
     fn follow(&mut self, step: &ObservedStep) -> Result<(), FieldError> {
@@ -179,7 +193,7 @@ impl<'a> Tangents<'a> {
             piece.advance(along, (t0, step.t_end), &mut self.columns)?;
             let z = self.around.extended.state(step.x_end);
             piece.project(step.t_end, &z, &mut self.columns)?;
-            self.piece = Some(piece);
+            self.put_back(piece);
             if self.columns.iter().flatten().any(|v| !v.is_finite()) {
                 self.lose(Lost::NotFinite);
             }
@@ -194,7 +208,7 @@ impl<'a> Tangents<'a> {
         }
         let mut before = self.take_piece(record.mode[0], record.discrete[0]);
         self.around.take_sides(record.mode[0]);
-        let mut after = Piece::new(&self.around, record.mode[1], record.discrete[1]);
+        let mut after = self.take_piece(record.mode[1], record.discrete[1]);
         let mut instant = Instant {
             extended: self.around.extended,
             record,
@@ -212,7 +226,8 @@ impl<'a> Tangents<'a> {
             found.lost.into_iter().for_each(|lost| self.lose(lost));
             self.found.instants.push(found);
         }
-        self.piece = Some(after);
+        self.put_back(before);
+        self.put_back(after);
         self.keep(record.t[1]);
         Ok(())
     }

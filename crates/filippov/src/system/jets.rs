@@ -157,7 +157,11 @@ fn compile(
 /// Filippov's field on surface `j` and its exit functions. With the field f0 + s f1 in the sign s of the surface,
 /// and the rates a0 + s a1 of its switching function, the multiplier is -a0/a1: in this form it is simple where
 /// the jump f1 is.
-fn sliding_field(graph: &mut Graph, field: &[NodeId], j: usize) -> (Vec<NodeId>, Vec<NodeId>) {
+pub(crate) fn sliding_field(
+    graph: &mut Graph,
+    field: &[NodeId],
+    j: usize,
+) -> (Vec<NodeId>, Vec<NodeId>) {
     let Gradient { time, states } = graph.gradient(graph.surface(j as u32));
     let (middle, jump) = middle_and_jump(graph, field, j);
     let zero = graph.constant(0.0);

@@ -46,6 +46,7 @@ pub(crate) use definition::{check_index, inconsistent};
 pub use definition::{Definition, Rules};
 pub use enclosures::Enclosures;
 pub use jacobian::MotionJacobian;
+pub(crate) use jets::sliding_field;
 pub use jets::MotionJets;
 pub use laws::{Law, LawAction, LawMap, Laws, Step};
 pub use lie_derivatives::{LieDerivatives, LieValue, RatePartials, Word};
@@ -57,6 +58,7 @@ pub(crate) use place::OwnSetting;
 pub use place::{Place, Setting};
 pub use sign_structure::SignStructure;
 pub use taylor_series::TaylorSeries;
+pub(crate) use tiered::Tiered;
 pub use traced::TracedSystem;
 
 use crate::error::FieldError;

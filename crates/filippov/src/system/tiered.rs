@@ -10,7 +10,7 @@ const CALLS_BEFORE_NATIVE: u32 = 2000;
 
 /// An interpreted program that is compiled to native code after [`CALLS_BEFORE_NATIVE`] calls. Both give
 /// the same bits, so the moment of the change does not show in any result.
-pub(super) struct Tiered<P> {
+pub(crate) struct Tiered<P> {
     /// Compiles for a backend, falling back to the interpreter.
     compile: Option<Box<dyn Fn(Backend) -> P + Send + Sync>>,
     backend: Backend,

@@ -6,7 +6,7 @@ mod rounding;
 
 use std::sync::Arc;
 
-use filippov_expr::{Backend, Enclosure, ExprError, Graph, Motion, Names, NodeId, Program};
+use filippov_expr::{Backend, Enclosure, ExprError, Graph, JetProgram, Motion, Names, NodeId, Program};
 use smallvec::SmallVec;
 
 use super::compiled::{Follower, Model};
@@ -161,6 +161,13 @@ impl TracedSystem {
             values = behind(&self.parameters, q);
             &values
         })
+    }
+
+    /// Evaluates the series of a motion at a place.
+    pub(crate) fn eval_series(&self, series: &JetProgram, place: &Place<'_>, out: &mut [f64]) {
+        self.with_values(place.q, |p| {
+            series.eval(place.t, place.x, place.signs, p, &[], out);
+        });
     }
 
     /// Evaluates a program at a place, with a vector handed in.
