@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use filippov::derivative::{
-    Column, Derivatives, Differentiated, EventGradient, Extension, Tangents, Term, Trail, WayBack,
-    When,
+    Column, Derivatives, Differentiated, DifferentiatedRun, EventGradient, Extension, Tangents,
+    Term, Trail, WayBack, When,
 };
 use filippov::{Error, FieldError, Options, Problem, Side, Solution};
 use numpy::{PyArray1, PyArray2};
@@ -167,19 +167,21 @@ impl RunDerivatives {
         &self,
         system: &filippov::TracedSystem,
         solution: &Solution,
-        ask: impl FnOnce(&Differentiated) -> PyResult<R>,
+        ask: impl FnOnce(&mut Differentiated) -> PyResult<R>,
     ) -> PyResult<R> {
         let none = filippov::action::Actions::default();
         let extended = self.extension.at(system.parameters(), &none);
         let extended = extended.map_err(|e| PyValueError::new_err(e.to_string()))?;
         let extended = extended.ok_or_else(|| PyValueError::new_err("maps that are not traced"))?;
-        ask(&Differentiated {
+        let impacts = extended.impacts();
+        ask(&mut Differentiated::new(DifferentiatedRun {
             solution,
             found: &self.found,
             kinds: &self.kinds,
             systems: (system, &extended),
+            impacts: &impacts,
             options: &self.options,
-        })
+        }))
     }
 
     /// The gradient of a sum of terms, an entry for each column; and where and why there is none, if so.

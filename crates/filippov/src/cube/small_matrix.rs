@@ -343,7 +343,9 @@ mod tests {
 
     #[test]
     fn the_transposed_equations_are_solved_with_the_same_factors() {
-        let a = Matrix::of(3, |i, j| [[0.0, 2.0, 1.0], [3.0, -1.0, 4.0], [1.0, 5.0, -2.0]][i][j]);
+        let a = Matrix::of(3, |i, j| {
+            [[0.0, 2.0, 1.0], [3.0, -1.0, 4.0], [1.0, 5.0, -2.0]][i][j]
+        });
         let found = Elimination::of(a.clone()).solve_transposed(&[1.0, -2.0, 3.0]);
         for (entry, exact) in a.transposed().apply(&found).iter().zip([1.0, -2.0, 3.0]) {
             assert!((entry - exact).abs() < 1e-14);

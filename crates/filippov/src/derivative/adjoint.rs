@@ -163,7 +163,9 @@ impl WayBack<'_> {
             let mut piece = Piece::new(&around, &start.mode, &start.q);
             let z = extended.state(&start.x);
             let mut field = vec![0.0; n + m];
-            piece.field.eval_unprojected(start.t, &mut z.clone(), &mut field)?;
+            piece
+                .field
+                .eval_unprojected(start.t, &mut z.clone(), &mut field)?;
             if !piece.sliding.is_empty() {
                 let mut whole = [&found.by_state[..], &found.by_parameters].concat();
                 let entry = entered(extended, &piece, &[], (start.t, &z))?;
@@ -171,7 +173,9 @@ impl WayBack<'_> {
                     Some(entry) => Some(entry),
                     None => piece.projection(&[], start.t, &z)?,
                 };
-                entry.iter().for_each(|entry| entry.pull_back(n, &mut whole));
+                entry
+                    .iter()
+                    .for_each(|entry| entry.pull_back(n, &mut whole));
                 found.by_parameters = whole.split_off(n);
                 found.by_start = -dot(&whole, &field);
                 found.by_state = whole;
@@ -285,13 +289,17 @@ impl<'w> Walk<'w> {
             let extended = self.run.systems.1;
             let mut x = vec![0.0; extended.n];
             let systems = self.run.systems.0;
-            self.run.solution.evaluate(systems, at, Side::Left, &mut x)?;
+            self.run
+                .solution
+                .evaluate(systems, at, Side::Left, &mut x)?;
             let z = extended.state(&x);
             let (by_time, gradient) = term.cost.at(at, &z, &piece.q)?;
             add(&mut self.w, 1.0, &gradient);
             if let When::Zero(_, function) = term.at {
                 let mut field = vec![0.0; z.len()];
-                piece.field.eval_unprojected(at, &mut z.clone(), &mut field)?;
+                piece
+                    .field
+                    .eval_unprojected(at, &mut z.clone(), &mut field)?;
                 let (time, normal) = function.at(at, &z, &piece.q)?;
                 let rate = time + dot(&normal, &field);
                 let moved = by_time + dot(&gradient[..extended.n], &field);

@@ -11,6 +11,14 @@ use crate::system::{sides_of, Actions, PiecewiseSystem, Rules, Setting, TracedSy
 
 /// A run with its derivatives.
 pub struct Differentiated<'r> {
+    run: DifferentiatedRun<'r>,
+    /// The motion at the time asked for last, and the start of its segment.
+    latest: Option<(f64, Box<Piece<'r>>)>,
+}
+
+/// What is known of a run with its derivatives.
+#[derive(Clone, Copy)]
+pub struct DifferentiatedRun<'r> {
     /// The run.
     pub solution: &'r Solution,
     /// The derivatives at its steps.
@@ -19,18 +27,25 @@ pub struct Differentiated<'r> {
     pub kinds: &'r [Column],
     /// The system, and its extension by the parameters among these.
     pub systems: (&'r TracedSystem, &'r Extended<'r>),
+    /// The impacts of the extended system.
+    pub impacts: &'r Actions<'r>,
     /// The options of the run.
     pub options: &'r Options,
 }
 
-impl Differentiated<'_> {
+impl<'r> Differentiated<'r> {
+    /// To be asked for derivatives, soonest in the order of time.
+    pub fn new(run: DifferentiatedRun<'r>) -> Self {
+        Differentiated { run, latest: None }
+    }
+
     /// The derivative of the state at a time, a column of n states after the other, found from that at the last step before;
     /// `None` outside of the run, or if its continuous extension was not kept.
     ///
     /// # Errors
     /// If a function of the user raises.
-    pub fn at(&self, t: f64, side: Side) -> Result<Option<Vec<f64>>, FieldError> {
-        let (columns, n) = (self.columns(t, side)?, self.systems.1.n);
+    pub fn at(&mut self, t: f64, side: Side) -> Result<Option<Vec<f64>>, FieldError> {
+        let (columns, n) = (self.columns(t, side)?, self.run.systems.1.n);
         let states = |columns: Vec<Vec<f64>>| {
             let columns = columns.into_iter();
             columns
@@ -46,7 +61,7 @@ impl Differentiated<'_> {
     /// # Errors
     /// If a function of the user raises.
     pub fn time_of_zero(
-        &self,
+        &mut self,
         function: &EventGradient,
         t: f64,
     ) -> Result<Option<Vec<f64>>, FieldError> {
@@ -54,13 +69,13 @@ impl Differentiated<'_> {
         let Some(columns) = self.columns(t, side)? else {
             return Ok(None);
         };
-        let (system, extended) = self.systems;
-        let impacts = extended.impacts();
-        let Some(mut piece) = self.piece(&impacts, t, side) else {
+        let (system, extended) = self.run.systems;
+        let solution = self.run.solution;
+        let Some(piece) = self.piece(t, side) else {
             return Ok(None);
         };
         let mut x = vec![0.0; extended.n];
-        self.solution.evaluate(system, t, side, &mut x)?;
+        solution.evaluate(system, t, side, &mut x)?;
         let z = extended.state(&x);
         let mut field = vec![0.0; z.len()];
         piece
@@ -73,12 +88,17 @@ impl Differentiated<'_> {
     }
 
     /// The derivative of the state, with the shares of the parameters behind each column.
-    fn columns(&self, t: f64, side: Side) -> Result<Option<Vec<Vec<f64>>>, FieldError> {
-        let (system, extended) = self.systems;
-        let Derivatives {
-            t: times, values, ..
-        } = self.found;
-        let (n, size) = (extended.n, extended.n * self.kinds.len());
+    fn columns(&mut self, t: f64, side: Side) -> Result<Option<Vec<Vec<f64>>>, FieldError> {
+        let DifferentiatedRun {
+            solution,
+            found: Derivatives {
+                t: times, values, ..
+            },
+            kinds,
+            systems: (system, extended),
+            ..
+        } = self.run;
+        let (n, size) = (extended.n, extended.n * kinds.len());
         let is_known = |&known: &f64| match side {
             Side::Left => known < t,
             Side::Right => known <= t,
@@ -93,20 +113,19 @@ impl Differentiated<'_> {
             return Ok(None);
         };
         let known = values[index * size..][..size].chunks_exact(n);
-        let columns = self.kinds.iter().zip(known);
+        let columns = kinds.iter().zip(known);
         let mut columns: Vec<Vec<f64>> = columns
             .map(|(kind, states)| extended.column(*kind, states))
             .collect();
         if times[index] == t {
             return Ok(Some(columns));
         }
-        let impacts = extended.impacts();
-        let Some(mut piece) = self.piece(&impacts, t, side) else {
+        let Some(piece) = self.piece(t, side) else {
             return Ok(None);
         };
         let mut x = vec![0.0; n];
         let path = |t: f64, x: &mut [f64]| {
-            let mode = self.solution.evaluate(system, t, side, x)?;
+            let mode = solution.evaluate(system, t, side, x)?;
             if mode.is_none() {
                 x.fill(f64::NAN);
             }
@@ -119,15 +138,21 @@ impl Differentiated<'_> {
     }
 
     /// The motion of the extended system at a time.
-    fn piece<'p>(&'p self, impacts: &'p Actions<'p>, t: f64, side: Side) -> Option<Piece<'p>> {
-        let (_, extended) = self.systems;
-        let segments = self.solution.segments.iter();
-        let segment = self.solution.segment_at(t, side);
-        let segment = segment.filter(|_| self.solution.is_dense())?;
-        let mut around = Surroundings::at_start(extended, impacts, self.options);
-        let so_far = segments.take_while(|earlier| earlier.t_start <= segment.t_start);
-        so_far.for_each(|earlier| around.take_sides(&earlier.mode));
-        Some(Piece::new(&around, &segment.mode, &segment.discrete))
+    fn piece(&mut self, t: f64, side: Side) -> Option<&mut Piece<'r>> {
+        let run = self.run;
+        let segment = run.solution.segment_at(t, side);
+        let segment = segment.filter(|_| run.solution.is_dense())?;
+        let latest = self.latest.take();
+        let latest = latest.filter(|latest| latest.0 == segment.t_start);
+        let (_, piece) = self.latest.insert(latest.unwrap_or_else(|| {
+            let mut around = Surroundings::at_start(run.systems.1, run.impacts, run.options);
+            let segments = run.solution.segments.iter();
+            let so_far = segments.take_while(|earlier| earlier.t_start <= segment.t_start);
+            so_far.for_each(|earlier| around.take_sides(&earlier.mode));
+            let piece = Piece::new(&around, &segment.mode, &segment.discrete);
+            (segment.t_start, Box::new(piece))
+        }));
+        Some(piece)
     }
 }
 
@@ -152,12 +177,7 @@ impl EventGradient {
     }
 
     /// The derivatives by the time and by the extended state on the side that the point lies on; NaN where there are none.
-    pub(super) fn at(
-        &self,
-        t: f64,
-        z: &[f64],
-        q: &[f64],
-    ) -> Result<(f64, Vec<f64>), FieldError> {
+    pub(super) fn at(&self, t: f64, z: &[f64], q: &[f64]) -> Result<(f64, Vec<f64>), FieldError> {
         let system = &self.extended;
         let signs = sides_of(system, (t, z), q)?;
         let linearisations = system.linearisations();

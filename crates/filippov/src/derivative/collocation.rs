@@ -22,6 +22,14 @@ pub(super) struct Collocation {
     is_regular: bool,
 }
 
+/// About how many operations a part takes with so many changes of n states.
+pub(super) fn operations(n: usize, n_columns: usize) -> usize {
+    let unknowns = STAGES * n;
+    // Large systems are sparse.
+    let width = unknowns.min(STAGES * MOST_FULL);
+    unknowns * width * (width + 6 * n_columns) / 3 + STAGES * 200
+}
+
 impl Collocation {
     /// For n states and m parameters.
     pub fn new(n: usize, m: usize) -> Self {
@@ -168,11 +176,7 @@ impl Collocation {
 
 /// The derivatives of the natural extension of a field by states and parameters, n rows of n + m entries: the multipliers follow
 /// from G = 0. `None` if they do not.
-fn eliminated(
-    rows: &SparseRows,
-    (n, m, l): (usize, usize, usize),
-    out: &mut [f64],
-) -> Option<()> {
+fn eliminated(rows: &SparseRows, (n, m, l): (usize, usize, usize), out: &mut [f64]) -> Option<()> {
     let width = n + m;
     let mut by_multipliers = vec![0.0; n * l];
     out.fill(0.0);

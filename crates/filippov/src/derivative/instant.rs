@@ -188,7 +188,10 @@ impl Instant<'_, '_> {
         }
         let (map, mut moved) = self.mapped()?;
         let after = record.field[1].iter();
-        moved.iter_mut().zip(after).for_each(|(f, after)| *f -= after);
+        moved
+            .iter_mut()
+            .zip(after)
+            .for_each(|(f, after)| *f -= after);
         changes.push(Change {
             map,
             directions: vec![moved],
@@ -320,7 +323,9 @@ impl Instant<'_, '_> {
             let place = (self.record.t[0], &act.x[..], &act.discrete[..]);
             let (rows, by_time) = map.derivative(place, values)?;
             let moved = rows.iter().zip(&by_time);
-            along = moved.map(|(row, by_time)| dot(&row[..n], &along) + by_time).collect();
+            along = moved
+                .map(|(row, by_time)| dot(&row[..n], &along) + by_time)
+                .collect();
             total = Some(match total {
                 None => rows,
                 Some(earlier) => rows.iter().map(|row| chained(n, row, &earlier)).collect(),
@@ -353,7 +358,8 @@ pub(super) fn entered(
     (t, z): (f64, &[f64]),
 ) -> Result<Option<Change>, FieldError> {
     let n = extended.n;
-    if !sliding.is_affine || matches!(sliding.field, ModeField::Reduced(_) | ModeField::Contact(_)) {
+    if !sliding.is_affine || matches!(sliding.field, ModeField::Reduced(_) | ModeField::Contact(_))
+    {
         return Ok(None);
     }
     let normals = sliding.normals(t, z)?;

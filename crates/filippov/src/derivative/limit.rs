@@ -77,7 +77,11 @@ impl Shares {
         let (share, slope) = (rounds.share(), rounds.slope());
         let by_limit = -dot(w, records[0].field[1]);
         let moved = records[0].x[0].iter().zip(records[1].x[0]);
-        let moved: f64 = w.iter().zip(moved).map(|(w, (x, before))| w * (x - before)).sum();
+        let moved: f64 = w
+            .iter()
+            .zip(moved)
+            .map(|(w, (x, before))| w * (x - before))
+            .sum();
         let by_share = (moved + by_limit * rounds.late) * slope;
         let scaled = |factor: f64| w.iter().map(|w| factor * w).collect();
         let of = |k: usize, by_time: f64, factor: f64| Shares {
@@ -87,7 +91,11 @@ impl Shares {
         };
         Some([
             of(0, by_limit * (1.0 + share) + by_share, 1.0 + share),
-            of(1, -by_limit * share - by_share * (1.0 + rounds.ratio), -share),
+            of(
+                1,
+                -by_limit * share - by_share * (1.0 + rounds.ratio),
+                -share,
+            ),
             of(2, by_share * rounds.ratio, 0.0),
         ])
     }

@@ -21,7 +21,7 @@ mod series;
 mod tangents;
 
 pub use adjoint::{CostGradient, Term, Trail, WayBack, When};
-pub use between::{Differentiated, EventGradient};
+pub use between::{Differentiated, DifferentiatedRun, EventGradient};
 pub use extended::{Column, Extended, Extension};
 pub use instant::{InstantDerivative, Lost};
 pub use tangents::{Derivatives, Tangents};

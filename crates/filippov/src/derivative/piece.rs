@@ -6,7 +6,7 @@ use std::sync::Arc;
 use smallvec::SmallVec;
 
 use super::change::Change;
-use super::collocation::Collocation;
+use super::collocation::{operations, Collocation};
 use super::extended::Extended;
 use super::radau::NODES;
 use super::series::{ChangeSeries, Coefficients};
@@ -216,7 +216,11 @@ impl<'a> Piece<'a> {
         (t0, t1): (f64, f64),
         columns: &mut [Vec<f64>],
     ) -> Result<bool, FieldError> {
-        let Some(series) = &self.series else {
+        let is_cheap = |series: &&Arc<ChangeSeries>| {
+            let count = columns.len();
+            series.operations() * count <= operations(self.extended.n, count)
+        };
+        let Some(series) = self.series.as_ref().filter(is_cheap) else {
             return Ok(false);
         };
         let (n, system) = (self.extended.n, &self.extended.system);
@@ -394,20 +398,27 @@ impl<'a> Piece<'a> {
             .collect()
     }
 
-    /// The surfaces through a point that the motion leaves, where the field jumps.
-    pub fn left_at_once(&self, t: f64, z: &[f64]) -> Result<Vec<usize>, FieldError> {
+    /// The surfaces through a point that the motion leaves, where the field jumps, if one of these changes moves the point off
+    /// them. Each has a share of the time too.
+    pub fn left_at_once(
+        &self,
+        t: f64,
+        z: &[f64],
+        changes: &[(f64, &[f64])],
+    ) -> Result<Vec<usize>, FieldError> {
         let (system, place) = (&self.extended.system, self.at(t, z));
         let mut h = vec![0.0; system.n_surfaces()];
         system.surfaces(&place, &mut h)?;
-        let mut found = Vec::new();
-        for (j, h) in h
-            .iter()
-            .enumerate()
-            .filter(|(j, _)| self.mode.entries()[*j] != 0)
-        {
-            let is_there = h.abs() <= ROUNDING * system.surface_size(j, &place)?;
+        let (mut found, mut normal) = (Vec::new(), vec![0.0; z.len()]);
+        for (j, h) in h.iter().enumerate() {
+            let is_on_a_side = self.mode.entries()[j] != 0;
+            let is_there = is_on_a_side && h.abs() <= ROUNDING * system.surface_size(j, &place)?;
             if is_there && system.jumps_across(j, &self.signs, &self.sliding) {
-                found.push(j);
+                let by_time = system.gradient(j, &place, &mut normal)?;
+                let moves = |(time, x): &(f64, &[f64])| by_time * time + dot(&normal, x) != 0.0;
+                if changes.iter().any(moves) {
+                    found.push(j);
+                }
             }
         }
         Ok(found)

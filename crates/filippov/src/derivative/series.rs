@@ -51,6 +51,11 @@ impl ChangeSeries {
         })
     }
 
+    /// How many operations it takes to carry a change.
+    pub fn operations(&self) -> usize {
+        self.program.program().operations()
+    }
+
     /// Carries a change of the n first states over a time `dt` from a place, as far as the series allows; returns the time that is
     /// left, `None` if the series is too short.
     pub fn carry(
@@ -66,15 +71,21 @@ impl ChangeSeries {
         room.start.clear();
         room.start.extend_from_slice(place.x);
         room.start.extend_from_slice(column);
-        let at = Place { x: &room.start, ..*place };
+        let at = Place {
+            x: &room.start,
+            ..*place
+        };
         system.eval_series(self.program.program(), &at, &mut room.rows);
-        if !room.rows[self.order * width..].iter().all(|c| c.is_finite()) {
+        if !room.rows[self.order * width..]
+            .iter()
+            .all(|c| c.is_finite())
+        {
             return None;
         }
         let start = largest(&column[..n]);
         self.sum(&room.rows, dt, &mut column[..n]);
         // The two last terms are to be below the tolerance.
-        let bound = 0.1 * rtol * start.max(largest(&column[..n]));
+        let bound = 0.5 * rtol * start.max(largest(&column[..n]));
         let mut share = 1.0_f64;
         for k in [self.order - 1, self.order] {
             let term = largest(&room.rows[k * width + self.size..][..n]) * dt.powi(k as i32);

@@ -140,7 +140,11 @@ impl<'a> Tangents<'a> {
                 None => piece.project(t, &z, &mut self.columns)?,
             }
         }
-        self.found.starts_on = piece.left_at_once(t, &z)?;
+        let changes = self.kinds.iter().zip(&self.columns);
+        let changes: Vec<(f64, &[f64])> = changes
+            .map(|(kind, column)| (f64::from(*kind == Column::Start), &column[..]))
+            .collect();
+        self.found.starts_on = piece.left_at_once(t, &z, &changes)?;
         self.put_back(Box::new(piece));
         self.keep(t);
         Ok(())

@@ -14,8 +14,8 @@ pub use decision_record::{
     replay_decision, DecisionCause, DecisionOutcome, DecisionPoint, DecisionRecord, StartingZero,
 };
 pub use held::{as_multiplier, Held, Piece};
-pub(crate) use observer::{KeptInstant, Observed};
 pub use observer::{Gradient, InstantRecord, ObservedStep, Observer};
+pub(crate) use observer::{KeptInstant, Observed};
 pub(crate) use recorder::Recorder;
 pub(crate) use solution::Step;
 pub use solution::{Segment, Side, Solution};

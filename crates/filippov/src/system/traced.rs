@@ -6,7 +6,9 @@ mod rounding;
 
 use std::sync::Arc;
 
-use filippov_expr::{Backend, Enclosure, ExprError, Graph, JetProgram, Motion, Names, NodeId, Program};
+use filippov_expr::{
+    Backend, Enclosure, ExprError, Graph, JetProgram, Motion, Names, NodeId, Program,
+};
 use smallvec::SmallVec;
 
 use super::compiled::{Follower, Model};
