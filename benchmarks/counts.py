@@ -16,19 +16,15 @@ again.
 from __future__ import annotations
 
 import argparse
-import gc
 import json
-import os
-import re
-import shutil
-import subprocess
 import sys
-import tempfile
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import callgrind
 import filippov as fl
+from callgrind import Counted
 from friction_chain import chain, start_of_chain
 from measure import table, write_section
 
@@ -48,7 +44,6 @@ TOLERANCE = 1e-9
 BASELINE = Path(__file__).with_name("baseline.json")
 GATED = ("dry_friction", "relay_feedback", "chain_10", "chain_100")
 LIMIT = 1.02  # times the instructions of the baseline
-STEADY = 0.01  # largest difference of the two halves of the counted runs
 
 
 class Plan(NamedTuple):
@@ -68,14 +63,6 @@ class Plan(NamedTuple):
 # by 0.3 %. Programs that are called less than ten times per run are still interpreted then; by their share in
 # the short chain, where all become native, they are less than 1 %.
 PLANS = {"chain_10": Plan(warm=210), "chain_100": Plan(("Taylor", "DOPRI5"), 210, 25, 2)}
-ALLOCATORS = re.compile(r"^cfn=\(\d+\) (malloc|calloc|realloc|posix_memalign|aligned_alloc)$")
-
-
-class Counted(NamedTuple):
-    """What callgrind counted."""
-
-    instructions: float
-    allocations: float
 
 
 def runner(name: str, method: str) -> fl.Solution:
@@ -95,78 +82,17 @@ def prepared(name: str) -> tuple[fl.System, tuple[float, float], Any]:
 
 
 def be_counted(name: str) -> None:
-    """Run a problem by every method under callgrind, with two dumps for each; before them two of no run."""
-
-    def control(*request: str) -> None:
-        command = ["callgrind_control", *request, str(os.getpid())]
-        subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=True)
-
-    def dump(method: str, runs: int) -> None:
-        gc.collect()
-        control("--instr=on")
-        control("--zero")
-        for _ in range(runs):
-            runner(name, method)
-        control("--dump")
-        control("--instr=off")
-
+    """Run a problem by every method under callgrind."""
     plan = PLANS.get(name, Plan())
-    gc.disable()  # a collection in one of the counted runs would count as theirs
-    for _ in range(2):
-        dump("", 0)
-    for method in plan.methods:
-        for k in range(plan.first_warm if method == plan.methods[0] else plan.warm):
-            runner(name, method)
-            if k % 100 == 0:
-                gc.collect()
-        for _ in range(2):
-            dump(method, plan.counted // 2)
+    warm = [plan.first_warm, *[plan.warm] * (len(plan.methods) - 1)]
+    calls = [(partial(runner, name, method), times) for method, times in zip(plan.methods, warm, strict=True)]
+    callgrind.be_counted(calls, plan.counted)
 
 
 def counted(name: str) -> dict[str, Counted]:
     """Return what callgrind counts of a problem, by method."""
     plan = PLANS.get(name, Plan())
-    with tempfile.TemporaryDirectory() as folder:
-        command = ["valgrind", "--tool=callgrind", "--instr-atstart=no", f"--callgrind-out-file={folder}/out"]
-        command += [sys.executable, __file__, "--counted", name]
-        single = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PYTHONHASHSEED": "0"}
-        subprocess.run(command, env=os.environ | single, capture_output=True, check=True)
-        dumps = sorted(Path(folder).glob("out.*"), key=lambda path: int(path.suffix[1:]))
-        # The second one of no run is what the dump itself takes.
-        _, idle, *found = [read(dump) for dump in dumps[: 2 + 2 * len(plan.methods)]]
-    counts = {}
-    for k, method in enumerate(plan.methods):
-        halves = [per_run(half, idle, plan.counted // 2) for half in found[2 * k : 2 * k + 2]]
-        first, second = (half.instructions for half in halves)
-        if abs(first - second) > STEADY * second:
-            print(f"{name} by {method} is not steady: {first:.0f}, then {second:.0f} instructions")
-        counts[method] = Counted(*(sum(pair) / 2 for pair in zip(*halves, strict=True)))
-    return counts
-
-
-def per_run(total: Counted, idle: Counted, runs: int) -> Counted:
-    """Return the counts of one of these runs; `idle` are those of a dump of no run."""
-    return Counted(
-        (total.instructions - idle.instructions) / runs, (total.allocations - idle.allocations) / runs
-    )
-
-
-def read(dump: Path) -> Counted:
-    """Return the totals of a dump."""
-    instructions, allocations, names = 0, 0, {}
-    allocates = False
-    for line in dump.read_text(encoding="utf-8").splitlines():
-        if line.startswith(("fn=", "cfn=")):
-            number, _, written = line.partition("=")[2].partition(" ")
-            if written:
-                names[number] = written
-            if line.startswith("cfn="):
-                allocates = ALLOCATORS.match(f"cfn={number} {names.get(number, '')}") is not None
-        elif line.startswith("calls=") and allocates:
-            allocations += int(line[len("calls=") :].split()[0])
-        elif line.startswith("totals:"):
-            instructions = int(line.split()[1])
-    return Counted(instructions, allocations)
+    return callgrind.count(__file__, ["--counted", name], plan.methods, plan.counted)
 
 
 def rows(name: str, found: dict[str, Counted]) -> list[list[str]]:
@@ -247,7 +173,7 @@ def main() -> int:
     if arguments.counted:
         be_counted(arguments.counted)
         return 0
-    has_valgrind = shutil.which("valgrind") is not None
+    has_valgrind = callgrind.is_there()
     if not has_valgrind:
         if arguments.compare or arguments.record:
             parser.error("valgrind is missing: without it there is nothing to compare or record")
