@@ -246,6 +246,7 @@ impl IndexMut<(usize, usize)> for Matrix {
 }
 
 /// Gaussian elimination with row pivoting: factors below and above the diagonal, row order, sign.
+#[derive(Clone)]
 pub(crate) struct Elimination {
     factors: Matrix,
     order: SmallVec<[usize; 4]>,

@@ -3,36 +3,43 @@
 use super::piece::dot;
 use crate::cube::{Elimination, Matrix, Vector};
 
-/// A linear map of changes (x, p) of the extended state, which leaves p as it is: x goes to R (x, p) + sum_i d_i (g_i . (x, p)).
-#[derive(Clone, Debug, Default)]
+/// A linear map of changes c = (x, p) of the extended state, which leaves p as it is: x goes to R c + sum_i d_i s_i, where the shares s
+/// are the products g_i . c, or what solves equations with them on the right.
+#[derive(Clone, Default)]
 pub(super) struct Change {
     /// The rows of R, one for each state; x itself where there are none.
-    pub map: Option<Vec<Vec<f64>>>,
+    map: Option<Vec<Vec<f64>>>,
     /// The directions d_i, of the states.
-    pub directions: Vec<Vec<f64>>,
+    directions: Vec<Vec<f64>>,
     /// The rows g_i.
-    pub rows: Vec<Vec<f64>>,
-    /// Is it a projection, to be done twice? What is left after the first time is rounding.
-    pub is_projection: bool,
+    rows: Vec<Vec<f64>>,
+    /// The matrix of the equations of a projection, which is done twice: what is left after the first time is rounding.
+    equations: Option<Elimination>,
 }
 
 impl Change {
-    /// Takes from a change its part along some directions of the states, so that it is normal to these gradients.
-    pub fn normal_to(normals: &[Vec<f64>], directions: &[&[f64]]) -> Change {
-        let products = Matrix::of(normals.len(), |i, k| dot(&normals[i], directions[k]));
-        let factors = Elimination::of(products);
-        let width = normals.first().map_or(0, Vec::len);
-        let mut rows = vec![vec![0.0; width]; normals.len()];
-        for c in 0..width {
-            let column: Vector = normals.iter().map(|normal| normal[c]).collect();
-            let shares = factors.solve(&column);
-            rows.iter_mut().zip(shares).for_each(|(row, v)| row[c] = -v);
+    /// Of an instant that moves in time by `row` . c: each unit of time changes the state by `direction` behind the map.
+    pub fn at_moving_time(
+        map: Option<Vec<Vec<f64>>>,
+        direction: Vec<f64>,
+        row: Vec<f64>,
+    ) -> Change {
+        Change {
+            map,
+            directions: vec![direction],
+            rows: vec![row],
+            equations: None,
         }
+    }
+
+    /// Takes from a change its part along some directions of the states, so that it is normal to these gradients.
+    pub fn normal_to(normals: Vec<Vec<f64>>, directions: Vec<Vec<f64>>) -> Change {
+        let products = Matrix::of(normals.len(), |i, k| -dot(&normals[i], &directions[k]));
         Change {
             map: None,
-            directions: directions.iter().map(|d| d.to_vec()).collect(),
-            rows,
-            is_projection: true,
+            directions,
+            rows: normals,
+            equations: Some(Elimination::of(products)),
         }
     }
 
@@ -44,15 +51,17 @@ impl Change {
     }
 
     fn times(&self) -> usize {
-        if self.is_projection {
-            2
-        } else {
-            1
+        match self.equations {
+            Some(_) => 2,
+            None => 1,
         }
     }
 
     fn apply_once(&self, n: usize, column: &mut [f64]) {
-        let shares: Vector = self.rows.iter().map(|row| dot(row, column)).collect();
+        let mut shares: Vector = self.rows.iter().map(|row| dot(row, column)).collect();
+        if let Some(equations) = &self.equations {
+            shares = equations.solve(&shares);
+        }
         if let Some(map) = &self.map {
             let image: Vec<f64> = map.iter().map(|row| dot(row, column)).collect();
             column[..n].copy_from_slice(&image);
@@ -72,7 +81,10 @@ impl Change {
 
     fn pull_back_once(&self, n: usize, gradient: &mut [f64]) {
         let products = |d: &Vec<f64>| dot(d, &gradient[..n]);
-        let shares: Vector = self.directions.iter().map(products).collect();
+        let mut shares: Vector = self.directions.iter().map(products).collect();
+        if let Some(equations) = &self.equations {
+            shares = equations.solve_transposed(&shares);
+        }
         if let Some(map) = &self.map {
             let behind = gradient[..n].to_vec();
             gradient[..n].fill(0.0);
@@ -92,18 +104,25 @@ impl Change {
 mod tests {
     use super::*;
 
-    #[test]
-    fn what_is_pulled_back_has_the_same_product_with_every_change() {
-        let change = Change {
-            map: Some(vec![vec![1.0, 2.0, 0.5], vec![-1.0, 3.0, 0.0]]),
-            directions: vec![vec![0.3, -0.7]],
-            rows: vec![vec![2.0, 0.1, -0.4]],
-            is_projection: false,
-        };
+    fn same_products(change: &Change) {
         let (mut column, mut gradient) = (vec![0.2, -1.1, 0.6], vec![1.5, 0.4, 0.9]);
         let (before, behind) = (column.clone(), gradient.clone());
         change.apply(2, &mut column);
         change.pull_back(2, &mut gradient);
         assert!((dot(&behind, &column) - dot(&gradient, &before)).abs() < 1e-15);
+    }
+
+    #[test]
+    fn what_is_pulled_back_has_the_same_product_with_every_change() {
+        let map = vec![vec![1.0, 2.0, 0.5], vec![-1.0, 3.0, 0.0]];
+        same_products(&Change::at_moving_time(
+            Some(map),
+            vec![0.3, -0.7],
+            vec![2.0, 0.1, -0.4],
+        ));
+        same_products(&Change::normal_to(
+            vec![vec![1.0, 2.0, 0.3]],
+            vec![vec![0.5, -0.1]],
+        ));
     }
 }

@@ -1,25 +1,50 @@
 //! The collocation of M' = Df M + D_p f on a part of a step, and its transpose.
 
-use super::radau::{STAGES, WEIGHTS};
-use crate::cube::{Elimination, Matrix};
+use super::radau::{INTEGRALS, STAGES, WEIGHTS};
+use crate::cube::{Elimination, Matrix, Vector};
 use crate::sparse::{SparseRows, SparseSolver};
 use crate::system::Linearisation;
+use crate::tolerances::EPS;
 
 /// Up to so many states the equations are solved as a full matrix, with the multipliers eliminated at each node.
 const MOST_FULL: usize = 8;
 
-/// The equations sum_j W_ij (Y_j - Y_0) = dt Df(t_i) Y_i for the change Y of the state, with multipliers as unknowns of their own.
+/// Up to so many changes are found by iteration, if it converges, before a sparse matrix is factored for them.
+const MOST_ITERATED: usize = 16;
+
+/// So many iterations at most, two of which are to make the rest smaller by the factor.
+const MOST_ITERATIONS: usize = 40;
+const CONTRACTION: f64 = 0.5;
+
+/// The equations Y_i = Y_0 + dt sum_j C_ij Df(t_j) Y_j for the change Y of the state at the nodes.
+///
+/// For few states they are a full matrix. For many they are solved by iteration where the step is not stiff, and as a sparse matrix
+/// with the multipliers as unknowns of their own otherwise.
 pub(super) struct Collocation {
     n: usize,
     m: usize,
-    /// Unknowns at each node.
-    block: usize,
-    /// The right-hand side, by the change at the start with the shares of the parameters behind it.
+    /// Iteration ends at changes so small beside the result.
+    rest: f64,
+    dt: f64,
+    way: Way,
+    /// The right-hand side of the matrix, by the change at the start with the shares of the parameters behind it.
     right: SparseRows,
-    full: Option<Elimination>,
     sparse: SparseSolver,
-    /// Do the equations have a solution?
-    is_regular: bool,
+    /// What iterations need of each node.
+    nodes: Vec<Node>,
+}
+
+/// The derivatives at a node without those by the parameters, and what the multipliers follow from.
+struct Node {
+    rows: SparseRows,
+    multipliers: Elimination,
+}
+
+enum Way {
+    Full(Elimination),
+    Iteration,
+    /// The sparse matrix is factored, or its transpose, if it has an inverse.
+    Sparse(bool),
 }
 
 /// About how many operations a part takes with so many changes of n states.
@@ -31,60 +56,64 @@ pub(super) fn operations(n: usize, n_columns: usize) -> usize {
 }
 
 impl Collocation {
-    /// For n states and m parameters.
-    pub fn new(n: usize, m: usize) -> Self {
+    /// For n states and m parameters, in runs with this tolerance.
+    pub fn new((n, m): (usize, usize), rtol: f64) -> Self {
         Collocation {
             n,
             m,
-            block: n,
+            rest: (1e-4 * rtol).max(4.0 * EPS),
+            dt: f64::NAN,
+            way: Way::Sparse(false),
             right: SparseRows::new(n + m),
-            full: None,
             sparse: SparseSolver::for_all_pivots(),
-            is_regular: false,
+            nodes: Vec::new(),
         }
     }
 
-    /// Takes the derivatives of the field at the nodes of a part of this length, for changes that are carried on, or for gradients
-    /// that are pulled back.
-    pub fn take(&mut self, nodes: &[Linearisation], dt: f64, is_pulled_back: bool) {
-        self.right.clear(self.n + self.m);
-        let n_multipliers = nodes[0].rows().n_rows().saturating_sub(self.n + self.m);
-        let is_small = self.n <= MOST_FULL;
-        let full = is_small.then(|| self.factor_full(nodes, dt, n_multipliers));
-        self.full = full.flatten();
-        self.is_regular =
-            self.full.is_some() || self.factor_sparse(nodes, dt, n_multipliers, is_pulled_back);
-    }
-
-    /// Carries changes on, each of n states with the shares of the parameters behind them.
-    pub fn carry(&mut self, columns: &mut [Vec<f64>]) {
+    /// Carries changes on over a part of this length, each of n states with the shares of the parameters behind them.
+    pub fn carry(&mut self, nodes: &[Linearisation], dt: f64, columns: &mut [Vec<f64>]) {
+        self.take(nodes, dt, columns.len());
+        if matches!(self.way, Way::Iteration) {
+            let found: Option<Vec<Vec<f64>>> =
+                columns.iter().map(|c| self.iterate(nodes, c)).collect();
+            if let Some(found) = found {
+                for (column, end) in columns.iter_mut().zip(found) {
+                    column[..self.n].copy_from_slice(&end);
+                }
+                return;
+            }
+            self.way = Way::Sparse(self.factor_sparse(nodes, false));
+        }
         for column in columns {
-            let stages = self.stages(column, &[]);
-            column[..self.n].copy_from_slice(&stages[(STAGES - 1) * self.block..][..self.n]);
+            let rows = 0..self.right.n_rows();
+            let mut right: Vec<f64> = rows.map(|k| self.right.dot(k, column)).collect();
+            match &self.way {
+                Way::Full(elimination) => right = elimination.solve(&right).into_vec(),
+                Way::Sparse(true) => self.sparse.solve(&mut right),
+                _ => right.fill(f64::NAN),
+            }
+            let block = right.len() / STAGES;
+            column[..self.n].copy_from_slice(&right[(STAGES - 1) * block..][..self.n]);
         }
     }
 
-    /// The unknowns at all nodes, for a change at the start, and with what is added to the right-hand sides if anything is.
-    fn stages(&mut self, column: &[f64], added: &[f64]) -> Vec<f64> {
-        let rows = 0..STAGES * self.block;
-        let mut right: Vec<f64> = rows.map(|k| self.right.dot(k, column)).collect();
-        right.iter_mut().zip(added).for_each(|(r, a)| *r += a);
-        match &self.full {
-            Some(elimination) => right = elimination.solve(&right).into_vec(),
-            None if self.is_regular => self.sparse.solve(&mut right),
-            None => right.fill(f64::NAN),
+    /// Takes the gradient of a function by the state at the end of a part back to the start, and adds to the shares of the
+    /// parameters.
+    pub fn pull_back(&mut self, nodes: &[Linearisation], dt: f64, gradient: &mut [f64]) {
+        self.take(nodes, dt, 1);
+        if matches!(self.way, Way::Iteration) {
+            if self.iterate_back(nodes, gradient) {
+                return;
+            }
+            self.way = Way::Sparse(self.factor_sparse(nodes, true));
         }
-        right
-    }
-
-    /// Takes the gradient of a function by the state at the end back to the start, and adds to the shares of the parameters.
-    pub fn pull_back(&mut self, gradient: &mut [f64]) {
-        let mut weights = vec![0.0; STAGES * self.block];
-        weights[(STAGES - 1) * self.block..][..self.n].copy_from_slice(&gradient[..self.n]);
-        match &self.full {
-            Some(elimination) => weights = elimination.solve_transposed(&weights).into_vec(),
-            None if self.is_regular => self.sparse.solve(&mut weights),
-            None => weights.fill(f64::NAN),
+        let block = self.right.n_rows() / STAGES;
+        let mut weights = vec![0.0; STAGES * block];
+        weights[(STAGES - 1) * block..][..self.n].copy_from_slice(&gradient[..self.n]);
+        match &self.way {
+            Way::Full(elimination) => weights = elimination.solve_transposed(&weights).into_vec(),
+            Way::Sparse(true) => self.sparse.solve(&mut weights),
+            _ => weights.fill(f64::NAN),
         }
         gradient[..self.n].fill(0.0);
         for (k, weight) in weights.iter().enumerate() {
@@ -94,15 +123,134 @@ impl Collocation {
         }
     }
 
+    /// Chooses the way for so many changes.
+    fn take(&mut self, nodes: &[Linearisation], dt: f64, n_changes: usize) {
+        self.dt = dt;
+        self.way = Way::Sparse(false);
+        if self.n <= MOST_FULL {
+            if let Some(elimination) = self.factor_full(nodes) {
+                self.way = Way::Full(elimination);
+                return;
+            }
+        }
+        if n_changes > MOST_ITERATED {
+            self.way = Way::Sparse(self.factor_sparse(nodes, false));
+            return;
+        }
+        self.nodes.clear();
+        let sizes = (self.n, self.m);
+        let own = nodes.iter().map(|node| Node::of(node.rows(), sizes));
+        self.nodes.extend(own);
+        self.way = Way::Iteration;
+    }
+
+    /// The change at the end, by iteration; `None` if it does not converge.
+    fn iterate(&self, nodes: &[Linearisation], column: &[f64]) -> Option<Vec<f64>> {
+        let n = self.n;
+        let by_parameters: Vec<Vec<f64>> = nodes
+            .iter()
+            .map(|node| self.by_parameters(node.rows(), column))
+            .collect();
+        let mut stages: Vec<Vec<f64>> = vec![column[..n].to_vec(); STAGES];
+        let mut rates = vec![vec![0.0; n]; STAGES];
+        let mut before = [f64::INFINITY; 2];
+        for _ in 0..MOST_ITERATIONS {
+            for (i, rates) in rates.iter_mut().enumerate() {
+                self.nodes[i].rates(&stages[i], &by_parameters[i], rates);
+            }
+            let (mut change, mut size) = (0.0_f64, 0.0_f64);
+            for (stage, weights) in stages.iter_mut().zip(&INTEGRALS) {
+                for r in 0..n {
+                    let terms = weights.iter().zip(&rates).map(|(w, rates)| w * rates[r]);
+                    let value = column[r] + self.dt * terms.sum::<f64>();
+                    change = change.max((value - stage[r]).abs());
+                    size = size.max(value.abs());
+                    stage[r] = value;
+                }
+            }
+            if change <= self.rest * size {
+                return stages.pop();
+            }
+            if change.is_nan() || change > CONTRACTION * before[0] {
+                return None;
+            }
+            before = [before[1], change];
+        }
+        None
+    }
+
+    /// What the shares of the parameters add to each row.
+    fn by_parameters(&self, rows: &SparseRows, column: &[f64]) -> Vec<f64> {
+        let parameters = self.n..self.n + self.m;
+        let row = |r: usize| {
+            let entries = rows.row(r).filter(|(c, _)| parameters.contains(c));
+            entries.map(|(c, value)| value * column[c]).sum()
+        };
+        let own = (0..self.n).chain(self.n + self.m..rows.n_rows());
+        own.map(row).collect()
+    }
+
+    /// The same for the transposed equations: V_i = b_i + dt Df_i^T U_i with U_i = sum_j C_ji V_j, where b is the gradient at the last
+    /// node.
+    fn iterate_back(&self, nodes: &[Linearisation], gradient: &mut [f64]) -> bool {
+        let n = self.n;
+        let mut v = vec![vec![0.0; n]; STAGES];
+        v[STAGES - 1].copy_from_slice(&gradient[..n]);
+        let mut u = v.clone();
+        let (mut back, mut multipliers) = (vec![0.0; n], Vector::new());
+        let mut before = [f64::INFINITY; 2];
+        for _ in 0..MOST_ITERATIONS {
+            let (mut change, mut size) = (0.0_f64, 0.0_f64);
+            integrate_back(&v, &mut u);
+            for i in 0..STAGES {
+                self.nodes[i].rates_back(&u[i], &mut back, &mut multipliers);
+                for r in 0..n {
+                    let end = if i == STAGES - 1 { gradient[r] } else { 0.0 };
+                    let value = end + self.dt * back[r];
+                    change = change.max((value - v[i][r]).abs());
+                    size = size.max(value.abs());
+                    v[i][r] = value;
+                }
+            }
+            if change <= self.rest * size {
+                integrate_back(&v, &mut u);
+                for (i, node) in nodes.iter().enumerate() {
+                    self.nodes[i].rates_back(&u[i], &mut back, &mut multipliers);
+                    self.add_shares(node.rows(), (&u[i], &multipliers), gradient);
+                }
+                for r in 0..n {
+                    gradient[r] = v.iter().map(|v| v[r]).sum();
+                }
+                return true;
+            }
+            if change.is_nan() || change > CONTRACTION * before[0] {
+                return false;
+            }
+            before = [before[1], change];
+        }
+        false
+    }
+
+    /// Adds what the rows have in the shares of the parameters.
+    fn add_shares(
+        &self,
+        rows: &SparseRows,
+        (weights, multipliers): (&[f64], &[f64]),
+        gradient: &mut [f64],
+    ) {
+        let (n, width) = (self.n, self.n + self.m);
+        let own = (0..n).zip(weights).chain((width..).zip(multipliers));
+        for (r, weight) in own {
+            let entries = rows.row(r).filter(|(c, _)| (n..width).contains(c));
+            entries.for_each(|(c, value)| gradient[c] -= self.dt * weight * value);
+        }
+    }
+
     /// The full matrix, with the multipliers eliminated; `None` where they have no solution.
-    fn factor_full(
-        &mut self,
-        nodes: &[Linearisation],
-        dt: f64,
-        n_multipliers: usize,
-    ) -> Option<Elimination> {
-        let (n, m) = (self.n, self.m);
-        self.block = n;
+    fn factor_full(&mut self, nodes: &[Linearisation]) -> Option<Elimination> {
+        let (n, m, dt) = (self.n, self.m, self.dt);
+        let n_multipliers = nodes[0].rows().n_rows() - n - m;
+        self.right.clear(n + m);
         let mut matrix = Matrix::zeros(STAGES * n);
         let mut slopes = vec![0.0; n * (n + m)];
         for (i, node) in nodes.iter().enumerate() {
@@ -127,15 +275,10 @@ impl Collocation {
     }
 
     /// The matrix with the multipliers as unknowns: is it regular?
-    fn factor_sparse(
-        &mut self,
-        nodes: &[Linearisation],
-        dt: f64,
-        n_multipliers: usize,
-        is_pulled_back: bool,
-    ) -> bool {
-        let (n, m, block) = (self.n, self.m, self.n + n_multipliers);
-        self.block = block;
+    fn factor_sparse(&mut self, nodes: &[Linearisation], is_pulled_back: bool) -> bool {
+        let (n, m, dt) = (self.n, self.m, self.dt);
+        let n_multipliers = nodes[0].rows().n_rows() - n - m;
+        let block = n + n_multipliers;
         self.right.clear(n + m);
         let mut matrix = SparseRows::new(STAGES * block);
         for (i, node) in nodes.iter().enumerate() {
@@ -171,6 +314,79 @@ impl Collocation {
             matrix = matrix.transposed();
         }
         matrix.is_finite() && self.sparse.factor(&matrix).is_ok()
+    }
+}
+
+impl Node {
+    fn of(rows: &SparseRows, (n, m): (usize, usize)) -> Self {
+        let l = rows.n_rows() - n - m;
+        let mut own = SparseRows::new(n + l);
+        for r in (0..n).chain(n + m..n + m + l) {
+            own.push_row(rows.row(r).filter_map(|(c, value)| match c {
+                c if c < n => Some((c, value)),
+                c if c >= n + m => Some((c - m, value)),
+                _ => None,
+            }));
+        }
+        let mut matrix = Matrix::zeros(l);
+        for k in 0..l {
+            let entries = own.row(n + k).filter(|(c, _)| *c >= n);
+            entries.for_each(|(c, value)| matrix[(k, c - n)] = value);
+        }
+        Node {
+            rows: own,
+            multipliers: Elimination::of(matrix),
+        }
+    }
+
+    /// The rates of a change, with what the parameters add to each row.
+    fn rates(&self, change: &[f64], by_parameters: &[f64], out: &mut [f64]) {
+        let n = change.len();
+        let l = self.rows.n_rows() - n;
+        let mut all = change.to_vec();
+        all.resize(n + l, 0.0);
+        if l > 0 {
+            let known = (n..n + l).map(|k| -self.rows.dot(k, &all) - by_parameters[k]);
+            let known: Vector = known.collect();
+            all[n..].copy_from_slice(&self.multipliers.solve(&known));
+        }
+        for (r, out) in out.iter_mut().enumerate() {
+            *out = -self.rows.dot(r, &all) - by_parameters[r];
+        }
+    }
+
+    /// The transpose of [`rates`](Self::rates), and the weights of the equations of the multipliers.
+    fn rates_back(&self, weights: &[f64], out: &mut [f64], multipliers: &mut Vector) {
+        let n = weights.len();
+        let l = self.rows.n_rows() - n;
+        let mut rest = Vector::from_elem(0.0, l);
+        out.fill(0.0);
+        for (r, weight) in weights.iter().enumerate() {
+            for (c, value) in self.rows.row(r) {
+                match c.checked_sub(n) {
+                    None => out[c] -= weight * value,
+                    Some(k) => rest[k] -= weight * value,
+                }
+            }
+        }
+        if l > 0 {
+            *multipliers = self.multipliers.solve_transposed(&rest);
+            for (k, share) in multipliers.iter().enumerate() {
+                let entries = self.rows.row(n + k).filter(|(c, _)| *c < n);
+                entries.for_each(|(c, value)| out[c] -= share * value);
+            }
+        }
+    }
+}
+
+/// U_i = sum_j C_ji V_j.
+fn integrate_back(v: &[Vec<f64>], u: &mut [Vec<f64>]) {
+    for (i, u) in u.iter_mut().enumerate() {
+        u.fill(0.0);
+        for (v, weights) in v.iter().zip(&INTEGRALS) {
+            let entries = u.iter_mut().zip(v);
+            entries.for_each(|(u, v)| *u += weights[i] * v);
+        }
     }
 }
 

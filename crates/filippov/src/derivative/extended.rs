@@ -48,7 +48,7 @@ impl Extension {
     pub fn new(system: &TracedSystem, rules: &Rules, parameters: &[usize]) -> Result<Self, Error> {
         let n = system.n_states();
         let definition = Definition::of(system, rules);
-        let (system, made) = definition.extended(&pairs(parameters, n))?;
+        let (system, made) = definition.extended(&pairs(parameters, n), Backend::Native)?;
         Ok(Extension {
             system,
             rules: rules.clone(),
@@ -196,14 +196,15 @@ impl Extended<'_> {
     }
 }
 
-/// The system with these parameters as states that rest, behind its own.
+/// The system of a function with these parameters as states that rest, behind its own; its program is called a few times.
 pub(super) fn extended_system(
     system: &TracedSystem,
     rules: &Rules,
     parameters: &[usize],
 ) -> Result<TracedSystem, Error> {
     let pairs = pairs(parameters, system.n_states());
-    let (extended, _) = Definition::of(system, rules).extended(&pairs)?;
+    let definition = Definition::of(system, rules);
+    let (extended, _) = definition.extended(&pairs, Backend::Interpreter)?;
     Ok(extended.with_parameters(system.parameters().to_vec()))
 }
 
@@ -217,7 +218,11 @@ fn pairs(parameters: &[usize], n: usize) -> Vec<(u32, u32)> {
 impl Definition {
     /// Makes a system in which the second number of each pair is a state that rests, and replaces the parameter with the first number.
     /// Returns it with the new node for each old one. It has no laws: the caller hands in the discrete states.
-    fn extended(&self, parameters: &[(u32, u32)]) -> Result<(TracedSystem, Vec<NodeId>), Error> {
+    fn extended(
+        &self,
+        parameters: &[(u32, u32)],
+        backend: Backend,
+    ) -> Result<(TracedSystem, Vec<NodeId>), Error> {
         let (mut graph, made) = self.graph.with_states_for(parameters);
         let still = graph.constant(0.0);
         let mut field: Vec<NodeId> = self.field.iter().map(|id| made[id.index()]).collect();
@@ -229,7 +234,7 @@ impl Definition {
             parameters: self.names.parameters.clone(),
         };
         let values = vec![0.0; self.n_parameters()];
-        let system = TracedSystem::new(graph, field, values, names, Backend::Native)?;
+        let system = TracedSystem::new(graph, field, values, names, backend)?;
         let system = system.watching(&self.rules.watched).sticking(&ratios);
         Ok((system.with_discrete(self.rules.laws.len()), made))
     }

@@ -192,12 +192,7 @@ impl Instant<'_, '_> {
             .iter_mut()
             .zip(after)
             .for_each(|(f, after)| *f -= after);
-        changes.push(Change {
-            map,
-            directions: vec![moved],
-            rows: vec![time.clone()],
-            is_projection: false,
-        });
+        changes.push(Change::at_moving_time(map, moved, time.clone()));
         let z = self.extended.state(record.x[1]);
         // What is new is held exactly; the columns of the run keep to the other surfaces by themselves.
         let kept = match record.acts.is_empty() {
@@ -395,7 +390,7 @@ struct Jumps {
 impl Jumps {
     /// What takes from a change its parts off the surfaces, along the jumps.
     fn taken_out(&self, n: usize) -> Change {
-        let directions: Vec<&[f64]> = self.changes.iter().map(|jump| &jump[..n]).collect();
-        Change::normal_to(&self.normals, &directions)
+        let directions = self.changes.iter().map(|jump| jump[..n].to_vec());
+        Change::normal_to(self.normals.clone(), directions.collect())
     }
 }

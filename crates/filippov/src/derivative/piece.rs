@@ -156,7 +156,7 @@ impl<'a> Piece<'a> {
             carried: Vec::new(),
             rtol: around.rtol,
             longest: longest_part(around.rtol),
-            collocation: Collocation::new(extended.n, extended.n_parameters()),
+            collocation: Collocation::new((extended.n, extended.n_parameters()), around.rtol),
             nodes: Vec::new(),
             rates: vec![0.0; z.len()],
             point: z,
@@ -203,8 +203,8 @@ impl<'a> Piece<'a> {
         }
         let (parts, dt) = self.parts(&mut path, (t0, t1))?;
         for part in 0..parts {
-            self.take(&mut path, t0 + part as f64 * dt, dt, false)?;
-            self.collocation.carry(columns);
+            self.take(&mut path, t0 + part as f64 * dt, dt)?;
+            self.collocation.carry(&self.nodes, dt, columns);
         }
         Ok(())
     }
@@ -253,8 +253,8 @@ impl<'a> Piece<'a> {
     ) -> Result<(), FieldError> {
         let (parts, dt) = self.parts(&mut path, (t0, t1))?;
         for part in (0..parts).rev() {
-            self.take(&mut path, t0 + part as f64 * dt, dt, true)?;
-            self.collocation.pull_back(gradient);
+            self.take(&mut path, t0 + part as f64 * dt, dt)?;
+            self.collocation.pull_back(&self.nodes, dt, gradient);
         }
         Ok(())
     }
@@ -268,9 +268,9 @@ impl<'a> Piece<'a> {
         let n = self.extended.n;
         path(0.5 * (t0 + t1), &mut self.point[..n])?;
         self.slopes(0, 0.5 * (t0 + t1))?;
-        let steepest = norm(self.nodes[0].rows(), n);
+        let fastest = fastest(self.nodes[0].rows(), n);
         // NaN becomes one part, and stays NaN.
-        let parts = ((t1 - t0) * steepest / self.longest).ceil();
+        let parts = ((t1 - t0) * fastest / self.longest).ceil();
         let parts = parts.clamp(1.0, MOST_PARTS).max(1.0);
         Ok((parts as usize, (t1 - t0) / parts))
     }
@@ -281,14 +281,12 @@ impl<'a> Piece<'a> {
         path: &mut impl FnMut(f64, &mut [f64]) -> Result<(), FieldError>,
         start: f64,
         dt: f64,
-        is_pulled_back: bool,
     ) -> Result<(), FieldError> {
         for (i, node) in NODES.iter().enumerate() {
             let t = start + node * dt;
             path(t, &mut self.point[..self.extended.n])?;
             self.slopes(i, t)?;
         }
-        self.collocation.take(&self.nodes, dt, is_pulled_back);
         Ok(())
     }
 
@@ -461,8 +459,8 @@ impl<'a> Piece<'a> {
             .collect();
         normals.extend(self.rate_normals(t, z)?);
         let n = self.extended.n;
-        let directions: Vec<&[f64]> = normals.iter().map(|row| &row[..n]).collect();
-        Ok((!normals.is_empty()).then(|| Change::normal_to(&normals, &directions)))
+        let directions = normals.iter().map(|row| row[..n].to_vec()).collect();
+        Ok((!normals.is_empty()).then(|| Change::normal_to(normals, directions)))
     }
 }
 
@@ -471,13 +469,18 @@ fn is_affine(system: &TracedSystem, sliding: &[usize]) -> bool {
     known.is_some_and(|affine| affine.affine_parts(sliding).is_some())
 }
 
-/// The largest sum of the absolute values of a row of F_x.
-fn norm(rows: &SparseRows, n: usize) -> f64 {
-    let row = |r: usize| {
-        let entries = rows.row(r).filter(|(c, _)| *c < n);
-        entries.map(|(_, value)| value.abs()).sum::<f64>()
-    };
-    (0..n).map(row).fold(0.0, f64::max)
+/// The root of the largest sum of the absolute values of a row of F_x^2: at least the fastest rate.
+fn fastest(rows: &SparseRows, n: usize) -> f64 {
+    let (mut product, mut most) = (vec![0.0; n], 0.0_f64);
+    for r in 0..n {
+        product.fill(0.0);
+        for (k, factor) in rows.row(r).filter(|(c, _)| *c < n) {
+            let entries = rows.row(k).filter(|(c, _)| *c < n);
+            entries.for_each(|(c, value)| product[c] += factor * value);
+        }
+        most = most.max(product.iter().map(|v| v.abs()).sum());
+    }
+    most.sqrt()
 }
 
 /// The product of as many entries as both have.
