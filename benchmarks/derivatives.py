@@ -87,7 +87,7 @@ CALLS: Mapping[str, Callable[[], dict[str, Callable[[], Any]]]] = {
     "transient": transient,
     "chain": chain_of_parameters,
 }
-WARM = {"transient": 1000, "chain": 60}
+WARM = {"transient": 1000, "chain": 300}
 
 
 def costs(name: str) -> tuple[dict[str, float], str]:

@@ -111,6 +111,8 @@ def gradient(
     (1.0, -2.0)
     """
     own, parts = _checked(system, terminal, running, instants, events, options)
+    if t_span[0] == t_span[1]:
+        raise InputError("t_span: a run of no length has no gradient")
     values = system.parameter_values(params)
     start = np.atleast_1d(np.asarray(y0, dtype=float))
     n = len(start)
@@ -135,7 +137,7 @@ def gradient(
     cost = _Sum(sol, values, n)
     if final is not None:
         ends = (watched[k].g for k in range(len(own)) if _has_ended(sol, k))
-        cost.add("terminal", final, float(sol.t[-1]), zero=next(ends, None))
+        cost.add_at_end("terminal", final, next(ends, None))
     place = len(own)
     for part in parts:
         if part.event is not None:
@@ -273,7 +275,7 @@ class _Sum:
     def __init__(self, sol: Solution, values: Mapping[str, float], n: int) -> None:
         self.value = 0.0
         self._sol, self._values, self._n = sol, values, n
-        self._terms: list[tuple[TracedSystem, float | None, int, TracedSystem | None]] = []
+        self._terms: list[tuple[TracedSystem, float | None, int | None, TracedSystem | None]] = []
         self._traced: dict[Cost, TracedSystem] = {}
 
     def add(self, name: str, cost: Cost, t: float, zero: Cost | None = None) -> None:
@@ -283,7 +285,13 @@ class _Sum:
             raise InputError(f"{name}: the time {t:g} is not in the run, [{first:g}, {last:g}]")
         self._add_value(cost, t)
         known = None if zero is None else self._trace(name, zero)
-        self._terms.append((self._trace(name, cost), t, 0, known))
+        self._terms.append((self._trace(name, cost), t, None, known))
+
+    def add_at_end(self, name: str, cost: Cost, zero: Cost | None) -> None:
+        """Add a function at the end of the run, which is at a zero of another function if this is given."""
+        self.value += float(cost(self._sol.t[-1], self._sol.y[:, -1], **_named(cost, self._values)))
+        known = None if zero is None else self._trace(name, zero)
+        self._terms.append((self._trace(name, cost), None, None, known))
 
     def add_at_surface(self, name: str, cost: Cost, surface: str) -> None:
         """Add a function at all switches that a surface brings about."""
@@ -293,7 +301,7 @@ class _Sum:
             raise InputError(f"{name}: there is no surface {surface!r}{hint}; the surfaces are {surfaces}")
         place = surfaces.index(surface)
         for switch in self._sol.switches:
-            if switch.surfaces and switch.surfaces[0] == surface:
+            if switch.surfaces[:1] == (place,):
                 self._add_value(cost, switch.t)
         self._terms.append((self._trace(name, cost), None, place, None))
 

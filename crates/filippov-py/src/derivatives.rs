@@ -38,12 +38,12 @@ pub struct RunDerivatives {
     span: f64,
 }
 
-/// A term of a cost: the function, the time at which it counts, or else the surface at whose switches it does, and the function
-/// whose zero is at that time, if one is.
+/// A term of a cost: the function, the time at which it counts, or else the surface at whose switches it does, or neither for the
+/// end; and the function whose zero is at that time, if one is.
 pub type TermRow<'py> = (
     Bound<'py, crate::systems::TracedSystem>,
     Option<f64>,
-    usize,
+    Option<usize>,
     Option<Bound<'py, crate::systems::TracedSystem>>,
 );
 
@@ -125,16 +125,19 @@ fn column(kind: u8, place: usize) -> Column {
     }
 }
 
+/// What a run computed, and its actions.
+type RunOf<'r> = (&'r Solution, &'r filippov::action::Actions<'r>);
+
 impl RunDerivatives {
     /// The derivative of the state at these times, n rows of one entry per column for each.
     pub fn at<'py>(
         &self,
         py: Python<'py>,
         system: &filippov::TracedSystem,
-        solution: &Solution,
+        (solution, actions): RunOf<'_>,
         (times, side): (&[f64], Side),
     ) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
-        self.with(system, solution, |run| {
+        self.with(system, (solution, actions), |run| {
             let at = |&t: &f64| {
                 let values = run.at(t, side).map_err(raised)?;
                 let values = values.ok_or_else(|| unknown(t))?;
@@ -148,13 +151,13 @@ impl RunDerivatives {
     pub fn of_zeros(
         &self,
         system: &filippov::TracedSystem,
-        solution: &Solution,
+        run: RunOf<'_>,
         function: &filippov::TracedSystem,
         times: &[f64],
     ) -> PyResult<Vec<Vec<f64>>> {
         let gradient = EventGradient::new(function, self.extension.rules(), &self.parameters);
         let gradient = gradient.map_err(|e| PyValueError::new_err(e.to_string()))?;
-        self.with(system, solution, |run| {
+        self.with(system, run, |run| {
             let of_zero = |&t: &f64| {
                 let found = run.time_of_zero(&gradient, t).map_err(raised)?;
                 found.ok_or_else(|| unknown(t))
@@ -166,11 +169,10 @@ impl RunDerivatives {
     fn with<R>(
         &self,
         system: &filippov::TracedSystem,
-        solution: &Solution,
+        (solution, actions): RunOf<'_>,
         ask: impl FnOnce(&mut Differentiated) -> PyResult<R>,
     ) -> PyResult<R> {
-        let none = filippov::action::Actions::default();
-        let extended = self.extension.at(system.parameters(), &none);
+        let extended = self.extension.at(system.parameters(), actions);
         let extended = extended.map_err(|e| PyValueError::new_err(e.to_string()))?;
         let extended = extended.ok_or_else(|| PyValueError::new_err("maps that are not traced"))?;
         let impacts = extended.impacts();
@@ -188,7 +190,7 @@ impl RunDerivatives {
     pub fn gradient(
         &self,
         system: &filippov::TracedSystem,
-        (solution, actions): (&Solution, &filippov::action::Actions<'_>),
+        (solution, actions): RunOf<'_>,
         terms: &[TermRow<'_>],
     ) -> PyResult<(Vec<f64>, Option<(f64, &'static str)>)> {
         let wrong = |e: Error| PyValueError::new_err(e.to_string());
@@ -210,10 +212,11 @@ impl RunDerivatives {
         let terms: Vec<Term> = rows
             .map(|((_, t, surface, _), (cost, zero))| Term {
                 cost,
-                at: match (t, zero) {
-                    (Some(t), Some(zero)) => When::Zero(*t, zero),
-                    (Some(t), None) => When::Time(*t),
-                    (None, _) => When::Surface(*surface),
+                at: match (t, surface, zero) {
+                    (Some(t), _, Some(zero)) => When::Zero(*t, zero),
+                    (Some(t), _, None) => When::Time(*t),
+                    (None, Some(surface), _) => When::Surface(*surface),
+                    (None, None, zero) => When::End(zero.as_ref()),
                 },
             })
             .collect();

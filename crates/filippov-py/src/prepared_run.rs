@@ -205,12 +205,14 @@ impl PreparedRun {
         }
     }
 
-    /// The result of the run as a Python object, which keeps of this what the forces of contacts follow from: the times of a table
-    /// are as many as its knots.
-    pub fn result(mut self, solution: Solution) -> Run {
-        let is_at_surface = |trigger: &Trigger| matches!(trigger, Trigger::Surface { .. });
-        self.given.retain(|(_, trigger, _)| is_at_surface(trigger));
-        self.laws.retain(|law| is_at_surface(&law.trigger));
+    /// The result of the run as a Python object, which keeps of this what is asked for later: all actions where derivatives are,
+    /// and else those that the forces of contacts follow from, since the times of a table are as many as its knots.
+    pub fn result(mut self, solution: Solution, has_derivatives: bool) -> Run {
+        if !has_derivatives {
+            let is_at_surface = |trigger: &Trigger| matches!(trigger, Trigger::Surface { .. });
+            self.given.retain(|(_, trigger, _)| is_at_surface(trigger));
+            self.laws.retain(|law| is_at_surface(&law.trigger));
+        }
         self.events.clear();
         Run::new(self, solution)
     }

@@ -539,7 +539,8 @@ impl Run {
             return Ok(Vec::new());
         };
         let when = (t.as_slice()?, side_of(left));
-        derivatives.at(py, system, &self.solution(), when)
+        let run = (&*self.solution(), &self.prepared.actions());
+        derivatives.at(py, system, run, when)
     }
 
     /// The derivatives of the times of zeros of a function, the first component of a system, shape (zeros, columns).
@@ -552,13 +553,9 @@ impl Run {
         let (Some(derivatives), Some(system)) = (&self.derivatives, self.prepared.traced()) else {
             return Ok(Vec::new());
         };
-        let (solution, times) = (self.solution(), t.as_slice()?);
-        let found = derivatives.of_zeros(
-            system,
-            &solution,
-            &function.with(system.parameters()),
-            times,
-        )?;
+        let run = (&*self.solution(), &self.prepared.actions());
+        let function = function.with(system.parameters());
+        let found = derivatives.of_zeros(system, run, &function, t.as_slice()?)?;
         Ok(found
             .into_iter()
             .map(|row| PyArray1::from_vec(py, row))

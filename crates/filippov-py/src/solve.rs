@@ -83,7 +83,8 @@ pub fn solve(
             Failure::Raised(error) => raised(error),
             Failure::CalledMap => PyValueError::new_err("wrt: the map of a reset is not traced"),
         })?;
-    Ok(prepared.result(solution).with_derivatives(derivatives))
+    let result = prepared.result(solution, derivatives.is_some());
+    Ok(result.with_derivatives(derivatives))
 }
 
 /// Integrates a system from many initial states, the rows of `y0`, with the parameters in the rows of `p`, on some
@@ -120,7 +121,7 @@ pub fn solve_many(
         let is_cut = done.results.len() < prepared.len();
         for (prepared, solution) in prepared.into_iter().zip(done.results) {
             let solution = solution.map_err(|e| PyValueError::new_err(e.to_string()))?;
-            runs.push(prepared.result(solution));
+            runs.push(prepared.result(solution, false));
         }
         let raised = done.raised.or_else(|| py.check_signals().err());
         let raised = raised.or_else(|| {

@@ -12,7 +12,7 @@ use super::limit::{is_like, Shares};
 use super::piece::{dot, Piece, Surroundings};
 use crate::error::FieldError;
 use crate::mode::Mode;
-use crate::motion::{Guard, SmoothField};
+use crate::motion::SmoothField;
 use crate::options::Options;
 use crate::record::{InstantRecord, KeptInstant, ObservedStep, Observer, Side, Solution};
 use crate::system::{Actions, TracedSystem};
@@ -69,14 +69,16 @@ pub struct Term<'c> {
     pub at: When<'c>,
 }
 
-/// The instants at which a term of a cost counts: the state is that before.
+/// The instants at which a term of a cost counts: the state is that before, but for the end.
 #[derive(Clone, Copy)]
 pub enum When<'c> {
+    /// At the end of the run, and at the zero of a function if the run ends there.
+    End(Option<&'c EventGradient>),
     /// At a time that does not depend on anything.
     Time(f64),
     /// At a zero of a function of time, state and parameters, at this time.
     Zero(f64, &'c EventGradient),
-    /// At every instant that these surfaces end a motion at.
+    /// At every instant at which a guard of this surface ends a motion.
     Surface(usize),
 }
 
@@ -200,33 +202,34 @@ impl<'w> Walk<'w> {
         };
         let pieces = self.surroundings(impacts);
         let mut steps = trail.steps.iter().rev().peekable();
+        let last = trail.instants.last().map(KeptInstant::record);
+        let (mode, q) = last.map_or((&start.mode, &start.q[..]), |record| {
+            (record.mode[1], record.discrete[1])
+        });
+        let mut piece = Piece::new(&pieces[trail.instants.len()], mode, q);
+        let end = (self.run.solution.t_last, self.run.solution.last_state());
+        for term in terms {
+            if let When::End(zero) = term.at {
+                self.add_term(&mut piece, (term.cost, zero), end)?;
+            }
+        }
         for number in (0..=trail.instants.len()).rev() {
-            let around = &pieces[number];
-            let (mode, q) = match number.checked_sub(1) {
-                None => (&start.mode, &start.q[..]),
-                Some(earlier) => {
-                    let record = trail.instants[earlier].record();
-                    (record.mode[1], record.discrete[1])
-                }
-            };
-            let mut piece = Piece::new(around, mode, q);
+            let earlier = number.checked_sub(1);
+            let record = earlier.map(|earlier| trail.instants[earlier].record());
+            let first = record.map_or(start.t, |record| record.t[1]);
             while let Some(&(end, _)) = steps.next_if(|step| step.1 == number) {
                 let before = steps.peek().map_or(start.t, |step| step.0);
-                let begin = match number.checked_sub(1) {
-                    Some(earlier) => trail.instants[earlier].record().t[1].max(before),
-                    None => before,
-                };
-                self.step(&mut piece, (begin, end))?;
+                self.step(&mut piece, (before.max(first), end))?;
             }
-            let Some(earlier) = number.checked_sub(1) else {
+            let (Some(earlier), Some(record)) = (earlier, record) else {
                 self.terms_at(&mut piece, start.t)?;
                 break;
             };
-            let record = trail.instants[earlier].record();
             let mut before = Piece::new(&pieces[earlier], record.mode[0], record.discrete[0]);
             if let Some(lost) = self.pass(earlier, &record, (&mut before, &mut piece), terms)? {
                 return Ok(Some((record.t[0], lost)));
             }
+            piece = before;
         }
         Ok(None)
     }
@@ -286,25 +289,37 @@ impl<'w> Walk<'w> {
     /// Adds the terms at a time and later, of the motion before.
     fn terms_at(&mut self, piece: &mut Piece, t: f64) -> Result<(), FieldError> {
         while let Some((at, term)) = self.terms.pop_if(|term| term.0 >= t) {
-            let extended = self.run.systems.1;
+            let (system, extended) = self.run.systems;
             let mut x = vec![0.0; extended.n];
-            let systems = self.run.systems.0;
-            self.run
-                .solution
-                .evaluate(systems, at, Side::Left, &mut x)?;
-            let z = extended.state(&x);
-            let (by_time, gradient) = term.cost.at(at, &z, &piece.q)?;
-            add(&mut self.w, 1.0, &gradient);
-            if let When::Zero(_, function) = term.at {
-                let mut field = vec![0.0; z.len()];
-                piece
-                    .field
-                    .eval_unprojected(at, &mut z.clone(), &mut field)?;
-                let (time, normal) = function.at(at, &z, &piece.q)?;
-                let rate = time + dot(&normal, &field);
-                let moved = by_time + dot(&gradient[..extended.n], &field);
-                add(&mut self.w, -moved / rate, &normal);
-            }
+            self.run.solution.evaluate(system, at, Side::Left, &mut x)?;
+            let zero = match term.at {
+                When::Zero(_, function) => Some(function),
+                _ => None,
+            };
+            self.add_term(piece, (term.cost, zero), (at, &x))?;
+        }
+        Ok(())
+    }
+
+    /// Adds a function at a point, and at the zero of another one if that is given.
+    fn add_term(
+        &mut self,
+        piece: &mut Piece,
+        (cost, zero): (&EventGradient, Option<&EventGradient>),
+        (t, x): (f64, &[f64]),
+    ) -> Result<(), FieldError> {
+        let extended = self.run.systems.1;
+        let z = extended.state(x);
+        let (by_time, gradient) = cost.at(t, &z, &piece.q)?;
+        add(&mut self.w, 1.0, &gradient);
+        if let Some(function) = zero {
+            let mut field = vec![0.0; z.len()];
+            let mut point = z.clone();
+            piece.field.eval_unprojected(t, &mut point, &mut field)?;
+            let (time, normal) = function.at(t, &z, &piece.q)?;
+            let rate = time + dot(&normal, &field);
+            let moved = by_time + dot(&gradient[..extended.n], &field);
+            add(&mut self.w, -moved / rate, &normal);
         }
         Ok(())
     }
@@ -368,8 +383,8 @@ impl<'w> Walk<'w> {
             add(&mut self.w, moved, &time);
         }
         for term in terms {
-            let ends_at = |j: usize| record.guards.first() == Some(&Guard::Surface(j));
-            if matches!(term.at, When::Surface(j) if ends_at(j)) {
+            let surface = record.guards.first().and_then(|guard| guard.surface());
+            if matches!(term.at, When::Surface(j) if surface == Some(j)) {
                 let z = extended.state(record.x[0]);
                 let (by_time, gradient) = term.cost.at(record.t[0], &z, record.discrete[0])?;
                 add(&mut self.w, 1.0, &gradient);

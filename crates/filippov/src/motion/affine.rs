@@ -22,8 +22,8 @@ pub struct AffineLaw<'a> {
     /// The sizes of the rows of N for two surfaces, when they were first looked at: in these units its determinant goes
     /// through zero where a row does.
     sizes: Option<[f64; 2]>,
-    /// The exit functions of the root, where they are the same all along the motion and were computed.
-    known_ends: Option<[f64; 2]>,
+    /// The exit functions of the root that were computed last, and the values of N that they belong to.
+    known_ends: Option<(Vec<f64>, [f64; 2])>,
     /// No two gradients have a state in common.
     is_orthogonal: bool,
     multipliers: Vec<f64>,
@@ -155,10 +155,16 @@ impl<'a> AffineLaw<'a> {
         if self.parts.surfaces().len() > MOST_MEETING || self.is_shared() {
             return [1.0, 1.0];
         }
-        let ends = self
-            .known_ends
-            .unwrap_or_else(|| self.present_ends(oscillates));
-        self.known_ends = self.parts.is_steady().then_some(ends);
+        let values = self.parts.normal().values();
+        let known = self.known_ends.as_ref().filter(|known| known.0 == values);
+        if let Some((_, ends)) = known {
+            return *ends;
+        }
+        let mut of = self.known_ends.take().unwrap_or_default().0;
+        of.clear();
+        of.extend_from_slice(values);
+        let ends = self.present_ends(oscillates);
+        self.known_ends = Some((of, ends));
         ends
     }
 

@@ -52,6 +52,14 @@ impl Guard {
         }
     }
 
+    /// The surface that it belongs to, if there is one.
+    pub fn surface(self) -> Option<usize> {
+        match self {
+            Guard::Surface(surface) => Some(surface),
+            other => other.surface_held(),
+        }
+    }
+
     /// Is it a switching function?
     pub fn is_surface(self) -> bool {
         matches!(self, Guard::Surface(_))

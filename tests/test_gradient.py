@@ -1,0 +1,248 @@
+"""Gradients of costs by the adjoint equations: closed forms, derivatives followed forward, differences.
+
+Reference: Cao, Li, Petzold, Serban, SIAM J. Sci. Comput. 24 (2003) 1076.
+"""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import filippov as fl
+import numpy as np
+import pytest
+from fuzz.systems import build, random_case
+
+METHODS = ("Taylor", "DOP853", "DOPRI5", "Rodas5P")
+TIGHT: dict[str, Any] = {"rtol": 1e-11, "atol": 1e-12}
+
+
+def friction(t: float, x: Any, F: float = 0.4, omega: float = 1 / 3) -> list[Any]:
+    return [x[1], -x[0] + np.sin(omega * t) - F * np.sign(x[1])]
+
+
+OSCILLATOR = fl.System(friction, states=("y", "v"))
+
+
+def by_differences(cost: Any, values: dict[str, float], d: float = 1e-5) -> dict[str, float]:
+    found = {}
+    for name in values:
+        above, below = (cost({**values, name: values[name] + side}) for side in (d, -d))
+        found[name] = (above - below) / (2 * d)
+    return found
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_it_is_the_product_of_the_slope_of_the_cost_with_the_derivatives(method: str) -> None:
+    wrt = ["y0", "t0", "F", "omega"]
+
+    def cost(t: float, y: Any, F: float) -> Any:
+        return y[0] ** 2 + np.sin(y[1]) + F * t
+
+    options = {**TIGHT, "method": method}
+    value, found = fl.gradient(OSCILLATOR, (0, 20), [1.0, 2.0], terminal=cost, wrt=wrt, **options)
+    sol = OSCILLATOR.solve((0, 20), [1.0, 2.0], wrt=wrt, **options)
+    y, v = sol.y[:, -1]
+    expected = np.array([2 * y, np.cos(v)]) @ sol.derivative() + np.array([0, 0, 0, 20, 0])
+    assert tuple(found) == sol.wrt
+    assert value == pytest.approx(y**2 + np.sin(v) + 0.4 * 20, rel=1e-12)
+    np.testing.assert_allclose(list(found.values()), expected, rtol=2e-9, atol=2e-10)
+
+
+def test_a_running_cost_that_bends_and_jumps() -> None:
+    def running(t: float, y: Any, omega: float) -> Any:
+        return abs(y[1]) + omega * y[0] ** 2 + np.where(y[0] > 0.3, 1.0, 0.0)
+
+    def cost(values: dict[str, float]) -> float:
+        start, params = [values["y"], values["v"]], {"F": values["F"], "omega": values["omega"]}
+        return fl.gradient(OSCILLATOR, (values["t0"], 20), start, params, running=running, wrt="y0", **TIGHT)[
+            0
+        ]
+
+    values = {"y": 1.0, "v": 2.0, "t0": 0.1, "F": 0.4, "omega": 1 / 3}
+    _, found = fl.gradient(
+        OSCILLATOR, (0.1, 20), [1.0, 2.0], running=running, wrt=["y0", "t0", "F", "omega"], **TIGHT
+    )
+    for name, expected in by_differences(cost, values).items():
+        assert found[name] == pytest.approx(expected, rel=1e-6, abs=1e-6)
+
+
+def test_a_cost_that_ends_at_an_event() -> None:
+    # x' = p reaches 1 at t = 1 / p.
+    ramp = fl.System(lambda t, x, p=0.7: [p], n=1)
+    reached = fl.Event(lambda t, y: y[0] - 1, terminal=True)
+    value, found = fl.gradient(ramp, (0, 10), [0.0], terminal=lambda t, y: t, events=reached, wrt=["y0", "p"])
+    assert value == pytest.approx(1 / 0.7, rel=1e-12)
+    assert found["p"] == pytest.approx(-1 / 0.7**2, rel=1e-12)
+    assert found["x[0]"] == pytest.approx(-1 / 0.7, rel=1e-12)
+    # The event may depend on a parameter, and the cost be an integral up to it: p / 2 T^2 with T = (1 + a) / p.
+    sloped = fl.System(lambda t, x, p=0.7, a=0.5: [p + 0 * a], n=1)
+    reached = fl.Event(lambda t, y, a: y[0] - 1 - a, terminal=True)
+    value, found = fl.gradient(
+        sloped, (0, 10), [0.0], running=lambda t, y: y[0], events=reached, wrt="params"
+    )
+    assert value == pytest.approx(1.5**2 / (2 * 0.7), rel=1e-9)
+    assert found["p"] == pytest.approx(-(1.5**2) / (2 * 0.7**2), rel=1e-9)
+    assert found["a"] == pytest.approx(1.5 / 0.7, rel=1e-9)
+
+
+def test_costs_at_known_times_at_events_and_at_switches() -> None:
+    def at_time(t: float, y: Any, F: float) -> Any:
+        return y[0] ** 2 + F
+
+    def at_zero(t: float, y: Any) -> Any:
+        return t * y[1] ** 2
+
+    zero = fl.Event(lambda t, y: y[0] - 0.2, name="level")
+    instants = [([3.0, 7.5, 12.0], at_time), (zero, at_zero), ("v", lambda t, y: t * y[0])]
+    options: dict[str, Any] = {"instants": instants, **TIGHT}
+
+    def cost(values: dict[str, float]) -> float:
+        params = {"F": values["F"], "omega": values["omega"]}
+        return fl.gradient(OSCILLATOR, (0, 15), [values["y"], values["v"]], params, wrt="y0", **options)[0]
+
+    value, found = fl.gradient(OSCILLATOR, (0, 15), [1.0, 2.0], wrt="all", **options)
+    sol = OSCILLATOR.solve((0, 15), [1.0, 2.0], events=zero, **TIGHT)
+    times = sol.t_events[0]
+    own = [t * sol.sol(t)[1] ** 2 for t in times] + [
+        s.t * sol.sol(s.t)[0] for s in sol.switches if s.surfaces[0] == "v"
+    ]
+    assert len(own) == 3
+    assert value == pytest.approx(sum(sol.sol(t)[0] ** 2 + 0.4 for t in instants[0][0]) + sum(own), rel=1e-9)
+    for name, expected in by_differences(cost, {"y": 1.0, "v": 2.0, "F": 0.4, "omega": 1 / 3}).items():
+        assert found[name] == pytest.approx(expected, rel=1e-6, abs=1e-6)
+
+
+def test_an_impact_on_a_wall() -> None:
+    # Falls from rest at height x0 above the wall w, hits at T = sqrt(2 (x0 - w) / g), and goes on with r times the speed.
+    wall = fl.System(
+        lambda t, x, g=9.81, r=0.8, w=0.2: [x[1], -g],
+        n=2,
+        resets=fl.Reset(lambda t, x, w: x[0] - w, lambda t, x, r: [x[0], -r * x[1]], direction="down"),
+    )
+    _, found = fl.gradient(wall, (0, 0.6), [1.0, 0.0], terminal=lambda t, y: y[0], wrt="all", **TIGHT)
+
+    def height(x0: float, v0: float, g: float, r: float, w: float) -> float:
+        hit = (v0 + np.sqrt(v0**2 + 2 * g * (x0 - w))) / g
+        left = 0.6 - hit
+        return w - r * (v0 - g * hit) * left - g * left**2 / 2
+
+    values = {"x0": 1.0, "v0": 0.0, "g": 9.81, "r": 0.8, "w": 0.2}
+    expected = by_differences(lambda v: height(**v), values)
+    for name, exact in zip(("x[0]", "x[1]", "g", "r", "w"), expected.values(), strict=True):
+        assert found[name] == pytest.approx(exact, rel=1e-8)
+
+
+def test_impacts_that_accumulate() -> None:
+    # The whole path of a ball that comes to rest, and what its integral is worth: closed form by a geometric series.
+    ball = fl.System(
+        lambda t, x, g=9.81, r=0.6: [x[1], -g],
+        n=2,
+        resets=fl.Reset(lambda t, x: x[0], lambda t, x, r: [0.0, -r * x[1]], direction="down"),
+    )
+
+    def area(g: float, r: float, x0: float) -> float:
+        # The first fall, then parabolas of duration 2 v / g and area 2 v^3 / (3 g^2).
+        v = np.sqrt(2 * g * x0)
+        return 2 / 3 * x0 * np.sqrt(2 * x0 / g) + 2 * (r * v) ** 3 / (3 * g**2) / (1 - r**3)
+
+    value, found = fl.gradient(
+        ball, (0, 5), [1.0, 0.0], running=lambda t, y: y[0], wrt=["y0", "g", "r"], **TIGHT
+    )
+    exact = by_differences(lambda v: area(**v), {"g": 9.81, "r": 0.6, "x0": 1.0}, 1e-6)
+    assert value == pytest.approx(area(9.81, 0.6, 1.0), rel=1e-7)
+    for name, key in (("g", "g"), ("r", "r"), ("x[0]", "x0")):
+        assert found[name] == pytest.approx(exact[key], rel=1e-6)
+
+
+def test_many_masses_that_stick_together() -> None:
+    d = 12
+    rng = np.random.default_rng(5)
+    push = rng.uniform(0.8, 1.2, d)
+
+    def field(t: float, x: Any, **p: float) -> list[Any]:
+        q, v = x[:d], x[d:]
+        wave = np.sin(0.7 * t)
+        pairs = [(q[max(i - 1, 0)], q[min(i + 1, d - 1)]) for i in range(d)]
+        rates = [
+            a - 2 * q[i] + b - p[f"F{i}"] * np.sign(v[i]) + push[i] * wave for i, (a, b) in enumerate(pairs)
+        ]
+        return [*v, *rates]
+
+    chain = fl.System(field, n=2 * d, params={f"F{i}": 0.5 + 0.02 * i for i in range(d)})
+    start = np.concatenate([np.zeros(d), 0.1 * np.linspace(1, 2, d)])
+    options = {**TIGHT, "method": "Taylor"}
+    _, found = fl.gradient(chain, (0, 12), start, terminal=lambda t, y: (y**2).sum(), wrt="all", **options)
+    sol = chain.solve((0, 12), start, wrt="all", **options)
+    assert max(sum(entry == 0 for entry in segment.mode) for segment in sol.segments) > 4
+    expected = 2 * sol.y[:, -1] @ sol.derivative()
+    np.testing.assert_allclose(list(found.values()), expected, atol=1e-10 * abs(expected).max())
+
+
+@pytest.mark.parametrize("first", range(0, 90, 30))
+@pytest.mark.filterwarnings("ignore::filippov.FilippovWarning")
+def test_random_systems_have_the_same_product_forward_and_back(first: int) -> None:
+    compared = 0
+    for seed in range(first, first + 30):
+        problem = build(random_case(seed).source)
+        options = {"rtol": 1e-11, "atol": 1e-11, "max_events": 2000, "max_steps": 20_000}
+        system = fl.System(problem.rhs, n=len(problem.y0), resets=problem.resets or None)
+        weights = np.random.default_rng(seed).standard_normal(len(problem.y0))
+        span = (0, problem.t_end)
+        sol = system.solve(span, problem.y0, wrt="y0", **options)
+        if not sol.success or not np.isfinite(sol.derivative()).all():
+            continue
+
+        def cost(t: float, y: Any, weights: Any = weights) -> Any:
+            return y @ weights
+
+        _, found = fl.gradient(system, span, problem.y0, terminal=cost, wrt="y0", **options)
+        largest = max(abs(sol.derivative(sol.t)).max(), 1.0)
+        expected = weights @ sol.derivative()
+        np.testing.assert_allclose(
+            list(found.values()), expected, atol=1e-9 * largest, rtol=1e-9, err_msg=f"seed {seed}"
+        )
+        compared += 1
+    assert compared > 20
+
+
+def test_where_there_is_no_derivative_the_gradient_is_nan() -> None:
+    touch = fl.System(lambda t, x: [1.0, 2 * (x[0] - 1) + np.where(x[1] > 0, 0.0, 5.0)], n=2)
+    with pytest.warns(fl.FilippovWarning, match=r"the gradient is NaN: the run has no derivative at t = 1 "):
+        value, found = fl.gradient(touch, (0, 2), [0.0, 1.0], terminal=lambda t, y: y[1], wrt="y0")
+    assert np.isfinite(value)
+    assert np.isnan(list(found.values())).all()
+
+
+@pytest.mark.parametrize(
+    ("changed", "text"),
+    [
+        ({}, "terminal, running, instants: there is no cost"),
+        ({"terminal": 3}, "terminal: a function"),
+        ({"running": "v"}, "running: a function"),
+        ({"terminal": lambda t, y: y}, "terminal"),
+        ({"instants": [3]}, "instants: entry 0: a pair"),
+        ({"instants": [(1.0, 3)]}, "instants: entry 0: the cost"),
+        ({"instants": [("w", lambda t, y: y[0])]}, "there is no surface 'w'"),
+        ({"instants": [(30.0, lambda t, y: y[0])]}, "the time 30 is not in the run"),
+        ({"terminal": lambda t, y: y[0], "wrt": ["G"]}, "wrt: 'G'"),
+        ({"terminal": lambda t, y: y[0], "t_eval": [1.0]}, "t_eval: it is not an option"),
+        ({"terminal": lambda t, y: y[0] if y[0].hex() else 1.0}, "terminal"),
+    ],
+)
+def test_wrong_arguments_are_refused(changed: dict[str, Any], text: str) -> None:
+    with pytest.raises(fl.InputError, match=text):
+        fl.gradient(OSCILLATOR, (0, 20), [1.0, 2.0], **changed)
+
+
+def test_a_system_is_needed() -> None:
+    with pytest.raises(fl.InputError, match=r"system: a filippov.System is needed, not function"):
+        fl.gradient(friction, (0, 1), [1.0, 2.0], terminal=lambda t, y: y[0])  # type: ignore[arg-type]
+
+
+def test_a_run_that_fails_hands_over_its_part() -> None:
+    blows = fl.System(lambda t, x: [x[0] ** 2 + np.sign(x[0])], n=1)
+    with pytest.raises(fl.FilippovError) as raised, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        fl.gradient(blows, (0, 5), [1.0], terminal=lambda t, y: y[0], wrt="y0")
+    assert 0.5 < raised.value.partial.t[-1] < 1.0
