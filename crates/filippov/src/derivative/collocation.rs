@@ -61,7 +61,7 @@ impl Collocation {
         Collocation {
             n,
             m,
-            rest: (1e-4 * rtol).max(4.0 * EPS),
+            rest: (1e-3 * rtol).max(4.0 * EPS),
             dt: f64::NAN,
             way: Way::Sparse(false),
             right: SparseRows::new(n + m),
