@@ -36,7 +36,7 @@ Array = npt.NDArray[np.float64]
 Cost = Callable[..., Any]
 
 _RUNNING = "running cost"
-_REFUSED = ("wrt", "t_eval", "keep", "dense_output", "args", "resets", "surfaces")
+_REFUSED = ("order", "t_eval", "keep", "dense_output", "args", "resets", "surfaces")
 
 
 def gradient(

@@ -516,6 +516,10 @@ def derivative_warnings(run: Run, t0: float, names: Sequence[str]) -> list[RunWa
         t, why = lost
         text = f"derivatives are not known from t = {t:.10g} on: {_WHY_LOST[why]}"
         found.append(RunWarning(t, "no_derivative", text))
+    second = run.second_lost()
+    if second is not None and (lost is None or second < lost[0]):
+        text = f"second derivatives are not known from t = {second:.10g} on"
+        found.append(RunWarning(second, "no_derivative", text))
     return found
 
 

@@ -14,8 +14,8 @@ use pyo3::prelude::*;
 use crate::systems::raised;
 
 /// The columns, each a kind (0: a component of the initial state, 1: the initial time, 2: a parameter) with a place; the parameters by
-/// which is differentiated; and whether the run is kept for gradients of costs, instead of derivatives that are followed.
-pub type Wanted = (Vec<(u8, usize)>, Vec<usize>, bool);
+/// which is differentiated; and the order of the derivatives, 0 where the run is kept for gradients of costs instead.
+pub type Wanted = (Vec<(u8, usize)>, Vec<usize>, u8);
 
 /// Time, derivative of the time, saltation matrix, its part by parameters, condition, and why derivatives end there.
 pub type InstantRow<'py> = (
@@ -57,7 +57,7 @@ pub fn run_with_derivatives(
     ),
     options: &Options,
     span: f64,
-    (kinds, parameters, goes_back): &Wanted,
+    (kinds, parameters, order): &Wanted,
     interrupt: &mut dyn FnMut(f64) -> bool,
 ) -> Result<(Solution, RunDerivatives), Failure> {
     let kinds: Vec<Column> = kinds
@@ -67,12 +67,15 @@ pub fn run_with_derivatives(
     let extended = extension.at(system.parameters(), actions)?;
     let extended = extended.ok_or(Failure::CalledMap)?;
     let impacts = extended.impacts();
-    let (solution, found, trail) = if *goes_back {
+    let (solution, found, trail) = if *order == 0 {
         let mut trail = Trail::default();
         let solution = problem.solve_observed(&mut trail, interrupt)?;
         (solution, Derivatives::default(), Some(trail))
     } else {
         let mut tangents = Tangents::new(&extended, &impacts, kinds.clone(), options, span);
+        if *order == 2 {
+            tangents = tangents.with_second();
+        }
         let solution = problem.solve_observed(&mut tangents, interrupt)?;
         (solution, tangents.finish()?, None)
     };
@@ -145,6 +148,38 @@ impl RunDerivatives {
             };
             times.iter().map(at).collect()
         })
+    }
+
+    /// The mixed second derivatives at these times, for each those of the state by every pair of columns (a, b) with b <= a.
+    pub fn second_at<'py>(
+        &self,
+        py: Python<'py>,
+        system: &filippov::TracedSystem,
+        run: RunOf<'_>,
+        (times, side): (&[f64], Side),
+    ) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
+        let n = run.0.n_states;
+        let n_pairs = self.kinds.len() * (self.kinds.len() + 1) / 2;
+        self.with(system, run, |run| {
+            let at = |&t: &f64| {
+                let values = run.second_at(t, side).map_err(raised)?;
+                let values = values.ok_or_else(|| unknown(t))?;
+                Ok(transposed(py, &values, n_pairs, n))
+            };
+            times.iter().map(at).collect()
+        })
+    }
+
+    /// The same at the end of the run.
+    pub fn second_at_end<'py>(&self, py: Python<'py>, n: usize) -> Bound<'py, PyArray2<f64>> {
+        let n_pairs = self.kinds.len() * (self.kinds.len() + 1) / 2;
+        let last = self.found.second.len().saturating_sub(n * n_pairs);
+        transposed(py, &self.found.second[last..], n_pairs, n)
+    }
+
+    /// The time from which on second derivatives are not known.
+    pub fn second_lost(&self) -> Option<f64> {
+        self.found.second_lost
     }
 
     /// The derivatives of the times of zeros of a function, the first component of a system: a row for each.

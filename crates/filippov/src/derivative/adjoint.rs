@@ -354,7 +354,7 @@ impl<'w> Walk<'w> {
             }
         } else {
             match instant.passage(&weights, &mut 0.0)? {
-                Ok(Passage { time, changes }) => {
+                Ok(Passage { time, changes, .. }) => {
                     let changes = changes.iter().rev();
                     changes.for_each(|change| change.pull_back(n, &mut self.w));
                     time

@@ -3,6 +3,7 @@
 use super::change::Change;
 use super::extended::Extended;
 use super::piece::{dot, Piece};
+use super::second::{Second, SecondOrder};
 use crate::error::FieldError;
 use crate::motion::{Guard, ModeField};
 use crate::record::InstantRecord;
@@ -118,6 +119,8 @@ pub(super) struct Passage {
     pub time: Vec<f64>,
     /// What becomes of a change, one after the other.
     pub changes: Vec<Change>,
+    /// The field goes on: the time alone is of interest.
+    pub goes_on: bool,
 }
 
 impl Instant<'_, '_> {
@@ -126,10 +129,15 @@ impl Instant<'_, '_> {
         &mut self,
         weights: &Weights,
         columns: &mut [Vec<f64>],
+        second: &mut Option<Second>,
     ) -> Result<InstantDerivative, FieldError> {
         let (n, m) = (self.extended.n, self.extended.n_parameters());
         let mut found = InstantDerivative::unknown(self.record.t[0], columns.len(), (n, m));
-        let Passage { time, changes } = match self.passage(weights, &mut found.condition)? {
+        let Passage {
+            time,
+            changes,
+            goes_on,
+        } = match self.passage(weights, &mut found.condition)? {
             Ok(passage) => passage,
             Err(lost) => {
                 found.lost = Some(lost);
@@ -138,6 +146,17 @@ impl Instant<'_, '_> {
         };
         let dt = found.dt.iter_mut().zip(&*columns);
         dt.for_each(|(dt, column)| *dt = dot(&time, column));
+        if let Some(pairs) = second.take() {
+            let mut order = SecondOrder {
+                extended: self.extended,
+                record: self.record,
+                before: self.before,
+                after: self.after,
+                time: &time,
+                goes_on,
+            };
+            *second = order.pass(columns, &pairs)?;
+        }
         let through = |column: &mut [f64]| changes.iter().for_each(|one| one.apply(n, column));
         columns.iter_mut().for_each(|column| through(column));
         let mut unit = vec![0.0; n + m];
@@ -175,13 +194,17 @@ impl Instant<'_, '_> {
         {
             return Ok(Err(Lost::Unsupported));
         }
-        let mut changes = Vec::new();
-        if self.leaves_as_it_is() {
-            return Ok(Ok(Passage { time, changes }));
+        let mut passage = Passage {
+            time,
+            changes: Vec::new(),
+            goes_on: self.leaves_as_it_is(),
+        };
+        if passage.goes_on {
+            return Ok(Ok(passage));
         }
         if let Some(entry) = self.entry()? {
-            changes.push(entry);
-            return Ok(Ok(Passage { time, changes }));
+            passage.changes.push(entry);
+            return Ok(Ok(passage));
         }
         if record.guards.len() > 1 {
             return Ok(Err(Lost::OneSided));
@@ -192,15 +215,17 @@ impl Instant<'_, '_> {
             .iter_mut()
             .zip(after)
             .for_each(|(f, after)| *f -= after);
-        changes.push(Change::at_moving_time(map, moved, time.clone()));
+        let jump = Change::at_moving_time(map, moved, passage.time.clone());
+        passage.changes.push(jump);
         let z = self.extended.state(record.x[1]);
         // What is new is held exactly; the columns of the run keep to the other surfaces by themselves.
         let kept = match record.acts.is_empty() {
             true => &self.before.sliding[..],
             false => &[],
         };
-        changes.extend(self.after.projection(kept, record.t[1], &z)?);
-        Ok(Ok(Passage { time, changes }))
+        let held = self.after.projection(kept, record.t[1], &z)?;
+        passage.changes.extend(held);
+        Ok(Ok(passage))
     }
 
     /// The derivative of the time, a row, from what fixes it.

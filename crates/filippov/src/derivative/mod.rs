@@ -17,6 +17,7 @@ mod instant;
 mod limit;
 mod piece;
 mod radau;
+mod second;
 mod series;
 mod tangents;
 

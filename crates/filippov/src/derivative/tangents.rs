@@ -4,6 +4,7 @@ use super::extended::{Column, Extended};
 use super::instant::{entered, Instant, InstantDerivative, Lost, Weights};
 use super::limit::{at_its_time, History, Past};
 use super::piece::{dot, Piece, Surroundings};
+use super::second::{at_start, pairs, Second};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::SmoothField;
@@ -21,6 +22,11 @@ pub struct Derivatives {
     pub t: Vec<f64>,
     /// The derivative of the state at each of them, a column after the other.
     pub values: Vec<f64>,
+    /// The mixed second derivatives at each of them, if they are followed: for every pair of columns (a, b) with b <= a, in order, those
+    /// of the state. NaN where they are not known.
+    pub second: Vec<f64>,
+    /// The time from which on the second derivatives are not known.
+    pub second_lost: Option<f64>,
     /// Those of all instants.
     pub instants: Vec<InstantDerivative>,
     /// Surfaces on which the run starts and that it leaves, where the field jumps: the derivatives by the start are those of one
@@ -66,6 +72,9 @@ pub struct Tangents<'a> {
     kinds: Vec<Column>,
     /// For each column the derivative of the state, and its shares of the parameters behind it.
     columns: Vec<Vec<f64>>,
+    has_second: bool,
+    /// The mixed derivatives, as long as they are known.
+    second: Option<Second>,
     /// Motions that were met, the latest last.
     pieces: Vec<Box<Piece<'a>>>,
     history: History,
@@ -92,6 +101,8 @@ impl<'a> Tangents<'a> {
                 atol: options.atol.clone(),
             },
             columns: Vec::new(),
+            has_second: false,
+            second: None,
             kinds,
             pieces: Vec::new(),
             history: History::default(),
@@ -100,6 +111,13 @@ impl<'a> Tangents<'a> {
             found: Derivatives::default(),
             raised: None,
         }
+    }
+
+    /// With second derivatives.
+    #[must_use]
+    pub fn with_second(mut self) -> Self {
+        self.has_second = true;
+        self
     }
 
     /// The derivatives.
@@ -123,6 +141,10 @@ impl<'a> Tangents<'a> {
         piece
             .field
             .eval_unprojected(t, &mut z.clone(), &mut field)?;
+        if self.has_second {
+            let at = (t, &z[..]);
+            self.second = Some(at_start(&mut piece, at, &field, &self.kinds)?);
+        }
         for kind in &self.kinds {
             let mut states = vec![0.0; n];
             match *kind {
@@ -135,6 +157,7 @@ impl<'a> Tangents<'a> {
         }
         if !piece.sliding.is_empty() {
             // A start beside the surfaces comes to them at once.
+            self.second = None;
             match entered(self.around.extended, &piece, &[], (t, &z))? {
                 Some(entry) => self.columns.iter_mut().for_each(|c| entry.apply(n, c)),
                 None => piece.project(t, &z, &mut self.columns)?,
@@ -156,10 +179,22 @@ impl<'a> Tangents<'a> {
             let states = &column[..self.around.extended.n];
             self.found.values.extend_from_slice(states);
         }
+        if self.has_second {
+            let n = self.around.extended.n;
+            match &self.second {
+                Some(second) => self.found.second.extend(second.pairs.iter().flatten()),
+                None => {
+                    self.found.second_lost.get_or_insert(t);
+                    let unknown = pairs(self.kinds.len()).flat_map(|_| vec![f64::NAN; n]);
+                    self.found.second.extend(unknown);
+                }
+            }
+        }
     }
 
     fn lose(&mut self, lost: Lost) {
         self.lost = Some(lost);
+        self.second = None;
         self.columns
             .iter_mut()
             .for_each(|column| column.fill(f64::NAN));
@@ -194,7 +229,13 @@ impl<'a> Tangents<'a> {
                 step.at(t, x);
                 Ok(())
             };
-            piece.advance(along, (t0, step.t_end), &mut self.columns)?;
+            let span = (t0, step.t_end);
+            if let Some(mut second) = self.second.take() {
+                if piece.advance_pairs(along, span, &self.columns, &mut second)? {
+                    self.second = Some(second);
+                }
+            }
+            piece.advance(along, span, &mut self.columns)?;
             let z = self.around.extended.state(step.x_end);
             piece.project(step.t_end, &z, &mut self.columns)?;
             self.put_back(piece);
@@ -220,11 +261,12 @@ impl<'a> Tangents<'a> {
             after: &mut after,
         };
         if record.t[0] != record.t[1] {
+            self.second = None;
             let time = instant.time(&self.weights, &mut 0.0)?.ok();
             self.jump(record, time, &after)?;
         } else {
             let columns = self.columns.clone();
-            let mut found = instant.pass(&self.weights, &mut self.columns)?;
+            let mut found = instant.pass(&self.weights, &mut self.columns, &mut self.second)?;
             found.lost = self.lost.or(found.lost);
             self.history.push(past(record, &columns, found.dt.clone()));
             found.lost.into_iter().for_each(|lost| self.lose(lost));
