@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use filippov::derivative::{
-    Column, Derivatives, Differentiated, DifferentiatedRun, EventGradient, Extension, Tangents,
-    Term, Trail, WayBack, When,
+    Column, Derivatives, Differentiated, DifferentiatedRun, EventGradient, Extension, OneSided,
+    Tangents, Term, Trail, WayBack, When,
 };
 use filippov::{Error, FieldError, Options, Problem, Side, Solution};
 use numpy::{PyArray1, PyArray2};
@@ -17,7 +17,8 @@ use crate::systems::raised;
 /// which is differentiated; and the order of the derivatives, 0 where the run is kept for gradients of costs instead.
 pub type Wanted = (Vec<(u8, usize)>, Vec<usize>, u8);
 
-/// Time, derivative of the time, saltation matrix, its part by parameters, condition, and why derivatives end there.
+/// Time, derivative of the time, saltation matrix, its part by parameters, condition, why derivatives end there, the matrices by
+/// sides, and the coefficient of a square root.
 pub type InstantRow<'py> = (
     f64,
     Bound<'py, PyArray1<f64>>,
@@ -25,6 +26,15 @@ pub type InstantRow<'py> = (
     Bound<'py, PyArray2<f64>>,
     f64,
     &'static str,
+    Vec<SideRow<'py>>,
+    Option<Bound<'py, PyArray1<f64>>>,
+);
+
+/// The surfaces in their order, the saltation matrix, and its part by parameters.
+pub type SideRow<'py> = (
+    Vec<usize>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
 );
 
 /// The derivatives of a run, or what they need on the way back; and what they are continued with between steps.
@@ -298,6 +308,15 @@ impl RunDerivatives {
         let instants = self.found.instants.iter();
         instants
             .map(|found| {
+                let root = !found.square_root.is_empty();
+                let side = |side: &OneSided| {
+                    let order = side.order.clone();
+                    (
+                        order,
+                        rows(&side.saltation, n),
+                        rows(&side.by_parameters, m),
+                    )
+                };
                 (
                     found.t,
                     PyArray1::from_slice(py, &found.dt),
@@ -305,6 +324,8 @@ impl RunDerivatives {
                     rows(&found.by_parameters, m),
                     found.condition,
                     found.lost.map_or("", filippov::derivative::Lost::name),
+                    found.sides.iter().map(side).collect(),
+                    root.then(|| PyArray1::from_slice(py, &found.square_root)),
                 )
             })
             .collect()

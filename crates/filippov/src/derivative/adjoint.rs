@@ -226,7 +226,8 @@ impl<'w> Walk<'w> {
                 break;
             };
             let mut before = Piece::new(&pieces[earlier], record.mode[0], record.discrete[0]);
-            if let Some(lost) = self.pass(earlier, &record, (&mut before, &mut piece), terms)? {
+            let both = (&mut before, &mut piece);
+            if let Some(lost) = self.pass(earlier, &record, &pieces[earlier], both, terms)? {
                 return Ok(Some((record.t[0], lost)));
             }
             piece = before;
@@ -329,6 +330,7 @@ impl<'w> Walk<'w> {
         &mut self,
         number: usize,
         record: &InstantRecord,
+        around: &Surroundings<'p>,
         (before, after): (&mut Piece<'p>, &mut Piece<'p>),
         terms: &[Term],
     ) -> Result<Option<&'static str>, FieldError> {
@@ -343,6 +345,7 @@ impl<'w> Walk<'w> {
         let is_limit = record.t[0] != record.t[1];
         let mut instant = Instant {
             extended,
+            around,
             record,
             before,
             after,

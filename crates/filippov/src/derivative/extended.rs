@@ -145,6 +145,16 @@ pub struct Extended<'a> {
 }
 
 impl Extended<'_> {
+    /// The action that a surface triggers and that moves the state, if there is one.
+    pub(super) fn triggered_by(&self, surface: usize) -> Option<usize> {
+        let is_own = |(action, trigger): (usize, &Trigger)| {
+            matches!(trigger, Trigger::Surface { index, .. } if *index == surface)
+                && self.moves(action)
+        };
+        let mut all = self.triggers.iter().enumerate();
+        all.find_map(|(action, trigger)| is_own((action, trigger)).then_some(action))
+    }
+
     /// Does an action move the state?
     pub(super) fn moves(&self, action: usize) -> bool {
         self.maps.get(action).is_some_and(Option::is_some)

@@ -2,7 +2,8 @@
 
 use super::change::Change;
 use super::extended::Extended;
-use super::piece::{dot, Piece};
+use super::one_sided::{agree, OneSided};
+use super::piece::{dot, Piece, Surroundings};
 use super::second::{Second, SecondOrder};
 use crate::error::FieldError;
 use crate::motion::{Guard, ModeField};
@@ -55,6 +56,11 @@ pub struct InstantDerivative {
     pub condition: f64,
     /// Why the derivatives end here, if they do.
     pub lost: Option<Lost>,
+    /// The derivatives by sides, where they differ.
+    pub sides: Vec<OneSided>,
+    /// At an impact without speed: by how much the state behind differs from the undisturbed motion, for each unit of the root of the
+    /// depth that this would reach.
+    pub square_root: Vec<f64>,
 }
 
 impl InstantDerivative {
@@ -67,6 +73,8 @@ impl InstantDerivative {
             by_parameters: vec![f64::NAN; n * m],
             condition: f64::NAN,
             lost: None,
+            sides: Vec::new(),
+            square_root: Vec::new(),
         }
     }
 }
@@ -108,6 +116,7 @@ struct Timing {
 /// An instant with the motions around it.
 pub(super) struct Instant<'i, 'a> {
     pub extended: &'a Extended<'a>,
+    pub around: &'i Surroundings<'a>,
     pub record: &'i InstantRecord<'i>,
     pub before: &'i mut Piece<'a>,
     pub after: &'i mut Piece<'a>,
@@ -141,6 +150,7 @@ impl Instant<'_, '_> {
             Ok(passage) => passage,
             Err(lost) => {
                 found.lost = Some(lost);
+                self.add_sides(&mut found)?;
                 return Ok(found);
             }
         };
@@ -176,6 +186,21 @@ impl Instant<'_, '_> {
         Ok(found)
     }
 
+    /// Adds what is known of an instant without a derivative.
+    fn add_sides(&mut self, found: &mut InstantDerivative) -> Result<(), FieldError> {
+        let sizes = (self.extended.n, self.extended.n_parameters());
+        let cones = match found.lost {
+            Some(Lost::OneSided) => self.cones()?.unwrap_or_default(),
+            Some(Lost::Grazing) => {
+                found.square_root = self.square_root()?;
+                self.touching()?
+            }
+            _ => Vec::new(),
+        };
+        found.sides = cones.iter().map(|cone| cone.matrices(sizes)).collect();
+        Ok(())
+    }
+
     /// What the instant does.
     pub fn passage(
         &mut self,
@@ -185,6 +210,14 @@ impl Instant<'_, '_> {
         let record = self.record;
         let time = match self.time(weights, condition)? {
             Ok(time) => time,
+            // Where the field is the same on both sides of a surface, a touch changes nothing.
+            Err(Lost::Grazing) if self.touching()?.len() == 1 => {
+                return Ok(Ok(Passage {
+                    time: vec![f64::NAN; self.extended.n + self.extended.n_parameters()],
+                    changes: Vec::new(),
+                    goes_on: true,
+                }));
+            }
             Err(lost) => return Ok(Err(lost)),
         };
         let fields = [&self.before.field, &self.after.field];
@@ -207,7 +240,14 @@ impl Instant<'_, '_> {
             return Ok(Ok(passage));
         }
         if record.guards.len() > 1 {
-            return Ok(Err(Lost::OneSided));
+            let sizes = (self.extended.n, self.extended.n_parameters());
+            return Ok(match self.cones()? {
+                Some(mut cones) if agree(&cones, sizes) => {
+                    passage.changes = cones.swap_remove(0).changes;
+                    Ok(passage)
+                }
+                _ => Err(Lost::OneSided),
+            });
         }
         let (map, mut moved) = self.mapped()?;
         let after = record.field[1].iter();

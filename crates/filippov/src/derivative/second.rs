@@ -114,6 +114,9 @@ impl SecondOrder<'_, '_> {
         let [z_before, z_after] = record.x.map(|x| self.extended.state(x));
         let pad = |field: &[f64]| [field, &vec![0.0; size - n]].concat();
         let [f_before, f_after] = record.field.map(pad);
+        if self.time.iter().any(|v| v.is_nan()) {
+            return Ok(None);
+        }
         let is_timed = self.time.iter().any(|v| *v != 0.0);
         let surface = match record.guards {
             _ if self.goes_on => None,

@@ -254,7 +254,9 @@ impl<'a> Tangents<'a> {
         let mut before = self.take_piece(record.mode[0], record.discrete[0]);
         self.around.take_sides(record.mode[0]);
         let mut after = self.take_piece(record.mode[1], record.discrete[1]);
+        let around = self.around.clone();
         let mut instant = Instant {
+            around: &around,
             extended: self.around.extended,
             record,
             before: &mut before,
