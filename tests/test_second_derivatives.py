@@ -37,7 +37,7 @@ def test_second_derivatives_of_the_friction_transient(method: str) -> None:
 
 
 def by_differences(run: Any, start: Any, params: dict[str, float], d: float) -> Any:
-    """Return the central differences of the first derivatives by every component of the start and parameter."""
+    """Return the central differences of the first derivatives by the start and the parameters."""
     found = []
     for column in range(len(start) + len(params)):
         sides = []
@@ -145,7 +145,7 @@ def test_random_systems_against_differences_of_first_derivatives(first: int) -> 
         if not sol.success or any(warning.code != "other" for warning in sol.warnings):
             continue
         found = sol.derivative(order=2)
-        two = [by_differences(lambda start, _: run(start), problem.y0, {}, d) for d in (2e-6, 4e-6)]  # noqa: B023
+        two = [by_differences(lambda start, _: run(start), problem.y0, {}, d) for d in (2e-6, 4e-6)]
         size = 1 + abs(two[0]).max()
         # Where the differences by two lengths differ, they are no oracle.
         if np.isfinite(two).all() and abs(two[0] - two[1]).max() < 1e-3 * size:

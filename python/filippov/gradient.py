@@ -68,12 +68,12 @@ def gradient(
     params : dict, optional
         Values of parameters; the others have their defaults.
     terminal, running : callable, optional
-        ``cost(t, y, **params) -> float``; each takes the parameters that it names. What they branch or jump on
-        is located as in the system.
+        ``cost(t, y, **params) -> float``; each takes the parameters that it names. What they branch or jump
+        on is located as in the system.
     instants : sequence of (when, callable), optional
-        ``cost(t, y, **params)`` at each instant of `when`: a time or an array of times, an `Event` or a function
-        ``g(t, y)`` (at its zeros), or the name of a surface (at the switches that it brings about). The state
-        is that before the instant.
+        ``cost(t, y, **params)`` at each instant of `when`: a time or an array of times, an `Event` or a
+        function ``g(t, y)`` (at its zeros), or the name of a surface (at the switches that it brings about).
+        The state is that before the instant.
     wrt : str or sequence of str, optional
         As for `solve_ivp`: ``"y0"``, ``"t0"``, names of parameters, ``"params"`` (default), ``"all"``.
     events : optional
@@ -85,8 +85,8 @@ def gradient(
     -------
     value : float
     gradient : dict of str to float
-        By the names of `wrt`. NaN, with a warning that says where, if the run passes an instant at which it has
-        no derivative.
+        By the names of `wrt`. NaN, with a warning that says where, if the run passes an instant at which it
+        has no derivative.
 
     Raises
     ------
@@ -97,8 +97,8 @@ def gradient(
 
     References
     ----------
-    Cao, Li, Petzold, Serban, SIAM J. Sci. Comput. 24 (2003) 1076 (adjoint equations); Mueller, Chaos, Solitons &
-    Fractals 5 (1995) 1671 (saltation matrices, whose transposes are used).
+    Cao, Li, Petzold, Serban, SIAM J. Sci. Comput. 24 (2003) 1076 (adjoint equations); Mueller, Chaos,
+    Solitons & Fractals 5 (1995) 1671 (saltation matrices, whose transposes are used).
 
     Examples
     --------
@@ -134,26 +134,26 @@ def gradient(
     if not sol.success:
         raise FilippovError(sol.message, partial=sol)
 
-    cost = _Sum(sol, values, n)
+    total = _Sum(sol, values, n)
     if final is not None:
         ends = (watched[k].g for k in range(len(own)) if _has_ended(sol, k))
-        cost.add_at_end("terminal", final, next(ends, None))
+        total.add_at_end("terminal", final, next(ends, None))
     place = len(own)
     for part in parts:
         if part.event is not None:
-            for t in sol.t_events[place]:
-                cost.add(part.name, part.cost, float(t), zero=watched[place].g)
+            for t in (sol.t_events or [])[place]:
+                total.add(part.name, part.cost, float(t), zero=watched[place].g)
             place += 1
         elif part.surface is not None:
-            cost.add_at_surface(part.name, part.cost, part.surface)
+            total.add_at_surface(part.name, part.cost, part.surface)
         else:
             for t in part.times:
-                cost.add(part.name, part.cost, float(t))
-    found, lost = cost.gradient()
+                total.add(part.name, part.cost, float(t))
+    found, lost = total.gradient()
     if lost is not None:
         warn_user([f"the gradient is NaN: the run has no derivative at t = {lost[0]:.6g} ({lost[1]})"])
     entries = zip(sol.wrt, found.tolist(), strict=True)
-    return cost.value, {name: entry for name, entry in entries if name != _RUNNING}
+    return total.value, {name: entry for name, entry in entries if name != _RUNNING}
 
 
 class _Part(NamedTuple):
@@ -202,7 +202,8 @@ def _checked(
 
 def _has_ended(sol: Solution, k: int) -> bool:
     """Return whether the run ended at an event of this number."""
-    return sol.status == 1 and len(sol.t_events[k]) > 0 and sol.t_events[k][-1] == sol.t[-1]
+    times = (sol.t_events or [])[k]
+    return sol.status == 1 and len(times) > 0 and bool(times[-1] == sol.t[-1])
 
 
 def _named(function: Cost, params: Mapping[str, Any]) -> dict[str, Any]:

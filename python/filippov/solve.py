@@ -260,7 +260,9 @@ def solve_prepared(
                 solution = _present(
                     run, system, prepared, call.options, t0, call.states, False, None, (), wanted
                 )
-                warns = run.n_warnings or prepared.warnings or (wanted is not None and run.warns_of_derivatives)
+                warns = (
+                    run.n_warnings or prepared.warnings or (wanted is not None and run.warns_of_derivatives)
+                )
                 return _shown(solution) if warns else solution
     solution = _solve(system, t_span, y0, _changed(options), None, (), params, None, None)
     if key is not None and call is None and len(system._calls) < _MOST_CALLS:

@@ -59,8 +59,8 @@ class InstantDerivative(NamedTuple):
         Why derivatives are not known from here on, empty if they are: ``"grazing"``, ``"one-sided"``,
         ``"accumulation"``, ``"unsupported"`` (sliding of higher order, rest) or ``"not_finite"``.
     sides : tuple of OneSided
-        Where the derivative has sides: for several surfaces that are reached at once one for every order, for a
-        motion that touches a surface the one that misses it and the one that stays on it for a while.
+        Where the derivative has sides: for several surfaces that are reached at once one for every order, for
+        a motion that touches a surface the one that misses it and the one that stays on it for a while.
     square_root : ndarray, shape (n,), or None
         At an impact without speed: the state behind differs from the undisturbed motion by this times the
         square root of the depth that the undisturbed motion would reach.
@@ -78,9 +78,9 @@ class InstantDerivative(NamedTuple):
     @classmethod
     def from_row(cls, row: tuple[Any, ...]) -> InstantDerivative:
         """Return what a row of the core says."""
-        *own, sides, square_root = row
-        by_side = (OneSided(tuple(order), states, params) for order, states, params in sides)
-        return cls(*own, tuple(by_side), square_root)
+        t, dt, saltation, params, condition, lost, sides, square_root = row
+        by_side = (OneSided(tuple(order), states, own) for order, states, own in sides)
+        return cls(t, dt, saltation, params, condition, lost, tuple(by_side), square_root)
 
 
 class Switch(NamedTuple):

@@ -138,6 +138,9 @@ fn column(kind: u8, place: usize) -> Column {
     }
 }
 
+/// The time at which there is no derivative, and why.
+pub type LostAt = (f64, &'static str);
+
 /// What a run computed, and its actions.
 type RunOf<'r> = (&'r Solution, &'r filippov::action::Actions<'r>);
 
@@ -237,7 +240,7 @@ impl RunDerivatives {
         system: &filippov::TracedSystem,
         (solution, actions): RunOf<'_>,
         terms: &[TermRow<'_>],
-    ) -> PyResult<(Vec<f64>, Option<(f64, &'static str)>)> {
+    ) -> PyResult<(Vec<f64>, Option<LostAt>)> {
         let wrong = |e: Error| PyValueError::new_err(e.to_string());
         let trail = self.trail.as_ref();
         let trail = trail.ok_or_else(|| PyValueError::new_err("the run has no trail"))?;

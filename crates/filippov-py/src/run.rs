@@ -14,7 +14,7 @@ use pyo3::types::{PyDict, PyTuple};
 use crate::callbacks::{Signal, TracedEvent};
 use crate::conversion::columns;
 use crate::decisions::record_as_pair;
-use crate::derivatives::{InstantRow, RunDerivatives, TermRow};
+use crate::derivatives::{InstantRow, LostAt, RunDerivatives, TermRow};
 use crate::prepared_run::PreparedRun;
 use crate::systems::{raised, CoreSystem, TracedSystem};
 
@@ -567,7 +567,7 @@ impl Run {
         &self,
         py: Python<'py>,
         terms: Vec<TermRow<'py>>,
-    ) -> PyResult<(Vector<'py>, Option<(f64, &'static str)>)> {
+    ) -> PyResult<(Vector<'py>, Option<LostAt>)> {
         let (Some(derivatives), Some(system)) = (&self.derivatives, self.prepared.traced()) else {
             return Err(PyValueError::new_err("the run has no derivatives"));
         };
@@ -625,7 +625,7 @@ impl Run {
     }
 
     /// The time at which derivatives end, and why.
-    fn derivatives_lost(&self) -> Option<(f64, &'static str)> {
+    fn derivatives_lost(&self) -> Option<LostAt> {
         self.derivatives.as_ref()?.lost()
     }
 

@@ -7,15 +7,17 @@
 
 use super::between::EventGradient;
 use super::extended::{Column, Extended};
+use super::forms::add;
 use super::instant::{entered, Instant, Passage, Weights};
 use super::limit::{is_like, Shares};
-use super::piece::{dot, Piece, Surroundings};
+use super::piece::{Piece, Surroundings};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::SmoothField;
 use crate::options::Options;
 use crate::record::{InstantRecord, KeptInstant, ObservedStep, Observer, Side, Solution};
 use crate::system::{Actions, TracedSystem};
+use crate::vectors::dot;
 
 /// The instants of a run and the times of its steps, for the way back. An observer.
 #[derive(Clone, Debug, Default)]
@@ -356,7 +358,7 @@ impl<'w> Walk<'w> {
                 Err(lost) => return Ok(Some(lost.name())),
             }
         } else {
-            match instant.passage(&weights, &mut 0.0)? {
+            match instant.through(&weights, &mut 0.0)? {
                 Ok(Passage { time, changes, .. }) => {
                     let changes = changes.iter().rev();
                     changes.for_each(|change| change.pull_back(n, &mut self.w));
@@ -408,9 +410,4 @@ impl<'w> Walk<'w> {
         let all = [number, number - round, number - 2 * round];
         Shares::of(all, all.map(of), &self.w[..record.x[1].len()])
     }
-}
-
-fn add(to: &mut [f64], factor: f64, row: &[f64]) {
-    let entries = to.iter_mut().zip(row);
-    entries.for_each(|(entry, value)| *entry += factor * value);
 }

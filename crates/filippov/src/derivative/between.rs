@@ -1,14 +1,15 @@
 //! The derivatives of a run at any of its times, and of the zeros of functions along it.
 
 use super::extended::{extended_system, Column, Extended};
-use super::piece::{dot, Piece, Surroundings};
-use super::second::{pairs, Second};
+use super::forms::{pairs, Second};
+use super::piece::{Piece, Surroundings};
 use super::tangents::Derivatives;
 use crate::error::{Error, FieldError};
 use crate::motion::SmoothField;
 use crate::options::Options;
 use crate::record::{Side, Solution};
 use crate::system::{sides_of, Actions, PiecewiseSystem, Rules, Setting, TracedSystem};
+use crate::vectors::dot;
 
 /// A run with its derivatives.
 pub struct Differentiated<'r> {

@@ -6,7 +6,7 @@ use filippov_expr::{Backend, ExprError, Names, NodeId, Program};
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 
-use super::second::{Form, MapAt};
+use super::forms::{Form, MapAt};
 use super::series::ChangeSeries;
 use crate::error::{Error, FieldError};
 use crate::system::{

@@ -2,12 +2,13 @@
 
 use super::change::Change;
 use super::instant::{entered, Instant};
-use super::piece::{dot, Piece};
+use super::piece::Piece;
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::{Guard, SmoothField};
 use crate::system::LieDerivatives;
 use crate::tolerances::AT_SIDE;
+use crate::vectors::dot;
 
 /// So many surfaces at one instant have all their orders looked at.
 const MOST_AT_ONCE: usize = 3;

@@ -8,8 +8,8 @@ use smallvec::SmallVec;
 use super::change::Change;
 use super::collocation::{operations, Collocation};
 use super::extended::Extended;
+use super::forms::{pairs, Second};
 use super::radau::NODES;
-use super::second::{pairs, Second};
 use super::series::{ChangeSeries, Coefficients};
 use crate::cube::{Matrix, Vector};
 use crate::error::FieldError;
@@ -23,6 +23,7 @@ use crate::system::{
     Setting, SignStructure, TracedSystem,
 };
 use crate::tolerances::{EPS, ROUNDING};
+use crate::vectors::dot;
 
 /// Series that allow less than this share of a step are not used where there is another way; where there is none, less than that.
 const SHORTEST: f64 = 0.25;
@@ -562,9 +563,4 @@ fn fastest(rows: &SparseRows, n: usize) -> f64 {
         most = most.max(product.iter().map(|v| v.abs()).sum());
     }
     most.sqrt()
-}
-
-/// The product of as many entries as both have.
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

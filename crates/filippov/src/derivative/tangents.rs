@@ -1,16 +1,19 @@
 //! The derivatives of a run, as its observer.
 
 use super::extended::{Column, Extended};
-use super::instant::{entered, Instant, InstantDerivative, Lost, Weights};
+use super::forms::{pairs, Second};
+use super::instant::{entered, Instant, Lost, Weights};
 use super::limit::{at_its_time, History, Past};
-use super::piece::{dot, Piece, Surroundings};
-use super::second::{at_start, pairs, Second};
+use super::passing::InstantDerivative;
+use super::piece::{Piece, Surroundings};
+use super::second::at_start;
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::SmoothField;
 use crate::options::Options;
 use crate::record::{InstantRecord, ObservedStep, Observer};
 use crate::system::Actions;
+use crate::vectors::dot;
 
 /// So many motions are kept, in case that they come again.
 const MOST_PIECES: usize = 16;
@@ -75,7 +78,8 @@ pub struct Tangents<'a> {
     has_second: bool,
     /// The mixed derivatives, as long as they are known.
     second: Option<Second>,
-    /// Motions that were met, the latest last.
+    /// Motions that were met, the latest last. They are moved in and out.
+    #[allow(clippy::vec_box)]
     pieces: Vec<Box<Piece<'a>>>,
     history: History,
     has_started: bool,
@@ -202,8 +206,9 @@ impl<'a> Tangents<'a> {
 
     /// The motion of this mode, to be put back.
     fn take_piece(&mut self, mode: &Mode, q: &[f64]) -> Box<Piece<'a>> {
-        let is_known = |piece: &Box<Piece>| piece.is_of(&self.around, mode, q);
-        match self.pieces.iter().rposition(is_known) {
+        let around = &self.around;
+        let mut known = self.pieces.iter();
+        match known.rposition(|piece| piece.is_of(around, mode, q)) {
             Some(place) => self.pieces.remove(place),
             None => Box::new(Piece::new(&self.around, mode, q)),
         }
