@@ -35,7 +35,7 @@ def is_there() -> bool:
 
 
 def be_counted(calls: Sequence[tuple[Callable[[], Any], int]], counted: int) -> None:
-    """Make calls under callgrind: each so often before, then in two dumps. The first two dumps are of no call."""
+    """Make calls under callgrind: each so often before, then in two dumps. First come two of no call."""
 
     def control(*request: str) -> None:
         command = ["callgrind_control", *request, str(os.getpid())]
