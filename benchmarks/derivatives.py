@@ -2,8 +2,8 @@
 
 Run ``python benchmarks/derivatives.py``; the table also goes into ``README.md`` unless ``--no-write``. Costs
 are instructions of a warmed call, counted by callgrind, Python included; without valgrind they are times.
-Beside them are central differences of runs, two for each column. The runs that a gradient is compared with are
-those of version 0.1.0, whose counts were 618,000 and 19.6 million instructions.
+Beside them are central differences of runs, two for each column. The runs that a gradient is compared with
+are those of version 0.1.0, whose counts were 618,000 and 19.6 million instructions.
 """
 
 from __future__ import annotations
