@@ -239,6 +239,26 @@ def test_a_system_is_needed() -> None:
         fl.gradient(friction, (0, 1), [1.0, 2.0], terminal=lambda t, y: y[0])  # type: ignore[arg-type]
 
 
+def test_a_start_by_names_and_what_has_no_gradient() -> None:
+    def cost(t: float, y: Any) -> Any:
+        return y[0]
+
+    by_names = fl.gradient(OSCILLATOR, (0, 3), {"v": 2.0, "y": 1.0}, terminal=cost, wrt="y0")
+    assert by_names == fl.gradient(OSCILLATOR, (0, 3), [1.0, 2.0], terminal=cost, wrt="y0")
+    with pytest.raises(fl.InputError, match="a run of no length has no gradient"):
+        fl.gradient(OSCILLATOR, (1, 1), [1.0, 2.0], terminal=cost)
+    with pytest.raises(fl.InputError, match="forward in time only"):
+        fl.gradient(OSCILLATOR, (1, 0), [1.0, 2.0], terminal=cost)
+    geared = fl.System(
+        lambda t, x, gear=1: [gear * np.sign(x[0])],
+        n=1,
+        discrete={"gear": 1},
+        resets=fl.Reset(times=[0.5], set={"gear": 2}),
+    )
+    with pytest.raises(fl.InputError, match="no derivatives pass through discrete states, here gear"):
+        fl.gradient(geared, (0, 1), [1.0], running=cost)
+
+
 @pytest.mark.filterwarnings("ignore::filippov.FilippovWarning")
 def test_a_run_that_fails_hands_over_its_part() -> None:
     blows = fl.System(lambda t, x: [x[0] ** 2 + np.sign(x[0])], n=1)

@@ -24,6 +24,7 @@ from filippov.events import (
     selective,
 )
 from filippov.forms import Source
+from filippov.options import check_t_span, check_y0
 from filippov.resets import Reset
 from filippov.solution import Solution
 from filippov.system import System
@@ -111,15 +112,16 @@ def gradient(
     (1.0, -2.0)
     """
     own, parts = _checked(system, terminal, running, instants, events, options)
-    if t_span[0] == t_span[1]:
+    t0, t1 = check_t_span(t_span)
+    if t0 == t1:
         raise InputError("t_span: a run of no length has no gradient")
     values = system.parameter_values(params)
-    start = np.atleast_1d(np.asarray(y0, dtype=float))
+    start = check_y0(y0, states=system._states)
     n = len(start)
     costs = [("terminal", terminal), ("running", running), *((part.name, part.cost) for part in parts)]
     for name, cost in costs:
         if cost is not None:
-            check_scalar_function(bind_function(cost, (), values), float(t_span[0]), start, name)
+            check_scalar_function(bind_function(cost, (), values), t0, start, name)
 
     followed, final = system, terminal
     if running is not None:
@@ -130,7 +132,7 @@ def gradient(
             options["atol"] = np.append(options["atol"], np.min(options["atol"]))
     own_parts = (part.event for part in parts if part.event is not None)
     watched = [_of_first(event, n) for event in (*own, *own_parts)]
-    sol = followed.solve(t_span, start, params, events=watched, wrt=Back(wrt), dense_output=True, **options)
+    sol = followed.solve((t0, t1), start, params, events=watched, wrt=Back(wrt), dense_output=True, **options)
     if not sol.success:
         raise FilippovError(sol.message, partial=sol)
 
@@ -188,6 +190,9 @@ def _checked(
     """Return the events and the costs at instants; refuse what is none."""
     if not isinstance(system, System):
         raise InputError(f"system: a filippov.System is needed, not {type(system).__name__}")
+    if system.discrete:
+        names = ", ".join(system.discrete)
+        raise InputError(f"system: no derivatives pass through discrete states, here {names}")
     refused = [name for name in _REFUSED if name in options]
     if refused:
         raise InputError(f"{refused[0]}: it is not an option of a gradient")
