@@ -247,7 +247,7 @@ def test_a_start_by_names_and_what_has_no_gradient() -> None:
     assert by_names == fl.gradient(OSCILLATOR, (0, 3), [1.0, 2.0], terminal=cost, wrt="y0")
     with pytest.raises(fl.InputError, match="a run of no length has no gradient"):
         fl.gradient(OSCILLATOR, (1, 1), [1.0, 2.0], terminal=cost)
-    with pytest.raises(fl.InputError, match="forward in time only"):
+    with pytest.raises(fl.InputError, match="t1 < t0 is refused"):
         fl.gradient(OSCILLATOR, (1, 0), [1.0, 2.0], terminal=cost)
     geared = fl.System(
         lambda t, x, gear=1: [gear * np.sign(x[0])],
