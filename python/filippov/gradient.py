@@ -282,7 +282,7 @@ class _Sum:
         self.value = 0.0
         self._sol, self._values, self._n = sol, values, n
         self._terms: list[tuple[TracedSystem, float | None, int | None, TracedSystem | None]] = []
-        self._traced: dict[Cost, TracedSystem] = {}
+        self._traced: dict[Cost, TracedSystem | str] = {}  # or what kept it from that
 
     def add(self, name: str, cost: Cost, t: float, zero: Cost | None = None) -> None:
         """Add a function at a time, that of a zero of another function if this is given."""
@@ -291,7 +291,8 @@ class _Sum:
             raise InputError(f"{name}: the time {t:g} is not in the run, [{first:g}, {last:g}]")
         self._add_value(cost, t)
         known = None if zero is None else self._trace(name, zero)
-        self._terms.append((self._trace(name, cost), t, None, known))
+        function = self._trace(name, cost, None if zero is not None else t)
+        self._terms.append((function, t, None, known))
 
     def add_at_end(self, name: str, cost: Cost, zero: Cost | None) -> None:
         """Add a function at the end of the run, which is at a zero of another function if this is given."""
@@ -322,12 +323,19 @@ class _Sum:
         y = self._sol.sol(t, side="left")
         self.value += float(cost(t, y, **_named(cost, self._values)))
 
-    def _trace(self, name: str, function: Cost) -> TracedSystem:
-        if function not in self._traced:
-            trace = self._sol._origin.prepared.trace
-            assert trace is not None
-            found = trace_output(trace, selective(function, dict(self._values)))
-            if isinstance(found, str):
-                raise InputError(f"{name}: its derivative is not known: it has {found}")
-            self._traced[function] = found
-        return self._traced[function]
+    def _trace(self, name: str, function: Cost, known_time: float | None = None) -> TracedSystem:
+        """Return a function as an expression. At a known time what it reads of the time is a number."""
+        if isinstance(known := self._traced.get(function), TracedSystem):
+            return known
+        trace = self._sol._origin.prepared.trace
+        assert trace is not None
+        own = selective(function, dict(self._values))
+        found = known or trace_output(trace, own)
+        self._traced[function] = found
+        if isinstance(found, str) and known_time is not None:
+            there = trace_output(trace, lambda t, y, **params: own(known_time, y, **params))
+            if isinstance(there, TracedSystem):
+                return there
+        if isinstance(found, str):
+            raise InputError(f"{name}: its derivative is not known: it has {found}")
+        return found
