@@ -234,6 +234,14 @@ def test_wrong_arguments_are_refused(changed: dict[str, Any], text: str) -> None
         fl.gradient(OSCILLATOR, (0, 20), [1.0, 2.0], **changed)
 
 
+def test_a_start_on_a_surface_is_named() -> None:
+    leaves = fl.System(lambda t, x, a=2.0: [a + np.sign(x[0])], n=1)
+    with pytest.warns(fl.FilippovWarning, match=r"the run starts on x\[0\] = 0"):
+        fl.gradient(leaves, (0, 1), [0.0], terminal=lambda t, y: y[0], wrt="y0")
+    _, found = fl.gradient(leaves, (0, 1), [0.0], terminal=lambda t, y: y[0], wrt="a")
+    assert found["a"] == pytest.approx(1.0, rel=1e-12)
+
+
 def test_a_system_is_needed() -> None:
     with pytest.raises(fl.InputError, match=r"system: a filippov.System is needed, not function"):
         fl.gradient(friction, (0, 1), [1.0, 2.0], terminal=lambda t, y: y[0])  # type: ignore[arg-type]
@@ -262,6 +270,6 @@ def test_a_start_by_names_and_what_has_no_gradient() -> None:
 @pytest.mark.filterwarnings("ignore::filippov.FilippovWarning")
 def test_a_run_that_fails_hands_over_its_part() -> None:
     blows = fl.System(lambda t, x: [x[0] ** 2 + np.sign(x[0])], n=1)
-    with pytest.raises(fl.FilippovError) as raised:
+    with pytest.raises(fl.ModelError) as raised:
         fl.gradient(blows, (0, 5), [1.0], terminal=lambda t, y: y[0], wrt="y0")
     assert 0.5 < raised.value.partial.t[-1] < 1.0

@@ -14,7 +14,7 @@ from filippov._core import Run, TracedSystem
 from filippov.arrays import real_array
 from filippov.caution import warn_user
 from filippov.derivatives import Back
-from filippov.errors import FilippovError, InputError
+from filippov.errors import InputError, ModelError
 from filippov.events import (
     Event,
     accepted_names,
@@ -93,7 +93,7 @@ def gradient(
     ------
     InputError
         If a cost is no function or does not return a number, a name is unknown, or the system is not traced.
-    FilippovError
+    ModelError
         If the run fails; ``partial`` is the part that was computed.
 
     References
@@ -134,7 +134,7 @@ def gradient(
     watched = [_of_first(event, n) for event in (*own, *own_parts)]
     sol = followed.solve((t0, t1), start, params, events=watched, wrt=Back(wrt), dense_output=True, **options)
     if not sol.success:
-        raise FilippovError(sol.message, partial=sol)
+        raise ModelError(sol.message, partial=sol)
 
     total = _Sum(sol, values, n)
     if final is not None:
@@ -151,9 +151,12 @@ def gradient(
         else:
             for t in part.times:
                 total.add(part.name, part.cost, float(t))
-    found, lost = total.gradient()
+    found, lost, starts_on = total.gradient()
     if lost is not None:
         warn_user([f"the gradient is NaN: the run has no derivative at t = {lost[0]:.6g} ({lost[1]})"])
+    if starts_on:
+        names = ", ".join(sol.surfaces[j] for j in starts_on if j < len(sol.surfaces))
+        warn_user([f"the run starts on {names} = 0: the gradient by the start is that of one side"])
     entries = zip(sol.wrt, found.tolist(), strict=True)
     return total.value, {name: entry for name, entry in entries if name != _RUNNING}
 
@@ -312,8 +315,8 @@ class _Sum:
                 self._add_value(cost, switch.t)
         self._terms.append((self._trace(name, cost), None, place, None))
 
-    def gradient(self) -> tuple[Array, tuple[float, str] | None]:
-        """Return the gradient by the columns of the run; and where and why there is none, if so."""
+    def gradient(self) -> tuple[Array, tuple[float, str] | None, list[int]]:
+        """Return the gradient by the columns, where and why there is none, and surfaces it starts on."""
         run = self._sol._run
         assert isinstance(run, Run)
         return run.cost_gradient(self._terms)

@@ -234,13 +234,14 @@ impl RunDerivatives {
         }))
     }
 
-    /// The gradient of a sum of terms, an entry for each column; and where and why there is none, if so.
+    /// The gradient of a sum of terms, an entry for each column; where and why there is none, if so; and the surfaces that
+    /// the run starts on and leaves.
     pub fn gradient(
         &self,
         system: &filippov::TracedSystem,
         (solution, actions): RunOf<'_>,
         terms: &[TermRow<'_>],
-    ) -> PyResult<(Vec<f64>, Option<LostAt>)> {
+    ) -> PyResult<(Vec<f64>, Option<LostAt>, Vec<usize>)> {
         let wrong = |e: Error| PyValueError::new_err(e.to_string());
         let trail = self.trail.as_ref();
         let trail = trail.ok_or_else(|| PyValueError::new_err("the run has no trail"))?;
@@ -272,12 +273,13 @@ impl RunDerivatives {
             solution,
             trail,
             systems: (system, &extended),
+            kinds: &self.kinds,
             options: &self.options,
             span: self.span,
         };
         let found = way.gradient(&terms).map_err(raised)?;
         let entries = self.kinds.iter().map(|&kind| found.by(kind)).collect();
-        Ok((entries, found.lost))
+        Ok((entries, found.lost, found.starts_on))
     }
 
     /// The derivative of the state at the end.

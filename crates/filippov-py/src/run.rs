@@ -567,13 +567,13 @@ impl Run {
         &self,
         py: Python<'py>,
         terms: Vec<TermRow<'py>>,
-    ) -> PyResult<(Vector<'py>, Option<LostAt>)> {
+    ) -> PyResult<(Vector<'py>, Option<LostAt>, Vec<usize>)> {
         let (Some(derivatives), Some(system)) = (&self.derivatives, self.prepared.traced()) else {
             return Err(PyValueError::new_err("the run has no derivatives"));
         };
         let run = (&*self.solution(), &self.prepared.actions());
-        let (entries, lost) = derivatives.gradient(system, run, &terms)?;
-        Ok((PyArray1::from_vec(py, entries), lost))
+        let (entries, lost, starts_on) = derivatives.gradient(system, run, &terms)?;
+        Ok((PyArray1::from_vec(py, entries), lost, starts_on))
     }
 
     /// The same at the end of the run.

@@ -92,6 +92,8 @@ pub struct CostGradient {
     by_start: f64,
     /// The time of an instant at which there is no derivative: the gradient is NaN.
     pub lost: Option<(f64, &'static str)>,
+    /// Surfaces on which the run starts and that it leaves, where the field jumps: the gradient is that of one side.
+    pub starts_on: Vec<usize>,
 }
 
 impl CostGradient {
@@ -113,6 +115,8 @@ pub struct WayBack<'r> {
     pub trail: &'r Trail,
     /// The system, and its extension by the parameters.
     pub systems: (&'r TracedSystem, &'r Extended<'r>),
+    /// By what the gradient is asked for.
+    pub kinds: &'r [Column],
     /// The options of the run.
     pub options: &'r Options,
     /// The length of its span of time.
@@ -157,6 +161,7 @@ impl WayBack<'_> {
             by_state: walk.w,
             by_start: f64::NAN,
             lost,
+            starts_on: Vec::new(),
         };
         if found.lost.is_some() {
             found.by_state.fill(f64::NAN);
@@ -170,6 +175,17 @@ impl WayBack<'_> {
             piece
                 .field
                 .eval_unprojected(start.t, &mut z.clone(), &mut field)?;
+            let changes = self.kinds.iter().map(|&kind| match kind {
+                Column::State(i) => (0.0, extended.column(kind, &unit(n, i))),
+                Column::Start => (
+                    1.0,
+                    extended.column(kind, &field[..n].iter().map(|f| -f).collect::<Vec<_>>()),
+                ),
+                Column::Parameter(_) => (0.0, extended.column(kind, &vec![0.0; n])),
+            });
+            let changes: Vec<(f64, Vec<f64>)> = changes.collect();
+            let changes: Vec<(f64, &[f64])> = changes.iter().map(|(t, c)| (*t, &c[..])).collect();
+            found.starts_on = piece.left_at_once(start.t, &z, &changes)?;
             if !piece.sliding.is_empty() {
                 let mut whole = [&found.by_state[..], &found.by_parameters].concat();
                 let entry = entered(extended, &piece, &[], (start.t, &z))?;
@@ -410,4 +426,10 @@ impl<'w> Walk<'w> {
         let all = [number, number - round, number - 2 * round];
         Shares::of(all, all.map(of), &self.w[..record.x[1].len()])
     }
+}
+
+fn unit(size: usize, i: usize) -> Vec<f64> {
+    let mut unit = vec![0.0; size];
+    unit[i] = 1.0;
+    unit
 }
