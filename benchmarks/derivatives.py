@@ -120,6 +120,7 @@ def main() -> None:
                 f"transient, {columns} columns: {unit} of each beside the run",
                 (cost - run) / columns,
                 COLUMN,
+                unit="",
                 detail=f"the run {run:.3g}; {(cost - run) / (2 * columns * run):.2f} of central differences",
             )
         )
