@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from typing import Any, NamedTuple
 
 from filippov._core import TracedSystem
@@ -10,8 +10,9 @@ from filippov.errors import InputError
 from filippov.prepare import Prepared
 from filippov.unknown import did_you_mean
 
-__all__ = ["Back", "Wanted", "check_wrt", "refuse_without_derivatives"]
+__all__ = ["FORWARD_ONLY", "Back", "Wanted", "check_wrt", "refuse_without_derivatives"]
 
+FORWARD_ONLY = "wrt: derivatives are followed forward in time only"
 _STATE, _START, _PARAMETER = 0, 1, 2
 
 
@@ -52,9 +53,7 @@ class Back(NamedTuple):
     wrt: Any
 
 
-def check_wrt(
-    wrt: Any, states: Sequence[str], params: Mapping[str, float], discrete: Collection[str]
-) -> Wanted:
+def check_wrt(wrt: Any, states: Sequence[str], params: Collection[str], discrete: Collection[str]) -> Wanted:
     """Return by what is differentiated.
 
     Parameters
@@ -64,8 +63,8 @@ def check_wrt(
         (both).
     states : sequence of str
         Names of the states.
-    params : mapping of str to float
-        The parameters of the system, its discrete states among them.
+    params : collection of str
+        Names of the parameters of the system in their order, its discrete states among them.
     discrete : collection of str
         Those that are discrete states.
 
@@ -133,4 +132,4 @@ def refuse_without_derivatives(
     if discrete:
         raise InputError(f"wrt: no derivatives pass through discrete states, here {', '.join(discrete)}")
     if t_span[1] < t_span[0]:
-        raise InputError("wrt: derivatives are followed forward in time only")
+        raise InputError(FORWARD_ONLY)

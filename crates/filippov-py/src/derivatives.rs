@@ -11,7 +11,7 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::systems::raised;
+use crate::systems::{raised, refused};
 
 /// The columns, each a kind (0: a component of the initial state, 1: the initial time, 2: a parameter) with a place; the parameters by
 /// which is differentiated; and whether the run is kept for gradients of costs, instead of derivatives that are followed.
@@ -113,6 +113,16 @@ impl From<FieldError> for Failure {
     }
 }
 
+impl From<Failure> for PyErr {
+    fn from(failure: Failure) -> Self {
+        match failure {
+            Failure::Refused(error) => refused(error),
+            Failure::Raised(error) => raised(error),
+            Failure::CalledMap => PyValueError::new_err("wrt: the map of a reset is not traced"),
+        }
+    }
+}
+
 fn unknown(t: f64) -> PyErr {
     PyValueError::new_err(format!("t = {t} has no derivative here"))
 }
@@ -129,7 +139,7 @@ fn column(kind: u8, place: usize) -> Column {
 type RunOf<'r> = (&'r Solution, &'r filippov::action::Actions<'r>);
 
 impl RunDerivatives {
-    /// The derivative of the state at these times, n rows of one entry per column for each.
+    /// The derivative of the state at these times, n rows of one entry per column for each; NaN if the run took no step.
     pub fn at<'py>(
         &self,
         py: Python<'py>,
@@ -137,11 +147,15 @@ impl RunDerivatives {
         (solution, actions): RunOf<'_>,
         (times, side): (&[f64], Side),
     ) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
+        let n = solution.n_states;
+        if self.found.t.is_empty() {
+            return Ok(times.iter().map(|_| self.not_known(py, n)).collect());
+        }
         self.with(system, (solution, actions), |run| {
             let at = |&t: &f64| {
                 let values = run.at(t, side).map_err(raised)?;
                 let values = values.ok_or_else(|| unknown(t))?;
-                Ok(transposed(py, &values, self.kinds.len(), solution.n_states))
+                Ok(transposed(py, &values, self.kinds.len(), n))
             };
             times.iter().map(at).collect()
         })
@@ -232,11 +246,18 @@ impl RunDerivatives {
         Ok((entries, found.lost))
     }
 
-    /// The derivative of the state at the end.
+    /// The derivative of the state at the end; NaN if the run took no step.
     pub fn at_end<'py>(&self, py: Python<'py>, n: usize) -> Bound<'py, PyArray2<f64>> {
         let size = n * self.kinds.len();
-        let last = self.found.values.len().saturating_sub(size);
-        transposed(py, &self.found.values[last..], self.kinds.len(), n)
+        match self.found.values.len().checked_sub(size) {
+            Some(last) => transposed(py, &self.found.values[last..], self.kinds.len(), n),
+            None => self.not_known(py, n),
+        }
+    }
+
+    fn not_known<'py>(&self, py: Python<'py>, n: usize) -> Bound<'py, PyArray2<f64>> {
+        let k = self.kinds.len();
+        transposed(py, &vec![f64::NAN; n * k], k, n)
     }
 
     /// The surfaces on which the run starts and that it leaves.
