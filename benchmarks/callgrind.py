@@ -35,7 +35,7 @@ def is_there() -> bool:
 
 
 def be_counted(calls: Sequence[tuple[Callable[[], Any], int]], counted: int) -> None:
-    """Make calls under callgrind, each so often before and `counted` times in two dumps; first two of no call."""
+    """Make calls under callgrind: each so often before, then in two dumps. First come two of no call."""
 
     def control(*request: str) -> None:
         command = ["callgrind_control", *request, str(os.getpid())]
@@ -63,7 +63,7 @@ def be_counted(calls: Sequence[tuple[Callable[[], Any], int]], counted: int) -> 
 
 
 def count(script: str, arguments: Sequence[str], names: Sequence[str], counted: int) -> dict[str, Counted]:
-    """Return what callgrind counts of the calls that a script makes when it is started with these arguments."""
+    """Return what callgrind counts of the calls that a script makes, started with these arguments."""
     with tempfile.TemporaryDirectory() as folder:
         command = ["valgrind", "--tool=callgrind", "--instr-atstart=no", f"--callgrind-out-file={folder}/out"]
         command += [sys.executable, script, *arguments]

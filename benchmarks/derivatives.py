@@ -1,9 +1,9 @@
 """What derivatives cost: a column of the dry-friction transient, and a gradient by a hundred parameters.
 
-Run ``python benchmarks/derivatives.py``; the table also goes into ``README.md`` unless ``--no-write``. Costs are
-instructions of a warmed call, counted by callgrind, Python included; without valgrind they are times. Beside
-them are central differences of runs, two for each column. The runs that a gradient is compared with are those
-of version 0.1.0, whose counts were 618,000 and 19.6 million instructions.
+Run ``python benchmarks/derivatives.py``; the table also goes into ``README.md`` unless ``--no-write``. Costs
+are instructions of a warmed call, counted by callgrind, Python included; without valgrind they are times.
+Beside them are central differences of runs, two for each column. The runs that a gradient is compared with
+are those of version 0.1.0, whose counts were 618,000 and 19.6 million instructions.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def transient() -> dict[str, Callable[[], Any]]:
 
 
 def chain_of_parameters() -> dict[str, Callable[[], Any]]:
-    """Return a run of a chain of masses with friction that has a hundred parameters, and its gradient by them.
+    """Return a run of a chain of masses with friction by a hundred parameters, and its gradient by them.
 
     Each mass has its own mass, friction, stiffness and damping, and six coefficients of its forcing.
     """
@@ -120,6 +120,7 @@ def main() -> None:
                 f"transient, {columns} columns: {unit} of each beside the run",
                 (cost - run) / columns,
                 COLUMN,
+                unit="",
                 detail=f"the run {run:.3g}; {(cost - run) / (2 * columns * run):.2f} of central differences",
             )
         )

@@ -281,6 +281,69 @@ def test_where_derivatives_end_is_named() -> None:
     assert sol.switches[0].derivative.lost == "grazing"
 
 
+@pytest.mark.filterwarnings("ignore:no_derivative:filippov.FilippovWarning")
+def test_several_surfaces_at_once_have_a_matrix_for_every_order() -> None:
+    def relays(t: float, x: Any, k: float = 0.7) -> list[Any]:
+        a, b = np.sign(x[0]), np.sign(x[1])
+        return [1.0, 1.0, k * a * b + a]
+
+    sol = fl.System(relays, n=3).solve((0, 2), [-1, -1, 0.0], wrt="y0")
+    found = sol.switches[0].derivative
+    assert found is not None
+    assert found.lost == "one-sided"
+    by_order = {side.order: side.saltation[2] for side in found.sides}
+    # -k + ... : the third rate is k - 1 before, 1 - k or -1 - k between, and 1 + k behind.
+    np.testing.assert_allclose(by_order[0, 1], [0.6, 1.4, 1.0], atol=1e-12)
+    np.testing.assert_allclose(by_order[1, 0], [3.4, -1.4, 1.0], atol=1e-12)
+    # A start that reaches surface 0 first, and one that reaches surface 1 first.
+    for d, order in ((np.array([1e-6, 0, 0]), (0, 1)), (np.array([0, 1e-6, 0]), (1, 0))):
+        moved = fl.System(relays, n=3).solve((0, 2), np.array([-1, -1, 0.0]) + d).y[2, -1] - sol.y[2, -1]
+        assert moved == pytest.approx(by_order[order] @ d, rel=1e-6)
+
+
+def test_surfaces_at_once_that_have_nothing_to_do_with_one_another() -> None:
+    system = fl.System(lambda t, x: [2 + np.sign(x[0]), 3 - np.sign(x[1])], n=2)
+    sol = system.solve((0, 2), [-1, -4], wrt="y0")
+    assert len(sol.switches) == 1
+    np.testing.assert_allclose(sol.derivative(), [[3.0, 0.0], [0.0, 0.5]], atol=1e-14)
+
+
+def test_a_kink_that_is_touched_changes_nothing() -> None:
+    sol = fl.System(lambda t, x: [1.0, 2 * (x[0] - 1), abs(x[1])], n=3).solve((0, 2), [0, 1.0, 0.0], wrt="y0")
+    assert [switch.kind for switch in sol.switches] == ["grazing"]
+    np.testing.assert_allclose(sol.derivative(), [[1, 0, 0], [4, 1, 0], [4, 2, 1]], atol=1e-12)
+
+
+@pytest.mark.filterwarnings("ignore:no_derivative:filippov.FilippovWarning")
+def test_a_surface_that_is_touched_has_two_sides() -> None:
+    def touching(t: float, x: Any) -> list[Any]:
+        return [1.0, np.where(x[1] > 0, 2 * (x[0] - 1), 5.0), np.where(x[1] > 0, 0.0, 1.0)]
+
+    sol = fl.System(touching, n=3).solve((0, 2), [0, 1.0, 0.0], wrt="y0")
+    found = sol.switches[0].derivative
+    assert found is not None
+    assert (found.lost, [side.order for side in found.sides]) == ("grazing", [(), (0,)])
+    missed, reached = (side.saltation for side in found.sides)
+    np.testing.assert_array_equal(missed, np.eye(3))
+    # Along the jump (5, 1) of the two last rates.
+    np.testing.assert_allclose(reached, [[1, 0, 0], [0, 0, 0], [0, -0.2, 1]], atol=1e-12)
+
+
+@pytest.mark.filterwarnings("ignore:no_derivative:filippov.FilippovWarning")
+def test_an_impact_without_speed_has_a_square_root() -> None:
+    wall = fl.Reset(lambda t, x: x[0], lambda t, x: [x[0], -0.8 * x[1]], direction="down")
+    system = fl.System(lambda t, x: [x[1], 2.0], n=2, resets=wall)
+    found = system.solve((0, 2), [1.0, -2.0], wrt="y0").switches[0].derivative
+    assert found is not None
+    assert found.lost == "grazing"
+    # (1 + r) sqrt(2 b), K5: 1.8 * sqrt(2 * 2).
+    np.testing.assert_allclose(found.square_root, [0.0, 3.6], atol=1e-12)
+    depth = 1e-8
+    hit = system.solve((0, 1.5), [1.0 - depth, -2.0], rtol=1e-12, atol=1e-14)
+    missed = np.array([1.0 - depth - 2 * 1.5 + 1.5**2, -2 + 2 * 1.5])
+    assert hit.y[1, -1] - missed[1] == pytest.approx(3.6 * np.sqrt(depth), rel=1e-3)
+
+
 def test_start_on_a_surface_is_named() -> None:
     with pytest.warns(fl.FilippovWarning, match=r"one_sided: the run starts on x\[0\] = 0"):
         fl.solve_ivp(lambda t, x: [2.0 + np.sign(x[0])], (0, 2), [0.0], wrt="y0")

@@ -174,3 +174,15 @@ def test_what_is_asked_for_in_vain() -> None:
         runs.derivative(0.5, side="up")
     with pytest.raises(ValueError, match="t: a number or a one-dimensional array"):
         runs.derivative([[0.5]])
+
+
+def test_second_derivatives_of_ensembles_are_refused() -> None:
+    system = fl.System(lambda t, x, a=1.0: [a * np.sign(x[0])], n=1)
+    with pytest.raises(fl.InputError, match="order: the derivatives of ensembles are of order 1"):
+        system.ensemble((0, 1), [[1.0], [2.0]], wrt="a", order=2)
+
+
+def test_second_derivatives_with_the_last_state_alone() -> None:
+    system = fl.System(lambda t, x, a=1.0: [a * x[0]], n=1)
+    sol = system.solve((0, 1), [1.0], wrt="a", order=2, keep="last", rtol=1e-11, atol=1e-11)
+    np.testing.assert_allclose(sol.derivative(order=2), [[[np.e]]], rtol=1e-9)

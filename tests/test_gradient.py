@@ -5,7 +5,6 @@ Reference: Cao, Li, Petzold, Serban, SIAM J. Sci. Comput. 24 (2003) 1076.
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import filippov as fl
@@ -75,7 +74,7 @@ def test_a_cost_that_ends_at_an_event() -> None:
     assert value == pytest.approx(1 / 0.7, rel=1e-12)
     assert found["p"] == pytest.approx(-1 / 0.7**2, rel=1e-12)
     assert found["x[0]"] == pytest.approx(-1 / 0.7, rel=1e-12)
-    # The event may depend on a parameter, and the cost be an integral up to it: p / 2 T^2 with T = (1 + a) / p.
+    # The event may depend on a parameter, and the cost be an integral to it: p / 2 T^2, T = (1 + a) / p.
     sloped = fl.System(lambda t, x, p=0.7, a=0.5: [p + 0 * a], n=1)
     reached = fl.Event(lambda t, y, a: y[0] - 1 - a, terminal=True)
     value, found = fl.gradient(
@@ -114,7 +113,7 @@ def test_costs_at_known_times_at_events_and_at_switches() -> None:
 
 
 def test_an_impact_on_a_wall() -> None:
-    # Falls from rest at height x0 above the wall w, hits at T = sqrt(2 (x0 - w) / g), and goes on with r times the speed.
+    # Falls from rest at x0, hits the wall w at sqrt(2 (x0 - w) / g), and goes on with r times the speed.
     wall = fl.System(
         lambda t, x, g=9.81, r=0.8, w=0.2: [x[1], -g],
         n=2,
@@ -134,7 +133,7 @@ def test_an_impact_on_a_wall() -> None:
 
 
 def test_impacts_that_accumulate() -> None:
-    # The whole path of a ball that comes to rest, and what its integral is worth: closed form by a geometric series.
+    # The integral of the height of a ball that comes to rest: a geometric series.
     ball = fl.System(
         lambda t, x, g=9.81, r=0.6: [x[1], -g],
         n=2,
@@ -235,14 +234,42 @@ def test_wrong_arguments_are_refused(changed: dict[str, Any], text: str) -> None
         fl.gradient(OSCILLATOR, (0, 20), [1.0, 2.0], **changed)
 
 
+def test_a_start_on_a_surface_is_named() -> None:
+    leaves = fl.System(lambda t, x, a=2.0: [a + np.sign(x[0])], n=1)
+    with pytest.warns(fl.FilippovWarning, match=r"the run starts on x\[0\] = 0"):
+        fl.gradient(leaves, (0, 1), [0.0], terminal=lambda t, y: y[0], wrt="y0")
+    _, found = fl.gradient(leaves, (0, 1), [0.0], terminal=lambda t, y: y[0], wrt="a")
+    assert found["a"] == pytest.approx(1.0, rel=1e-12)
+
+
 def test_a_system_is_needed() -> None:
     with pytest.raises(fl.InputError, match=r"system: a filippov.System is needed, not function"):
         fl.gradient(friction, (0, 1), [1.0, 2.0], terminal=lambda t, y: y[0])  # type: ignore[arg-type]
 
 
+def test_a_start_by_names_and_what_has_no_gradient() -> None:
+    def cost(t: float, y: Any) -> Any:
+        return y[0]
+
+    by_names = fl.gradient(OSCILLATOR, (0, 3), {"v": 2.0, "y": 1.0}, terminal=cost, wrt="y0")
+    assert by_names == fl.gradient(OSCILLATOR, (0, 3), [1.0, 2.0], terminal=cost, wrt="y0")
+    with pytest.raises(fl.InputError, match="a run of no length has no gradient"):
+        fl.gradient(OSCILLATOR, (1, 1), [1.0, 2.0], terminal=cost)
+    with pytest.raises(fl.InputError, match="t1 < t0 is refused"):
+        fl.gradient(OSCILLATOR, (1, 0), [1.0, 2.0], terminal=cost)
+    geared = fl.System(
+        lambda t, x, gear=1: [gear * np.sign(x[0])],
+        n=1,
+        discrete={"gear": 1},
+        resets=fl.Reset(times=[0.5], set={"gear": 2}),
+    )
+    with pytest.raises(fl.InputError, match="no derivatives pass through discrete states, here gear"):
+        fl.gradient(geared, (0, 1), [1.0], running=cost)
+
+
+@pytest.mark.filterwarnings("ignore::filippov.FilippovWarning")
 def test_a_run_that_fails_hands_over_its_part() -> None:
     blows = fl.System(lambda t, x: [x[0] ** 2 + np.sign(x[0])], n=1)
-    with pytest.raises(fl.FilippovError) as raised, warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+    with pytest.raises(fl.ModelError) as raised:
         fl.gradient(blows, (0, 5), [1.0], terminal=lambda t, y: y[0], wrt="y0")
     assert 0.5 < raised.value.partial.t[-1] < 1.0

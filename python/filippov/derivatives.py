@@ -27,18 +27,18 @@ class Wanted(NamedTuple):
         Each column as the core takes it: a kind, and a place.
     parameters : list of int
         The places of the parameters among all of the system.
-    goes_back : bool
-        Whether the run is kept for gradients of costs, instead of derivatives that are followed forward.
+    order : int
+        The order of the derivatives; 0 for a run that is kept for gradients of costs.
     """
 
     names: tuple[str, ...]
     columns: list[tuple[int, int]]
     parameters: list[int]
-    goes_back: bool = False
+    order: int = 1
 
-    def for_core(self) -> tuple[list[tuple[int, int]], list[int], bool]:
+    def for_core(self) -> tuple[list[tuple[int, int]], list[int], int]:
         """Return what the core takes."""
-        return self.columns, self.parameters, self.goes_back
+        return self.columns, self.parameters, self.order
 
 
 class Back(NamedTuple):
@@ -53,7 +53,13 @@ class Back(NamedTuple):
     wrt: Any
 
 
-def check_wrt(wrt: Any, states: Sequence[str], params: Collection[str], discrete: Collection[str]) -> Wanted:
+def check_wrt(
+    wrt: Any,
+    states: Sequence[str],
+    params: Collection[str],
+    discrete: Collection[str],
+    order: Any = 1,
+) -> Wanted:
     """Return by what is differentiated.
 
     Parameters
@@ -67,14 +73,18 @@ def check_wrt(wrt: Any, states: Sequence[str], params: Collection[str], discrete
         Names of the parameters of the system in their order, its discrete states among them.
     discrete : collection of str
         Those that are discrete states.
+    order : int, optional
+        The order of the derivatives, 1 or 2.
 
     Raises
     ------
     InputError
         If a name is unknown, or nothing is asked for.
     """
+    if order not in (1, 2) or isinstance(order, bool):
+        raise InputError(f"order: derivatives are of order 1 or 2, not {order!r}")
     if isinstance(wrt, Back):
-        return check_wrt(wrt.wrt, states, params, discrete)._replace(goes_back=True)
+        return check_wrt(wrt.wrt, states, params, discrete)._replace(order=0)
     names = [wrt] if isinstance(wrt, str) else wrt
     if not isinstance(names, Sequence) or not names or not all(isinstance(name, str) for name in names):
         raise InputError(
@@ -107,7 +117,7 @@ def check_wrt(wrt: Any, states: Sequence[str], params: Collection[str], discrete
             found[parameter] = (_PARAMETER, place)
     if not found:
         raise InputError(f"wrt: {wrt!r} names nothing: the system has no parameters")
-    return Wanted(tuple(found), list(found.values()), [places[name] for name in asked])
+    return Wanted(tuple(found), list(found.values()), [places[name] for name in asked], int(order))
 
 
 def refuse_without_derivatives(

@@ -228,6 +228,8 @@ def run_ensemble(
     """Run an ensemble; all arguments as in `System.ensemble`."""
     t0, t1 = check_t_span(t_span)
     wrt = options.get("wrt")
+    if options.get("order", 1) != 1:
+        raise InputError("order: the derivatives of ensembles are of order 1")
     if t1 < t0 and wrt is not None:
         raise InputError(FORWARD_ONLY)
     if t1 <= t0:

@@ -14,7 +14,7 @@ from filippov._core import Run, TracedSystem
 from filippov.arrays import real_array
 from filippov.caution import warn_user
 from filippov.derivatives import Back
-from filippov.errors import FilippovError, InputError
+from filippov.errors import InputError, ModelError
 from filippov.events import (
     Event,
     accepted_names,
@@ -24,6 +24,7 @@ from filippov.events import (
     selective,
 )
 from filippov.forms import Source
+from filippov.options import check_t_span, check_y0
 from filippov.resets import Reset
 from filippov.solution import Solution
 from filippov.system import System
@@ -36,7 +37,7 @@ Array = npt.NDArray[np.float64]
 Cost = Callable[..., Any]
 
 _RUNNING = "running cost"
-_REFUSED = ("wrt", "t_eval", "keep", "dense_output", "args", "resets", "surfaces")
+_REFUSED = ("order", "t_eval", "keep", "dense_output", "args", "resets", "surfaces")
 
 
 def gradient(
@@ -68,12 +69,12 @@ def gradient(
     params : dict, optional
         Values of parameters; the others have their defaults.
     terminal, running : callable, optional
-        ``cost(t, y, **params) -> float``; each takes the parameters that it names. What they branch or jump on
-        is located as in the system.
+        ``cost(t, y, **params) -> float``; each takes the parameters that it names. What they branch or jump
+        on is located as in the system.
     instants : sequence of (when, callable), optional
-        ``cost(t, y, **params)`` at each instant of `when`: a time or an array of times, an `Event` or a function
-        ``g(t, y)`` (at its zeros), or the name of a surface (at the switches that it brings about). The state
-        is that before the instant.
+        ``cost(t, y, **params)`` at each instant of `when`: a time or an array of times, an `Event` or a
+        function ``g(t, y)`` (at its zeros), or the name of a surface (at the switches that it brings about).
+        The state is that before the instant.
     wrt : str or sequence of str, optional
         As for `solve_ivp`: ``"y0"``, ``"t0"``, names of parameters, ``"params"`` (default), ``"all"``.
     events : optional
@@ -85,20 +86,20 @@ def gradient(
     -------
     value : float
     gradient : dict of str to float
-        By the names of `wrt`. NaN, with a warning that says where, if the run passes an instant at which it has
-        no derivative.
+        By the names of `wrt`. NaN, with a warning that says where, if the run passes an instant at which it
+        has no derivative.
 
     Raises
     ------
     InputError
         If a cost is no function or does not return a number, a name is unknown, or the system is not traced.
-    FilippovError
+    ModelError
         If the run fails; ``partial`` is the part that was computed.
 
     References
     ----------
-    Cao, Li, Petzold, Serban, SIAM J. Sci. Comput. 24 (2003) 1076 (adjoint equations); Mueller, Chaos, Solitons &
-    Fractals 5 (1995) 1671 (saltation matrices, whose transposes are used).
+    Cao, Li, Petzold, Serban, SIAM J. Sci. Comput. 24 (2003) 1076 (adjoint equations); Mueller, Chaos,
+    Solitons & Fractals 5 (1995) 1671 (saltation matrices, whose transposes are used).
 
     Examples
     --------
@@ -111,15 +112,16 @@ def gradient(
     (1.0, -2.0)
     """
     own, parts = _checked(system, terminal, running, instants, events, options)
-    if t_span[0] == t_span[1]:
+    t0, t1 = check_t_span(t_span)
+    if t0 == t1:
         raise InputError("t_span: a run of no length has no gradient")
     values = system.parameter_values(params)
-    start = np.atleast_1d(np.asarray(y0, dtype=float))
+    start = check_y0(y0, states=system._states)
     n = len(start)
     costs = [("terminal", terminal), ("running", running), *((part.name, part.cost) for part in parts)]
     for name, cost in costs:
         if cost is not None:
-            check_scalar_function(bind_function(cost, (), values), float(t_span[0]), start, name)
+            check_scalar_function(bind_function(cost, (), values), t0, start, name)
 
     followed, final = system, terminal
     if running is not None:
@@ -130,30 +132,33 @@ def gradient(
             options["atol"] = np.append(options["atol"], np.min(options["atol"]))
     own_parts = (part.event for part in parts if part.event is not None)
     watched = [_of_first(event, n) for event in (*own, *own_parts)]
-    sol = followed.solve(t_span, start, params, events=watched, wrt=Back(wrt), dense_output=True, **options)
+    sol = followed.solve((t0, t1), start, params, events=watched, wrt=Back(wrt), dense_output=True, **options)
     if not sol.success:
-        raise FilippovError(sol.message, partial=sol)
+        raise ModelError(sol.message, partial=sol)
 
-    cost = _Sum(sol, values, n)
+    total = _Sum(sol, values, n)
     if final is not None:
         ends = (watched[k].g for k in range(len(own)) if _has_ended(sol, k))
-        cost.add_at_end("terminal", final, next(ends, None))
+        total.add_at_end("terminal", final, next(ends, None))
     place = len(own)
     for part in parts:
         if part.event is not None:
-            for t in sol.t_events[place]:
-                cost.add(part.name, part.cost, float(t), zero=watched[place].g)
+            for t in (sol.t_events or [])[place]:
+                total.add(part.name, part.cost, float(t), zero=watched[place].g)
             place += 1
         elif part.surface is not None:
-            cost.add_at_surface(part.name, part.cost, part.surface)
+            total.add_at_surface(part.name, part.cost, part.surface)
         else:
             for t in part.times:
-                cost.add(part.name, part.cost, float(t))
-    found, lost = cost.gradient()
+                total.add(part.name, part.cost, float(t))
+    found, lost, starts_on = total.gradient()
     if lost is not None:
         warn_user([f"the gradient is NaN: the run has no derivative at t = {lost[0]:.6g} ({lost[1]})"])
+    if starts_on:
+        names = ", ".join(sol.surfaces[j] for j in starts_on if j < len(sol.surfaces))
+        warn_user([f"the run starts on {names} = 0: the gradient by the start is that of one side"])
     entries = zip(sol.wrt, found.tolist(), strict=True)
-    return cost.value, {name: entry for name, entry in entries if name != _RUNNING}
+    return total.value, {name: entry for name, entry in entries if name != _RUNNING}
 
 
 class _Part(NamedTuple):
@@ -188,6 +193,9 @@ def _checked(
     """Return the events and the costs at instants; refuse what is none."""
     if not isinstance(system, System):
         raise InputError(f"system: a filippov.System is needed, not {type(system).__name__}")
+    if system.discrete:
+        names = ", ".join(system.discrete)
+        raise InputError(f"system: no derivatives pass through discrete states, here {names}")
     refused = [name for name in _REFUSED if name in options]
     if refused:
         raise InputError(f"{refused[0]}: it is not an option of a gradient")
@@ -202,7 +210,8 @@ def _checked(
 
 def _has_ended(sol: Solution, k: int) -> bool:
     """Return whether the run ended at an event of this number."""
-    return sol.status == 1 and len(sol.t_events[k]) > 0 and sol.t_events[k][-1] == sol.t[-1]
+    times = (sol.t_events or [])[k]
+    return sol.status == 1 and len(times) > 0 and bool(times[-1] == sol.t[-1])
 
 
 def _named(function: Cost, params: Mapping[str, Any]) -> dict[str, Any]:
@@ -276,7 +285,7 @@ class _Sum:
         self.value = 0.0
         self._sol, self._values, self._n = sol, values, n
         self._terms: list[tuple[TracedSystem, float | None, int | None, TracedSystem | None]] = []
-        self._traced: dict[Cost, TracedSystem] = {}
+        self._traced: dict[Cost, TracedSystem | str] = {}  # or what kept it from that
 
     def add(self, name: str, cost: Cost, t: float, zero: Cost | None = None) -> None:
         """Add a function at a time, that of a zero of another function if this is given."""
@@ -285,7 +294,8 @@ class _Sum:
             raise InputError(f"{name}: the time {t:g} is not in the run, [{first:g}, {last:g}]")
         self._add_value(cost, t)
         known = None if zero is None else self._trace(name, zero)
-        self._terms.append((self._trace(name, cost), t, None, known))
+        function = self._trace(name, cost, None if zero is not None else t)
+        self._terms.append((function, t, None, known))
 
     def add_at_end(self, name: str, cost: Cost, zero: Cost | None) -> None:
         """Add a function at the end of the run, which is at a zero of another function if this is given."""
@@ -305,8 +315,8 @@ class _Sum:
                 self._add_value(cost, switch.t)
         self._terms.append((self._trace(name, cost), None, place, None))
 
-    def gradient(self) -> tuple[Array, tuple[float, str] | None]:
-        """Return the gradient by the columns of the run; and where and why there is none, if so."""
+    def gradient(self) -> tuple[Array, tuple[float, str] | None, list[int]]:
+        """Return the gradient by the columns, where and why there is none, and surfaces it starts on."""
         run = self._sol._run
         assert isinstance(run, Run)
         return run.cost_gradient(self._terms)
@@ -316,12 +326,19 @@ class _Sum:
         y = self._sol.sol(t, side="left")
         self.value += float(cost(t, y, **_named(cost, self._values)))
 
-    def _trace(self, name: str, function: Cost) -> TracedSystem:
-        if function not in self._traced:
-            trace = self._sol._origin.prepared.trace
-            assert trace is not None
-            found = trace_output(trace, selective(function, dict(self._values)))
-            if isinstance(found, str):
-                raise InputError(f"{name}: its derivative is not known: it has {found}")
-            self._traced[function] = found
-        return self._traced[function]
+    def _trace(self, name: str, function: Cost, known_time: float | None = None) -> TracedSystem:
+        """Return a function as an expression. At a known time what it reads of the time is a number."""
+        if isinstance(known := self._traced.get(function), TracedSystem):
+            return known
+        trace = self._sol._origin.prepared.trace
+        assert trace is not None
+        own = selective(function, dict(self._values))
+        found = known or trace_output(trace, own)
+        self._traced[function] = found
+        if isinstance(found, str) and known_time is not None:
+            there = trace_output(trace, lambda t, y, **params: own(known_time, y, **params))
+            if isinstance(there, TracedSystem):
+                return there
+        if isinstance(found, str):
+            raise InputError(f"{name}: its derivative is not known: it has {found}")
+        return found

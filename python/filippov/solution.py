@@ -418,7 +418,7 @@ class Solution:
             found.append(np.array(rows) if len(rows) else unknown)
         return found
 
-    def derivative(self, t: npt.ArrayLike | None = None, side: str = "right") -> Array:
+    def derivative(self, t: npt.ArrayLike | None = None, side: str = "right", order: int = 1) -> Array:
         """Return the derivative of the state by the start and parameters, as asked for with ``wrt=``.
 
         Parameters
@@ -427,10 +427,12 @@ class Solution:
             Times, by default the end of the run.
         side : {"right", "left"}, optional
             Which limit is taken at a switch, where the derivative jumps.
+        order : {1, 2}, optional
+            2 for the second derivatives of a run with ``order=2``.
 
         Returns
         -------
-        ndarray, shape (n, len(wrt)) or (n, len(wrt), k)
+        ndarray, shape (n, len(wrt)) or (n, len(wrt), k); for order 2 (n, len(wrt), len(wrt)) or with k behind
             NaN from an instant on at which there is no derivative; ``sol.switches[i].derivative.lost`` says
             why.
 
@@ -460,15 +462,35 @@ class Solution:
             raise ModelError(NO_DERIVATIVES)
         if side not in ("right", "left"):
             raise ValueError(f'side: "right" or "left" is needed, not {side!r}')
+        if order not in (1, 2):
+            raise ValueError(f"order: derivatives are of order 1 or 2, not {order!r}")
+        wanted = self._origin.wanted
+        if order == 2 and (wanted is None or wanted.order < 2):
+            raise ModelError("no second derivatives were followed: solve with order=2")
         if t is None:
+            if order == 2:
+                return self._as_forms(self._run.second_derivatives(None, False)[0])
             at_end = self._run.derivatives_at_end()
             assert at_end is not None
             return at_end
         times = real_array(t, "t", "a number or a one-dimensional array")
         flat = np.ascontiguousarray(np.atleast_1d(times))
         self._kept_function()._check_range(flat)
-        found = np.stack(self._run.derivatives(flat, side == "left"), axis=-1)
+        left = side == "left"
+        if order == 2:
+            forms = [self._as_forms(pairs) for pairs in self._run.second_derivatives(flat, left)]
+            found = np.stack(forms, axis=-1)
+        else:
+            found = np.stack(self._run.derivatives(flat, left), axis=-1)
         return found if times.ndim else found[..., 0]
+
+    def _as_forms(self, pairs: Array) -> Array:
+        """Return symmetric matrices from the entries (a, b) with b <= a in order, for every state."""
+        k = len(self.wrt)
+        forms = np.empty((len(pairs), k, k))
+        rows, columns = np.tril_indices(k)
+        forms[:, rows, columns] = forms[:, columns, rows] = pairs
+        return forms
 
     @cached_property
     def segments(self) -> SegmentTable:

@@ -67,6 +67,7 @@ def solve_ivp(
     max_wall_time: float | None = None,
     progress: bool | Callable[..., Any] = False,
     wrt: str | Sequence[str] | None = None,
+    order: int = 1,
     **unknown: Any,
 ) -> Solution:
     """Solve an initial value problem of a piecewise-smooth system.
@@ -143,6 +144,8 @@ def solve_ivp(
         By what the solution is differentiated: ``"y0"``, ``"t0"``, names of parameters, ``"params"`` for all
         of these, ``"all"`` for the states and them. `Solution.derivative` and ``sol.switches.dt`` are the
         derivatives. Default: none are followed.
+    order : {1, 2}, optional
+        Up to which order derivatives are followed.
 
     Returns
     -------
@@ -205,6 +208,7 @@ def solve_ivp(
         "max_wall_time": max_wall_time,
         "progress": progress,
         "wrt": wrt,
+        "order": order,
     }
     solution = _solve(fun, t_span, y0, _changed(given), events, args, params, surfaces, resets)
     return _shown(solution)
@@ -256,7 +260,9 @@ def solve_prepared(
                 solution = _present(
                     run, system, prepared, call.options, t0, call.states, False, None, (), wanted
                 )
-                warns = run.n_warnings or prepared.warnings or (wanted is not None and run.warns_of_derivatives)
+                warns = (
+                    run.n_warnings or prepared.warnings or (wanted is not None and run.warns_of_derivatives)
+                )
                 return _shown(solution) if warns else solution
     solution = _solve(system, t_span, y0, _changed(options), None, (), params, None, None)
     if key is not None and call is None and len(system._calls) < _MOST_CALLS:
@@ -269,10 +275,12 @@ def _key_of(options: Mapping[str, Any]) -> Hashable | None:
     if "wrt" not in options:
         return repeatable_key(options)
     others = dict(options)
-    names = others.pop("wrt")
+    names, order = others.pop("wrt"), others.pop("order", 1)
     key = repeatable_key(others)
     is_plain = isinstance(names, (str, list, tuple)) and all(isinstance(name, str) for name in names)
-    return None if key is None or not is_plain else (key, names if isinstance(names, str) else tuple(names))
+    if key is None or not is_plain or type(order) is not int:
+        return None
+    return key, order, names if isinstance(names, str) else tuple(names)
 
 
 def _shown(solution: Solution) -> Solution:
@@ -288,7 +296,7 @@ def _shown(solution: Solution) -> Solution:
 def _keep_call(system: System, key: Hashable, given: Mapping[str, Any], n: int) -> None:
     values = system.parameter_values(None)
     changed = _changed(given)
-    wrt = changed.pop("wrt", None)
+    wrt, order = changed.pop("wrt", None), changed.pop("order", 1)
     options = check_options(changed, (0.0, 1.0), n)
     states = system.state_names(n)
     if options.nonunique != "branch":
@@ -302,7 +310,7 @@ def _keep_call(system: System, key: Hashable, given: Mapping[str, Any], n: int) 
             parameter_vector(values),
             list(prepared.actions),
             states,
-            None if wrt is None else check_wrt(wrt, states, values, system.discrete),
+            None if wrt is None else check_wrt(wrt, states, values, system.discrete, order),
         )
 
 
@@ -327,7 +335,9 @@ def _solve(
     state = check_y0(y0, states=fun._states if isinstance(fun, System) else None)
     n = len(state)
     changed = dict(changed)
-    wrt = changed.pop("wrt", None)
+    wrt, order = changed.pop("wrt", None), changed.pop("order", 1)
+    if wrt is None and order != 1:
+        raise InputError("order: it is that of derivatives, and wrt= is not given")
     options = check_options(changed, (t0, t1), n)
     constants = check_args(args)
     specs = normalise_events(events)
@@ -343,7 +353,7 @@ def _solve(
     states = system.state_names(n)
     wanted = None
     if wrt is not None:
-        wanted = check_wrt(wrt, states, values, system.discrete)
+        wanted = check_wrt(wrt, states, values, system.discrete, order)
         refuse_without_derivatives(prepared, system.discrete, (t0, t1))
 
     def run_of(prepared: Prepared, choices: tuple[Mode, ...]) -> AnyRun:

@@ -21,6 +21,24 @@ _ROWS_SHOWN = 20
 NO_DERIVATIVES = 'no derivatives were followed: give wrt=[...] to the run, names of parameters, "y0" or "t0"'
 
 
+class OneSided(NamedTuple):
+    """The derivative of the state behind an instant for changes to one side.
+
+    Attributes
+    ----------
+    order : tuple of int
+        The surfaces that the changed motion reaches, in this order; empty where it misses the surface.
+    saltation : ndarray, shape (n, n)
+        The saltation matrix.
+    saltation_params : ndarray, shape (n, number of parameters)
+        What the instant adds to the columns of the parameters.
+    """
+
+    order: tuple[int, ...]
+    saltation: Array
+    saltation_params: Array
+
+
 class InstantDerivative(NamedTuple):
     """The derivatives of an instant, in which a motion ends and another one begins.
 
@@ -40,6 +58,12 @@ class InstantDerivative(NamedTuple):
     lost : str
         Why derivatives are not known from here on, empty if they are: ``"grazing"``, ``"one-sided"``,
         ``"accumulation"``, ``"unsupported"`` (sliding of higher order, rest) or ``"not_finite"``.
+    sides : tuple of OneSided
+        Where the derivative has sides: for several surfaces that are reached at once one for every order, for
+        a motion that touches a surface the one that misses it and the one that stays on it for a while.
+    square_root : ndarray, shape (n,), or None
+        At an impact without speed: the state behind differs from the undisturbed motion by this times the
+        square root of the depth that the undisturbed motion would reach.
     """
 
     t: float
@@ -48,6 +72,15 @@ class InstantDerivative(NamedTuple):
     saltation_params: Array
     condition: float
     lost: str
+    sides: tuple[OneSided, ...] = ()
+    square_root: Array | None = None
+
+    @classmethod
+    def from_row(cls, row: tuple[Any, ...]) -> InstantDerivative:
+        """Return what a row of the core says."""
+        t, dt, saltation, params, condition, lost, sides, square_root = row
+        by_side = (OneSided(tuple(order), states, own) for order, states, own in sides)
+        return cls(t, dt, saltation, params, condition, lost, tuple(by_side), square_root)
 
 
 class Switch(NamedTuple):
@@ -516,6 +549,10 @@ def derivative_warnings(run: Run, t0: float, names: Sequence[str]) -> list[RunWa
         t, why = lost
         text = f"derivatives are not known from t = {t:.10g} on: {_WHY_LOST[why]}"
         found.append(RunWarning(t, "no_derivative", text))
+    second = run.second_lost()
+    if second is not None and (lost is None or second < lost[0]):
+        text = f"second derivatives are not known from t = {second:.10g} on"
+        found.append(RunWarning(second, "no_derivative", text))
     return found
 
 
@@ -525,7 +562,7 @@ def at_switches(
     """Return the derivatives of the instants to which switches at these times belong, in their order."""
     at_time: dict[float, list[InstantDerivative]] = {}
     for row in instants:
-        at_time.setdefault(row[0], []).append(InstantDerivative(*row))
+        at_time.setdefault(row[0], []).append(InstantDerivative.from_row(row))
     found: list[InstantDerivative | None] = []
     for t in times:
         known = at_time.get(t)

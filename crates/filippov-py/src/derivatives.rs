@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use filippov::derivative::{
-    Column, Derivatives, Differentiated, DifferentiatedRun, EventGradient, Extension, Tangents,
-    Term, Trail, WayBack, When,
+    Column, Derivatives, Differentiated, DifferentiatedRun, EventGradient, Extension, OneSided,
+    Tangents, Term, Trail, WayBack, When,
 };
 use filippov::{Error, FieldError, Options, Problem, Side, Solution};
 use numpy::{PyArray1, PyArray2};
@@ -14,10 +14,11 @@ use pyo3::prelude::*;
 use crate::systems::{raised, refused};
 
 /// The columns, each a kind (0: a component of the initial state, 1: the initial time, 2: a parameter) with a place; the parameters by
-/// which is differentiated; and whether the run is kept for gradients of costs, instead of derivatives that are followed.
-pub type Wanted = (Vec<(u8, usize)>, Vec<usize>, bool);
+/// which is differentiated; and the order of the derivatives, 0 where the run is kept for gradients of costs instead.
+pub type Wanted = (Vec<(u8, usize)>, Vec<usize>, u8);
 
-/// Time, derivative of the time, saltation matrix, its part by parameters, condition, and why derivatives end there.
+/// Time, derivative of the time, saltation matrix, its part by parameters, condition, why derivatives end there, the matrices by
+/// sides, and the coefficient of a square root.
 pub type InstantRow<'py> = (
     f64,
     Bound<'py, PyArray1<f64>>,
@@ -25,6 +26,15 @@ pub type InstantRow<'py> = (
     Bound<'py, PyArray2<f64>>,
     f64,
     &'static str,
+    Vec<SideRow<'py>>,
+    Option<Bound<'py, PyArray1<f64>>>,
+);
+
+/// The surfaces in their order, the saltation matrix, and its part by parameters.
+pub type SideRow<'py> = (
+    Vec<usize>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
 );
 
 /// The derivatives of a run, or what they need on the way back; and what they are continued with between steps.
@@ -57,7 +67,7 @@ pub fn run_with_derivatives(
     ),
     options: &Options,
     span: f64,
-    (kinds, parameters, goes_back): &Wanted,
+    (kinds, parameters, order): &Wanted,
     interrupt: &mut dyn FnMut(f64) -> bool,
 ) -> Result<(Solution, RunDerivatives), Failure> {
     let kinds: Vec<Column> = kinds
@@ -67,12 +77,15 @@ pub fn run_with_derivatives(
     let extended = extension.at(system.parameters(), actions)?;
     let extended = extended.ok_or(Failure::CalledMap)?;
     let impacts = extended.impacts();
-    let (solution, found, trail) = if *goes_back {
+    let (solution, found, trail) = if *order == 0 {
         let mut trail = Trail::default();
         let solution = problem.solve_observed(&mut trail, interrupt)?;
         (solution, Derivatives::default(), Some(trail))
     } else {
         let mut tangents = Tangents::new(&extended, &impacts, kinds.clone(), options, span);
+        if *order == 2 {
+            tangents = tangents.with_second();
+        }
         let solution = problem.solve_observed(&mut tangents, interrupt)?;
         (solution, tangents.finish()?, None)
     };
@@ -135,6 +148,9 @@ fn column(kind: u8, place: usize) -> Column {
     }
 }
 
+/// The time at which there is no derivative, and why.
+pub type LostAt = (f64, &'static str);
+
 /// What a run computed, and its actions.
 type RunOf<'r> = (&'r Solution, &'r filippov::action::Actions<'r>);
 
@@ -159,6 +175,40 @@ impl RunDerivatives {
             };
             times.iter().map(at).collect()
         })
+    }
+
+    /// The mixed second derivatives at these times, for each those of the state by every pair of columns (a, b) with b <= a.
+    pub fn second_at<'py>(
+        &self,
+        py: Python<'py>,
+        system: &filippov::TracedSystem,
+        run: RunOf<'_>,
+        (times, side): (&[f64], Side),
+    ) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
+        let n = run.0.n_states;
+        let n_pairs = self.kinds.len() * (self.kinds.len() + 1) / 2;
+        self.with(system, run, |run| {
+            let at = |&t: &f64| {
+                let values = run.second_at(t, side).map_err(raised)?;
+                let values = values.unwrap_or_else(|| vec![f64::NAN; n * n_pairs]);
+                Ok(transposed(py, &values, n_pairs, n))
+            };
+            times.iter().map(at).collect()
+        })
+    }
+
+    /// The same at the end of the run.
+    pub fn second_at_end<'py>(&self, py: Python<'py>, n: usize) -> Bound<'py, PyArray2<f64>> {
+        let n_pairs = self.kinds.len() * (self.kinds.len() + 1) / 2;
+        let last = self.found.second.len().checked_sub(n * n_pairs);
+        let known = last.map(|last| &self.found.second[last..]);
+        let unknown = vec![f64::NAN; n * n_pairs];
+        transposed(py, known.unwrap_or(&unknown), n_pairs, n)
+    }
+
+    /// The time from which on second derivatives are not known.
+    pub fn second_lost(&self) -> Option<f64> {
+        self.found.second_lost
     }
 
     /// The derivatives of the times of zeros of a function, the first component of a system: a row for each.
@@ -200,13 +250,14 @@ impl RunDerivatives {
         }))
     }
 
-    /// The gradient of a sum of terms, an entry for each column; and where and why there is none, if so.
+    /// The gradient of a sum of terms, an entry for each column; where and why there is none, if so; and the surfaces that
+    /// the run starts on and leaves.
     pub fn gradient(
         &self,
         system: &filippov::TracedSystem,
         (solution, actions): RunOf<'_>,
         terms: &[TermRow<'_>],
-    ) -> PyResult<(Vec<f64>, Option<(f64, &'static str)>)> {
+    ) -> PyResult<(Vec<f64>, Option<LostAt>, Vec<usize>)> {
         let wrong = |e: Error| PyValueError::new_err(e.to_string());
         let trail = self.trail.as_ref();
         let trail = trail.ok_or_else(|| PyValueError::new_err("the run has no trail"))?;
@@ -238,12 +289,13 @@ impl RunDerivatives {
             solution,
             trail,
             systems: (system, &extended),
+            kinds: &self.kinds,
             options: &self.options,
             span: self.span,
         };
         let found = way.gradient(&terms).map_err(raised)?;
         let entries = self.kinds.iter().map(|&kind| found.by(kind)).collect();
-        Ok((entries, found.lost))
+        Ok((entries, found.lost, found.starts_on))
     }
 
     /// The derivative of the state at the end; NaN if the run took no step.
@@ -284,6 +336,15 @@ impl RunDerivatives {
         let instants = self.found.instants.iter();
         instants
             .map(|found| {
+                let root = !found.square_root.is_empty();
+                let side = |side: &OneSided| {
+                    let order = side.order.clone();
+                    (
+                        order,
+                        rows(&side.saltation, n),
+                        rows(&side.by_parameters, m),
+                    )
+                };
                 (
                     found.t,
                     PyArray1::from_slice(py, &found.dt),
@@ -291,6 +352,8 @@ impl RunDerivatives {
                     rows(&found.by_parameters, m),
                     found.condition,
                     found.lost.map_or("", filippov::derivative::Lost::name),
+                    found.sides.iter().map(side).collect(),
+                    root.then(|| PyArray1::from_slice(py, &found.square_root)),
                 )
             })
             .collect()

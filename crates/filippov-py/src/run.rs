@@ -14,7 +14,7 @@ use pyo3::types::{PyDict, PyTuple};
 use crate::callbacks::{Signal, TracedEvent};
 use crate::conversion::columns;
 use crate::decisions::record_as_pair;
-use crate::derivatives::{InstantRow, RunDerivatives, TermRow};
+use crate::derivatives::{InstantRow, LostAt, RunDerivatives, TermRow};
 use crate::prepared_run::PreparedRun;
 use crate::systems::{raised, CoreSystem, TracedSystem};
 
@@ -561,13 +561,13 @@ impl Run {
         &self,
         py: Python<'py>,
         terms: Vec<TermRow<'py>>,
-    ) -> PyResult<(Vector<'py>, Option<(f64, &'static str)>)> {
+    ) -> PyResult<(Vector<'py>, Option<LostAt>, Vec<usize>)> {
         let (Some(derivatives), Some(system)) = (&self.derivatives, self.prepared.traced()) else {
             return Err(PyValueError::new_err("the run has no derivatives"));
         };
         let run = (&*self.solution(), &self.prepared.actions());
-        let (entries, lost) = derivatives.gradient(system, run, &terms)?;
-        Ok((PyArray1::from_vec(py, entries), lost))
+        let (entries, lost, starts_on) = derivatives.gradient(system, run, &terms)?;
+        Ok((PyArray1::from_vec(py, entries), lost, starts_on))
     }
 
     /// The same at the end of the run.
@@ -583,15 +583,43 @@ impl Run {
         derivatives.map_or_else(Vec::new, |derivatives| derivatives.starts_on().to_vec())
     }
 
+    /// The mixed second derivatives of the state at the times `t`, each of shape (n, pairs of columns); at the end without times.
+    #[pyo3(signature = (t, left))]
+    fn second_derivatives<'py>(
+        &self,
+        py: Python<'py>,
+        t: Option<PyReadonlyArray1<'py, f64>>,
+        left: bool,
+    ) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
+        let (Some(derivatives), Some(system)) = (&self.derivatives, self.prepared.traced()) else {
+            return Ok(Vec::new());
+        };
+        let solution = self.solution();
+        let Some(t) = t else {
+            return Ok(vec![derivatives.second_at_end(py, solution.n_states)]);
+        };
+        let run = (&*solution, &self.prepared.actions());
+        let when = (t.as_slice()?, side_of(left));
+        derivatives.second_at(py, system, run, when)
+    }
+
+    /// The time from which on second derivatives are not known.
+    fn second_lost(&self) -> Option<f64> {
+        self.derivatives.as_ref()?.second_lost()
+    }
+
     /// Do derivatives end, or are they those of one side?
     #[getter]
     fn warns_of_derivatives(&self) -> bool {
         let derivatives = self.derivatives.as_ref();
-        derivatives.is_some_and(|found| found.lost().is_some() || !found.starts_on().is_empty())
+        derivatives.is_some_and(|found| {
+            let ends = found.lost().is_some() || found.second_lost().is_some();
+            ends || !found.starts_on().is_empty()
+        })
     }
 
     /// The time at which derivatives end, and why.
-    fn derivatives_lost(&self) -> Option<(f64, &'static str)> {
+    fn derivatives_lost(&self) -> Option<LostAt> {
         self.derivatives.as_ref()?.lost()
     }
 

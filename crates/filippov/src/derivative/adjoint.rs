@@ -7,15 +7,17 @@
 
 use super::between::EventGradient;
 use super::extended::{Column, Extended};
+use super::forms::add;
 use super::instant::{entered, Instant, Passage, Weights};
 use super::limit::{is_like, Shares};
-use super::piece::{dot, Piece, Surroundings};
+use super::piece::{Piece, Surroundings};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::SmoothField;
 use crate::options::Options;
 use crate::record::{InstantRecord, KeptInstant, ObservedStep, Observer, Side, Solution};
 use crate::system::{Actions, TracedSystem};
+use crate::vectors::dot;
 
 /// The instants of a run and the times of its steps, for the way back. An observer.
 #[derive(Clone, Debug, Default)]
@@ -90,6 +92,8 @@ pub struct CostGradient {
     by_start: f64,
     /// The time of an instant at which there is no derivative: the gradient is NaN.
     pub lost: Option<(f64, &'static str)>,
+    /// Surfaces on which the run starts and that it leaves, where the field jumps: the gradient is that of one side.
+    pub starts_on: Vec<usize>,
 }
 
 impl CostGradient {
@@ -111,6 +115,8 @@ pub struct WayBack<'r> {
     pub trail: &'r Trail,
     /// The system, and its extension by the parameters.
     pub systems: (&'r TracedSystem, &'r Extended<'r>),
+    /// By what the gradient is asked for.
+    pub kinds: &'r [Column],
     /// The options of the run.
     pub options: &'r Options,
     /// The length of its span of time.
@@ -155,6 +161,7 @@ impl WayBack<'_> {
             by_state: walk.w,
             by_start: f64::NAN,
             lost,
+            starts_on: Vec::new(),
         };
         if found.lost.is_some() {
             found.by_state.fill(f64::NAN);
@@ -168,6 +175,17 @@ impl WayBack<'_> {
             piece
                 .field
                 .eval_unprojected(start.t, &mut z.clone(), &mut field)?;
+            let changes = self.kinds.iter().map(|&kind| match kind {
+                Column::State(i) => (0.0, extended.column(kind, &unit(n, i))),
+                Column::Start => (
+                    1.0,
+                    extended.column(kind, &field[..n].iter().map(|f| -f).collect::<Vec<_>>()),
+                ),
+                Column::Parameter(_) => (0.0, extended.column(kind, &vec![0.0; n])),
+            });
+            let changes: Vec<(f64, Vec<f64>)> = changes.collect();
+            let changes: Vec<(f64, &[f64])> = changes.iter().map(|(t, c)| (*t, &c[..])).collect();
+            found.starts_on = piece.left_at_once(start.t, &z, &changes)?;
             if !piece.sliding.is_empty() {
                 let mut whole = [&found.by_state[..], &found.by_parameters].concat();
                 let entry = entered(extended, &piece, &[], (start.t, &z))?;
@@ -226,7 +244,8 @@ impl<'w> Walk<'w> {
                 break;
             };
             let mut before = Piece::new(&pieces[earlier], record.mode[0], record.discrete[0]);
-            if let Some(lost) = self.pass(earlier, &record, (&mut before, &mut piece), terms)? {
+            let both = (&mut before, &mut piece);
+            if let Some(lost) = self.pass(earlier, &record, &pieces[earlier], both, terms)? {
                 return Ok(Some((record.t[0], lost)));
             }
             piece = before;
@@ -329,6 +348,7 @@ impl<'w> Walk<'w> {
         &mut self,
         number: usize,
         record: &InstantRecord,
+        around: &Surroundings<'p>,
         (before, after): (&mut Piece<'p>, &mut Piece<'p>),
         terms: &[Term],
     ) -> Result<Option<&'static str>, FieldError> {
@@ -343,6 +363,7 @@ impl<'w> Walk<'w> {
         let is_limit = record.t[0] != record.t[1];
         let mut instant = Instant {
             extended,
+            around,
             record,
             before,
             after,
@@ -353,8 +374,8 @@ impl<'w> Walk<'w> {
                 Err(lost) => return Ok(Some(lost.name())),
             }
         } else {
-            match instant.passage(&weights, &mut 0.0)? {
-                Ok(Passage { time, changes }) => {
+            match instant.through(&weights, &mut 0.0)? {
+                Ok(Passage { time, changes, .. }) => {
                     let changes = changes.iter().rev();
                     changes.for_each(|change| change.pull_back(n, &mut self.w));
                     time
@@ -407,7 +428,8 @@ impl<'w> Walk<'w> {
     }
 }
 
-fn add(to: &mut [f64], factor: f64, row: &[f64]) {
-    let entries = to.iter_mut().zip(row);
-    entries.for_each(|(entry, value)| *entry += factor * value);
+fn unit(size: usize, i: usize) -> Vec<f64> {
+    let mut unit = vec![0.0; size];
+    unit[i] = 1.0;
+    unit
 }

@@ -1,13 +1,15 @@
 //! The derivatives of a run at any of its times, and of the zeros of functions along it.
 
 use super::extended::{extended_system, Column, Extended};
-use super::piece::{dot, Piece, Surroundings};
+use super::forms::{pairs, Second};
+use super::piece::{Piece, Surroundings};
 use super::tangents::Derivatives;
 use crate::error::{Error, FieldError};
 use crate::motion::SmoothField;
 use crate::options::Options;
 use crate::record::{Side, Solution};
 use crate::system::{sides_of, Actions, PiecewiseSystem, Rules, Setting, TracedSystem};
+use crate::vectors::dot;
 
 /// A run with its derivatives.
 pub struct Differentiated<'r> {
@@ -87,51 +89,94 @@ impl<'r> Differentiated<'r> {
         Ok(Some(columns.iter().map(shift).collect()))
     }
 
-    /// The derivative of the state, with the shares of the parameters behind each column.
-    fn columns(&mut self, t: f64, side: Side) -> Result<Option<Vec<Vec<f64>>>, FieldError> {
-        let DifferentiatedRun {
-            solution,
-            found: Derivatives {
-                t: times, values, ..
-            },
-            kinds,
-            systems: (system, extended),
-            ..
-        } = self.run;
-        let (n, size) = (extended.n, extended.n * kinds.len());
+    /// The mixed second derivatives of the state at a time, for every pair of columns (a, b) with b <= a those of n states; `None` as
+    /// for [`at`](Self::at), or if they were not followed.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn second_at(&mut self, t: f64, side: Side) -> Result<Option<Vec<f64>>, FieldError> {
+        let DifferentiatedRun { found, kinds, .. } = self.run;
+        let n = self.run.systems.1.n;
+        let size = n * pairs(kinds.len()).count();
+        let Some(index) = self
+            .last_known(t, side)
+            .filter(|_| !found.second.is_empty())
+        else {
+            return Ok(None);
+        };
+        let known = &found.second[index * size..][..size];
+        if found.t[index] == t || known.iter().any(|v| v.is_nan()) {
+            return Ok(Some(known.to_vec()));
+        }
+        let columns = self.known_columns(index);
+        let mut second = Second {
+            pairs: known.chunks_exact(n).map(<[f64]>::to_vec).collect(),
+        };
+        let path = self.path(side);
+        let Some(piece) = self.piece(t, side) else {
+            return Ok(None);
+        };
+        let span = (found.t[index], t);
+        if !piece.advance_pairs(path, span, &columns, &mut second)? {
+            return Ok(Some(vec![f64::NAN; size]));
+        }
+        Ok(Some(second.pairs.concat()))
+    }
+
+    /// The place among the known times of the last one before a time.
+    fn last_known(&self, t: f64, side: Side) -> Option<usize> {
+        let times = &self.run.found.t;
         let is_known = |&known: &f64| match side {
             Side::Left => known < t,
             Side::Right => known <= t,
         };
         let next = times.partition_point(is_known);
-        let is_at_next = side == Side::Left && times.get(next) == Some(&t);
-        let Some(index) = (if is_at_next {
-            Some(next)
-        } else {
-            next.checked_sub(1)
-        }) else {
-            return Ok(None);
-        };
-        let known = values[index * size..][..size].chunks_exact(n);
-        let columns = kinds.iter().zip(known);
-        let mut columns: Vec<Vec<f64>> = columns
-            .map(|(kind, states)| extended.column(*kind, states))
-            .collect();
-        if times[index] == t {
-            return Ok(Some(columns));
+        if side == Side::Left && times.get(next) == Some(&t) {
+            return Some(next);
         }
-        let Some(piece) = self.piece(t, side) else {
-            return Ok(None);
-        };
-        let mut x = vec![0.0; n];
-        let path = |t: f64, x: &mut [f64]| {
+        next.checked_sub(1)
+    }
+
+    /// The columns at a known time, with the shares of the parameters.
+    fn known_columns(&self, index: usize) -> Vec<Vec<f64>> {
+        let DifferentiatedRun { found, kinds, .. } = self.run;
+        let extended = self.run.systems.1;
+        let (n, size) = (extended.n, extended.n * kinds.len());
+        let known = found.values[index * size..][..size].chunks_exact(n);
+        let columns = kinds.iter().zip(known);
+        columns
+            .map(|(kind, states)| extended.column(*kind, states))
+            .collect()
+    }
+
+    /// The path of the run.
+    fn path(&self, side: Side) -> impl Fn(f64, &mut [f64]) -> Result<(), FieldError> + Copy + 'r {
+        let (solution, system) = (self.run.solution, self.run.systems.0);
+        move |t: f64, x: &mut [f64]| {
             let mode = solution.evaluate(system, t, side, x)?;
             if mode.is_none() {
                 x.fill(f64::NAN);
             }
             Ok(())
+        }
+    }
+
+    /// The derivative of the state, with the shares of the parameters behind each column.
+    fn columns(&mut self, t: f64, side: Side) -> Result<Option<Vec<Vec<f64>>>, FieldError> {
+        let Some(index) = self.last_known(t, side) else {
+            return Ok(None);
         };
-        piece.advance(path, (times[index], t), &mut columns)?;
+        let mut columns = self.known_columns(index);
+        let start = self.run.found.t[index];
+        if start == t {
+            return Ok(Some(columns));
+        }
+        let (path, extended) = (self.path(side), self.run.systems.1);
+        let Some(piece) = self.piece(t, side) else {
+            return Ok(None);
+        };
+        piece.advance(path, (start, t), &mut columns)?;
+        let mut x = vec![0.0; extended.n];
         path(t, &mut x)?;
         piece.project(t, &extended.state(&x), &mut columns)?;
         Ok(Some(columns))

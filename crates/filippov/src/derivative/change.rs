@@ -1,7 +1,7 @@
 //! What an instant makes of a change of the extended state.
 
-use super::piece::dot;
 use crate::cube::{Elimination, Matrix, Vector};
+use crate::vectors::dot;
 
 /// A linear map of changes c = (x, p) of the extended state, which leaves p as it is: x goes to R c + sum_i d_i s_i, where the shares s
 /// are the products g_i . c, or what solves equations with them on the right.

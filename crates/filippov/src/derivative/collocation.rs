@@ -291,7 +291,7 @@ impl Collocation {
             };
             let is_parameter = |(column, _): &(usize, f64)| (n..n + m).contains(column);
             for r in 0..n {
-                let mut own = vec![0.0; STAGES];
+                let mut own = [0.0; STAGES];
                 own[i] = rows.diagonal(r) * dt;
                 let mut row: Vec<(usize, f64)> = (0..STAGES)
                     .map(|j| (j * block + r, WEIGHTS[i][j] + own[j]))

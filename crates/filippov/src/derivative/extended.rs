@@ -1,16 +1,17 @@
 //! A traced system in which parameters are states that rest.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use filippov_expr::{Backend, Names, NodeId, Program};
+use filippov_expr::{Backend, ExprError, Names, NodeId, Program};
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 
+use super::forms::{Form, MapAt};
 use super::series::ChangeSeries;
 use crate::error::{Error, FieldError};
 use crate::system::{
-    sides_of, Action, Actions, Definition, PiecewiseSystem, Place, Rules, TracedMap, TracedSystem,
-    Trigger,
+    sides_of, Act, Action, ActionMap, Actions, Definition, PiecewiseSystem, Place, Rules,
+    TracedMap, TracedSystem, Trigger,
 };
 
 /// By what is differentiated.
@@ -34,10 +35,12 @@ pub struct Extension {
     /// What each node of the system has become.
     made: Vec<NodeId>,
     series: Arc<SeriesCache>,
+    /// Second derivatives of switching functions.
+    forms: Arc<Mutex<FxHashMap<usize, Arc<Form>>>>,
 }
 
 /// The series of changes, by the surfaces slid on and the order.
-type SeriesCache = Mutex<FxHashMap<(Surfaces, usize), Option<Arc<ChangeSeries>>>>;
+type SeriesCache = Mutex<FxHashMap<(Surfaces, usize, bool), Option<Arc<ChangeSeries>>>>;
 type Surfaces = SmallVec<[usize; 2]>;
 
 impl Extension {
@@ -56,6 +59,7 @@ impl Extension {
             parameters: parameters.to_vec(),
             made,
             series: Arc::default(),
+            forms: Arc::default(),
         })
     }
 
@@ -100,6 +104,7 @@ impl Extension {
             triggers: triggers.collect(),
             clocks,
             series: Arc::clone(&self.series),
+            forms: Arc::clone(&self.forms),
         }))
     }
 
@@ -136,14 +141,56 @@ pub struct Extended<'a> {
     /// For each action at the known times of a law the derivatives of what the law reads: by the time, then by the parameters.
     clocks: Vec<Option<Program>>,
     series: Arc<SeriesCache>,
+    forms: Arc<Mutex<FxHashMap<usize, Arc<Form>>>>,
 }
 
 impl Extended<'_> {
-    /// The series of the changes of the motions on these surfaces, if they have any.
-    pub(super) fn series(&self, sliding: &[usize], order: usize) -> Option<Arc<ChangeSeries>> {
+    /// The action that a surface triggers and that moves the state, if there is one.
+    pub(super) fn triggered_by(&self, surface: usize) -> Option<usize> {
+        let is_own = |(action, trigger): (usize, &Trigger)| {
+            matches!(trigger, Trigger::Surface { index, .. } if *index == surface)
+                && self.moves(action)
+        };
+        let mut all = self.triggers.iter().enumerate();
+        all.find_map(|(action, trigger)| is_own((action, trigger)).then_some(action))
+    }
+
+    /// Does an action move the state?
+    pub(super) fn moves(&self, action: usize) -> bool {
+        self.maps.get(action).is_some_and(Option::is_some)
+    }
+
+    /// The second derivative of a switching function.
+    pub(super) fn form_of_surface(&self, j: usize) -> Result<Arc<Form>, ExprError> {
+        let mut known = self.forms.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(form) = known.get(&j) {
+            return Ok(Arc::clone(form));
+        }
+        let graph = self.system.graph();
+        let size = self.n + self.values.len();
+        let form = Arc::new(Form::new(graph, &[graph.clone().surface(j as u32)], size)?);
+        known.insert(j, Arc::clone(&form));
+        Ok(form)
+    }
+
+    /// The derivatives of the map of an action, up to second order.
+    pub(super) fn second_of_map(&self, t: f64, act: &Act) -> Result<Option<MapAt<'_>>, FieldError> {
+        let Some(map) = self.maps.get(act.index).and_then(Option::as_ref) else {
+            return Ok(None);
+        };
+        map.second((t, &act.x, &act.discrete), &self.values)
+    }
+
+    /// The series of the changes of the motions on these surfaces, or of pairs of changes, if they have any.
+    pub(super) fn series(
+        &self,
+        sliding: &[usize],
+        order: usize,
+        of_pairs: bool,
+    ) -> Option<Arc<ChangeSeries>> {
         let mut known = self.series.lock().unwrap_or_else(PoisonError::into_inner);
-        let made = known.entry((SmallVec::from_slice(sliding), order));
-        let make = || ChangeSeries::new(&self.system, sliding, order).map(Arc::new);
+        let made = known.entry((SmallVec::from_slice(sliding), order, of_pairs));
+        let make = || ChangeSeries::new(&self.system, sliding, order, of_pairs).map(Arc::new);
         made.or_insert_with(make).clone()
     }
 
@@ -249,6 +296,8 @@ pub(super) struct ExtendedMap<'a> {
     derivative: Program,
     /// The map of the extended state.
     extended: TracedMap,
+    /// The second derivative of its first n components, once it was asked for.
+    form: OnceLock<Option<Form>>,
     n: usize,
 }
 
@@ -287,6 +336,7 @@ impl<'a> ExtendedMap<'a> {
             entries,
             derivative,
             extended: TracedMap::new(extended),
+            form: OnceLock::new(),
             n,
         })
     }
@@ -311,5 +361,35 @@ impl<'a> ExtendedMap<'a> {
             rows[r][c] = value;
         }
         Ok((rows, by_time))
+    }
+
+    /// The first and second derivatives of the new state at a place; `None` if the map cannot be compiled.
+    fn second(
+        &self,
+        (t, x, q): (f64, &[f64], &[f64]),
+        values: &[f64],
+    ) -> Result<Option<MapAt<'_>>, FieldError> {
+        let Some(system) = self.extended.expressions() else {
+            return Ok(None);
+        };
+        let size = self.expressions.n_states() + values.len();
+        let form = self.form.get_or_init(|| {
+            let nodes = &system.field_nodes()[..self.n];
+            Form::new(system.graph(), nodes, size).ok()
+        });
+        let Some(form) = form else {
+            return Ok(None);
+        };
+        let n_named = self.expressions.n_states() - self.n;
+        let (rows, by_time) = self.derivative((t, x, q), values)?;
+        Ok(Some(MapAt {
+            rows,
+            by_time,
+            form,
+            system,
+            t,
+            inputs: [x, &q[..n_named.min(q.len())], values].concat(),
+            n: self.n,
+        }))
     }
 }

@@ -2,12 +2,13 @@
 
 use super::change::Change;
 use super::extended::Extended;
-use super::piece::{dot, Piece};
+use super::piece::{Piece, Surroundings};
 use crate::error::FieldError;
 use crate::motion::{Guard, ModeField};
 use crate::record::InstantRecord;
 use crate::system::{PiecewiseSystem, SignStructure};
 use crate::tolerances::{AT_SIDE, ROUNDING};
+use crate::vectors::dot;
 
 /// Why derivatives are not known from an instant on: they are NaN.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,38 +35,6 @@ impl Lost {
             Lost::Accumulation => "accumulation",
             Lost::Unsupported => "unsupported",
             Lost::NotFinite => "not_finite",
-        }
-    }
-}
-
-/// The derivatives of an instant: of its time, and of the state behind it by the state before.
-#[derive(Clone, Debug)]
-pub struct InstantDerivative {
-    /// The time.
-    pub t: f64,
-    /// The derivative of the time by each column; NaN where it is not known.
-    pub dt: Vec<f64>,
-    /// The saltation matrix, n rows of n entries.
-    pub saltation: Vec<f64>,
-    /// What parameters add to their own columns, n rows of one entry for each of them.
-    pub by_parameters: Vec<f64>,
-    /// 1 / c with the cosine c = |dg . F| / (|dg| |F|) of the angle between motion and normal, F = (1, f) the motion before, in
-    /// which time is measured by the span of the run and each state by rtol |x| + atol, both over rtol.
-    pub condition: f64,
-    /// Why the derivatives end here, if they do.
-    pub lost: Option<Lost>,
-}
-
-impl InstantDerivative {
-    /// An instant at this time of which nothing is known.
-    pub(super) fn unknown(t: f64, n_columns: usize, (n, m): (usize, usize)) -> Self {
-        InstantDerivative {
-            t,
-            dt: vec![f64::NAN; n_columns],
-            saltation: vec![f64::NAN; n * n],
-            by_parameters: vec![f64::NAN; n * m],
-            condition: f64::NAN,
-            lost: None,
         }
     }
 }
@@ -107,6 +76,7 @@ struct Timing {
 /// An instant with the motions around it.
 pub(super) struct Instant<'i, 'a> {
     pub extended: &'a Extended<'a>,
+    pub around: &'i Surroundings<'a>,
     pub record: &'i InstantRecord<'i>,
     pub before: &'i mut Piece<'a>,
     pub after: &'i mut Piece<'a>,
@@ -118,46 +88,12 @@ pub(super) struct Passage {
     pub time: Vec<f64>,
     /// What becomes of a change, one after the other.
     pub changes: Vec<Change>,
+    /// The field goes on: the time alone is of interest.
+    pub goes_on: bool,
 }
 
 impl Instant<'_, '_> {
-    /// The derivatives of the instant, and the columns after it.
-    pub fn pass(
-        &mut self,
-        weights: &Weights,
-        columns: &mut [Vec<f64>],
-    ) -> Result<InstantDerivative, FieldError> {
-        let (n, m) = (self.extended.n, self.extended.n_parameters());
-        let mut found = InstantDerivative::unknown(self.record.t[0], columns.len(), (n, m));
-        let Passage { time, changes } = match self.passage(weights, &mut found.condition)? {
-            Ok(passage) => passage,
-            Err(lost) => {
-                found.lost = Some(lost);
-                return Ok(found);
-            }
-        };
-        let dt = found.dt.iter_mut().zip(&*columns);
-        dt.for_each(|(dt, column)| *dt = dot(&time, column));
-        let through = |column: &mut [f64]| changes.iter().for_each(|one| one.apply(n, column));
-        columns.iter_mut().for_each(|column| through(column));
-        let mut unit = vec![0.0; n + m];
-        for i in 0..n + m {
-            unit.fill(0.0);
-            unit[i] = 1.0;
-            through(&mut unit);
-            for (r, entry) in unit.iter().enumerate().take(n) {
-                match i.checked_sub(n) {
-                    None => found.saltation[r * n + i] = *entry,
-                    Some(p) => found.by_parameters[r * m + p] = *entry,
-                }
-            }
-        }
-        let is_finite = columns.iter().flatten().all(|v| v.is_finite());
-        found.lost = (!is_finite).then_some(Lost::NotFinite);
-        Ok(found)
-    }
-
-    /// What the instant does.
+    /// What the instant does, if one guard alone fixes its time, or all of it is an entry to sliding.
     pub fn passage(
         &mut self,
         weights: &Weights,
@@ -175,13 +111,17 @@ impl Instant<'_, '_> {
         {
             return Ok(Err(Lost::Unsupported));
         }
-        let mut changes = Vec::new();
-        if self.leaves_as_it_is() {
-            return Ok(Ok(Passage { time, changes }));
+        let mut passage = Passage {
+            time,
+            changes: Vec::new(),
+            goes_on: self.leaves_as_it_is(),
+        };
+        if passage.goes_on {
+            return Ok(Ok(passage));
         }
         if let Some(entry) = self.entry()? {
-            changes.push(entry);
-            return Ok(Ok(Passage { time, changes }));
+            passage.changes.push(entry);
+            return Ok(Ok(passage));
         }
         if record.guards.len() > 1 {
             return Ok(Err(Lost::OneSided));
@@ -192,15 +132,17 @@ impl Instant<'_, '_> {
             .iter_mut()
             .zip(after)
             .for_each(|(f, after)| *f -= after);
-        changes.push(Change::at_moving_time(map, moved, time.clone()));
+        let jump = Change::at_moving_time(map, moved, passage.time.clone());
+        passage.changes.push(jump);
         let z = self.extended.state(record.x[1]);
         // What is new is held exactly; the columns of the run keep to the other surfaces by themselves.
         let kept = match record.acts.is_empty() {
             true => &self.before.sliding[..],
             false => &[],
         };
-        changes.extend(self.after.projection(kept, record.t[1], &z)?);
-        Ok(Ok(Passage { time, changes }))
+        let held = self.after.projection(kept, record.t[1], &z)?;
+        passage.changes.extend(held);
+        Ok(Ok(passage))
     }
 
     /// The derivative of the time, a row, from what fixes it.
@@ -307,7 +249,7 @@ impl Instant<'_, '_> {
     }
 
     /// The derivative of the maps of the actions, if they move the state, and what becomes of the field before, R_x f + R_t.
-    fn mapped(&self) -> Result<(Option<Vec<Vec<f64>>>, Vec<f64>), FieldError> {
+    fn mapped(&self) -> Result<Mapped, FieldError> {
         let (n, values) = (self.extended.n, &self.extended.values);
         let mut total: Option<Vec<Vec<f64>>> = None;
         let mut along = self.record.field[0].to_vec();
@@ -329,6 +271,9 @@ impl Instant<'_, '_> {
         Ok((total, along))
     }
 }
+
+/// The rows of the derivative of maps, if any moves the state, and what becomes of the field before.
+type Mapped = (Option<Vec<Vec<f64>>>, Vec<f64>);
 
 /// A row of the derivative of a map behind another one.
 fn chained(n: usize, row: &[f64], earlier: &[Vec<f64>]) -> Vec<f64> {

@@ -5,10 +5,10 @@
 
 use smallvec::SmallVec;
 
-use super::piece::dot;
 use crate::mode::Mode;
 use crate::motion::Guard;
 use crate::record::InstantRecord;
+use crate::vectors::dot;
 
 /// Instants that are remembered: two rounds of up to so many and the last one.
 const MOST_REMEMBERED: usize = 17;

@@ -8,9 +8,10 @@ use smallvec::SmallVec;
 use super::change::Change;
 use super::collocation::{operations, Collocation};
 use super::extended::Extended;
+use super::forms::{pairs, Second};
 use super::radau::NODES;
 use super::series::{ChangeSeries, Coefficients};
-use crate::cube::Matrix;
+use crate::cube::{Matrix, Vector};
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::{ContactField, Law, ModeField, SmoothField};
@@ -22,6 +23,11 @@ use crate::system::{
     Setting, SignStructure, TracedSystem,
 };
 use crate::tolerances::{EPS, ROUNDING};
+use crate::vectors::dot;
+
+/// Series that allow less than this share of a step are not used where there is another way; where there is none, less than that.
+const SHORTEST: f64 = 0.25;
+const SHORTEST_OF_PAIRS: f64 = 1e-3;
 
 /// Stiff steps are not divided into more than so many parts.
 const MOST_PARTS: f64 = 16.0;
@@ -93,6 +99,8 @@ pub(super) struct Piece<'a> {
     coefficients: Coefficients,
     carried: Vec<Vec<f64>>,
     rtol: f64,
+    /// The order of the series.
+    order: usize,
     /// How long a part of a step may be, in units of 1 / |Df|.
     longest: f64,
     collocation: Collocation,
@@ -149,12 +157,13 @@ impl<'a> Piece<'a> {
             jacobian,
             is_affine: is_affine(&extended.system, &sliding),
             series: match by_graph {
-                true => extended.series(&sliding, around.order),
+                true => extended.series(&sliding, around.order, false),
                 false => None,
             },
             coefficients: Coefficients::default(),
             carried: Vec::new(),
             rtol: around.rtol,
+            order: around.order,
             longest: longest_part(around.rtol),
             collocation: Collocation::new((extended.n, extended.n_parameters()), around.rtol),
             nodes: Vec::new(),
@@ -232,7 +241,7 @@ impl<'a> Piece<'a> {
                 path(t, &mut self.point[..n])?;
                 let place = Setting::new(&self.signs, &self.q).at(t, &self.point);
                 let motion = (system, &place);
-                let size = (n, self.rtol);
+                let size = (n, self.rtol, SHORTEST);
                 match series.carry(motion, size, left, carried, &mut self.coefficients) {
                     Some(rest) => (t, left) = (t1 - rest, rest),
                     None => return Ok(false),
@@ -257,6 +266,79 @@ impl<'a> Piece<'a> {
             self.collocation.pull_back(&self.nodes, dt, gradient);
         }
         Ok(())
+    }
+
+    /// Carries the mixed derivatives of all pairs of columns over a step, with the columns at its start; `false` if the motion has no
+    /// series for them.
+    pub fn advance_pairs(
+        &mut self,
+        mut path: impl FnMut(f64, &mut [f64]) -> Result<(), FieldError>,
+        (t0, t1): (f64, f64),
+        columns: &[Vec<f64>],
+        second: &mut Second,
+    ) -> Result<bool, FieldError> {
+        let (n, system) = (self.extended.n, &self.extended.system);
+        let order = self.order;
+        let series = self
+            .series
+            .as_ref()
+            .and_then(|_| self.extended.series(&self.sliding, order, true));
+        let Some(series) = series else {
+            return Ok(false);
+        };
+        for ((a, b), mixed) in pairs(columns.len()).zip(&mut second.pairs) {
+            let rest = vec![0.0; self.point.len() - n];
+            let mut changes = [&columns[a][..], &columns[b], mixed, &rest].concat();
+            let (mut t, mut left) = (t0, t1 - t0);
+            while left > 0.0 {
+                path(t, &mut self.point[..n])?;
+                let place = Setting::new(&self.signs, &self.q).at(t, &self.point);
+                let size = (n, self.rtol, SHORTEST_OF_PAIRS);
+                let motion = (system, &place);
+                match series.carry(motion, size, left, &mut changes, &mut self.coefficients) {
+                    Some(rest) => (t, left) = (t1 - rest, rest),
+                    None => return Ok(false),
+                }
+            }
+            mixed.copy_from_slice(&changes[2 * self.point.len()..][..n]);
+        }
+        Ok(true)
+    }
+
+    /// Finds the derivatives of the field at a point, for [`rates_along`](Self::rates_along).
+    pub fn look_at(&mut self, t: f64, z: &[f64]) -> Result<(), FieldError> {
+        self.point.copy_from_slice(z);
+        self.slopes(0, t)
+    }
+
+    /// The derivative of the field along a change of time and state, at the point looked at.
+    pub fn rates_along(&self, time: f64, change: &[f64]) -> Vec<f64> {
+        let (rows, by_time, width) = (self.nodes[0].rows(), self.nodes[0].time(), change.len());
+        let l = rows.n_rows() - width;
+        let mut all = change.to_vec();
+        all.resize(width + l, 0.0);
+        if l > 0 {
+            let own = Matrix::of(l, |k, c| rows.entry(width + k, width + c));
+            let known = |k: usize| time * by_time[k] - rows.dot(k, &all);
+            let known: Vector = (width..width + l).map(known).collect();
+            match own.solve(&known) {
+                Some(multipliers) => all[width..].copy_from_slice(&multipliers),
+                None => all.fill(f64::NAN),
+            }
+        }
+        let rate = |r: usize| time * by_time[r] - rows.dot(r, &all);
+        (0..self.extended.n).map(rate).collect()
+    }
+
+    /// The derivative of a switching function by time; writes those by the extended state.
+    pub fn gradient(
+        &self,
+        j: usize,
+        t: f64,
+        z: &[f64],
+        out: &mut [f64],
+    ) -> Result<f64, FieldError> {
+        self.extended.system.gradient(j, &self.at(t, z), out)
     }
 
     /// Into how many parts a step is divided, and their length.
@@ -481,9 +563,4 @@ fn fastest(rows: &SparseRows, n: usize) -> f64 {
         most = most.max(product.iter().map(|v| v.abs()).sum());
     }
     most.sqrt()
-}
-
-/// The product of as many entries as both have.
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

@@ -4,15 +4,14 @@ use filippov_expr::{Backend, Graph, JetProgram, Multipliers, NodeId};
 
 use crate::system::{sliding_field, Place, Tiered, TracedSystem};
 
-/// A series may be used for so many steps in the place of one; where it is shorter, the motion is carried on by collocation.
-const MOST_STEPS: f64 = 4.0;
-
-/// The series of a motion of a traced system with that of its change, in a region or on one surface.
+/// The series of a motion of a traced system with those of its changes, in a region or on one surface: of one change, or of two with
+/// the mixed second derivative along them.
 pub(super) struct ChangeSeries {
     program: Tiered<JetProgram>,
     order: usize,
-    /// How many states the system has.
+    /// How many states the system has, and how many changes of these there are.
     size: usize,
+    n_changes: usize,
 }
 
 /// Room for the coefficients.
@@ -20,11 +19,17 @@ pub(super) struct ChangeSeries {
 pub(super) struct Coefficients {
     rows: Vec<f64>,
     start: Vec<f64>,
+    end: Vec<f64>,
 }
 
 impl ChangeSeries {
     /// Of the motions on these surfaces; `None` if there are more than one.
-    pub fn new(system: &TracedSystem, sliding: &[usize], order: usize) -> Option<Self> {
+    pub fn new(
+        system: &TracedSystem,
+        sliding: &[usize],
+        order: usize,
+        of_pairs: bool,
+    ) -> Option<Self> {
         let mut graph = system.graph().clone();
         let size = system.field_nodes().len();
         let mut field = match *sliding {
@@ -32,22 +37,35 @@ impl ChangeSeries {
             [j] => sliding_field(&mut graph, system.field_nodes(), j).0,
             _ => return None,
         };
-        let zero = graph.constant(0.0);
-        let changes: Vec<NodeId> = (0..size).map(|i| graph.state((size + i) as u32)).collect();
-        for i in 0..size {
-            let gradient = graph.gradient(field[i]);
-            let mut rate = zero;
-            for (k, partial) in gradient.states {
-                let term = graph.mul(partial, changes[k as usize]);
-                rate = graph.add(rate, term);
-            }
-            field.push(rate);
+        let own = field.clone();
+        let n_changes = if of_pairs { 3 } else { 1 };
+        let mut along = Vec::with_capacity(n_changes);
+        for k in 0..n_changes {
+            let change: Vec<NodeId> = (0..size)
+                .map(|i| graph.state((size * (k + 1) + i) as u32))
+                .collect();
+            let rates = own
+                .iter()
+                .map(|&rate| derivative(&mut graph, rate, &change));
+            along.push((rates.collect::<Vec<_>>(), change.clone()));
         }
+        if let [_, (_, first), _] = &along[..] {
+            let bends: Vec<NodeId> = along[0]
+                .0
+                .iter()
+                .map(|&rate| derivative(&mut graph, rate, first))
+                .collect();
+            for (rate, bend) in along[2].0.iter_mut().zip(bends) {
+                *rate = graph.add(*rate, bend);
+            }
+        }
+        field.extend(along.into_iter().flat_map(|(rates, _)| rates));
         let make = move |backend| compile(&graph, &field, order, backend);
         Some(ChangeSeries {
             program: Tiered::from(make, Backend::Native),
             order,
             size,
+            n_changes,
         })
     }
 
@@ -56,21 +74,21 @@ impl ChangeSeries {
         self.program.program().operations()
     }
 
-    /// Carries a change of the n first states over a time `dt` from a place, as far as the series allows; returns the time that is
-    /// left, `None` if the series is too short.
+    /// Carries changes, one behind the other, with n components that are not parameters, over a time `dt` from a place, as far as
+    /// the series allows and at least over `least` of it; returns the time that is left, `None` if the series is too short.
     pub fn carry(
         &self,
         (system, place): (&TracedSystem, &Place),
-        (n, rtol): (usize, f64),
+        (n, rtol, least): (usize, f64, f64),
         dt: f64,
-        column: &mut [f64],
+        changes: &mut [f64],
         room: &mut Coefficients,
     ) -> Option<f64> {
-        let width = 2 * self.size;
+        let width = (1 + self.n_changes) * self.size;
         room.rows.resize((self.order + 1) * width, 0.0);
         room.start.clear();
         room.start.extend_from_slice(place.x);
-        room.start.extend_from_slice(column);
+        room.start.extend_from_slice(changes);
         let at = Place {
             x: &room.start,
             ..*place
@@ -82,36 +100,59 @@ impl ChangeSeries {
         {
             return None;
         }
-        let start = largest(&column[..n]);
-        self.sum(&room.rows, dt, &mut column[..n]);
+        room.end.resize(changes.len(), 0.0);
+        self.sum(&room.rows, dt, &mut room.end);
         // The two last terms are to be below the tolerance.
-        let bound = 0.5 * rtol * start.max(largest(&column[..n]));
         let mut share = 1.0_f64;
-        for k in [self.order - 1, self.order] {
-            let term = largest(&room.rows[k * width + self.size..][..n]) * dt.powi(k as i32);
-            if term > bound {
-                share = share.min((bound / term).powf(1.0 / k as f64));
+        for block in 0..self.n_changes {
+            let own = block * self.size..block * self.size + n;
+            let size = largest(&changes[own.clone()]).max(largest(&room.end[own.clone()]));
+            let bound = 0.5 * rtol * size;
+            if !bound.is_finite() {
+                return None;
+            }
+            for k in [self.order - 1, self.order] {
+                let row = &room.rows[k * width + self.size..][own.clone()];
+                let term = largest(row) * dt.powi(k as i32);
+                if term > bound {
+                    share = share.min((bound / term).powf(1.0 / k as f64));
+                }
             }
         }
-        if share * MOST_STEPS < 1.0 || !bound.is_finite() {
+        if share < least {
             return None;
         }
         let step = share * dt;
         if share < 1.0 {
-            self.sum(&room.rows, step, &mut column[..n]);
+            self.sum(&room.rows, step, &mut room.end);
         }
+        changes.copy_from_slice(&room.end);
         Some(dt - step)
     }
 
-    /// The change after this time.
+    /// The changes after this time.
     fn sum(&self, rows: &[f64], dt: f64, out: &mut [f64]) {
         out.fill(0.0);
-        for row in rows.chunks_exact(2 * self.size).rev() {
+        let width = (1 + self.n_changes) * self.size;
+        for row in rows.chunks_exact(width).rev() {
             for (entry, c) in out.iter_mut().zip(&row[self.size..]) {
                 *entry = *entry * dt + c;
             }
         }
     }
+}
+
+/// The derivative of a value along a change of the states.
+fn derivative(graph: &mut Graph, value: NodeId, change: &[NodeId]) -> NodeId {
+    let gradient = graph.gradient(value);
+    let mut sum = graph.constant(0.0);
+    for (k, partial) in gradient.states {
+        if let Some(&own) = change.get(k as usize) {
+            let term = graph.mul(partial, own);
+            sum = graph.add(sum, term);
+        }
+    }
+    sum
 }
 
 fn largest(entries: &[f64]) -> f64 {

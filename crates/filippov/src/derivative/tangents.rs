@@ -1,15 +1,19 @@
 //! The derivatives of a run, as its observer.
 
 use super::extended::{Column, Extended};
-use super::instant::{entered, Instant, InstantDerivative, Lost, Weights};
+use super::forms::{pairs, Second};
+use super::instant::{entered, Instant, Lost, Weights};
 use super::limit::{at_its_time, History, Past};
-use super::piece::{dot, Piece, Surroundings};
+use super::passing::InstantDerivative;
+use super::piece::{Piece, Surroundings};
+use super::second::at_start;
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::SmoothField;
 use crate::options::{Keep, Options};
 use crate::record::{InstantRecord, ObservedStep, Observer};
 use crate::system::Actions;
+use crate::vectors::dot;
 
 /// So many motions are kept, in case that they come again.
 const MOST_PIECES: usize = 16;
@@ -22,6 +26,11 @@ pub struct Derivatives {
     pub t: Vec<f64>,
     /// The derivative of the state at each of them, a column after the other.
     pub values: Vec<f64>,
+    /// The mixed second derivatives at each of them, if they are followed: for every pair of columns (a, b) with b <= a, in order, those
+    /// of the state. NaN where they are not known.
+    pub second: Vec<f64>,
+    /// The time from which on the second derivatives are not known.
+    pub second_lost: Option<f64>,
     /// Those of all instants; if the run keeps its last state only, of the one at which they end.
     pub instants: Vec<InstantDerivative>,
     /// Surfaces on which the run starts and that it leaves, where the field jumps: the derivatives by the start are those of one
@@ -68,7 +77,11 @@ pub struct Tangents<'a> {
     kinds: Vec<Column>,
     /// For each column the derivative of the state, and its shares of the parameters behind it.
     columns: Vec<Vec<f64>>,
-    /// Motions that were met, the latest last.
+    has_second: bool,
+    /// The mixed derivatives, as long as they are known.
+    second: Option<Second>,
+    /// Motions that were met, the latest last. They are moved in and out.
+    #[allow(clippy::vec_box)]
     pieces: Vec<Box<Piece<'a>>>,
     history: History,
     has_started: bool,
@@ -95,6 +108,8 @@ impl<'a> Tangents<'a> {
             },
             columns: Vec::new(),
             kept: options.keep,
+            has_second: false,
+            second: None,
             kinds,
             pieces: Vec::new(),
             history: History::default(),
@@ -103,6 +118,13 @@ impl<'a> Tangents<'a> {
             found: Derivatives::default(),
             raised: None,
         }
+    }
+
+    /// With second derivatives.
+    #[must_use]
+    pub fn with_second(mut self) -> Self {
+        self.has_second = true;
+        self
     }
 
     /// The derivatives.
@@ -126,6 +148,10 @@ impl<'a> Tangents<'a> {
         piece
             .field
             .eval_unprojected(t, &mut z.clone(), &mut field)?;
+        if self.has_second {
+            let at = (t, &z[..]);
+            self.second = Some(at_start(&mut piece, at, &field, &self.kinds)?);
+        }
         for kind in &self.kinds {
             let mut states = vec![0.0; n];
             match *kind {
@@ -138,6 +164,7 @@ impl<'a> Tangents<'a> {
         }
         if !piece.sliding.is_empty() {
             // A start beside the surfaces comes to them at once.
+            self.second = None;
             match entered(self.around.extended, &piece, &[], (t, &z))? {
                 Some(entry) => self.columns.iter_mut().for_each(|c| entry.apply(n, c)),
                 None => piece.project(t, &z, &mut self.columns)?,
@@ -157,11 +184,23 @@ impl<'a> Tangents<'a> {
         if self.kept != Keep::Steps {
             self.found.t.clear();
             self.found.values.clear();
+            self.found.second.clear();
         }
         self.found.t.push(t);
         for column in &self.columns {
             let states = &column[..self.around.extended.n];
             self.found.values.extend_from_slice(states);
+        }
+        if self.has_second {
+            let n = self.around.extended.n;
+            match &self.second {
+                Some(second) => self.found.second.extend(second.pairs.iter().flatten()),
+                None => {
+                    self.found.second_lost.get_or_insert(t);
+                    let unknown = pairs(self.kinds.len()).flat_map(|_| vec![f64::NAN; n]);
+                    self.found.second.extend(unknown);
+                }
+            }
         }
     }
 
@@ -174,6 +213,7 @@ impl<'a> Tangents<'a> {
 
     fn lose(&mut self, lost: Lost) {
         self.lost = Some(lost);
+        self.second = None;
         self.columns
             .iter_mut()
             .for_each(|column| column.fill(f64::NAN));
@@ -181,8 +221,9 @@ impl<'a> Tangents<'a> {
 
     /// The motion of this mode, to be put back.
     fn take_piece(&mut self, mode: &Mode, q: &[f64]) -> Box<Piece<'a>> {
-        let is_known = |piece: &Box<Piece>| piece.is_of(&self.around, mode, q);
-        match self.pieces.iter().rposition(is_known) {
+        let around = &self.around;
+        let mut known = self.pieces.iter();
+        match known.rposition(|piece| piece.is_of(around, mode, q)) {
             Some(place) => self.pieces.remove(place),
             None => Box::new(Piece::new(&self.around, mode, q)),
         }
@@ -208,7 +249,13 @@ impl<'a> Tangents<'a> {
                 step.at(t, x);
                 Ok(())
             };
-            piece.advance(along, (t0, step.t_end), &mut self.columns)?;
+            let span = (t0, step.t_end);
+            if let Some(mut second) = self.second.take() {
+                if piece.advance_pairs(along, span, &self.columns, &mut second)? {
+                    self.second = Some(second);
+                }
+            }
+            piece.advance(along, span, &mut self.columns)?;
             let z = self.around.extended.state(step.x_end);
             piece.project(step.t_end, &z, &mut self.columns)?;
             self.put_back(piece);
@@ -227,18 +274,21 @@ impl<'a> Tangents<'a> {
         let mut before = self.take_piece(record.mode[0], record.discrete[0]);
         self.around.take_sides(record.mode[0]);
         let mut after = self.take_piece(record.mode[1], record.discrete[1]);
+        let around = self.around.clone();
         let mut instant = Instant {
+            around: &around,
             extended: self.around.extended,
             record,
             before: &mut before,
             after: &mut after,
         };
         if record.t[0] != record.t[1] {
+            self.second = None;
             let time = instant.time(&self.weights, &mut 0.0)?.ok();
             self.jump(record, time, &after)?;
         } else {
             let columns = self.columns.clone();
-            let mut found = instant.pass(&self.weights, &mut self.columns)?;
+            let mut found = instant.pass(&self.weights, &mut self.columns, &mut self.second)?;
             found.lost = self.lost.or(found.lost);
             self.history.push(past(record, &columns, found.dt.clone()));
             found.lost.into_iter().for_each(|lost| self.lose(lost));

@@ -98,7 +98,12 @@ impl SparseRows {
 
     /// Entry (i, i).
     pub fn diagonal(&self, i: usize) -> f64 {
-        let found = self.row(i).find(|&(column, _)| column == i);
+        self.entry(i, i)
+    }
+
+    /// Entry (i, j).
+    pub fn entry(&self, i: usize, j: usize) -> f64 {
+        let found = self.row(i).find(|&(column, _)| column == j);
         found.map_or(0.0, |(_, value)| value)
     }
 

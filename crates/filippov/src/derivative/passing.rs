@@ -1,0 +1,150 @@
+//! Instants of all kinds, on the way forward and back.
+
+use super::forms::Second;
+use super::instant::{Instant, Lost, Passage, Weights};
+use super::one_sided::{agree, OneSided};
+use super::second::SecondOrder;
+use crate::error::FieldError;
+use crate::vectors::dot;
+
+/// The derivatives of an instant: of its time, and of the state behind it by the state before.
+#[derive(Clone, Debug)]
+pub struct InstantDerivative {
+    /// The time.
+    pub t: f64,
+    /// The derivative of the time by each column; NaN where it is not known.
+    pub dt: Vec<f64>,
+    /// The saltation matrix, n rows of n entries.
+    pub saltation: Vec<f64>,
+    /// What parameters add to their own columns, n rows of one entry for each of them.
+    pub by_parameters: Vec<f64>,
+    /// 1 / c with the cosine c = |dg . F| / (|dg| |F|) of the angle between motion and normal, F = (1, f) the motion before, in
+    /// which time is measured by the span of the run and each state by rtol |x| + atol, both over rtol.
+    pub condition: f64,
+    /// Why the derivatives end here, if they do.
+    pub lost: Option<Lost>,
+    /// The derivatives by sides, where they differ.
+    pub sides: Vec<OneSided>,
+    /// At an impact without speed: by how much the state behind differs from the undisturbed motion, for each unit of the root of the
+    /// depth that this would reach.
+    pub square_root: Vec<f64>,
+}
+
+impl InstantDerivative {
+    /// An instant at this time of which nothing is known.
+    pub(super) fn unknown(t: f64, n_columns: usize, (n, m): (usize, usize)) -> Self {
+        InstantDerivative {
+            t,
+            dt: vec![f64::NAN; n_columns],
+            saltation: vec![f64::NAN; n * n],
+            by_parameters: vec![f64::NAN; n * m],
+            condition: f64::NAN,
+            lost: None,
+            sides: Vec::new(),
+            square_root: Vec::new(),
+        }
+    }
+}
+
+impl Instant<'_, '_> {
+    /// The derivatives of the instant, and the columns after it.
+    pub(super) fn pass(
+        &mut self,
+        weights: &Weights,
+        columns: &mut [Vec<f64>],
+        second: &mut Option<Second>,
+    ) -> Result<InstantDerivative, FieldError> {
+        let (n, m) = (self.extended.n, self.extended.n_parameters());
+        let mut found = InstantDerivative::unknown(self.record.t[0], columns.len(), (n, m));
+        let Passage {
+            time,
+            changes,
+            goes_on,
+        } = match self.through(weights, &mut found.condition)? {
+            Ok(passage) => passage,
+            Err(lost) => {
+                found.lost = Some(lost);
+                self.add_sides(&mut found)?;
+                return Ok(found);
+            }
+        };
+        let dt = found.dt.iter_mut().zip(&*columns);
+        dt.for_each(|(dt, column)| *dt = dot(&time, column));
+        if let Some(pairs) = second.take() {
+            let mut order = SecondOrder {
+                extended: self.extended,
+                record: self.record,
+                before: self.before,
+                after: self.after,
+                time: &time,
+                goes_on,
+            };
+            *second = order.pass(columns, &pairs)?;
+        }
+        let through = |column: &mut [f64]| changes.iter().for_each(|one| one.apply(n, column));
+        columns.iter_mut().for_each(|column| through(column));
+        let mut unit = vec![0.0; n + m];
+        for i in 0..n + m {
+            unit.fill(0.0);
+            unit[i] = 1.0;
+            through(&mut unit);
+            for (r, entry) in unit.iter().enumerate().take(n) {
+                match i.checked_sub(n) {
+                    None => found.saltation[r * n + i] = *entry,
+                    Some(p) => found.by_parameters[r * m + p] = *entry,
+                }
+            }
+        }
+        let is_finite = columns.iter().flatten().all(|v| v.is_finite());
+        found.lost = (!is_finite).then_some(Lost::NotFinite);
+        Ok(found)
+    }
+
+    /// Adds what is known of an instant without a derivative.
+    fn add_sides(&mut self, found: &mut InstantDerivative) -> Result<(), FieldError> {
+        let sizes = (self.extended.n, self.extended.n_parameters());
+        let cones = match found.lost {
+            Some(Lost::OneSided) => self.cones()?.unwrap_or_default(),
+            Some(Lost::Grazing) => {
+                found.square_root = self.square_root()?;
+                self.touching()?
+            }
+            _ => Vec::new(),
+        };
+        found.sides = cones.iter().map(|cone| cone.matrices(sizes)).collect();
+        Ok(())
+    }
+
+    /// What the instant does, whatever its kind.
+    pub(super) fn through(
+        &mut self,
+        weights: &Weights,
+        condition: &mut f64,
+    ) -> Result<Result<Passage, Lost>, FieldError> {
+        let sizes = (self.extended.n, self.extended.n_parameters());
+        let lost = match self.passage(weights, condition)? {
+            Err(lost) => lost,
+            found => return Ok(found),
+        };
+        if lost == Lost::OneSided {
+            if let Some(mut cones) = self.cones()?.filter(|cones| agree(cones, sizes)) {
+                if let Ok(time) = self.time(weights, condition)? {
+                    return Ok(Ok(Passage {
+                        time,
+                        changes: cones.swap_remove(0).changes,
+                        goes_on: false,
+                    }));
+                }
+            }
+        }
+        // Where the field is the same on both sides of a surface, a touch changes nothing.
+        if lost == Lost::Grazing && self.touching()?.len() == 1 {
+            return Ok(Ok(Passage {
+                time: vec![f64::NAN; sizes.0 + sizes.1],
+                changes: Vec::new(),
+                goes_on: true,
+            }));
+        }
+        Ok(Err(lost))
+    }
+}

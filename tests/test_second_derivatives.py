@@ -1,0 +1,177 @@
+"""Second derivatives of runs: the reference K2, closed forms, and differences of first derivatives."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import filippov as fl
+import numpy as np
+import pytest
+from fuzz.systems import build, random_case
+from reference import DATA
+
+METHODS = ("Taylor", "DOP853", "DOPRI5", "Rodas5P")
+TIGHT: dict[str, Any] = {"rtol": 1e-12, "atol": 1e-12}
+
+
+def friction(t: float, x: Any, F: float = 0.4, omega: float = 1 / 3) -> list[Any]:
+    return [x[1], -x[0] + np.sin(omega * t) - F * np.sign(x[1])]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_second_derivatives_of_the_friction_transient(method: str) -> None:
+    cases = json.loads((DATA / "K2_sensitivities.json").read_text())["cases"]
+    case = next(case for case in cases if case["id"] == "friction_transient")["second_derivatives"]
+    options = {**TIGHT, "method": method}
+    sol = fl.System(friction, n=2).solve((0, 14), [1.0, 2.0], wrt=["y0", "F", "omega"], order=2, **options)
+    found = sol.derivative(order=2)
+    assert found.shape == (2, 4, 4)
+    np.testing.assert_array_equal(found, found.transpose(0, 2, 1))
+    np.testing.assert_array_equal(found[1], np.zeros((4, 4)))  # it sticks
+    for line in case["cases"]:
+        direction = np.array(line["direction"], dtype=float)
+        second = np.einsum("nab,a,b->n", found, direction, direction)
+        exact = np.array(line["second"], dtype=float)
+        np.testing.assert_allclose(second, exact, rtol=1e-12 if method == "Taylor" else 1e-7)
+
+
+def by_differences(run: Any, start: Any, params: dict[str, float], d: float) -> Any:
+    """Return the central differences of the first derivatives by the start and the parameters."""
+    found = []
+    for column in range(len(start) + len(params)):
+        sides = []
+        for side in (d, -d):
+            moved, values = np.array(start, dtype=float), dict(params)
+            if column < len(start):
+                moved[column] += side
+            else:
+                values[list(params)[column - len(start)]] += side
+            sides.append(run(moved, values).derivative())
+        found.append((sides[0] - sides[1]) / (2 * d))
+    return np.moveaxis(np.array(found), 0, -1)
+
+
+def check(system: fl.System, span: tuple[float, float], start: Any, tolerance: float = 1e-6) -> None:
+    params = dict(system.params)
+
+    def run(start: Any, values: dict[str, float], order: int = 1) -> fl.Solution:
+        return system.solve(span, start, values, wrt="all", order=order, **TIGHT)
+
+    sol = run(start, params, 2)
+    expected = by_differences(run, start, params, 1e-5)
+    size = 1 + abs(expected).max()
+    np.testing.assert_allclose(sol.derivative(order=2), expected, atol=tolerance * size, rtol=0)
+
+
+def test_a_curved_surface_that_moves_is_crossed() -> None:
+    def fun(t: float, x: Any, a: float = 0.3, b: float = 0.7) -> list[Any]:
+        side = np.sign(x[0] ** 2 + x[1] ** 2 - 1 - a * np.sin(t))
+        return [1 + b * x[1] * side, -0.4 * x[0] + a * side * x[0] ** 2]
+
+    check(fl.System(fun, n=2), (0.0, 2.0), [0.2, 0.4])
+
+
+def test_sliding_on_a_curved_surface_that_moves() -> None:
+    def fun(t: float, x: Any, a: float = 0.2, b: float = 0.5) -> list[Any]:
+        side = np.sign(x[0] ** 2 + x[1] ** 2 - 1 - a * np.sin(t))
+        return [-2 * x[0] * side + b, -2 * x[1] * side + np.cos(b * t)]
+
+    system = fl.System(fun, n=2)
+    sol = system.solve((0, 1.5), [0.3, 0.4])
+    assert 0 in sol.segments[-1].mode
+    check(system, (0.0, 1.5), [0.3, 0.4])
+
+
+def test_an_impact_on_a_curved_wall_that_shakes() -> None:
+    wall = fl.Reset(
+        lambda t, x, a: x[0] + 0.1 * x[1] ** 2 - a * np.sin(3 * t),
+        lambda t, x, r, a: [x[0], x[1], -r * x[2] + a * np.cos(3 * t), x[3] * (1 - 0.1 * x[2] ** 2)],
+        direction="down",
+    )
+    system = fl.System(
+        lambda t, x, r=0.8, a=0.1: [x[2], x[3], -9.81 + 0 * (r + a), -0.1 * x[3]], n=4, resets=wall
+    )
+    check(system, (0.0, 0.9), [1.0, 0.3, 0.2, 0.4], 1e-5)
+
+
+def test_a_reset_at_known_times() -> None:
+    kick = fl.Reset(times=[0.4, 0.9], map=lambda t, x, k: [x[0] + k * x[1] ** 2, x[1] - k * np.sin(x[0])])
+    check(
+        fl.System(lambda t, x, k=0.3: [x[1], -np.sin(x[0]) + 0 * k], n=2, resets=kick), (0.0, 1.2), [0.5, 1.0]
+    )
+
+
+def test_derivatives_by_the_initial_time() -> None:
+    # x' = a t x from x0 at t0: x0 exp(a (T^2 - t0^2) / 2).
+    sol = fl.System(lambda t, x, a=0.3: [a * t * x[0]], n=1).solve(
+        (0.5, 2.0), [1.2], wrt=["y0", "t0", "a"], order=2, **TIGHT
+    )
+    x0, t0, a, T = 1.2, 0.5, 0.3, 2.0
+    grown, half = np.exp(a * (T**2 - t0**2) / 2), (T**2 - t0**2) / 2
+    exact = [
+        [0.0, -a * t0 * grown, half * grown],
+        [-a * t0 * grown, x0 * grown * (a**2 * t0**2 - a), -x0 * t0 * grown * (1 + a * half)],
+        [half * grown, -x0 * t0 * grown * (1 + a * half), x0 * half**2 * grown],
+    ]
+    np.testing.assert_allclose(sol.derivative(order=2)[0], exact, rtol=1e-11, atol=1e-12)
+
+
+def test_second_derivatives_between_steps() -> None:
+    system = fl.System(friction, n=2)
+    sol = system.solve((0, 14), [1.0, 2.0], wrt="all", order=2, **TIGHT)
+    for t in (0.7, 5.0, 11.3):
+        ended = system.solve((0, t), [1.0, 2.0], wrt="all", order=2, **TIGHT)
+        expected = ended.derivative(order=2)
+        np.testing.assert_allclose(
+            sol.derivative(t, order=2), expected, atol=1e-9 * (1 + abs(expected).max())
+        )
+    assert sol.derivative([1.0, 2.0], order=2).shape == (2, 4, 4, 2)
+
+
+@pytest.mark.parametrize("first", range(0, 60, 30))
+@pytest.mark.filterwarnings("ignore::filippov.FilippovWarning")
+def test_random_systems_against_differences_of_first_derivatives(first: int) -> None:
+    compared = 0
+    for seed in range(first, first + 30):
+        problem = build(random_case(seed).source)
+        options = {"rtol": 1e-11, "atol": 1e-11, "max_events": 2000, "max_steps": 20_000}
+        system = fl.System(problem.rhs, n=len(problem.y0), resets=problem.resets or None)
+
+        def run(start: Any, order: int = 1, system: Any = system, end: float = problem.t_end) -> fl.Solution:
+            return system.solve((0, end), start, wrt="y0", order=order, **options)  # noqa: B023
+
+        sol = run(problem.y0, 2)
+        if not sol.success or any(warning.code != "other" for warning in sol.warnings):
+            continue
+        found = sol.derivative(order=2)
+        two = [by_differences(lambda start, _: run(start), problem.y0, {}, d) for d in (2e-6, 4e-6)]
+        size = 1 + abs(two[0]).max()
+        # Where the differences by two lengths differ, they are no oracle.
+        if np.isfinite(two).all() and abs(two[0] - two[1]).max() < 1e-3 * size:
+            np.testing.assert_allclose(found, two[0], atol=3e-3 * size, rtol=0, err_msg=f"seed {seed}")
+            compared += 1
+    assert compared > 8
+
+
+def test_wrong_orders_are_refused() -> None:
+    system = fl.System(friction, n=2)
+    for order in (0, 3, "2", True):
+        with pytest.raises(fl.InputError, match=r"order: derivatives are of order 1 or 2"):
+            system.solve((0, 1), [1.0, 2.0], wrt="y0", order=order)
+    with pytest.raises(fl.InputError, match=r"order: it is that of derivatives"):
+        system.solve((0, 1), [1.0, 2.0], order=2)
+    with pytest.raises(fl.ModelError, match=r"no second derivatives were followed: solve with order=2"):
+        system.solve((0, 1), [1.0, 2.0], wrt="y0").derivative(order=2)
+    with pytest.raises(ValueError, match=r"order: derivatives are of order 1 or 2, not 3"):
+        system.solve((0, 1), [1.0, 2.0], wrt="y0").derivative(order=3)
+
+
+def test_where_second_derivatives_end_is_named() -> None:
+    def two(t: float, x: Any) -> list[Any]:
+        return [0.5 - np.sign(x[0]), 0.2 + 0.1 * np.sign(x[0]) - np.sign(x[1]), np.sign(x[0]) * x[2]]
+
+    with pytest.warns(fl.FilippovWarning, match="second derivatives are not known from t ="):
+        sol = fl.System(two, n=3).solve((0, 3), [0.3, 0.2, 1.0], wrt="y0", order=2)
+    assert np.isfinite(sol.derivative()).all()
+    assert np.isnan(sol.derivative(order=2)).all()
