@@ -50,9 +50,9 @@ def recording(take: Decided) -> Iterator[None]:
         return run
 
     def run_many(
-        core: Any, t0: float, t1: float, y0: Any, p: Any, options: Any, events: Any, actions: Any, n: int
+        core: Any, t0: float, t1: float, y0: Any, p: Any, options: Any, events: Any, actions: Any, *rest: Any
     ) -> Any:
-        runs, raised = solve_many(core, t0, t1, y0, p, options, events, actions, n)
+        runs, raised = solve_many(core, t0, t1, y0, p, options, events, actions, *rest)
         for run, values in zip(runs, p, strict=False):
             hand_on(run, core, values, options, actions)
         return runs, raised

@@ -45,6 +45,8 @@ def run(what: str, store: str) -> Any:
         return fl.poincare(friction, section, (0.0, 1e9), start)
     if what == "ensemble":
         return friction.ensemble((0, 1e5), np.ones((1000, 2)))
+    if what == "ensemble with wrt":
+        return friction.ensemble((0, 1e5), np.ones((1000, 2)), wrt=["y0", "F"])
     if what == "basins":
         grid = np.linspace(-2.0, 2.0, 1000)
         return fl.basins(fl.System(bistable, n=2, states=("a", "b")), None, (0, 100), {"a": grid, "b": grid})
@@ -64,7 +66,8 @@ def told(partial: Any) -> dict[str, Any]:
     if isinstance(partial, fl.Solution):
         return {"t": float(partial.t[-1]), "reason": partial.message}
     if isinstance(partial, fl.Ensemble):
-        return {"t": partial.t.tolist(), "status": partial.status.tolist()}
+        derivative = partial.derivative().shape if partial.wrt else None
+        return {"t": partial.t.tolist(), "status": partial.status.tolist(), "derivative": derivative}
     if "status" not in partial:
         return {"returns": partial.sizes["obs"], "reason": partial.attrs["reason"]}
     reasons = partial.reason.attrs["flag_meanings"].split()

@@ -375,8 +375,6 @@ def test_what_has_no_derivatives_is_refused() -> None:
         smooth.solve((0, 1), [1.0], wrt="params")
     with pytest.raises(fl.InputError, match="wrt: derivatives are followed forward"):
         smooth.solve((1, 0), [1.0], wrt="y0")
-    with pytest.raises(fl.InputError, match="wrt: derivatives are those of single runs"):
-        smooth.ensemble((0, 1), [[1.0]], wrt="y0")
     with pytest.raises(fl.ModelError, match="no derivatives were followed"):
         smooth.solve((0, 1), [1.0]).derivative()
     kept = pickle.loads(pickle.dumps(smooth.solve((0, 1), [1.0], wrt="y0")))

@@ -81,12 +81,14 @@ def test_basins_have_their_attractors(tmp_path: Path) -> None:
     assert found["reasons"]["not_run"] > 1000
 
 
-def test_an_ensemble_has_its_first_members(tmp_path: Path) -> None:
-    found = interrupted("ensemble", tmp_path)
+@pytest.mark.parametrize("what", ["ensemble", "ensemble with wrt"])
+def test_an_ensemble_has_its_first_members(tmp_path: Path, what: str) -> None:
+    found = interrupted(what, tmp_path)
     assert 0 < len(found["t"]) < 1000
     assert set(found["status"]) <= {0, -1}
     assert -1 in found["status"]
     assert all(t > 0.0 for t in found["t"])
+    assert found["derivative"] == ([len(found["t"]), 2, 3] if "wrt" in what else None)
 
 
 def test_a_store_is_resumed(tmp_path: Path) -> None:

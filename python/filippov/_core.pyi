@@ -280,6 +280,7 @@ def solve_many(
     events: list[tuple[Callable[[float, _Array], float] | TracedEvent, float, int, str]],
     actions: list[tuple[str, list[float], Any, str]],
     threads: int,
+    wrt: tuple[list[tuple[int, int]], list[int], int] | None = None,
 ) -> tuple[list[Run], BaseException | None]: ...
 def warning_codes() -> list[str]: ...
 def solve_points(

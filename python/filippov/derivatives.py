@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from typing import Any, NamedTuple
 
 from filippov._core import TracedSystem
@@ -10,8 +10,9 @@ from filippov.errors import InputError
 from filippov.prepare import Prepared
 from filippov.unknown import did_you_mean
 
-__all__ = ["Back", "Wanted", "check_wrt", "refuse_without_derivatives"]
+__all__ = ["FORWARD_ONLY", "Back", "Wanted", "check_wrt", "refuse_without_derivatives"]
 
+FORWARD_ONLY = "wrt: derivatives are followed forward in time only"
 _STATE, _START, _PARAMETER = 0, 1, 2
 
 
@@ -55,7 +56,7 @@ class Back(NamedTuple):
 def check_wrt(
     wrt: Any,
     states: Sequence[str],
-    params: Mapping[str, float],
+    params: Collection[str],
     discrete: Collection[str],
     order: Any = 1,
 ) -> Wanted:
@@ -68,8 +69,8 @@ def check_wrt(
         (both).
     states : sequence of str
         Names of the states.
-    params : mapping of str to float
-        The parameters of the system, its discrete states among them.
+    params : collection of str
+        Names of the parameters of the system in their order, its discrete states among them.
     discrete : collection of str
         Those that are discrete states.
     order : int, optional
@@ -141,4 +142,4 @@ def refuse_without_derivatives(
     if discrete:
         raise InputError(f"wrt: no derivatives pass through discrete states, here {', '.join(discrete)}")
     if t_span[1] < t_span[0]:
-        raise InputError("wrt: derivatives are followed forward in time only")
+        raise InputError(FORWARD_ONLY)

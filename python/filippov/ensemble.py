@@ -12,16 +12,18 @@ import numpy as np
 import numpy.typing as npt
 
 from filippov._core import Run, solve_many
-from filippov.arrays import finite_array
+from filippov.arrays import finite_array, real_array
 from filippov.core_events import CoreEvent, core_events
-from filippov.errors import InputError, Interrupted
+from filippov.derivatives import FORWARD_ONLY, Wanted, check_wrt, refuse_without_derivatives
+from filippov.errors import InputError, Interrupted, ModelError
 from filippov.events import EventSpec, normalise_events
 from filippov.notices import show_summary
-from filippov.options import NOT_FOR_MANY, OPTIONS, check_options, check_t_span, in_order
+from filippov.options import OPTIONS, check_options, check_t_span, in_order
 from filippov.outputs import at_ends, refuse_outputs_that_fail
 from filippov.prepare import Prepared
 from filippov.sliding_policy import fit_kappa
 from filippov.solution import Solution
+from filippov.switches import NO_DERIVATIVES, derivative_warnings
 from filippov.unknown import check_unknown
 
 if TYPE_CHECKING:
@@ -47,6 +49,8 @@ class Ensemble(Sequence[Solution]):
         How many warnings each run has; `Solution.warnings` of a member has them.
     outputs : dict of str to ndarray, shape (n_members,)
         The outputs of the system at the ends of the runs, by name.
+    wrt : tuple of str
+        The names of the columns of `derivative`; empty if no derivatives were followed.
 
     An index gives the `Solution` of a member, with what `keep` left of it; its `message` says why it ended.
     """
@@ -58,14 +62,25 @@ class Ensemble(Sequence[Solution]):
         prepared: Sequence[Prepared],
         parameters: Sequence[str],
         values: Array,
-        **origin: Any,
+        *,
+        t_span: tuple[float, float],
+        states: tuple[str, ...],
+        has_events: bool,
+        dense_output: bool,
+        wanted: Wanted | None,
+        events: tuple[EventSpec, ...],
     ) -> None:
         self._runs = runs
         self._system = system
         self._prepared = prepared  # one per member
         self._parameters = tuple(parameters)
         self._values = values  # one row per member
-        self._origin = origin
+        self._t_span = t_span
+        self._states = states
+        self._has_events = has_events
+        self._dense_output = dense_output
+        self._wanted = wanted
+        self._events = events
 
     def __len__(self) -> int:
         return len(self._runs)
@@ -78,8 +93,18 @@ class Ensemble(Sequence[Solution]):
         if isinstance(index, slice):
             return [self[i] for i in range(*index.indices(len(self)))]
         values = dict(zip(self._parameters, self._values[index].tolist(), strict=True))
-        prepared = self._prepared[index]
-        return Solution.from_run(self._runs[index], self._system, prepared, values=values, **self._origin)
+        return Solution.from_run(
+            self._runs[index],
+            self._system,
+            self._prepared[index],
+            values=values,
+            t0=self._t_span[0],
+            states=self._states,
+            has_events=self._has_events,
+            dense_output=self._dense_output,
+            wanted=self._wanted,
+            events=self._events,
+        )
 
     def __iter__(self) -> Iterator[Solution]:
         return (self[i] for i in range(len(self)))
@@ -108,8 +133,14 @@ class Ensemble(Sequence[Solution]):
     @cached_property
     def n_warnings(self) -> npt.NDArray[np.int64]:
         """How many warnings each run has, shape (n_members,)."""
-        pairs = zip(self._runs, self._prepared, strict=False)  # an interrupted ensemble has fewer runs
-        return np.array([run.n_warnings + len(prepared.warnings) for run, prepared in pairs], dtype=np.int64)
+
+        def count(run: Run, prepared: Prepared) -> int:
+            of_derivatives = derivative_warnings(run, self._t_span[0], prepared.surfaces)
+            return run.n_warnings + len(prepared.warnings) + len(of_derivatives)
+
+        # An interrupted ensemble has fewer runs.
+        pairs = zip(self._runs, self._prepared, strict=False)
+        return np.array([count(run, prepared) for run, prepared in pairs], dtype=np.int64)
 
     @cached_property
     def outputs(self) -> dict[str, Array]:
@@ -120,6 +151,65 @@ class Ensemble(Sequence[Solution]):
         return {
             name: at_ends(self._system, fun, f"the output {name!r}", members) for name, fun in given.items()
         }
+
+    @property
+    def wrt(self) -> tuple[str, ...]:
+        """The names of the columns of `derivative`; empty if no derivatives were followed."""
+        return () if self._wanted is None else self._wanted.names
+
+    def derivative(self, t: npt.ArrayLike | None = None, side: str = "right") -> Array:
+        """Return the derivative of the state of every run, as `Solution.derivative` does of one.
+
+        Parameters
+        ----------
+        t : float or array_like, shape (k,), optional
+            Times, by default the end of each run. They need ``keep="steps"``.
+        side : {"right", "left"}, optional
+            Which limit is taken at a switch, where the derivative jumps.
+
+        Returns
+        -------
+        ndarray, shape (n_members, n, len(wrt)) or (n_members, n, len(wrt), k)
+            NaN where a run has no derivative, and at times that it did not reach.
+
+        Raises
+        ------
+        ModelError
+            If no derivatives were followed; with other times than the end, if the steps were not kept.
+        ValueError
+            If a time is outside of the interval of the ensemble, or `side` is unknown.
+
+        Examples
+        --------
+        >>> import numpy as np, filippov as fl
+        >>> stops = fl.System(lambda t, x, a: [-a * np.sign(x[0])], n=1, params={"a": 0.5})
+        >>> runs = stops.ensemble((0, 3), [1.0], {"a": [0.2, 0.5]}, wrt=["y0", "a"])
+        >>> runs.wrt, runs.derivative().round(12).tolist()
+        (('x[0]', 'a'), [[[1.0, -3.0]], [[0.0, 0.0]]])
+        """
+        if not self.wrt:
+            raise ModelError(NO_DERIVATIVES)
+        if side not in ("right", "left"):
+            raise ValueError(f'side: "right" or "left" is needed, not {side!r}')
+        shape = len(self), len(self._states), len(self.wrt)
+        if t is None:
+            return np.reshape([member.derivative() for member in self], shape)
+        if not self._dense_output:
+            raise ModelError('the runs are no functions of time: give keep="steps" to the ensemble')
+        times = real_array(t, "t", "a number or a one-dimensional array")
+        if times.ndim > 1:
+            raise ValueError(f"t: a number or a one-dimensional array is needed, not shape {times.shape}")
+        flat = np.atleast_1d(times)
+        t0, t1 = self._t_span
+        outside = flat[~((flat >= t0) & (flat <= t1))]
+        if len(outside):
+            raise ValueError(f"t: {outside[0]:.17g} is outside of [{t0:.17g}, {t1:.17g}]")
+        found = np.full((*shape, len(flat)), np.nan)
+        for values, run, member in zip(found, self._runs, self, strict=True):
+            is_reached = flat <= run.t_last
+            if is_reached.any():
+                values[..., is_reached] = member.derivative(flat[is_reached], side)
+        return found if times.ndim else found[..., 0]
 
     def __repr__(self) -> str:
         failed = int(np.count_nonzero(~self.success))
@@ -137,17 +227,26 @@ def run_ensemble(
 ) -> Ensemble:
     """Run an ensemble; all arguments as in `System.ensemble`."""
     t0, t1 = check_t_span(t_span)
+    wrt = options.get("wrt")
+    if options.get("order", 1) != 1:
+        raise InputError("order: the derivatives of ensembles are of order 1")
+    if t1 < t0 and wrt is not None:
+        raise InputError(FORWARD_ONLY)
     if t1 <= t0:
         raise InputError("t_span: an ensemble runs forward, t1 > t0")
     states, values = _members(system, y0, params)
     n = states.shape[1]
+    names = system.state_names(n)
     checked = check_options({"keep": "last", **_known(options, system)}, (t0, t1), n)
+    wanted = None if wrt is None else check_wrt(wrt, names, values, system.discrete)
     n_threads = min(check_threads(threads), len(states))
     specs = normalise_events(events)
     table = np.column_stack(list(values.values())) if values else np.empty((len(states), 0))
     groups = _groups(system, t0, states, tuple(values), table, specs or [])
     for group in groups:
         fit_kappa(checked.sliding, group.prepared.surfaces)
+        if wanted is not None:
+            refuse_without_derivatives(group.prepared, system.discrete, (t0, t1))
     runs: list[Run] = []
     raised: BaseException | None = None
     for group in groups:
@@ -161,6 +260,7 @@ def run_ensemble(
             group.events,
             list(group.prepared.actions),
             n_threads,
+            None if wanted is None else wanted.for_core(),
         )
         runs += done
         if raised is not None:
@@ -171,10 +271,12 @@ def run_ensemble(
         [group.prepared for group in groups for _ in range(len(states))[group.members]],
         tuple(values),
         table,
-        t0=t0,
-        states=system.state_names(n),
+        t_span=(t0, t1),
+        states=names,
         has_events=specs is not None,
         dense_output=checked.dense_output and checked.keep == "steps",
+        wanted=wanted,
+        events=tuple(specs or ()),
     )
     if isinstance(raised, KeyboardInterrupt):
         raise Interrupted(
@@ -236,8 +338,6 @@ def _known(options: Mapping[str, Any], system: System) -> dict[str, Any]:
     for name in ("fun", "surfaces", "args", "resets"):
         if options.get(name) is not None:
             raise InputError(f"{name}: belongs to the System; pass it to fl.System, not to the ensemble")
-    if options.get("wrt") is not None:
-        raise InputError(NOT_FOR_MANY)
     for name in ("nonunique", "progress"):
         if options.get(name) in ("branch", True) or callable(options.get(name)):
             raise InputError(f"{name}: {options[name]!r} is not for an ensemble")

@@ -23,7 +23,6 @@ __all__ = ["Options", "check_options", "check_t_span", "check_y0", "in_order"]
 
 Array = npt.NDArray[np.float64]
 
-NOT_FOR_MANY = "wrt: derivatives are those of single runs, by solve_ivp and System.solve"
 _NAMED_METHODS = ("auto", "DOPRI5", "Taylor", "DOP853", "Rodas5P", "Midpoint")
 _METHODS = {"RK45": "DOPRI5", **{name: name for name in _NAMED_METHODS}}
 _STIFF_METHODS = ("Radau", "BDF", "LSODA")
@@ -136,8 +135,6 @@ def check_options(given: Mapping[str, Any], t_span: tuple[float, float], n: int)
     """
     if not given:
         return _DEFAULT_OPTIONS
-    if given.get("wrt") is not None:
-        raise InputError(NOT_FOR_MANY)
     key = repeatable_key(given)
     if key in _KNOWN:
         return _KNOWN[key]

@@ -249,6 +249,7 @@ class Solution:
         has_events: bool,
         dense_output: bool,
         wanted: Wanted | None = None,
+        events: tuple[EventSpec, ...] = (),
     ) -> Solution:
         """Present what the core computed. Every field is made when it is first asked for.
 
@@ -272,6 +273,8 @@ class Solution:
             Whether `sol` is kept.
         wanted : Wanted or None
             By what the run was differentiated.
+        events : tuple of EventSpec
+            The events, for the derivatives of their times.
 
         Returns
         -------
@@ -279,7 +282,9 @@ class Solution:
         """
         solution = cls()
         solution._run = run
-        solution._origin = _Origin(system, prepared, values, t0, states, has_events, dense_output, wanted)
+        solution._origin = _Origin(
+            system, prepared, values, t0, states, has_events, dense_output, wanted, events
+        )
         return solution
 
     @cached_property

@@ -367,7 +367,8 @@ class System(Points, Saving):
         threads : int, optional
             Number of threads; by default one per core. The results do not depend on it, to the bit.
         **options
-            Options of `solve_ivp`; `keep` is ``"last"`` by default.
+            Options of `solve_ivp`; `keep` is ``"last"`` by default. With `wrt`, `Ensemble.derivative` has the
+            derivatives of all members.
 
         Returns
         -------

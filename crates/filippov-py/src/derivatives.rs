@@ -11,7 +11,7 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::systems::raised;
+use crate::systems::{raised, refused};
 
 /// The columns, each a kind (0: a component of the initial state, 1: the initial time, 2: a parameter) with a place; the parameters by
 /// which is differentiated; and the order of the derivatives, 0 where the run is kept for gradients of costs instead.
@@ -126,6 +126,16 @@ impl From<FieldError> for Failure {
     }
 }
 
+impl From<Failure> for PyErr {
+    fn from(failure: Failure) -> Self {
+        match failure {
+            Failure::Refused(error) => refused(error),
+            Failure::Raised(error) => raised(error),
+            Failure::CalledMap => PyValueError::new_err("wrt: the map of a reset is not traced"),
+        }
+    }
+}
+
 fn unknown(t: f64) -> PyErr {
     PyValueError::new_err(format!("t = {t} has no derivative here"))
 }
@@ -145,7 +155,7 @@ pub type LostAt = (f64, &'static str);
 type RunOf<'r> = (&'r Solution, &'r filippov::action::Actions<'r>);
 
 impl RunDerivatives {
-    /// The derivative of the state at these times, n rows of one entry per column for each.
+    /// The derivative of the state at these times, n rows of one entry per column for each; NaN if the run took no step.
     pub fn at<'py>(
         &self,
         py: Python<'py>,
@@ -153,11 +163,15 @@ impl RunDerivatives {
         (solution, actions): RunOf<'_>,
         (times, side): (&[f64], Side),
     ) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
+        let n = solution.n_states;
+        if self.found.t.is_empty() {
+            return Ok(times.iter().map(|_| self.not_known(py, n)).collect());
+        }
         self.with(system, (solution, actions), |run| {
             let at = |&t: &f64| {
                 let values = run.at(t, side).map_err(raised)?;
                 let values = values.ok_or_else(|| unknown(t))?;
-                Ok(transposed(py, &values, self.kinds.len(), solution.n_states))
+                Ok(transposed(py, &values, self.kinds.len(), n))
             };
             times.iter().map(at).collect()
         })
@@ -176,7 +190,7 @@ impl RunDerivatives {
         self.with(system, run, |run| {
             let at = |&t: &f64| {
                 let values = run.second_at(t, side).map_err(raised)?;
-                let values = values.ok_or_else(|| unknown(t))?;
+                let values = values.unwrap_or_else(|| vec![f64::NAN; n * n_pairs]);
                 Ok(transposed(py, &values, n_pairs, n))
             };
             times.iter().map(at).collect()
@@ -186,8 +200,10 @@ impl RunDerivatives {
     /// The same at the end of the run.
     pub fn second_at_end<'py>(&self, py: Python<'py>, n: usize) -> Bound<'py, PyArray2<f64>> {
         let n_pairs = self.kinds.len() * (self.kinds.len() + 1) / 2;
-        let last = self.found.second.len().saturating_sub(n * n_pairs);
-        transposed(py, &self.found.second[last..], n_pairs, n)
+        let last = self.found.second.len().checked_sub(n * n_pairs);
+        let known = last.map(|last| &self.found.second[last..]);
+        let unknown = vec![f64::NAN; n * n_pairs];
+        transposed(py, known.unwrap_or(&unknown), n_pairs, n)
     }
 
     /// The time from which on second derivatives are not known.
@@ -282,11 +298,18 @@ impl RunDerivatives {
         Ok((entries, found.lost, found.starts_on))
     }
 
-    /// The derivative of the state at the end.
+    /// The derivative of the state at the end; NaN if the run took no step.
     pub fn at_end<'py>(&self, py: Python<'py>, n: usize) -> Bound<'py, PyArray2<f64>> {
         let size = n * self.kinds.len();
-        let last = self.found.values.len().saturating_sub(size);
-        transposed(py, &self.found.values[last..], self.kinds.len(), n)
+        match self.found.values.len().checked_sub(size) {
+            Some(last) => transposed(py, &self.found.values[last..], self.kinds.len(), n),
+            None => self.not_known(py, n),
+        }
+    }
+
+    fn not_known<'py>(&self, py: Python<'py>, n: usize) -> Bound<'py, PyArray2<f64>> {
+        let k = self.kinds.len();
+        transposed(py, &vec![f64::NAN; n * k], k, n)
     }
 
     /// The surfaces on which the run starts and that it leaves.

@@ -102,14 +102,17 @@ impl PreparedRun {
             .solve_interruptible(interrupt)
     }
 
-    /// Runs, and follows derivatives.
-    pub fn run_with_derivatives(
+    /// Runs, and follows the derivatives that are wanted, if any are.
+    pub fn run_differentiated(
         &self,
         t_span: (f64, f64),
         options: &Options,
-        (extension, wanted): (&Arc<Extension>, &Wanted),
+        wanted: Option<(&Arc<Extension>, &Wanted)>,
         interrupt: &mut dyn FnMut(f64) -> bool,
-    ) -> Result<(Solution, RunDerivatives), Failure> {
+    ) -> Result<(Solution, Option<RunDerivatives>), Failure> {
+        let Some((extension, wanted)) = wanted else {
+            return Ok((self.run(t_span, options, interrupt)?, None));
+        };
         let Some(system) = &self.compiled else {
             return Err(Failure::CalledMap);
         };
@@ -119,14 +122,15 @@ impl PreparedRun {
             .events(&events)
             .actions(&actions);
         let span = t_span.1 - t_span.0;
-        run_with_derivatives(
+        let (solution, derivatives) = run_with_derivatives(
             problem,
             (system, extension, &actions),
             options,
             span,
             wanted,
             interrupt,
-        )
+        )?;
+        Ok((solution, Some(derivatives)))
     }
 
     fn user_events(&self) -> Vec<UserEvent<'_>> {
@@ -207,14 +211,14 @@ impl PreparedRun {
 
     /// The result of the run as a Python object, which keeps of this what is asked for later: all actions where derivatives are,
     /// and else those that the forces of contacts follow from, since the times of a table are as many as its knots.
-    pub fn result(mut self, solution: Solution, has_derivatives: bool) -> Run {
-        if !has_derivatives {
+    pub fn result(mut self, solution: Solution, derivatives: Option<RunDerivatives>) -> Run {
+        if derivatives.is_none() {
             let is_at_surface = |trigger: &Trigger| matches!(trigger, Trigger::Surface { .. });
             self.given.retain(|(_, trigger, _)| is_at_surface(trigger));
             self.laws.retain(|law| is_at_surface(&law.trigger));
         }
         self.events.clear();
-        Run::new(self, solution)
+        Run::new(self, solution, derivatives)
     }
 }
 

@@ -65,21 +65,19 @@ pub struct Run {
 }
 
 impl Run {
-    pub fn new(prepared: PreparedRun, mut solution: Solution) -> Self {
+    pub fn new(
+        prepared: PreparedRun,
+        mut solution: Solution,
+        derivatives: Option<RunDerivatives>,
+    ) -> Self {
         let error = take_error(&mut solution);
         Run {
             n_visible: prepared.n_visible(),
             prepared,
             solution: Mutex::new(solution),
             error,
-            derivatives: None,
+            derivatives,
         }
-    }
-
-    /// The same with derivatives that were followed.
-    pub fn with_derivatives(mut self, derivatives: Option<RunDerivatives>) -> Self {
-        self.derivatives = derivatives;
-        self
     }
 
     fn system(&self) -> &CoreSystem {
@@ -162,12 +160,8 @@ pub fn take_error(solution: &mut Solution) -> Option<PyErr> {
 }
 
 /// Was a run ended by Ctrl-C in a function of the user?
-pub fn is_interruption(outcome: &Result<Solution, filippov::Error>) -> bool {
-    let Ok(Solution {
-        stop: Stop::FieldRaised(error),
-        ..
-    }) = outcome
-    else {
+pub fn is_interruption(solution: &Solution) -> bool {
+    let Stop::FieldRaised(error) = &solution.stop else {
         return false;
     };
     let raised = error.0.downcast_ref::<PyErr>();

@@ -1,17 +1,24 @@
 //! The call of the integrator.
 
-use filippov::{Clock, Keep, Method, Mode, NonUnique, Options, SlidingRule, Stabilization};
+use std::sync::Arc;
+
+use filippov::derivative::Extension;
+use filippov::{
+    Clock, Keep, Method, Mode, NonUnique, Options, SlidingRule, Solution, Stabilization,
+};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::clock::ManualClock;
-use crate::derivatives::{Failure, Wanted};
+use crate::derivatives::{Failure, RunDerivatives, Wanted};
 use crate::prepared_run::{ActionRow, EventRow, PreparedRun};
 use crate::run::{is_interruption, Run};
-use crate::systems::{raised, TracedSystem};
+use crate::systems::TracedSystem;
 use crate::threads::{on_threads, CHUNK_PER_THREAD, POLL_EVERY};
+
+type Outcome = Result<(Solution, Option<RunDerivatives>), Failure>;
 
 /// The options of a run, read once; `filippov.solve_ivp` checks them before.
 #[pyclass(frozen, module = "filippov._core")]
@@ -48,11 +55,7 @@ pub fn solve(
     let (y0, p) = (y0.as_slice()?.to_vec(), p.as_slice()?.to_vec());
     let prepared = PreparedRun::new(&system, t0, y0, p, &events, &actions)?;
     let RunOptions { options, progress } = options;
-    let traced = system.cast::<TracedSystem>().ok();
-    let extension = match (&wrt, traced) {
-        (Some(wanted), Some(traced)) => Some(traced.get().extension(&wanted.1)?),
-        _ => None,
-    };
+    let extension = extension_of(&system, wrt.as_ref())?;
     let wanted = extension.as_ref().zip(wrt.as_ref());
     let (solution, derivatives) = py
         .detach(|| {
@@ -68,30 +71,28 @@ pub fn solve(
                     py.check_signals().is_err() || matches!(reported, Some(Err(_)))
                 })
             };
-            Ok(match wanted {
-                None => (prepared.run((t0, t1), options, &mut interrupt)?, None),
-                Some(wanted) => {
-                    let span = (t0, t1);
-                    let both =
-                        prepared.run_with_derivatives(span, options, wanted, &mut interrupt)?;
-                    (both.0, Some(both.1))
-                }
-            })
+            prepared.run_differentiated((t0, t1), options, wanted, &mut interrupt)
         })
-        .map_err(|failure| match failure {
-            Failure::Refused(error) => PyValueError::new_err(error.to_string()),
-            Failure::Raised(error) => raised(error),
-            Failure::CalledMap => PyValueError::new_err("wrt: the map of a reset is not traced"),
-        })?;
-    let result = prepared.result(solution, derivatives.is_some());
-    Ok(result.with_derivatives(derivatives))
+        .map_err(PyErr::from)?;
+    Ok(prepared.result(solution, derivatives))
+}
+
+/// The extension of a system by the parameters by which is differentiated; none if nothing is, or the system is not traced.
+fn extension_of(
+    system: &Bound<'_, PyAny>,
+    wrt: Option<&Wanted>,
+) -> PyResult<Option<Arc<Extension>>> {
+    let traced = system.cast::<TracedSystem>().ok();
+    let extension = wrt.zip(traced);
+    let extension = extension.map(|(wanted, traced)| traced.get().extension(&wanted.1));
+    extension.transpose()
 }
 
 /// Integrates a system from many initial states, the rows of `y0`, with the parameters in the rows of `p`, on some
 /// threads. The result of each is that of a run of its own. Where a signal raised, the runs are the first ones, and
 /// the exception stands beside them.
 #[pyfunction]
-#[pyo3(signature = (system, t0, t1, y0, p, options, events, actions, threads))]
+#[pyo3(signature = (system, t0, t1, y0, p, options, events, actions, threads, wrt=None))]
 #[allow(clippy::too_many_arguments)]
 pub fn solve_many(
     py: Python<'_>,
@@ -104,8 +105,11 @@ pub fn solve_many(
     events: Vec<EventRow>,
     actions: Vec<ActionRow>,
     threads: usize,
+    wrt: Option<Wanted>,
 ) -> PyResult<(Vec<Run>, Option<Py<PyAny>>)> {
     let (y0, p) = (y0.as_array(), p.as_array());
+    let extension = extension_of(&system, wrt.as_ref())?;
+    let wanted = extension.as_ref().zip(wrt.as_ref());
     let mut runs = Vec::with_capacity(y0.nrows());
     let rows: Vec<usize> = (0..y0.nrows()).collect();
     for chunk in rows.chunks(CHUNK_PER_THREAD * threads.max(1)) {
@@ -115,13 +119,15 @@ pub fn solve_many(
         };
         let prepared = chunk.iter().map(prepare).collect::<PyResult<Vec<_>>>()?;
         let run = |job: &PreparedRun, interrupt: &mut dyn FnMut(f64) -> bool| {
-            job.run((t0, t1), &options.options, interrupt)
+            job.run_differentiated((t0, t1), &options.options, wanted, interrupt)
         };
-        let done = py.detach(|| on_threads(&prepared, threads, run, is_interruption));
+        let is_last =
+            |outcome: &Outcome| outcome.as_ref().is_ok_and(|(run, _)| is_interruption(run));
+        let done = py.detach(|| on_threads(&prepared, threads, run, is_last));
         let is_cut = done.results.len() < prepared.len();
-        for (prepared, solution) in prepared.into_iter().zip(done.results) {
-            let solution = solution.map_err(|e| PyValueError::new_err(e.to_string()))?;
-            runs.push(prepared.result(solution, false));
+        for (prepared, outcome) in prepared.into_iter().zip(done.results) {
+            let (solution, derivatives) = outcome.map_err(PyErr::from)?;
+            runs.push(prepared.result(solution, derivatives));
         }
         let raised = done.raised.or_else(|| py.check_signals().err());
         let raised = raised.or_else(|| {

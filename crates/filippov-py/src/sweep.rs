@@ -69,7 +69,8 @@ pub fn solve_points<'py>(
                 _ => run.run(*span, &options.options, interrupt),
             }
         };
-        let done = py.detach(|| on_threads(&jobs, threads, go, is_interruption));
+        let is_last = |outcome: &Outcome| outcome.as_ref().is_ok_and(is_interruption);
+        let done = py.detach(|| on_threads(&jobs, threads, go, is_last));
         for (((run, _, span), outcome), row) in jobs.iter().zip(done.results).zip(chunk) {
             let signals = Signals {
                 outputs: &outputs,

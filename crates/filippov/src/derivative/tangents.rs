@@ -10,7 +10,7 @@ use super::second::at_start;
 use crate::error::FieldError;
 use crate::mode::Mode;
 use crate::motion::SmoothField;
-use crate::options::Options;
+use crate::options::{Keep, Options};
 use crate::record::{InstantRecord, ObservedStep, Observer};
 use crate::system::Actions;
 use crate::vectors::dot;
@@ -21,7 +21,8 @@ const MOST_PIECES: usize = 16;
 /// The derivatives of a run.
 #[derive(Clone, Debug, Default)]
 pub struct Derivatives {
-    /// The times of the steps, the start included; a time at which an instant lies occurs twice.
+    /// The times of the steps, the start included; a time at which an instant lies occurs twice. The last one alone, if the run does
+    /// not keep its steps.
     pub t: Vec<f64>,
     /// The derivative of the state at each of them, a column after the other.
     pub values: Vec<f64>,
@@ -30,7 +31,7 @@ pub struct Derivatives {
     pub second: Vec<f64>,
     /// The time from which on the second derivatives are not known.
     pub second_lost: Option<f64>,
-    /// Those of all instants.
+    /// Those of all instants; if the run keeps its last state only, of the one at which they end.
     pub instants: Vec<InstantDerivative>,
     /// Surfaces on which the run starts and that it leaves, where the field jumps: the derivatives by the start are those of one
     /// side.
@@ -72,6 +73,7 @@ pub struct Derivatives {
 pub struct Tangents<'a> {
     around: Surroundings<'a>,
     weights: Weights,
+    kept: Keep,
     kinds: Vec<Column>,
     /// For each column the derivative of the state, and its shares of the parameters behind it.
     columns: Vec<Vec<f64>>,
@@ -105,6 +107,7 @@ impl<'a> Tangents<'a> {
                 atol: options.atol.clone(),
             },
             columns: Vec::new(),
+            kept: options.keep,
             has_second: false,
             second: None,
             kinds,
@@ -178,6 +181,11 @@ impl<'a> Tangents<'a> {
     }
 
     fn keep(&mut self, t: f64) {
+        if self.kept != Keep::Steps {
+            self.found.t.clear();
+            self.found.values.clear();
+            self.found.second.clear();
+        }
         self.found.t.push(t);
         for column in &self.columns {
             let states = &column[..self.around.extended.n];
@@ -193,6 +201,13 @@ impl<'a> Tangents<'a> {
                     self.found.second.extend(unknown);
                 }
             }
+        }
+    }
+
+    fn keep_instant(&mut self, found: InstantDerivative) {
+        let is_end = found.lost.is_some() && self.found.instants.is_empty();
+        if self.kept != Keep::Last || is_end {
+            self.found.instants.push(found);
         }
     }
 
@@ -277,7 +292,7 @@ impl<'a> Tangents<'a> {
             found.lost = self.lost.or(found.lost);
             self.history.push(past(record, &columns, found.dt.clone()));
             found.lost.into_iter().for_each(|lost| self.lose(lost));
-            self.found.instants.push(found);
+            self.keep_instant(found);
         }
         self.put_back(before);
         self.put_back(after);
@@ -320,7 +335,9 @@ impl Tangents<'_> {
                 limit.dt = found.dt;
             }
         }
-        self.found.instants.extend([last, limit]);
+        [last, limit]
+            .into_iter()
+            .for_each(|found| self.keep_instant(found));
         Ok(())
     }
 }
