@@ -396,6 +396,14 @@ def differences(run: Callable[[Any, float], fl.Solution], y0: Any, column: int, 
     return [(found[0] - middle) / d, (middle - found[1]) / d]
 
 
+def test_a_name_of_a_state_and_of_a_parameter_is_refused() -> None:
+    system = fl.System(lambda t, x, v=1.0: [x[1], -v * x[0]], states=("y", "v"))
+    for wrt in (["y0", "v"], ["v", "y0"], "all"):
+        with pytest.raises(fl.InputError, match="wrt: 'v' is a state and a parameter"):
+            system.solve((0, 1), [1.0, 0.0], wrt=wrt)
+    assert system.solve((0, 1), [1.0, 0.0], wrt="v").wrt == ("v",)
+
+
 @pytest.mark.parametrize("first", range(0, 120, 30))
 @pytest.mark.filterwarnings("ignore::filippov.FilippovWarning")
 def test_random_systems_against_differences(first: int) -> None:

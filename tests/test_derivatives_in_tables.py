@@ -107,3 +107,11 @@ def test_a_copy_keeps_those_of_switches(sol: fl.Solution) -> None:
     copy = pickle.loads(pickle.dumps(sol))
     assert copy.switches.to_xarray().identical(sol.switches.to_xarray())
     assert "derivative" not in copy.to_xarray()
+
+
+def test_a_state_with_a_name_of_the_table_is_refused() -> None:
+    pytest.importorskip("xarray")
+    system = fl.System(lambda t, x: [-x[0]], states=("derivative",))
+    with pytest.raises(fl.ModelError, match="to_xarray: derivative is a name of the table of derivatives"):
+        system.solve((0, 1), [1.0], wrt="y0").to_xarray()
+    assert "derivative" in system.solve((0, 1), [1.0]).to_xarray()

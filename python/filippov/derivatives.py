@@ -113,6 +113,10 @@ def check_wrt(
                     f"parameters: {known}"
                 )
         for parameter in own:
+            if parameter in states and not {"y0", "all"}.isdisjoint(names):
+                raise InputError(
+                    f"wrt: {parameter!r} is a state and a parameter, and columns have one name each"
+                )
             place = asked.setdefault(parameter, len(asked))
             found[parameter] = (_PARAMETER, place)
     if not found:

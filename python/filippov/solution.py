@@ -781,6 +781,8 @@ class Solution:
         ------
         ImportError
             If xarray is not installed.
+        ModelError
+            If a run with ``wrt=`` has a state or output with a name of these dimensions.
         """
         xarray = import_xarray()
         variables: dict[str, Any] = {name: ("t", self.y[i]) for i, name in enumerate(self.states)}
@@ -789,6 +791,11 @@ class Solution:
             variables["mode"] = ("t", as_texts(self._modes_at(self.t)))
         coords: dict[str, Any] = {"t": self.t}
         if self.wrt and isinstance(self._run, Run) and self.sol is not None:
+            taken = {"derivative", "state", "wrt"}.intersection(variables)
+            if taken:
+                raise ModelError(
+                    f"to_xarray: {', '.join(sorted(taken))} is a name of the table of derivatives"
+                )
             variables["derivative"] = (("state", "wrt", "t"), self.derivative(self.t))
             coords.update(state=as_texts(self.states), wrt=as_texts(self.wrt))
         attributes = {"message": self.message, "status": self.status, "surfaces": "\n".join(self.surfaces)}

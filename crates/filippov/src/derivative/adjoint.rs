@@ -8,7 +8,7 @@
 use super::between::EventGradient;
 use super::extended::{Column, Extended};
 use super::forms::add;
-use super::instant::{entered, Instant, Passage, Weights};
+use super::instant::{arrival, Instant, Passage, Weights};
 use super::limit::{is_like, Shares};
 use super::piece::{Piece, Surroundings};
 use crate::error::FieldError;
@@ -175,33 +175,16 @@ impl WayBack<'_> {
             piece
                 .field
                 .eval_unprojected(start.t, &mut z.clone(), &mut field)?;
-            let changes = self.kinds.iter().map(|&kind| match kind {
-                Column::State(i) => (0.0, extended.column(kind, &unit(n, i))),
-                Column::Start => (
-                    1.0,
-                    extended.column(kind, &field[..n].iter().map(|f| -f).collect::<Vec<_>>()),
-                ),
-                Column::Parameter(_) => (0.0, extended.column(kind, &vec![0.0; n])),
-            });
-            let changes: Vec<(f64, Vec<f64>)> = changes.collect();
-            let changes: Vec<(f64, &[f64])> = changes.iter().map(|(t, c)| (*t, &c[..])).collect();
-            found.starts_on = piece.left_at_once(start.t, &z, &changes)?;
-            if !piece.sliding.is_empty() {
+            let mut columns = extended.columns_at_start(self.kinds, &field);
+            if let Some(arrival) = arrival(&piece, start.t, &z)? {
+                columns.iter_mut().for_each(|c| arrival.apply(n, c));
                 let mut whole = [&found.by_state[..], &found.by_parameters].concat();
-                let entry = entered(extended, &piece, &[], (start.t, &z))?;
-                let entry = match entry {
-                    Some(entry) => Some(entry),
-                    None => piece.projection(&[], start.t, &z)?,
-                };
-                entry
-                    .iter()
-                    .for_each(|entry| entry.pull_back(n, &mut whole));
+                arrival.pull_back(n, &mut whole);
                 found.by_parameters = whole.split_off(n);
-                found.by_start = -dot(&whole, &field);
                 found.by_state = whole;
-            } else {
-                found.by_start = -dot(&found.by_state, &field);
             }
+            found.starts_on = piece.left_at_once(start.t, &z, self.kinds, &columns)?;
+            found.by_start = -dot(&found.by_state, &field);
         }
         Ok(found)
     }
@@ -426,10 +409,4 @@ impl<'w> Walk<'w> {
         let all = [number, number - round, number - 2 * round];
         Shares::of(all, all.map(of), &self.w[..record.x[1].len()])
     }
-}
-
-fn unit(size: usize, i: usize) -> Vec<f64> {
-    let mut unit = vec![0.0; size];
-    unit[i] = 1.0;
-    unit
 }

@@ -100,6 +100,25 @@ impl Change {
     }
 }
 
+/// What changes, one after the other, make of a change of n states and m parameters: n rows of the shares of the states, and n of those
+/// of the parameters.
+pub(super) fn matrices(changes: &[Change], (n, m): (usize, usize)) -> (Vec<f64>, Vec<f64>) {
+    let (mut by_states, mut by_parameters) = (vec![0.0; n * n], vec![0.0; n * m]);
+    let mut unit = vec![0.0; n + m];
+    for i in 0..n + m {
+        unit.fill(0.0);
+        unit[i] = 1.0;
+        changes.iter().for_each(|one| one.apply(n, &mut unit));
+        for (r, entry) in unit.iter().enumerate().take(n) {
+            match i.checked_sub(n) {
+                None => by_states[r * n + i] = *entry,
+                Some(p) => by_parameters[r * m + p] = *entry,
+            }
+        }
+    }
+    (by_states, by_parameters)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

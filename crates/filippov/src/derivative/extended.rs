@@ -227,6 +227,20 @@ impl Extended<'_> {
         Some((out[0], state))
     }
 
+    /// The columns at the start of a run with this velocity.
+    pub(super) fn columns_at_start(&self, kinds: &[Column], field: &[f64]) -> Vec<Vec<f64>> {
+        let column = |&kind: &Column| {
+            let mut states = vec![0.0; self.n];
+            match kind {
+                Column::State(i) => states[i] = 1.0,
+                Column::Start => (0..self.n).for_each(|r| states[r] = -field[r]),
+                Column::Parameter(_) => {}
+            }
+            self.column(kind, &states)
+        };
+        kinds.iter().map(column).collect()
+    }
+
     /// The derivative of the state by this, with the shares of the parameters behind it.
     pub(super) fn column(&self, kind: Column, states: &[f64]) -> Vec<f64> {
         let mut column = states.to_vec();

@@ -50,20 +50,13 @@ impl Form {
             let along: Vec<NodeId> = (first..=first + size)
                 .map(|i| graph.state(i as u32))
                 .collect();
-            form = form
-                .iter()
-                .map(|&node| {
-                    let gradient = graph.gradient(node);
-                    let mut sum = graph.mul(gradient.time, along[size]);
-                    for (k, partial) in gradient.states {
-                        if (k as usize) < size {
-                            let term = graph.mul(partial, along[k as usize]);
-                            sum = graph.add(sum, term);
-                        }
-                    }
-                    sum
-                })
-                .collect();
+            let own = form.iter().map(|&node| {
+                let by_time = graph.gradient(node).time;
+                let sum = graph.mul(by_time, along[size]);
+                let by_state = derivative_along(&mut graph, node, &along[..size]);
+                graph.add(sum, by_state)
+            });
+            form = own.collect();
         }
         Ok(Form {
             program: Program::compile(&graph, &form, Backend::Interpreter)?,
@@ -118,6 +111,19 @@ impl MapAt<'_> {
         rows.map(|((row, by_time), bend)| dot(&row[..self.n], q) + by_time * tau + bend)
             .collect()
     }
+}
+
+/// The derivative of a value along a change of the states.
+pub(super) fn derivative_along(graph: &mut Graph, value: NodeId, change: &[NodeId]) -> NodeId {
+    let gradient = graph.gradient(value);
+    let mut sum = graph.constant(0.0);
+    for (k, partial) in gradient.states {
+        if let Some(&own) = change.get(k as usize) {
+            let term = graph.mul(partial, own);
+            sum = graph.add(sum, term);
+        }
+    }
+    sum
 }
 
 /// Adds a multiple of a row.

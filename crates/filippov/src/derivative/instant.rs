@@ -325,6 +325,18 @@ pub(super) fn entered(
     Ok(Some(new.taken_out(n)))
 }
 
+/// What becomes of a change at a start on surfaces that the motion slides on: a start beside them comes to them at once. `None` if it
+/// slides on none.
+pub(super) fn arrival(piece: &Piece, t: f64, z: &[f64]) -> Result<Option<Change>, FieldError> {
+    if piece.sliding.is_empty() {
+        return Ok(None);
+    }
+    match entered(piece.extended, piece, &[], (t, z))? {
+        None => piece.projection(&[], t, z),
+        entry => Ok(entry),
+    }
+}
+
 /// Surfaces with the jumps of the field there.
 #[derive(Default)]
 struct Jumps {

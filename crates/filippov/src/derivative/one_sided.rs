@@ -1,6 +1,6 @@
 //! Where a derivative has sides: several surfaces that are reached at once, and motions that touch one.
 
-use super::change::Change;
+use super::change::{matrices, Change};
 use super::instant::{entered, Instant};
 use super::piece::Piece;
 use crate::error::FieldError;
@@ -33,18 +33,7 @@ pub(super) struct Cone {
 impl Cone {
     /// As matrices, for n states and m parameters.
     pub fn matrices(&self, (n, m): (usize, usize)) -> OneSided {
-        let (mut saltation, mut by_parameters) = (vec![0.0; n * n], vec![0.0; n * m]);
-        for i in 0..n + m {
-            let mut unit = vec![0.0; n + m];
-            unit[i] = 1.0;
-            self.changes.iter().for_each(|one| one.apply(n, &mut unit));
-            for (r, entry) in unit.iter().enumerate().take(n) {
-                match i.checked_sub(n) {
-                    None => saltation[r * n + i] = *entry,
-                    Some(p) => by_parameters[r * m + p] = *entry,
-                }
-            }
-        }
+        let (saltation, by_parameters) = matrices(&self.changes, (n, m));
         OneSided {
             order: self.order.clone(),
             saltation,
@@ -169,6 +158,10 @@ impl<'a> Instant<'_, 'a> {
         let (&[Guard::Surface(j)], true) = (record.guards, record.acts.is_empty()) else {
             return Ok(Vec::new());
         };
+        // Beside others that the motion slides on, the field on one side is not that of one corner.
+        if !self.before.sliding.is_empty() {
+            return Ok(Vec::new());
+        }
         let entry = record.mode[0].entries()[j];
         let stays = record.mode[0] == record.mode[1] && entry != 0;
         if !stays || self.extended.triggered_by(j).is_some() {

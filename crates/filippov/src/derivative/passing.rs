@@ -1,5 +1,6 @@
 //! Instants of all kinds, on the way forward and back.
 
+use super::change::matrices;
 use super::forms::Second;
 use super::instant::{Instant, Lost, Passage, Weights};
 use super::one_sided::{agree, OneSided};
@@ -81,20 +82,10 @@ impl Instant<'_, '_> {
             };
             *second = order.pass(columns, &pairs)?;
         }
-        let through = |column: &mut [f64]| changes.iter().for_each(|one| one.apply(n, column));
-        columns.iter_mut().for_each(|column| through(column));
-        let mut unit = vec![0.0; n + m];
-        for i in 0..n + m {
-            unit.fill(0.0);
-            unit[i] = 1.0;
-            through(&mut unit);
-            for (r, entry) in unit.iter().enumerate().take(n) {
-                match i.checked_sub(n) {
-                    None => found.saltation[r * n + i] = *entry,
-                    Some(p) => found.by_parameters[r * m + p] = *entry,
-                }
-            }
+        for column in columns.iter_mut() {
+            changes.iter().for_each(|one| one.apply(n, column));
         }
+        (found.saltation, found.by_parameters) = matrices(&changes, (n, m));
         let is_finite = columns.iter().flatten().all(|v| v.is_finite());
         found.lost = (!is_finite).then_some(Lost::NotFinite);
         Ok(found)

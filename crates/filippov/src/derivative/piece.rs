@@ -7,7 +7,7 @@ use smallvec::SmallVec;
 
 use super::change::Change;
 use super::collocation::{operations, Collocation};
-use super::extended::Extended;
+use super::extended::{Column, Extended};
 use super::forms::{pairs, Second};
 use super::radau::NODES;
 use super::series::{ChangeSeries, Coefficients};
@@ -478,13 +478,13 @@ impl<'a> Piece<'a> {
             .collect()
     }
 
-    /// The surfaces through a point that the motion leaves, where the field jumps, if one of these changes moves the point off
-    /// them. Each has a share of the time too.
+    /// The surfaces through a start that the motion leaves, where the field jumps, if one of these columns moves the start off them.
     pub fn left_at_once(
         &self,
         t: f64,
         z: &[f64],
-        changes: &[(f64, &[f64])],
+        kinds: &[Column],
+        columns: &[Vec<f64>],
     ) -> Result<Vec<usize>, FieldError> {
         let (system, place) = (&self.extended.system, self.at(t, z));
         let mut h = vec![0.0; system.n_surfaces()];
@@ -495,8 +495,11 @@ impl<'a> Piece<'a> {
             let is_there = is_on_a_side && h.abs() <= ROUNDING * system.surface_size(j, &place)?;
             if is_there && system.jumps_across(j, &self.signs, &self.sliding) {
                 let by_time = system.gradient(j, &place, &mut normal)?;
-                let moves = |(time, x): &(f64, &[f64])| by_time * time + dot(&normal, x) != 0.0;
-                if changes.iter().any(moves) {
+                let moves = |(kind, column): (&Column, &Vec<f64>)| {
+                    let later = f64::from(*kind == Column::Start);
+                    by_time * later + dot(&normal, column) != 0.0
+                };
+                if kinds.iter().zip(columns).any(moves) {
                     found.push(j);
                 }
             }

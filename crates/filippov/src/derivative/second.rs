@@ -83,7 +83,10 @@ impl SecondOrder<'_, '_> {
         };
         let map = match moving.first() {
             None => None,
-            Some(act) => self.extended.second_of_map(record.t[0], act)?,
+            Some(act) => match self.extended.second_of_map(record.t[0], act)? {
+                None => return Ok(None),
+                known => known,
+            },
         };
         let firsts: Vec<First> = columns
             .iter()
@@ -141,7 +144,8 @@ impl SecondOrder<'_, '_> {
                 }
             }
         }
-        Ok(Some(Second { pairs: found }))
+        let is_finite = found.iter().flatten().all(|value| value.is_finite());
+        Ok(is_finite.then_some(Second { pairs: found }))
     }
 }
 

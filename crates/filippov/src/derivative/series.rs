@@ -2,6 +2,7 @@
 
 use filippov_expr::{Backend, Graph, JetProgram, Multipliers, NodeId};
 
+use super::forms::derivative_along;
 use crate::system::{sliding_field, Place, Tiered, TracedSystem};
 
 /// The series of a motion of a traced system with those of its changes, in a region or on one surface: of one change, or of two with
@@ -46,14 +47,14 @@ impl ChangeSeries {
                 .collect();
             let rates = own
                 .iter()
-                .map(|&rate| derivative(&mut graph, rate, &change));
+                .map(|&rate| derivative_along(&mut graph, rate, &change));
             along.push((rates.collect::<Vec<_>>(), change.clone()));
         }
         if let [_, (_, first), _] = &along[..] {
             let bends: Vec<NodeId> = along[0]
                 .0
                 .iter()
-                .map(|&rate| derivative(&mut graph, rate, first))
+                .map(|&rate| derivative_along(&mut graph, rate, first))
                 .collect();
             for (rate, bend) in along[2].0.iter_mut().zip(bends) {
                 *rate = graph.add(*rate, bend);
@@ -140,19 +141,6 @@ impl ChangeSeries {
             }
         }
     }
-}
-
-/// The derivative of a value along a change of the states.
-fn derivative(graph: &mut Graph, value: NodeId, change: &[NodeId]) -> NodeId {
-    let gradient = graph.gradient(value);
-    let mut sum = graph.constant(0.0);
-    for (k, partial) in gradient.states {
-        if let Some(&own) = change.get(k as usize) {
-            let term = graph.mul(partial, own);
-            sum = graph.add(sum, term);
-        }
-    }
-    sum
 }
 
 fn largest(entries: &[f64]) -> f64 {

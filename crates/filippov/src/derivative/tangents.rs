@@ -2,7 +2,7 @@
 
 use super::extended::{Column, Extended};
 use super::forms::{pairs, Second};
-use super::instant::{entered, Instant, Lost, Weights};
+use super::instant::{arrival, Instant, Lost, Weights};
 use super::limit::{at_its_time, History, Past};
 use super::passing::InstantDerivative;
 use super::piece::{Piece, Surroundings};
@@ -152,29 +152,12 @@ impl<'a> Tangents<'a> {
             let at = (t, &z[..]);
             self.second = Some(at_start(&mut piece, at, &field, &self.kinds)?);
         }
-        for kind in &self.kinds {
-            let mut states = vec![0.0; n];
-            match *kind {
-                Column::State(i) => states[i] = 1.0,
-                Column::Start => (0..n).for_each(|r| states[r] = -field[r]),
-                Column::Parameter(_) => {}
-            }
-            self.columns
-                .push(self.around.extended.column(*kind, &states));
-        }
-        if !piece.sliding.is_empty() {
-            // A start beside the surfaces comes to them at once.
+        self.columns = self.around.extended.columns_at_start(&self.kinds, &field);
+        if let Some(arrival) = arrival(&piece, t, &z)? {
             self.second = None;
-            match entered(self.around.extended, &piece, &[], (t, &z))? {
-                Some(entry) => self.columns.iter_mut().for_each(|c| entry.apply(n, c)),
-                None => piece.project(t, &z, &mut self.columns)?,
-            }
+            self.columns.iter_mut().for_each(|c| arrival.apply(n, c));
         }
-        let changes = self.kinds.iter().zip(&self.columns);
-        let changes: Vec<(f64, &[f64])> = changes
-            .map(|(kind, column)| (f64::from(*kind == Column::Start), &column[..]))
-            .collect();
-        self.found.starts_on = piece.left_at_once(t, &z, &changes)?;
+        self.found.starts_on = piece.left_at_once(t, &z, &self.kinds, &self.columns)?;
         self.put_back(Box::new(piece));
         self.keep(t);
         Ok(())
