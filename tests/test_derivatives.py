@@ -16,40 +16,13 @@ import numpy as np
 import pytest
 from filippov.problems import drill_string
 from reference import DATA
+from statements import cases, numbers, system_of
 
 METHODS = ("Taylor", "DOP853", "DOPRI5", "Rodas5P")
 TIGHT: dict[str, Any] = {"rtol": 1e-12, "atol": 1e-12}
 
 
-def cases(name: str) -> dict[str, dict[str, Any]]:
-    return {case["id"]: case for case in json.loads((DATA / f"{name}.json").read_text())["cases"]}
-
-
 CYCLES, RUNS, INSTANTS = cases("K1_cycles"), cases("K2_sensitivities"), cases("K5_instants")
-
-
-def numbers(rows: list[list[str]]) -> Any:
-    return np.array([[float(value) for value in row] for row in rows])
-
-
-def value(text: str) -> float:
-    top, _, bottom = text.partition("/")
-    return float(top) / float(bottom or 1)
-
-
-def system_of(case: dict[str, Any], **options: Any) -> fl.System:
-    """Return the system that a statement of the references describes."""
-    statement = case["statement"]
-
-    def fun(t: float, x: Any, **params: Any) -> list[Any]:
-        names = {**params, **dict(zip(statement["state"], x, strict=True))}
-        names.update(t=t, sin=np.sin, cos=np.cos, abs=abs)
-        for j, surface in enumerate(statement.get("surfaces", ())):
-            names[f"s{j + 1}"] = np.sign(eval(surface, names))
-        return [eval(rate, names) for rate in statement["rhs"]]
-
-    params = {name: value(text) for name, text in case["parameters"].items()}
-    return fl.System(fun, n=len(statement["state"]), params=params, **options)
 
 
 @pytest.mark.parametrize("method", METHODS)

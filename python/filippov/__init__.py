@@ -51,6 +51,7 @@ if TYPE_CHECKING:
         poincare,
         sweep,
     )
+    from filippov.cycles import Cycle, limit_cycle
     from filippov.ensemble import Ensemble
     from filippov.hidden import HiddenDynamics, hidden_dynamics
     from filippov.sheets import SurfaceParts, surface_parts
@@ -58,6 +59,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Branches",
     "Classification",
+    "Cycle",
     "DenseSolution",
     "Ensemble",
     "Event",
@@ -92,6 +94,7 @@ __all__ = [
     "gradient",
     "hidden_dynamics",
     "hysteresis",
+    "limit_cycle",
     "load",
     "open_sweep",
     "plot",
@@ -113,6 +116,7 @@ _LAZY_NAMES = {
     "Ensemble": "ensemble",
     **dict.fromkeys(("Phase", "Section", "Tangency", "poincare"), "analysis"),
     **dict.fromkeys(("basins", "bifurcation_diagram", "open_sweep", "sweep"), "analysis"),
+    **dict.fromkeys(("Cycle", "limit_cycle"), "cycles"),
     "SurfaceParts": "sheets",
     "surface_parts": "sheets",
 }

@@ -9,6 +9,7 @@ from typing_extensions import Self
 
 __all__ = [
     "Builder",
+    "HeldMotions",
     "ManualClock",
     "OpaqueSystem",
     "Regions",
@@ -33,6 +34,11 @@ __all__ = [
 _Array = npt.NDArray[np.float64]
 
 __version__: str
+
+_Guard = tuple[str, int, int]
+_Instant = tuple[
+    list[float], list[_Array], list[list[int]], list[list[float]], list[_Guard], list[int]
+]
 
 @final
 class Builder:
@@ -232,6 +238,7 @@ class Run:
     def contacts_at_end(self) -> _Array: ...
     def derivatives(self, t: _Array, left: bool) -> list[_Array]: ...
     def zero_derivatives(self, function: TracedSystem, t: _Array) -> list[_Array]: ...
+    def kept_instants(self) -> tuple[list[int], list[float], list[_Instant]] | None: ...
     def cost_gradient(
         self, terms: list[tuple[TracedSystem, float | None, int | None, TracedSystem | None]]
     ) -> tuple[_Array, tuple[float, str] | None, list[int]]: ...
@@ -258,6 +265,35 @@ class ManualClock:
 @final
 class RunOptions:
     def __new__(cls, given: dict[str, Any]) -> Self: ...
+
+@final
+class HeldMotions:
+    def __new__(
+        cls,
+        system: TracedSystem,
+        t0: float,
+        y0: _Array,
+        p: _Array,
+        options: RunOptions,
+        actions: Sequence[Any],
+        parameters: Sequence[int],
+    ) -> Self: ...
+    def leg(
+        self,
+        mode: Sequence[int],
+        q: Sequence[float],
+        t0: float,
+        x: _Array,
+        t1: float,
+        places: int = 0,
+    ) -> tuple[_Array, _Array, list[_Array], _Array, _Array]: ...
+    def guards(self, mode: Sequence[int], q: Sequence[float]) -> list[_Guard]: ...
+    def at(
+        self, mode: Sequence[int], q: Sequence[float], t: float, x: _Array
+    ) -> tuple[_Array, _Array, _Array, _Array]: ...
+    def act(
+        self, index: int, mode: Sequence[int], q: Sequence[float], t: float, x: _Array
+    ) -> tuple[_Array, list[float], _Array | None, _Array, tuple[float, _Array] | None]: ...
 
 def solve(
     system: TracedSystem | OpaqueSystem | SignedSystem,

@@ -11,6 +11,7 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use crate::itineraries::{instant_row, TrailRows};
 use crate::systems::{raised, refused};
 
 /// The columns, each a kind (0: a component of the initial state, 1: the initial time, 2: a parameter) with a place; the parameters by
@@ -310,6 +311,14 @@ impl RunDerivatives {
     fn not_known<'py>(&self, py: Python<'py>, n: usize) -> Bound<'py, PyArray2<f64>> {
         let k = self.kinds.len();
         transposed(py, &vec![f64::NAN; n * k], k, n)
+    }
+
+    /// The mode and the discrete states at the start of a run that was kept for the way back, and its instants.
+    pub fn trail_rows<'py>(&self, py: Python<'py>) -> Option<TrailRows<'py>> {
+        let trail = self.trail.as_ref()?;
+        let (mode, q) = trail.first()?;
+        let rows = trail.instants().map(|record| instant_row(py, &record));
+        Some((mode.entries().to_vec(), q.to_vec(), rows.collect()))
     }
 
     /// The surfaces on which the run starts and that it leaves.

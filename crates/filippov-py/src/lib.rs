@@ -8,6 +8,7 @@ mod conversion;
 mod decisions;
 mod derivatives;
 mod inspect;
+mod itineraries;
 mod laws;
 mod prepared_run;
 mod regions;
@@ -35,6 +36,8 @@ mod _core {
     use super::decisions::replay_decision;
     #[pymodule_export]
     use super::inspect::{classify, hidden_dynamics, intersection_field};
+    #[pymodule_export]
+    use super::itineraries::HeldMotions;
     #[pymodule_export]
     use super::regions::Regions;
     #[pymodule_export]

@@ -15,6 +15,7 @@ use crate::callbacks::{Signal, TracedEvent};
 use crate::conversion::columns;
 use crate::decisions::record_as_pair;
 use crate::derivatives::{InstantRow, LostAt, RunDerivatives, TermRow};
+use crate::itineraries::TrailRows;
 use crate::prepared_run::PreparedRun;
 use crate::systems::{raised, CoreSystem, TracedSystem};
 
@@ -554,6 +555,11 @@ impl Run {
             .into_iter()
             .map(|row| PyArray1::from_vec(py, row))
             .collect())
+    }
+
+    /// The mode and the discrete states at the start, and the instants of a run that was kept for them.
+    fn kept_instants<'py>(&self, py: Python<'py>) -> Option<TrailRows<'py>> {
+        self.derivatives.as_ref()?.trail_rows(py)
     }
 
     /// The gradient of a cost, a sum of terms; and at which time and why there is none, if so.

@@ -37,6 +37,17 @@ struct Start {
 }
 
 impl Trail {
+    /// The mode and the discrete states at the start of the run.
+    pub fn first(&self) -> Option<(&Mode, &[f64])> {
+        let start = self.start.as_ref()?;
+        Some((&start.mode, &start.q))
+    }
+
+    /// The instants of the run.
+    pub fn instants(&self) -> impl Iterator<Item = InstantRecord<'_>> {
+        self.instants.iter().map(KeptInstant::record)
+    }
+
     fn begin(&mut self, t: f64, x: &[f64], mode: &Mode, q: &[f64]) {
         self.start.get_or_insert_with(|| Start {
             t,

@@ -9,6 +9,7 @@ use smallvec::SmallVec;
 use super::forms::{Form, MapAt};
 use super::series::ChangeSeries;
 use crate::error::{Error, FieldError};
+use crate::record::Gradient;
 use crate::system::{
     sides_of, Act, Action, ActionMap, Actions, Definition, PiecewiseSystem, Place, Rules,
     TracedMap, TracedSystem, Trigger,
@@ -108,7 +109,7 @@ impl Extension {
         }))
     }
 
-    /// The derivatives of what a law reads, by the time and by the parameters that have become states.
+    /// The derivatives of what a law reads, by the time and by the parameters that have become states; then its value.
     fn clock_of(&self, law: usize) -> Result<Option<Program>, Error> {
         let Some(&argument) = self.rules.laws[law].nodes().first() else {
             return Ok(None);
@@ -123,6 +124,7 @@ impl Extension {
         let mut outputs = vec![gradient.time];
         let states = pairs(&self.parameters, self.n);
         outputs.extend(states.into_iter().map(|(_, state)| by_state(state)));
+        outputs.push(self.made[argument.index()]);
         let program = Program::compile(&graph, &outputs, Backend::Interpreter)?;
         Ok(Some(program))
     }
@@ -213,18 +215,20 @@ impl Extended<'_> {
     }
 
     /// How many parameters have become states.
-    pub(super) fn n_parameters(&self) -> usize {
+    pub fn n_parameters(&self) -> usize {
         self.values.len()
     }
 
-    /// The derivatives of the clock whose tick an action is, by the time and by the extended state; `None` if it ticks whatever the
-    /// parameters.
-    pub(super) fn clock(&self, index: usize, place: &Place) -> Option<(f64, Vec<f64>)> {
+    /// The value of the clock whose tick an action is, with its derivatives by the time and by the extended state; `None` if it ticks
+    /// whatever the parameters.
+    pub(super) fn clock(&self, index: usize, place: &Place) -> Option<(f64, Gradient)> {
         let program = self.clocks.get(index)?.as_ref()?;
-        let mut out = vec![0.0; 1 + self.values.len()];
+        let m = self.values.len();
+        let mut out = vec![0.0; 2 + m];
         self.system.eval(program, place, &[], &mut out);
-        let state = [&vec![0.0; self.n], &out[1..]].concat();
-        Some((out[0], state))
+        let state = [&vec![0.0; self.n], &out[1..1 + m]].concat();
+        let time = out[0];
+        Some((out[1 + m], Gradient { time, state }))
     }
 
     /// The columns at the start of a run with this velocity.

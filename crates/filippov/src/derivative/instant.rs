@@ -5,8 +5,8 @@ use super::extended::Extended;
 use super::piece::{Piece, Surroundings};
 use crate::error::FieldError;
 use crate::motion::{Guard, ModeField};
-use crate::record::InstantRecord;
-use crate::system::{PiecewiseSystem, SignStructure};
+use crate::record::{Gradient, InstantRecord};
+use crate::system::SignStructure;
 use crate::tolerances::{AT_SIDE, ROUNDING};
 use crate::vectors::dot;
 
@@ -65,12 +65,6 @@ impl Weights {
         }
         (normal * speed).sqrt() / rate.abs()
     }
-}
-
-/// A function that fixes the time of an instant: its derivatives by time and by the extended state.
-struct Timing {
-    time: f64,
-    state: Vec<f64>,
 }
 
 /// An instant with the motions around it.
@@ -154,7 +148,10 @@ impl Instant<'_, '_> {
         let record = self.record;
         let timing = match record.guards {
             [] => self.known_time(),
-            [guard, ..] => self.timing(*guard)?,
+            [guard, ..] => {
+                let z = self.extended.state(record.x[0]);
+                self.before.gradient_of(*guard, record.t[0], &z)?
+            }
         };
         let field = record.field[0];
         let states = &timing.state[..self.extended.n];
@@ -174,34 +171,16 @@ impl Instant<'_, '_> {
     }
 
     /// What fixes a known time: the clock that ticks, or the time alone.
-    fn known_time(&self) -> Timing {
+    fn known_time(&self) -> Gradient {
         let (t, z) = (self.record.t[0], self.extended.state(self.record.x[0]));
         let place = self.before.at(t, &z);
         let mut acts = self.record.acts.iter();
         let clock = acts.find_map(|act| self.extended.clock(act.index, &place));
-        let (time, state) = clock.unwrap_or_else(|| (1.0, vec![0.0; z.len()]));
-        Timing { time, state }
-    }
-
-    /// The gradient of a guard of the motion before.
-    fn timing(&mut self, guard: Guard) -> Result<Timing, FieldError> {
-        let (t, z) = (self.record.t[0], self.extended.state(self.record.x[0]));
-        let mut state = vec![0.0; z.len()];
-        let system = &self.extended.system;
-        match guard {
-            Guard::Surface(j) => {
-                let time = system.gradient(j, &self.before.at(t, &z), &mut state)?;
-                return Ok(Timing { time, state });
-            }
-            Guard::Multiplier { surface, .. } if !system.sticks_at(surface) => {
-                if let Some((time, state)) = self.before.multiplier_slopes(surface, t, &z)? {
-                    return Ok(Timing { time, state });
-                }
-            }
-            _ => {}
-        }
-        let time = self.before.field.gradient_of(guard, t, &z, &mut state)?;
-        Ok(Timing { time, state })
+        let alone = || Gradient {
+            time: 1.0,
+            state: vec![0.0; z.len()],
+        };
+        clock.map_or_else(alone, |(_, gradient)| gradient)
     }
 
     /// Does the same field go on? So it is at the end of a multiplier where nothing else changes.

@@ -14,8 +14,9 @@ use super::series::{ChangeSeries, Coefficients};
 use crate::cube::{Matrix, Vector};
 use crate::error::FieldError;
 use crate::mode::Mode;
-use crate::motion::{ContactField, Law, ModeField, SmoothField};
+use crate::motion::{ContactField, Guard, Law, ModeField, SmoothField};
 use crate::options::{Options, SlidingRule};
+use crate::record::Gradient;
 use crate::sparse::SparseRows;
 use crate::stepper::Taylor;
 use crate::system::{
@@ -177,6 +178,11 @@ impl<'a> Piece<'a> {
     pub fn is_of(&self, around: &Surroundings, mode: &Mode, q: &[f64]) -> bool {
         let is_same = || self.contacts.is_empty() || self.sides == around.sides;
         self.mode == *mode && self.q == q && is_same()
+    }
+
+    /// Are the derivatives of its multipliers known from the graph?
+    pub fn knows_multipliers(&self) -> bool {
+        self.jacobian.is_some()
     }
 
     /// A point of the extended system in this motion.
@@ -461,6 +467,26 @@ impl<'a> Piece<'a> {
             }
         }
         Ok(Some((time, state)))
+    }
+
+    /// The derivatives of a guard by the time and by the extended state, in either sense: those of the switching function, or of the
+    /// multiplier.
+    pub fn gradient_of(&mut self, guard: Guard, t: f64, z: &[f64]) -> Result<Gradient, FieldError> {
+        let mut state = vec![0.0; z.len()];
+        match guard {
+            Guard::Surface(j) => {
+                let time = self.gradient(j, t, z, &mut state)?;
+                return Ok(Gradient { time, state });
+            }
+            Guard::Multiplier { surface, .. } if !self.extended.system.sticks_at(surface) => {
+                if let Some((time, state)) = self.multiplier_slopes(surface, t, z)? {
+                    return Ok(Gradient { time, state });
+                }
+            }
+            _ => {}
+        }
+        let time = self.field.gradient_of(guard, t, z, &mut state)?;
+        Ok(Gradient { time, state })
     }
 
     /// The gradients of the surfaces slid on and of those in contact by the extended state.

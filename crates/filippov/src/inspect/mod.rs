@@ -1,14 +1,16 @@
-//! Inspection: the field of a mode at a point, what happens at a point, and its hidden dynamics.
+//! Inspection: the field of a mode at a point, what happens at a point, its hidden dynamics, and motions that are held in a mode.
 //!
 //! Nothing here is part of a run; the decisions are those of a run.
 
 mod classify;
 mod hidden_dynamics;
+mod leg;
 mod mode_field;
 mod not_finite;
 
 pub use classify::{classify, contradicts, Classification, Inspection, PointKind};
 pub use hidden_dynamics::{hidden_dynamics, HiddenDynamics, HiddenRoot};
+pub use leg::{leg, Leg, LegError, Over};
 pub use mode_field::{intersection_field, IntersectionValue};
 pub use not_finite::{not_finite, state_text, NotFinitePlace};
 

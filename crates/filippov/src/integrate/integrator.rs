@@ -47,6 +47,8 @@ pub struct Integrator<'a> {
     /// Guards of this mode whose multipliers were held at their ends, with what they may go beyond.
     pub(super) slacks: Slacks,
     pub(super) watch: Watch<'a>,
+    /// The mode in which the motion stays whatever its guards are, if it is such a run.
+    pub(super) held: Option<&'a Mode>,
 }
 
 impl<'a> Integrator<'a> {
@@ -62,12 +64,14 @@ impl<'a> Integrator<'a> {
             options,
             events,
             actions,
+            held,
         } = problem;
         check(&problem)?;
         let n = system.n_states();
         Ok(Integrator {
             run: Run::new(system, options, actions, (t_span.0, y0)),
             t_end: t_span.1,
+            held,
             timetable: Timetable::new(actions, t_span.0),
             horizon: t_span.1,
             stepper: Steppers::new(options, system, t_span.1 - t_span.0),

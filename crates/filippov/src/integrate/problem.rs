@@ -4,6 +4,7 @@ use std::sync::LazyLock;
 
 use crate::error::Error;
 use crate::event::UserEvent;
+use crate::mode::Mode;
 use crate::options::Options;
 use crate::system::{Actions, PiecewiseSystem, Trigger};
 
@@ -51,6 +52,7 @@ pub struct Problem<'a> {
     pub(super) options: &'a Options,
     pub(super) events: &'a [UserEvent<'a>],
     pub(super) actions: &'a Actions<'a>,
+    pub(super) held: Option<&'a Mode>,
 }
 
 impl<'a> Problem<'a> {
@@ -63,6 +65,7 @@ impl<'a> Problem<'a> {
             options: &DEFAULTS,
             events: &[],
             actions: &NO_ACTIONS,
+            held: None,
         }
     }
 
@@ -80,6 +83,13 @@ impl<'a> Problem<'a> {
     pub fn actions(self, actions: &'a Actions<'a>) -> Self {
         Problem { actions, ..self }
     }
+
+    /// In this mode to the end, whatever its guards are: nothing is looked for, and no action is done. The discrete states are those of
+    /// the actions.
+    pub fn held_in(self, mode: &'a Mode) -> Self {
+        let held = Some(mode);
+        Problem { held, ..self }
+    }
 }
 
 /// Checks the arguments of a run.
@@ -90,6 +100,7 @@ pub(super) fn check(problem: &Problem) -> Result<(), Error> {
         y0,
         options,
         actions,
+        held,
         ..
     } = *problem;
     let n = system.n_states();
@@ -105,6 +116,13 @@ pub(super) fn check(problem: &Problem) -> Result<(), Error> {
             name: "atol",
             found: options.atol.len(),
             expected: n,
+        });
+    }
+    if let Some(mode) = held.filter(|mode| mode.entries().len() != system.n_surfaces()) {
+        return Err(Error::WrongLength {
+            name: "mode",
+            found: mode.entries().len(),
+            expected: system.n_surfaces(),
         });
     }
     let require = |name, value: f64, holds: bool, requirement| {

@@ -468,6 +468,10 @@ impl<'a> Integrator<'a> {
     /// Finds the mode of the initial state and starts the motion.
     pub(super) fn start(&mut self) -> Result<Option<Stop>, FieldError> {
         self.recorder.start(self.run.t, &self.run.x);
+        if let Some(mode) = self.held {
+            self.run.motion.hold();
+            return self.begin(Next::new(mode.clone(), Lefts::new()), &Multiple::default());
+        }
         if !self.run.actions.list.is_empty() {
             return self.start_with_actions();
         }
@@ -525,6 +529,9 @@ impl<'a> Integrator<'a> {
     /// The end of the span, or a known time of actions.
     #[cold]
     pub(super) fn reach_horizon(&mut self) -> Result<Option<Stop>, FieldError> {
+        if self.held.is_some() {
+            return Ok(Some(Stop::End));
+        }
         let mut due = self.timetable.take(self.run.actions, self.run.t);
         self.horizon = self
             .timetable

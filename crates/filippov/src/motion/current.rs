@@ -50,6 +50,8 @@ pub(crate) struct CurrentMotion<'a> {
     pub monitored: Vec<Monitored>,
     /// It slides on several surfaces, some of them with static friction above kinetic.
     sticks: bool,
+    /// It stays in its mode whatever its guards are: nothing is monitored.
+    is_held: bool,
     law: Law<'a>,
     /// Surfaces that the motion stays on by either field, so that h is zero all along: not monitored.
     pub resting: SlidingSet,
@@ -89,6 +91,7 @@ impl<'a> CurrentMotion<'a> {
             current: 0,
             monitored: Vec::new(),
             sticks: false,
+            is_held: false,
             law,
             resting: SmallVec::new(),
             settled: SmallVec::new(),
@@ -133,6 +136,12 @@ impl<'a> CurrentMotion<'a> {
         self.is_straight = self.sliding.iter().all(|&j| system.is_affine(j));
         self.restart_field(system);
         self.find_monitored(system, zeros);
+    }
+
+    /// Stays in whatever mode it restarts in: nothing is monitored any more.
+    pub fn hold(&mut self) {
+        self.is_held = true;
+        self.known.clear();
     }
 
     /// Makes the field that of the mode.
@@ -236,6 +245,9 @@ impl<'a> CurrentMotion<'a> {
 
     /// Lists what is monitored in this mode, wherever its motion starts.
     fn list_monitored(&mut self, system: &dyn PiecewiseSystem) {
+        if self.is_held {
+            return;
+        }
         let signs = &self.signs;
         let monitor = |guard, place, orientation, affine| Monitored {
             guard,

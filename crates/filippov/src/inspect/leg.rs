@@ -1,0 +1,119 @@
+//! A motion that is held in one mode over a given time, whatever its guards are: a leg of an itinerary.
+
+use crate::derivative::{Column, Extended, HeldMotion, Tangents};
+use crate::error::{Error, FieldError};
+use crate::integrate::Problem;
+use crate::mode::Mode;
+use crate::options::{Keep, Options};
+use crate::record::Side;
+use crate::status::Stop;
+use crate::system::{Actions, TracedSystem};
+
+/// Over what time a leg goes, from where, and at how many places in each step its guards are evaluated.
+#[derive(Clone, Copy, Debug)]
+pub struct Over<'s> {
+    /// Its first and last time.
+    pub span: (f64, f64),
+    /// The state at its start.
+    pub start: &'s [f64],
+    /// The places in each step, or none.
+    pub places: usize,
+}
+
+/// A leg.
+#[derive(Debug)]
+pub struct Leg {
+    /// The state at its end.
+    pub x: Vec<f64>,
+    /// The velocity at its start and its end.
+    pub velocities: [Vec<f64>; 2],
+    /// The derivative of the state at the end, n entries by each of the states at the start, then by each parameter.
+    pub derivative: Vec<f64>,
+    /// Times, and the values of the guards there.
+    pub samples: Vec<(f64, Vec<f64>)>,
+    /// Why it ended.
+    pub stop: Stop,
+}
+
+/// Follows the motion in a mode over a given time.
+///
+/// # Errors
+/// If an argument is out of range, or a function of the user raises.
+pub fn leg(
+    (system, extended, actions): (&TracedSystem, &Extended, &Actions),
+    options: &Options,
+    (mode, q): (&Mode, &[f64]),
+    Over {
+        span,
+        start,
+        places,
+    }: Over,
+) -> Result<Leg, LegError> {
+    let n = start.len();
+    let impacts = extended.impacts();
+    let parameters = 0..extended.n_parameters();
+    let kinds: Vec<Column> = (0..n)
+        .map(Column::State)
+        .chain(parameters.map(Column::Parameter))
+        .collect();
+    let options = Options {
+        keep: if places > 0 { Keep::Steps } else { Keep::Last },
+        dense_output: places > 0,
+        ..options.clone()
+    };
+    let mut tangents = Tangents::new(extended, &impacts, kinds, &options, span.1 - span.0);
+    let solution = Problem::new(system, span, start)
+        .options(&options)
+        .actions(actions)
+        .held_in(mode)
+        .solve_observed(&mut tangents, &mut |_| false)?;
+    let derivatives = tangents.finish()?;
+    let mut motion = HeldMotion::new(extended, &impacts, &options, mode, q);
+    let mut velocity = |t: f64, x: &[f64]| -> Result<Vec<f64>, FieldError> {
+        let mut all = motion.velocity(t, x)?;
+        all.truncate(n);
+        Ok(all)
+    };
+    let x = solution.last_state().to_vec();
+    let velocities = [velocity(span.0, start)?, velocity(solution.t_last, &x)?];
+    let mut samples = Vec::new();
+    let mut point = vec![0.0; n];
+    for pair in solution.t.windows(2).filter(|_| places > 0) {
+        for place in 0..places {
+            let t = pair[0] + (pair[1] - pair[0]) * place as f64 / places as f64;
+            solution.evaluate(system, t, Side::Right, &mut point)?;
+            samples.push((t, motion.values(t, &point)?));
+        }
+    }
+    if places > 0 {
+        samples.push((solution.t_last, motion.values(solution.t_last, &x)?));
+    }
+    Ok(Leg {
+        x,
+        velocities,
+        derivative: derivatives.values,
+        samples,
+        stop: solution.stop,
+    })
+}
+
+/// Why there is no leg.
+#[derive(Debug)]
+pub enum LegError {
+    /// An argument is out of range.
+    Argument(Error),
+    /// A function of the user raised.
+    Raised(FieldError),
+}
+
+impl From<Error> for LegError {
+    fn from(error: Error) -> Self {
+        LegError::Argument(error)
+    }
+}
+
+impl From<FieldError> for LegError {
+    fn from(error: FieldError) -> Self {
+        LegError::Raised(error)
+    }
+}

@@ -1,0 +1,602 @@
+"""Limit cycles: found by simulation, then by Newton's method on the durations of their pieces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from filippov.analysis import Phase, Section
+from filippov.analysis.sections import as_section
+from filippov.cycles.forcing import GivenPeriod, InferredPeriod, depends_on_time, forcing_of
+from filippov.cycles.itinerary import Itinerary, Leg, itinerary_from_event, itinerary_of
+from filippov.cycles.motions import Array, Motions
+from filippov.cycles.shooting import Period, Shooting, Shot, solve
+from filippov.errors import InputError, ModelError
+from filippov.events import Event, accepted_names
+from filippov.modes import Mode
+from filippov.options import check_time, check_y0
+from filippov.solution import Solution
+from filippov.system import System
+from filippov.unknown import did_you_mean
+
+__all__ = ["Cycle", "CycleDerivative", "cycle_at", "limit_cycle"]
+
+_MOST_RETURNS = 32
+_NEAR = 1e-3
+
+
+class CycleDerivative(NamedTuple):
+    """The derivative of a cycle by a parameter.
+
+    Attributes
+    ----------
+    y0 : ndarray, shape (n,)
+        That of its start.
+    period : float
+        That of its period.
+    times : ndarray, shape (m,)
+        Those of the times of its switches.
+    states : ndarray, shape (m, n)
+        Those of the states behind its switches.
+    """
+
+    y0: Array
+    period: float
+    times: Array
+    states: Array
+
+
+class Cycle:
+    """A limit cycle.
+
+    Attributes
+    ----------
+    system : System
+    params : dict
+        Values of all parameters.
+    t0, y0 : float, ndarray of shape (n,)
+        Its start.
+    period : float
+    itinerary : Itinerary
+        Its pieces in their order, with the state at the start of each and how long it lasts.
+    residual : float
+        The size of the last step of Newton's method, relative to the size of the cycle.
+    """
+
+    def __init__(self, shooting: Shooting, u: Array, shot: Shot, residual: float, section: Any = None) -> None:
+        self._shooting, self._u, self._shot = shooting, u, shot
+        self._section = section
+        motions = shooting.motions
+        self.system, self.params = motions.system, motions.params
+        self.itinerary = shooting.itinerary(u)
+        self.t0, self.y0 = self.itinerary.t0, self.itinerary.starts[0].copy()
+        self.period = self.itinerary.period
+        self.residual = residual
+
+    @property
+    def is_forced(self) -> bool:
+        """Whether something acts on the system from outside, with a period of its own."""
+        return self._shooting.period is not None
+
+    @cached_property
+    def monodromy(self) -> Array:
+        """The derivative of the state after one period by that at the start, both at fixed times, (n, n)."""
+        return self._shot.monodromy()
+
+    @property
+    def modes(self) -> tuple[Mode, ...]:
+        """The modes of its pieces."""
+        visible = len(self._shooting.motions.prepared.surfaces)
+        return tuple(Mode(leg.mode[:visible]) for leg in self.itinerary.legs)
+
+    @cached_property
+    def n_zero(self) -> int:
+        """How many multipliers are zero: sliding on m surfaces takes m of them, contact two for each."""
+        found = max(_codimension(self._shooting.motions, leg) for leg in self.itinerary.legs)
+        n = self._shooting.n
+        for passage in self._shot.passages:
+            rank = int(np.linalg.matrix_rank(passage.map[:, 1 : 1 + n], tol=1e-12))
+            found = max(found, n - rank)
+        return min(found, n)
+
+    @cached_property
+    def multipliers(self) -> npt.NDArray[np.complex128]:
+        """The eigenvalues of the monodromy matrix, the largest first.
+
+        Those that sliding, contact and maps make zero are zero exactly. Without forcing one of them is 1.
+        """
+        return multipliers_of(self.monodromy, self.n_zero)
+
+    @property
+    def trivial_error(self) -> float:
+        """By how much M f differs from f, relative to f, for a cycle without forcing; 0 for one with it."""
+        if self.is_forced:
+            return 0.0
+        velocity = self._shot.passages[0].leg.velocities[0]
+        return float(np.linalg.norm(self.monodromy @ velocity - velocity) / np.linalg.norm(velocity))
+
+    @property
+    def nontrivial(self) -> npt.NDArray[np.complex128]:
+        """The multipliers without the one that is 1 in a cycle without forcing."""
+        found = self.multipliers
+        if self.is_forced:
+            return found
+        return np.delete(found, int(np.argmin(np.abs(found - 1.0))))
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether all multipliers but the trivial one lie inside the unit circle."""
+        return bool(np.all(np.abs(self.nontrivial) < 1.0))
+
+    @cached_property
+    def solution(self) -> Solution:
+        """The run over one period."""
+        return self._shooting.motions.run((self.t0, self.t0 + self.period), self.y0)
+
+    @cached_property
+    def is_admissible(self) -> bool:
+        """Whether the flow follows the itinerary: a run from the start makes the same pieces."""
+        return follows_itinerary(self)
+
+    def derivative(self, name: str) -> CycleDerivative:
+        """Return the derivative by a parameter.
+
+        Parameters
+        ----------
+        name : str
+            Name of the parameter.
+
+        Returns
+        -------
+        CycleDerivative
+            The start moves on the section; without one, where it is at a switch it stays there, and else it
+            moves at right angles to the motion; with forcing its time is fixed.
+
+        Raises
+        ------
+        InputError
+            If there is no such parameter.
+        """
+        if name not in self.params or name in self.system.discrete:
+            raise InputError(f"name: the system has no parameter {name!r}{did_you_mean(name, self.params)}")
+        shooting = self._with_derivatives_by((name,))
+        size, n, m = shooting.size, shooting.n, shooting.m
+        jacobian = shooting.shoot(self._u).jacobian
+        du = -np.linalg.solve(jacobian[:, :size], jacobian[:, size])
+        states, durations = du[: m * n].reshape(m, n), du[m * n : m * (n + 1)]
+        since = float(du[m * (n + 1)]) if shooting.is_free_in_time else 0.0
+        times = since + np.cumsum(durations)
+        start, shift = states[0], 0.0
+        if self._section is not None:
+            by_state, by_name = _slopes_of(self._section, self.t0, self.y0, self.params, name)
+            velocity = self._shot.passages[0].leg.velocities[0]
+            shift = -float(by_state @ start + by_name) / float(by_state @ velocity)
+            start = start + shift * velocity
+        ended = [i for i, leg in enumerate(self.itinerary.legs) if leg.ending is not None]
+        after = states[[(i + 1) % m for i in ended]]
+        return CycleDerivative(start, float(np.sum(durations)), times[ended] - shift, after)
+
+    def plot(self, *names: str, **options: Any) -> Any:
+        """Draw the cycle; see `Solution.plot`."""
+        return self.solution.plot(*names, **options)
+
+    def __repr__(self) -> str:
+        stable = "stable" if self.is_stable else "unstable"
+        largest = np.max(np.abs(self.nontrivial), initial=0.0)
+        modes = " ".join(str(mode) for mode in self.modes)
+        return (
+            f"Cycle({stable}, period {self.period:.9g}, modes {modes}, largest multiplier {largest:.6g} in "
+            f"modulus, {self.n_zero} zero)"
+        )
+
+    def _with_derivatives_by(self, names: Sequence[str]) -> Shooting:
+        motions = self._shooting.motions.with_derivatives_by(names)
+        return Shooting(motions, self.itinerary, self._shooting.period)
+
+
+def multipliers_of(monodromy: Array, n_zero: int) -> npt.NDArray[np.complex128]:
+    """Return the eigenvalues, the largest first, of which the smallest are zero."""
+    found = np.linalg.eigvals(monodromy).astype(np.complex128)
+    found = found[np.argsort(-np.abs(found), kind="stable")]
+    if n_zero:
+        found[len(found) - n_zero :] = 0.0
+    return found
+
+
+def _codimension(motions: Motions, leg: Leg) -> int:
+    """Return how many dimensions a leg has lost."""
+    slid = sum(entry == 0 for entry in leg.mode)
+    forces = sum(kind == "force" for kind, *_ in motions.guards(leg.mode, leg.discrete))
+    return slid + forces
+
+
+def _slopes_of(
+    section: Callable[..., Any], t: float, y: Array, params: Mapping[str, float], name: str
+) -> tuple[Array, float]:
+    """Return the derivatives of a section by the state and a parameter, by central differences."""
+    names = accepted_names(section, params)
+
+    def value(y: Array, params: Mapping[str, float]) -> float:
+        return float(section(t, y, **{key: params[key] for key in names}))
+
+    def slope(function: Callable[[float], float], size: float) -> float:
+        d = 6e-6 * max(abs(size), 1e-3)
+        return (function(d) - function(-d)) / (2 * d)
+
+    by_state = [slope(lambda d, e=e: value(y + d * e, params), v) for e, v in zip(np.eye(len(y)), y, strict=True)]
+    p = params[name]
+    return np.array(by_state), slope(lambda d: value(y, {**params, name: p + d}), p)
+
+
+def follows_itinerary(cycle: Cycle) -> bool:
+    """Whether a run from the middle of the longest leg makes the pieces of a cycle."""
+    itinerary, motions = cycle.itinerary, cycle._shooting.motions
+    longest = int(np.argmax(itinerary.durations))
+    leg = itinerary.legs[longest]
+    t = itinerary.t0 + sum(itinerary.durations[:longest])
+    half = 0.5 * itinerary.durations[longest]
+    x = motions.leg(leg.mode, leg.discrete, t, itinerary.starts[longest], half).x
+    if not itinerary.is_closed_by_event() and longest == 0:
+        t, x = itinerary.t0, itinerary.starts[0]
+    else:
+        t += half
+    try:
+        record = motions.record((t, t + itinerary.period), x)
+        found = itinerary_of(record, t + itinerary.period)
+    except ModelError:
+        return False
+    own, theirs = _kinds(itinerary), _kinds(found)
+    if len(own) != len(theirs):
+        return False
+    is_same = not own or any(own == theirs[k:] + theirs[:k] for k in range(len(own)))
+    end = record.solution.y[:, -1]
+    size = np.max(np.abs(record.solution.y))
+    growth = max(1.0, float(np.max(np.abs(cycle.multipliers), initial=0.0)))
+    return bool(is_same and np.max(np.abs(end - x)) < 1e-6 * growth * size)
+
+
+def _kinds(itinerary: Itinerary) -> list[object]:
+    """Return what happens at the switches, in their order."""
+    ended = [leg for leg in itinerary.legs if leg.ending is not None]
+    return [(leg.mode, leg.ending.guard, leg.ending.acts) for leg in ended if leg.ending is not None]
+
+
+def limit_cycle(
+    system: System,
+    y0: npt.ArrayLike,
+    params: Mapping[str, float] | None = None,
+    section: Any = None,
+    period: float | Callable[..., float] | None = None,
+    itinerary: Itinerary | Cycle | None = None,
+    *,
+    t0: float = 0.0,
+    transient: int | None = None,
+    **options: Any,
+) -> Cycle:
+    """Return the limit cycle that a run from `y0` comes to, or one near a guess.
+
+    The system is simulated, the period is recognised, the pieces are taken from the record of switches, and
+    Newton's method finds the cycle, with the states at the switches and the durations as unknowns.
+
+    Parameters
+    ----------
+    system : System
+        A traced system.
+    y0 : array_like, shape (n,)
+        Start of the run.
+    params : dict, optional
+        Values of parameters; the others have their defaults.
+    section : Event, callable or Phase, optional
+        Where the cycle starts: a zero of a function ``g(t, y)``, or a phase of the time. By default, with
+        forcing at the time `t0`; else at a switch, that before its longest piece.
+    period : float or callable, optional
+        With forcing, its period: a number, or a function of parameters by their names; by default it is found
+        from field and switching functions. The cycle may have a multiple of it. Without forcing a guess of
+        the period of the cycle, used with ``transient=0``.
+    itinerary : Itinerary or Cycle, optional
+        A cycle, or its pieces, to start Newton's method from; `y0` is not used then.
+    t0 : float, optional
+        Time of the start.
+    transient : int, optional
+        How many periods are simulated first. Default: 200 of a forcing, and else until the run returns. 0: none;
+        `y0` is a guess, and the cycle may be unstable.
+    **options
+        Options of `solve_ivp` for all runs, among them ``rtol`` (default 1e-12) and ``atol`` (1e-13).
+
+    Returns
+    -------
+    Cycle
+
+    Raises
+    ------
+    InputError
+        If an argument is wrong.
+    ModelError
+        If there is no cycle, or it is not found; the message says why.
+
+    References
+    ----------
+    Thota and Dankowicz, SIAM J. Appl. Dyn. Syst. 7 (2008) 1283; Piiroinen and Kuznetsov, ACM TOMS 34 (2008) 13.
+
+    Examples
+    --------
+    >>> import numpy as np, filippov as fl
+    >>> relay = fl.System(lambda t, x: [x[1], x[2], -2 * x[2] - 3 * x[1] - np.sign(x[0])], n=3)
+    >>> cycle = fl.limit_cycle(relay, [0.1, 0.0, 0.0])
+    >>> round(cycle.period, 9), cycle.is_stable
+    (3.661904667, True)
+    """
+    if not isinstance(system, System):
+        raise InputError(f"system: a filippov.System is needed, not {type(system).__name__}")
+    if transient is not None and (isinstance(transient, bool) or not isinstance(transient, int) or transient < 0):
+        raise InputError(f"transient: a number of periods is needed, not {transient!r}")
+    start, t0 = check_y0(y0, states=system._states), check_time(t0)
+    motions = Motions(system, len(start), system.parameter_values(params), (), options)
+    anchor = _check_section(section)
+    if isinstance(anchor, Phase):
+        t0, period = anchor.offset, anchor.period
+    if itinerary is not None:
+        found = _from_itinerary(motions, itinerary, period)
+    elif period is not None and transient == 0 and not _is_forced(motions, t0, start, period):
+        if callable(period):
+            raise InputError("period: the guess of a period is a number")
+        found = cycle_at(motions, t0, start, float(period), None)
+    else:
+        found = _simulated(motions, t0, start, period, transient)
+    return _moved_to(found, anchor, t0)
+
+
+def cycle_at(
+    motions: Motions, t0: float, x: Array, duration: float, period: Period, is_free: bool = False
+) -> Cycle:
+    """Return the cycle near a guess of a point and of the period, with the pieces of a run from there.
+
+    Parameters
+    ----------
+    motions : Motions
+    t0, x : float, ndarray of shape (n,)
+        The point.
+    duration : float
+        The period.
+    period : GivenPeriod, InferredPeriod or None
+        That of the forcing.
+    is_free : bool, optional
+        Start at the point and not at an event.
+
+    Raises
+    ------
+    ModelError
+        If the run has no itinerary, or Newton's method does not converge.
+    """
+    itinerary = None
+    if not is_free:
+        record = motions.record((t0, t0 + 2.05 * duration), x)
+        itinerary = itinerary_from_event(record, duration)
+    if itinerary is None:
+        record = motions.record((t0, t0 + duration), x)
+        itinerary = itinerary_of(record, t0 + duration)
+    return cycle_of(motions, itinerary, period)
+
+
+def cycle_of(motions: Motions, itinerary: Itinerary, period: Period) -> Cycle:
+    """Return the cycle with an itinerary, from a guess of its states and durations.
+
+    Raises
+    ------
+    ModelError
+        If Newton's method does not converge, or the cycle holds a sample of the state.
+    """
+    shooting = Shooting(motions, itinerary, period)
+    u, shot, residual = solve(shooting, shooting.unknowns(itinerary))
+    _refuse_samples(shooting, shot)
+    return Cycle(shooting, u, shot, residual)
+
+
+def _refuse_samples(shooting: Shooting, shot: Shot) -> None:
+    """Refuse a cycle whose discrete states are samples of its state: they are no constants of its pieces."""
+    for i, passage in enumerate(shot.passages[:-1]):
+        held = np.array(shooting.legs[i + 1].discrete)
+        if held.size and np.max(np.abs(held - passage.discrete)) > 1e-9 * (1 + np.max(np.abs(held))):
+            raise ModelError(
+                "the cycle holds samples of its state: they change with it, and are no constants of its pieces"
+            )
+
+
+def _check_section(section: Any) -> Phase | Event | Callable[..., Any] | None:
+    if section is None or isinstance(section, (Phase, Event)) or callable(section):
+        return section
+    if isinstance(section, Section) and callable(section.where):
+        return Event(section.where, section.direction)
+    as_section(section)
+    raise InputError("section: a function g(t, y), an Event or a Phase says where a cycle starts")
+
+
+def _is_forced(motions: Motions, t0: float, x: Array, period: Any) -> bool:
+    scale = float(period) if isinstance(period, (int, float)) else 1.0
+    if depends_on_time(motions, scale):
+        return True
+    record = motions.record((t0, t0 + scale), x)
+    return any(not instant.guards for instant in record.instants if instant.acts)
+
+
+def _from_itinerary(motions: Motions, given: Itinerary | Cycle, period: Any) -> Cycle:
+    if isinstance(given, Cycle):
+        own = given._shooting.period
+        return cycle_of(motions, given.itinerary, own if period is None else GivenPeriod(period))
+    if not isinstance(given, Itinerary):
+        raise InputError(f"itinerary: that of a cycle is needed, not {type(given).__name__}")
+    forced = None if period is None else GivenPeriod(period)
+    if forced is not None:
+        forced.multiple = max(1, round(given.period / forced.value(motions)))
+    return cycle_of(motions, given, forced)
+
+
+def _simulated(motions: Motions, t0: float, x: Array, period: Any, transient: int | None) -> Cycle:
+    """Run until the motion repeats itself."""
+    forcing: GivenPeriod | InferredPeriod | None = None if period is None else GivenPeriod(period)
+    if forcing is None:
+        span, solution = _first_span(motions, t0, x)
+        steps = np.diff(solution.t)
+        if depends_on_time(motions, span):
+            step = float(np.median(steps[steps > 0]))
+            forcing = forcing_of(motions, 0.5 * step, span)
+            if forcing is None:
+                raise ModelError(
+                    "the system depends on time, and no period of field and switching functions was found: "
+                    "give period=, a number or a function of the parameters"
+                )
+        else:
+            ticks = _ticks(motions, t0, x, span)
+            if ticks is not None:
+                forcing = GivenPeriod(ticks)
+    if forcing is not None:
+        return _repeated_forced(motions, t0, x, forcing, 200 if transient is None else transient)
+    return _repeated(motions, t0, x, span)
+
+
+def _first_span(motions: Motions, t0: float, x: Array) -> tuple[float, Solution]:
+    """Return a span of time in which much happens, with the run over it."""
+    span = 1.0
+    while True:
+        solution = motions.run((t0, t0 + span), x)
+        if not solution.success:
+            raise ModelError(f"the run ends before it repeats itself: {solution.message}", partial=solution)
+        if len(solution.t) > 400 or len(solution.switches) > 60 or span > 1e8:
+            return span, solution
+        span *= 4.0
+
+
+def _ticks(motions: Motions, t0: float, x: Array, span: float) -> float | None:
+    """Return the period of what happens at known times, if anything does."""
+    record = motions.record((t0, t0 + span), x)
+    times = np.unique([instant.times[0] for instant in record.instants if not instant.guards and instant.acts])
+    if len(times) < 3:
+        return None
+    gaps = np.diff(times)
+    for k in range(1, len(gaps) // 2 + 1):
+        if np.allclose(gaps[k:], gaps[:-k], rtol=1e-9):
+            return float(np.sum(gaps[:k]))
+    raise ModelError("things happen at known times that do not repeat themselves: give period=")
+
+
+def _repeated_forced(
+    motions: Motions, t0: float, x: Array, forcing: GivenPeriod | InferredPeriod, transient: int
+) -> Cycle:
+    single = forcing.value(motions)
+    if transient == 0:
+        return cycle_at(motions, t0, x, single, forcing)
+    for attempt in range(4):
+        count = transient * 4**attempt
+        strobes = t0 + single * np.arange(count, count + _MOST_RETURNS + 1)
+        solution = motions.run((t0, float(strobes[-1])), x, t_eval=strobes, dense_output=False)
+        if not solution.success:
+            raise ModelError(f"the run ends before it repeats itself: {solution.message}", partial=solution)
+        points = solution.y
+        size = np.max(np.abs(points), axis=1) + 1e-12
+        distances = np.max(np.abs(points[:, 1:] - points[:, :1]) / size[:, None], axis=0)
+        near = max(_NEAR, 10 * float(np.min(distances))) if np.min(distances) < 1e-2 else 0.0
+        alike = np.flatnonzero(distances < near)
+        if len(alike):
+            multiple = int(alike[0]) + 1
+            forcing.multiple = multiple
+            try:
+                return cycle_at(motions, float(strobes[0]), points[:, 0], multiple * single, forcing)
+            except ModelError:
+                if attempt == 3:
+                    raise
+    raise ModelError(
+        f"no cycle was found: after {count} periods of the forcing the run does not repeat itself within "
+        f"{_MOST_RETURNS} more (nearest return: {float(np.min(distances)):.2g} of its size). It may be chaotic, "
+        "quasiperiodic or grow; more of it is simulated with transient="
+    )
+
+
+def _repeated(motions: Motions, t0: float, x: Array, span: float) -> Cycle:
+    t, point = t0, x
+    problem = ""
+    for _ in range(6):
+        solution = motions.run((t, t + span), point)
+        if not solution.success:
+            raise ModelError(f"the run ends before it repeats itself: {solution.message}", partial=solution)
+        t, end = t + span, solution.y[:, -1]
+        size = np.max(np.abs(solution.y), axis=1) + 1e-300
+        if np.max(np.abs(end) / (1e-300 + np.max(np.abs(x)) + 1.0)) > 1e8:
+            raise ModelError(f"no cycle was found: the run grows without bound, to {_short(end)} at t = {t:.6g}")
+        point = end
+        velocity = motions.record((t, t + 1e-6 * span), point)
+        at = motions.at(velocity.mode, velocity.discrete, t, point).velocity
+        later = solution.y[:, len(solution.t) // 2 :]
+        moves = np.max(np.ptp(later, axis=1) / size)
+        if moves < 1e-7 or not np.any(at):
+            raise ModelError(
+                f"no cycle was found: the run comes to rest at {_short(end)}; fl.equilibrium finds where"
+            )
+        returns = motions.run((t, t + span), point, events=Event(_plane(at, point), direction=1))
+        times, points = returns.t_events[0], returns.y_events[0]
+        later_ones = times > t + 1e-9 * span
+        times, points = times[later_ones], points[later_ones]
+        if len(times):
+            amplitude = np.ptp(solution.y, axis=1) + 1e-12 * size
+            distances = np.max(np.abs(points - point) / amplitude, axis=1)[:_MOST_RETURNS]
+            nearest = float(np.min(distances))
+            problem = f" (nearest return: {nearest:.2g} of its size)"
+            if nearest < 1e-2:
+                k = int(np.flatnonzero(distances < max(_NEAR, 10 * nearest))[0])
+                try:
+                    return cycle_at(motions, t, point, float(times[k] - t), None)
+                except ModelError as error:
+                    problem = f": {error}"
+        span *= 2.0
+    raise ModelError(
+        f"no cycle was found: by t = {t:.6g} the run does not repeat itself{problem}. It may be chaotic or "
+        "quasiperiodic, or need more time"
+    )
+
+
+def _plane(normal: Array, point: Array) -> Callable[..., Any]:
+    def g(t: Any, y: Any, **_: Any) -> Any:
+        return sum(float(a) * (y[i] - float(b)) for i, (a, b) in enumerate(zip(normal, point, strict=True)))
+
+    return g
+
+
+def _short(x: Array) -> str:
+    return np.array2string(x, precision=6, threshold=8)
+
+
+def _moved_to(cycle: Cycle, section: Any, t0: float) -> Cycle:
+    """Return a cycle from where it is to start."""
+    motions, forcing, period = cycle._shooting.motions, cycle._shooting.period, cycle.period
+    if isinstance(section, Phase) or (section is None and forcing is not None):
+        turns = np.ceil((cycle.t0 - t0) / period - 1e-9)
+        x = _state_at(cycle, t0 + turns * period)
+        return cycle_at(motions, t0, x, period, forcing, is_free=True)
+    if section is None:
+        return cycle
+    event = section if isinstance(section, Event) else Event(section)
+    there = motions.run((cycle.t0, cycle.t0 + 1.05 * period), cycle.y0, events=event)
+    times, points = there.t_events[0], there.y_events[0]
+    if not len(times):
+        raise ModelError(f"section: the cycle does not reach {event.name or 'it'}")
+    # At a switch the cycle starts behind it.
+    record = motions.record((cycle.t0, cycle.t0 + 2.2 * period), cycle.y0)
+    at_switch = itinerary_from_event(record, period, at=float(times[0]))
+    if at_switch is None:
+        moved = cycle_at(motions, float(times[0]), points[0], period, forcing, is_free=True)
+    else:
+        moved = cycle_of(motions, at_switch, forcing)
+    moved._section = event.g
+    return moved
+
+
+def _state_at(cycle: Cycle, t: float) -> Array:
+    if t <= cycle.t0:
+        return cycle.y0
+    run = cycle._shooting.motions.run((cycle.t0, t), cycle.y0)
+    if not run.success:
+        raise ModelError(run.message, partial=run)
+    return np.asarray(run.y[:, -1])

@@ -1,0 +1,170 @@
+"""The period of what acts on a system from outside."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from filippov.analysis import Phase
+from filippov.cycles.motions import Array, Motions
+from filippov.errors import InputError, ModelError
+
+__all__ = ["Forcing", "GivenPeriod", "InferredPeriod", "depends_on_time", "forcing_of"]
+
+_PLACES = 7
+
+
+def _samples(motions: Motions) -> list[tuple[float, Array, Array]]:
+    """Return places for looking at a right-hand side: times in units of one, states, signs."""
+    random = np.random.default_rng(20)
+    m = motions.prepared.core.n_surfaces
+    return [
+        (random.uniform(0.0, 1.0), random.uniform(-1.0, 1.0, motions.n), random.choice([-1.0, 1.0], m))
+        for _ in range(_PLACES)
+    ]
+
+
+def depends_on_time(motions: Motions, scale: float) -> bool:
+    """Whether field or switching functions contain the time; `scale` is a span of it."""
+    for u, x, signs in _samples(motions):
+        first = motions.right_hand_side(0.0, x, signs)
+        for k in range(1, 4):
+            later = motions.right_hand_side(k * u * scale, x, signs)
+            if not np.array_equal(first, later, equal_nan=True):
+                return True
+    return False
+
+
+class GivenPeriod:
+    """A multiple of a period that the user gives: a number, or a function of parameters by their names."""
+
+    def __init__(self, period: float | Callable[..., Any], multiple: int = 1) -> None:
+        self.phase, self.multiple = Phase(period), multiple
+
+    def value(self, motions: Motions) -> float:
+        """Return the period for the parameters of the motions."""
+        found = float(self.phase.period_at(motions.params))
+        if not np.isfinite(found) or found <= 0:
+            raise InputError(f"period: it is positive, not {found}")
+        return self.multiple * found
+
+    def slopes(self, motions: Motions) -> Array:
+        """Return its derivatives by the parameters of the motions, by differences of a smooth function."""
+        params = motions.params
+
+        def slope(name: str) -> float:
+            def at(change: float) -> Array:
+                values = {**params, name: params[name] + change}
+                return np.array([float(self.phase.period_at(values))])
+
+            return float(_slope(at, 1e-3 * max(abs(params[name]), 1e-6))[0])
+
+        return self.multiple * np.array([slope(name) for name in motions.by])
+
+
+class InferredPeriod:
+    """A multiple of the period of field and switching functions, found from their values."""
+
+    def __init__(self, guess: float, multiple: int = 1) -> None:
+        self.latest, self.multiple = guess, multiple
+
+    def value(self, motions: Motions) -> float:
+        """Return the period for the parameters of the motions."""
+        self.latest = _refined(motions, self.latest)
+        return self.multiple * self.latest
+
+    def slopes(self, motions: Motions) -> Array:
+        """Return its derivatives by the parameters of the motions.
+
+        Where the right-hand side repeats itself for all values of a parameter, its derivative by that and by the period vanish
+        together.
+        """
+        params, own = motions.params, self.latest
+        by_period = _slope(lambda change: _difference(motions, own + change), 1e-3 * own)
+        size = float(by_period @ by_period)
+        found = []
+        for name in motions.by:
+
+            def at(change: float, name: str = name) -> Array:
+                motions.use({**params, name: params[name] + change})
+                return _difference(motions, own)
+
+            try:
+                by_parameter = _slope(at, 1e-3 * max(abs(params[name]), 1e-6))
+            finally:
+                motions.use(params)
+            found.append(0.0 if size == 0.0 else -float(by_period @ by_parameter) / size)
+        return self.multiple * np.array(found)
+
+
+def _slope(function: Callable[[float], Array], d: float) -> Array:
+    """Return the derivative of a smooth function at 0, by differences of sixth order."""
+    near, middle, far = ((function(k * d) - function(-k * d)) / (2 * k * d) for k in (1, 2, 3))
+    return np.asarray(1.5 * near - 0.6 * middle + 0.1 * far)
+
+
+def _difference(motions: Motions, period: float) -> Array:
+    """Return by how much field and switching functions differ a period later."""
+    parts = []
+    for u, x, signs in _samples(motions):
+        t = u * period
+        parts.append(motions.right_hand_side(t + period, x, signs) - motions.right_hand_side(t, x, signs))
+    found = np.concatenate(parts)
+    return found[np.isfinite(found)]
+
+
+def _refined(motions: Motions, guess: float) -> float:
+    """Return the period nearest to a guess, by Gauss and Newton."""
+    period = guess
+    for _ in range(30):
+        d = 1e-6 * period
+        value = _difference(motions, period)
+        slope = (_difference(motions, period + d) - _difference(motions, period - d)) / (2 * d)
+        size = float(slope @ slope)
+        if size == 0.0:
+            return period
+        step = -float(slope @ value) / size
+        step = float(np.clip(step, -0.1 * period, 0.1 * period))
+        period += step
+        if abs(step) < 4e-16 * period:
+            break
+    if np.max(np.abs(_difference(motions, period)), initial=0.0) > 1e-7 * _size(motions):
+        raise ModelError(
+            f"the period of the right-hand side near {guess:.6g} is not found: give period=, a number or a "
+            "function of the parameters"
+        )
+    return period
+
+
+def _size(motions: Motions) -> float:
+    values = [motions.right_hand_side(u, x, signs) for u, x, signs in _samples(motions)]
+    found = np.abs(np.concatenate(values))
+    return max(float(np.max(found[np.isfinite(found)], initial=0.0)), 1.0)
+
+
+def forcing_of(motions: Motions, shortest: float, longest: float) -> InferredPeriod | None:
+    """Return the shortest period of the right-hand side in an interval, if it has one."""
+    step = shortest / 8
+    count = int(min(longest / step, 40_000))
+    size = _size(motions)
+    before = [np.inf, np.inf]
+    for k in range(4, count):
+        value = float(np.max(np.abs(_difference_from_start(motions, k * step))))
+        is_dip = before[1] < before[0] and before[1] <= value
+        if is_dip and before[1] < 0.2 * size:
+            try:
+                return InferredPeriod(_refined(motions, (k - 1) * step))
+            except ModelError:
+                pass
+        before = [before[1], value]
+    return None
+
+
+def _difference_from_start(motions: Motions, period: float) -> Array:
+    parts = []
+    for u, x, signs in _samples(motions)[:3]:
+        parts.append(motions.right_hand_side(u + period, x, signs) - motions.right_hand_side(u, x, signs))
+    found = np.concatenate(parts)
+    return found[np.isfinite(found)]

@@ -1,0 +1,193 @@
+"""An itinerary: the modes of a cycle in their order, and what ends each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from filippov.cycles.motions import Array, Guard, Instant, Mode, Record
+from filippov.errors import ModelError
+
+__all__ = ["MOST_LEGS", "Ending", "Itinerary", "Leg", "itinerary_from_event", "itinerary_of"]
+
+MOST_LEGS = 400
+
+
+class Ending(NamedTuple):
+    """What ends a leg.
+
+    Attributes
+    ----------
+    guard : Guard or None
+        The guard that vanishes; ``None``: a known time.
+    time : float
+        The time, if it is known.
+    acts : tuple of int
+        The actions that are done.
+    """
+
+    guard: Guard | None
+    time: float
+    acts: tuple[int, ...] = ()
+
+    def is_same(self, other: Ending | None) -> bool:
+        """Whether another ending is of this kind."""
+        return other is not None and self.guard == other.guard and self.acts == other.acts
+
+
+class Leg(NamedTuple):
+    """A piece of constant mode.
+
+    Attributes
+    ----------
+    mode : Mode
+        One entry per surface.
+    discrete : tuple of float
+        The discrete states.
+    ending : Ending or None
+        ``None``: the end of the period, where nothing happens.
+    """
+
+    mode: Mode
+    discrete: tuple[float, ...]
+    ending: Ending | None
+
+
+class Itinerary(NamedTuple):
+    """The legs of a cycle, with a first guess of where they start and how long they last.
+
+    Attributes
+    ----------
+    legs : tuple of Leg
+    t0 : float
+        The start of the first.
+    starts : tuple of ndarray
+        The state at the start of each.
+    durations : tuple of float
+    """
+
+    legs: tuple[Leg, ...]
+    t0: float
+    starts: tuple[Array, ...]
+    durations: tuple[float, ...]
+
+    @property
+    def period(self) -> float:
+        """The sum of all durations."""
+        return float(sum(self.durations))
+
+    def is_closed_by_event(self) -> bool:
+        """Whether the last leg ends at an event."""
+        return self.legs[-1].ending is not None
+
+    def is_same(self, other: Itinerary) -> bool:
+        """Whether two cycles have the same modes and endings, up to where they start."""
+        if len(self.legs) != len(other.legs):
+            return False
+        own = [_signature(leg) for leg in self.legs]
+        theirs = [_signature(leg) for leg in other.legs]
+        return any(own == theirs[k:] + theirs[:k] for k in range(len(own)))
+
+
+def _signature(leg: Leg) -> tuple[object, ...]:
+    ending = leg.ending
+    return (leg.mode, None if ending is None else (ending.guard, ending.acts))
+
+
+def itinerary_of(record: Record, t1: float) -> Itinerary:
+    """Return the itinerary of a run from its start to the time `t1`.
+
+    Raises
+    ------
+    ModelError
+        If it has infinitely many switches, or too many.
+    """
+    start = _start_of(record)
+    return _between(start, [instant for instant in _changes(record) if start.times[1] < instant.times[0] < t1], t1)
+
+
+def itinerary_from_event(record: Record, period: float, at: float | None = None) -> Itinerary | None:
+    """Return the itinerary of a period that starts at an event: at a time, or else before the longest leg.
+
+    The run lasts for two periods at least. ``None`` if there is no such event that comes again a period later.
+
+    Raises
+    ------
+    ModelError
+        If it has infinitely many switches, or too many.
+    """
+    start, instants = _start_of(record), _changes(record)
+    first = start.times[1]
+    best: tuple[float, Itinerary] | None = None
+    for i, instant in enumerate(instants[:-1]):
+        t = instant.times[1]
+        if not instant.guards or t > first + period:
+            continue
+        if at is not None and abs(t - at) > 1e-8 * period:
+            continue
+        lasts = instants[i + 1].times[0] - t
+        if best is not None and lasts <= best[0]:
+            continue
+        again = _nearest(instants, instant, t + period)
+        if again is not None:
+            best = lasts, _between(instant, instants[i + 1 : again + 1], None)
+    return None if best is None else best[1]
+
+
+def _changes(record: Record) -> list[Instant]:
+    found = [instant for instant in record.instants if instant.changes()]
+    if len(found) > 2 * MOST_LEGS:
+        raise ModelError(
+            f"the run has {len(found)} switches in two periods, more than {2 * MOST_LEGS}: its cycle is not "
+            "followed piece by piece"
+        )
+    for instant in found:
+        if instant.times[0] != instant.times[1]:
+            raise ModelError(
+                f"infinitely many switches come to an end at t = {instant.times[1]:.6g}: the cycle has no "
+                "itinerary"
+            )
+    return found
+
+
+def _start_of(record: Record) -> Instant:
+    """Return the start of a run as an instant."""
+    solution = record.solution
+    x, t = solution.y[:, 0].copy(), float(solution.t[0])
+    start = Instant((t, t), (x, x), (record.mode, record.mode), (record.discrete, record.discrete), (), ())
+    at_start = [instant for instant in record.instants if instant.times[0] == t and instant.changes()]
+    return at_start[-1] if at_start else start
+
+
+def _nearest(instants: Sequence[Instant], instant: Instant, t: float) -> int | None:
+    """Return the place of the instant of the same kind that is nearest to a time, if one is near."""
+    alike = [
+        k
+        for k, other in enumerate(instants)
+        if (other.guards, other.modes, other.acts) == (instant.guards, instant.modes, instant.acts)
+        and other.times[0] > instant.times[0]
+    ]
+    if not alike:
+        return None
+    nearest = min(alike, key=lambda k: abs(instants[k].times[0] - t))
+    period = t - instant.times[0]
+    return nearest if abs(instants[nearest].times[0] - t) < 0.1 * period else None
+
+
+def _between(start: Instant, instants: Sequence[Instant], t1: float | None) -> Itinerary:
+    """Return the legs from one instant over others, to the last of them or to a later time."""
+    legs, starts, durations = [], [start.states[1]], []
+    mode, q, since = start.modes[1], start.discrete[1], start.times[1]
+    for instant in instants:
+        guard = instant.guards[0] if instant.guards else None
+        t = instant.times[0]
+        legs.append(Leg(instant.modes[0], instant.discrete[0], Ending(guard, t, instant.acts)))
+        durations.append(t - since)
+        mode, q, since = instant.modes[1], instant.discrete[1], t
+        starts.append(instant.states[1])
+    if t1 is None:
+        starts.pop()
+    else:
+        legs.append(Leg(mode, q, None))
+        durations.append(t1 - since)
+    return Itinerary(tuple(legs), start.times[1], tuple(starts), tuple(durations))

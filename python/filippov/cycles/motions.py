@@ -1,0 +1,276 @@
+"""The motions of a system in given modes, whatever their guards are, for any values of its parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from filippov._core import HeldMotions, Run, TracedSystem
+from filippov.derivatives import Back, refuse_without_derivatives
+from filippov.errors import InputError, ModelError
+from filippov.options import Options, check_options
+from filippov.prepare import Prepared, parameter_vector
+from filippov.solution import Solution
+from filippov.system import System
+
+__all__ = ["Guard", "GuardsAt", "Instant", "LegEnd", "Mode", "Motions", "Record"]
+
+Array = npt.NDArray[np.float64]
+Mode = tuple[int, ...]
+# Kind, surface and end of a guard, as the core names it.
+Guard = tuple[str, int, int]
+
+_DEFAULTS = {"rtol": 1e-12, "atol": 1e-13}
+
+
+class LegEnd(NamedTuple):
+    """Where a motion leads in a given time.
+
+    Attributes
+    ----------
+    x : ndarray, shape (n,)
+        The state at the end.
+    by_state, by_parameters : ndarray, shape (n, n) and (n, k)
+        Its derivatives.
+    velocities : (ndarray, ndarray)
+        The velocities at both ends.
+    times, guards : ndarray, shape (m,) and (g, m)
+        Places on the way, and the values of the guards there.
+    """
+
+    x: Array
+    by_state: Array
+    by_parameters: Array
+    velocities: tuple[Array, Array]
+    times: Array
+    guards: Array
+
+
+class GuardsAt(NamedTuple):
+    """The guards of a motion at a place.
+
+    Attributes
+    ----------
+    velocity, multipliers : ndarray
+        The velocity, and the multipliers of the surfaces slid on.
+    values : ndarray, shape (g,)
+        The guards; positive while the motion lasts.
+    by_time, by_state, by_parameters : ndarray, shape (g,), (g, n), (g, k)
+        Their derivatives.
+    """
+
+    velocity: Array
+    multipliers: Array
+    values: Array
+    by_time: Array
+    by_state: Array
+    by_parameters: Array
+
+    def rates(self) -> Array:
+        """Return the derivatives of the guards along the motion."""
+        return np.asarray(self.by_time + self.by_state @ self.velocity)
+
+
+class Instant(NamedTuple):
+    """An instant of a run.
+
+    Attributes
+    ----------
+    times : (float, float)
+        Its time; they differ where infinitely many switches are jumped over.
+    states : (ndarray, ndarray)
+    modes : (Mode, Mode)
+    discrete : (tuple of float, tuple of float)
+        Before and after.
+    guards : tuple of Guard
+        What vanishes, what fixes the time first; none at a known time.
+    acts : tuple of int
+        The actions done.
+    """
+
+    times: tuple[float, float]
+    states: tuple[Array, Array]
+    modes: tuple[Mode, Mode]
+    discrete: tuple[tuple[float, ...], tuple[float, ...]]
+    guards: tuple[Guard, ...]
+    acts: tuple[int, ...]
+
+    def changes(self) -> bool:
+        """Whether another motion follows."""
+        return bool(self.acts) or self.modes[0] != self.modes[1] or self.discrete[0] != self.discrete[1]
+
+
+class Record(NamedTuple):
+    """A run with its instants.
+
+    Attributes
+    ----------
+    solution : Solution
+    mode, discrete : Mode, tuple of float
+        Those at the start.
+    instants : list of Instant
+    """
+
+    solution: Solution
+    mode: Mode
+    discrete: tuple[float, ...]
+    instants: list[Instant]
+
+
+class Motions:
+    """The motions of a traced system.
+
+    Parameters
+    ----------
+    system : System
+    n : int
+        Number of its states.
+    params : mapping
+        Values of its parameters.
+    by : sequence of str
+        The parameters by which derivatives are taken.
+    options : mapping
+        Options of the runs.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        n: int,
+        params: Mapping[str, float],
+        by: Sequence[str],
+        options: Mapping[str, Any],
+    ) -> None:
+        self.system, self.n = system, n
+        self.options = {**_DEFAULTS, **options}
+        self._checked: Options = check_options(self.options, (0.0, 1.0), n)
+        self._by = tuple(by)
+        self._held: tuple[Array, HeldMotions] | None = None
+        self.use(params)
+
+    @property
+    def by(self) -> tuple[str, ...]:
+        """The parameters by which derivatives are taken."""
+        return self._by
+
+    @property
+    def params(self) -> dict[str, float]:
+        """The values of the parameters."""
+        return dict(self._params)
+
+    @property
+    def prepared(self) -> Prepared:
+        """The system of the core."""
+        return self._prepared
+
+    def use(self, params: Mapping[str, float]) -> None:
+        """Take these values of the parameters."""
+        values = self.system.parameter_values(params)
+        prepared = self.system.prepare(self.n, 0.0, None, values)
+        refuse_without_derivatives(prepared, self.system.discrete, (0.0, 1.0))
+        assert isinstance(prepared.core, TracedSystem)
+        self._params, self._prepared, self._core = values, prepared, prepared.core
+        self._held = None
+
+    def move(self, values: Sequence[float]) -> None:
+        """Take other values of the parameters by which derivatives are taken."""
+        if any(self._params[name] != value for name, value in zip(self._by, values, strict=True)):
+            self.use({**self._params, **dict(zip(self._by, map(float, values), strict=True))})
+
+    def with_derivatives_by(self, names: Sequence[str]) -> Motions:
+        """Return the same motions with derivatives by other parameters."""
+        return Motions(self.system, self.n, self._params, names, self.options)
+
+    def leg(
+        self, mode: Mode, q: tuple[float, ...], t0: float, x: Array, duration: float, places: int = 0
+    ) -> LegEnd:
+        """Follow the motion in a mode for some time, at least a rounding of it.
+
+        Raises
+        ------
+        ModelError
+            If the motion cannot be followed so far.
+        """
+        last = max(t0 + duration, np.nextafter(t0, np.inf))
+        try:
+            end, derivative, velocities, times, guards = self._motions().leg(
+                mode, q, t0, _contiguous(x), last, places
+            )
+        except ValueError as error:
+            raise ModelError(f"in mode {mode} from t = {t0:.6g}: {error}") from None
+        by_state, by_parameters = derivative[:, : self.n], derivative[:, self.n :]
+        return LegEnd(end, by_state, by_parameters, (velocities[0], velocities[1]), times, guards)
+
+    def guards(self, mode: Mode, q: tuple[float, ...]) -> list[Guard]:
+        """Return what ends the motion in a mode."""
+        return self._motions().guards(mode, q)
+
+    def at(self, mode: Mode, q: tuple[float, ...], t: float, x: Array) -> GuardsAt:
+        """Return the guards of a motion at a place."""
+        velocity, multipliers, values, rows = self._motions().at(mode, q, t, _contiguous(x))
+        own = 1 + self.n
+        return GuardsAt(velocity, multipliers, values, rows[:, 0], rows[:, 1:own], rows[:, own:])
+
+    def act(
+        self, index: int, mode: Mode, q: tuple[float, ...], t: float, x: Array
+    ) -> tuple[Array, tuple[float, ...], Array | None, Array, tuple[float, Array] | None]:
+        """Return what an action makes of a place: state, discrete states, derivatives, and its clock."""
+        after, discrete, rows, by_time, clock = self._motions().act(index, mode, q, t, _contiguous(x))
+        return after, tuple(discrete), rows, by_time, clock
+
+    def run(self, t_span: tuple[float, float], x: Array, **options: Any) -> Solution:
+        """Run the system with these parameters."""
+        return self.system.solve(t_span, x, self._params, **{**self.options, **options})
+
+    def record(self, t_span: tuple[float, float], x: Array) -> Record:
+        """Run the system, and return the run with its instants.
+
+        Raises
+        ------
+        ModelError
+            If the run fails; with what it computed.
+        """
+        solution = self.run(t_span, x, wrt=Back("t0"))
+        if not solution.success:
+            raise ModelError(solution.message, partial=solution)
+        run = solution._run
+        kept = run.kept_instants() if isinstance(run, Run) else None
+        if kept is None:
+            raise InputError("system: its runs have no derivatives")
+        mode, q, rows = kept
+        instants = [
+            Instant(
+                (t[0], t[1]),
+                (states[0], states[1]),
+                (tuple(modes[0]), tuple(modes[1])),
+                (tuple(discrete[0]), tuple(discrete[1])),
+                tuple(guards),
+                tuple(acts),
+            )
+            for t, states, modes, discrete, guards, acts in rows
+        ]
+        return Record(solution, tuple(mode), tuple(q), instants)
+
+    def right_hand_side(self, t: float, x: Array, signs: Array) -> Array:
+        """Return the field and the switching functions at a place, with these signs."""
+        p = parameter_vector(self._params)
+        field = self._core.field(t, x, signs, p)
+        return np.concatenate([field, self._core.surface_values(t, x, signs, p)])
+
+    def _motions(self) -> HeldMotions:
+        p = parameter_vector(self._params)
+        if self._held is None:
+            places = [list(self._params).index(name) for name in self._by]
+            start = np.zeros(self.n)
+            held = HeldMotions(
+                self._core, 0.0, start, p, self._checked.for_core(), list(self._prepared.actions), places
+            )
+            self._held = (p, held)
+        return self._held[1]
+
+
+def _contiguous(x: Array) -> Array:
+    return np.ascontiguousarray(x, dtype=np.float64)

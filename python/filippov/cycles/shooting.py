@@ -1,0 +1,279 @@
+"""The equations of a cycle with a given itinerary, and their derivatives.
+
+The unknowns are the states at the starts of the legs, their durations, the time at which the first starts, if that is not known, and
+parameters. Each leg is followed in its mode for its duration, whatever its guards do in between: a cycle can be continued beyond the
+end of its itinerary, where a piece no longer ends at what ends it in the flow.
+
+References: Thota, Dankowicz, SIAM J. Appl. Dyn. Syst. 7 (2008) 1283 (itineraries as boundary-value problems); `docs/theory`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from filippov.cycles.forcing import GivenPeriod, InferredPeriod
+from filippov.cycles.itinerary import Ending, Itinerary, Leg
+from filippov.cycles.motions import Array, LegEnd, Motions
+from filippov.errors import ModelError
+
+__all__ = ["Passage", "Period", "Shooting", "Shot", "scales", "solve"]
+
+Period = GivenPeriod | InferredPeriod | None
+_MOST_STEPS = 30
+
+
+class Passage(NamedTuple):
+    """A leg with what happens at its end.
+
+    Attributes
+    ----------
+    t : float
+        The time of its end.
+    leg : LegEnd
+        The motion.
+    value, row : float, ndarray of shape (1 + n + k,)
+        The equation of its end, by the time, the state and the parameters; no row if nothing ends it.
+    after : ndarray, shape (n,)
+        The state behind the end.
+    map : ndarray, shape (n, 1 + n + k)
+        Its derivatives by the time, the state before, and the parameters.
+    discrete : tuple of float
+        The discrete states behind the end.
+    """
+
+    t: float
+    leg: LegEnd
+    value: float
+    row: Array | None
+    after: Array
+    map: Array
+    discrete: tuple[float, ...]
+
+
+class Shot(NamedTuple):
+    """The equations at a point.
+
+    Attributes
+    ----------
+    residual : ndarray, shape (N,)
+    jacobian : ndarray, shape (N, N + k)
+        Its derivatives by the unknowns, then by the parameters.
+    passages : list of Passage
+    """
+
+    residual: Array
+    jacobian: Array
+    passages: list[Passage]
+
+    def monodromy(self) -> Array:
+        """Return the derivative of the state after one period by the state at the start, at fixed times."""
+        n = len(self.passages[0].after)
+        states, time = np.eye(n), np.zeros(n)
+        for passage in self.passages:
+            at_start, at_end = passage.leg.velocities
+            states = passage.leg.by_state @ (states - np.outer(at_start, time))  # at a fixed time
+            if passage.row is None:
+                return np.asarray(states)
+            rate = passage.row[0] + passage.row[1 : 1 + n] @ at_end
+            time = -(passage.row[1 : 1 + n] @ states) / rate
+            states = states + np.outer(at_end, time)
+            states = passage.map[:, 1 : 1 + n] @ states + np.outer(passage.map[:, 0], time)
+        return np.asarray(states - np.outer(self.passages[0].leg.velocities[0], time))
+
+
+class Shooting:
+    """The equations of an itinerary.
+
+    Parameters
+    ----------
+    motions : Motions
+        The motions of the system, with derivatives by some parameters.
+    itinerary : Itinerary
+        Legs, and a first guess.
+    period : GivenPeriod, InferredPeriod or None
+        The period of a forced system.
+    """
+
+    def __init__(self, motions: Motions, itinerary: Itinerary, period: Period) -> None:
+        self.motions, self.legs, self.period = motions, itinerary.legs, period
+        self.t0 = itinerary.t0
+        self.is_free_in_time = period is not None and itinerary.is_closed_by_event()
+        self.n, self.m = motions.n, len(self.legs)
+        self._reference = itinerary.starts[0].copy()
+        first = self.legs[0]
+        self._along = motions.at(first.mode, first.discrete, self.t0, self._reference).velocity
+
+    @property
+    def size(self) -> int:
+        """The number of unknowns."""
+        return self.m * (self.n + 1) + int(self.is_free_in_time)
+
+    def unknowns(self, itinerary: Itinerary) -> Array:
+        """Return the unknowns of a guess."""
+        parts = [*itinerary.starts, np.array(itinerary.durations)]
+        if self.is_free_in_time:
+            parts.append(np.array([itinerary.t0]))
+        return np.concatenate(parts)
+
+    def itinerary(self, u: Array) -> Itinerary:
+        """Return the itinerary at these unknowns."""
+        legs = list(self.legs)
+        starts, durations, t0 = self.parts(u)
+        t = t0
+        for i, leg in enumerate(legs):
+            t += durations[i]
+            if leg.ending is not None:
+                legs[i] = leg._replace(ending=leg.ending._replace(time=t))
+        return Itinerary(tuple(legs), t0, tuple(starts), tuple(durations))
+
+    def parts(self, u: Array) -> tuple[Array, list[float], float]:
+        """Return states, durations and the first time."""
+        n, m = self.n, self.m
+        t0 = float(u[m * (n + 1)]) if self.is_free_in_time else self.t0
+        return u[: m * n].reshape(m, n), u[m * n : m * (n + 1)].tolist(), t0
+
+    def shoot(self, u: Array, places: int = 0) -> Shot:
+        """Return the equations at these unknowns, with the parameters that the motions have.
+
+        Raises
+        ------
+        ModelError
+            If a leg cannot be followed.
+        """
+        n, m, k = self.n, self.m, len(self.motions.by)
+        starts, durations, t = self.parts(u)
+        size = self.size
+        residual, jacobian = np.zeros(size), np.zeros((size, size + k))
+        time = np.zeros(size + k)
+        if self.is_free_in_time:
+            time[m * (n + 1)] = 1.0
+        passages = []
+        row = m * n
+        for i, leg in enumerate(self.legs):
+            if durations[i] <= 0:
+                raise ModelError(f"the duration of piece {i} of the itinerary is {durations[i]:.3g}")
+            passage = self._pass(leg, t, starts[i], durations[i], places)
+            found = passage.leg
+            # The end as a function of all unknowns and parameters; so is its time.
+            state = np.outer(found.velocities[1] - found.by_state @ found.velocities[0], time)
+            state[:, i * n : (i + 1) * n] += found.by_state
+            state[:, size:] += found.by_parameters
+            state[:, m * n + i] += found.velocities[1]
+            time[m * n + i] = 1.0
+            t = passage.t
+            if passage.row is not None:
+                residual[row] = passage.value
+                jacobian[row] = passage.row[0] * time + passage.row[1 : 1 + n] @ state
+                jacobian[row, size:] += passage.row[1 + n :]
+                row += 1
+            own, following = slice(i * n, (i + 1) * n), (i + 1) % m
+            residual[own] = passage.after - starts[following]
+            jacobian[own] = passage.map[:, 1 : 1 + n] @ state + np.outer(passage.map[:, 0], time)
+            jacobian[own, size:] += passage.map[:, 1 + n :]
+            jacobian[own, following * n : (following + 1) * n] -= np.eye(n)
+            passages.append(passage)
+        if self.period is not None:
+            residual[row] = sum(durations) - self.period.value(self.motions)
+            jacobian[row, m * n : m * (n + 1)] = 1.0
+            if k:
+                jacobian[row, size:] = -self.period.slopes(self.motions)
+        elif self.legs[-1].ending is None:
+            residual[row] = self._along @ (starts[0] - self._reference)
+            jacobian[row, :n] = self._along
+        return Shot(residual, jacobian, passages)
+
+    def _pass(self, leg: Leg, t0: float, x: Array, duration: float, places: int) -> Passage:
+        """Follow a leg, and do what happens at its end."""
+        n, k = self.n, len(self.motions.by)
+        found = self.motions.leg(leg.mode, leg.discrete, t0, x, duration, places)
+        t, unit = t0 + duration, np.eye(n, 1 + n + k, 1)
+        if leg.ending is None:
+            return Passage(t, found, 0.0, None, found.x, unit, leg.discrete)
+        value, row = self._end(leg, leg.ending, t, found.x)
+        after, discrete, derivative = found.x, leg.discrete, unit
+        for index in leg.ending.acts:
+            after, discrete, rows, by_time, _ = self.motions.act(index, leg.mode, discrete, t, after)
+            if rows is not None:
+                derivative = rows[:, :n] @ derivative
+                derivative[:, 0] += by_time
+                derivative[:, 1 + n :] += rows[:, n:]
+        return Passage(t, found, value, row, after, derivative, discrete)
+
+    def _end(self, leg: Leg, ending: Ending, t: float, x: Array) -> tuple[float, Array]:
+        """Return the equation of the end of a leg, and its derivatives by time, state and parameters."""
+        n, k = self.n, len(self.motions.by)
+        if ending.guard is not None:
+            place = self.motions.guards(leg.mode, leg.discrete).index(ending.guard)
+            at = self.motions.at(leg.mode, leg.discrete, t, x)
+            parts = [at.by_time[place : place + 1], at.by_state[place], at.by_parameters[place]]
+            return float(at.values[place]), np.concatenate(parts)
+        for index in ending.acts:
+            clock = self.motions.act(index, leg.mode, leg.discrete, t, x)[4]
+            if clock is not None:
+                value, row = clock
+                nearest = round(value)  # the count at which it ticks
+                return value - nearest, row
+        row = np.zeros(1 + n + k)
+        row[0] = 1.0
+        return t - ending.time, row
+
+
+def scales(shooting: Shooting, u: Array) -> Array:
+    """Return the sizes by which the unknowns are measured."""
+    starts, durations, _ = shooting.parts(u)
+    size = np.max(np.abs(starts), axis=0)
+    size = np.maximum(size, 1e-3 * max(float(np.max(size)), 1e-300))
+    period = float(sum(durations))
+    parts = [np.tile(size, shooting.m), np.full(shooting.m, period)]
+    if shooting.is_free_in_time:
+        parts.append(np.array([period]))
+    return np.concatenate(parts)
+
+
+def solve(
+    shooting: Shooting, u: Array, tol: float = 1e-12, most: int = _MOST_STEPS
+) -> tuple[Array, Shot, float]:
+    """Return the cycle near a guess: unknowns, equations, and the size of the last step.
+
+    Raises
+    ------
+    ModelError
+        If Newton's method does not converge.
+    """
+    u = u.copy()
+    best = np.inf
+    for step in range(most):
+        shot = shooting.shoot(u)
+        change = _newton_step(shot.jacobian[:, : shooting.size], shot.residual)
+        size = float(np.max(np.abs(change) / scales(shooting, u)))
+        if not np.isfinite(size):
+            break
+        u = u + _shorter(shooting, u, change) * change
+        if size < tol or (size < 1e-9 and size >= 0.5 * best):
+            return u, shooting.shoot(u), size
+        best = min(best, size)
+        if step > 8 and size > 10.0:
+            break
+    raise ModelError(
+        f"Newton's method does not converge to a cycle with this itinerary: the last step was {size:.2g} of "
+        "the size of the cycle"
+    )
+
+
+def _newton_step(jacobian: Array, residual: Array) -> Array:
+    try:
+        return np.asarray(-np.linalg.solve(jacobian, residual))
+    except np.linalg.LinAlgError:
+        return np.asarray(-np.linalg.lstsq(jacobian, residual, rcond=None)[0])
+
+
+def _shorter(shooting: Shooting, u: Array, change: Array) -> float:
+    """Return the share of a step that leaves all durations positive."""
+    n, m = shooting.n, shooting.m
+    durations, changes = u[m * n : m * (n + 1)], change[m * n : m * (n + 1)]
+    shrinking = changes < 0
+    if not np.any(shrinking):
+        return 1.0
+    return float(min(1.0, np.min(-0.9 * durations[shrinking] / changes[shrinking])))
