@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -16,14 +17,18 @@ __all__ = ["Forcing", "GivenPeriod", "InferredPeriod", "depends_on_time", "forci
 _PLACES = 7
 
 
-def _samples(motions: Motions) -> list[tuple[float, Array, Array]]:
+@lru_cache(maxsize=16)
+def _places(n: int, m: int) -> list[tuple[float, Array, Array]]:
     """Return places for looking at a right-hand side: times in units of one, states, signs."""
     random = np.random.default_rng(20)
-    m = motions.prepared.core.n_surfaces
     return [
-        (random.uniform(0.0, 1.0), random.uniform(-1.0, 1.0, motions.n), random.choice([-1.0, 1.0], m))
+        (random.uniform(0.0, 1.0), random.uniform(-1.0, 1.0, n), random.choice([-1.0, 1.0], m))
         for _ in range(_PLACES)
     ]
+
+
+def _samples(motions: Motions) -> list[tuple[float, Array, Array]]:
+    return _places(motions.n, motions.prepared.core.n_surfaces)
 
 
 def depends_on_time(motions: Motions, scale: float) -> bool:
@@ -42,6 +47,10 @@ class GivenPeriod:
 
     def __init__(self, period: float | Callable[..., Any], multiple: int = 1) -> None:
         self.phase, self.multiple = Phase(period), multiple
+
+    def near(self, duration: float) -> GivenPeriod:
+        """Return it for cycles of about this duration."""
+        return self
 
     def value(self, motions: Motions) -> float:
         """Return the period for the parameters of the motions."""
@@ -65,38 +74,86 @@ class GivenPeriod:
 
 
 class InferredPeriod:
-    """A multiple of the period of field and switching functions, found from their values."""
+    """A multiple of the period of field and switching functions, found from their values.
 
-    def __init__(self, guess: float, multiple: int = 1) -> None:
-        self.latest, self.multiple = guess, multiple
+    Most periods are products of powers of parameters, as 2 pi / omega is: where the exponents are whole numbers they are taken, and
+    confirmed at every value.
+    """
+
+    def __init__(
+        self, guess: float, multiple: int = 1, exponents: dict[str, float] | None = None
+    ) -> None:
+        self.guess, self.multiple = guess, multiple
+        self._known: tuple[dict[str, float], float] | None = None
+        self._exponents = {} if exponents is None else exponents
+
+    def near(self, duration: float) -> InferredPeriod:
+        """Return it for cycles of about this duration."""
+        return InferredPeriod(duration / self.multiple, self.multiple, self._exponents)
 
     def value(self, motions: Motions) -> float:
         """Return the period for the parameters of the motions."""
-        self.latest = _refined(motions, self.latest)
-        return self.multiple * self.latest
+        return self.multiple * self._single(motions)
+
+    def _single(self, motions: Motions) -> float:
+        params = motions.params
+        if self._known is None:
+            self._known = params, _refined(motions, self.guess)
+        elif self._known[0] != params:
+            known, period = self._known
+            changed = [name for name in params if params[name] != known[name]]
+            if all(self._exponent(motions, name, known, period).is_integer() for name in changed):
+                for name in changed:
+                    period *= (params[name] / known[name]) ** self._exponents[name]
+            if not _repeats(motions, period):
+                period = _refined(motions, period)
+            self._known = params, period
+        return self._known[1]
 
     def slopes(self, motions: Motions) -> Array:
-        """Return its derivatives by the parameters of the motions.
-
-        Where the right-hand side repeats itself for all values of a parameter, its derivative by that and by the period vanish
-        together.
-        """
-        params, own = motions.params, self.latest
-        by_period = _slope(lambda change: _difference(motions, own + change), 1e-3 * own)
-        size = float(by_period @ by_period)
+        """Return its derivatives by the parameters of the motions."""
+        params, period = motions.params, self._single(motions)
         found = []
         for name in motions.by:
-
-            def at(change: float, name: str = name) -> Array:
-                motions.use({**params, name: params[name] + change})
-                return _difference(motions, own)
-
-            try:
-                by_parameter = _slope(at, 1e-3 * max(abs(params[name]), 1e-6))
-            finally:
-                motions.use(params)
-            found.append(0.0 if size == 0.0 else -float(by_period @ by_parameter) / size)
+            exponent = self._exponent(motions, name, params, period)
+            if exponent.is_integer() and params[name] != 0.0:
+                found.append(exponent * period / params[name])
+            else:
+                found.append(_slope_of_period(motions, name, period))
         return self.multiple * np.array(found)
+
+    def _exponent(self, motions: Motions, name: str, params: dict[str, float], period: float) -> float:
+        """Return the exponent with which a parameter is in the period, a whole number up to rounding."""
+        if name not in self._exponents:
+            latest = motions.params
+            motions.use(params)
+            try:
+                found = _slope_of_period(motions, name, period) * params[name] / period
+            finally:
+                motions.use(latest)
+            is_whole = abs(found - round(found)) < 1e-8 and params[name] != 0.0
+            self._exponents[name] = float(round(found)) if is_whole else 0.5
+        return self._exponents[name]
+
+
+def _slope_of_period(motions: Motions, name: str, period: float) -> float:
+    """Return the derivative of the period by a parameter.
+
+    Where the right-hand side repeats itself for all values of a parameter, its derivative by that and by the period vanish together.
+    """
+    params = motions.params
+
+    def at(change: float) -> Array:
+        motions.use({**params, name: params[name] + change})
+        return _difference(motions, period)
+
+    by_period = _slope(lambda change: _difference(motions, period + change), 1e-3 * period)
+    size = float(by_period @ by_period)
+    try:
+        by_parameter = _slope(at, 1e-3 * max(abs(params[name]), 1e-6))
+    finally:
+        motions.use(params)
+    return 0.0 if size == 0.0 else -float(by_period @ by_parameter) / size
 
 
 def _slope(function: Callable[[float], Array], d: float) -> Array:
@@ -130,12 +187,17 @@ def _refined(motions: Motions, guess: float) -> float:
         period += step
         if abs(step) < 4e-16 * period:
             break
-    if np.max(np.abs(_difference(motions, period)), initial=0.0) > 1e-7 * _size(motions):
+    if not _repeats(motions, period):
         raise ModelError(
             f"the period of the right-hand side near {guess:.6g} is not found: give period=, a number or a "
             "function of the parameters"
         )
     return period
+
+
+def _repeats(motions: Motions, period: float) -> bool:
+    """Whether the right-hand side is the same a period later."""
+    return bool(np.max(np.abs(_difference(motions, period)), initial=0.0) <= 1e-11 * _size(motions))
 
 
 def _size(motions: Motions) -> float:

@@ -61,11 +61,15 @@ class Shot(NamedTuple):
     jacobian : ndarray, shape (N, N + k)
         Its derivatives by the unknowns, then by the parameters.
     passages : list of Passage
+    states, times : list of ndarray, shape (n, N + k) and (N + k,)
+        The derivatives of the state and of the time at the end of each leg, by unknowns and parameters.
     """
 
     residual: Array
     jacobian: Array
     passages: list[Passage]
+    states: list[Array]
+    times: list[Array]
 
     def monodromy(self) -> Array:
         """Return the derivative of the state after one period by the state at the start, at fixed times."""
@@ -97,7 +101,8 @@ class Shooting:
     """
 
     def __init__(self, motions: Motions, itinerary: Itinerary, period: Period) -> None:
-        self.motions, self.legs, self.period = motions, itinerary.legs, period
+        self.motions, self.legs = motions, itinerary.legs
+        self.period = None if period is None else period.near(itinerary.period)
         self.t0 = itinerary.t0
         self.is_free_in_time = period is not None and itinerary.is_closed_by_event()
         self.n, self.m = motions.n, len(self.legs)
@@ -149,7 +154,7 @@ class Shooting:
         time = np.zeros(size + k)
         if self.is_free_in_time:
             time[m * (n + 1)] = 1.0
-        passages = []
+        passages, states, times = [], [], []
         row = m * n
         for i, leg in enumerate(self.legs):
             if durations[i] <= 0:
@@ -174,6 +179,8 @@ class Shooting:
             jacobian[own, size:] += passage.map[:, 1 + n :]
             jacobian[own, following * n : (following + 1) * n] -= np.eye(n)
             passages.append(passage)
+            states.append(state)
+            times.append(time.copy())
         if self.period is not None:
             residual[row] = sum(durations) - self.period.value(self.motions)
             jacobian[row, m * n : m * (n + 1)] = 1.0
@@ -182,7 +189,7 @@ class Shooting:
         elif self.legs[-1].ending is None:
             residual[row] = self._along @ (starts[0] - self._reference)
             jacobian[row, :n] = self._along
-        return Shot(residual, jacobian, passages)
+        return Shot(residual, jacobian, passages, states, times)
 
     def _pass(self, leg: Leg, t0: float, x: Array, duration: float, places: int) -> Passage:
         """Follow a leg, and do what happens at its end."""

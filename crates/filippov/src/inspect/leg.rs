@@ -67,7 +67,9 @@ pub fn leg(
         .actions(actions)
         .held_in(mode)
         .solve_observed(&mut tangents, &mut |_| false)?;
-    let derivatives = tangents.finish()?;
+    let mut derivative = tangents.finish()?.values;
+    let size = n * (n + extended.n_parameters());
+    derivative.drain(..derivative.len() - size);
     let mut motion = HeldMotion::new(extended, &impacts, &options, mode, q);
     let mut velocity = |t: f64, x: &[f64]| -> Result<Vec<f64>, FieldError> {
         let mut all = motion.velocity(t, x)?;
@@ -91,7 +93,7 @@ pub fn leg(
     Ok(Leg {
         x,
         velocities,
-        derivative: derivatives.values,
+        derivative,
         samples,
         stop: solution.stop,
     })

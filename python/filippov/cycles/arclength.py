@@ -1,0 +1,95 @@
+"""One step along a curve that N equations in N + 1 unknowns define: prediction along the tangent, then Newton's method.
+
+Reference: Allgower, Georg, Introduction to Numerical Continuation Methods (2003), chapters 2 and 6.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from filippov.cycles.motions import Array
+from filippov.errors import ModelError
+
+__all__ = ["Curve", "Step", "corrected", "tangent_of"]
+
+_TOLERANCE = 1e-11
+_MOST_STEPS = 12
+
+
+class Curve(Protocol):
+    """N equations in N + 1 unknowns."""
+
+    def equations(self, w: Array) -> tuple[Array, Array]:
+        """Return the equations, shape (N,), and their derivatives, shape (N, N + 1)."""
+
+    def scales(self, w: Array) -> Array:
+        """Return the sizes by which the unknowns are measured."""
+
+
+class Step(NamedTuple):
+    """A point of a curve.
+
+    Attributes
+    ----------
+    w : ndarray, shape (N + 1,)
+    jacobian : ndarray, shape (N, N + 1)
+    n_steps : int
+        How many steps Newton's method made.
+    error : float
+        The size of the last one.
+    """
+
+    w: Array
+    jacobian: Array
+    n_steps: int
+    error: float
+
+
+def tangent_of(jacobian: Array, scale: Array, along: Array | None = None) -> Array:
+    """Return the direction of a curve in scaled unknowns, of length 1, in the sense of another direction."""
+    scaled = jacobian * scale
+    if along is not None:
+        try:
+            right = np.zeros(len(along))
+            right[-1] = 1.0
+            found = np.linalg.solve(np.vstack([scaled, along]), right)
+            return np.asarray(found / np.linalg.norm(found))
+        except np.linalg.LinAlgError:
+            pass
+    found = np.linalg.svd(scaled)[2][-1]
+    if along is not None and found @ along < 0:
+        found = -found
+    return np.asarray(found / np.linalg.norm(found))
+
+
+def corrected(curve: Curve, w: Array, scale: Array, normal: Array, level: float | None = None) -> Step:
+    """Return the point of a curve in a plane: that through `w` with a normal in scaled unknowns.
+
+    Raises
+    ------
+    ModelError
+        If Newton's method does not converge.
+    """
+    plane = w / scale @ normal if level is None else level
+    w = w.copy()
+    before = np.inf
+    for count in range(1, _MOST_STEPS + 1):
+        residual, jacobian = curve.equations(w)
+        matrix = np.vstack([jacobian * scale, normal])
+        right = np.append(residual, w / scale @ normal - plane)
+        try:
+            change = -np.linalg.solve(matrix, right)
+        except np.linalg.LinAlgError:
+            change = -np.linalg.lstsq(matrix, right, rcond=None)[0]
+        size = float(np.max(np.abs(change)))
+        if not np.isfinite(size):
+            break
+        w = w + change * scale
+        if size < _TOLERANCE or (size < 1e-8 and size > 0.5 * before):
+            return Step(w, jacobian, count, size)
+        if count > 3 and size > before:
+            break
+        before = size
+    raise ModelError("Newton's method does not converge to a point of the branch")

@@ -1,0 +1,293 @@
+"""What a continuation finds: points, special points, and why it ended."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple, overload
+
+import numpy as np
+
+from filippov.analysis.optional import need
+from filippov.cycles.cycle import Cycle
+from filippov.cycles.equilibrium import Equilibrium
+from filippov.errors import InputError
+
+__all__ = ["CODES", "Branch", "Point", "Special", "SpecialPoints"]
+
+State = Cycle | Equilibrium
+
+# What the codes of special points mean.
+CODES = {
+    "LP": "fold",
+    "PD": "period doubling",
+    "NS": "Neimark-Sacker: a torus begins",
+    "BP": "branch point",
+    "HB": "Hopf",
+    "PSN": "pseudo-saddle-node",
+    "BE": "boundary equilibrium",
+    "CS": "crossing-sliding",
+    "GS": "grazing-sliding",
+    "SS": "switching-sliding",
+    "AS": "adding-sliding",
+    "GR": "grazing of a reset",
+    "UZ": "a monitor vanishes",
+    "EP": "end",
+}
+
+
+class Point(NamedTuple):
+    """A point of a branch.
+
+    Attributes
+    ----------
+    params : dict
+        Values of the parameters that vary.
+    state : Cycle or Equilibrium
+    tests : dict
+        Values of test functions.
+    """
+
+    params: dict[str, float]
+    state: State
+    tests: dict[Any, float]
+
+
+class Special(NamedTuple):
+    """A special point.
+
+    Attributes
+    ----------
+    code : str
+        One of `CODES`.
+    kind : str
+        What that means.
+    surface : str
+        The surface concerned, printed; empty if there is none.
+    t : float
+        When it happens in the cycle; NaN if that has no meaning.
+    params : dict
+        Values of the parameters that vary.
+    point : int
+        The place on the branch: behind this point.
+    state : Cycle or Equilibrium
+    test : object
+        Which test function vanishes.
+    """
+
+    code: str
+    kind: str
+    surface: str
+    t: float
+    params: dict[str, float]
+    point: int
+    state: State
+    test: Any = None
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{name} = {value:.12g}" for name, value in self.params.items())
+        about = f" at {self.surface} = 0" if self.surface else ""
+        when = "" if np.isnan(self.t) else f", t = {self.t:.6g}"
+        return f"{self.code} ({self.kind}{about}) {values}{when}"
+
+
+class SpecialPoints(Sequence[Special]):
+    """The special points of a branch; those of one code by ``special["CS"]``."""
+
+    def __init__(self, points: Sequence[Special]) -> None:
+        self._points = list(points)
+
+    @overload
+    def __getitem__(self, key: int) -> Special: ...
+
+    @overload
+    def __getitem__(self, key: str | slice) -> list[Special]: ...
+
+    def __getitem__(self, key: int | str | slice) -> Special | list[Special]:
+        if isinstance(key, str):
+            if key not in CODES:
+                raise InputError(f"special: the codes are {', '.join(CODES)}, not {key!r}")
+            return [point for point in self._points if point.code == key]
+        return self._points[key]
+
+    def __len__(self) -> int:
+        return len(self._points)
+
+    def __iter__(self) -> Iterator[Special]:
+        return iter(self._points)
+
+    def __repr__(self) -> str:
+        return "\n".join(map(repr, self._points)) or "no special points"
+
+    def to_pandas(self) -> Any:
+        """Return the table as a pandas DataFrame, a row for each point."""
+        rows = [
+            {"code": p.code, "kind": p.kind, "surface": p.surface, "t": p.t, "point": p.point, **p.params}
+            for p in self._points
+        ]
+        return need("pandas", "a table").DataFrame(rows)
+
+
+class Branch:
+    """A branch of cycles or equilibria, or a curve of special points in two parameters.
+
+    Attributes
+    ----------
+    points : list of Point
+        In their order along the branch.
+    special : SpecialPoints
+    reason : str
+        Why it ended, at both ends.
+    names : tuple of str
+        The parameters that vary.
+    """
+
+    def __init__(
+        self,
+        points: Sequence[Point],
+        special: Sequence[Special],
+        reasons: Mapping[str, str],
+        names: Sequence[str],
+        monitors: Sequence[str] = (),
+    ) -> None:
+        self.points, self.special = list(points), SpecialPoints(special)
+        self.reasons, self.names, self.monitors = dict(reasons), tuple(names), tuple(monitors)
+
+    @property
+    def reason(self) -> str:
+        """Why the branch ended, at both ends, in words."""
+        return "; ".join(f"{side}: {text}" for side, text in self.reasons.items())
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def values(self, name: str) -> Any:
+        """Return a quantity along the branch: a parameter, a state, a monitor, or ``"period"``, an array."""
+        if name in self.names:
+            return np.array([point.params[name] for point in self.points])
+        if name in self.monitors:
+            return np.array([point.tests[("UZ", name)] for point in self.points])
+        first = self.points[0].state
+        if name == "period" and isinstance(first, Cycle):
+            return np.array([_period(point.state) for point in self.points])
+        states = first.system.state_names(len(_start(first)))
+        if name in states:
+            i = states.index(name)
+            return np.array([_start(point.state)[i] for point in self.points])
+        known = [*self.names, *states, *self.monitors, *(["period"] if isinstance(first, Cycle) else [])]
+        raise InputError(f"the branch has {', '.join(map(repr, known))}, and no {name!r}")
+
+    @property
+    def stable(self) -> Any:
+        """Whether each point is stable, an array of bool."""
+        return np.array([point.state.is_stable for point in self.points])
+
+    def at(self, **params: float) -> State:
+        """Return the cycle or equilibrium at the value of a parameter; the first one along the branch.
+
+        Raises
+        ------
+        InputError
+            If the branch does not come there.
+        """
+        from filippov.cycles.continuation import at_value
+
+        if len(params) != 1 or next(iter(params)) not in self.names:
+            raise InputError(f"at: the value of one of {', '.join(self.names)} is needed")
+        ((name, value),) = params.items()
+        along = self.values(name) - float(value)
+        places = np.flatnonzero(along[:-1] * along[1:] <= 0)
+        if not len(places):
+            raise InputError(f"{name}: the branch does not come to {value:g}")
+        k = int(places[0])
+        nearer = k if abs(along[k]) <= abs(along[k + 1]) else k + 1
+        return at_value(self.points[nearer].state, name, float(value))
+
+    @property
+    def data(self) -> Any:
+        """The branch as an xarray Dataset with the dimension `point`."""
+        xarray = need("xarray", "a branch as a Dataset")
+        first = self.points[0].state
+        variables: dict[str, Any] = {name: ("point", self.values(name)) for name in self.names}
+        for name in first.system.state_names(len(_start(first))):
+            variables[name] = ("point", self.values(name))
+        for name in self.monitors:
+            variables[name] = ("point", self.values(name))
+        states = [point.state for point in self.points]
+        if isinstance(first, Cycle):
+            variables["period"] = ("point", self.values("period"))
+            variables["multipliers"] = (("point", "multiplier"), np.array([_multipliers(s) for s in states]))
+            variables["n_zero"] = ("point", np.array([_n_zero(s) for s in states]))
+        else:
+            variables["eigenvalues"] = (("point", "eigenvalue"), _padded([_eigenvalues(s) for s in states]))
+        variables["stable"] = ("point", self.stable)
+        variables["itinerary"] = ("point", np.array([_itinerary_text(s) for s in states]))
+        variables["admissible"] = ("point", np.array([_is_admissible(point) for point in self.points]))
+        variables["residual"] = ("point", np.array([s.residual for s in states]))
+        return xarray.Dataset(variables, attrs={"reason": self.reason})
+
+    def plot(self, x: str | None = None, y: str | None = None, ax: Any = None) -> Any:
+        """Draw one quantity over another, stable parts as lines, unstable ones dashed, special points named.
+
+        Parameters
+        ----------
+        x, y : str, optional
+            Names as in `values`. Default: the parameter, and the period or the first state; for a curve in
+            two parameters these.
+        ax : matplotlib Axes, optional
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        from filippov.plot.branches import draw_branch
+
+        return draw_branch(self, x, y, ax)
+
+    def __repr__(self) -> str:
+        what = "cycles" if isinstance(self.points[0].state, Cycle) else "equilibria"
+        ranges = ", ".join(
+            f"{name} from {np.min(self.values(name)):.6g} to {np.max(self.values(name)):.6g}" for name in self.names
+        )
+        return f"Branch({len(self)} {what}, {ranges}; {len(self.special)} special points; {self.reason})"
+
+
+def _start(state: State) -> Any:
+    return state.y0 if isinstance(state, Cycle) else state.y
+
+
+def _period(state: State) -> float:
+    return state.period if isinstance(state, Cycle) else np.nan
+
+
+def _multipliers(state: State) -> Any:
+    assert isinstance(state, Cycle)
+    return state.multipliers
+
+
+def _n_zero(state: State) -> int:
+    assert isinstance(state, Cycle)
+    return state.n_zero
+
+
+def _eigenvalues(state: State) -> Any:
+    assert isinstance(state, Equilibrium)
+    return state.eigenvalues
+
+
+def _padded(rows: Sequence[Any]) -> Any:
+    width = max(len(row) for row in rows)
+    found = np.full((len(rows), width), np.nan + 0j)
+    for out, row in zip(found, rows, strict=True):
+        out[: len(row)] = row
+    return found
+
+
+def _itinerary_text(state: State) -> str:
+    return " ".join(map(str, state.modes)) if isinstance(state, Cycle) else str(state.mode)
+
+
+def _is_admissible(point: Point) -> bool:
+    """Whether the flow follows the itinerary there: all its test functions are positive."""
+    if isinstance(point.state, Equilibrium):
+        return point.state.is_admissible
+    return all(value > 0 for key, value in point.tests.items() if key[0] in ("CS", "SS", "GS", "AS", "GR"))

@@ -1,0 +1,590 @@
+"""Branches of cycles and equilibria in a parameter, through the points at which their itinerary changes.
+
+References: Allgower, Georg (2003); Kuznetsov, Elements of Applied Bifurcation Theory (2004), chapter 10; Thota, Dankowicz, SIAM J.
+Appl. Dyn. Syst. 7 (2008) 1283; di Bernardo et al. (2008), chapters 7 and 8.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from filippov.cycles.arclength import Step, corrected, tangent_of
+from filippov.cycles.branch import CODES, Branch, Point, Special, State
+from filippov.cycles.cycle import Cycle, cycle_at, cycle_of
+from filippov.cycles.cycle_curve import CycleCurve
+from filippov.cycles.equilibrium import Equilibrium, EquilibriumCurve, rest_of
+from filippov.cycles.monitors import Monitor, monitors_of
+from filippov.cycles.motions import Array
+from filippov.cycles.tests import tests_at
+from filippov.cycles.zero import zero_between
+from filippov.errors import InputError, ModelError
+from filippov.scalars import count, positive
+from filippov.unknown import did_you_mean
+
+__all__ = ["at_value", "continuation"]
+
+AnyCurve = CycleCurve | EquilibriumCurve
+
+_FIRST_STEP, _LONGEST_STEP, _SHORTEST_STEP = 0.01, 0.05, 1e-5
+# Codes at which the flow takes another itinerary.
+_CHANGES = ("CS", "SS", "GS", "AS", "GR", "BE")
+_WIDTH = 1e-13
+
+
+class _Settings(NamedTuple):
+    name: str
+    bounds: tuple[float, float]
+    step: float
+    detect: frozenset[str]
+    switch: str
+    monitors: tuple[Monitor, ...]
+    most: int
+    report: Callable[[int, float], None]
+
+    @property
+    def size(self) -> float:
+        """The size by which the parameter is measured."""
+        return self.bounds[1] - self.bounds[0]
+
+
+def continuation(
+    start: State | Special,
+    parameter: str | Sequence[str],
+    bounds: Any,
+    step: float | None = None,
+    *,
+    monitor: Mapping[str, Any] | None = None,
+    detect: str | Sequence[str] = "all",
+    switch: str = "follow",
+    max_points: int = 2000,
+    store: Any = None,
+    progress: bool = False,
+) -> Branch:
+    """Return the branch of cycles or equilibria through one of them, in a parameter; or a curve in two.
+
+    The branch is followed in both directions by pseudo-arclength, and through points at which the flow takes
+    another itinerary: these are located, and the branch goes on with the itinerary of the other side, which
+    a simulation finds.
+
+    Parameters
+    ----------
+    start : Cycle, Equilibrium or Special
+        With one parameter a special point is where the other branch through it starts: cycles of twice the
+        period at PD, the other equilibria at BE. With two parameters it is a point of the curve.
+    parameter : str, or pair of str
+        What varies.
+    bounds : (float, float), or dict
+        The range; with two parameters a dict of the ranges by their names.
+    step : float, optional
+        First step, in units of the parameter. Default: a hundredth of the range. It adapts.
+    monitor : dict, optional
+        Functions by name: an `Event` or a function ``g(t, y)``, for cycles at its largest value over a period; or a
+        function of the cycle or equilibrium, marked by ``fl.cycles.of_state``. Their values along the branch are
+        kept, and their zeros are special points UZ.
+    detect : "all" or sequence of str, optional
+        Codes of the special points to look for.
+    switch : {"follow", "stop", "ignore"}, optional
+        What to do where the flow takes another itinerary: go on with that, stop, or go on with a cycle that the flow
+        does not follow.
+    max_points : int, optional
+        The most points in each direction.
+    store : path, optional
+        A file that the branch is written to while it grows, and that continues it if it is there.
+    progress : bool, optional
+        Print how far the branch is.
+
+    Returns
+    -------
+    Branch
+
+    Raises
+    ------
+    InputError
+        If an argument is wrong, or the start lies outside of the range.
+    KeyboardInterrupt
+        On Ctrl-C; its `partial` is the branch up to there.
+
+    Examples
+    --------
+    >>> import numpy as np, filippov as fl
+    >>> fish = fl.System(lambda t, x, a=0.5: [x[0] * (1 - x[0]) - 0.2 * x[0] * (x[0] > a)], n=1)
+    >>> branch = fl.continuation(fl.equilibrium(fish, [0.7]), "a", (0.1, 1.0))
+    >>> [(point.code, round(point.params["a"], 9)) for point in branch.special["BE"]]
+    [('BE', 0.8), ('BE', 1.0)]
+    """
+    if not isinstance(parameter, str):
+        from filippov.cycles.curves import curve_in_two
+
+        return curve_in_two(start, tuple(parameter), bounds, step, max_points=max_points)
+    first = _other_branch(start, parameter) if isinstance(start, Special) else start
+    if not isinstance(first, (Cycle, Equilibrium)):
+        raise InputError(
+            f"start: a cycle, an equilibrium or a special point is needed, not {type(start).__name__}"
+        )
+    settings = _checked(first, parameter, bounds, step, monitor, detect, switch, max_points, progress)
+    sides: list[_Side] = []
+    try:
+        for direction in (-1.0, 1.0):
+            sides.append(_Side(first, settings, direction))
+            sides[-1].follow()
+    except KeyboardInterrupt as interrupt:
+        interrupt.partial = _joined(sides, settings)  # type: ignore[attr-defined]
+        raise
+    branch = _joined(sides, settings)
+    if store is not None:
+        from filippov.cycles.saving import save_branch
+
+        save_branch(branch, store)
+    return branch
+
+
+def _checked(
+    start: State,
+    name: str,
+    bounds: Any,
+    step: Any,
+    monitor: Any,
+    detect: Any,
+    switch: Any,
+    most: Any,
+    progress: Any,
+) -> _Settings:
+    if name not in start.params or name in start.system.discrete:
+        raise InputError(f"parameter: the system has no parameter {name!r}{did_you_mean(name, start.params)}")
+    low, high = bounds_of(bounds, name)
+    value = start.params[name]
+    if not low <= value <= high:
+        raise InputError(f"bounds: the start has {name} = {value:g}, outside of ({low:g}, {high:g})")
+    if switch not in ("follow", "stop", "ignore"):
+        raise InputError(f'switch: "follow", "stop" or "ignore", not {switch!r}')
+    codes = CODES if isinstance(detect, str) and detect == "all" else detect
+    if isinstance(codes, str) or any(code not in CODES for code in codes):
+        raise InputError(f"detect: \"all\" or codes among {', '.join(CODES)}, not {detect!r}")
+    share = _FIRST_STEP if step is None else positive("step", step) / (high - low)
+
+    def report(count: int, value: float) -> None:
+        if progress:
+            print(f"\r{count} points, {name} = {value:.6g}   ", end="", flush=True)
+
+    return _Settings(
+        name,
+        (low, high),
+        min(share, _LONGEST_STEP),
+        frozenset(codes),
+        switch,
+        monitors_of(monitor, start),
+        count("max_points", most),
+        report,
+    )
+
+
+def bounds_of(bounds: Any, name: str) -> tuple[float, float]:
+    """Return the range of a parameter.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    try:
+        low, high = (float(v) for v in bounds)
+    except (TypeError, ValueError):
+        raise InputError(f"bounds: a pair (low, high) of {name} is needed, not {bounds!r}") from None
+    if not (np.isfinite(low) and np.isfinite(high) and low < high):
+        raise InputError(f"bounds: a finite range (low, high) with low < high is needed, not {bounds!r}")
+    return low, high
+
+
+def curve_of(state: State, names: tuple[str, ...], sizes: tuple[float, ...]) -> tuple[AnyCurve, Array]:
+    """Return the equations of a cycle or equilibrium in parameters, and the point itself."""
+    if isinstance(state, Cycle):
+        curve = CycleCurve(state, names, sizes)
+        return curve, curve.start
+    own = EquilibriumCurve(state._curve.motions, state._curve.mode, names, sizes)
+    w = state._w[: own.n_unknowns]
+    return own, np.append(w, [state.params[name] for name in names])
+
+
+def at_value(state: State, name: str, value: float) -> State:
+    """Return the cycle or equilibrium with the same itinerary at another value of a parameter."""
+    if isinstance(state, Cycle):
+        motions = state._shooting.motions.with_derivatives_by(())
+        motions.use({**state.params, name: value})
+        return cycle_of(motions, state.itinerary, state._shooting.period)
+    motions = state._curve.motions.with_derivatives_by(())
+    motions.use({**state.params, name: value})
+    curve = EquilibriumCurve(motions, state._curve.mode)
+    return rest_of(curve, state._w[: curve.n_unknowns])
+
+
+class _Side:
+    """One direction of a branch."""
+
+    def __init__(self, start: State, settings: _Settings, direction: float) -> None:
+        self.settings, self.direction = settings, direction
+        self.points: list[Point] = []
+        self.special: list[Special] = []
+        self.reason = "interrupted"
+        self._begin(start, direction)
+
+    def _begin(self, state: State, direction: float) -> None:
+        """Start with the itinerary of a state."""
+        self.curve, self.w = curve_of(state, (self.settings.name,), (self.settings.size,))
+        residual, jacobian = self.curve.equations(self.w)
+        scale = self.curve.scales(self.w)
+        self.tangent = tangent_of(jacobian, scale)
+        if self.tangent[-1] * direction < 0:
+            self.tangent = -self.tangent
+        self.jacobian = jacobian
+        self.tests = self._tests(self.w, jacobian, self.tangent)
+        self._keep(state)
+
+    def _tests(self, w: Array, jacobian: Array, tangent: Array) -> dict[Any, float]:
+        found = tests_at(self.curve, w, jacobian, tangent, self.settings.detect)
+        for monitor in self.settings.monitors:
+            found["UZ", monitor.name] = monitor.value(self.curve.state(w, 0.0))
+        return found
+
+    def _keep(self, state: State) -> None:
+        value = float(self.w[-1])
+        self.points.append(Point({self.settings.name: value}, state, self.tests))
+        self.settings.report(len(self.points), value)
+
+    def follow(self) -> None:
+        """Follow the branch to its end."""
+        low, high = self.settings.bounds
+        ds = self.settings.step
+        changes = 0
+        while len(self.points) < self.settings.most:
+            if not low < self.w[-1] < high and self._leads_out():
+                self.reason = f"{self.settings.name} = {self.w[-1]:g} is the end of the range"
+                self._add("EP", None, self.points[-1].state)
+                return
+            try:
+                step, tangent = self._step(ds)
+            except ModelError as error:
+                if ds > 4e-3 or (isinstance(self.curve, EquilibriumCurve) and ds > _SHORTEST_STEP):
+                    ds *= 0.5
+                    continue
+                found = self._beyond_vanishing_leg(max(ds, 1e-3)) if self._may_change() else None
+                if found is not None:
+                    changes += 1
+                    ds = min(self.settings.step, 4 * ds)
+                    continue
+                if ds > _SHORTEST_STEP:
+                    ds *= 0.5
+                    continue
+                self.reason = self._why_it_ended(error)
+                return
+            if not self._accept(step, tangent, ds):
+                return
+            ds = min(ds * (1.5 if step.n_steps <= 3 else 1.0 if step.n_steps <= 5 else 0.6), _LONGEST_STEP)
+        self.reason = f"{self.settings.most} points"
+
+    def _may_change(self) -> bool:
+        return isinstance(self.curve, CycleCurve) and self.settings.switch == "follow"
+
+    def _leads_out(self) -> bool:
+        low, _ = self.settings.bounds
+        outward = -1.0 if self.w[-1] <= low else 1.0
+        return bool(self.tangent[-1] * outward > 0) or len(self.points) > 1
+
+    def _step(self, ds: float) -> tuple[Step, Array]:
+        """Return the next point and the direction there."""
+        low, high = self.settings.bounds
+        scale = self.curve.scales(self.w)
+        guess = self.w + ds * self.tangent * scale
+        step = corrected(self.curve, guess, scale, self.tangent)
+        if not low <= step.w[-1] <= high:
+            unit = np.zeros(len(self.w))
+            unit[-1] = 1.0
+            bound = low if step.w[-1] < low else high
+            share = (bound - self.w[-1]) / (step.w[-1] - self.w[-1])
+            on_bound = self.w + share * (step.w - self.w)
+            on_bound[-1] = bound
+            step = corrected(self.curve, on_bound, scale, unit)
+            step.w[-1] = bound
+        tangent = tangent_of(step.jacobian, self.curve.scales(step.w), self.tangent)
+        if tangent @ self.tangent < 0.8 and ds > 1e-4:
+            raise ModelError("the branch turns too far in one step")
+        return step, tangent
+
+    def _accept(self, step: Step, tangent: Array, ds: float) -> bool:
+        """Take a point; find what changes before it. False: the branch ends."""
+        tests = self._tests(step.w, step.jacobian, tangent)
+        changed = [key for key, value in tests.items() if key in self.tests and value * self.tests[key] < 0]
+        found = sorted(
+            (self._located(key, step, tests) for key in changed), key=lambda located: located[0]
+        )
+        for _, key, located in found:
+            code = key[0]
+            state = self.curve.state(located.w, located.error)
+            if code in _CHANGES and self.settings.switch != "ignore":
+                if self.tests[key] < 0:
+                    continue  # it becomes possible again: the flow does not follow it yet
+                self._add_located(key, state)
+                if self.settings.switch == "stop":
+                    self.reason = f"{self.special[-1]!r}"
+                    return False
+                return self._change(key, located, step)
+            if self._is_real(key, state):
+                self._add_located(key, state)
+        self._settle(step, tangent, tests)
+        return True
+
+    def _settle(self, step: Step, tangent: Array, tests: dict[Any, float]) -> None:
+        state = self.curve.state(step.w, step.error)
+        if isinstance(self.curve, CycleCurve) and isinstance(state, Cycle):
+            # The phase is fixed beside the latest cycle.
+            self.curve = CycleCurve(state, (self.settings.name,), (self.settings.size,))
+        self.w, self.tangent, self.tests, self.jacobian = step.w, tangent, tests, step.jacobian
+        self._keep(state)
+
+    def _located(self, key: Any, step: Step, tests: dict[Any, float]) -> tuple[float, Any, Step]:
+        """Return how far along the step a test function vanishes, which one, and the point."""
+        scale = self.curve.scales(self.w)
+        start, level = self.w, self.w / scale @ self.tangent
+        length = step.w / scale @ self.tangent - level
+        latest: list[Step] = []
+
+        def value(s: float) -> float:
+            guess = start + (s / length) * (step.w - start)
+            point = corrected(self.curve, guess, scale, self.tangent, level + s)
+            latest[:] = [point]
+            tangent = tangent_of(point.jacobian, self.curve.scales(point.w), self.tangent)
+            return self._value(key, point, tangent)
+
+        s = zero_between(value, (0.0, self.tests[key]), (length, tests[key]), _WIDTH)
+        value(s)
+        return s, key, latest[0]
+
+    def _value(self, key: Any, point: Step, tangent: Array) -> float:
+        found = self._tests(point.w, point.jacobian, tangent)
+        if key not in found:
+            raise ModelError(f"the test function of {key[0]} is lost on the way")
+        return found[key]
+
+    def _is_real(self, key: Any, state: State) -> bool:
+        """Whether a zero of a test function is what its code says."""
+        if key[0] == "HB":
+            assert isinstance(state, Equilibrium)
+            values = state.eigenvalues
+            critical = values[np.argmin(np.abs(values.real) + 1e3 * (np.abs(values.imag) < 1e-6))]
+            return bool(abs(critical.imag) > 1e-6 and abs(critical.real) < 1e-5 * (1 + abs(critical.imag)))
+        if key[0] == "NS":
+            assert isinstance(state, Cycle)
+            values = state.nontrivial
+            critical = values[np.argmin(np.abs(np.abs(values) - 1.0))]
+            return bool(abs(critical.imag) > 1e-6)
+        return True
+
+    def _add_located(self, key: Any, state: State) -> None:
+        self._add(key[0], key, state)
+
+    def _add(self, code: str, key: Any, state: State) -> None:
+        if code not in self.settings.detect:
+            return
+        surface, t = "", np.nan
+        if code in _CHANGES and key is not None:
+            place = key[1] if code == "BE" else (key[2][1] if key[2] is not None else -1)
+            names = self.curve.shooting.motions.prepared.surfaces if isinstance(self.curve, CycleCurve) else (
+                self.curve.motions.prepared.surfaces
+            )
+            surface = names[place] if 0 <= place < len(names) else ""
+            if isinstance(self.curve, CycleCurve) and isinstance(state, Cycle):
+                probe = next((p for p in self.curve.probes(self._w_of(state)) if p.key == key), None)
+                t = np.nan if probe is None else probe.t
+        params = {self.settings.name: state.params[self.settings.name]}
+        kind = f"{key[1]} vanishes" if code == "UZ" and key is not None else CODES[code]
+        self.special.append(Special(code, kind, surface, t, params, len(self.points) - 1, state, key))
+
+    def _w_of(self, state: Cycle) -> Array:
+        return np.append(state._u, state.params[self.settings.name])
+
+    def _change(self, key: Any, located: Step, beyond: Step) -> bool:
+        """Go on with the itinerary of the flow behind a special point."""
+        direction = float(np.sign(beyond.w[-1] - located.w[-1])) or self.direction
+        if isinstance(self.curve, EquilibriumCurve):
+            following = _beyond_boundary(self.curve, key, located, direction, self.settings)
+            if following is None:
+                self.reason = f"no equilibrium goes on from {self.special[-1]!r}"
+                return False
+            state, direction = following
+            self._begin(state, direction)
+            return True
+        for reach in (1.0, 3.0, 0.3):
+            w = located.w + reach * (beyond.w - located.w)
+            new = _flow_near(self.curve, w)
+            if new is not None and not new.itinerary.is_same(self.curve.shooting.itinerary(w[:-1])):
+                self._begin(new, direction)
+                return True
+        self.reason = f"behind {self.special[-1]!r} no cycle of the flow was found"
+        return False
+
+    def _beyond_vanishing_leg(self, ds: float) -> bool | None:
+        """Go on behind the point at which a leg vanishes, which the shorter itinerary locates."""
+        assert isinstance(self.curve, CycleCurve)
+        scale = self.curve.scales(self.w)
+        direction = float(np.sign(self.tangent[-1])) or self.direction
+        for reach in (1.0, 2.0, 4.0):
+            w = self.w + reach * ds * self.tangent * scale
+            new = _flow_near(self.curve, w, self.w)
+            if new is None or new.itinerary.is_same(self.curve.shooting.itinerary(self.w[:-1])):
+                continue
+            shorter = _Side.__new__(_Side)
+            shorter.settings, shorter.direction = self.settings, direction
+            shorter.points, shorter.special, shorter.reason = self.points, self.special, ""
+            try:
+                shorter._locate_behind(new, float(self.w[-1]), direction)
+            except ModelError:
+                continue
+            self.curve, self.w, self.tangent = shorter.curve, shorter.w, shorter.tangent
+            self.tests, self.jacobian = shorter.tests, shorter.jacobian
+            return True
+        return None
+
+    def _locate_behind(self, state: Cycle, value: float, direction: float) -> None:
+        """Go back from a cycle to the value of the parameter before, and find which test function vanishes."""
+        self._begin(state, -direction)
+        self.points.pop()
+        start = (self.w, self.tangent, self.tests, self.jacobian)
+        scale = self.curve.scales(self.w)
+        unit = np.zeros(len(self.w))
+        unit[-1] = 1.0
+        share = (value - self.w[-1]) / (self.tangent[-1] * scale[-1])
+        guess = self.w + share * self.tangent * scale
+        guess[-1] = value
+        step = corrected(self.curve, guess, scale, unit)
+        step.w[-1] = value
+        tangent = tangent_of(step.jacobian, self.curve.scales(step.w), self.tangent)
+        tests = self._tests(step.w, step.jacobian, tangent)
+        lost = [key for key in tests if key[0] in _CHANGES and key in self.tests and tests[key] * self.tests[key] < 0]
+        if not lost:
+            raise ModelError("nothing vanishes between the two itineraries")
+        found = min((self._located(key, step, tests) for key in lost), key=lambda located: located[0])
+        self._add_located(found[1], self.curve.state(found[2].w, found[2].error))
+        self.w, tangent, _, self.jacobian = start
+        self.tangent = -tangent
+        self.tests = self._tests(self.w, self.jacobian, self.tangent)
+        self._keep(state)
+
+    def _why_it_ended(self, error: ModelError) -> str:
+        name, value = self.settings.name, float(self.w[-1])
+        state = self.points[-1].state
+        first = self.points[0].state
+        grows = ""
+        if isinstance(state, Cycle) and isinstance(first, Cycle):
+            sizes = [float(np.max(np.abs(np.array(c.itinerary.starts)))) for c in (first, state)]
+            if sizes[1] > 1e3 * sizes[0]:
+                grows = f"; the cycle grows without bound, to {sizes[1]:.3g}"
+            elif state.period > 1e3 * first.period:
+                grows = f"; the period grows without bound, to {state.period:.3g}"
+        return f"the branch cannot be followed beyond {name} = {value:.9g}{grows}: {error}"
+
+
+def _flow_near(curve: CycleCurve, w: Array, known: Array | None = None) -> Cycle | None:
+    """Return the cycle of the flow near a point that need not be one, with the pieces of a run."""
+    shooting = curve.shooting
+    motions = shooting.motions.with_derivatives_by(())
+    motions.use({**shooting.motions.params, **dict(zip(curve.names, w[curve.n_unknowns :], strict=True))})
+    starts, durations, t = shooting.parts(w[: curve.n_unknowns])
+    longest = int(np.argmax(durations))
+    leg = shooting.legs[longest]
+    t += sum(durations[:longest])
+    half = 0.5 * durations[longest]
+    try:
+        x = motions.leg(leg.mode, leg.discrete, t, starts[longest], half).x
+        forcing = shooting.period
+        duration = sum(durations) if forcing is None else forcing.value(motions)
+        found = cycle_at(motions, t + half, x, duration, forcing)
+    except ModelError:
+        return None
+    return found if abs(found.period - duration) < 0.3 * duration else None
+
+
+def _beyond_boundary(
+    curve: EquilibriumCurve, key: Any, located: Step, direction: float, settings: _Settings
+) -> tuple[Equilibrium, float] | None:
+    """Return the equilibrium that goes on from a boundary, a little way along its branch, and its direction."""
+    surface = key[1]
+    n, before = curve.n, curve.mode[surface]
+    x, value = located.w[:n], located.w[-1]
+    if before == 0:
+        end = float(np.sign(located.w[n + curve.sliding.index(surface)]))
+        targets = [(_with_entry(curve.mode, surface, int(end)), None)]
+    else:
+        targets = [
+            (_with_entry(curve.mode, surface, 0), float(before)),
+            (_with_entry(curve.mode, surface, -before), None),
+        ]
+    for mode, end_value in targets:
+        other = EquilibriumCurve(curve.motions, mode, curve.names, curve.sizes)
+        own = dict(zip(curve.sliding, located.w[n : n + len(curve.sliding)], strict=True))
+        if end_value is not None:
+            own[surface] = end_value
+        w = np.concatenate([x, [own[j] for j in other.sliding], [value]])
+        try:
+            point = corrected(other, w, other.scales(w), np.eye(len(w))[-1])
+        except ModelError:
+            continue
+        if np.max(np.abs((point.w - w) / other.scales(w))) > 1e-6:
+            continue
+        found = _admissible_along(other, point, surface, end_value, mode, settings)
+        if found is not None:
+            return found
+    return None
+
+
+def _with_entry(mode: Sequence[int], surface: int, entry: int) -> tuple[int, ...]:
+    return (*mode[:surface], entry, *mode[surface + 1 :])
+
+
+def _admissible_along(
+    curve: EquilibriumCurve,
+    point: Step,
+    surface: int,
+    end: float | None,
+    mode: Sequence[int],
+    settings: _Settings,
+) -> tuple[Equilibrium, float] | None:
+    scale = curve.scales(point.w)
+    tangent = tangent_of(point.jacobian, scale)
+    for sign in (1.0, -1.0):
+        try:
+            step = corrected(curve, point.w + 1e-4 * sign * tangent * scale, scale, tangent)
+        except ModelError:
+            continue
+        state = curve.state(step.w, step.error)
+        inside = np.all(np.abs(state.multipliers) <= 1.0)
+        if inside and np.all(state.switching > 0):
+            low, high = settings.bounds
+            if low <= step.w[-1] <= high:
+                return state, float(np.sign(step.w[-1] - point.w[-1])) or sign
+    return None
+
+
+def _other_branch(special: Special, name: str) -> State:
+    """Return a state of the other branch through a special point."""
+    from filippov.cycles.switching import other_branch
+
+    return other_branch(special, name)
+
+
+def _joined(sides: Sequence[_Side], settings: _Settings) -> Branch:
+    """Return both directions as one branch, from low values of the parameter at the start to high ones."""
+    backward = sides[0]
+    forward = sides[1] if len(sides) > 1 else None
+    last = len(backward.points) - 1
+    points = backward.points[::-1]
+    special = [
+        s._replace(point=max(last - s.point - (s.code != "EP"), 0)) for s in backward.special[::-1]
+    ]
+    reasons = {"below": backward.reason}
+    if forward is not None:
+        points = points + forward.points[1:]
+        special += [s._replace(point=s.point + last) for s in forward.special]
+        reasons["above"] = forward.reason
+    return Branch(points, special, reasons, (settings.name,), [m.name for m in settings.monitors])

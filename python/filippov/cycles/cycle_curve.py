@@ -1,0 +1,66 @@
+"""The equations of a cycle with a given itinerary in one parameter, as a curve."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from filippov.cycles.cycle import Cycle
+from filippov.cycles.motions import Array
+from filippov.cycles.probes import PLACES, Probe, probes_of
+from filippov.cycles.shooting import Shooting, Shot, scales
+
+__all__ = ["CycleCurve"]
+
+
+class CycleCurve:
+    """Cycles with the itinerary of a cycle, in one or two parameters.
+
+    Parameters
+    ----------
+    cycle : Cycle
+        One of them.
+    names : sequence of str
+        The parameters.
+    sizes : sequence of float
+        The sizes by which these are measured.
+    """
+
+    def __init__(self, cycle: Cycle, names: tuple[str, ...], sizes: tuple[float, ...]) -> None:
+        self.names, self.sizes = names, np.array(sizes)
+        self._shooting = cycle._with_derivatives_by(names)
+        self.start = np.append(cycle._u, [cycle.params[name] for name in names])
+        self.n_unknowns = len(cycle._u)
+
+    @property
+    def shooting(self) -> Shooting:
+        """The equations, at the parameters asked for last."""
+        return self._shooting
+
+    def shot(self, w: Array, places: int = 0) -> Shot:
+        """Return the equations of the cycle."""
+        u, p = w[: self.n_unknowns], w[self.n_unknowns :]
+        self._shooting.motions.move(p)
+        return self._shooting.shoot(u, places)
+
+    def equations(self, w: Array) -> tuple[Array, Array]:
+        """Return the equations, and their derivatives by unknowns and parameters."""
+        shot = self.shot(w)
+        return shot.residual, shot.jacobian
+
+    def scales(self, w: Array) -> Array:
+        """Return the sizes by which unknowns and parameters are measured."""
+        return np.append(scales(self._shooting, w[: self.n_unknowns]), self.sizes)
+
+    def probes(self, w: Array) -> list[Probe]:
+        """Return the test functions there."""
+        shot = self.shot(w, PLACES)
+        return probes_of(self._shooting, w[: self.n_unknowns], shot)
+
+    def state(self, w: Array, error: float) -> Cycle:
+        """Return the cycle there."""
+        u = w[: self.n_unknowns].copy()
+        self.shot(w)
+        motions = self._shooting.motions
+        own = motions.with_derivatives_by(())
+        shooting = Shooting(own, self._shooting.itinerary(u), self._shooting.period)
+        return Cycle(shooting, u, shooting.shoot(u), error)

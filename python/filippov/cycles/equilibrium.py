@@ -1,0 +1,350 @@
+"""Equilibria of regions, and pseudo-equilibria on any number of surfaces, where the sliding motion rests.
+
+A pseudo-equilibrium on h_j = 0 has f(x, lambda) = 0 with the multipliers as unknowns, f linear in each of them: these equations are
+regular where a multiplier is -1 or +1, and the equilibrium is one of a region there.
+
+References: Filippov (1988), section 19; Kuznetsov, Rinaldi, Gragnani, Int. J. Bifurcation and Chaos 13 (2003) 2157.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from filippov._core import TracedSystem
+from filippov.cycles.forcing import depends_on_time
+from filippov.cycles.motions import Array, Motions
+from filippov.errors import InputError, ModelError
+from filippov.modes import Mode
+from filippov.options import check_y0
+from filippov.system import System
+
+__all__ = ["Equilibrium", "EquilibriumCurve", "equilibrium", "rest_of"]
+
+_MOST_STEPS = 50
+_TOLERANCE = 1e-13
+
+
+class Equilibrium:
+    """An equilibrium or a pseudo-equilibrium.
+
+    Attributes
+    ----------
+    system : System
+    params : dict
+        Values of all parameters.
+    y : ndarray, shape (n,)
+        The state.
+    mode : Mode
+        One entry per surface; 0: the equilibrium is one of the sliding motion there.
+    multipliers : ndarray, shape (m,)
+        Those of the m surfaces slid on.
+    residual : float
+        The size of the last step of Newton's method, relative to the state.
+    """
+
+    def __init__(self, curve: EquilibriumCurve, w: Array, residual: float) -> None:
+        self._curve, self._w = curve, w.copy()
+        curve.use(w)
+        self.system, self.params = curve.motions.system, curve.motions.params
+        self.y, self.multipliers = w[: curve.n].copy(), w[curve.n : curve.n + len(curve.sliding)].copy()
+        self.residual = residual
+        self._entries = curve.mode
+
+    @property
+    def mode(self) -> Mode:
+        """One entry per surface."""
+        return Mode(self._entries[: len(self._curve.motions.prepared.surfaces)])
+
+    @property
+    def codimension(self) -> int:
+        """On how many surfaces it is."""
+        return len(self._curve.sliding)
+
+    @cached_property
+    def switching(self) -> Array:
+        """The values of the switching functions, each in the sense of the mode: positive if it is admissible."""
+        return self._curve.switching(self._w)
+
+    @property
+    def is_admissible(self) -> bool:
+        """Whether the system is there: in its region, and with multipliers between -1 and 1; else virtual."""
+        inside = np.all(np.abs(self.multipliers) <= 1.0)
+        return bool(inside and np.all(self.switching > 0))
+
+    @cached_property
+    def eigenvalues(self) -> npt.NDArray[np.complex128]:
+        """Those of the motion in its mode: n in a region, n - m on m surfaces; the largest real part first."""
+        found = np.linalg.eigvals(self._curve.linearisation(self._w)).astype(np.complex128)
+        return found[np.lexsort((-found.imag, -found.real))]
+
+    @cached_property
+    def attracts(self) -> bool:
+        """Whether the motion comes to the surfaces from beside them; yes in a region."""
+        if not self._curve.sliding:
+            return True
+        return bool(np.all(np.linalg.eigvals(self._curve.normal_rates(self._w)).real < 0))
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether all eigenvalues have negative real parts, and its surfaces attract."""
+        return self.attracts and bool(np.all(self.eigenvalues.real < 0))
+
+    def __repr__(self) -> str:
+        kind = "pseudo-equilibrium" if self.codimension else "equilibrium"
+        words = f"{'stable' if self.is_stable else 'unstable'}{'' if self.is_admissible else ', virtual'}"
+        multipliers = f", multipliers {_numbers(self.multipliers)}" if self.codimension else ""
+        return (
+            f"Equilibrium({words} {kind} at {_numbers(self.y)}, mode {self.mode}{multipliers}, "
+            f"eigenvalues {_numbers(self.eigenvalues)})"
+        )
+
+
+def _numbers(values: Any) -> str:
+    return "(" + ", ".join(f"{value:.6g}" for value in values) + ")"
+
+
+class EquilibriumCurve:
+    """The equations of an equilibrium in a mode, with some parameters as further unknowns.
+
+    Parameters
+    ----------
+    motions : Motions
+    mode : tuple of int
+        One entry per surface.
+    names : sequence of str
+        The parameters.
+    sizes : sequence of float
+        The sizes by which they are measured.
+    """
+
+    def __init__(
+        self, motions: Motions, mode: Sequence[int], names: Sequence[str] = (), sizes: Sequence[float] = ()
+    ) -> None:
+        self.motions = motions.with_derivatives_by(tuple(names))
+        self.mode, self.n, self.names = tuple(mode), motions.n, tuple(names)
+        self.sizes = np.array(sizes, dtype=np.float64)
+        self.sliding = tuple(j for j, entry in enumerate(self.mode) if entry == 0)
+        signs = np.array(self.mode, dtype=np.float64)
+        corners = itertools.product((-1.0, 1.0), repeat=len(self.sliding))
+        self._corners = []
+        for corner in corners:
+            signs[list(self.sliding)] = corner
+            self._corners.append((np.array(corner), signs.copy()))
+        core = self.motions.prepared.core
+        assert isinstance(core, TracedSystem)
+        self._active = core.active(np.array(self.mode, dtype=np.float64))
+
+    @property
+    def n_unknowns(self) -> int:
+        """The number of states and multipliers."""
+        return self.n + len(self.sliding)
+
+    def use(self, w: Array) -> None:
+        """Take the parameters of a point."""
+        self.motions.move(w[self.n_unknowns :])
+
+    def residual(self, w: Array) -> Array:
+        """Return the field with its multipliers, and the functions of the surfaces slid on."""
+        self.use(w)
+        n, m = self.n, len(self.sliding)
+        x, multipliers = w[:n], w[n : n + m]
+        total = np.zeros(n)
+        h = np.zeros(m)
+        for corner, signs in self._corners:
+            weight = float(np.prod(0.5 * (1.0 + corner * multipliers)))
+            found = self.motions.right_hand_side(0.0, x, signs)
+            total += weight * found[:n]
+            h += found[n:][list(self.sliding)] / len(self._corners)
+        return np.concatenate([total, h])
+
+    def equations(self, w: Array) -> tuple[Array, Array]:
+        """Return the equations and their derivatives."""
+        return self.residual(w), differences(self.residual, w, self.scales(w))
+
+    def scales(self, w: Array) -> Array:
+        """Return the sizes by which states, multipliers and parameters are measured."""
+        size = np.abs(w[: self.n])
+        size = np.maximum(size, max(0.1 * float(np.max(size, initial=0.0)), 1e-3))
+        return np.concatenate([size, np.ones(len(self.sliding)), self.sizes])
+
+    def switching(self, w: Array) -> Array:
+        """Return the functions of the surfaces not slid on, in the sense of the mode."""
+        self.use(w)
+        _, signs = self._corners[0]
+        h = self.motions.right_hand_side(0.0, w[: self.n], signs)[self.n :]
+        kept = [j for j, entry in enumerate(self.mode) if entry != 0 and self._active[j]]
+        return np.array([h[j] * self.mode[j] for j in kept])
+
+    def surfaces_beside(self) -> list[int]:
+        """Return the surfaces that `switching` is about."""
+        return [j for j, entry in enumerate(self.mode) if entry != 0 and self._active[j]]
+
+    def linearisation(self, w: Array) -> Array:
+        """Return the derivative of the motion on its surfaces, in a basis of their tangent space."""
+        n, m = self.n, len(self.sliding)
+        jacobian = self._by_unknowns(w)
+        a, b, rows = jacobian[:n, :n], jacobian[:n, n:], jacobian[n:, :n]
+        if m == 0:
+            return a
+        tangents = np.linalg.svd(rows)[2][m:].T
+        # The multipliers keep the motion on the surfaces: rows (a dx + b dlambda) = 0 at rest.
+        by_state = -np.linalg.solve(rows @ b, rows @ a)
+        return np.asarray(tangents.T @ (a + b @ by_state) @ tangents)
+
+    def normal_rates(self, w: Array) -> Array:
+        """Return the derivatives of the rates of the surfaces slid on by their multipliers."""
+        jacobian = self._by_unknowns(w)
+        return np.asarray(jacobian[self.n :, : self.n] @ jacobian[: self.n, self.n :])
+
+    def _by_unknowns(self, w: Array) -> Array:
+        k = self.n_unknowns
+        own = w[:k]
+
+        def residual(v: Array) -> Array:
+            return self.residual(np.append(v, w[k:]))
+
+        return differences(residual, own, self.scales(w)[:k], is_fine=True)
+
+    def state(self, w: Array, error: float) -> Equilibrium:
+        """Return the equilibrium there."""
+        return Equilibrium(self, w, error)
+
+
+def differences(
+    function: Callable[[Array], Array], w: Array, scale: Array, is_fine: bool = False
+) -> Array:
+    """Return the derivative of a smooth function, by central differences of second or sixth order."""
+    columns = []
+    for i in range(len(w)):
+        d = (1e-3 if is_fine else 6e-6) * scale[i]
+
+        def at(k: int, i: int = i, d: float = d) -> Array:
+            moved = w.copy()
+            moved[i] += k * d
+            return function(moved)
+
+        if is_fine:
+            near, middle, far = ((at(k) - at(-k)) / (2 * k * d) for k in (1, 2, 3))
+            columns.append(1.5 * near - 0.6 * middle + 0.1 * far)
+        else:
+            columns.append((at(1) - at(-1)) / (2 * d))
+    if not columns:
+        return np.zeros((len(function(w)), 0))
+    return np.array(columns).T
+
+
+def equilibrium(
+    system: System,
+    y0: npt.ArrayLike,
+    params: Mapping[str, float] | None = None,
+    mode: Any = None,
+    **options: Any,
+) -> Equilibrium:
+    """Return the equilibrium of a mode near a point.
+
+    Parameters
+    ----------
+    system : System
+        A traced system that does not depend on the time.
+    y0 : array_like, shape (n,)
+        A point near it.
+    params : dict, optional
+        Values of parameters; the others have their defaults.
+    mode : Mode, tuple of int, or str, optional
+        The mode, one entry per surface: with a 0 the equilibrium is a pseudo-equilibrium, where the sliding
+        motion rests. Default: the mode of the motion from `y0`.
+    **options
+        Options of `solve_ivp`, for the motion from `y0`.
+
+    Returns
+    -------
+    Equilibrium
+        Also a virtual one, which the system does not have: `is_admissible` says so.
+
+    Raises
+    ------
+    InputError
+        If an argument is wrong, or the system depends on the time.
+    ModelError
+        If Newton's method does not converge.
+
+    Examples
+    --------
+    >>> import numpy as np, filippov as fl
+    >>> fish = fl.System(lambda t, x, a=0.5: [x[0] * (1 - x[0]) - 0.2 * x[0] * (x[0] > a)], n=1)
+    >>> fl.equilibrium(fish, [0.7])
+    Equilibrium(stable equilibrium at (0.8), mode +, eigenvalues (-0.8+0j))
+    """
+    if not isinstance(system, System):
+        raise InputError(f"system: a filippov.System is needed, not {type(system).__name__}")
+    start = check_y0(y0, states=system._states)
+    motions = Motions(system, len(start), system.parameter_values(params), (), options)
+    if depends_on_time(motions, 1.0):
+        raise InputError("system: it depends on the time: it has cycles (fl.limit_cycle), and no equilibria")
+    entries = _mode_of(motions, start, mode)
+    curve = EquilibriumCurve(motions, entries)
+    w = np.append(start, _first_multipliers(curve, start))
+    return rest_of(curve, w)
+
+
+def rest_of(curve: EquilibriumCurve, w: Array) -> Equilibrium:
+    """Return the equilibrium near a guess, by Newton's method.
+
+    Raises
+    ------
+    ModelError
+        If that does not converge.
+    """
+    before = np.inf
+    for _ in range(_MOST_STEPS):
+        residual, jacobian = curve.equations(w)
+        own = jacobian[:, : curve.n_unknowns]
+        change = -np.linalg.lstsq(own, residual, rcond=None)[0]
+        size = float(np.max(np.abs(change) / curve.scales(w)[: curve.n_unknowns]))
+        if not np.isfinite(size):
+            break
+        # Far away a step is no longer than the state itself.
+        w = w.copy()
+        w[: curve.n_unknowns] += change * min(1.0, 2.0 / max(size, 1e-300))
+        if size < _TOLERANCE or (size < 1e-9 and size >= 0.5 * before):
+            return Equilibrium(curve, w, size)
+        before = size
+    raise ModelError(
+        f"no equilibrium in mode {Mode(curve.mode)} was found near {_numbers(w[: curve.n])}: Newton's method "
+        "does not converge"
+    )
+
+
+def _mode_of(motions: Motions, x: Array, mode: Any) -> tuple[int, ...]:
+    """Return the entries of a mode, those of surfaces without an entry in it as at the point."""
+    record = motions.record((0.0, 1e-9), x)
+    own = record.mode
+    if record.instants and record.instants[0].times[0] == 0.0:
+        own = record.instants[0].modes[1]
+    if mode is None:
+        return own
+    try:
+        given = tuple(Mode(mode))
+    except (TypeError, ValueError, InputError):
+        raise InputError(f"mode: entries over -1, 0, +1 are needed, as '+0' or (1, 0), not {mode!r}") from None
+    visible = len(motions.prepared.surfaces)
+    if len(given) != visible:
+        raise InputError(f"mode: the system has {visible} surfaces, {mode!r} has {len(given)} entries")
+    return given + own[visible:]
+
+
+def _first_multipliers(curve: EquilibriumCurve, x: Array) -> Array:
+    """Return multipliers that make the field small at a point."""
+    m = len(curve.sliding)
+    if m == 0:
+        return np.zeros(0)
+    w = np.append(x, np.zeros(m))
+    rows = differences(curve.residual, w, curve.scales(w))[: curve.n, curve.n :]
+    found = -np.linalg.lstsq(rows, curve.residual(w)[: curve.n], rcond=None)[0]
+    return np.clip(found, -2.0, 2.0)

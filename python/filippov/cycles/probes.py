@@ -1,0 +1,167 @@
+"""Test functions of a cycle with a given itinerary: positive while the flow follows it.
+
+Each is a smooth function of the equations of the itinerary, which goes on where the flow takes another way.
+References: di Bernardo, Budd, Champneys, Kowalczyk, Piecewise-smooth Dynamical Systems (2008), chapters 7 and 8; Kuznetsov, Rinaldi,
+Gragnani, Int. J. Bifurcation and Chaos 13 (2003) 2157.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from filippov.cycles.itinerary import Leg
+from filippov.cycles.motions import Array, Guard, Mode, Motions
+from filippov.cycles.shooting import Passage, Shooting, Shot
+from filippov.cycles.zero import zero_between
+
+__all__ = ["PLACES", "Probe", "probes_of"]
+
+PLACES = 6
+_NAMES = {
+    "CS": "crossing-sliding",
+    "SS": "switching-sliding",
+    "GS": "grazing-sliding",
+    "AS": "adding-sliding",
+    "GR": "grazing",
+}
+
+
+class Probe(NamedTuple):
+    """A test function at a point of a branch.
+
+    Attributes
+    ----------
+    code : str
+        What happens where it vanishes.
+    leg : int
+        The leg that it belongs to.
+    guard : Guard or None
+        The guard that it is about.
+    place : str
+        ``"inside"`` a leg, or at its ``"end"``.
+    number : int
+        Which of several.
+    t : float
+        The time.
+    value : float
+        Positive while the flow follows the itinerary.
+    x : ndarray, shape (n,)
+        The state there.
+    """
+
+    code: str
+    leg: int
+    guard: Guard | None
+    place: str
+    number: int
+    t: float
+    value: float
+    x: Array
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """What tells it from others."""
+        return self.code, self.leg, self.guard, self.place, self.number
+
+    @property
+    def surface(self) -> int | None:
+        """The surface that it is about."""
+        return None if self.guard is None or self.guard[1] < 0 else self.guard[1]
+
+
+def probes_of(shooting: Shooting, u: Array, shot: Shot) -> list[Probe]:
+    """Return the test functions of a cycle; the shot has the guards along the way."""
+    found: list[Probe] = []
+    starts, durations, t = shooting.parts(u)
+    for i, (leg, passage) in enumerate(zip(shooting.legs, shot.passages, strict=True)):
+        found += _inside(shooting, i, leg, t, starts[i], durations[i], passage)
+        t = passage.t
+        following = shooting.legs[(i + 1) % shooting.m]
+        if leg.ending is not None and leg.ending.guard is not None:
+            found += _at_end(shooting.motions, i, leg, following, passage)
+    return found
+
+
+def _inside(
+    shooting: Shooting, i: int, leg: Leg, t0: float, x: Array, duration: float, passage: Passage
+) -> list[Probe]:
+    """Return the local minima of the guards of a leg."""
+    found = []
+    times, values = passage.leg.times, passage.leg.guards
+    guards = shooting.motions.guards(leg.mode, leg.discrete)
+    for g, guard in enumerate(guards):
+        row = values[g] if g < len(values) else np.zeros(0)
+        if len(row) < 3:
+            continue
+        inner = (row[1:-1] < row[:-2]) & (row[1:-1] <= row[2:])
+        size = float(np.max(np.abs(row)))
+        for number, k in enumerate(np.flatnonzero(inner) + 1):
+            if abs(row[k]) > 0.5 * size:
+                continue  # far from zero, whatever the parameter does next
+            t, point, value = _minimum(shooting.motions, leg, t0, x, (times[k - 1], times[k + 1]), times[k], g)
+            found.append(Probe(_code_inside(shooting.motions, guard), i, guard, "inside", number, t, value, point))
+    return found
+
+
+def _minimum(
+    motions: Motions, leg: Leg, t0: float, x: Array, bracket: tuple[float, float], t: float, g: int
+) -> tuple[float, Array, float]:
+    """Return time, state and value of the minimum of a guard between two times: its rate is zero there."""
+    def point_at(t: float) -> Array:
+        return motions.leg(leg.mode, leg.discrete, t0, x, t - t0).x if t > t0 else x
+
+    def rate_at(t: float) -> float:
+        return float(motions.at(leg.mode, leg.discrete, t, point_at(t)).rates()[g])
+
+    low, high = ((t, rate_at(t)) for t in bracket)
+    if low[1] * high[1] < 0:
+        t = zero_between(rate_at, low, high, 1e-14 * max(1.0, abs(t)))
+    point = point_at(t)
+    return t, point, float(motions.at(leg.mode, leg.discrete, t, point).values[g])
+
+
+def _code_inside(motions: Motions, guard: Guard) -> str:
+    kind, surface, _ = guard
+    if kind == "surface":
+        return "GR" if _triggers(motions, surface) else "GS"
+    return "AS"
+
+
+def _triggers(motions: Motions, surface: int) -> bool:
+    """Whether a surface triggers a reset."""
+    return any(
+        action.when == "surface" and int(action.numbers[0]) == surface for action in motions.prepared.actions
+    )
+
+
+def _at_end(motions: Motions, i: int, leg: Leg, following: Leg, passage: Passage) -> list[Probe]:
+    """Return what must hold where a leg ends."""
+    assert leg.ending is not None and leg.ending.guard is not None
+    guard, t = leg.ending.guard, passage.t
+    kind, surface, _ = guard
+    own = motions.at(leg.mode, leg.discrete, t, passage.leg.x)
+    place = motions.guards(leg.mode, leg.discrete).index(guard)
+    found = []
+
+    def add(code: str, about: Guard, value: float, number: int = 0) -> None:
+        found.append(Probe(code, i, about, "end", number, t, float(value), passage.leg.x))
+
+    # The motion leads through the zero of its guard.
+    code = "GR" if leg.ending.acts else {"surface": "GS", "multiplier": "AS"}.get(kind, "AS")
+    add(code, guard, -own.rates()[place])
+    if leg.ending.acts or kind != "surface":
+        return found
+    behind = motions.at(following.mode, passage.discrete, t, passage.after)
+    guards = motions.guards(following.mode, passage.discrete)
+    for k, other in enumerate(guards):
+        if other[0] == "surface" and other[1] == surface and _is_crossed(leg.mode, following.mode, surface):
+            add("CS", other, behind.rates()[k], 1)
+        elif other[0] != "surface":
+            add("SS", other, behind.values[k], 2)
+    return found
+
+
+def _is_crossed(before: Mode, after: Mode, surface: int) -> bool:
+    return before[surface] != 0 and after[surface] == -before[surface]
