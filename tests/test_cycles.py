@@ -22,7 +22,9 @@ def eigenvalues(case: dict[str, Any]) -> Any:
     if "multipliers" not in case:
         found = np.linalg.eigvals(numbers(case["monodromy"]))
     else:
-        found = np.array([complex(*map(float, v)) if isinstance(v, list) else float(v) for v in case["multipliers"]])
+        found = np.array(
+            [complex(*map(float, v)) if isinstance(v, list) else float(v) for v in case["multipliers"]]
+        )
     return found[np.argsort(-np.abs(found), kind="stable")]
 
 

@@ -36,9 +36,7 @@ _Array = npt.NDArray[np.float64]
 __version__: str
 
 _Guard = tuple[str, int, int]
-_Instant = tuple[
-    list[float], list[_Array], list[list[int]], list[list[float]], list[_Guard], list[int]
-]
+_Instant = tuple[list[float], list[_Array], list[list[int]], list[list[float]], list[_Guard], list[int]]
 
 @final
 class Builder:

@@ -246,13 +246,17 @@ class Branch:
     def __repr__(self) -> str:
         what = "cycles" if isinstance(self.points[0].state, Cycle) else "equilibria"
         ranges = ", ".join(
-            f"{name} from {np.min(self.values(name)):.6g} to {np.max(self.values(name)):.6g}" for name in self.names
+            f"{name} from {np.min(self.values(name)):.6g} to {np.max(self.values(name)):.6g}"
+            for name in self.names
         )
         return f"Branch({len(self)} {what}, {ranges}; {len(self.special)} special points; {self.reason})"
 
 
 def _start(state: State) -> Any:
-    return state.y0 if isinstance(state, Cycle) else state.y
+    """Return the state at the start: for a forced cycle that at time 0 modulo the period, for others that at a switch."""
+    if isinstance(state, Cycle):
+        return state.at(0.0) if state.is_forced else state.y0
+    return state.y
 
 
 def _period(state: State) -> float:

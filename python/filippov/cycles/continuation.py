@@ -15,6 +15,7 @@ from filippov.cycles.arclength import Step, corrected, tangent_of
 from filippov.cycles.branch import CODES, Branch, Point, Special, State
 from filippov.cycles.cycle import Cycle, cycle_at, cycle_of
 from filippov.cycles.cycle_curve import CycleCurve
+from filippov.cycles.itinerary import Itinerary
 from filippov.cycles.equilibrium import Equilibrium, EquilibriumCurve, rest_of
 from filippov.cycles.monitors import Monitor, monitors_of
 from filippov.cycles.motions import Array
@@ -124,6 +125,8 @@ def continuation(
         raise InputError(
             f"start: a cycle, an equilibrium or a special point is needed, not {type(start).__name__}"
         )
+    if isinstance(first, Cycle):
+        first = first.from_event()
     settings = _checked(first, parameter, bounds, step, monitor, detect, switch, max_points, progress)
     sides: list[_Side] = []
     try:
@@ -162,7 +165,7 @@ def _checked(
         raise InputError(f'switch: "follow", "stop" or "ignore", not {switch!r}')
     codes = CODES if isinstance(detect, str) and detect == "all" else detect
     if isinstance(codes, str) or any(code not in CODES for code in codes):
-        raise InputError(f"detect: \"all\" or codes among {', '.join(CODES)}, not {detect!r}")
+        raise InputError(f'detect: "all" or codes among {", ".join(CODES)}, not {detect!r}')
     share = _FIRST_STEP if step is None else positive("step", step) / (high - low)
 
     def report(count: int, value: float) -> None:
@@ -316,9 +319,7 @@ class _Side:
         """Take a point; find what changes before it. False: the branch ends."""
         tests = self._tests(step.w, step.jacobian, tangent)
         changed = [key for key, value in tests.items() if key in self.tests and value * self.tests[key] < 0]
-        found = sorted(
-            (self._located(key, step, tests) for key in changed), key=lambda located: located[0]
-        )
+        found = sorted((self._located(key, step, tests) for key in changed), key=lambda located: located[0])
         for _, key, located in found:
             code = key[0]
             state = self.curve.state(located.w, located.error)
@@ -390,13 +391,15 @@ class _Side:
         surface, t = "", np.nan
         if code in _CHANGES and key is not None:
             place = key[1] if code == "BE" else (key[2][1] if key[2] is not None else -1)
-            names = self.curve.shooting.motions.prepared.surfaces if isinstance(self.curve, CycleCurve) else (
-                self.curve.motions.prepared.surfaces
+            names = (
+                self.curve.shooting.motions.prepared.surfaces
+                if isinstance(self.curve, CycleCurve)
+                else (self.curve.motions.prepared.surfaces)
             )
             surface = names[place] if 0 <= place < len(names) else ""
             if isinstance(self.curve, CycleCurve) and isinstance(state, Cycle):
                 probe = next((p for p in self.curve.probes(self._w_of(state)) if p.key == key), None)
-                t = np.nan if probe is None else probe.t
+                t = np.nan if probe is None else (probe.t if state.is_forced else probe.t - state.t0)
         params = {self.settings.name: state.params[self.settings.name]}
         kind = f"{key[1]} vanishes" if code == "UZ" and key is not None else CODES[code]
         self.special.append(Special(code, kind, surface, t, params, len(self.points) - 1, state, key))
@@ -421,6 +424,12 @@ class _Side:
             if new is not None and not new.itinerary.is_same(self.curve.shooting.itinerary(w[:-1])):
                 self._begin(new, direction)
                 return True
+        if (
+            key[3] == "end"
+            and (without := _without_leg(self.curve, key[1], located, self.settings)) is not None
+        ):
+            self._begin(*without)
+            return True
         self.reason = f"behind {self.special[-1]!r} no cycle of the flow was found"
         return False
 
@@ -461,7 +470,11 @@ class _Side:
         step.w[-1] = value
         tangent = tangent_of(step.jacobian, self.curve.scales(step.w), self.tangent)
         tests = self._tests(step.w, step.jacobian, tangent)
-        lost = [key for key in tests if key[0] in _CHANGES and key in self.tests and tests[key] * self.tests[key] < 0]
+        lost = [
+            key
+            for key in tests
+            if key[0] in _CHANGES and key in self.tests and tests[key] * self.tests[key] < 0
+        ]
         if not lost:
             raise ModelError("nothing vanishes between the two itineraries")
         found = min((self._located(key, step, tests) for key in lost), key=lambda located: located[0])
@@ -503,6 +516,45 @@ def _flow_near(curve: CycleCurve, w: Array, known: Array | None = None) -> Cycle
     except ModelError:
         return None
     return found if abs(found.period - duration) < 0.3 * duration else None
+
+
+def _without_leg(
+    curve: CycleCurve, end: int, located: Step, settings: _Settings
+) -> tuple[Cycle, float] | None:
+    """Return the cycle near a point that does not do what happens at the end of a leg, and where it leads to.
+
+    Two branches may meet at a point and both lie on one side of it, like those with and without an impact.
+    """
+    shooting = curve.shooting
+    itinerary = shooting.itinerary(located.w[: curve.n_unknowns])
+    following = (end + 1) % len(itinerary.legs)
+    if len(itinerary.legs) == 1:
+        legs, starts, durations = (
+            [itinerary.legs[0]._replace(ending=None)],
+            itinerary.starts,
+            itinerary.durations,
+        )
+    elif itinerary.legs[end].mode == itinerary.legs[following].mode and following > end:
+        kept = [k for k in range(len(itinerary.legs)) if k != end]
+        legs = [itinerary.legs[k] for k in kept]
+        starts = tuple(itinerary.starts[end if k == following else k] for k in kept)
+        both = itinerary.durations[end] + itinerary.durations[following]
+        durations = tuple(both if k == following else itinerary.durations[k] for k in kept)
+    else:
+        return None
+    shorter = Itinerary(tuple(legs), itinerary.t0, tuple(starts), tuple(durations))
+    motions = shooting.motions.with_derivatives_by(())
+    for direction in (1.0, -1.0):
+        value = located.w[-1] + direction * 1e-4 * settings.size
+        motions = motions.with_derivatives_by(())
+        motions.use({**motions.params, settings.name: value})
+        try:
+            cycle = cycle_of(motions, shorter, shooting.period)
+        except ModelError:
+            continue
+        if cycle.is_admissible:
+            return cycle, direction
+    return None
 
 
 def _beyond_boundary(
@@ -579,9 +631,7 @@ def _joined(sides: Sequence[_Side], settings: _Settings) -> Branch:
     forward = sides[1] if len(sides) > 1 else None
     last = len(backward.points) - 1
     points = backward.points[::-1]
-    special = [
-        s._replace(point=max(last - s.point - (s.code != "EP"), 0)) for s in backward.special[::-1]
-    ]
+    special = [s._replace(point=max(last - s.point - (s.code != "EP"), 0)) for s in backward.special[::-1]]
     reasons = {"below": backward.reason}
     if forward is not None:
         points = points + forward.points[1:]

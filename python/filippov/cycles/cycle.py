@@ -67,7 +67,9 @@ class Cycle:
         The size of the last step of Newton's method, relative to the size of the cycle.
     """
 
-    def __init__(self, shooting: Shooting, u: Array, shot: Shot, residual: float, section: Any = None) -> None:
+    def __init__(
+        self, shooting: Shooting, u: Array, shot: Shot, residual: float, section: Any = None
+    ) -> None:
         self._shooting, self._u, self._shot = shooting, u, shot
         self._section = section
         motions = shooting.motions
@@ -141,6 +143,33 @@ class Cycle:
     def is_admissible(self) -> bool:
         """Whether the flow follows the itinerary: a run from the start makes the same pieces."""
         return follows_itinerary(self)
+
+    def at(self, t: float) -> Array:
+        """Return the state at a time, modulo the period; behind a switch if one is then.
+
+        Parameters
+        ----------
+        t : float
+
+        Returns
+        -------
+        ndarray, shape (n,)
+        """
+        itinerary, motions = self.itinerary, self._shooting.motions
+        t = self.t0 + (t - self.t0) % self.period
+        since = self.t0
+        for leg, start, duration in zip(itinerary.legs, itinerary.starts, itinerary.durations, strict=True):
+            if t < since + duration or leg is itinerary.legs[-1]:
+                return start if t <= since else motions.leg(leg.mode, leg.discrete, since, start, t - since).x
+            since += duration
+        raise AssertionError  # there is a leg
+
+    def from_event(self) -> Cycle:
+        """Return the same cycle from a switch, that before its longest piece, if it has switches."""
+        if self.itinerary.is_closed_by_event() or not self.itinerary.has_events():
+            return self
+        shooting = self._shooting
+        return cycle_at(shooting.motions, self.t0, self.y0, self.period, shooting.period)
 
     def derivative(self, name: str) -> CycleDerivative:
         """Return the derivative by a parameter.
@@ -227,7 +256,9 @@ def _slopes_of(
         d = 6e-6 * max(abs(size), 1e-3)
         return (function(d) - function(-d)) / (2 * d)
 
-    by_state = [slope(lambda d, e=e: value(y + d * e, params), v) for e, v in zip(np.eye(len(y)), y, strict=True)]
+    by_state = [
+        slope(lambda d, e=e: value(y + d * e, params), v) for e, v in zip(np.eye(len(y)), y, strict=True)
+    ]
     p = params[name]
     return np.array(by_state), slope(lambda d: value(y, {**params, name: p + d}), p)
 
@@ -332,7 +363,9 @@ def limit_cycle(
     """
     if not isinstance(system, System):
         raise InputError(f"system: a filippov.System is needed, not {type(system).__name__}")
-    if transient is not None and (isinstance(transient, bool) or not isinstance(transient, int) or transient < 0):
+    if transient is not None and (
+        isinstance(transient, bool) or not isinstance(transient, int) or transient < 0
+    ):
         raise InputError(f"transient: a number of periods is needed, not {transient!r}")
     start, t0 = check_y0(y0, states=system._states), check_time(t0)
     motions = Motions(system, len(start), system.parameter_values(params), (), options)
@@ -379,7 +412,7 @@ def cycle_at(
     if itinerary is None:
         record = motions.record((t0, t0 + duration), x)
         itinerary = itinerary_of(record, t0 + duration)
-    return cycle_of(motions, itinerary, period)
+    return cycle_of(motions, itinerary if period is not None else itinerary.from_time(0.0), period)
 
 
 def cycle_of(motions: Motions, itinerary: Itinerary, period: Period) -> Cycle:
@@ -473,7 +506,9 @@ def _first_span(motions: Motions, t0: float, x: Array) -> tuple[float, Solution]
 def _ticks(motions: Motions, t0: float, x: Array, span: float) -> float | None:
     """Return the period of what happens at known times, if anything does."""
     record = motions.record((t0, t0 + span), x)
-    times = np.unique([instant.times[0] for instant in record.instants if not instant.guards and instant.acts])
+    times = np.unique(
+        [instant.times[0] for instant in record.instants if not instant.guards and instant.acts]
+    )
     if len(times) < 3:
         return None
     gaps = np.diff(times)
@@ -525,7 +560,9 @@ def _repeated(motions: Motions, t0: float, x: Array, span: float) -> Cycle:
         t, end = t + span, solution.y[:, -1]
         size = np.max(np.abs(solution.y), axis=1) + 1e-300
         if np.max(np.abs(end) / (1e-300 + np.max(np.abs(x)) + 1.0)) > 1e8:
-            raise ModelError(f"no cycle was found: the run grows without bound, to {_short(end)} at t = {t:.6g}")
+            raise ModelError(
+                f"no cycle was found: the run grows without bound, to {_short(end)} at t = {t:.6g}"
+            )
         point = end
         velocity = motions.record((t, t + 1e-6 * span), point)
         at = motions.at(velocity.mode, velocity.discrete, t, point).velocity

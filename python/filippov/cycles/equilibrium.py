@@ -216,9 +216,7 @@ class EquilibriumCurve:
         return Equilibrium(self, w, error)
 
 
-def differences(
-    function: Callable[[Array], Array], w: Array, scale: Array, is_fine: bool = False
-) -> Array:
+def differences(function: Callable[[Array], Array], w: Array, scale: Array, is_fine: bool = False) -> Array:
     """Return the derivative of a smooth function, by central differences of second or sixth order."""
     columns = []
     for i in range(len(w)):
@@ -332,7 +330,9 @@ def _mode_of(motions: Motions, x: Array, mode: Any) -> tuple[int, ...]:
     try:
         given = tuple(Mode(mode))
     except (TypeError, ValueError, InputError):
-        raise InputError(f"mode: entries over -1, 0, +1 are needed, as '+0' or (1, 0), not {mode!r}") from None
+        raise InputError(
+            f"mode: entries over -1, 0, +1 are needed, as '+0' or (1, 0), not {mode!r}"
+        ) from None
     visible = len(motions.prepared.surfaces)
     if len(given) != visible:
         raise InputError(f"mode: the system has {visible} surfaces, {mode!r} has {len(given)} entries")

@@ -80,9 +80,7 @@ class InferredPeriod:
     confirmed at every value.
     """
 
-    def __init__(
-        self, guess: float, multiple: int = 1, exponents: dict[str, float] | None = None
-    ) -> None:
+    def __init__(self, guess: float, multiple: int = 1, exponents: dict[str, float] | None = None) -> None:
         self.guess, self.multiple = guess, multiple
         self._known: tuple[dict[str, float], float] | None = None
         self._exponents = {} if exponents is None else exponents

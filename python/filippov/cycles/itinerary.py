@@ -76,6 +76,21 @@ class Itinerary(NamedTuple):
         """The sum of all durations."""
         return float(sum(self.durations))
 
+    def from_time(self, t0: float) -> Itinerary:
+        """Return the same cycle of a system that does not depend on the time, from another time."""
+        shift = t0 - self.t0
+        legs = [
+            leg
+            if leg.ending is None
+            else leg._replace(ending=leg.ending._replace(time=leg.ending.time + shift))
+            for leg in self.legs
+        ]
+        return self._replace(legs=tuple(legs), t0=t0)
+
+    def has_events(self) -> bool:
+        """Whether a leg ends at an event."""
+        return any(leg.ending is not None and leg.ending.guard is not None for leg in self.legs)
+
     def is_closed_by_event(self) -> bool:
         """Whether the last leg ends at an event."""
         return self.legs[-1].ending is not None
@@ -103,7 +118,9 @@ def itinerary_of(record: Record, t1: float) -> Itinerary:
         If it has infinitely many switches, or too many.
     """
     start = _start_of(record)
-    return _between(start, [instant for instant in _changes(record) if start.times[1] < instant.times[0] < t1], t1)
+    return _between(
+        start, [instant for instant in _changes(record) if start.times[1] < instant.times[0] < t1], t1
+    )
 
 
 def itinerary_from_event(record: Record, period: float, at: float | None = None) -> Itinerary | None:

@@ -74,9 +74,15 @@ class Probe(NamedTuple):
 def probes_of(shooting: Shooting, u: Array, shot: Shot) -> list[Probe]:
     """Return the test functions of a cycle; the shot has the guards along the way."""
     found: list[Probe] = []
-    starts, durations, t = shooting.parts(u)
+    starts, _, t = shooting.parts(u)
     for i, (leg, passage) in enumerate(zip(shooting.legs, shot.passages, strict=True)):
-        found += _inside(shooting, i, leg, t, starts[i], durations[i], passage)
+        along = passage.leg.times, passage.leg.guards
+        if leg.ending is None:
+            # The first leg goes on with it.
+            times, guards = shot.passages[0].leg.times, shot.passages[0].leg.guards
+            beyond = passage.t + times[1] - times[0]
+            along = np.append(along[0], beyond), np.hstack([along[1], guards[:, 1:2]])
+        found += _inside(shooting, i, leg, t, starts[i], along)
         t = passage.t
         following = shooting.legs[(i + 1) % shooting.m]
         if leg.ending is not None and leg.ending.guard is not None:
@@ -85,14 +91,14 @@ def probes_of(shooting: Shooting, u: Array, shot: Shot) -> list[Probe]:
 
 
 def _inside(
-    shooting: Shooting, i: int, leg: Leg, t0: float, x: Array, duration: float, passage: Passage
+    shooting: Shooting, i: int, leg: Leg, t0: float, x: Array, along: tuple[Array, Array]
 ) -> list[Probe]:
-    """Return the local minima of the guards of a leg."""
+    """Return the local minima of the guards of a leg, from their values at some times."""
     found = []
-    times, values = passage.leg.times, passage.leg.guards
+    times, values = along
     guards = shooting.motions.guards(leg.mode, leg.discrete)
     for g, guard in enumerate(guards):
-        row = values[g] if g < len(values) else np.zeros(0)
+        row = values[g]
         if len(row) < 3:
             continue
         inner = (row[1:-1] < row[:-2]) & (row[1:-1] <= row[2:])
@@ -100,8 +106,12 @@ def _inside(
         for number, k in enumerate(np.flatnonzero(inner) + 1):
             if abs(row[k]) > 0.5 * size:
                 continue  # far from zero, whatever the parameter does next
-            t, point, value = _minimum(shooting.motions, leg, t0, x, (times[k - 1], times[k + 1]), times[k], g)
-            found.append(Probe(_code_inside(shooting.motions, guard), i, guard, "inside", number, t, value, point))
+            t, point, value = _minimum(
+                shooting.motions, leg, t0, x, (times[k - 1], times[k + 1]), times[k], g
+            )
+            found.append(
+                Probe(_code_inside(shooting.motions, guard), i, guard, "inside", number, t, value, point)
+            )
     return found
 
 
@@ -109,6 +119,7 @@ def _minimum(
     motions: Motions, leg: Leg, t0: float, x: Array, bracket: tuple[float, float], t: float, g: int
 ) -> tuple[float, Array, float]:
     """Return time, state and value of the minimum of a guard between two times: its rate is zero there."""
+
     def point_at(t: float) -> Array:
         return motions.leg(leg.mode, leg.discrete, t0, x, t - t0).x if t > t0 else x
 
