@@ -40,7 +40,7 @@ from filippov.switches import RunWarning, Segment, SegmentTable, Switch, SwitchT
 from filippov.system import System
 
 if TYPE_CHECKING:
-    from filippov import analysis, plot, problems
+    from filippov import analysis, cycles, plot, problems
     from filippov.analysis import (
         Phase,
         Section,
@@ -51,17 +51,27 @@ if TYPE_CHECKING:
         poincare,
         sweep,
     )
-    from filippov.cycles import Cycle, limit_cycle
+    from filippov.cycles import (
+        Branch,
+        Cycle,
+        Equilibrium,
+        Special,
+        continuation,
+        equilibrium,
+        limit_cycle,
+    )
     from filippov.ensemble import Ensemble
     from filippov.hidden import HiddenDynamics, hidden_dynamics
     from filippov.sheets import SurfaceParts, surface_parts
 
 __all__ = [
+    "Branch",
     "Branches",
     "Classification",
     "Cycle",
     "DenseSolution",
     "Ensemble",
+    "Equilibrium",
     "Event",
     "FilippovError",
     "FilippovWarning",
@@ -80,6 +90,7 @@ __all__ = [
     "SegmentTable",
     "SlidingPolicy",
     "Solution",
+    "Special",
     "Stick",
     "SurfaceParts",
     "Switch",
@@ -91,6 +102,9 @@ __all__ = [
     "analysis",
     "basins",
     "bifurcation_diagram",
+    "continuation",
+    "cycles",
+    "equilibrium",
     "gradient",
     "hidden_dynamics",
     "hysteresis",
@@ -109,14 +123,15 @@ __all__ = [
     "system",
 ]
 
-_LAZY = ("analysis", "plot", "problems")
+_LAZY = ("analysis", "cycles", "plot", "problems")
 _LAZY_NAMES = {
     "HiddenDynamics": "hidden",
     "hidden_dynamics": "hidden",
     "Ensemble": "ensemble",
     **dict.fromkeys(("Phase", "Section", "Tangency", "poincare"), "analysis"),
     **dict.fromkeys(("basins", "bifurcation_diagram", "open_sweep", "sweep"), "analysis"),
-    **dict.fromkeys(("Cycle", "limit_cycle"), "cycles"),
+    **dict.fromkeys(("Branch", "Cycle", "Equilibrium", "Special"), "cycles"),
+    **dict.fromkeys(("continuation", "equilibrium", "limit_cycle"), "cycles"),
     "SurfaceParts": "sheets",
     "surface_parts": "sheets",
 }

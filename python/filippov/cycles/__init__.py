@@ -1,8 +1,25 @@
-"""Limit cycles, equilibria, their branches in parameters, and exponents."""
+"""Limit cycles, equilibria, and their branches in parameters, through sliding bifurcations."""
 
 from __future__ import annotations
 
+from filippov.cycles.branch import Branch, Point, Special, SpecialPoints
+from filippov.cycles.continuation import continuation
 from filippov.cycles.cycle import Cycle, CycleDerivative, limit_cycle
+from filippov.cycles.equilibrium import Equilibrium, equilibrium
 from filippov.cycles.itinerary import Itinerary
+from filippov.cycles.monitors import of_state
 
-__all__ = ["Cycle", "CycleDerivative", "Itinerary", "limit_cycle"]
+__all__ = [
+    "Branch",
+    "Cycle",
+    "CycleDerivative",
+    "Equilibrium",
+    "Itinerary",
+    "Point",
+    "Special",
+    "SpecialPoints",
+    "continuation",
+    "equilibrium",
+    "limit_cycle",
+    "of_state",
+]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, overload
 
 import numpy as np
@@ -30,6 +30,7 @@ CODES = {
     "SS": "switching-sliding",
     "AS": "adding-sliding",
     "GR": "grazing of a reset",
+    "CP": "degenerate point",
     "UZ": "a monitor vanishes",
     "EP": "end",
 }
@@ -148,7 +149,9 @@ class Branch:
         reasons: Mapping[str, str],
         names: Sequence[str],
         monitors: Sequence[str] = (),
+        at_value: Callable[[State, str, float], State] | None = None,
     ) -> None:
+        self._at_value = at_value
         self.points, self.special = list(points), SpecialPoints(special)
         self.reasons, self.names, self.monitors = dict(reasons), tuple(names), tuple(monitors)
 
@@ -189,8 +192,6 @@ class Branch:
         InputError
             If the branch does not come there.
         """
-        from filippov.cycles.continuation import at_value
-
         if len(params) != 1 or next(iter(params)) not in self.names:
             raise InputError(f"at: the value of one of {', '.join(self.names)} is needed")
         ((name, value),) = params.items()
@@ -200,7 +201,8 @@ class Branch:
             raise InputError(f"{name}: the branch does not come to {value:g}")
         k = int(places[0])
         nearer = k if abs(along[k]) <= abs(along[k + 1]) else k + 1
-        return at_value(self.points[nearer].state, name, float(value))
+        assert self._at_value is not None
+        return self._at_value(self.points[nearer].state, name, float(value))
 
     @property
     def data(self) -> Any:

@@ -637,4 +637,5 @@ def _joined(sides: Sequence[_Side], settings: _Settings) -> Branch:
         points = points + forward.points[1:]
         special += [s._replace(point=s.point + last) for s in forward.special]
         reasons["above"] = forward.reason
-    return Branch(points, special, reasons, (settings.name,), [m.name for m in settings.monitors])
+    monitors = [monitor.name for monitor in settings.monitors]
+    return Branch(points, special, reasons, (settings.name,), monitors, at_value)

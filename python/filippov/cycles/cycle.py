@@ -412,7 +412,10 @@ def cycle_at(
     if itinerary is None:
         record = motions.record((t0, t0 + duration), x)
         itinerary = itinerary_of(record, t0 + duration)
-    return cycle_of(motions, itinerary if period is not None else itinerary.from_time(0.0), period)
+    found = cycle_of(motions, itinerary if period is not None else itinerary.from_time(0.0), period)
+    if abs(found.period - duration) > 0.5 * duration:
+        raise ModelError(f"Newton's method leads to a period of {found.period:.3g}, from a guess of {duration:.3g}")
+    return found
 
 
 def cycle_of(motions: Motions, itinerary: Itinerary, period: Period) -> Cycle:
@@ -539,7 +542,9 @@ def _repeated_forced(
             multiple = int(alike[0]) + 1
             forcing.multiple = multiple
             try:
-                return cycle_at(motions, float(strobes[0]), points[:, 0], multiple * single, forcing)
+                found = cycle_at(motions, float(strobes[0]), points[:, 0], multiple * single, forcing)
+                if _attracts(found):
+                    return found
             except ModelError:
                 if attempt == 3:
                     raise
@@ -584,7 +589,10 @@ def _repeated(motions: Motions, t0: float, x: Array, span: float) -> Cycle:
             if nearest < 1e-2:
                 k = int(np.flatnonzero(distances < max(_NEAR, 10 * nearest))[0])
                 try:
-                    return cycle_at(motions, t, point, float(times[k] - t), None)
+                    found = cycle_at(motions, t, point, float(times[k] - t), None)
+                    if _attracts(found):
+                        return found
+                    problem = ", and the cycle near it is unstable"
                 except ModelError as error:
                     problem = f": {error}"
         span *= 2.0
@@ -592,6 +600,11 @@ def _repeated(motions: Motions, t0: float, x: Array, span: float) -> Cycle:
         f"no cycle was found: by t = {t:.6g} the run does not repeat itself{problem}. It may be chaotic or "
         "quasiperiodic, or need more time"
     )
+
+
+def _attracts(cycle: Cycle) -> bool:
+    """Whether a run may have come to a cycle: near chaos Newton's method finds unstable ones."""
+    return bool(np.all(np.abs(cycle.nontrivial) < 1.0 + 1e-6))
 
 
 def _plane(normal: Array, point: Array) -> Callable[..., Any]:
@@ -610,7 +623,7 @@ def _moved_to(cycle: Cycle, section: Any, t0: float) -> Cycle:
     motions, forcing, period = cycle._shooting.motions, cycle._shooting.period, cycle.period
     if isinstance(section, Phase) or (section is None and forcing is not None):
         turns = np.ceil((cycle.t0 - t0) / period - 1e-9)
-        x = _state_at(cycle, t0 + turns * period)
+        x = cycle.at(t0 + turns * period)
         return cycle_at(motions, t0, x, period, forcing, is_free=True)
     if section is None:
         return cycle
@@ -628,12 +641,3 @@ def _moved_to(cycle: Cycle, section: Any, t0: float) -> Cycle:
         moved = cycle_of(motions, at_switch, forcing)
     moved._section = event.g
     return moved
-
-
-def _state_at(cycle: Cycle, t: float) -> Array:
-    if t <= cycle.t0:
-        return cycle.y0
-    run = cycle._shooting.motions.run((cycle.t0, t), cycle.y0)
-    if not run.success:
-        raise ModelError(run.message, partial=run)
-    return np.asarray(run.y[:, -1])

@@ -14,6 +14,7 @@ from filippov.errors import InputError, ModelError
 from filippov.options import Options, check_options
 from filippov.prepare import Prepared, parameter_vector
 from filippov.solution import Solution
+from filippov.solve import solve_quietly
 from filippov.system import System
 
 __all__ = ["Guard", "GuardsAt", "Instant", "LegEnd", "Mode", "Motions", "Record"]
@@ -223,7 +224,7 @@ class Motions:
 
     def run(self, t_span: tuple[float, float], x: Array, **options: Any) -> Solution:
         """Run the system with these parameters."""
-        return self.system.solve(t_span, x, self._params, **{**self.options, **options})
+        return solve_quietly(self.system, t_span, x, self._params, {**self.options, **options})
 
     def record(self, t_span: tuple[float, float], x: Array) -> Record:
         """Run the system, and return the run with its instants.

@@ -81,7 +81,8 @@ class Shot(NamedTuple):
             if passage.row is None:
                 return np.asarray(states)
             rate = passage.row[0] + passage.row[1 : 1 + n] @ at_end
-            time = -(passage.row[1 : 1 + n] @ states) / rate
+            with np.errstate(divide="ignore", invalid="ignore"):
+                time = -(passage.row[1 : 1 + n] @ states) / rate
             states = states + np.outer(at_end, time)
             states = passage.map[:, 1 : 1 + n] @ states + np.outer(passage.map[:, 0], time)
         return np.asarray(states - np.outer(self.passages[0].leg.velocities[0], time))
