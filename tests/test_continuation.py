@@ -243,3 +243,54 @@ def test_no_cycle_is_a_reason_in_words() -> None:
 def test_equilibrium_of_a_forced_system_is_refused() -> None:
     with pytest.raises(fl.InputError, match="depends on the time"):
         fl.equilibrium(friction(), [0.0, 0.0])
+
+
+def test_cycles_of_twice_the_period_begin_at_a_period_doubling() -> None:
+    cycle = fl.limit_cycle(impacts("impact_flip", omega="2.4", s="0"), [0.001, 0.67], t0=2.49)
+    branch = fl.continuation(cycle, "omega", (2.3, 2.9))
+    doubling = branch.special["PD"][0]
+    doubled = fl.continuation(doubling, "omega", (2.5, 2.9))
+    assert "it starts at PD" in doubled.reason
+    ratio = doubled.values("period") * doubled.values("omega") / (2 * np.pi)
+    np.testing.assert_allclose(ratio, 2.0, atol=1e-9)
+    assert np.all(doubled.values("omega")[1:] > doubling.params["omega"])
+    assert doubled.stable[1] and not doubled.stable[-1]
+    # A run comes to the doubled cycle.
+    omega = 0.5 * (doubling.params["omega"] + doubled.special["PD"][0].params["omega"])
+    there = doubled.at(omega=omega)
+    run = fl.limit_cycle(impacts("impact_flip", omega=str(omega), s="0"), [0.001, 0.67], t0=2.49)
+    assert abs(run.period - there.period) < 1e-10
+    speeds = [sorted(start[1] for start in c.itinerary.starts if abs(start[0]) < 1e-12) for c in (run, there)]
+    np.testing.assert_allclose(speeds[0], speeds[1], atol=1e-8)
+
+
+def test_other_branches_begin_at_boundary_equilibria() -> None:
+    start = fl.equilibrium(harvest("harvest_equilibria", alpha="0.45"), [0.2, 0.4])
+    branch = fl.continuation(start, "alpha", (0.25, 0.6), switch="stop")
+    (boundary,) = branch.special["BE"]
+    other = fl.continuation(boundary, "alpha", (0.25, 0.6))
+    assert other.points[0].state.codimension == 1
+    assert codes(other)[:1] == ["PSN"]
+    with pytest.raises(fl.InputError, match="other branches begin at PD, BP and BE, not at EP"):
+        fl.continuation(branch.special["EP"][0], "alpha", (0.25, 0.6))
+
+
+def test_branches_are_saved_and_go_on_from_any_point(tmp_path: Any) -> None:
+    system = friction(omega=0.7)
+    path = tmp_path / "branch.json"
+    branch = fl.continuation(fl.limit_cycle(system, [1.0, 2.0]), "omega", (0.45, 0.8), store=path)
+    again = fl.cycles.load_branch(path, system)
+    assert again.data.equals(branch.data)
+    assert repr(again.special) == repr(branch.special)
+    longer = fl.continuation(again.points[3].state, "omega", (0.3, 0.8))
+    pair = [found.at(omega=0.6).at(0.0) for found in (longer, branch)]
+    np.testing.assert_allclose(*pair, atol=1e-10)
+    curve = fl.continuation(again.special["CS"][0], ("F", "omega"), {"F": (0.35, 0.5), "omega": (0.1, 2.0)})
+    exact = POINTS["dry_friction_crossing_sliding"]["points"][2]
+    assert abs(curve.at(F=0.5).params["omega"] - float(exact["omega"])) < 1e-10
+    path.write_text(path.read_text().replace('"version": 1', '"version": 99'))
+    with pytest.raises(fl.InputError, match="version 99"):
+        fl.cycles.load_branch(path, system)
+    path.write_text("[1, 2]")
+    with pytest.raises(fl.InputError, match=r"branch\.json"):
+        fl.cycles.load_branch(path, system)

@@ -120,17 +120,22 @@ impl HeldMotions {
                 start: &x,
                 places,
             };
-            leg(
-                (system, extended, actions),
-                &self.options,
-                (&mode, &q),
-                over,
-            )
-            .map_err(|error| match error {
+            let of = (system, extended, actions);
+            let mut interrupt = |_: f64| {
+                py.check_signals().is_err_and(|raised| {
+                    raised.restore(py);
+                    true
+                })
+            };
+            let found = leg(of, &self.options, (&mode, &q), over, &mut interrupt);
+            found.map_err(|error| match error {
                 LegError::Argument(error) => refused(error),
                 LegError::Raised(error) => raised(error),
             })
         })?;
+        if let Some(raised) = PyErr::take(py) {
+            return Err(raised);
+        }
         if !matches!(found.stop, Stop::End) {
             let name = |j: usize| self.prepared.core().surface_name(j);
             let message = found.stop.message(t0, &mode, name);

@@ -8,6 +8,7 @@ from filippov.cycles.cycle import Cycle, CycleDerivative, limit_cycle
 from filippov.cycles.equilibrium import Equilibrium, equilibrium
 from filippov.cycles.itinerary import Itinerary
 from filippov.cycles.monitors import of_state
+from filippov.cycles.saving import load_branch, save_branch
 
 __all__ = [
     "Branch",
@@ -21,5 +22,7 @@ __all__ = [
     "continuation",
     "equilibrium",
     "limit_cycle",
+    "load_branch",
     "of_state",
+    "save_branch",
 ]

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from filippov.cycles.arclength import Step, corrected, tangent_of
+from filippov.cycles.boundary import beyond_boundary
 from filippov.cycles.branch import CODES, Branch, Point, Special, State
 from filippov.cycles.cycle import Cycle, cycle_at, cycle_of
 from filippov.cycles.cycle_curve import CycleCurve
@@ -33,6 +34,7 @@ _FIRST_STEP, _LONGEST_STEP, _SHORTEST_STEP = 0.01, 0.05, 1e-5
 # Codes at which the flow takes another itinerary.
 _CHANGES = ("CS", "SS", "GS", "AS", "GR", "BE")
 _WIDTH = 1e-13
+_SAVED_EVERY = 50
 
 
 class _Settings(NamedTuple):
@@ -44,6 +46,7 @@ class _Settings(NamedTuple):
     monitors: tuple[Monitor, ...]
     most: int
     report: Callable[[int, float], None]
+    save: Callable[[], None]
 
     @property
     def size(self) -> float:
@@ -93,7 +96,7 @@ def continuation(
     max_points : int, optional
         The most points in each direction.
     store : path, optional
-        A file that the branch is written to while it grows, and that continues it if it is there.
+        A file that the branch is written to while it grows; `filippov.cycles.load_branch` reads it.
     progress : bool, optional
         Print how far the branch is.
 
@@ -128,20 +131,32 @@ def continuation(
     if isinstance(first, Cycle):
         first = first.from_event()
     settings = _checked(first, parameter, bounds, step, monitor, detect, switch, max_points, progress)
+    directions = [-1.0, 1.0]
+    if isinstance(start, Special):
+        away = float(np.sign(first.params[parameter] - start.params[parameter]))
+        directions = [-away, away]
     sides: list[_Side] = []
+
+    def save() -> None:
+        if store is not None and sides:
+            from filippov.cycles.saving import save_branch
+
+            save_branch(_joined(sides, settings), store)
+
+    settings = settings._replace(save=save)
     try:
-        for direction in (-1.0, 1.0):
+        for direction in directions:
             sides.append(_Side(first, settings, direction))
-            sides[-1].follow()
+            if isinstance(start, Special) and direction == directions[0]:
+                sides[0].reason = f"it starts at {start!r}"
+            else:
+                sides[-1].follow()
     except KeyboardInterrupt as interrupt:
+        save()
         interrupt.partial = _joined(sides, settings)  # type: ignore[attr-defined]
         raise
-    branch = _joined(sides, settings)
-    if store is not None:
-        from filippov.cycles.saving import save_branch
-
-        save_branch(branch, store)
-    return branch
+    save()
+    return _joined(sides, settings)
 
 
 def _checked(
@@ -181,6 +196,7 @@ def _checked(
         monitors_of(monitor, start),
         count("max_points", most),
         report,
+        lambda: None,
     )
 
 
@@ -255,6 +271,8 @@ class _Side:
         value = float(self.w[-1])
         self.points.append(Point({self.settings.name: value}, state, self.tests))
         self.settings.report(len(self.points), value)
+        if len(self.points) % _SAVED_EVERY == 0:
+            self.settings.save()
 
     def follow(self) -> None:
         """Follow the branch to its end."""
@@ -349,18 +367,25 @@ class _Side:
         scale = self.curve.scales(self.w)
         start, level = self.w, self.w / scale @ self.tangent
         length = step.w / scale @ self.tangent - level
-        latest: list[Step] = []
+        nearest: list[tuple[float, float, Step]] = []
 
         def value(s: float) -> float:
             guess = start + (s / length) * (step.w - start)
             point = corrected(self.curve, guess, scale, self.tangent, level + s)
-            latest[:] = [point]
             tangent = tangent_of(point.jacobian, self.curve.scales(point.w), self.tangent)
-            return self._value(key, point, tangent)
+            found = self._value(key, point, tangent)
+            if not nearest or abs(found) <= nearest[0][0]:
+                nearest[:] = [(abs(found), s, point)]
+            return found
 
-        s = zero_between(value, (0.0, self.tests[key]), (length, tests[key]), _WIDTH)
-        value(s)
-        return s, key, latest[0]
+        try:
+            zero_between(value, (0.0, self.tests[key]), (length, tests[key]), _WIDTH)
+        except ModelError:
+            # The equations are singular at a branch point: the point is as near as they can be solved.
+            if key[0] in _CHANGES or not nearest:
+                raise
+        _, s, point = nearest[0]
+        return s, key, point
 
     def _value(self, key: Any, point: Step, tangent: Array) -> float:
         found = self._tests(point.w, point.jacobian, tangent)
@@ -411,7 +436,8 @@ class _Side:
         """Go on with the itinerary of the flow behind a special point."""
         direction = float(np.sign(beyond.w[-1] - located.w[-1])) or self.direction
         if isinstance(self.curve, EquilibriumCurve):
-            following = _beyond_boundary(self.curve, key, located, direction, self.settings)
+            here = self.curve.state(located.w, located.error)
+            following = beyond_boundary(here, key[1], self.settings.name, self.settings.bounds)
             if following is None:
                 self.reason = f"no equilibrium goes on from {self.special[-1]!r}"
                 return False
@@ -554,67 +580,6 @@ def _without_leg(
             continue
         if cycle.is_admissible:
             return cycle, direction
-    return None
-
-
-def _beyond_boundary(
-    curve: EquilibriumCurve, key: Any, located: Step, direction: float, settings: _Settings
-) -> tuple[Equilibrium, float] | None:
-    """Return the equilibrium that goes on from a boundary, a little way along its branch, and its direction."""
-    surface = key[1]
-    n, before = curve.n, curve.mode[surface]
-    x, value = located.w[:n], located.w[-1]
-    if before == 0:
-        end = float(np.sign(located.w[n + curve.sliding.index(surface)]))
-        targets = [(_with_entry(curve.mode, surface, int(end)), None)]
-    else:
-        targets = [
-            (_with_entry(curve.mode, surface, 0), float(before)),
-            (_with_entry(curve.mode, surface, -before), None),
-        ]
-    for mode, end_value in targets:
-        other = EquilibriumCurve(curve.motions, mode, curve.names, curve.sizes)
-        own = dict(zip(curve.sliding, located.w[n : n + len(curve.sliding)], strict=True))
-        if end_value is not None:
-            own[surface] = end_value
-        w = np.concatenate([x, [own[j] for j in other.sliding], [value]])
-        try:
-            point = corrected(other, w, other.scales(w), np.eye(len(w))[-1])
-        except ModelError:
-            continue
-        if np.max(np.abs((point.w - w) / other.scales(w))) > 1e-6:
-            continue
-        found = _admissible_along(other, point, surface, end_value, mode, settings)
-        if found is not None:
-            return found
-    return None
-
-
-def _with_entry(mode: Sequence[int], surface: int, entry: int) -> tuple[int, ...]:
-    return (*mode[:surface], entry, *mode[surface + 1 :])
-
-
-def _admissible_along(
-    curve: EquilibriumCurve,
-    point: Step,
-    surface: int,
-    end: float | None,
-    mode: Sequence[int],
-    settings: _Settings,
-) -> tuple[Equilibrium, float] | None:
-    scale = curve.scales(point.w)
-    tangent = tangent_of(point.jacobian, scale)
-    for sign in (1.0, -1.0):
-        try:
-            step = corrected(curve, point.w + 1e-4 * sign * tangent * scale, scale, tangent)
-        except ModelError:
-            continue
-        state = curve.state(step.w, step.error)
-        inside = np.all(np.abs(state.multipliers) <= 1.0)
-        if inside and np.all(state.switching > 0):
-            low, high = settings.bounds
-            if low <= step.w[-1] <= high:
-                return state, float(np.sign(step.w[-1] - point.w[-1])) or sign
     return None
 
 

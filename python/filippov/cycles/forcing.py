@@ -83,11 +83,11 @@ class InferredPeriod:
     def __init__(self, guess: float, multiple: int = 1, exponents: dict[str, float] | None = None) -> None:
         self.guess, self.multiple = guess, multiple
         self._known: tuple[dict[str, float], float] | None = None
-        self._exponents = {} if exponents is None else exponents
+        self.exponents = {} if exponents is None else exponents
 
     def near(self, duration: float) -> InferredPeriod:
         """Return it for cycles of about this duration."""
-        return InferredPeriod(duration / self.multiple, self.multiple, self._exponents)
+        return InferredPeriod(duration / self.multiple, self.multiple, self.exponents)
 
     def value(self, motions: Motions) -> float:
         """Return the period for the parameters of the motions."""
@@ -102,7 +102,7 @@ class InferredPeriod:
             changed = [name for name in params if params[name] != known[name]]
             if all(self._exponent(motions, name, known, period).is_integer() for name in changed):
                 for name in changed:
-                    period *= (params[name] / known[name]) ** self._exponents[name]
+                    period *= (params[name] / known[name]) ** self.exponents[name]
             if not _repeats(motions, period):
                 period = _refined(motions, period)
             self._known = params, period
@@ -122,7 +122,7 @@ class InferredPeriod:
 
     def _exponent(self, motions: Motions, name: str, params: dict[str, float], period: float) -> float:
         """Return the exponent with which a parameter is in the period, a whole number up to rounding."""
-        if name not in self._exponents:
+        if name not in self.exponents:
             latest = motions.params
             motions.use(params)
             try:
@@ -130,8 +130,8 @@ class InferredPeriod:
             finally:
                 motions.use(latest)
             is_whole = abs(found - round(found)) < 1e-8 and params[name] != 0.0
-            self._exponents[name] = float(round(found)) if is_whole else 0.5
-        return self._exponents[name]
+            self.exponents[name] = float(round(found)) if is_whole else 0.5
+        return self.exponents[name]
 
 
 def _slope_of_period(motions: Motions, name: str, period: float) -> float:

@@ -252,13 +252,17 @@ def solve(
     """
     u = u.copy()
     best = np.inf
+    first = sum(shooting.parts(u)[1])
     for step in range(most):
         shot = shooting.shoot(u)
         change = _newton_step(shot.jacobian[:, : shooting.size], shot.residual)
         size = float(np.max(np.abs(change) / scales(shooting, u)))
         if not np.isfinite(size):
             break
-        u = u + _shorter(shooting, u, change) * change
+        # Far from the cycle a step is no longer than the cycle.
+        u = u + min(_shorter(shooting, u, change), 1.0 / max(size, 1e-300)) * change
+        if not 0.02 * first < sum(shooting.parts(u)[1]) < 50 * first:
+            break
         if size < tol or (size < 1e-9 and size >= 0.5 * best):
             return u, shooting.shoot(u), size
         best = min(best, size)
