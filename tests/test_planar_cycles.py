@@ -87,7 +87,7 @@ def check(known: Known) -> None:
         assert not (is_same and found.is_admissible)
         return
     if abs(known.multiplier) < 0.8:
-        cycle = fl.limit_cycle(SYSTEM, known.start + 1e-2, known.params)
+        cycle = fl.limit_cycle(SYSTEM, known.start + 1e-4, known.params)
     else:
         guess = known.start * (1 + 1e-4) + [1e-5, 0.0]
         cycle = fl.limit_cycle(SYSTEM, guess, known.params, period=known.period, transient=0)
