@@ -356,9 +356,7 @@ class _Side:
 
     def _settle(self, step: Step, tangent: Array, tests: dict[Any, float]) -> None:
         state = self.curve.state(step.w, step.error)
-        if isinstance(self.curve, CycleCurve) and isinstance(state, Cycle):
-            # The phase is fixed beside the latest cycle.
-            self.curve = CycleCurve(state, (self.settings.name,), (self.settings.size,))
+        self.curve.refer_to(step.w)
         self.w, self.tangent, self.tests, self.jacobian = step.w, tangent, tests, step.jacobian
         self._keep(state)
 

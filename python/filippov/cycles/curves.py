@@ -116,6 +116,8 @@ class _SpectralCondition:
 class _Extended:
     """The equations of a curve with the condition."""
 
+    is_exact = False
+
     def __init__(self, curve: AnyCurve, condition: _Condition) -> None:
         self.curve, self.condition = curve, condition
 

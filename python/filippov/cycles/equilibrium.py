@@ -123,6 +123,8 @@ class EquilibriumCurve:
         The sizes by which they are measured.
     """
 
+    is_exact = False
+
     def __init__(
         self, motions: Motions, mode: Sequence[int], names: Sequence[str] = (), sizes: Sequence[float] = ()
     ) -> None:
@@ -210,6 +212,9 @@ class EquilibriumCurve:
             return self.residual(np.append(v, w[k:]))
 
         return differences(residual, own, self.scales(w)[:k], is_fine=True)
+
+    def refer_to(self, w: Array) -> None:
+        """Take a point as the latest one; nothing depends on it."""
 
     def state(self, w: Array, error: float) -> Equilibrium:
         """Return the equilibrium there."""

@@ -14,7 +14,7 @@ from filippov.errors import InputError, ModelError
 
 __all__ = ["Forcing", "GivenPeriod", "InferredPeriod", "depends_on_time", "forcing_of"]
 
-_PLACES = 7
+_PLACES, _CONFIRMED_AT = 7, 3
 
 
 @lru_cache(maxsize=16)
@@ -160,10 +160,10 @@ def _slope(function: Callable[[float], Array], d: float) -> Array:
     return np.asarray(1.5 * near - 0.6 * middle + 0.1 * far)
 
 
-def _difference(motions: Motions, period: float) -> Array:
-    """Return by how much field and switching functions differ a period later."""
+def _difference(motions: Motions, period: float, count: int = _PLACES) -> Array:
+    """Return by how much field and switching functions differ a period later, at some places."""
     parts = []
-    for u, x, signs in _samples(motions):
+    for u, x, signs in _samples(motions)[:count]:
         t = u * period
         parts.append(motions.right_hand_side(t + period, x, signs) - motions.right_hand_side(t, x, signs))
     found = np.concatenate(parts)
@@ -195,11 +195,12 @@ def _refined(motions: Motions, guess: float) -> float:
 
 def _repeats(motions: Motions, period: float) -> bool:
     """Whether the right-hand side is the same a period later."""
-    return bool(np.max(np.abs(_difference(motions, period)), initial=0.0) <= 1e-11 * _size(motions))
+    left = np.max(np.abs(_difference(motions, period, _CONFIRMED_AT)), initial=0.0)
+    return bool(left <= 1e-11 * _size(motions, _CONFIRMED_AT))
 
 
-def _size(motions: Motions) -> float:
-    values = [motions.right_hand_side(u, x, signs) for u, x, signs in _samples(motions)]
+def _size(motions: Motions, count: int = _PLACES) -> float:
+    values = [motions.right_hand_side(u, x, signs) for u, x, signs in _samples(motions)[:count]]
     found = np.abs(np.concatenate(values))
     return max(float(np.max(found[np.isfinite(found)], initial=0.0)), 1.0)
 

@@ -178,12 +178,24 @@ class Motions:
 
     def move(self, values: Sequence[float]) -> None:
         """Take other values of the parameters by which derivatives are taken."""
-        if any(self._params[name] != value for name, value in zip(self._by, values, strict=True)):
-            self.use({**self._params, **dict(zip(self._by, map(float, values), strict=True))})
+        moved = {**self._params, **dict(zip(self._by, map(float, values), strict=True))}
+        if moved == self._params:
+            return
+        if self._prepared.pinned is not None:
+            self.use(moved)
+        self._params, self._held = moved, None
+
+    def copy(self) -> Motions:
+        """Return the same motions, to be moved on their own."""
+        other = Motions.__new__(Motions)
+        other.__dict__.update(self.__dict__)
+        return other
 
     def with_derivatives_by(self, names: Sequence[str]) -> Motions:
         """Return the same motions with derivatives by other parameters."""
-        return Motions(self.system, self.n, self._params, names, self.options)
+        other = self.copy()
+        other._by, other._held = tuple(names), None
+        return other
 
     def leg(
         self, mode: Mode, q: tuple[float, ...], t0: float, x: Array, duration: float, places: int = 0

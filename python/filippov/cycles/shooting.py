@@ -111,6 +111,14 @@ class Shooting:
         first = self.legs[0]
         self._along = motions.at(first.mode, first.discrete, self.t0, self._reference).velocity
 
+    def refer_to(self, u: Array) -> None:
+        """Fix the phase of a cycle that starts at no event beside another one."""
+        if self.period is not None or self.legs[-1].ending is not None:
+            return
+        first = self.legs[0]
+        self._reference = u[: self.n].copy()
+        self._along = self.motions.at(first.mode, first.discrete, self.t0, self._reference).velocity
+
     @property
     def size(self) -> int:
         """The number of unknowns."""
