@@ -1,6 +1,7 @@
 """Branches of cycles and equilibria: the points of K3 to 1e-8, reasons in words, agreement with simulation.
 
-References: Piiroinen, Kuznetsov, ACM TOMS 34 (2008) 13; Kuznetsov, Rinaldi, Gragnani, Int. J. Bifurcation and Chaos 13 (2003) 2157.
+References: Piiroinen, Kuznetsov, ACM TOMS 34 (2008) 13; Kuznetsov, Rinaldi, Gragnani, Int. J. Bifurcation and
+Chaos 13 (2003) 2157.
 """
 
 from __future__ import annotations
@@ -49,12 +50,19 @@ def test_branch_of_the_dry_friction_oscillator(dry: fl.Branch) -> None:
     crossing, adding = dry.special["CS"][0], dry.special["AS"][0]
     assert abs(1 / crossing.params["omega"] - 1.866523638121) < 1e-10
     assert abs(1 / adding.params["omega"] - 4.823126106845) < 1e-10
-    assert abs(crossing.params["omega"] - float(POINTS["dry_friction_crossing_sliding"]["points"][0]["omega"])) < 1e-10
-    assert abs(adding.params["omega"] - float(POINTS["dry_friction_adding_sliding"]["points"][0]["omega"])) < 1e-10
+    assert (
+        abs(crossing.params["omega"] - float(POINTS["dry_friction_crossing_sliding"]["points"][0]["omega"]))
+        < 1e-10
+    )
+    assert (
+        abs(adding.params["omega"] - float(POINTS["dry_friction_adding_sliding"]["points"][0]["omega"]))
+        < 1e-10
+    )
     assert crossing.surface == adding.surface == "x[1]"
     data = dry.data
     assert data.sizes["point"] == len(dry)
-    assert bool(data.admissible.all()) and bool(data.stable.all())
+    assert bool(data.admissible.all())
+    assert bool(data.stable.all())
     sticks = data.n_zero.values
     assert np.array_equal(sticks == 1, data.omega.values < crossing.params["omega"])
     assert np.max(data.residual.values) < 1e-9
@@ -208,7 +216,9 @@ def test_monitors_are_kept_and_their_zeros_found(dry: fl.Branch) -> None:
 
 def test_wrong_arguments_are_named() -> None:
     cycle = fl.limit_cycle(friction(omega=0.7), [1.0, 2.0])
-    with pytest.raises(fl.InputError, match="parameter: the system has no parameter 'omga'; did you mean 'omega'"):
+    with pytest.raises(
+        fl.InputError, match="parameter: the system has no parameter 'omga'; did you mean 'omega'"
+    ):
         fl.continuation(cycle, "omga", (0.5, 0.9))
     with pytest.raises(fl.InputError, match=r"bounds: the start has omega = 0.7, outside of \(0.8, 0.9\)"):
         fl.continuation(cycle, "omega", (0.8, 0.9))
@@ -231,7 +241,7 @@ def test_no_cycle_is_a_reason_in_words() -> None:
     with pytest.raises(fl.ModelError, match="comes to rest"):
         fl.limit_cycle(decay, [1.0, 1.0])
     growth = fl.System(lambda t, x: [x[0] + x[1], x[1] - x[0]], n=2)
-    with pytest.raises(fl.ModelError, match="grows without bound|ends before"):
+    with pytest.raises(fl.ModelError, match=r"grows without bound|ends before"):
         fl.limit_cycle(growth, [1.0, 1.0])
     lorenz = fl.System(
         lambda t, x: [10 * (x[1] - x[0]), x[0] * (28 - x[2]) - x[1], x[0] * x[1] - 8 / 3 * x[2]], n=3
@@ -254,7 +264,8 @@ def test_cycles_of_twice_the_period_begin_at_a_period_doubling() -> None:
     ratio = doubled.values("period") * doubled.values("omega") / (2 * np.pi)
     np.testing.assert_allclose(ratio, 2.0, atol=1e-9)
     assert np.all(doubled.values("omega")[1:] > doubling.params["omega"])
-    assert doubled.stable[1] and not doubled.stable[-1]
+    assert doubled.stable[1]
+    assert not doubled.stable[-1]
     # A run comes to the doubled cycle.
     omega = 0.5 * (doubling.params["omega"] + doubled.special["PD"][0].params["omega"])
     there = doubled.at(omega=omega)

@@ -1,4 +1,4 @@
-"""Limit cycles: those of the references K1 to 22 digits and more, unstable ones, laws with memory, and what is none."""
+"""Limit cycles: those of the references K1, to 22 digits and more."""
 
 from __future__ import annotations
 

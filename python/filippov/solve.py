@@ -273,7 +273,7 @@ def solve_prepared(
 def solve_quietly(
     system: System, t_span: Any, y0: npt.ArrayLike, params: Mapping[str, float], options: Mapping[str, Any]
 ) -> Solution:
-    """Solve as `solve_ivp` does, for an analysis, which shows no warnings of its runs: they are in `warnings`."""
+    """Solve as `solve_ivp` does, and show no warnings; for the runs of an analysis."""
     others = dict(options)
     events = others.pop("events", None)
     return _solve(system, t_span, y0, _changed(others), events, None, params, None, None)

@@ -255,7 +255,7 @@ class Branch:
 
 
 def _start(state: State) -> Any:
-    """Return the state at the start: for a forced cycle that at time 0 modulo the period, for others that at a switch."""
+    """Return the state at the start: with forcing that at time 0 modulo the period, else that at a switch."""
     if isinstance(state, Cycle):
         return state.at(0.0) if state.is_forced else state.y0
     return state.y

@@ -1,7 +1,7 @@
 """Branches of cycles and equilibria in a parameter, through the points at which their itinerary changes.
 
-References: Allgower, Georg (2003); Kuznetsov, Elements of Applied Bifurcation Theory (2004), chapter 10; Thota, Dankowicz, SIAM J.
-Appl. Dyn. Syst. 7 (2008) 1283; di Bernardo et al. (2008), chapters 7 and 8.
+References: Allgower, Georg (2003); Kuznetsov, Elements of Applied Bifurcation Theory (2004), chapter 10;
+Thota, Dankowicz, SIAM J. Appl. Dyn. Syst. 7 (2008) 1283; di Bernardo et al. (2008), chapters 7 and 8.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from filippov.cycles.boundary import beyond_boundary
 from filippov.cycles.branch import CODES, Branch, Point, Special, State
 from filippov.cycles.cycle import Cycle, cycle_at, cycle_of
 from filippov.cycles.cycle_curve import CycleCurve
-from filippov.cycles.itinerary import Itinerary
 from filippov.cycles.equilibrium import Equilibrium, EquilibriumCurve, rest_of
+from filippov.cycles.indicators import tests_at
+from filippov.cycles.itinerary import Itinerary
 from filippov.cycles.monitors import Monitor, monitors_of
 from filippov.cycles.motions import Array
-from filippov.cycles.tests import tests_at
 from filippov.cycles.zero import zero_between
 from filippov.errors import InputError, ModelError
 from filippov.scalars import count, positive
@@ -85,14 +85,14 @@ def continuation(
     step : float, optional
         First step, in units of the parameter. Default: a hundredth of the range. It adapts.
     monitor : dict, optional
-        Functions by name: an `Event` or a function ``g(t, y)``, for cycles at its largest value over a period; or a
-        function of the cycle or equilibrium, marked by ``fl.cycles.of_state``. Their values along the branch are
-        kept, and their zeros are special points UZ.
+        Functions by name: an `Event` or a function ``g(t, y)``, for cycles at its largest value over a
+        period; or a function of the cycle or equilibrium, marked by ``fl.cycles.of_state``. Their values
+        along the branch are kept, and their zeros are special points UZ.
     detect : "all" or sequence of str, optional
         Codes of the special points to look for.
     switch : {"follow", "stop", "ignore"}, optional
-        What to do where the flow takes another itinerary: go on with that, stop, or go on with a cycle that the flow
-        does not follow.
+        What to do where the flow takes another itinerary: go on with that, stop, or go on with a cycle that
+        the flow does not follow.
     max_points : int, optional
         The most points in each direction.
     store : path, optional
@@ -252,7 +252,7 @@ class _Side:
     def _begin(self, state: State, direction: float) -> None:
         """Start with the itinerary of a state."""
         self.curve, self.w = curve_of(state, (self.settings.name,), (self.settings.size,))
-        residual, jacobian = self.curve.equations(self.w)
+        _, jacobian = self.curve.equations(self.w)
         scale = self.curve.scales(self.w)
         self.tangent = tangent_of(jacobian, scale)
         if self.tangent[-1] * direction < 0:
@@ -363,8 +363,8 @@ class _Side:
     def _located(self, key: Any, step: Step, tests: dict[Any, float]) -> tuple[float, Any, Step]:
         """Return how far along the step a test function vanishes, which one, and the point."""
         scale = self.curve.scales(self.w)
-        start, level = self.w, self.w / scale @ self.tangent
-        length = step.w / scale @ self.tangent - level
+        start, level = self.w, float(self.w / scale @ self.tangent)
+        length = float(step.w / scale @ self.tangent) - level
         nearest: list[tuple[float, float, Step]] = []
 
         def value(s: float) -> float:
@@ -480,7 +480,7 @@ class _Side:
         return None
 
     def _locate_behind(self, state: Cycle, value: float, direction: float) -> None:
-        """Go back from a cycle to the value of the parameter before, and find which test function vanishes."""
+        """Go back from a cycle to a value of the parameter, and find which test function vanishes between."""
         self._begin(state, -direction)
         self.points.pop()
         start = (self.w, self.tangent, self.tests, self.jacobian)

@@ -207,11 +207,12 @@ class Cycle:
             start = start + shift * velocity
         ended = [i for i, leg in enumerate(self.itinerary.legs) if leg.ending is not None]
         after = states[[(i + 1) % m for i in ended]]
-        return CycleDerivative(start, float(np.sum(durations)), times[ended] - shift, after)
+        moved = np.asarray(times[ended] - shift, dtype=np.float64)
+        return CycleDerivative(start, float(np.sum(durations)), moved, after)
 
-    def plot(self, *names: str, **options: Any) -> Any:
+    def plot(self, **options: Any) -> Any:
         """Draw the cycle; see `Solution.plot`."""
-        return self.solution.plot(*names, **options)
+        return self.solution.plot(**options)
 
     def __repr__(self) -> str:
         stable = "stable" if self.is_stable else "unstable"
@@ -252,15 +253,13 @@ def _slopes_of(
     def value(y: Array, params: Mapping[str, float]) -> float:
         return float(section(t, y, **{key: params[key] for key in names}))
 
-    def slope(function: Callable[[float], float], size: float) -> float:
-        d = 6e-6 * max(abs(size), 1e-3)
-        return (function(d) - function(-d)) / (2 * d)
-
-    by_state = [
-        slope(lambda d, e=e: value(y + d * e, params), v) for e, v in zip(np.eye(len(y)), y, strict=True)
-    ]
+    sizes = 6e-6 * np.maximum(np.abs(y), 1e-3)
+    moves = zip(np.eye(len(y)), sizes, strict=True)
+    by_state = [(value(y + d * e, params) - value(y - d * e, params)) / (2 * d) for e, d in moves]
     p = params[name]
-    return np.array(by_state), slope(lambda d: value(y, {**params, name: p + d}), p)
+    d = 6e-6 * max(abs(p), 1e-3)
+    above, below = ({**params, name: p + change} for change in (d, -d))
+    return np.array(by_state), (value(y, above) - value(y, below)) / (2 * d)
 
 
 def follows_itinerary(cycle: Cycle) -> bool:
@@ -333,8 +332,8 @@ def limit_cycle(
     t0 : float, optional
         Time of the start.
     transient : int, optional
-        How many periods are simulated first. Default: 200 of a forcing, and else until the run returns. 0: none;
-        `y0` is a guess, and the cycle may be unstable.
+        How many periods are simulated first. Default: 200 of a forcing, and else until the run returns. 0:
+        none; `y0` is a guess, and the cycle may be unstable.
     **options
         Options of `solve_ivp` for all runs, among them ``rtol`` (default 1e-12) and ``atol`` (1e-13).
 
@@ -351,7 +350,8 @@ def limit_cycle(
 
     References
     ----------
-    Thota and Dankowicz, SIAM J. Appl. Dyn. Syst. 7 (2008) 1283; Piiroinen and Kuznetsov, ACM TOMS 34 (2008) 13.
+    Thota and Dankowicz, SIAM J. Appl. Dyn. Syst. 7 (2008) 1283; Piiroinen and Kuznetsov, ACM TOMS 34 (2008)
+    13.
 
     Examples
     --------
@@ -414,7 +414,9 @@ def cycle_at(
         itinerary = itinerary_of(record, t0 + duration)
     found = cycle_of(motions, itinerary if period is not None else itinerary.from_time(0.0), period)
     if abs(found.period - duration) > 0.5 * duration:
-        raise ModelError(f"Newton's method leads to a period of {found.period:.3g}, from a guess of {duration:.3g}")
+        raise ModelError(
+            f"Newton's method leads to a period of {found.period:.3g}, from a guess of {duration:.3g}"
+        )
     return found
 
 
@@ -438,16 +440,18 @@ def _refuse_samples(shooting: Shooting, shot: Shot) -> None:
         held = np.array(shooting.legs[i + 1].discrete)
         if held.size and np.max(np.abs(held - passage.discrete)) > 1e-9 * (1 + np.max(np.abs(held))):
             raise ModelError(
-                "the cycle holds samples of its state: they change with it, and are no constants of its pieces"
+                "the cycle holds samples of its state: they change with it, and its pieces have no constants"
             )
 
 
-def _check_section(section: Any) -> Phase | Event | Callable[..., Any] | None:
-    if section is None or isinstance(section, (Phase, Event)) or callable(section):
+def _check_section(section: Any) -> Phase | Event | None:
+    if section is None or isinstance(section, (Phase, Event)):
         return section
+    if callable(section):
+        return Event(section)
     if isinstance(section, Section) and callable(section.where):
         return Event(section.where, section.direction)
-    as_section(section)
+    as_section(section)  # what is none is refused there
     raise InputError("section: a function g(t, y), an Event or a Phase says where a cycle starts")
 
 
@@ -550,8 +554,8 @@ def _repeated_forced(
                     raise
     raise ModelError(
         f"no cycle was found: after {count} periods of the forcing the run does not repeat itself within "
-        f"{_MOST_RETURNS} more (nearest return: {float(np.min(distances)):.2g} of its size). It may be chaotic, "
-        "quasiperiodic or grow; more of it is simulated with transient="
+        f"{_MOST_RETURNS} more (nearest return: {float(np.min(distances)):.2g} of its size). It may be "
+        "chaotic, quasiperiodic or grow; more of it is simulated with transient="
     )
 
 
@@ -578,7 +582,7 @@ def _repeated(motions: Motions, t0: float, x: Array, span: float) -> Cycle:
                 f"no cycle was found: the run comes to rest at {_short(end)}; fl.equilibrium finds where"
             )
         returns = motions.run((t, t + span), point, events=Event(_plane(at, point), direction=1))
-        times, points = returns.t_events[0], returns.y_events[0]
+        times, points = _first_event(returns)
         later_ones = times > t + 1e-9 * span
         times, points = times[later_ones], points[later_ones]
         if len(times):
@@ -602,6 +606,13 @@ def _repeated(motions: Motions, t0: float, x: Array, span: float) -> Cycle:
     )
 
 
+def _first_event(run: Solution) -> tuple[Array, Array]:
+    """Return the times and the states of the first event of a run."""
+    assert run.t_events is not None
+    assert run.y_events is not None
+    return run.t_events[0], run.y_events[0]
+
+
 def _attracts(cycle: Cycle) -> bool:
     """Whether a run may have come to a cycle: near chaos Newton's method finds unstable ones."""
     return bool(np.all(np.abs(cycle.nontrivial) < 1.0 + 1e-6))
@@ -618,7 +629,7 @@ def _short(x: Array) -> str:
     return np.array2string(x, precision=6, threshold=8)
 
 
-def _moved_to(cycle: Cycle, section: Any, t0: float) -> Cycle:
+def _moved_to(cycle: Cycle, section: Phase | Event | None, t0: float) -> Cycle:
     """Return a cycle from where it is to start."""
     motions, forcing, period = cycle._shooting.motions, cycle._shooting.period, cycle.period
     if isinstance(section, Phase) or (section is None and forcing is not None):
@@ -627,9 +638,9 @@ def _moved_to(cycle: Cycle, section: Any, t0: float) -> Cycle:
         return cycle_at(motions, t0, x, period, forcing, is_free=True)
     if section is None:
         return cycle
-    event = section if isinstance(section, Event) else Event(section)
+    event = section
     there = motions.run((cycle.t0, cycle.t0 + 1.05 * period), cycle.y0, events=event)
-    times, points = there.t_events[0], there.y_events[0]
+    times, points = _first_event(there)
     if not len(times):
         raise ModelError(f"section: the cycle does not reach {event.name or 'it'}")
     # At a switch the cycle starts behind it.

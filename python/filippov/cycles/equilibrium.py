@@ -1,9 +1,10 @@
 """Equilibria of regions, and pseudo-equilibria on any number of surfaces, where the sliding motion rests.
 
-A pseudo-equilibrium on h_j = 0 has f(x, lambda) = 0 with the multipliers as unknowns, f linear in each of them: these equations are
-regular where a multiplier is -1 or +1, and the equilibrium is one of a region there.
+A pseudo-equilibrium on h_j = 0 has f(x, lambda) = 0 with the multipliers as unknowns, f linear in each of
+them: these equations are regular where a multiplier is -1 or +1, and the equilibrium is one of a region there.
 
-References: Filippov (1988), section 19; Kuznetsov, Rinaldi, Gragnani, Int. J. Bifurcation and Chaos 13 (2003) 2157.
+References: Filippov (1988), section 19; Kuznetsov, Rinaldi, Gragnani, Int. J. Bifurcation and Chaos 13 (2003)
+2157.
 """
 
 from __future__ import annotations
@@ -68,7 +69,7 @@ class Equilibrium:
 
     @cached_property
     def switching(self) -> Array:
-        """The values of the switching functions, each in the sense of the mode: positive if it is admissible."""
+        """The switching functions, each in the sense of the mode: positive where it is admissible."""
         return self._curve.switching(self._w)
 
     @property
@@ -79,7 +80,7 @@ class Equilibrium:
 
     @cached_property
     def eigenvalues(self) -> npt.NDArray[np.complex128]:
-        """Those of the motion in its mode: n in a region, n - m on m surfaces; the largest real part first."""
+        """Those of its motion: n in a region, n - m on m surfaces; the largest real part first."""
         found = np.linalg.eigvals(self._curve.linearisation(self._w)).astype(np.complex128)
         return found[np.lexsort((-found.imag, -found.real))]
 
@@ -193,7 +194,7 @@ class EquilibriumCurve:
         jacobian = self._by_unknowns(w)
         a, b, rows = jacobian[:n, :n], jacobian[:n, n:], jacobian[n:, :n]
         if m == 0:
-            return a
+            return np.asarray(a)
         tangents = np.linalg.svd(rows)[2][m:].T
         # The multipliers keep the motion on the surfaces: rows (a dx + b dlambda) = 0 at rest.
         by_state = -np.linalg.solve(rows @ b, rows @ a)

@@ -12,7 +12,7 @@ from filippov.analysis import Phase
 from filippov.cycles.motions import Array, Motions
 from filippov.errors import InputError, ModelError
 
-__all__ = ["Forcing", "GivenPeriod", "InferredPeriod", "depends_on_time", "forcing_of"]
+__all__ = ["GivenPeriod", "InferredPeriod", "depends_on_time", "forcing_of"]
 
 _PLACES, _CONFIRMED_AT = 7, 3
 
@@ -52,6 +52,10 @@ class GivenPeriod:
         """Return it for cycles of about this duration."""
         return self
 
+    def twice(self) -> GivenPeriod:
+        """Return it for cycles of twice the period."""
+        return GivenPeriod(self.phase.period, 2 * self.multiple)
+
     def value(self, motions: Motions) -> float:
         """Return the period for the parameters of the motions."""
         found = float(self.phase.period_at(motions.params))
@@ -76,8 +80,8 @@ class GivenPeriod:
 class InferredPeriod:
     """A multiple of the period of field and switching functions, found from their values.
 
-    Most periods are products of powers of parameters, as 2 pi / omega is: where the exponents are whole numbers they are taken, and
-    confirmed at every value.
+    Most periods are products of powers of parameters, as 2 pi / omega is: where the exponents are whole numbers
+    they are taken, and confirmed at every value.
     """
 
     def __init__(self, guess: float, multiple: int = 1, exponents: dict[str, float] | None = None) -> None:
@@ -88,6 +92,10 @@ class InferredPeriod:
     def near(self, duration: float) -> InferredPeriod:
         """Return it for cycles of about this duration."""
         return InferredPeriod(duration / self.multiple, self.multiple, self.exponents)
+
+    def twice(self) -> InferredPeriod:
+        """Return it for cycles of twice the period."""
+        return InferredPeriod(self.guess, 2 * self.multiple, self.exponents)
 
     def value(self, motions: Motions) -> float:
         """Return the period for the parameters of the motions."""
@@ -137,7 +145,8 @@ class InferredPeriod:
 def _slope_of_period(motions: Motions, name: str, period: float) -> float:
     """Return the derivative of the period by a parameter.
 
-    Where the right-hand side repeats itself for all values of a parameter, its derivative by that and by the period vanish together.
+    Where the right-hand side repeats itself for all values of a parameter, its derivatives by that and by the
+    period vanish together.
     """
     params = motions.params
 

@@ -126,7 +126,7 @@ def itinerary_of(record: Record, t1: float) -> Itinerary:
 def itinerary_from_event(record: Record, period: float, at: float | None = None) -> Itinerary | None:
     """Return the itinerary of a period that starts at an event: at a time, or else before the longest leg.
 
-    The run lasts for two periods at least. ``None`` if there is no such event that comes again a period later.
+    The run lasts for two periods at least. ``None`` if no such event comes again a period later.
 
     Raises
     ------

@@ -176,9 +176,9 @@ class Motions:
         self._params, self._prepared, self._core = values, prepared, prepared.core
         self._held = None
 
-    def move(self, values: Sequence[float]) -> None:
+    def move(self, values: Array) -> None:
         """Take other values of the parameters by which derivatives are taken."""
-        moved = {**self._params, **dict(zip(self._by, map(float, values), strict=True))}
+        moved = {**self._params, **dict(zip(self._by, values.tolist(), strict=True))}
         if moved == self._params:
             return
         if self._prepared.pinned is not None:

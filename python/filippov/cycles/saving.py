@@ -88,7 +88,9 @@ def load_branch(
     if not is_known:
         raise InputError(f"{path}: the file has no branch")
     if data["version"] > _VERSION:
-        raise InputError(f"{path}: the file is of version {data['version']}, this program reads up to {_VERSION}")
+        raise InputError(
+            f"{path}: the file is of version {data['version']}, this program reads up to {_VERSION}"
+        )
     build = _Builder(data, system, period)
     points = [
         Point(row["params"], build.state(row), {tuple(_tupled(key)): value for key, value in row["tests"]})
@@ -158,7 +160,9 @@ class _Builder:
     def __init__(self, data: Mapping[str, Any], system: System, period: Any) -> None:
         self._params, self._system, self._period = data["params"], system, period
         first = data["points"][0]
-        self._n = len(first["starts"][0]) if data["kind"] == "cycles" else len(first["w"]) - first["mode"].count(0)
+        self._n = (
+            len(first["starts"][0]) if data["kind"] == "cycles" else len(first["w"]) - first["mode"].count(0)
+        )
 
     def state(self, row: Mapping[str, Any]) -> State:
         """Return the state of a row."""

@@ -1,10 +1,11 @@
 """The equations of a cycle with a given itinerary, and their derivatives.
 
-The unknowns are the states at the starts of the legs, their durations, the time at which the first starts, if that is not known, and
-parameters. Each leg is followed in its mode for its duration, whatever its guards do in between: a cycle can be continued beyond the
-end of its itinerary, where a piece no longer ends at what ends it in the flow.
+The unknowns are the states at the starts of the legs, their durations, the time at which the first starts,
+if that is not known, and parameters. Each leg is followed in its mode for its duration, whatever its guards do
+in between: a cycle can be continued beyond the end of its itinerary, where a piece no longer ends at what ends
+it in the flow.
 
-References: Thota, Dankowicz, SIAM J. Appl. Dyn. Syst. 7 (2008) 1283 (itineraries as boundary-value problems); `docs/theory`.
+Reference: Thota, Dankowicz, SIAM J. Appl. Dyn. Syst. 7 (2008) 1283 (itineraries as boundary-value problems).
 """
 
 from __future__ import annotations

@@ -54,8 +54,7 @@ def _doubled(cycle: Cycle) -> Cycle:
     shooting = own._shooting
     motions, period = shooting.motions, shooting.period
     if period is not None:
-        period = period.near(cycle.period)
-        period = type(period)(*_twice(period))
+        period = period.twice()
     record = motions.record((own.t0, own.t0 + 4.2 * own.period), own.y0)
     itinerary = itinerary_from_event(record, 2 * own.period)
     if itinerary is None:
@@ -65,17 +64,8 @@ def _doubled(cycle: Cycle) -> Cycle:
     return Cycle(doubled, u, doubled.shoot(u), 0.0)
 
 
-def _twice(period: object) -> tuple[object, ...]:
-    from filippov.cycles.forcing import GivenPeriod, InferredPeriod
-
-    if isinstance(period, InferredPeriod):
-        return period.guess, 2 * period.multiple, period.exponents
-    assert isinstance(period, GivenPeriod)
-    return period.phase.period, 2 * period.multiple
-
-
 def _beside(curve: CycleCurve, code: str) -> State:
-    """Return a cycle beside the branch through the start of a curve, along the other direction of its kernel."""
+    """Return a cycle beside the start of a curve, along the other direction of the kernel there."""
     w = curve.start
     scale = curve.scales(w)
     _, jacobian = curve.equations(w)

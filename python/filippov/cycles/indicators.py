@@ -43,7 +43,7 @@ def tests_at(
 
 
 def singular_values_of(curve: CycleCurve | EquilibriumCurve, w: Array) -> dict[Any, float]:
-    """Return the functions of multipliers or eigenvalues that vanish at special points, and those of boundaries."""
+    """Return the functions of multipliers or eigenvalues, and those of boundaries."""
     if isinstance(curve, CycleCurve):
         return _of_multipliers(curve, curve.shot(w))
     return _of_equilibrium(curve, w)
