@@ -285,7 +285,7 @@ class _CurveSide:
         self.reason = f"{most} points"
 
     def _ends_nearby(self) -> bool:
-        """Whether the condition is degenerate just behind the last point, where the equations are singular."""
+        """Whether the condition is degenerate just behind, where the equations are singular too."""
         key = ("degenerate",)
         # Of points that are too near the difference is noise.
         latest: list[tuple[Array, float]] = []

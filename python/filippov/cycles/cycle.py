@@ -11,7 +11,13 @@ import numpy.typing as npt
 
 from filippov.analysis import Phase, Section
 from filippov.analysis.sections import as_section
-from filippov.cycles.forcing import GivenPeriod, InferredPeriod, depends_on_time, forcing_of
+from filippov.cycles.forcing import (
+    GivenPeriod,
+    InferredPeriod,
+    common_period,
+    depends_on_time,
+    forcing_of,
+)
 from filippov.cycles.itinerary import Itinerary, Leg, itinerary_from_event, itinerary_of
 from filippov.cycles.motions import Array, Motions
 from filippov.cycles.shooting import Period, Shooting, Shot, solve
@@ -137,31 +143,44 @@ class Cycle:
     @cached_property
     def solution(self) -> Solution:
         """The run over one period."""
-        return self._shooting.motions.run((self.t0, self.t0 + self.period), self.y0)
+        ending = self.itinerary.legs[-1].ending
+        # A run does what is to be done at its first time.
+        is_timed = ending is not None and ending.guard is None
+        start = self.at(self.t0, before=True) if is_timed else self.y0
+        return self._shooting.motions.run((self.t0, self.t0 + self.period), start)
 
     @cached_property
     def is_admissible(self) -> bool:
         """Whether the flow follows the itinerary: a run from the start makes the same pieces."""
         return follows_itinerary(self)
 
-    def at(self, t: float) -> Array:
-        """Return the state at a time, modulo the period; behind a switch if one is then.
+    def at(self, t: float, *, before: bool = False) -> Array:
+        """Return the state at a time, modulo the period.
 
         Parameters
         ----------
         t : float
+        before : bool, optional
+            Before a switch that is at this time, and not behind it.
 
         Returns
         -------
         ndarray, shape (n,)
         """
         itinerary, motions = self.itinerary, self._shooting.motions
-        t = self.t0 + (t - self.t0) % self.period
+        rounding = 1e-10 * self.period
+        t = self.t0 + (t - self.t0 + rounding) % self.period - rounding
         since = self.t0
-        for leg, start, duration in zip(itinerary.legs, itinerary.starts, itinerary.durations, strict=True):
-            if t < since + duration or leg is itinerary.legs[-1]:
-                return start if t <= since else motions.leg(leg.mode, leg.discrete, since, start, t - since).x
-            since += duration
+        if abs(t - since) <= rounding:
+            return self._shot.passages[-1].leg.x if before else self.y0
+        for k, (leg, start) in enumerate(zip(itinerary.legs, itinerary.starts, strict=True)):
+            until = since + itinerary.durations[k]
+            if abs(t - until) <= rounding:
+                passage = self._shot.passages[k]
+                return passage.leg.x if before else passage.after
+            if t < until or k + 1 == len(itinerary.legs):
+                return motions.leg(leg.mode, leg.discrete, since, start, t - since).x
+            since = until
         raise AssertionError  # there is a leg
 
     def from_event(self) -> Cycle:
@@ -275,7 +294,7 @@ def follows_itinerary(cycle: Cycle) -> bool:
     else:
         t += half
     try:
-        record = motions.record((t, t + itinerary.period), x)
+        record = motions.record((t, t + 1.02 * itinerary.period), x)
         found = itinerary_of(record, t + itinerary.period)
     except ModelError:
         return False
@@ -283,7 +302,8 @@ def follows_itinerary(cycle: Cycle) -> bool:
     if len(own) != len(theirs):
         return False
     is_same = not own or any(own == theirs[k:] + theirs[:k] for k in range(len(own)))
-    end = record.solution.y[:, -1]
+    assert record.solution.sol is not None
+    end = record.solution.sol(t + itinerary.period, side="left")
     size = np.max(np.abs(record.solution.y))
     growth = max(1.0, float(np.max(np.abs(cycle.multipliers), initial=0.0)))
     return bool(is_same and np.max(np.abs(end - x)) < 1e-6 * growth * size)
@@ -410,7 +430,7 @@ def cycle_at(
         record = motions.record((t0, t0 + 2.05 * duration), x)
         itinerary = itinerary_from_event(record, duration)
     if itinerary is None:
-        record = motions.record((t0, t0 + duration), x)
+        record = motions.record((t0, t0 + 1.02 * duration), x)
         itinerary = itinerary_of(record, t0 + duration)
     found = cycle_of(motions, itinerary if period is not None else itinerary.from_time(0.0), period)
     if abs(found.period - duration) > 0.5 * duration:
@@ -481,7 +501,10 @@ def _simulated(motions: Motions, t0: float, x: Array, period: Any, transient: in
     if forcing is None:
         span, solution = _first_span(motions, t0, x)
         steps = np.diff(solution.t)
-        if depends_on_time(motions, span):
+        ticks = _ticks(motions, t0, x, span)
+        if ticks is not None:
+            forcing = GivenPeriod(common_period(motions, ticks))
+        elif depends_on_time(motions, span):
             step = float(np.median(steps[steps > 0]))
             forcing = forcing_of(motions, 0.5 * step, span)
             if forcing is None:
@@ -489,10 +512,6 @@ def _simulated(motions: Motions, t0: float, x: Array, period: Any, transient: in
                     "the system depends on time, and no period of field and switching functions was found: "
                     "give period=, a number or a function of the parameters"
                 )
-        else:
-            ticks = _ticks(motions, t0, x, span)
-            if ticks is not None:
-                forcing = GivenPeriod(ticks)
     if forcing is not None:
         return _repeated_forced(motions, t0, x, forcing, 200 if transient is None else transient)
     return _repeated(motions, t0, x, span)
@@ -533,7 +552,8 @@ def _repeated_forced(
         return cycle_at(motions, t0, x, single, forcing)
     for attempt in range(4):
         count = transient * 4**attempt
-        strobes = t0 + single * np.arange(count, count + _MOST_RETURNS + 1)
+        # Not at a phase at which a clock is likely to tick.
+        strobes = t0 + single * (np.arange(count, count + _MOST_RETURNS + 1) + 0.381966)
         solution = motions.run((t0, float(strobes[-1])), x, t_eval=strobes, dense_output=False)
         if not solution.success:
             raise ModelError(f"the run ends before it repeats itself: {solution.message}", partial=solution)
@@ -547,6 +567,11 @@ def _repeated_forced(
             forcing.multiple = multiple
             try:
                 found = cycle_at(motions, float(strobes[0]), points[:, 0], multiple * single, forcing)
+                turns = _turns(found, multiple)
+                if turns > 1:
+                    forcing.multiple = multiple // turns
+                    start = found.at(float(strobes[0]))
+                    found = cycle_at(motions, float(strobes[0]), start, found.period / turns, forcing)
                 if _attracts(found):
                     return found
             except ModelError:
@@ -594,6 +619,9 @@ def _repeated(motions: Motions, t0: float, x: Array, span: float) -> Cycle:
                 k = int(np.flatnonzero(distances < max(_NEAR, 10 * nearest))[0])
                 try:
                     found = cycle_at(motions, t, point, float(times[k] - t), None)
+                    turns = _turns(found, len(found.itinerary.legs))
+                    if turns > 1:
+                        found = cycle_at(motions, 0.0, found.y0, found.period / turns, None)
                     if _attracts(found):
                         return found
                     problem = ", and the cycle near it is unstable"
@@ -618,6 +646,18 @@ def _attracts(cycle: Cycle) -> bool:
     return bool(np.all(np.abs(cycle.nontrivial) < 1.0 + 1e-6))
 
 
+def _turns(cycle: Cycle, most: int) -> int:
+    """Return how many times a cycle goes round another one, at most so many times."""
+    size = 1e-8 * np.max(np.abs(np.array(cycle.itinerary.starts)))
+    t, x = cycle.t0 + 0.381966 * cycle.period / most, None
+    for turns in range(most, 1, -1):
+        if most % turns == 0:
+            x = cycle.at(t) if x is None else x
+            if np.max(np.abs(cycle.at(t + cycle.period / turns) - x)) < size:
+                return turns
+    return 1
+
+
 def _plane(normal: Array, point: Array) -> Callable[..., Any]:
     def g(t: Any, y: Any, **_: Any) -> Any:
         return sum(float(a) * (y[i] - float(b)) for i, (a, b) in enumerate(zip(normal, point, strict=True)))
@@ -634,7 +674,7 @@ def _moved_to(cycle: Cycle, section: Phase | Event | None, t0: float) -> Cycle:
     motions, forcing, period = cycle._shooting.motions, cycle._shooting.period, cycle.period
     if isinstance(section, Phase) or (section is None and forcing is not None):
         turns = np.ceil((cycle.t0 - t0) / period - 1e-9)
-        x = cycle.at(t0 + turns * period)
+        x = cycle.at(t0 + turns * period, before=True)
         return cycle_at(motions, t0, x, period, forcing, is_free=True)
     if section is None:
         return cycle

@@ -1,7 +1,7 @@
 """Equilibria of regions, and pseudo-equilibria on any number of surfaces, where the sliding motion rests.
 
 A pseudo-equilibrium on h_j = 0 has f(x, lambda) = 0 with the multipliers as unknowns, f linear in each of
-them: these equations are regular where a multiplier is -1 or +1, and the equilibrium is one of a region there.
+them: these equations are regular where a multiplier is -1 or +1, and the equilibrium is one of a region.
 
 References: Filippov (1988), section 19; Kuznetsov, Rinaldi, Gragnani, Int. J. Bifurcation and Chaos 13 (2003)
 2157.

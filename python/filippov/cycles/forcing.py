@@ -12,9 +12,12 @@ from filippov.analysis import Phase
 from filippov.cycles.motions import Array, Motions
 from filippov.errors import InputError, ModelError
 
-__all__ = ["GivenPeriod", "InferredPeriod", "depends_on_time", "forcing_of"]
+__all__ = ["GivenPeriod", "InferredPeriod", "common_period", "depends_on_time", "forcing_of"]
 
-_PLACES, _CONFIRMED_AT = 7, 3
+_PLACES, _CONFIRMED_AT, _MOST_MULTIPLES = 7, 3, 64
+
+
+_GIVE_PERIOD = "give period=, a number or a function of the parameters"
 
 
 @lru_cache(maxsize=16)
@@ -80,8 +83,8 @@ class GivenPeriod:
 class InferredPeriod:
     """A multiple of the period of field and switching functions, found from their values.
 
-    Most periods are products of powers of parameters, as 2 pi / omega is: where the exponents are whole numbers
-    they are taken, and confirmed at every value.
+    Most periods are products of powers of parameters, as 2 pi / omega is: where the exponents are whole
+    numbers they are taken, and confirmed at every value.
     """
 
     def __init__(self, guess: float, multiple: int = 1, exponents: dict[str, float] | None = None) -> None:
@@ -188,17 +191,14 @@ def _refined(motions: Motions, guess: float) -> float:
         slope = (_difference(motions, period + d) - _difference(motions, period - d)) / (2 * d)
         size = float(slope @ slope)
         if size == 0.0:
-            return period
+            raise ModelError(f"the right-hand side jumps and does nothing else in time: {_GIVE_PERIOD}")
         step = -float(slope @ value) / size
         step = float(np.clip(step, -0.1 * period, 0.1 * period))
         period += step
         if abs(step) < 4e-16 * period:
             break
     if not _repeats(motions, period):
-        raise ModelError(
-            f"the period of the right-hand side near {guess:.6g} is not found: give period=, a number or a "
-            "function of the parameters"
-        )
+        raise ModelError(f"the period of the right-hand side near {guess:.6g} is not found: {_GIVE_PERIOD}")
     return period
 
 
@@ -230,6 +230,23 @@ def forcing_of(motions: Motions, shortest: float, longest: float) -> InferredPer
                 pass
         before = [before[1], value]
     return None
+
+
+def common_period(motions: Motions, ticks: float) -> float:
+    """Return the least multiple of the period of a clock after which the right-hand side is the same.
+
+    Raises
+    ------
+    ModelError
+        If there is none.
+    """
+    for multiple in range(1, _MOST_MULTIPLES + 1):
+        if _repeats(motions, multiple * ticks):
+            return multiple * ticks
+    raise ModelError(
+        f"things happen every {ticks:.6g} units of time, and the right-hand side does not repeat itself after "
+        f"{_MOST_MULTIPLES} of them: {_GIVE_PERIOD}"
+    )
 
 
 def _difference_from_start(motions: Motions, period: float) -> Array:

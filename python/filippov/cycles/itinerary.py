@@ -110,21 +110,25 @@ def _signature(leg: Leg) -> tuple[object, ...]:
 
 
 def itinerary_of(record: Record, t1: float) -> Itinerary:
-    """Return the itinerary of a run from its start to the time `t1`.
+    """Return the itinerary of a run from its start to the time `t1`; the run lasts a little longer.
+
+    If something happens at that time because it is that time, the cycle starts behind it.
 
     Raises
     ------
     ModelError
         If it has infinitely many switches, or too many.
     """
-    start = _start_of(record)
-    return _between(
-        start, [instant for instant in _changes(record) if start.times[1] < instant.times[0] < t1], t1
-    )
+    start, t0 = _start_of(record), float(record.solution.t[0])
+    rounding = 1e-9 * (t1 - t0)
+    found = [instant for instant in _changes(record) if t0 < instant.times[0] < t1 + rounding]
+    if found and not found[-1].guards and found[-1].times[0] > t1 - rounding:
+        return _between(start, found, None)
+    return _between(start, [instant for instant in found if instant.times[0] < t1], t1)
 
 
 def itinerary_from_event(record: Record, period: float, at: float | None = None) -> Itinerary | None:
-    """Return the itinerary of a period that starts at an event: at a time, or else before the longest leg.
+    """Return the itinerary of a period that starts at an event: at a time, or before the longest leg.
 
     The run lasts for two periods at least. ``None`` if no such event comes again a period later.
 

@@ -71,7 +71,7 @@ pub fn leg(
     let mut derivative = tangents.finish()?.values;
     let size = n * (n + extended.n_parameters());
     derivative.drain(..derivative.len() - size);
-    let mut motion = HeldMotion::new(extended, &impacts, &options, mode, q);
+    let mut motion = HeldMotion::new((system, extended), &impacts, &options, mode, q);
     let mut velocity = |t: f64, x: &[f64]| -> Result<Vec<f64>, FieldError> {
         let mut all = motion.velocity(t, x)?;
         all.truncate(n);
