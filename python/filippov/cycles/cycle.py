@@ -31,7 +31,7 @@ from filippov.unknown import did_you_mean
 
 __all__ = ["Cycle", "CycleDerivative", "cycle_at", "limit_cycle"]
 
-_MOST_RETURNS = 32
+_MOST_RETURNS, _PHASES = 32, 16
 _NEAR = 1e-3
 
 
@@ -188,7 +188,19 @@ class Cycle:
         if self.itinerary.is_closed_by_event() or not self.itinerary.has_events():
             return self
         shooting = self._shooting
-        return cycle_at(shooting.motions, self.t0, self.y0, self.period, shooting.period)
+        return cycle_at(shooting.motions, *self.inside(), self.period, shooting.period)
+
+    def inside(self) -> tuple[float, Array]:
+        """Return a time and the state then in the middle of a piece, a long one that loses few dimensions.
+
+        A run can start there: at a switch, and in contact, the state does not say what it does.
+        """
+        itinerary, motions = self.itinerary, self._shooting.motions
+        lost = [_codimension(motions, leg) for leg in itinerary.legs]
+        ranked = zip(lost, (-duration for duration in itinerary.durations), strict=True)
+        place = min(range(len(lost)), key=list(ranked).__getitem__)
+        t = self.t0 + sum(itinerary.durations[:place]) + 0.5 * itinerary.durations[place]
+        return t, self.at(t)
 
     def derivative(self, name: str) -> CycleDerivative:
         """Return the derivative by a parameter.
@@ -282,28 +294,19 @@ def _slopes_of(
 
 
 def follows_itinerary(cycle: Cycle) -> bool:
-    """Whether a run from the middle of the longest leg makes the pieces of a cycle."""
-    itinerary, motions = cycle.itinerary, cycle._shooting.motions
-    longest = int(np.argmax(itinerary.durations))
-    leg = itinerary.legs[longest]
-    t = itinerary.t0 + sum(itinerary.durations[:longest])
-    half = 0.5 * itinerary.durations[longest]
-    x = motions.leg(leg.mode, leg.discrete, t, itinerary.starts[longest], half).x
-    if not itinerary.is_closed_by_event() and longest == 0:
-        t, x = itinerary.t0, itinerary.starts[0]
-    else:
-        t += half
+    """Whether a run from within a cycle makes its pieces."""
+    (t, x), period = cycle.inside(), cycle.period
     try:
-        record = motions.record((t, t + 1.02 * itinerary.period), x)
-        found = itinerary_of(record, t + itinerary.period)
+        record = cycle._shooting.motions.record((t, t + 1.02 * period), x)
+        found = itinerary_of(record, t, t + period)
     except ModelError:
         return False
-    own, theirs = _kinds(itinerary), _kinds(found)
+    own, theirs = _kinds(cycle.itinerary), _kinds(found)
     if len(own) != len(theirs):
         return False
     is_same = not own or any(own == theirs[k:] + theirs[:k] for k in range(len(own)))
     assert record.solution.sol is not None
-    end = record.solution.sol(t + itinerary.period, side="left")
+    end = record.solution.sol(t + period, side="left")
     size = np.max(np.abs(record.solution.y))
     growth = max(1.0, float(np.max(np.abs(cycle.multipliers), initial=0.0)))
     return bool(is_same and np.max(np.abs(end - x)) < 1e-6 * growth * size)
@@ -431,7 +434,7 @@ def cycle_at(
         itinerary = itinerary_from_event(record, duration)
     if itinerary is None:
         record = motions.record((t0, t0 + 1.02 * duration), x)
-        itinerary = itinerary_of(record, t0 + duration)
+        itinerary = itinerary_of(record, t0, t0 + duration)
     found = cycle_of(motions, itinerary if period is not None else itinerary.from_time(0.0), period)
     if abs(found.period - duration) > 0.5 * duration:
         raise ModelError(
@@ -552,12 +555,14 @@ def _repeated_forced(
         return cycle_at(motions, t0, x, single, forcing)
     for attempt in range(4):
         count = transient * 4**attempt
-        # Not at a phase at which a clock is likely to tick.
-        strobes = t0 + single * (np.arange(count, count + _MOST_RETURNS + 1) + 0.381966)
-        solution = motions.run((t0, float(strobes[-1])), x, t_eval=strobes, dense_output=False)
+        phases = t0 + single * (count + (np.arange(_PHASES) + 0.381966) / _PHASES)
+        strobes = (phases + single * np.arange(_MOST_RETURNS + 1)[:, None]).ravel()
+        solution = motions.run((t0, float(strobes[-1])), x, t_eval=strobes)
         if not solution.success:
             raise ModelError(f"the run ends before it repeats itself: {solution.message}", partial=solution)
-        points = solution.y
+        # A run can start where no surface is slid on.
+        phase = int(np.argmin([solution.mode_at(t).codimension for t in phases]))
+        start, points = float(phases[phase]), solution.y[:, phase::_PHASES]
         size = np.max(np.abs(points), axis=1) + 1e-12
         distances = np.max(np.abs(points[:, 1:] - points[:, :1]) / size[:, None], axis=0)
         near = max(_NEAR, 10 * float(np.min(distances))) if np.min(distances) < 1e-2 else 0.0
@@ -566,12 +571,11 @@ def _repeated_forced(
             multiple = int(alike[0]) + 1
             forcing.multiple = multiple
             try:
-                found = cycle_at(motions, float(strobes[0]), points[:, 0], multiple * single, forcing)
+                found = cycle_at(motions, start, points[:, 0], multiple * single, forcing)
                 turns = _turns(found, multiple)
                 if turns > 1:
                     forcing.multiple = multiple // turns
-                    start = found.at(float(strobes[0]))
-                    found = cycle_at(motions, float(strobes[0]), start, found.period / turns, forcing)
+                    found = cycle_at(motions, *found.inside(), found.period / turns, forcing)
                 if _attracts(found):
                     return found
             except ModelError:
@@ -591,7 +595,7 @@ def _repeated(motions: Motions, t0: float, x: Array, span: float) -> Cycle:
         solution = motions.run((t, t + span), point)
         if not solution.success:
             raise ModelError(f"the run ends before it repeats itself: {solution.message}", partial=solution)
-        t, end = t + span, solution.y[:, -1]
+        t, end = _last_inside(solution)
         size = np.max(np.abs(solution.y), axis=1) + 1e-300
         if np.max(np.abs(end) / (1e-300 + np.max(np.abs(x)) + 1.0)) > 1e8:
             raise ModelError(
@@ -600,11 +604,13 @@ def _repeated(motions: Motions, t0: float, x: Array, span: float) -> Cycle:
         point = end
         velocity = motions.record((t, t + 1e-6 * span), point)
         at = motions.at(velocity.mode, velocity.discrete, t, point).velocity
-        later = solution.y[:, len(solution.t) // 2 :]
+        assert solution.sol is not None
+        later = solution.sol(np.linspace(solution.t[-1] - 0.25 * span, solution.t[-1], 64))
         moves = np.max(np.ptp(later, axis=1) / size)
         if moves < 1e-7 or not np.any(at):
             raise ModelError(
-                f"no cycle was found: the run comes to rest at {_short(end)}; fl.equilibrium finds where"
+                f"no cycle was found: the run comes to rest at {_short(solution.y[:, -1])}; fl.equilibrium "
+                "finds where"
             )
         returns = motions.run((t, t + span), point, events=Event(_plane(at, point), direction=1))
         times, points = _first_event(returns)
@@ -621,7 +627,7 @@ def _repeated(motions: Motions, t0: float, x: Array, span: float) -> Cycle:
                     found = cycle_at(motions, t, point, float(times[k] - t), None)
                     turns = _turns(found, len(found.itinerary.legs))
                     if turns > 1:
-                        found = cycle_at(motions, 0.0, found.y0, found.period / turns, None)
+                        found = cycle_at(motions, *found.inside(), found.period / turns, None)
                     if _attracts(found):
                         return found
                     problem = ", and the cycle near it is unstable"
@@ -639,6 +645,16 @@ def _first_event(run: Solution) -> tuple[Array, Array]:
     assert run.t_events is not None
     assert run.y_events is not None
     return run.t_events[0], run.y_events[0]
+
+
+def _last_inside(run: Solution) -> tuple[float, Array]:
+    """Return the last place of a run in the middle of a piece that slides on no surface; or else its end."""
+    assert run.sol is not None
+    for segment in run.segments[::-1][:_MOST_RETURNS]:
+        if segment.mode.codimension == 0 and segment.t_end > segment.t_start:
+            t = 0.5 * (segment.t_start + segment.t_end)
+            return t, run.sol(t)
+    return float(run.t[-1]), run.y[:, -1]
 
 
 def _attracts(cycle: Cycle) -> bool:
@@ -672,23 +688,33 @@ def _short(x: Array) -> str:
 def _moved_to(cycle: Cycle, section: Phase | Event | None, t0: float) -> Cycle:
     """Return a cycle from where it is to start."""
     motions, forcing, period = cycle._shooting.motions, cycle._shooting.period, cycle.period
-    if isinstance(section, Phase) or (section is None and forcing is not None):
-        turns = np.ceil((cycle.t0 - t0) / period - 1e-9)
-        x = cycle.at(t0 + turns * period, before=True)
-        return cycle_at(motions, t0, x, period, forcing, is_free=True)
-    if section is None:
+    is_timed = isinstance(section, Phase) or (section is None and forcing is not None)
+    if section is None and not is_timed:
         return cycle
-    event = section
-    there = motions.run((cycle.t0, cycle.t0 + 1.05 * period), cycle.y0, events=event)
-    times, points = _first_event(there)
+    t, x = cycle.inside()
+    if is_timed:
+        turns = np.ceil((t - t0) / period - 1e-9)
+        if _counts_time(cycle.itinerary):
+            start = cycle.at(t0 + turns * period, before=True)
+            return cycle_at(motions, t0, start, period, forcing, is_free=True)
+        record = motions.record((t, t + 2.3 * period), x)
+        at = t0 + float(turns) * period
+        return cycle_of(motions, itinerary_of(record, at, at + period).from_time(t0), forcing)
+    assert isinstance(section, Event)
+    times, _ = _first_event(motions.run((t, t + 1.05 * period), x, events=section))
     if not len(times):
-        raise ModelError(f"section: the cycle does not reach {event.name or 'it'}")
+        raise ModelError(f"section: the cycle does not reach {section.name or 'it'}")
     # At a switch the cycle starts behind it.
-    record = motions.record((cycle.t0, cycle.t0 + 2.2 * period), cycle.y0)
-    at_switch = itinerary_from_event(record, period, at=float(times[0]))
-    if at_switch is None:
-        moved = cycle_at(motions, float(times[0]), points[0], period, forcing, is_free=True)
-    else:
-        moved = cycle_of(motions, at_switch, forcing)
-    moved._section = event.g
+    record, at = motions.record((t, t + 3.2 * period), x), float(times[0])
+    itinerary = itinerary_from_event(record, period, at=at)
+    moved = cycle_of(motions, itinerary or itinerary_of(record, at, at + period), forcing)
+    moved._section = section.g
     return moved
+
+
+def _counts_time(itinerary: Itinerary) -> bool:
+    """Whether clocks tick in a cycle, whose counts belong to a time."""
+    endings = (leg.ending for leg in itinerary.legs)
+    return any(leg.discrete for leg in itinerary.legs) or any(
+        e is not None and e.guard is None for e in endings
+    )

@@ -55,7 +55,8 @@ def _doubled(cycle: Cycle) -> Cycle:
     motions, period = shooting.motions, shooting.period
     if period is not None:
         period = period.twice()
-    record = motions.record((own.t0, own.t0 + 4.2 * own.period), own.y0)
+    t, x = own.inside()
+    record = motions.record((t, t + 4.2 * own.period), x)
     itinerary = itinerary_from_event(record, 2 * own.period)
     if itinerary is None:
         raise ModelError("the cycle has no switch from which its double could start")
