@@ -244,7 +244,7 @@ def common_period(motions: Motions, ticks: float) -> float:
         if _repeats(motions, multiple * ticks):
             return multiple * ticks
     raise ModelError(
-        f"things happen every {ticks:.6g} units of time, and the right-hand side does not repeat itself after "
+        f"things happen every {ticks:.6g} units of time, and the right-hand side does not repeat itself in "
         f"{_MOST_MULTIPLES} of them: {_GIVE_PERIOD}"
     )
 
