@@ -8,6 +8,7 @@ Needs Matplotlib: ``pip install filippov[plot]``.
 
 from __future__ import annotations
 
+from filippov.plot.branches import branches
 from filippov.plot.diagrams import basins, bifurcation_diagram, poincare_section
 from filippov.plot.hidden_dynamics import hidden_dynamics
 from filippov.plot.phase import phase, phase3d
@@ -18,6 +19,7 @@ from filippov.plot.time_series import time_series
 __all__ = [
     "basins",
     "bifurcation_diagram",
+    "branches",
     "hidden_dynamics",
     "phase",
     "phase3d",
