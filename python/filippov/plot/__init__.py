@@ -12,6 +12,7 @@ from filippov.plot.branches import branches
 from filippov.plot.diagrams import basins, bifurcation_diagram, poincare_section
 from filippov.plot.hidden_dynamics import hidden_dynamics
 from filippov.plot.phase import phase, phase3d
+from filippov.plot.portrait import portrait
 from filippov.plot.style import style, theme
 from filippov.plot.surface import surface
 from filippov.plot.time_series import time_series
@@ -24,6 +25,7 @@ __all__ = [
     "phase",
     "phase3d",
     "poincare_section",
+    "portrait",
     "style",
     "surface",
     "theme",
