@@ -201,7 +201,7 @@ class EquilibriumCurve:
         return np.asarray(tangents.T @ (a + b @ by_state) @ tangents)
 
     def tangents(self, w: Array) -> Array:
-        """Return the basis of the tangent space of the surfaces, shape (n, n - m), that `linearisation` has."""
+        """Return the basis, shape (n, n - m), of the tangent space that `linearisation` is in."""
         if not self.sliding:
             return np.eye(self.n)
         return np.asarray(np.linalg.svd(self.normals(w))[2][len(self.sliding) :].T)

@@ -156,8 +156,8 @@ def phase_portrait(
 
     Notes
     -----
-    Equilibria are found by Newton's method from many starts, tangencies between points of a grid: a heuristic,
-    which may miss some.
+    Equilibria are found by Newton's method from many starts, and tangencies between points of a grid. That is
+    a heuristic, which may miss some.
 
     Examples
     --------
