@@ -107,7 +107,8 @@ def test_equilibria_of_one_of_several_systems(model: Path, capsys: pytest.Captur
     codes = [line.split()[:2] for line in printed.splitlines() if line.startswith("BE")]
     assert codes == [["BE", "0.8"], ["BE", "1"]]
     assert (
-        main(["continue", "model.py", "--system", "fish", *arguments, "--mode", "0", "--param", "a=17/20"]) == 0
+        main(["continue", "model.py", "--system", "fish", *arguments, "--mode", "0", "--param", "a=17/20"])
+        == 0
     )
     printed = capsys.readouterr().out
     assert "equilibrium: stable pseudo-equilibrium in mode 0" in printed
@@ -131,9 +132,8 @@ def test_pictures_of_branches(model: Path) -> None:
 
 
 def test_a_stored_branch_is_read_again(model: Path) -> None:
-    saving = pytest.importorskip("filippov.cycles.saving")
     assert main([*CONTINUE, "--store", "branch.json", "--quiet"]) == 0
-    branch = saving.load_branch("branch.json", oscillator())
+    branch = fl.cycles.load_branch("branch.json", oscillator())
     assert [special.code for special in branch.special] == ["EP", "AS", "CS", "EP"]
 
 

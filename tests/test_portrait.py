@@ -147,7 +147,13 @@ class TestPicture:
     def test_in_one_call_with_a_cycle(self) -> None:
         system = harvest(0.5, "harvest_cycle")
         cycle = fl.limit_cycle(system, [0.3, 0.5])
-        ax = fl.plot.portrait(system, [(0, 1), (0.1, 0.8)], cycles=[cycle], starts=[[0.9, 0.2]], density=6)
+        curves = fl.manifold(fl.equilibrium(system, [1.0, 0.0], mode="-"), length=1.0)
+        more = {"cycles": [cycle], "manifolds": curves}
+        ax = fl.plot.portrait(system, [(0, 1), (0.1, 0.8)], starts=[[0.9, 0.2]], density=6, **more)
+        drawn = [line for line in ax.lines if line.get_label() == "manifold"]
+        np.testing.assert_array_equal(
+            [line.get_xdata()[-1] for line in drawn], [c.points[0, -1] for c in curves]
+        )
         lines = [line for line in ax.lines if line.get_label() == "cycle"]
         closed = np.concatenate([line.get_xydata() for line in lines])
         np.testing.assert_allclose(closed[0], closed[-1], atol=1e-8)
@@ -156,7 +162,9 @@ class TestPicture:
         assert ax.get_xlim() == (0.0, 1.0)
         named = [text.get_text() for text in ax.get_legend().get_texts()]
         assert len(named) == len(set(named))
-        assert {"cycle", "trajectory", "visible tangency", "x[1] - alpha = 0: crossed"} <= set(named)
+        assert {"cycle", "manifold", "trajectory", "visible tangency", "x[1] - alpha = 0: crossed"} <= set(
+            named
+        )
 
 
 @pytest.mark.parametrize(
