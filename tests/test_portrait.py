@@ -95,7 +95,7 @@ def test_surfaces_that_meet_have_an_equilibrium_there() -> None:
 
 
 def test_a_field_without_equilibria_has_none() -> None:
-    """The sliding field is 1 along the surface: least squares would stop beside it."""
+    """The sliding field is 1 along the surface: least squares come to rest where it is not zero."""
     system = fl.System(lambda t, x: [1.0, -np.sign(x[1]) / (1.0 + abs(x[1]))], n=2)
     assert phase_portrait(system, [(-1, 1), (-1, 1.1)], starts=0, density=4).equilibria == []
     with pytest.raises(fl.ModelError, match="no equilibrium in mode 0"):
@@ -185,3 +185,15 @@ def test_mistakes_are_named(arguments: tuple[Any, ...], message: str) -> None:
     pytest.importorskip("matplotlib")
     with pytest.raises(ValueError, match="box: the window is needed"):
         fl.plot.portrait(harvest(ALPHA))
+
+
+def test_a_field_that_is_not_finite_in_a_part_of_the_window() -> None:
+    def fun(t: Any, x: Any) -> list[Any]:
+        return [-np.sqrt(x[0]) + 0.5 * (x[1] > 0), -x[1] + np.sign(x[0] - 0.3)]
+
+    found = phase_portrait(fl.System(fun, n=2), [(-1, 1), (-1.1, 1)], starts=2, density=5)
+    assert found.streamlines
+    assert all((line.points[0] >= 0.0).all() for line in found.streamlines)
+    (first, *_) = (parts for parts in found.surfaces if parts.name == "x[1]")
+    kinds = np.concatenate(first.kinds)[np.concatenate(first.sheets, axis=1)[0] < -0.1]
+    assert set(kinds.tolist()) == {"inactive"}

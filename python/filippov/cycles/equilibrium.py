@@ -319,6 +319,8 @@ def rest_of(curve: EquilibriumCurve, w: Array) -> Equilibrium:
     for _ in range(_MOST_STEPS):
         residual, jacobian = curve.equations(w)
         own = jacobian[:, : curve.n_unknowns]
+        if not (np.isfinite(residual).all() and np.isfinite(own).all()):
+            break
         change = -np.linalg.lstsq(own, residual, rcond=None)[0]
         size = float(np.max(np.abs(change) / curve.scales(w)[: curve.n_unknowns]))
         if not np.isfinite(size):
