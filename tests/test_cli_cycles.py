@@ -86,7 +86,8 @@ def test_special_points_are_a_table(model: Path, capsys: pytest.CaptureFixture[s
     assert list(written[0]) == ["omega", "y", "v", "period", "stable", "admissible", "modes"]
     omega = np.array([float(row["omega"]) for row in written])
     assert (omega[0], omega[-1]) == (0.15, 0.7)
-    np.testing.assert_allclose([float(row["period"]) for row in written] * omega, 2 * np.pi, rtol=1e-12)
+    # Newton's method ends with steps below 1e-9 of the cycle.
+    np.testing.assert_allclose([float(row["period"]) for row in written] * omega, 2 * np.pi, rtol=1e-9)
     assert {row["stable"] for row in written} == {"True"}
 
 

@@ -195,20 +195,18 @@ class EquilibriumCurve:
         a, b, rows = jacobian[:n, :n], jacobian[:n, n:], jacobian[n:, :n]
         if m == 0:
             return np.asarray(a)
-        tangents = self.tangents(w)
+        tangents = _tangents(rows)
         # The multipliers keep the motion on the surfaces: rows (a dx + b dlambda) = 0 at rest.
         by_state = -np.linalg.solve(rows @ b, rows @ a)
         return np.asarray(tangents.T @ (a + b @ by_state) @ tangents)
 
     def tangents(self, w: Array) -> Array:
         """Return the basis, shape (n, n - m), of the tangent space that `linearisation` is in."""
-        if not self.sliding:
-            return np.eye(self.n)
-        return np.asarray(np.linalg.svd(self.normals(w))[2][len(self.sliding) :].T)
+        return _tangents(self.normals(w))
 
     def normals(self, w: Array) -> Array:
         """Return the gradients of the surfaces slid on, shape (m, n)."""
-        return self._by_unknowns(w)[self.n :, : self.n]
+        return np.asarray(self._by_unknowns(w)[self.n :, : self.n])
 
     def normal_rates(self, w: Array) -> Array:
         """Return the derivatives of the rates of the surfaces slid on by their multipliers."""
@@ -230,6 +228,14 @@ class EquilibriumCurve:
     def state(self, w: Array, error: float) -> Equilibrium:
         """Return the equilibrium there."""
         return Equilibrium(self, w, error)
+
+
+def _tangents(rows: Array) -> Array:
+    """Return a basis of the space that the gradients are at right angles to, shape (n, n - m)."""
+    m, n = rows.shape
+    if m == 0:
+        return np.eye(n)
+    return np.asarray(np.linalg.svd(rows)[2][m:].T)
 
 
 def differences(function: Callable[[Array], Array], w: Array, scale: Array, is_fine: bool = False) -> Array:
