@@ -59,6 +59,7 @@ if TYPE_CHECKING:
         continuation,
         equilibrium,
         limit_cycle,
+        manifold,
     )
     from filippov.ensemble import Ensemble
     from filippov.hidden import HiddenDynamics, hidden_dynamics
@@ -110,6 +111,7 @@ __all__ = [
     "hysteresis",
     "limit_cycle",
     "load",
+    "manifold",
     "open_sweep",
     "plot",
     "poincare",
@@ -131,7 +133,7 @@ _LAZY_NAMES = {
     **dict.fromkeys(("Phase", "Section", "Tangency", "poincare"), "analysis"),
     **dict.fromkeys(("basins", "bifurcation_diagram", "open_sweep", "sweep"), "analysis"),
     **dict.fromkeys(("Branch", "Cycle", "Equilibrium", "Special"), "cycles"),
-    **dict.fromkeys(("continuation", "equilibrium", "limit_cycle"), "cycles"),
+    **dict.fromkeys(("continuation", "equilibrium", "limit_cycle", "manifold"), "cycles"),
     "SurfaceParts": "sheets",
     "surface_parts": "sheets",
 }

@@ -7,7 +7,9 @@ from filippov.cycles.continuation import continuation
 from filippov.cycles.cycle import Cycle, CycleDerivative, limit_cycle
 from filippov.cycles.equilibrium import Equilibrium, equilibrium
 from filippov.cycles.itinerary import Itinerary
+from filippov.cycles.manifolds import ManifoldCurve, manifold
 from filippov.cycles.monitors import of_state
+from filippov.cycles.portrait import Portrait, phase_portrait
 from filippov.cycles.saving import load_branch, save_branch
 
 __all__ = [
@@ -16,13 +18,17 @@ __all__ = [
     "CycleDerivative",
     "Equilibrium",
     "Itinerary",
+    "ManifoldCurve",
     "Point",
+    "Portrait",
     "Special",
     "SpecialPoints",
     "continuation",
     "equilibrium",
     "limit_cycle",
     "load_branch",
+    "manifold",
     "of_state",
+    "phase_portrait",
     "save_branch",
 ]

@@ -52,6 +52,13 @@ class Point(NamedTuple):
     state: State
     tests: dict[Any, float]
 
+    @property
+    def is_admissible(self) -> bool:
+        """Whether the flow follows the itinerary there: all its test functions are positive."""
+        if isinstance(self.state, Equilibrium):
+            return self.state.is_admissible
+        return all(value > 0 for key, value in self.tests.items() if key[0] in ("CS", "SS", "GS", "AS", "GR"))
+
 
 class Special(NamedTuple):
     """A special point.
@@ -163,6 +170,13 @@ class Branch:
     def __len__(self) -> int:
         return len(self.points)
 
+    @property
+    def quantities(self) -> list[str]:
+        """The names that `values` takes: parameters, states, monitors, and ``"period"`` for cycles."""
+        first = self.points[0].state
+        states = first.system.state_names(len(_start(first)))
+        return [*self.names, *states, *self.monitors, *(["period"] if isinstance(first, Cycle) else [])]
+
     def values(self, name: str) -> Any:
         """Return a quantity along the branch: a parameter, a state, a monitor, or ``"period"``, an array."""
         if name in self.names:
@@ -176,13 +190,37 @@ class Branch:
         if name in states:
             i = states.index(name)
             return np.array([_start(point.state)[i] for point in self.points])
-        known = [*self.names, *states, *self.monitors, *(["period"] if isinstance(first, Cycle) else [])]
-        raise InputError(f"the branch has {', '.join(map(repr, known))}, and no {name!r}")
+        raise InputError(f"the branch has {', '.join(map(repr, self.quantities))}, and no {name!r}")
+
+    def special_values(self, name: str) -> Any:
+        """Return a quantity at the special points, an array.
+
+        A monitor is interpolated between the points beside a special point.
+        """
+        if name in self.monitors:
+            along, values, first = self.values(self.names[0]), self.values(name), self.names[0]
+            found = []
+            for special in self.special:
+                i, j = special.point, min(special.point + 1, len(self) - 1)
+                width = along[j] - along[i]
+                share = (special.params[first] - along[i]) / width if width else 0.0
+                found.append(values[i] + min(max(share, 0.0), 1.0) * (values[j] - values[i]))
+            return np.array(found)
+        if not len(self.special):
+            self.values(name)
+            return np.zeros(0)
+        points = [Point(special.params, special.state, {}) for special in self.special]
+        return Branch(points, (), {}, self.names).values(name)
 
     @property
     def stable(self) -> Any:
         """Whether each point is stable, an array of bool."""
         return np.array([point.state.is_stable for point in self.points])
+
+    @property
+    def admissible(self) -> Any:
+        """Whether the flow follows each point, an array of bool."""
+        return np.array([point.is_admissible for point in self.points])
 
     def at(self, **params: float) -> State:
         """Return the cycle or equilibrium at the value of a parameter; the first one along the branch.
@@ -223,7 +261,7 @@ class Branch:
             variables["eigenvalues"] = (("point", "eigenvalue"), _padded([_eigenvalues(s) for s in states]))
         variables["stable"] = ("point", self.stable)
         variables["itinerary"] = ("point", np.array([_itinerary_text(s) for s in states]))
-        variables["admissible"] = ("point", np.array([_is_admissible(point) for point in self.points]))
+        variables["admissible"] = ("point", self.admissible)
         variables["residual"] = ("point", np.array([s.residual for s in states]))
         return xarray.Dataset(variables, attrs={"reason": self.reason})
 
@@ -290,10 +328,3 @@ def _padded(rows: Sequence[Any]) -> Any:
 
 def _itinerary_text(state: State) -> str:
     return " ".join(map(str, state.modes)) if isinstance(state, Cycle) else str(state.mode)
-
-
-def _is_admissible(point: Point) -> bool:
-    """Whether the flow follows the itinerary there: all its test functions are positive."""
-    if isinstance(point.state, Equilibrium):
-        return point.state.is_admissible
-    return all(value > 0 for key, value in point.tests.items() if key[0] in ("CS", "SS", "GS", "AS", "GR"))

@@ -25,7 +25,7 @@ from filippov.modes import Mode
 from filippov.options import check_y0
 from filippov.system import System
 
-__all__ = ["Equilibrium", "EquilibriumCurve", "equilibrium", "rest_of"]
+__all__ = ["Equilibrium", "EquilibriumCurve", "equilibrium", "first_multipliers", "rest_of"]
 
 _MOST_STEPS = 50
 _TOLERANCE = 1e-13
@@ -195,10 +195,18 @@ class EquilibriumCurve:
         a, b, rows = jacobian[:n, :n], jacobian[:n, n:], jacobian[n:, :n]
         if m == 0:
             return np.asarray(a)
-        tangents = np.linalg.svd(rows)[2][m:].T
+        tangents = _tangents(rows)
         # The multipliers keep the motion on the surfaces: rows (a dx + b dlambda) = 0 at rest.
         by_state = -np.linalg.solve(rows @ b, rows @ a)
         return np.asarray(tangents.T @ (a + b @ by_state) @ tangents)
+
+    def tangents(self, w: Array) -> Array:
+        """Return the basis, shape (n, n - m), of the tangent space that `linearisation` is in."""
+        return _tangents(self.normals(w))
+
+    def normals(self, w: Array) -> Array:
+        """Return the gradients of the surfaces slid on, shape (m, n)."""
+        return np.asarray(self._by_unknowns(w)[self.n :, : self.n])
 
     def normal_rates(self, w: Array) -> Array:
         """Return the derivatives of the rates of the surfaces slid on by their multipliers."""
@@ -220,6 +228,14 @@ class EquilibriumCurve:
     def state(self, w: Array, error: float) -> Equilibrium:
         """Return the equilibrium there."""
         return Equilibrium(self, w, error)
+
+
+def _tangents(rows: Array) -> Array:
+    """Return a basis of the space that the gradients are at right angles to, shape (n, n - m)."""
+    m, n = rows.shape
+    if m == 0:
+        return np.eye(n)
+    return np.asarray(np.linalg.svd(rows)[2][m:].T)
 
 
 def differences(function: Callable[[Array], Array], w: Array, scale: Array, is_fine: bool = False) -> Array:
@@ -293,7 +309,7 @@ def equilibrium(
         raise InputError("system: it depends on the time: it has cycles (fl.limit_cycle), and no equilibria")
     entries = _mode_of(motions, start, mode)
     curve = EquilibriumCurve(motions, entries)
-    w = np.append(start, _first_multipliers(curve, start))
+    w = np.append(start, first_multipliers(curve, start))
     return rest_of(curve, w)
 
 
@@ -309,6 +325,8 @@ def rest_of(curve: EquilibriumCurve, w: Array) -> Equilibrium:
     for _ in range(_MOST_STEPS):
         residual, jacobian = curve.equations(w)
         own = jacobian[:, : curve.n_unknowns]
+        if not (np.isfinite(residual).all() and np.isfinite(own).all()):
+            break
         change = -np.linalg.lstsq(own, residual, rcond=None)[0]
         size = float(np.max(np.abs(change) / curve.scales(w)[: curve.n_unknowns]))
         if not np.isfinite(size):
@@ -317,6 +335,9 @@ def rest_of(curve: EquilibriumCurve, w: Array) -> Equilibrium:
         w = w.copy()
         w[: curve.n_unknowns] += change * min(1.0, 2.0 / max(size, 1e-300))
         if size < _TOLERANCE or (size < 1e-9 and size >= 0.5 * before):
+            # With a singular Jacobian the least squares may come to a point that is no zero.
+            if np.any(np.abs(residual) > 1e-8 * (np.abs(own) @ curve.scales(w)[: curve.n_unknowns])):
+                break
             return Equilibrium(curve, w, size)
         before = size
     raise ModelError(
@@ -345,7 +366,7 @@ def _mode_of(motions: Motions, x: Array, mode: Any) -> tuple[int, ...]:
     return given + own[visible:]
 
 
-def _first_multipliers(curve: EquilibriumCurve, x: Array) -> Array:
+def first_multipliers(curve: EquilibriumCurve, x: Array) -> Array:
     """Return multipliers that make the field small at a point."""
     m = len(curve.sliding)
     if m == 0:
