@@ -7,8 +7,8 @@ from typing import Any
 import filippov as fl
 import numpy as np
 import pytest
-from filippov.cycles.equilibrium import equilibrium
 from filippov.cycles.portrait import Portrait, phase_portrait
+from filippov.cycles.rest import equilibrium
 from statements import cases, system_of
 
 ALPHA = 0.41

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from filippov.cycles.arclength import Step, corrected, tangent_of
-from filippov.cycles.equilibrium import Equilibrium, EquilibriumCurve
+from filippov.cycles.rest import Equilibrium, EquilibriumCurve
 from filippov.errors import ModelError
 
 __all__ = ["beyond_boundary"]

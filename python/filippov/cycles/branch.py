@@ -9,7 +9,7 @@ import numpy as np
 
 from filippov.analysis.optional import need
 from filippov.cycles.cycle import Cycle
-from filippov.cycles.equilibrium import Equilibrium
+from filippov.cycles.rest import Equilibrium
 from filippov.errors import InputError
 
 __all__ = ["CODES", "Branch", "Point", "Special", "SpecialPoints"]

@@ -13,12 +13,12 @@ import numpy as np
 
 from filippov.cycles.arclength import Step, corrected, tangent_of
 from filippov.cycles.branch import CODES, Branch, Point, Special, State
-from filippov.cycles.continuation import AnyCurve, bounds_of, curve_of
 from filippov.cycles.cycle_curve import CycleCurve
-from filippov.cycles.equilibrium import differences
+from filippov.cycles.following import AnyCurve, bounds_of, curve_of
 from filippov.cycles.indicators import singular_values_of
 from filippov.cycles.motions import Array
 from filippov.cycles.probes import PLACES, local_probe, probes_of
+from filippov.cycles.rest import differences
 from filippov.cycles.zero import zero_between
 from filippov.errors import InputError, ModelError
 from filippov.scalars import positive

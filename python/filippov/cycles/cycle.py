@@ -52,7 +52,7 @@ class CycleDerivative(NamedTuple):
 
     y0: Array
     period: float
-    times: Array
+    times: npt.NDArray[Any]
     states: Array
 
 
@@ -226,7 +226,7 @@ class Cycle:
         shooting = self._with_derivatives_by((name,))
         size, n, m = shooting.size, shooting.n, shooting.m
         jacobian = shooting.shoot(self._u).jacobian
-        du = -np.linalg.solve(jacobian[:, :size], jacobian[:, size])
+        du: Array = -np.linalg.solve(jacobian[:, :size], jacobian[:, size])
         states, durations = du[: m * n].reshape(m, n), du[m * n : m * (n + 1)]
         since = float(du[m * (n + 1)]) if shooting.is_free_in_time else 0.0
         times = since + np.cumsum(durations)
@@ -237,8 +237,8 @@ class Cycle:
             shift = -float(by_state @ start + by_name) / float(by_state @ velocity)
             start = start + shift * velocity
         ended = [i for i, leg in enumerate(self.itinerary.legs) if leg.ending is not None]
-        after = states[[(i + 1) % m for i in ended]]
-        moved = np.asarray(times[ended] - shift, dtype=np.float64)
+        after: Array = np.asarray(states[[(i + 1) % m for i in ended]], dtype=np.float64)
+        moved: Array = np.asarray(times[ended] - shift, dtype=np.float64)
         return CycleDerivative(start, float(np.sum(durations)), moved, after)
 
     def plot(self, **options: Any) -> Any:

@@ -11,6 +11,7 @@ import numpy as np
 from filippov.analysis import Phase
 from filippov.cycles.motions import Array, Motions
 from filippov.errors import InputError, ModelError
+from filippov.scalars import positive
 
 __all__ = ["GivenPeriod", "InferredPeriod", "common_period", "depends_on_time", "forcing_of"]
 
@@ -49,6 +50,8 @@ class GivenPeriod:
     """A multiple of a period that the user gives: a number, or a function of parameters by their names."""
 
     def __init__(self, period: float | Callable[..., Any], multiple: int = 1) -> None:
+        if not callable(period):
+            period = positive("period", period)
         self.phase, self.multiple = Phase(period), multiple
 
     def near(self, duration: float) -> GivenPeriod:

@@ -12,9 +12,9 @@ import numpy as np
 
 from filippov.cycles.cycle import multipliers_of
 from filippov.cycles.cycle_curve import CycleCurve
-from filippov.cycles.equilibrium import EquilibriumCurve
 from filippov.cycles.motions import Array
 from filippov.cycles.probes import PLACES, probes_of
+from filippov.cycles.rest import EquilibriumCurve
 from filippov.cycles.shooting import Shot
 
 __all__ = ["singular_values_of", "tests_at"]

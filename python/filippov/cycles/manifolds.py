@@ -17,8 +17,8 @@ import numpy as np
 
 from filippov.backward import reversed_source
 from filippov.cycles.cycle import Cycle
-from filippov.cycles.equilibrium import Equilibrium
 from filippov.cycles.motions import Array
+from filippov.cycles.rest import Equilibrium
 from filippov.cycles.return_map import ReturnMap, Stuck
 from filippov.errors import InputError
 from filippov.scalars import positive

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from filippov.cycles.branch import Branch, Point, Special, State
-from filippov.cycles.continuation import at_value
 from filippov.cycles.cycle import Cycle
-from filippov.cycles.equilibrium import Equilibrium, EquilibriumCurve
+from filippov.cycles.following import at_value
 from filippov.cycles.forcing import GivenPeriod, InferredPeriod
 from filippov.cycles.itinerary import Ending, Itinerary, Leg
 from filippov.cycles.motions import Motions
+from filippov.cycles.rest import Equilibrium, EquilibriumCurve
 from filippov.cycles.shooting import Period, Shooting
 from filippov.errors import InputError
 from filippov.system import System

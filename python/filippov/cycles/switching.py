@@ -14,9 +14,9 @@ from filippov.cycles.boundary import beyond_boundary
 from filippov.cycles.branch import Special, State
 from filippov.cycles.cycle import Cycle
 from filippov.cycles.cycle_curve import CycleCurve
-from filippov.cycles.equilibrium import Equilibrium
 from filippov.cycles.itinerary import itinerary_from_event
 from filippov.cycles.motions import Array
+from filippov.cycles.rest import Equilibrium
 from filippov.cycles.shooting import Shooting
 from filippov.errors import InputError, ModelError
 

@@ -256,7 +256,7 @@ def differences(function: Callable[[Array], Array], w: Array, scale: Array, is_f
             columns.append((at(1) - at(-1)) / (2 * d))
     if not columns:
         return np.zeros((len(function(w)), 0))
-    return np.array(columns).T
+    return np.asarray(np.array(columns).T, dtype=np.float64)
 
 
 def equilibrium(

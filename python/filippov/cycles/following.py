@@ -16,11 +16,11 @@ from filippov.cycles.boundary import beyond_boundary
 from filippov.cycles.branch import CODES, Branch, Point, Special, State
 from filippov.cycles.cycle import Cycle, cycle_at, cycle_of
 from filippov.cycles.cycle_curve import CycleCurve
-from filippov.cycles.equilibrium import Equilibrium, EquilibriumCurve, rest_of
 from filippov.cycles.indicators import tests_at
 from filippov.cycles.itinerary import Itinerary
 from filippov.cycles.monitors import Monitor, monitors_of
 from filippov.cycles.motions import Array
+from filippov.cycles.rest import Equilibrium, EquilibriumCurve, rest_of
 from filippov.cycles.zero import zero_between
 from filippov.errors import InputError, ModelError
 from filippov.scalars import count, positive
@@ -115,7 +115,7 @@ def continuation(
     --------
     >>> import numpy as np, filippov as fl
     >>> fish = fl.System(lambda t, x, a=0.5: [x[0] * (1 - x[0]) - 0.2 * x[0] * (x[0] > a)], n=1)
-    >>> branch = fl.continuation(fl.equilibrium(fish, [0.7]), "a", (0.1, 1.0))
+    >>> branch = fl.continuation(fl.equilibrium(fish, [0.7]), "a", (0.1, 1.2))
     >>> [(point.code, round(point.params["a"], 9)) for point in branch.special["BE"]]
     [('BE', 0.8), ('BE', 1.0)]
     """
