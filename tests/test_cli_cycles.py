@@ -151,7 +151,7 @@ def test_a_stored_branch_is_read_again(model: Path) -> None:
         (["cycle", "model.py", "--param", "G=1"], "no parameter 'G'"),
         (["cycle", "model.py", "--period", "2*pi/w"], "--period: no parameter 'w'"),
         (["cycle", "model.py", "--period", "f(2)"], "--period: 'f(2)' has more than"),
-        (["cycle", "model.py", "--period", "-1"], "the period is a positive number"),
+        (["cycle", "model.py", "--period", "-1"], "a positive number is needed"),
         (["cycle", "model.py", "--transient", "-1"], "transient"),
         (["cycle", "model.py", "--phase", "y", "v"], "--phase: needs --plot"),
         (["cycle", "model.py", "--plot", "o.png", "--phase", "y"], "--phase: two states are needed, not 1"),

@@ -226,7 +226,8 @@ class Cycle:
         shooting = self._with_derivatives_by((name,))
         size, n, m = shooting.size, shooting.n, shooting.m
         jacobian = shooting.shoot(self._u).jacobian
-        du: Array = -np.linalg.solve(jacobian[:, :size], jacobian[:, size])
+        solved = np.linalg.solve(jacobian[:, :size], -jacobian[:, size])
+        du: Array = np.asarray(solved, dtype=np.float64)
         states, durations = du[: m * n].reshape(m, n), du[m * n : m * (n + 1)]
         since = float(du[m * (n + 1)]) if shooting.is_free_in_time else 0.0
         times = since + np.cumsum(durations)
