@@ -309,3 +309,77 @@ def test_branches_are_saved_and_go_on_from_any_point(tmp_path: Any) -> None:
     path.write_text("[1, 2]")
     with pytest.raises(fl.InputError, match=r"branch\.json"):
         fl.cycles.load_branch(path, system)
+
+
+def test_a_parameter_that_does_not_matter_gives_a_straight_branch() -> None:
+    def fun(t: float, x: Any, omega: float, q: float) -> list[Any]:
+        return [x[1], -x[0] + np.sin(omega * t) - 0.4 * np.sign(x[1]) + 0 * q]
+
+    system = fl.System(fun, n=2, params={"omega": 0.7, "q": 1.0})
+    branch = fl.continuation(fl.limit_cycle(system, [1.0, 2.0]), "q", (0.0, 2.0))
+    assert codes(branch) == ["EP", "EP"]
+    starts = np.array([point.state.at(0.0) for point in branch.points])
+    assert np.max(np.ptp(np.abs(starts), axis=0)) < 1e-10
+
+
+def relay_loop() -> fl.System:
+    return fl.System(
+        lambda t, x, k=1.0: [x[1], x[2], -2 * x[2] - 3 * x[1] - k * np.sign(x[0] + 0.2 * x[1])], n=3
+    )
+
+
+def belt() -> fl.System:
+    def fun(t: float, x: Any, vdr: float = 0.2, delta: float = 3.0) -> list[Any]:
+        slip = x[1] - vdr
+        return [x[1], -x[0] - np.sign(slip) / (1 + delta * abs(slip))]
+
+    return fl.System(fun, n=2)
+
+
+@pytest.mark.parametrize(
+    ("system", "start", "name", "bounds"),
+    [
+        (friction(omega=0.7), [1.0, 2.0], "omega", (0.3, 0.9)),
+        (belt(), [0.1, 0.0], "vdr", (0.1, 0.4)),
+        (relay_loop(), [0.1, 0.0, 0.0], "k", (0.5, 2.0)),
+        (harvest("harvest_cycle", alpha="0.6"), [0.19, 0.59], "alpha", (0.46, 0.8)),
+        (impacts("impact_fold", omega="1.6", s="-0.5"), [-0.499, 2.2], "omega", (1.3, 1.7)),
+    ],
+    ids=["friction", "belt", "relay", "harvest", "impact"],
+)
+def test_branches_agree_with_simulation(system: fl.System, start: Any, name: str, bounds: Any) -> None:
+    branch = fl.continuation(fl.limit_cycle(system, start), name, bounds)
+    values = branch.values(name)
+    for value_ in np.linspace(*bounds, 7)[1:-1]:
+        k = int(np.argmin(np.abs(values - value_)))
+        near = branch.points[k].state
+        if not near.is_stable:
+            continue
+        # A run from the stable cycle stays there, ..
+        cycle = branch.at(**{name: value_})
+        t, x = cycle.inside()
+        turns = 10
+        run = system.solve((t, t + turns * cycle.period), x, params={name: value_}, rtol=1e-11, atol=1e-12)
+        np.testing.assert_allclose(run.y[:, -1], x, atol=1e-6)
+        # .. and one from beside it comes back.
+        again = fl.limit_cycle(system, x * (1 + 1e-3), {name: value_}, t0=t if cycle.is_forced else 0.0)
+        assert abs(again.period - cycle.period) < 1e-8
+
+
+def test_an_interrupt_keeps_the_part_that_was_computed(tmp_path: Any) -> None:
+    calls = []
+
+    def slow(state: Any) -> float:
+        calls.append(1)
+        if len(calls) > 8:
+            raise KeyboardInterrupt
+        return 1.0
+
+    path = tmp_path / "part.json"
+    cycle = fl.limit_cycle(friction(omega=0.7), [1.0, 2.0])
+    with pytest.raises(KeyboardInterrupt) as caught:
+        fl.continuation(cycle, "omega", (0.6, 0.9), monitor={"slow": fl.cycles.of_state(slow)}, store=path)
+    partial = caught.value.partial  # type: ignore[attr-defined]
+    assert 2 < len(partial) < 12
+    assert "interrupted" in partial.reason
+    assert len(fl.cycles.load_branch(path, friction(omega=0.7))) == len(partial)

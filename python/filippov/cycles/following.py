@@ -13,7 +13,7 @@ import numpy as np
 
 from filippov.cycles.arclength import Step, corrected, tangent_of
 from filippov.cycles.boundary import beyond_boundary
-from filippov.cycles.branch import CODES, Branch, Point, Special, State
+from filippov.cycles.branch import CHANGES, CODES, Branch, Point, Special, State
 from filippov.cycles.cycle import Cycle, cycle_at, cycle_of
 from filippov.cycles.cycle_curve import CycleCurve
 from filippov.cycles.indicators import tests_at
@@ -31,8 +31,6 @@ __all__ = ["at_value", "continuation"]
 AnyCurve = CycleCurve | EquilibriumCurve
 
 _FIRST_STEP, _LONGEST_STEP, _SHORTEST_STEP = 0.01, 0.05, 1e-5
-# Codes at which the flow takes another itinerary.
-_CHANGES = ("CS", "SS", "GS", "AS", "GR", "BE")
 _WIDTH = 1e-13
 _SAVED_EVERY = 50
 
@@ -341,7 +339,7 @@ class _Side:
         for _, key, located in found:
             code = key[0]
             state = self.curve.state(located.w, located.error)
-            if code in _CHANGES and self.settings.switch != "ignore":
+            if code in CHANGES and self.settings.switch != "ignore":
                 if self.tests[key] < 0:
                     continue  # it becomes possible again: the flow does not follow it yet
                 self._add_located(key, state)
@@ -380,7 +378,7 @@ class _Side:
             zero_between(value, (0.0, self.tests[key]), (length, tests[key]), _WIDTH)
         except ModelError:
             # The equations are singular at a branch point: the point is as near as they can be solved.
-            if key[0] in _CHANGES or not nearest:
+            if key[0] in CHANGES or not nearest:
                 raise
         _, s, point = nearest[0]
         return s, key, point
@@ -412,7 +410,7 @@ class _Side:
         if code not in self.settings.detect:
             return
         surface, t = "", np.nan
-        if code in _CHANGES and key is not None:
+        if code in CHANGES and key is not None:
             place = key[1] if code == "BE" else (key[2][1] if key[2] is not None else -1)
             names = (
                 self.curve.shooting.motions.prepared.surfaces
@@ -497,7 +495,7 @@ class _Side:
         lost = [
             key
             for key in tests
-            if key[0] in _CHANGES and key in self.tests and tests[key] * self.tests[key] < 0
+            if key[0] in CHANGES and key in self.tests and tests[key] * self.tests[key] < 0
         ]
         if not lost:
             raise ModelError("nothing vanishes between the two itineraries")

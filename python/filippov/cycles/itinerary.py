@@ -181,7 +181,7 @@ def _place_in(record: Record, earlier: Sequence[Instant], t: float) -> Instant:
     mode = earlier[-1].modes[1] if earlier else record.mode
     q = earlier[-1].discrete[1] if earlier else record.discrete
     assert record.solution.sol is not None
-    x = record.solution.sol(t)
+    x = record.solution.sol(max(t, float(record.solution.t[0])))
     return Instant((t, t), (x, x), (mode, mode), (q, q), (), ())
 
 
