@@ -212,7 +212,7 @@ def _key(
     if source.signed is not None:  # built once for a System, around functions of this package
         return None
     resets = [reset.parts() for reset in source.resets]
-    read = fingerprint(source.fun, source.args, source.surfaces, resets)
+    read = fingerprint(source.fun, source.args, source.surfaces, resets, source.beside)
     if read is None:
         return None
     return n, tuple(values), source.discrete, source.root_ends, states and tuple(states), read
@@ -243,6 +243,7 @@ def _trace(
         states=states,
         discrete=source.discrete,
         root_ends=source.root_ends,
+        beside=[selective(g, values) for g in source.beside],
     )
 
 

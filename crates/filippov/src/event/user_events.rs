@@ -25,6 +25,10 @@ pub(crate) struct UserEvents<'a> {
     pub sides: Vec<f64>,
     /// The same of the step that is searched.
     pub found_sides: RefCell<Vec<f64>>,
+    /// Discrete states, as they were when the motion began.
+    q: Vec<f64>,
+    /// Have discrete states changed where the motion began, so that every function may jump there?
+    pub may_have_jumped: bool,
     /// Time of the last zero, per event: divided out while it is the start of the search.
     pub last: Vec<f64>,
     pub zeros: Vec<Vec<UserZero>>,
@@ -45,6 +49,8 @@ impl<'a> UserEvents<'a> {
             left: vec![f64::NAN; d],
             sides: vec![0.0; d],
             found_sides: RefCell::new(vec![0.0; d]),
+            q: Vec::new(),
+            may_have_jumped: false,
             before: vec![f64::NAN; d],
             last: vec![f64::NAN; d],
             zeros: vec![Vec::new(); d],
@@ -58,11 +64,16 @@ impl<'a> UserEvents<'a> {
         for (event, left) in self.events.iter().zip(&mut self.left) {
             *left = event.function.value(t, x, q)?;
         }
+        if self.q != q {
+            self.may_have_jumped = true;
+            self.q = q.to_vec();
+        }
         Ok(())
     }
 
     /// Keeps the signs that the search of the accepted step found.
     pub fn accept_sides(&mut self) {
+        self.may_have_jumped = false;
         self.sides.copy_from_slice(&self.found_sides.borrow());
     }
 

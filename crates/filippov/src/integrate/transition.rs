@@ -756,6 +756,7 @@ impl<'a> Integrator<'a> {
         } else {
             self.run.x = x;
             self.recorder.jump(self.run.t, &self.run.x);
+            self.recorder.user_events.forget_sides();
         }
         self.run.stats.n_switches += 1;
         let passed = match surfaces[..] {

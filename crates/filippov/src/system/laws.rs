@@ -20,6 +20,7 @@ use std::sync::Arc;
 use filippov_expr::{Backend, ExprError, Graph, Node, NodeId, Program, Wrt};
 use smallvec::{smallvec, SmallVec};
 
+use super::readers::Reader;
 use super::{PiecewiseSystem, Setting, TracedSystem};
 use crate::error::FieldError;
 use crate::switch::Kind;
@@ -133,15 +134,17 @@ impl Law {
         }
     }
 
-    /// The surface at which the discrete state changes, if it is a function of the point: it need not be watched where
-    /// nothing reads it.
-    pub(crate) fn guard_without_memory(&self) -> Option<usize> {
+    /// Does the discrete state depend on the past, beside the point?
+    pub(crate) fn has_memory(&self) -> bool {
+        matches!(self, Law::Hysteresis { .. } | Law::Named { .. })
+    }
+
+    /// The surface at which the discrete state changes.
+    pub(crate) fn guard(&self) -> Option<usize> {
         match *self {
-            Law::Level { guard, .. } => Some(guard),
+            Law::Level { guard, .. } | Law::Hysteresis { guard, .. } => Some(guard),
             Law::Piece { guard, .. } => guard,
-            Law::Clock { .. } | Law::Held { .. } | Law::Hysteresis { .. } | Law::Named { .. } => {
-                None
-            }
+            Law::Clock { .. } | Law::Held { .. } | Law::Named { .. } => None,
         }
     }
 
@@ -176,6 +179,8 @@ pub struct Laws {
     reads: Vec<Option<usize>>,
     /// So many of the first are named.
     n_named: usize,
+    /// Who reads the discrete states.
+    readers: Vec<Reader>,
 }
 
 /// What triggers a change of a discrete state, what it does, and how it is recorded.
@@ -186,7 +191,8 @@ pub struct LawAction {
     pub map: LawMap,
     /// The index of the discrete state.
     pub index: usize,
-    /// The kind of switch; none where only the way changes in which the same field is written.
+    /// The kind of switch; none where only the way changes in which the same field is written, or where the field does not
+    /// read the discrete state.
     pub kind: Option<Kind>,
 }
 
@@ -200,11 +206,15 @@ pub struct LawMap {
 }
 
 impl Laws {
-    /// The laws of the discrete states of a graph, in their order.
+    /// The laws of the discrete states of a graph, in their order, and who reads these.
     ///
     /// # Errors
     /// If an expression cannot be compiled.
-    pub fn new(graph: &Graph, laws: Vec<Law>) -> Result<Self, ExprError> {
+    pub(super) fn new(
+        graph: &Graph,
+        laws: Vec<Law>,
+        readers: Vec<Reader>,
+    ) -> Result<Self, ExprError> {
         let mut graph = graph.clone();
         let expressions = laws.iter().flat_map(|law| law.expressions(&mut graph));
         let expressions: Vec<NodeId> = expressions.collect();
@@ -226,6 +236,7 @@ impl Laws {
             n_named: n_named(&laws),
             laws,
             program,
+            readers,
         })
     }
 
@@ -237,6 +248,16 @@ impl Laws {
     /// How many discrete states are named: the first ones.
     pub fn n_named(&self) -> usize {
         self.n_named
+    }
+
+    /// The indices of the laws that a run does not follow, since nobody reads their discrete states.
+    pub fn idle(&self) -> Vec<usize> {
+        let indices = 0..self.laws.len();
+        indices.filter(|&index| self.is_idle(index)).collect()
+    }
+
+    fn is_idle(&self, index: usize) -> bool {
+        self.readers[index] == Reader::Nobody
     }
 
     fn eval(&self, t: f64, x: &[f64], signs: &[f64], parameters: &[f64], q: &[f64]) -> Vec<f64> {
@@ -254,16 +275,42 @@ impl Laws {
     /// If a function of the user raises.
     pub fn start(&self, system: &TracedSystem, t: f64, x: &[f64]) -> Result<Vec<f64>, FieldError> {
         let mut q = vec![0.0; self.laws.len()];
-        if q.is_empty() {
-            return Ok(q);
+        let all: Vec<usize> = (0..q.len()).collect();
+        self.settle(system, (t, x), &all, &mut q)?;
+        Ok(q)
+    }
+
+    /// Brings the discrete states that a run does not follow up to date with a point of it.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn follow_idle(
+        &self,
+        system: &TracedSystem,
+        (t, x): (f64, &[f64]),
+        q: &mut [f64],
+    ) -> Result<(), FieldError> {
+        self.settle(system, (t, x), &self.idle(), q)
+    }
+
+    /// Sets some discrete states to what they are at a start at (t, x).
+    fn settle(
+        &self,
+        system: &TracedSystem,
+        (t, x): (f64, &[f64]),
+        indices: &[usize],
+        q: &mut [f64],
+    ) -> Result<(), FieldError> {
+        if indices.is_empty() {
+            return Ok(());
         }
         let mut signs = vec![1.0; system.n_surfaces()];
         let mut h = signs.clone();
         // Expressions may contain discrete states and signs of others.
         for _ in 0..=q.len() + signs.len() {
-            let before = (q.clone(), signs.clone());
-            for index in 0..q.len() {
-                let out = self.eval(t, x, &signs, system.parameters(), &q);
+            let before = (q.to_vec(), signs.clone());
+            for &index in indices {
+                let out = self.eval(t, x, &signs, system.parameters(), q);
                 let values = [out[3 * index], out[3 * index + 1], out[3 * index + 2]];
                 q[index] = match &self.laws[index] {
                     Law::Clock { .. } => self.ticking(index, x.len(), system.parameters()).start(t),
@@ -277,14 +324,14 @@ impl Laws {
                     Law::Hysteresis { initial, .. } => relay(values, *initial),
                 };
             }
-            system.surfaces(&Setting::new(&signs, &q).at(t, x), &mut h)?;
+            system.surfaces(&Setting::new(&signs, q).at(t, x), &mut h)?;
             let sides = h.iter().map(|&h| if h < 0.0 { -1.0 } else { 1.0 });
             signs = sides.collect();
-            if before == (q.clone(), signs.clone()) {
+            if before.0 == q && before.1 == signs {
                 break;
             }
         }
-        Ok(q)
+        Ok(())
     }
 
     /// The actions that change the discrete states in a run with these parameters.
@@ -297,8 +344,10 @@ impl Laws {
         };
         let follows_jumps =
             |(index, law): (usize, &Law)| matches!(law, Law::Held { .. }) && !follows_law(index);
-        let first_held = self.laws.iter().enumerate().position(follows_jumps);
-        for (index, law) in self.laws.iter().enumerate() {
+        let followed = || (0..self.laws.len()).filter(|&index| !self.is_idle(index));
+        let first_held = followed().find(|&index| follows_jumps((index, &self.laws[index])));
+        for index in followed() {
+            let law = &self.laws[index];
             let mut step = 0.0;
             let (trigger, kind) = match *law {
                 Law::Named { .. } => continue,
@@ -329,6 +378,7 @@ impl Laws {
                 Law::Level { guard, .. } => (falling(guard), None),
                 Law::Hysteresis { guard, .. } => (falling(guard), Some(Kind::Reset)),
             };
+            let kind = kind.filter(|_| self.readers[index] == Reader::System);
             actions.push(LawAction {
                 trigger,
                 map: LawMap {
@@ -527,6 +577,9 @@ impl LawMap {
             let Law::Held { step, .. } = law else {
                 continue;
             };
+            if self.laws.is_idle(k) {
+                continue;
+            }
             let discrete = self.laws.reads[k].and_then(|p| p.checked_sub(self.parameters.len()));
             let value = match discrete {
                 Some(read) => q[read],

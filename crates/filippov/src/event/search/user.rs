@@ -80,6 +80,8 @@ struct AtStart {
     before: f64,
     /// The function is zero there, and it has been said.
     is_known_zero: bool,
+    /// May the function, smooth as it is, have jumped there?
+    may_have_jumped: bool,
 }
 
 impl StepSearch<'_, '_> {
@@ -152,6 +154,7 @@ impl StepSearch<'_, '_> {
         let mut start = AtStart {
             before: side(left),
             is_known_zero: left == 0.0 || was_zero,
+            may_have_jumped: false,
         };
         let Some(parts) = function.parts() else {
             let along = Source::Sampled(function);
@@ -159,7 +162,8 @@ impl StepSearch<'_, '_> {
             return Ok(changes.map(|found| found.0));
         };
         let mut cuts = Cuts::none(parts.n_inner());
-        if parts.n_inner() > 0 {
+        start.may_have_jumped = events.may_have_jumped;
+        if parts.n_inner() > 0 || events.may_have_jumped {
             // At a kink or a jump rounding decides what the value there is: what counts is the piece before.
             start.is_known_zero = was_zero;
             start.before = match events.sides[index] {
@@ -193,6 +197,7 @@ impl StepSearch<'_, '_> {
         let nothing = AtStart {
             before: 0.0,
             is_known_zero: false,
+            may_have_jumped: false,
         };
         let mut ignored = Vec::new();
         let along = Along::new(source, &cuts.start, self);
@@ -201,6 +206,7 @@ impl StepSearch<'_, '_> {
         let known = AtStart {
             before: start.sign,
             is_known_zero: start.divided,
+            may_have_jumped: false,
         };
         let Some((changes, _)) = self.changes_along(source, cuts, theta, known)? else {
             return Ok(false);
@@ -261,7 +267,7 @@ impl StepSearch<'_, '_> {
         for to in cuts.ends(theta) {
             let signs = cuts.signs_behind(from);
             let along = Along::new(source, &signs, self);
-            let mut start = match along.is_smooth() {
+            let mut start = match along.is_smooth() && !before.may_have_jumped {
                 true => Start {
                     from,
                     divided: before.is_known_zero,
@@ -276,6 +282,7 @@ impl StepSearch<'_, '_> {
             before = AtStart {
                 before: start.sign,
                 is_known_zero: false,
+                may_have_jumped: false,
             };
             from = to;
         }
