@@ -65,8 +65,7 @@ def sampled(what: str, kink: str) -> str:
     """Return the warning for a function that has no bounds because of a kink."""
     return (
         f"{what} is sampled: it has {kink}. Its zeros are located, but two of them that are close together "
-        "within a step may both be missed; a small max_step makes it less likely. A floor or relay that the "
-        "right-hand side has, too, is followed"
+        "within a step may both be missed; a small max_step makes it less likely"
     )
 
 

@@ -79,7 +79,7 @@ class Laws:
 
     Attributes
     ----------
-    beside : set of int
+    kept : set of int
         Laws that functions beside the field read.
     idle : frozenset of int
         Laws that a run does not follow, since nothing reads them.
@@ -97,7 +97,7 @@ class Laws:
         self._entries: dict[int, tuple[int, _Law]] = {}
         self._values: list[str] = []
         self._is_complete = False
-        self.beside: set[int] = set()
+        self.kept: set[int] = set()
         self.idle: frozenset[int] = frozenset()
 
     def copy(self) -> Laws:
@@ -118,7 +118,7 @@ class Laws:
                 break  # those behind it may read it
             kept = tuple(node for node in nodes if node is not None)
             self._state(tracer, law._replace(nodes=kept), found.names[index])
-        self.beside |= {index for index in other.laws_read if index < len(self._laws)}
+        self.kept |= {index for index in other.laws_read if index < len(self._laws)}
 
     def name(self, tracer: Tracer, name: str, initial: int) -> None:
         """Add a discrete state that begins as an expression and that resets set; before all other laws."""

@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Trace", "trace", "trace_beside", "trace_event", "trace_output"]
 
-# What a warning says of an event with a law that the field has not.
-OWN_LAW = "a floor, a relay or a table of its own"
+# What a warning says of an event or a section with a law that the run does not follow.
+OWN_LAW = "a floor, a relay or a table that the run does not follow"
 
 Vector = NDArray[np.float64]
 _T = TypeVar("_T")
@@ -426,7 +426,7 @@ def _system(tracer: Tracer, field: list[int], watched: Sequence[int] = ()) -> Tr
         laws.rows,
         laws.n_guards,
         list(laws.sticking.items()),
-        sorted(laws.beside),
+        sorted(laws.kept),
     )
 
 

@@ -27,7 +27,9 @@ pub(crate) struct UserEvents<'a> {
     pub found_sides: RefCell<Vec<f64>>,
     /// Discrete states, as they were when the motion began.
     q: Vec<f64>,
-    /// Have discrete states changed where the motion began, so that every function may jump there?
+    /// Do discrete states change at the end of the step that is searched, and no state?
+    pub ends_at_law: bool,
+    /// Have they changed where the motion began? Every function may have jumped there.
     pub may_have_jumped: bool,
     /// Time of the last zero, per event: divided out while it is the start of the search.
     pub last: Vec<f64>,
@@ -50,6 +52,7 @@ impl<'a> UserEvents<'a> {
             sides: vec![0.0; d],
             found_sides: RefCell::new(vec![0.0; d]),
             q: Vec::new(),
+            ends_at_law: false,
             may_have_jumped: false,
             before: vec![f64::NAN; d],
             last: vec![f64::NAN; d],
@@ -64,10 +67,9 @@ impl<'a> UserEvents<'a> {
         for (event, left) in self.events.iter().zip(&mut self.left) {
             *left = event.function.value(t, x, q)?;
         }
-        if self.q != q {
-            self.may_have_jumped = true;
-            self.q = q.to_vec();
-        }
+        self.may_have_jumped = self.ends_at_law || self.q != q;
+        self.q.clear();
+        self.q.extend_from_slice(q);
         Ok(())
     }
 

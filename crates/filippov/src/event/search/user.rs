@@ -44,6 +44,8 @@ struct Cuts {
     start: Signs,
     /// (theta, index of the sign, sign after), in order of theta.
     changes: SmallVec<[(f64, usize, f64); 4]>,
+    /// May the function jump at the end of the step, with discrete states? The next step tells.
+    ends_with_one: bool,
 }
 
 impl Cuts {
@@ -164,12 +166,9 @@ impl StepSearch<'_, '_> {
         let mut cuts = Cuts::none(parts.n_inner());
         start.may_have_jumped = events.may_have_jumped;
         if parts.n_inner() > 0 || events.may_have_jumped {
-            // At a kink or a jump rounding decides what the value there is: what counts is the piece before.
+            // At a kink or a jump rounding decides what the value there is: what counts is the piece before, if there is one.
             start.is_known_zero = was_zero;
-            start.before = match events.sides[index] {
-                0.0 => sign_of(left),
-                side => side,
-            };
+            start.before = events.sides[index];
         }
         for part in 0..parts.n_inner() {
             if !self.add_cuts(parts, part, &mut cuts, theta)? {
@@ -177,6 +176,7 @@ impl StepSearch<'_, '_> {
             }
         }
         let whole = Source::Part(parts, parts.n_inner());
+        cuts.ends_with_one = events.ends_at_law;
         let changes = self.changes_along(whole, &cuts, theta, start)?;
         if let Some((_, side)) = &changes {
             events.found_sides.borrow_mut()[index] = *side;
@@ -275,7 +275,7 @@ impl StepSearch<'_, '_> {
                 },
                 false => self.enter(&along, (from, to), before, &mut changes)?,
             };
-            let kink = to < theta || cuts.has_change_from(theta - together);
+            let kink = to < theta || cuts.ends_with_one || cuts.has_change_from(theta - together);
             if !self.search_piece_of(&along, &mut start, (to, theta, kink), &mut changes)? {
                 return Ok(None);
             }
@@ -444,6 +444,7 @@ impl Cuts {
         Cuts {
             start: smallvec![0.0; n],
             changes: SmallVec::new(),
+            ends_with_one: false,
         }
     }
 }
