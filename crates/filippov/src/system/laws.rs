@@ -260,10 +260,18 @@ impl Laws {
         self.readers[index] == Reader::Nobody
     }
 
-    fn eval(&self, t: f64, x: &[f64], signs: &[f64], parameters: &[f64], q: &[f64]) -> Vec<f64> {
-        let mut out = vec![0.0; 3 * self.laws.len()];
+    fn eval(
+        &self,
+        t: f64,
+        x: &[f64],
+        signs: &[f64],
+        parameters: &[f64],
+        q: &[f64],
+    ) -> SmallVec<[f64; 16]> {
+        let mut out = SmallVec::from_elem(0.0, 3 * self.laws.len());
         if let Some(program) = &self.program {
-            let all: Vec<f64> = parameters.iter().chain(q).copied().collect();
+            let mut all: SmallVec<[f64; 16]> = SmallVec::from_slice(parameters);
+            all.extend_from_slice(q);
             program.eval(t, x, signs, &all, &[], &mut out);
         }
         out
@@ -458,6 +466,19 @@ fn passed(knots: &[f64], g: f64, rate: f64) -> f64 {
     knots.partition_point(|&knot| knot <= g + beside) as f64
 }
 
+/// The same, looked for at the knot behind `before` first.
+fn passed_from(knots: &[f64], before: f64, g: f64, rate: f64) -> f64 {
+    let next = before + if rate < 0.0 { -1.0 } else { 1.0 };
+    let beside = SAME_NUMBER * (1.0 + g.abs()) * if rate < 0.0 { -1.0 } else { 1.0 };
+    let is_passed = |place: usize| knots.get(place).is_some_and(|&knot| knot <= g + beside);
+    let is_next =
+        next >= 0.0 && !is_passed(next as usize) && (next == 0.0 || is_passed(next as usize - 1));
+    match is_next {
+        true => next,
+        false => passed(knots, g, rate),
+    }
+}
+
 /// The piece that g has come to from `piece`: at an end of it the one beyond.
 fn piece_beyond(knots: &[f64], piece: f64, g: f64) -> f64 {
     let below = (piece as usize).checked_sub(1).map(|k| knots[k]);
@@ -531,7 +552,7 @@ impl ActionMap for LawMap {
                 let g = out[3 * index];
                 q[index] = match guard {
                     Some(_) => piece_beyond(knots, q[index], g),
-                    None => passed(knots, g, out[3 * index + 1]),
+                    None => passed_from(knots, q[index], g, out[3 * index + 1]),
                 };
             }
             Law::Level { .. } => {
