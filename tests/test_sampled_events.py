@@ -1,4 +1,4 @@
-"""Events with a relay or a table of what may bend or end, and sections with a floor, are said to be sampled."""
+"""Events with a relay or a table of what may bend or end, and sections with a floor, are sampled."""
 
 from __future__ import annotations
 

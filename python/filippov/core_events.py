@@ -35,7 +35,7 @@ def core_events(
 ) -> tuple[Prepared, list[CoreEvent]]:
     """Turn events into nodes of the traced system where possible, else keep them as functions.
 
-    Without a `system` (time runs backward) events with tables and relays of their own are called as functions.
+    Without a `system`, while time runs backward, events with tables and relays of their own are called.
 
     Returns
     -------
@@ -54,10 +54,12 @@ def core_events(
             found = [_traced(prepared, spec, t0, y0, args, values) for spec in specs]
     events: list[CoreEvent] = []
     for index, (spec, g, traced) in enumerate(zip(specs, functions, found, strict=True)):
-        is_traced = isinstance(traced, TracedEvent)
-        if traced and not is_traced:
-            warn_user([sampled(f"events: entry {index} ({spec.name})", str(traced))])
-        events.append((traced if is_traced else g, spec.direction, spec.terminal, spec.name))
+        if isinstance(traced, TracedEvent):
+            events.append((traced, spec.direction, spec.terminal, spec.name))
+            continue
+        if traced:
+            warn_user([sampled(f"events: entry {index} ({spec.name})", traced)])
+        events.append((g, spec.direction, spec.terminal, spec.name))
     return prepared, events
 
 

@@ -109,7 +109,7 @@ class Laws:
         return new
 
     def adopt(self, tracer: Tracer, other: Tracer) -> None:
-        """Add the laws of a function that is traced beside the field with a copy of these, and keep what it reads."""
+        """Add the laws that a function beside the field found with a copy of these; those that it reads are kept."""
         found = other.laws
         for index in range(len(self._laws), len(found._laws)):
             law = found._laws[index]

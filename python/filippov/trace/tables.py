@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from filippov.errors import ModelError
 from filippov.trace.explain import NotTraceable, calling_line
-from filippov.trace.pieces import by_parts, has_constant_part
+from filippov.trace.pieces import Pieces, by_parts, has_constant_part
 from filippov.trace.ufuncs import choose
 
 if TYPE_CHECKING:
@@ -242,7 +242,7 @@ def _stands_still_or_ticks(tracer: Tracer, node: int) -> bool:
 def _has_own_parts(tracer: Tracer, node: int, pieces: Pieces) -> bool:
     """Whether each part of an expression has a place of its own in a table.
 
-    A place follows what moves continuously. That of an event follows what is smooth: no mode of the run reads it.
+    A place follows what moves continuously. That of an event follows what is smooth: no mode reads it.
     """
     return not tracer.may_slide or has_constant_part(tracer, pieces) or tracer.jumps(node)
 

@@ -5,8 +5,8 @@ use filippov_expr::container::{Container, Tag, Writer};
 use filippov_expr::{Backend, Graph, Lengths, Names, Node, NodeId};
 
 use super::compiled::Follower;
-use super::laws::n_named;
-use super::readers::Reader;
+use super::laws::{n_named, Reader};
+use super::readers::readers;
 use super::{Law, Laws, PiecewiseSystem, Step, TracedSystem};
 use crate::error::Error;
 
@@ -163,7 +163,7 @@ impl Definition {
     pub fn build(self, backend: Backend) -> Result<(TracedSystem, Laws), Error> {
         self.check()?;
         let zeros = vec![0.0; self.n_parameters()];
-        let readers = self.rules.readers(&self.graph, &self.field, zeros.len());
+        let readers = self.readers();
         let Rules {
             mut watched,
             laws,
@@ -187,6 +187,22 @@ impl Definition {
             .watching_with_followers(&watched, followers)
             .sticking(&sticking);
         Ok((system.with_discrete(n_laws), laws))
+    }
+
+    /// Who reads the discrete state of each law.
+    fn readers(&self) -> Vec<Reader> {
+        let rules = &self.rules;
+        let n_moving = self.graph.n_surfaces() - rules.n_hidden;
+        let surfaces = (0..n_moving).map(|j| self.graph.surface(j as u32));
+        let ratios = rules.sticking.iter().map(|&(_, ratio)| ratio);
+        let field = self.field.iter().copied();
+        readers(
+            &self.graph,
+            field.chain(surfaces).chain(ratios).collect(),
+            &rules.laws,
+            &rules.beside,
+            self.n_parameters(),
+        )
     }
 
     fn check_nodes(&self, nodes: &[NodeId]) -> Result<(), Error> {

@@ -20,7 +20,6 @@ use std::sync::Arc;
 use filippov_expr::{Backend, ExprError, Graph, Node, NodeId, Program, Wrt};
 use smallvec::{smallvec, SmallVec};
 
-use super::readers::Reader;
 use super::{PiecewiseSystem, Setting, TracedSystem};
 use crate::error::FieldError;
 use crate::switch::Kind;
@@ -168,6 +167,17 @@ impl Law {
             } => [argument, low, high],
         }
     }
+}
+
+/// Who reads the discrete state of a law.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Reader {
+    /// The field, or a switching function.
+    System,
+    /// At most functions beside the field. A law with a memory is followed for these in any case.
+    Beside,
+    /// Nobody. The discrete state is a function of the point, so that a run need not change it.
+    Nobody,
 }
 
 /// The laws of a system, one per discrete state.

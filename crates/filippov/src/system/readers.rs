@@ -1,91 +1,70 @@
-//! Who reads the discrete states of a system, and so which laws a run follows.
+//! Which laws of a system a run follows: those whose discrete states something reads.
 
 use filippov_expr::{Graph, NodeId};
 
-use super::{Law, Rules};
+use super::laws::{Law, Reader};
 
-/// Who reads the discrete state of a law.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Reader {
-    /// The field, or a switching function.
-    System,
-    /// At most functions beside the field. A law with a memory is followed for these in any case.
-    Beside,
-    /// Nobody. The discrete state is a function of the point, so that a run need not change it.
-    Nobody,
+/// Who reads the discrete state of each law, where the field, the switching functions and the ratios of friction are `roots`, and
+/// other functions read the laws in `beside`.
+pub(super) fn readers(
+    graph: &Graph,
+    roots: Vec<NodeId>,
+    laws: &[Law],
+    beside: &[usize],
+    n_parameters: usize,
+) -> Vec<Reader> {
+    let mut search = Search {
+        graph,
+        roots,
+        laws,
+        n_parameters,
+        readers: vec![Reader::Nobody; laws.len()],
+    };
+    search.mark(Reader::System);
+    for (index, law) in laws.iter().enumerate() {
+        if law.has_memory() || beside.contains(&index) {
+            search.add(index, Reader::Beside);
+        }
+    }
+    search.mark(Reader::Beside);
+    search.readers
 }
 
-impl Rules {
-    /// Who reads the discrete state of each law, in a system with this field and `n_parameters` parameters.
-    pub(super) fn readers(
-        &self,
-        graph: &Graph,
-        field: &[NodeId],
-        n_parameters: usize,
-    ) -> Vec<Reader> {
-        let n_moving = graph.n_surfaces() - self.n_hidden;
-        let surfaces = (0..n_moving).map(|j| graph.surface(j as u32));
-        let ratios = self.sticking.iter().map(|&(_, ratio)| ratio);
-        let mut roots: Vec<NodeId> = field
-            .iter()
-            .copied()
-            .chain(surfaces)
-            .chain(ratios)
-            .collect();
-        let mut readers = vec![Reader::Nobody; self.laws.len()];
-        self.mark(
-            graph,
-            &mut roots,
-            n_parameters,
-            &mut readers,
-            Reader::System,
-        );
-        for (index, law) in self.laws.iter().enumerate() {
-            let is_kept = law.has_memory() || self.beside.contains(&index);
-            if is_kept && readers[index] == Reader::Nobody {
-                readers[index] = Reader::Beside;
-                self.add_expressions(graph, law, &mut roots);
-            }
-        }
-        self.mark(
-            graph,
-            &mut roots,
-            n_parameters,
-            &mut readers,
-            Reader::Beside,
-        );
-        readers
-    }
+/// Expressions whose discrete states are looked for, and the laws found so far.
+struct Search<'a> {
+    graph: &'a Graph,
+    roots: Vec<NodeId>,
+    laws: &'a [Law],
+    n_parameters: usize,
+    readers: Vec<Reader>,
+}
 
-    /// Marks the laws whose discrete states some expressions read, and those that these laws read.
-    fn mark(
-        &self,
-        graph: &Graph,
-        roots: &mut Vec<NodeId>,
-        n_parameters: usize,
-        readers: &mut [Reader],
-        reader: Reader,
-    ) {
+impl Search<'_> {
+    /// Marks the laws whose discrete states the expressions read, and those that these laws read.
+    fn mark(&mut self, reader: Reader) {
         loop {
-            let n_before = roots.len();
-            for parameter in graph.parameters_read_at(roots, &[]) {
-                let Some(index) = (parameter as usize).checked_sub(n_parameters) else {
-                    continue;
-                };
-                if readers[index] == Reader::Nobody {
-                    readers[index] = reader;
-                    self.add_expressions(graph, &self.laws[index], roots);
+            let n_before = self.roots.len();
+            for parameter in self.graph.parameters_read_at(&self.roots, &[]) {
+                if let Some(index) = (parameter as usize).checked_sub(self.n_parameters) {
+                    self.add(index, reader);
                 }
             }
-            if roots.len() == n_before {
+            if self.roots.len() == n_before {
                 return;
             }
         }
     }
 
-    /// Adds the expressions that a law follows, and the function of the surface at which it changes.
-    fn add_expressions(&self, graph: &Graph, law: &Law, roots: &mut Vec<NodeId>) {
-        roots.extend(law.nodes());
-        roots.extend(law.guard().map(|guard| graph.surface(guard as u32)));
+    /// Marks a law that is not marked yet, and adds the expressions that it follows and the function of the surface at which it
+    /// changes.
+    fn add(&mut self, index: usize, reader: Reader) {
+        if self.readers[index] != Reader::Nobody {
+            return;
+        }
+        let law = &self.laws[index];
+        self.readers[index] = reader;
+        self.roots.extend(law.nodes());
+        let guard = law.guard().map(|guard| self.graph.surface(guard as u32));
+        self.roots.extend(guard);
     }
 }
