@@ -109,7 +109,7 @@ class Laws:
         return new
 
     def adopt(self, tracer: Tracer, other: Tracer) -> None:
-        """Add the laws that a function beside the field found with a copy of these; those that it reads are kept."""
+        """Add the laws that a function beside the field found with a copy of these; keep those it reads."""
         found = other.laws
         for index in range(len(self._laws), len(found._laws)):
             law = found._laws[index]
