@@ -73,6 +73,35 @@ def test_no_zero_of_a_narrow_table_is_lost() -> None:
     np.testing.assert_allclose(places, np.repeat([0.5e-6, 1.5e-6], int(passed)), rtol=0, atol=1e-8)
 
 
+def nested(value: Any, knots: Any, values: Any) -> Any:
+    """Return a table as choices in one another, which have bounds of their own."""
+    result = values[0] + 0.0 * value
+    for k in range(len(knots) - 1):
+        slope = (values[k + 1] - values[k]) / (knots[k + 1] - knots[k])
+        result = np.where(value > knots[k], values[k] + slope * (value - knots[k]), result)
+    return np.where(value > knots[-1], values[-1], result)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_random_tables_are_nested_choices(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    place = [lambda t, x: t, lambda t, x: x[0], lambda t, x: abs(x[0]), lambda t, x: x[0] - 0.3 * x[1]][
+        seed % 4
+    ]
+    knots = np.sort(rng.uniform(*((0.0, 10.0) if seed % 4 == 0 else (-1.3, 1.3)), rng.integers(2, 8)))
+    values, friction, slope = rng.uniform(-1, 1, len(knots)), rng.choice([0.0, 0.2]), rng.uniform(-0.5, 0.5)
+    fun = lambda t, x: [x[1], -1.2 * x[0] - friction * np.sign(x[1])]  # noqa: E731
+    options = {"method": rng.choice(["auto", "DOPRI5", "DOP853", "Rodas5P"]), "rtol": 1e-9, "atol": 1e-11}
+    table, choices = (
+        fl.solve_ivp(fun, (0, 10), [1.0, 0.2], events=event, **options).t_events[0]
+        for event in (
+            lambda t, x: np.interp(place(t, x), knots, values) + slope * x[1],
+            lambda t, x: nested(place(t, x), knots, values) + slope * x[1],
+        )
+    )
+    np.testing.assert_allclose(table, choices, rtol=0, atol=1e-6)
+
+
 def test_a_relay_remembers_and_is_no_switch() -> None:
     relay = lambda t, x: fl.hysteresis(x[0], -0.5, 0.5)  # noqa: E731
     sol = fl.solve_ivp(oscillator, (0, 9), [1.0, 0.0], events=relay, rtol=1e-10, atol=1e-12)
