@@ -211,8 +211,8 @@ pub struct LawMap {
     laws: Arc<Laws>,
     parameters: Vec<f64>,
     index: usize,
-    /// What a clock adds.
-    step: f64,
+    /// What a law of the time alone follows.
+    ticking: Ticking,
 }
 
 impl Laws {
@@ -366,7 +366,7 @@ impl Laws {
         let first_held = followed().find(|&index| follows_jumps((index, &self.laws[index])));
         for index in followed() {
             let law = &self.laws[index];
-            let mut step = 0.0;
+            let mut ticking = Ticking::default();
             let (trigger, kind) = match *law {
                 Law::Named { .. } => continue,
                 // One action brings all of them up to date.
@@ -378,15 +378,14 @@ impl Laws {
                     guard: Some(guard), ..
                 } => (falling(guard), None),
                 Law::Piece { ref knots, .. } => {
-                    let ticking = self.ticking(index, n_states, parameters);
+                    ticking = self.ticking(index, n_states, parameters);
                     (Trigger::Times(ticking.times(knots)), None)
                 }
                 Law::Clock { .. } => {
-                    let ticking = self.ticking(index, n_states, parameters);
+                    ticking = self.ticking(index, n_states, parameters);
                     let Some(clock) = ticking.clock() else {
                         continue;
                     };
-                    step = ticking.rate.signum();
                     let trigger = Trigger::Clock {
                         clock,
                         at_start: false,
@@ -403,7 +402,7 @@ impl Laws {
                     laws: Arc::clone(self),
                     parameters: parameters.to_vec(),
                     index,
-                    step,
+                    ticking,
                 },
                 index,
                 kind,
@@ -429,7 +428,7 @@ impl Laws {
 }
 
 /// The function offset + rate t, whose floor is wanted.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 struct Ticking {
     offset: f64,
     rate: f64,
@@ -554,16 +553,18 @@ impl ActionMap for LawMap {
     fn apply(&self, t: f64, x: &mut [f64], signs: &[f64], q: &mut [f64]) -> Result<(), FieldError> {
         let index = self.index;
         match &self.laws.laws[index] {
-            Law::Clock { .. } => q[index] += self.step,
+            Law::Clock { .. } => q[index] += self.ticking.rate.signum(),
             Law::Hysteresis { .. } => q[index] = -q[index],
             Law::Held { .. } | Law::Named { .. } => {}
-            Law::Piece { knots, guard, .. } => {
+            Law::Piece {
+                knots, guard: None, ..
+            } => {
+                let Ticking { offset, rate } = self.ticking;
+                q[index] = passed_from(knots, q[index], offset + rate * t, rate);
+            }
+            Law::Piece { knots, .. } => {
                 let out = self.laws.eval(t, x, signs, &self.parameters, q);
-                let g = out[3 * index];
-                q[index] = match guard {
-                    Some(_) => piece_beyond(knots, q[index], g),
-                    None => passed_from(knots, q[index], g, out[3 * index + 1]),
-                };
+                q[index] = piece_beyond(knots, q[index], out[3 * index]);
             }
             Law::Level { .. } => {
                 let out = self.laws.eval(t, x, signs, &self.parameters, q);
