@@ -1,10 +1,11 @@
 """What a branch of cycles costs: that of the dry friction oscillator in omega, with special points to 1e-10.
 
-Run ``python benchmarks/continuation.py``; the table also goes into ``README.md`` unless ``--no-write``. Beside
-it are two ways to come to the same curve: brute force, 400 periods of transient at each of its points; and a
-program as one writes it, SciPy's `fsolve` on the stroboscopic map of this package's runs, point after point,
-with multipliers by differences and special points by bisection on the itinerary. Processor times are medians of
-runs in turn in one process; instructions are counted by callgrind, Python included, if valgrind is there.
+Run ``python benchmarks/continuation.py``; the table also goes into ``README.md`` unless ``--no-write``.
+Beside it are two ways to come to the same curve: brute force, 400 periods of transient at each of its points;
+and a program as one writes it, SciPy's `fsolve` on the stroboscopic map of this package's runs, point after
+point, with multipliers by differences and special points by bisection on the itinerary. Processor times are
+medians of runs in turn in one process; instructions are counted by callgrind, Python included, if valgrind is
+there.
 """
 
 from __future__ import annotations

@@ -319,7 +319,7 @@ def _groups(
     while start < count:
         values = dict(zip(names, table[start].tolist(), strict=True))
         prepared = system.prepare(states.shape[1], t0, states[start].copy(), values)
-        events = core_events(specs, prepared, t0, states[start], (), values)
+        prepared, events = core_events(specs, system, prepared, t0, states[start], (), values)
         if start == 0 and system.outputs:
             refuse_outputs_that_fail(system, prepared, t0, states[start].copy(), values)
         stop = count

@@ -493,6 +493,21 @@ class System(Points, Saving):
         ended = prepare(self._source._replace(root_ends=True), n, values, self._states, t0, y0)
         return ended if ended.trace is not None and ended.trace.ends else None
 
+    def prepare_with_laws_of(
+        self,
+        functions: Sequence[Callable[..., Any]],
+        prepared: Prepared,
+        t0: float,
+        y0: Array,
+        values: dict[str, float],
+    ) -> Prepared | None:
+        """Return the system with the tables and relays of events too; None after unpickling."""
+        if self._source is None or prepared.trace is None:
+            return None
+        root_ends = bool(prepared.trace.ends)
+        source = self._source._replace(beside=tuple(functions), root_ends=root_ends)
+        return prepare(source, len(y0), values, self._states, t0, y0)
+
     def prepare_backward(self, n: int, s0: float, y0: Array, values: dict[str, float]) -> Prepared:
         """Return the system with time reversed, ``s = -t``; only for systems without surfaces.
 

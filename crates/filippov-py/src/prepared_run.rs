@@ -6,8 +6,8 @@ use filippov::action::{Action, ActionMap, Actions, Trigger};
 use filippov::derivative::Extension;
 use filippov::section::Section;
 use filippov::{
-    replay_decision, DecisionOutcome, DecisionPoint, Error, FieldError, Kind, LawAction, Options,
-    Problem, Solution, TracedMap, UserEvent, UserFunction,
+    replay_decision, DecisionOutcome, DecisionPoint, Error, FieldError, Kind, LawAction, Laws,
+    Options, Piece, Problem, Solution, TracedMap, UserEvent, UserFunction,
 };
 use pyo3::prelude::*;
 
@@ -32,6 +32,8 @@ pub struct PreparedRun {
     given: Vec<(SharedMap, Trigger, String)>,
     laws: Vec<LawAction>,
     law_names: Vec<String>,
+    /// All laws, for what is asked for that the run does not follow.
+    all_laws: Option<Arc<Laws>>,
     discrete: Vec<f64>,
     n_visible: usize,
     is_native: bool,
@@ -76,6 +78,7 @@ impl PreparedRun {
         Ok(PreparedRun {
             n_visible: n_visible_of(system, &*core),
             law_names: traced.map_or_else(Vec::new, |t| t.get().law_names()),
+            all_laws: traced.map(|t| Arc::clone(&t.get().laws)),
             is_native: traced.is_some_and(|t| t.get().system.is_native()),
             core,
             compiled,
@@ -164,6 +167,17 @@ impl PreparedRun {
         point: &DecisionPoint,
     ) -> Result<DecisionOutcome, FieldError> {
         replay_decision(&*self.core, &self.actions(), options, point)
+    }
+
+    /// Brings the discrete states of a piece that the run did not follow up to date with a point of it.
+    ///
+    /// # Errors
+    /// If a function of the user raises.
+    pub fn follow_idle(&self, piece: &mut Piece, at: (f64, &[f64])) -> Result<(), FieldError> {
+        match (&self.all_laws, &self.compiled) {
+            (Some(laws), Some(system)) => laws.follow_idle(system, at, &mut piece.discrete),
+            _ => Ok(()),
+        }
     }
 
     /// The system with its parameters, if it is traced.

@@ -465,7 +465,9 @@ impl Run {
             let found = solution.evaluate(system, t, side, &mut y).map_err(raised)?;
             found.ok_or_else(|| outside(&solution, t))?;
             let piece = solution.piece_at(system, t, side).map_err(raised)?;
-            let piece = piece.unwrap_or_default();
+            let mut piece = piece.unwrap_or_default();
+            let followed = self.prepared.follow_idle(&mut piece, (t, &y));
+            followed.map_err(raised)?;
             let held = piece.held(system, &actions, solution.sliding, (t, &y));
             let signal = Signal {
                 expression: &expression.expression,
@@ -484,8 +486,10 @@ impl Run {
         contacts: Vec<usize>,
     ) -> PyResult<f64> {
         let solution = self.solution();
-        let piece = solution.last_piece();
+        let mut piece = solution.last_piece();
         let at = (solution.t_last, solution.last_state());
+        let followed = self.prepared.follow_idle(&mut piece, at);
+        followed.map_err(raised)?;
         let actions = self.prepared.actions();
         let held = piece.held(&**self.system(), &actions, solution.sliding, at);
         let signal = Signal {

@@ -290,7 +290,7 @@ impl TracedSystem {
 #[pymethods]
 impl TracedSystem {
     #[new]
-    #[pyo3(signature = (builder, field, n_states, parameters, states=None, watched=Vec::new(), laws=Vec::new(), n_hidden=0, sticking=Vec::new()))]
+    #[pyo3(signature = (builder, field, n_states, parameters, states=None, watched=Vec::new(), laws=Vec::new(), n_hidden=0, sticking=Vec::new(), beside=Vec::new()))]
     #[allow(clippy::too_many_arguments)]
     fn new(
         py: Python<'_>,
@@ -303,6 +303,7 @@ impl TracedSystem {
         laws: Vec<LawRow>,
         n_hidden: usize,
         sticking: Vec<(usize, u32)>,
+        beside: Vec<usize>,
     ) -> PyResult<Self> {
         if field.len() != n_states {
             let text = format!(
@@ -329,6 +330,7 @@ impl TracedSystem {
             laws: laws.collect::<PyResult<_>>()?,
             n_hidden,
             sticking: sticking.collect::<PyResult<_>>()?,
+            beside,
         };
         let definition = Definition {
             graph,
@@ -352,6 +354,11 @@ impl TracedSystem {
     #[getter]
     fn n_laws(&self) -> usize {
         self.laws.list().len()
+    }
+
+    /// The indices of the laws that a run does not follow, since nothing reads their discrete states.
+    fn idle_laws(&self) -> Vec<usize> {
+        self.laws.idle()
     }
 
     fn surfaces(&self) -> Vec<String> {
