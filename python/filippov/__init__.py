@@ -52,6 +52,8 @@ if TYPE_CHECKING:
         sweep,
     )
     from filippov.cycles import Cycle, limit_cycle
+    from filippov.cycles.equilibria import equilibria
+    from filippov.cycles.lyapunov import lyapunov
     from filippov.ensemble import Ensemble
     from filippov.hidden import HiddenDynamics, hidden_dynamics
     from filippov.sheets import SurfaceParts, surface_parts
@@ -91,11 +93,13 @@ __all__ = [
     "analysis",
     "basins",
     "bifurcation_diagram",
+    "equilibria",
     "gradient",
     "hidden_dynamics",
     "hysteresis",
     "limit_cycle",
     "load",
+    "lyapunov",
     "open_sweep",
     "plot",
     "poincare",
@@ -117,6 +121,8 @@ _LAZY_NAMES = {
     **dict.fromkeys(("Phase", "Section", "Tangency", "poincare"), "analysis"),
     **dict.fromkeys(("basins", "bifurcation_diagram", "open_sweep", "sweep"), "analysis"),
     **dict.fromkeys(("Cycle", "limit_cycle"), "cycles"),
+    "equilibria": "cycles.equilibria",
+    "lyapunov": "cycles.lyapunov",
     "SurfaceParts": "sheets",
     "surface_parts": "sheets",
 }

@@ -127,6 +127,13 @@ impl<'a> Tangents<'a> {
         self
     }
 
+    /// Keeping this of the derivatives.
+    #[must_use]
+    pub(super) fn keeping(mut self, kept: Keep) -> Self {
+        self.kept = kept;
+        self
+    }
+
     /// The derivatives.
     ///
     /// # Errors
@@ -280,6 +287,52 @@ impl<'a> Tangents<'a> {
         self.put_back(before);
         self.put_back(after);
         self.keep(record.t[1]);
+        Ok(())
+    }
+}
+
+/// What is needed where the columns are a basis that is changed on the way.
+impl Tangents<'_> {
+    /// The columns at this moment.
+    pub(super) fn columns(&self) -> &[Vec<f64>] {
+        &self.columns
+    }
+
+    /// Takes combinations of the columns in their place.
+    pub(super) fn change(&mut self, columns: Vec<Vec<f64>>, change: &[Vec<f64>]) {
+        self.columns = columns;
+        self.history.change(change);
+    }
+
+    /// Takes other columns; the instants so far are forgotten.
+    pub(super) fn replace(&mut self, columns: Vec<Vec<f64>>) {
+        self.columns = columns;
+        self.history.clear();
+    }
+
+    /// Why the derivatives are not known any more.
+    pub(super) fn lost(&self) -> Option<Lost> {
+        self.lost
+    }
+
+    /// How many dimensions the motion in a mode has lost.
+    pub(super) fn codimension(&mut self, mode: &Mode, q: &[f64]) -> usize {
+        let piece = self.take_piece(mode, q);
+        let found = piece.codimension();
+        self.put_back(piece);
+        found
+    }
+
+    /// Takes from changes what leads off the surfaces of a mode.
+    pub(super) fn project(
+        &mut self,
+        (mode, q): (&Mode, &[f64]),
+        (t, x): (f64, &[f64]),
+        changes: &mut [Vec<f64>],
+    ) -> Result<(), FieldError> {
+        let piece = self.take_piece(mode, q);
+        piece.project(t, &self.around.extended.state(x), changes)?;
+        self.put_back(piece);
         Ok(())
     }
 }
