@@ -328,6 +328,7 @@ def growth_many(
     spans: _Array,
     y0: _Array,
     p: _Array,
+    marks: list[list[float]],
     options: RunOptions,
     actions: list[tuple[str, list[float], Any, str]],
     threads: int,

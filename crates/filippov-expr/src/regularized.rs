@@ -5,6 +5,7 @@ use rustc_hash::FxHashMap;
 use crate::graph::Graph;
 use crate::node::{Node, NodeId};
 use crate::op::UnaryOp;
+use crate::switching::Switching;
 
 /// The function that takes the place of a sign.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -86,7 +87,15 @@ impl Graph {
             Ramp::Linear => {
                 let (one, minus_one) = (self.constant(1.0), self.constant(-1.0));
                 let above = self.maximum(u, minus_one);
-                self.minimum(above, one)
+                // Not the minimum of that and 1: this would be a surface made of another one.
+                let beyond = self.sub(u, one);
+                match self.switch(beyond) {
+                    Switching::Constant(sign) if sign > 0.0 => one,
+                    Switching::Constant(_) => above,
+                    Switching::Surface { index, orientation } => {
+                        self.select(index, orientation, one, above)
+                    }
+                }
             }
         }
     }

@@ -31,9 +31,9 @@ type GrowthRow<'py> = (
 
 type Outcome = Result<(Solution, Growth), Failure>;
 
-/// Follows the growth of small changes from many initial states, the rows of `y0`, with the parameters in the rows of `p`. Each row of
-/// `spans` has the start, the time from which on growth is counted, and the end. Where a signal raised, the rows are the first ones, and
-/// the exception stands beside them.
+/// Follows the growth of small changes from many initial states, the rows of `y0`, at the times in the rows of `spans`, with the
+/// parameters in the rows of `p`. Growth is counted from the first of the times in `marks` on, and kept at each of them. Where a signal
+/// raised, the rows are the first ones, and the exception stands beside them.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
 pub fn growth_many<'py>(
@@ -42,6 +42,7 @@ pub fn growth_many<'py>(
     spans: PyReadonlyArray2<'py, f64>,
     y0: PyReadonlyArray2<'py, f64>,
     p: PyReadonlyArray2<'py, f64>,
+    marks: Vec<Vec<f64>>,
     options: &RunOptions,
     actions: Vec<ActionRow>,
     threads: usize,
@@ -53,28 +54,28 @@ pub fn growth_many<'py>(
     for chunk in rows.chunks(CHUNK_PER_THREAD * threads.max(1)) {
         let prepare = |&row: &usize| {
             let (y0, p) = (y0.row(row).to_vec(), p.row(row).to_vec());
-            let span = [0, 1, 2].map(|k| spans[[row, k]]);
-            let run = PreparedRun::new(system.as_any(), span[0], y0, p, &[], &actions)?;
-            Ok((run, span))
+            let span = (spans[[row, 0]], spans[[row, 1]]);
+            let run = PreparedRun::new(system.as_any(), span.0, y0, p, &[], &actions)?;
+            Ok((run, span, &marks[row]))
         };
         let jobs = chunk.iter().map(prepare).collect::<PyResult<Vec<_>>>()?;
-        let go = |(run, span): &(PreparedRun, [f64; 3]),
+        let go = |(run, span, marks): &(PreparedRun, (f64, f64), &Vec<f64>),
                   interrupt: &mut dyn FnMut(f64) -> bool|
          -> Outcome {
-            run.run_with_growth(*span, &options.options, &extension, interrupt)
+            run.run_with_growth(*span, marks, (&options.options, &extension), interrupt)
         };
         let is_last =
             |outcome: &Outcome| outcome.as_ref().is_ok_and(|(run, _)| is_interruption(run));
         let done = py.detach(|| on_threads(&jobs, threads, go, is_last));
         let mut raised = done.raised.or_else(|| py.check_signals().err());
-        for ((run, span), outcome) in jobs.iter().zip(done.results) {
+        for ((run, span, _), outcome) in jobs.iter().zip(done.results) {
             let row = match outcome {
                 Ok((solution, growth)) => row_of(py, run, solution, growth, &mut raised)?,
                 Err(Failure::Refused(error)) => {
                     let nothing = PyArray2::zeros(py, [0, y0.ncols()], false);
                     let (reason, text) = ("wrong_input".to_owned(), error.to_string());
                     let no_time = PyArray1::from_slice(py, &[]);
-                    (-1, reason, text, span[0], no_time, nothing, 0, None)
+                    (-1, reason, text, span.0, no_time, nothing, 0, None)
                 }
                 Err(failure) => return Err(failure.into()),
             };
@@ -126,13 +127,13 @@ pub fn run_with_growth(
     problem: Problem<'_>,
     (system, extension, actions): (&filippov::TracedSystem, &Arc<Extension>, &Actions<'_>),
     options: &Options,
-    (from, end): (f64, f64),
+    marks: &[f64],
     interrupt: &mut dyn FnMut(f64) -> bool,
 ) -> Result<(Solution, Growth), Failure> {
     let extended = extension.at(system.parameters(), actions)?;
     let extended = extended.ok_or(Failure::CalledMap)?;
     let impacts = extended.impacts();
-    let mut exponents = Exponents::new(&extended, &impacts, options, (from, end));
+    let mut exponents = Exponents::new(&extended, &impacts, options, marks);
     let solution = problem.solve_observed(&mut exponents, interrupt)?;
     Ok((solution, exponents.finish()?))
 }

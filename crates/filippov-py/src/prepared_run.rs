@@ -134,21 +134,21 @@ impl PreparedRun {
         Ok((solution, Some(derivatives)))
     }
 
-    /// Runs, and follows the growth of small changes: start, time from which on it is counted, and end.
+    /// Runs, and follows the growth of small changes, kept at these times.
     pub fn run_with_growth(
         &self,
-        [start, from, end]: [f64; 3],
-        options: &Options,
-        extension: &Arc<Extension>,
+        t_span: (f64, f64),
+        marks: &[f64],
+        (options, extension): (&Options, &Arc<Extension>),
         interrupt: &mut dyn FnMut(f64) -> bool,
     ) -> Result<(Solution, Growth), Failure> {
         let system = self.compiled.as_ref().ok_or(Failure::CalledMap)?;
         let actions = self.actions();
-        let problem = Problem::new(&**system, (start, end), &self.y0)
+        let problem = Problem::new(&**system, t_span, &self.y0)
             .options(options)
             .actions(&actions);
         let of = (&**system, extension, &actions);
-        run_with_growth(problem, of, options, (from, end), interrupt)
+        run_with_growth(problem, of, options, marks, interrupt)
     }
 
     fn user_events(&self) -> Vec<UserEvent<'_>> {

@@ -1,6 +1,7 @@
 """Lyapunov exponents: the mean growth of small changes, through all instants of a run.
 
-References: Benettin, Galgani, Giorgilli, Strelcyn, Meccanica 15 (1980) 9; P. C. Mueller, Chaos, Solitons & Fractals 5 (1995) 1671.
+References: Benettin, Galgani, Giorgilli, Strelcyn, Meccanica 15 (1980) 9; P. C. Mueller, Chaos, Solitons &
+Fractals 5 (1995) 1671.
 """
 
 from __future__ import annotations
@@ -62,8 +63,8 @@ def lyapunov(
     y0, params
         As in `sweep`: numbers, and arrays, each of which is a dimension of the result.
     n : int, optional
-        How many returns to the section are counted; the run ends behind them, or at the end of `t_span`.
-        Without a section the number of equal intervals of time that are counted, by default 100.
+        How many times between returns to the section are counted; the run ends behind them, or at the end of
+        `t_span`. Without a section the number of equal intervals of time that are counted, by default 100.
     transient : int, optional
         So many first returns, or intervals, are not counted. Default: a tenth of `n`; with a section and
         without `n` none.
@@ -175,10 +176,9 @@ class _Row(NamedTuple):
 
 
 class _Window(NamedTuple):
-    """The time that is counted, and the returns in it."""
+    """The time that is counted, divided into parts by marks, and the returns in it."""
 
-    start: float
-    end: float
+    marks: Array
     n_returns: int
     return_time: float
     failure: tuple[str, str] | None = None
@@ -196,14 +196,15 @@ def _rows_of(work: _Work, prepared: Prepared, y0: Array, p: Array) -> list[_Row]
     """Follow the growth at some points with one system of the core."""
     assert isinstance(prepared.core, TracedSystem)
     windows = _windows(work, prepared, y0, p)
-    spans = np.array([[work.span[0], window.start, window.end] for window in windows])
-    finite = np.isfinite(y0).all(axis=1) & np.isfinite(p).all(axis=1) & np.isfinite(spans).all(axis=1)
-    finite &= spans[:, 2] > spans[:, 0]
+    spans = np.array([[work.span[0], window.marks[-1]] for window in windows])
+    finite = np.isfinite(y0).all(axis=1) & np.isfinite(p).all(axis=1)
+    finite &= np.isfinite(spans[:, 1]) & (spans[:, 1] > spans[:, 0])
     runs, raised = growth_many(
         prepared.core,
         spans[finite],
         np.ascontiguousarray(y0[finite]),
         np.ascontiguousarray(p[finite]),
+        [window.marks.tolist() for window, is_run in zip(windows, finite, strict=True) if is_run],
         work.options.for_core(),
         list(prepared.actions),
         work.threads,
@@ -232,17 +233,18 @@ def _rows_of(work: _Work, prepared: Prepared, y0: Array, p: Array) -> list[_Row]
 
 
 def _windows(work: _Work, prepared: Prepared, y0: Array, p: Array) -> list[_Window]:
-    """Return the time that is counted at each point: from the last return that is not, to the last that is."""
+    """Return the time that is counted at each point: from the last return before it to the last in it."""
     t0, t1 = work.span
     section, n, skipped = work.section, work.n, work.transient
     if section is None:
-        total = (n or _INTERVALS) + skipped
-        step = (t1 - t0) / total
-        return [_Window(t0 + skipped * step, t1, total - skipped, step)] * len(y0)
+        counted = n or _INTERVALS
+        step = (t1 - t0) / (counted + skipped)
+        marks = np.append(t0 + step * (skipped + _places(counted)[:-1]), t1)
+        return [_Window(marks, counted, step)] * len(y0)
     clocks = clocks_of(section, work.grid.names, p)
     if isinstance(section, Phase) and section.of is None:
         return [_of_clock(work.span, clock, n, skipped) for clock in clocks]
-    most = 2**63 - 1 if n is None else n + skipped
+    most = 2**63 - 1 if n is None else n + max(skipped, 1)
     values = dict(zip(work.grid.names, p[0].tolist(), strict=True))
     place = section.place(prepared, work.grid.states, t0, y0[0], values)
     ends = end_times(section, work.span, 0, clocks)
@@ -259,14 +261,23 @@ def _windows(work: _Work, prepared: Prepared, y0: Array, p: Array) -> list[_Wind
         failure = None
         if table["status"][k] < 0:
             failure = table["reason"][k], table["message"][k]
-        elif size <= skipped:
+        elif size <= max(skipped, 1):
             failure = "no_returns", f"There are {size} returns, of which {skipped} are not counted."
+        # From the last return that is not counted, or the first one if all are; else from the start.
         counted = t[max(skipped - 1, 0) :]
         distance = (counted[-1] - counted[0]) / (len(counted) - 1) if len(counted) > 1 else math.nan
-        start = t[skipped - 1] if 0 < skipped < size else t0
-        end = t[-1] if size > skipped else table["t_last"][k]
-        windows.append(_Window(float(start), float(end), max(size - skipped, 0), float(distance), failure))
+        whole = np.array([t0, table["t_last"][k]])
+        marks = counted[_places(len(counted) - 1)] if len(counted) > 1 else whole
+        windows.append(_Window(marks, max(len(counted) - 1, 0), float(distance), failure))
     return windows
+
+
+def _places(n: int) -> npt.NDArray[np.int64]:
+    """Return whole numbers from 0 to n, about equally far apart: ends of the parts for standard errors."""
+    return np.unique(np.round(np.linspace(0, n, min(n, _BATCHES) + 1)).astype(np.int64))
+
+
+_NOTHING = np.array([math.nan])
 
 
 def _of_clock(span: tuple[float, float], clock: Array, n: int | None, skipped: int) -> _Window:
@@ -274,16 +285,17 @@ def _of_clock(span: tuple[float, float], clock: Array, n: int | None, skipped: i
     (t0, t1), (period, offset) = span, clock.tolist()
     if not (math.isfinite(period) and period > 0):
         text = f"The period is {period:g} at this point."
-        return _Window(math.nan, math.nan, 0, math.nan, ("wrong_input", text))
-    first = math.floor((t0 - offset) / period) + 1
+        return _Window(_NOTHING, 0, math.nan, ("wrong_input", text))
+    # The start is counted as a return if it is at one.
+    first = math.ceil((t0 - offset) / period)
     last = math.inf if math.isinf(t1) else math.floor((t1 - offset) / period)
-    last = min(last, math.inf if n is None else first + skipped + n - 1)
-    counted = int(last) - first - skipped + 1
+    last = min(last, math.inf if n is None else first + skipped + n)
+    counted = int(last) - first - skipped
     if counted < 1:
-        text = f"The span has {max(int(last) - first + 1, 0)} returns, of which {skipped} are not counted."
-        return _Window(math.nan, math.nan, 0, math.nan, ("no_returns", text))
-    start = offset + (first + skipped - 1) * period
-    return _Window(max(start, t0), offset + last * period, counted, period)
+        text = f"The span has {max(int(last) - first, 0)} periods, of which {skipped} are not counted."
+        return _Window(_NOTHING, 0, math.nan, ("no_returns", text))
+    marks = offset + (first + skipped + _places(counted)) * period
+    return _Window(np.maximum(marks, t0), counted, period)
 
 
 def _means(times: Array, sums: Array, n: int) -> tuple[Array, Array]:
@@ -291,18 +303,16 @@ def _means(times: Array, sums: Array, n: int) -> tuple[Array, Array]:
     nothing = np.full(n, np.nan)
     if len(times) < 2 or times[-1] <= times[0]:
         return nothing, nothing
-    mean = sums[-1] / (times[-1] - times[0])
+    duration = times[-1] - times[0]
+    mean = sums[-1] / duration
     order = np.argsort(-mean, kind="stable")
-    ends = np.searchsorted(times, np.linspace(times[0], times[-1], _BATCHES + 1))
-    ends = np.unique(np.minimum(ends, len(times) - 1))
     error = nothing.copy()
-    if len(ends) > 2:
+    if len(times) > 2:
         with np.errstate(invalid="ignore"):
-            batches = np.diff(sums[ends], axis=0) / np.diff(times[ends])[:, None]
-        # Batches of other lengths count as much as they are long.
-        weights = np.diff(times[ends]) / (times[-1] - times[0])
-        spread = np.sum((weights[:, None] * (batches - mean)) ** 2, axis=0)
-        error = np.sqrt(spread * len(weights) / (len(weights) - 1))
+            parts = np.diff(sums, axis=0) / np.diff(times)[:, None]
+        # Parts count as much as they are long.
+        weights = np.diff(times)[:, None] / duration
+        error = np.sqrt(np.sum(weights * (parts - mean) ** 2, axis=0) / (len(parts) - 1))
     error[np.isneginf(mean)] = 0.0
     return mean[order], error[order]
 
@@ -334,7 +344,7 @@ _LONG_NAMES = {
     "n_minus_inf": "number of exponents that are minus infinity",
     "t_start": "time from which on growth is counted",
     "t_last": "last time reached",
-    "n_returns": "number of returns that are counted",
+    "n_returns": "number of times between returns that are counted",
     "return_time": "mean time between returns",
     "status": "0: end of the span, 1: stopped as asked, -1: failed",
     "reason": "why the run ended",

@@ -7,22 +7,18 @@
 
 use super::extended::{Column, Extended};
 use super::instant::Lost;
-use super::orthonormal::{orthonormal, rank, Order, Orthonormal};
+use super::orthonormal::{orthonormal, rank, Choice, Orthonormal};
 use super::tangents::Tangents;
 use crate::error::FieldError;
-use crate::mode::Mode;
 use crate::options::{Keep, Options};
 use crate::record::{InstantRecord, ObservedStep, Observer};
 use crate::system::Actions;
 use crate::vectors::dot;
 
-/// Sums are kept at no more times than this: of more every second one goes.
-const MOST_SAMPLES: usize = 4096;
-
 /// The growth of small changes along a run.
 #[derive(Clone, Debug, Default)]
 pub struct Growth {
-    /// Times, the first one that from which on growth is counted.
+    /// The times asked for as far as the run came, and the last one if it ended before the last of them.
     pub t: Vec<f64>,
     /// At each of them, for every direction of the basis the logarithm of the growth since the first time; minus infinity for
     /// directions that are gone by the end. They are the last ones.
@@ -54,7 +50,7 @@ pub struct Growth {
 /// let extended = extension.at(&[], &none)?.expect("no map is called");
 /// let impacts = extended.impacts();
 /// let options = Options::default();
-/// let mut exponents = Exponents::new(&extended, &impacts, &options, (0.0, 4.0));
+/// let mut exponents = Exponents::new(&extended, &impacts, &options, &[0.0, 4.0]);
 /// let problem = Problem::new(&system, (0.0, 4.0), &[1.0, 1.0]);
 /// Integrator::new(problem)?.observed_by(&mut exponents).solve();
 /// let growth = exponents.finish()?;
@@ -66,40 +62,37 @@ pub struct Growth {
 pub struct Exponents<'a> {
     tangents: Tangents<'a>,
     n: usize,
-    /// From this time on growth is counted.
-    from: f64,
+    /// The times at which the sums are kept, the next one last.
+    marks: Vec<f64>,
     is_counting: bool,
-    /// How many directions the motion leaves.
+    /// How many directions the motion leaves; not known before the first step.
     left: Option<usize>,
     /// The logarithms of the growth of the directions that are left.
     sums: Vec<f64>,
-    /// One step of so many is kept, and how many there were since.
-    stride: usize,
-    since: usize,
+    t: f64,
     found: Growth,
     raised: Option<FieldError>,
 }
 
 impl<'a> Exponents<'a> {
-    /// The growth in a run from its start to its end, counted from `span.0` on. Of `options` what is kept is the last state.
+    /// The growth in a run, counted from the first of these times on and kept at each of them.
     pub fn new(
         extended: &'a Extended<'a>,
         impacts: &'a Actions<'a>,
         options: &'a Options,
-        span: (f64, f64),
+        marks: &[f64],
     ) -> Self {
         let n = extended.n;
         let kinds = (0..n).map(Column::State).collect();
-        let tangents = Tangents::new(extended, impacts, kinds, options, span.1 - span.0);
+        let tangents = Tangents::new(extended, impacts, kinds, options, 1.0);
         Exponents {
             tangents: tangents.keeping(Keep::Last),
             n,
-            from: span.0,
+            marks: marks.iter().rev().copied().collect(),
             is_counting: false,
             left: None,
             sums: vec![0.0; n],
-            stride: 1,
-            since: 0,
+            t: f64::NAN,
             found: Growth::default(),
             raised: None,
         }
@@ -114,6 +107,10 @@ impl<'a> Exponents<'a> {
             return Err(raised);
         }
         self.tangents.finish()?;
+        if self.found.t.last().is_some_and(|t| *t < self.t) && !self.marks.is_empty() {
+            self.found.t.push(self.t);
+            self.found.sums.push(self.sums);
+        }
         let gone = self.found.n_gone;
         for row in &mut self.found.sums {
             row.truncate(self.n - gone);
@@ -123,44 +120,98 @@ impl<'a> Exponents<'a> {
     }
 
     fn follow(&mut self, step: &ObservedStep) -> Result<(), FieldError> {
+        let is_first = self.left.is_none();
         let left = match self.left {
             Some(left) => left,
-            None => self.n - self.tangents.codimension(step.mode, step.discrete).min(self.n),
+            None => {
+                self.n
+                    - self
+                        .tangents
+                        .codimension(step.mode, step.discrete)
+                        .min(self.n)
+            }
         };
-        let is_first = self.left.replace(left).is_none();
-        if is_first && step.t_start() >= self.from {
-            self.start_counting(step.t_start());
+        self.left = Some(left);
+        let mut t = step.t_start();
+        let mut x = vec![0.0; self.n];
+        while let Some(&mark) = self.marks.last().filter(|mark| **mark <= step.t_end) {
+            if mark > t {
+                step.at(mark, &mut x);
+                self.advance(step, (t, mark), &x, is_first)?;
+                t = mark;
+            }
+            self.marks.pop();
+            if !self.is_counting {
+                let end = if mark == step.t_end { step.x_end } else { &x };
+                self.start_counting(step, t, end)?;
+            }
+            self.found.t.push(t);
+            self.found.sums.push(self.sums.clone());
         }
-        self.tangents.step(step);
-        self.make_orthonormal(left, is_first, step.t_end);
-        self.since += 1;
-        if !self.is_counting && step.t_end >= self.from {
-            self.fill(left, (step.mode, step.discrete), (step.t_end, step.x_end))?;
-            self.start_counting(step.t_end);
-        } else if self.is_counting && self.since >= self.stride {
-            self.sample(step.t_end);
+        if t < step.t_end {
+            self.advance(step, (t, step.t_end), step.x_end, is_first)?;
         }
         Ok(())
     }
 
-    fn pass(&mut self, record: &InstantRecord) {
-        let codimension = self.tangents.codimension(record.mode[1], record.discrete[1]);
-        let mut left = self.n - codimension.min(self.n);
+    /// Follows the growth over a part of a step.
+    fn advance(
+        &mut self,
+        step: &ObservedStep,
+        (t0, t1): (f64, f64),
+        x_end: &[f64],
+        is_first: bool,
+    ) -> Result<(), FieldError> {
+        self.tangents.follow_part(step, (t0, t1), x_end)?;
+        let left = self.left.unwrap_or(self.n);
+        self.make_orthonormal(left, is_first, t1);
+        Ok(())
+    }
+
+    /// Sets the sums to zero, and adds directions that were lost before, as far as the motion leaves them.
+    fn start_counting(&mut self, step: &ObservedStep, t: f64, x: &[f64]) -> Result<(), FieldError> {
+        self.is_counting = true;
+        let known = self.tangents.columns().len();
+        let left = self.left.unwrap_or(self.n);
+        let has_columns = known > 0 || self.found.n_gone == self.n;
+        if has_columns && known < left && self.found.lost.is_none() {
+            let unit = |i: usize| (0..self.n).map(|r| f64::from(u8::from(r == i))).collect();
+            let mut units: Vec<Vec<f64>> = (0..self.n).map(unit).collect();
+            self.tangents
+                .project((step.mode, step.discrete), (t, x), &mut units)?;
+            let columns = [self.tangents.columns(), &units].concat();
+            let choice = Choice {
+                in_order: known,
+                most: left,
+                leaves_out_rounding: true,
+            };
+            let made = orthonormal(&columns, self.n, choice);
+            self.found.n_gone = self.n - made.columns.len();
+            self.tangents.replace(made.columns);
+        }
+        self.sums = vec![0.0; self.n - self.found.n_gone];
+        Ok(())
+    }
+
+    fn pass(&mut self, record: &InstantRecord) -> Result<(), FieldError> {
+        let [before, after] = [0, 1].map(|k| {
+            let found = self
+                .tangents
+                .codimension(record.mode[k], record.discrete[k]);
+            found.min(self.n)
+        });
+        self.left.get_or_insert(self.n - before);
+        let mut left = self.n - after;
         if let Some(map) = record.map {
             let normal = (!record.guards.is_empty()).then_some(&record.gradient.state[..]);
             left = left.min(rank_at(self.n, map, normal));
         }
-        self.tangents.instant(record);
-        let takes = codimension > 0 || record.map.is_some();
+        self.tangents.pass(record)?;
+        let takes = before.max(after) > 0 || record.map.is_some();
         self.make_orthonormal(left, takes, record.t[1]);
         // What a map takes is gone; behind it the motion may have all dimensions.
-        self.left = Some(self.n - codimension.min(self.n));
-        if let Some(last) = self.found.t.last_mut() {
-            if self.is_counting && self.since == 0 && *last == record.t[1] {
-                self.found.sums.pop();
-                self.found.sums.push(self.sums.clone());
-            }
-        }
+        self.left = Some(self.n - after);
+        Ok(())
     }
 
     /// Makes the basis orthonormal. Of its directions no more than `most` are left; if something takes directions, those whose length
@@ -170,15 +221,14 @@ impl<'a> Exponents<'a> {
             self.found.lost.get_or_insert((t, lost));
             return;
         }
+        self.t = t;
         let columns = self.tangents.columns();
-        let given = orthonormal(columns, self.n, columns.len(), Order::Given);
-        let made = match given {
-            Some(made) if columns.len() <= most && !(takes && made.has_rounding()) => made,
-            _ => match orthonormal(columns, self.n, most, Order::Longest) {
-                Some(made) => made,
-                None => return,
-            },
+        let choice = Choice {
+            in_order: columns.len(),
+            most,
+            leaves_out_rounding: takes,
         };
+        let made = orthonormal(columns, self.n, choice);
         self.take(made);
     }
 
@@ -194,53 +244,6 @@ impl<'a> Exponents<'a> {
         self.sums = sums.map(|(&k, r)| self.sums[k] + r.ln()).collect();
         self.found.n_gone = self.n - count;
         self.tangents.change(made.columns, &made.change);
-    }
-
-    /// Adds directions that were lost before, as far as the motion leaves them.
-    fn fill(
-        &mut self,
-        left: usize,
-        (mode, q): (&Mode, &[f64]),
-        (t, x): (f64, &[f64]),
-    ) -> Result<(), FieldError> {
-        let known = self.tangents.columns().len();
-        if known >= left || self.found.lost.is_some() {
-            return Ok(());
-        }
-        let unit = |i: usize| (0..self.n).map(|r| f64::from(r == i)).collect();
-        let mut units: Vec<Vec<f64>> = (0..self.n).map(unit).collect();
-        self.tangents.project((mode, q), (t, x), &mut units)?;
-        let columns = [self.tangents.columns(), &units].concat();
-        if let Some(made) = orthonormal(&columns, self.n, left, Order::GivenThenLongest(known)) {
-            self.found.n_gone = self.n - made.columns.len();
-            self.tangents.replace(made.columns);
-        }
-        Ok(())
-    }
-
-    fn start_counting(&mut self, t: f64) {
-        self.is_counting = true;
-        self.sums = vec![0.0; self.n - self.found.n_gone];
-        self.sample(t);
-    }
-
-    fn sample(&mut self, t: f64) {
-        self.since = 0;
-        if self.found.t.len() == MOST_SAMPLES {
-            let mut k = 0;
-            self.found.t.retain(|_| {
-                k += 1;
-                k % 2 == 1
-            });
-            k = 0;
-            self.found.sums.retain(|_| {
-                k += 1;
-                k % 2 == 1
-            });
-            self.stride *= 2;
-        }
-        self.found.t.push(t);
-        self.found.sums.push(self.sums.clone());
     }
 }
 
@@ -270,7 +273,7 @@ impl Observer for Exponents<'_> {
 
     fn instant(&mut self, instant: &InstantRecord) {
         if self.raised.is_none() && self.found.lost.is_none() {
-            self.pass(instant);
+            self.raised = self.pass(instant).err();
         }
     }
 }

@@ -120,7 +120,10 @@ impl History {
     /// Lets the instants follow a change of the columns, each of which is a combination of the old ones.
     pub fn change(&mut self, change: &[Vec<f64>]) {
         for past in &mut self.0 {
-            past.dt = change.iter().map(|factors| dot(factors, &past.dt)).collect();
+            past.dt = change
+                .iter()
+                .map(|factors| dot(factors, &past.dt))
+                .collect();
             let combined = |factors: &Vec<f64>| {
                 let mut sum = vec![0.0; past.x.len()];
                 for (factor, dx) in factors.iter().zip(&past.dx) {

@@ -227,7 +227,16 @@ impl<'a> Tangents<'a> {
     }
 
     fn follow(&mut self, step: &ObservedStep) -> Result<(), FieldError> {
-        let t0 = step.t_start();
+        self.follow_part(step, (step.t_start(), step.t_end), step.x_end)
+    }
+
+    /// Follows the derivatives over a part of a step, at whose end the state is `x_end`.
+    pub(super) fn follow_part(
+        &mut self,
+        step: &ObservedStep,
+        (t0, t1): (f64, f64),
+        x_end: &[f64],
+    ) -> Result<(), FieldError> {
         if !self.has_started {
             let mut x = vec![0.0; self.around.extended.n];
             step.at(t0, &mut x);
@@ -239,25 +248,24 @@ impl<'a> Tangents<'a> {
                 step.at(t, x);
                 Ok(())
             };
-            let span = (t0, step.t_end);
             if let Some(mut second) = self.second.take() {
-                if piece.advance_pairs(along, span, &self.columns, &mut second)? {
+                if piece.advance_pairs(along, (t0, t1), &self.columns, &mut second)? {
                     self.second = Some(second);
                 }
             }
-            piece.advance(along, span, &mut self.columns)?;
-            let z = self.around.extended.state(step.x_end);
-            piece.project(step.t_end, &z, &mut self.columns)?;
+            piece.advance(along, (t0, t1), &mut self.columns)?;
+            let z = self.around.extended.state(x_end);
+            piece.project(t1, &z, &mut self.columns)?;
             self.put_back(piece);
             if self.columns.iter().flatten().any(|v| !v.is_finite()) {
                 self.lose(Lost::NotFinite);
             }
         }
-        self.keep(step.t_end);
+        self.keep(t1);
         Ok(())
     }
 
-    fn pass(&mut self, record: &InstantRecord) -> Result<(), FieldError> {
+    pub(super) fn pass(&mut self, record: &InstantRecord) -> Result<(), FieldError> {
         if !self.has_started {
             self.start(record.t[0], record.x[0], record.mode[0], record.discrete[0])?;
         }
