@@ -105,7 +105,8 @@ def lyapunov(
     The derivative of the state is followed as a basis that is made orthonormal behind every step and every
     instant. Minus infinity is counted from modes and maps, never read off small numbers. The exponents
     converge like 1 / T, and the standard error does not see that: without forcing one of them is zero in the
-    limit, and how far it is from zero shows how long the run has to be.
+    limit, and how far it is from zero shows how long the run has to be. From a return of a cycle to another
+    one the mean is exact. Where a stiff method damps fast changes in a step, their exponents are rough.
 
     References
     ----------

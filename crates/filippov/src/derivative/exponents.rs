@@ -133,11 +133,15 @@ impl<'a> Exponents<'a> {
         };
         self.left = Some(left);
         let mut t = step.t_start();
+        if is_first {
+            self.tangents.begin(step)?;
+            self.make_orthonormal(left, left < self.n, t);
+        }
         let mut x = vec![0.0; self.n];
         while let Some(&mark) = self.marks.last().filter(|mark| **mark <= step.t_end) {
             if mark > t {
                 step.at(mark, &mut x);
-                self.advance(step, (t, mark), &x, is_first)?;
+                self.advance(step, (t, mark), &x)?;
                 t = mark;
             }
             self.marks.pop();
@@ -149,7 +153,7 @@ impl<'a> Exponents<'a> {
             self.found.sums.push(self.sums.clone());
         }
         if t < step.t_end {
-            self.advance(step, (t, step.t_end), step.x_end, is_first)?;
+            self.advance(step, (t, step.t_end), step.x_end)?;
         }
         Ok(())
     }
@@ -160,11 +164,10 @@ impl<'a> Exponents<'a> {
         step: &ObservedStep,
         (t0, t1): (f64, f64),
         x_end: &[f64],
-        is_first: bool,
     ) -> Result<(), FieldError> {
         self.tangents.follow_part(step, (t0, t1), x_end)?;
         let left = self.left.unwrap_or(self.n);
-        self.make_orthonormal(left, is_first, t1);
+        self.make_orthonormal(left, false, t1);
         Ok(())
     }
 
@@ -173,8 +176,7 @@ impl<'a> Exponents<'a> {
         self.is_counting = true;
         let known = self.tangents.columns().len();
         let left = self.left.unwrap_or(self.n);
-        let has_columns = known > 0 || self.found.n_gone == self.n;
-        if has_columns && known < left && self.found.lost.is_none() {
+        if known < left && self.found.lost.is_none() {
             let unit = |i: usize| (0..self.n).map(|r| f64::from(u8::from(r == i))).collect();
             let mut units: Vec<Vec<f64>> = (0..self.n).map(unit).collect();
             self.tangents
@@ -183,7 +185,7 @@ impl<'a> Exponents<'a> {
             let choice = Choice {
                 in_order: known,
                 most: left,
-                leaves_out_rounding: true,
+                size: Some(1.0),
             };
             let made = orthonormal(&columns, self.n, choice);
             self.found.n_gone = self.n - made.columns.len();
@@ -207,7 +209,7 @@ impl<'a> Exponents<'a> {
             left = left.min(rank_at(self.n, map, normal));
         }
         self.tangents.pass(record)?;
-        let takes = before.max(after) > 0 || record.map.is_some();
+        let takes = before > 0 || left < self.n;
         self.make_orthonormal(left, takes, record.t[1]);
         // What a map takes is gone; behind it the motion may have all dimensions.
         self.left = Some(self.n - after);
@@ -226,7 +228,8 @@ impl<'a> Exponents<'a> {
         let choice = Choice {
             in_order: columns.len(),
             most,
-            leaves_out_rounding: takes,
+            // Before what takes directions the columns had length 1.
+            size: takes.then_some(1.0),
         };
         let made = orthonormal(columns, self.n, choice);
         self.take(made);

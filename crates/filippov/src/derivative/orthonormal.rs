@@ -22,8 +22,9 @@ pub(super) struct Choice {
     pub in_order: usize,
     /// So many at most.
     pub most: usize,
-    /// Those whose normal part is rounding are left out, and not only those where it is zero.
-    pub leaves_out_rounding: bool,
+    /// Those whose normal part is rounding beside this number or beside the longest column are left out; else only those where it is
+    /// zero.
+    pub size: Option<f64>,
 }
 
 /// An orthonormal basis of what columns with n entries span, by the method of Gram and Schmidt, each product taken twice.
@@ -37,10 +38,7 @@ pub(super) fn orthonormal(columns: &[Vec<f64>], n: usize, choice: Choice) -> Ort
         .collect();
     let length = |row: &[f64]| dot(&row[..n], &row[..n]).sqrt();
     let longest = rows.iter().map(|row| length(row)).fold(0.0, f64::max);
-    let shortest = match choice.leaves_out_rounding {
-        true => GONE * longest,
-        false => 0.0,
-    };
+    let shortest = choice.size.map_or(0.0, |size| GONE * longest.max(size));
     let mut found = Orthonormal {
         columns: Vec::new(),
         order: Vec::new(),
@@ -93,7 +91,7 @@ pub(super) fn rank(rows: &[f64], n: usize, size: f64) -> usize {
     let longest_first = Choice {
         in_order: 0,
         most: n,
-        leaves_out_rounding: true,
+        size: Some(size),
     };
     orthonormal(&rows, n, longest_first).columns.len()
 }

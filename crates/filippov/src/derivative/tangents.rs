@@ -230,6 +230,16 @@ impl<'a> Tangents<'a> {
         self.follow_part(step, (step.t_start(), step.t_end), step.x_end)
     }
 
+    /// Takes the columns of the start, if the step is the first one.
+    pub(super) fn begin(&mut self, step: &ObservedStep) -> Result<(), FieldError> {
+        if self.has_started {
+            return Ok(());
+        }
+        let mut x = vec![0.0; self.around.extended.n];
+        step.at(step.t_start(), &mut x);
+        self.start(step.t_start(), &x, step.mode, step.discrete)
+    }
+
     /// Follows the derivatives over a part of a step, at whose end the state is `x_end`.
     pub(super) fn follow_part(
         &mut self,
@@ -237,11 +247,7 @@ impl<'a> Tangents<'a> {
         (t0, t1): (f64, f64),
         x_end: &[f64],
     ) -> Result<(), FieldError> {
-        if !self.has_started {
-            let mut x = vec![0.0; self.around.extended.n];
-            step.at(t0, &mut x);
-            self.start(t0, &x, step.mode, step.discrete)?;
-        }
+        self.begin(step)?;
         if self.lost.is_none() {
             let mut piece = self.take_piece(step.mode, step.discrete);
             let along = |t: f64, x: &mut [f64]| {
