@@ -163,7 +163,7 @@ def test_a_run_that_stops_gives_its_part() -> None:
     assert found.status.values.tolist() == [0, -1]
     assert found.reason.values[1] == "step_too_small"
     assert float(found.t_last[1]) == pytest.approx(1.0, abs=1e-3)
-    with pytest.warns(fl.FilippovWarning, match="returns, of which 5 are not counted"):
+    with pytest.warns(fl.FilippovWarning, match="returns to the section, and more than 5"):
         few = fl.lyapunov(system, (0, 2), [-1.0], transient=5, section=lambda t, x: x[0] + 0.5)
     assert int(few.status) == -1
 

@@ -263,7 +263,8 @@ def _windows(work: _Work, prepared: Prepared, y0: Array, p: Array) -> list[_Wind
         if table["status"][k] < 0:
             failure = table["reason"][k], table["message"][k]
         elif size <= max(skipped, 1):
-            failure = "no_returns", f"There are {size} returns, of which {skipped} are not counted."
+            text = f"There are {size} returns to the section, and more than {max(skipped, 1)} are needed."
+            failure = "no_returns", text
         # From the last return that is not counted, or the first one if all are; else from the start.
         counted = t[max(skipped - 1, 0) :]
         distance = (counted[-1] - counted[0]) / (len(counted) - 1) if len(counted) > 1 else math.nan
