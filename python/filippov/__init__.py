@@ -40,7 +40,7 @@ from filippov.switches import RunWarning, Segment, SegmentTable, Switch, SwitchT
 from filippov.system import System
 
 if TYPE_CHECKING:
-    from filippov import analysis, plot, problems
+    from filippov import analysis, cycles, plot, problems
     from filippov.analysis import (
         Phase,
         Section,
@@ -51,7 +51,16 @@ if TYPE_CHECKING:
         poincare,
         sweep,
     )
-    from filippov.cycles import Cycle, limit_cycle
+    from filippov.cycles import (
+        Branch,
+        Cycle,
+        Equilibrium,
+        Special,
+        continuation,
+        equilibrium,
+        limit_cycle,
+        manifold,
+    )
     from filippov.cycles.equilibria import equilibria
     from filippov.cycles.lyapunov import lyapunov
     from filippov.ensemble import Ensemble
@@ -59,11 +68,13 @@ if TYPE_CHECKING:
     from filippov.sheets import SurfaceParts, surface_parts
 
 __all__ = [
+    "Branch",
     "Branches",
     "Classification",
     "Cycle",
     "DenseSolution",
     "Ensemble",
+    "Equilibrium",
     "Event",
     "FilippovError",
     "FilippovWarning",
@@ -82,6 +93,7 @@ __all__ = [
     "SegmentTable",
     "SlidingPolicy",
     "Solution",
+    "Special",
     "Stick",
     "SurfaceParts",
     "Switch",
@@ -93,13 +105,17 @@ __all__ = [
     "analysis",
     "basins",
     "bifurcation_diagram",
+    "continuation",
+    "cycles",
     "equilibria",
+    "equilibrium",
     "gradient",
     "hidden_dynamics",
     "hysteresis",
     "limit_cycle",
     "load",
     "lyapunov",
+    "manifold",
     "open_sweep",
     "plot",
     "poincare",
@@ -113,14 +129,15 @@ __all__ = [
     "system",
 ]
 
-_LAZY = ("analysis", "plot", "problems")
+_LAZY = ("analysis", "cycles", "plot", "problems")
 _LAZY_NAMES = {
     "HiddenDynamics": "hidden",
     "hidden_dynamics": "hidden",
     "Ensemble": "ensemble",
     **dict.fromkeys(("Phase", "Section", "Tangency", "poincare"), "analysis"),
     **dict.fromkeys(("basins", "bifurcation_diagram", "open_sweep", "sweep"), "analysis"),
-    **dict.fromkeys(("Cycle", "limit_cycle"), "cycles"),
+    **dict.fromkeys(("Branch", "Cycle", "Equilibrium", "Special"), "cycles"),
+    **dict.fromkeys(("continuation", "equilibrium", "limit_cycle", "manifold"), "cycles"),
     "equilibria": "cycles.equilibria",
     "lyapunov": "cycles.lyapunov",
     "SurfaceParts": "sheets",

@@ -270,6 +270,15 @@ def solve_prepared(
     return _shown(solution)
 
 
+def solve_quietly(
+    system: System, t_span: Any, y0: npt.ArrayLike, params: Mapping[str, float], options: Mapping[str, Any]
+) -> Solution:
+    """Solve as `solve_ivp` does, and show no warnings; for the runs of an analysis."""
+    others = dict(options)
+    events = others.pop("events", None)
+    return _solve(system, t_span, y0, _changed(others), events, None, params, None, None)
+
+
 def _key_of(options: Mapping[str, Any]) -> Hashable | None:
     """Return what tells these options from others, if that is known."""
     if "wrt" not in options:

@@ -120,17 +120,22 @@ impl HeldMotions {
                 start: &x,
                 places,
             };
-            leg(
-                (system, extended, actions),
-                &self.options,
-                (&mode, &q),
-                over,
-            )
-            .map_err(|error| match error {
+            let of = (system, extended, actions);
+            let mut interrupt = |_: f64| {
+                py.check_signals().is_err_and(|raised| {
+                    raised.restore(py);
+                    true
+                })
+            };
+            let found = leg(of, &self.options, (&mode, &q), over, &mut interrupt);
+            found.map_err(|error| match error {
                 LegError::Argument(error) => refused(error),
                 LegError::Raised(error) => raised(error),
             })
         })?;
+        if let Some(raised) = PyErr::take(py) {
+            return Err(raised);
+        }
         if !matches!(found.stop, Stop::End) {
             let name = |j: usize| self.prepared.core().surface_name(j);
             let message = found.stop.message(t0, &mode, name);
@@ -263,9 +268,9 @@ impl HeldMotions {
         ask: impl FnOnce(&mut HeldMotion) -> PyResult<R>,
     ) -> PyResult<R> {
         let mode = Mode::new(mode);
-        self.with(q, |_, extended, _| {
+        self.with(q, |system, extended, _| {
             let impacts = extended.impacts();
-            let mut motion = HeldMotion::new(extended, &impacts, &self.options, &mode, q);
+            let mut motion = HeldMotion::new((system, extended), &impacts, &self.options, &mode, q);
             ask(&mut motion)
         })
     }

@@ -52,7 +52,7 @@ def load_model(text: str, wanted: str | None = None) -> Model:
     Parameters
     ----------
     text : str
-        A Python file, or the name of a reference problem.
+        A Python file, ``FILE.py:NAME`` for one of several systems in it, or the name of a reference problem.
     wanted : str, optional
         Name of the system in the file, if it has several.
 
@@ -65,6 +65,11 @@ def load_model(text: str, wanted: str | None = None) -> Model:
     Mistake
         If there is no such file or problem, or the file has no system or cannot be run.
     """
+    before, colon, name = text.rpartition(":")
+    if colon and before.endswith(".py") and name:
+        if wanted not in (None, name):
+            raise Mistake(f"--system: {wanted!r} is another one than that of {text}")
+        return _from_file(Path(before), name)
     path = Path(text)
     if path.suffix == ".py" or path.exists():
         return _from_file(path, wanted)

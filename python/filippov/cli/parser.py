@@ -8,6 +8,7 @@ from pathlib import Path
 
 from filippov._core import __version__
 from filippov.cli import commands
+from filippov.cli.following import add_continue_options, add_cycle_options, continue_, cycle
 from filippov.cli.solving import add_run_options
 from filippov.cli.sweeping import add_sweep_options, sweep
 
@@ -25,6 +26,8 @@ first steps:
   filippov solve dry_friction --param F=0.8  the same with another parameter
   filippov solve model.py --t 0 100 --y0 1 0 --plot out.png
   filippov sweep model.py --param omega=0.2:2:500 --period "2*pi/omega" --store runs --plot diagram.png
+  filippov cycle model.py --plot cycle.png
+  filippov continue model.py --parameter omega --range 0.2 0.9 --plot branch.png
 
 a model is a Python file, written as for SciPy:
   import filippov as fl, numpy as np
@@ -69,6 +72,8 @@ def build_parser() -> argparse.ArgumentParser:
     _add_demo(subparsers)
     _add_solve(subparsers)
     _add_sweep(subparsers)
+    _add_cycle(subparsers)
+    _add_continue(subparsers)
     return parser
 
 
@@ -144,3 +149,54 @@ def _add_sweep(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     command._negative_number_matcher = re.compile(r"-\.?\d")
     add_sweep_options(command)
     command.set_defaults(run=sweep)
+
+
+_CYCLE = """\
+examples:
+  filippov cycle model.py --param F=0.4 omega=1/3 --plot cycle.png --json cycle.json
+  filippov cycle model.py --period "2*pi/omega" --y0 1 2
+
+A run comes to the cycle, whose period is recognised, and Newton's method finds it. With --transient 0 the
+initial state is a guess, and the cycle may be unstable; without forcing --period is a guess too.
+"""
+
+
+def _add_cycle(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    command = subparsers.add_parser(
+        "cycle",
+        help="find a limit cycle, its period and multipliers",
+        description="Find the limit cycle that a run comes to; print its period, multipliers and pieces.",
+        epilog=_CYCLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    # All that begins with a minus and a digit is a number here, such as -1e-3 and -1/3; no option does.
+    command._negative_number_matcher = re.compile(r"-\.?\d")
+    add_cycle_options(command)
+    command.set_defaults(run=cycle)
+
+
+_CONTINUE = """\
+examples:
+  filippov continue model.py --parameter omega --range 0.2 0.9 --plot branch.png --csv branch.csv
+  filippov continue model.py --param F=1/2 --parameter omega --range 0.2 0.9 --store branch.json
+  filippov continue model.py --equilibrium --mode 0 --parameter F --range 0 1
+
+The cycle is found as by `filippov cycle`, or with --equilibrium the equilibrium near the initial state. The
+branch is followed through sliding bifurcations, and special points are printed: LP fold, PD period doubling,
+NS torus, HB Hopf, BE boundary equilibrium, PSN pseudo-saddle-node, CS GS SS AS crossing-, grazing-,
+switching- and adding-sliding, GR grazing of a reset, EP end.
+"""
+
+
+def _add_continue(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    command = subparsers.add_parser(
+        "continue",
+        help="follow a cycle or an equilibrium in a parameter",
+        description="Follow a cycle or an equilibrium in a parameter; print where it changes.",
+        epilog=_CONTINUE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    # All that begins with a minus and a digit is a number here, such as -1e-3 and -1/3; no option does.
+    command._negative_number_matcher = re.compile(r"-\.?\d")
+    add_continue_options(command)
+    command.set_defaults(run=continue_)

@@ -11,20 +11,20 @@ import numpy as np
 from filippov.cli.mistakes import Mistake, assignments, hint, number
 from filippov.cli.model import Model
 
-__all__ = ["add_run_options", "initial_state", "interval", "options_of_run", "parameters"]
+__all__ = [
+    "add_model_options",
+    "add_run_options",
+    "initial_state",
+    "interval",
+    "options_of_run",
+    "parameters",
+]
 
 
 def add_run_options(command: argparse.ArgumentParser) -> None:
     """Add the arguments that describe a run to a command."""
-    command.add_argument("model", metavar="MODEL", help="a Python file, or a problem of `filippov list`")
-    command.add_argument("--system", metavar="NAME", help="which system of the file")
+    add_model_options(command)
     command.add_argument("--t", nargs="+", metavar="T", help="end, or start and end; else t_span of the file")
-    command.add_argument(
-        "--y0", nargs="+", metavar="X", help="initial state: numbers, or NAME=NUMBER for some of them"
-    )
-    command.add_argument(
-        "--param", nargs="+", default=[], action="extend", metavar="NAME=VALUE", help="values of parameters"
-    )
     how = command.add_argument_group("how it is solved")
     how.add_argument("--rtol", metavar="TOL", help="relative tolerance, 1e-6 by default")
     how.add_argument("--atol", metavar="TOL", help="absolute tolerance, 1e-9 by default")
@@ -35,6 +35,18 @@ def add_run_options(command: argparse.ArgumentParser) -> None:
     how.add_argument("--max-steps", type=int, metavar="N", help="give up after N steps")
     how.add_argument("--max-wall-time", metavar="SECONDS", help="give up after that time")
     how.add_argument("--progress", action="store_true", help="show how far the run is")
+
+
+def add_model_options(command: argparse.ArgumentParser) -> None:
+    """Add the arguments that choose a model, its initial state and its parameters to a command."""
+    command.add_argument("model", metavar="MODEL", help="a Python file, or a problem of `filippov list`")
+    command.add_argument("--system", metavar="NAME", help="which system of the file; or FILE.py:NAME")
+    command.add_argument(
+        "--y0", nargs="+", metavar="X", help="initial state: numbers, or NAME=NUMBER for some of them"
+    )
+    command.add_argument(
+        "--param", nargs="+", default=[], action="extend", metavar="NAME=VALUE", help="values of parameters"
+    )
 
 
 def options_of_run(given: argparse.Namespace) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import ast
 import math
 import sys
 from pathlib import Path
@@ -15,6 +14,7 @@ from filippov import analysis
 from filippov.analysis.dataset import kinds_of
 from filippov.analysis.grid import memory_of_machine
 from filippov.cli.commands import check_needs, check_picture, check_target, say
+from filippov.cli.expressions import expression
 from filippov.cli.mistakes import Mistake, assignments, hint, number
 from filippov.cli.model import Model, load_model
 from filippov.cli.solving import initial_state, interval, options_of_run
@@ -25,7 +25,6 @@ from filippov.notices import summary
 __all__ = ["add_sweep_options", "sweep"]
 
 _RETURNS, _TRANSIENT = 100, 400
-_NODES = (ast.Expression, ast.BinOp, ast.UnaryOp, ast.Constant, ast.Name, ast.Load, ast.operator, ast.unaryop)
 
 
 def add_sweep_options(command: argparse.ArgumentParser) -> None:
@@ -153,27 +152,8 @@ def _section(given: argparse.Namespace, model: Model) -> Any:
     if given.period is not None and given.section is not None:
         raise Mistake("--period: give either it or --section")
     if given.period is not None:
-        return analysis.Phase(_expression(given.period, list(model.system.params)))
+        return analysis.Phase(expression(given.period, list(model.system.params), "--period"))
     return given.section if given.section is not None else model.section
-
-
-def _expression(text: str, names: list[str]) -> Any:
-    """Return a number, or a function of parameters, written with + - * / ** and pi."""
-    try:
-        tree = ast.parse(text, mode="eval")
-    except (SyntaxError, ValueError):
-        raise Mistake(f"--period: {text!r} cannot be read; write like 2*pi/omega") from None
-    used = sorted({node.id for node in ast.walk(tree) if isinstance(node, ast.Name)} - {"pi"})
-    for node in ast.walk(tree):
-        is_text = isinstance(node, ast.Constant) and type(node.value) not in (int, float)
-        if is_text or not isinstance(node, _NODES):
-            raise Mistake(f"--period: {text!r} has more than numbers, parameters, pi and + - * / **")
-    for name in used:
-        if name not in names:
-            raise Mistake(f"--period: no parameter {name!r}{hint(name, names)}")
-    # Nothing but arithmetic of numbers and names is left in the text.
-    value = eval(f"lambda {', '.join(used)}: {text}", {"__builtins__": {}, "pi": math.pi})
-    return value if used else value()
 
 
 def _span(given: argparse.Namespace, model: Model, section: Any) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""One step along a curve that N equations in N + 1 unknowns define: prediction along the tangent, then Newton's method.
+"""One step along a curve of N equations in N + 1 unknowns: a prediction, then Newton's method.
 
 Reference: Allgower, Georg, Introduction to Numerical Continuation Methods (2003), chapters 2 and 6.
 """
@@ -19,7 +19,15 @@ _MOST_STEPS = 12
 
 
 class Curve(Protocol):
-    """N equations in N + 1 unknowns."""
+    """N equations in N + 1 unknowns.
+
+    Attributes
+    ----------
+    is_exact : bool
+        Are their derivatives exact, and not differences?
+    """
+
+    is_exact: bool
 
     def equations(self, w: Array) -> tuple[Array, Array]:
         """Return the equations, shape (N,), and their derivatives, shape (N, N + 1)."""
@@ -87,8 +95,11 @@ def corrected(curve: Curve, w: Array, scale: Array, normal: Array, level: float 
         if not np.isfinite(size):
             break
         w = w + change * scale
-        if size < _TOLERANCE or (size < 1e-8 and size > 0.5 * before):
-            return Step(w, jacobian, count, size)
+        # Newton's method squares what is left.
+        squares = curve.is_exact and size < 1e-2 * before < np.inf
+        left = size**3 / before**2 if squares else size
+        if left < _TOLERANCE or (size < 1e-8 and size > 0.5 * before):
+            return Step(w, jacobian, count, left)
         if count > 3 and size > before:
             break
         before = size

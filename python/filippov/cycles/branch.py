@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, overload
 
 import numpy as np
 
 from filippov.analysis.optional import need
 from filippov.cycles.cycle import Cycle
-from filippov.cycles.equilibrium import Equilibrium
+from filippov.cycles.rest import Equilibrium
 from filippov.errors import InputError
 
-__all__ = ["CODES", "Branch", "Point", "Special", "SpecialPoints"]
+__all__ = ["CHANGES", "CODES", "Branch", "Point", "Special", "SpecialPoints"]
 
 State = Cycle | Equilibrium
 
@@ -30,9 +30,14 @@ CODES = {
     "SS": "switching-sliding",
     "AS": "adding-sliding",
     "GR": "grazing of a reset",
+    "CP": "degenerate point",
     "UZ": "a monitor vanishes",
     "EP": "end",
 }
+
+
+# At these the flow takes another itinerary.
+CHANGES = ("CS", "SS", "GS", "AS", "GR", "BE")
 
 
 class Point(NamedTuple):
@@ -50,6 +55,13 @@ class Point(NamedTuple):
     params: dict[str, float]
     state: State
     tests: dict[Any, float]
+
+    @property
+    def is_admissible(self) -> bool:
+        """Whether the flow follows the itinerary there: all its test functions are positive."""
+        if isinstance(self.state, Equilibrium):
+            return self.state.is_admissible
+        return all(value > 0 for key, value in self.tests.items() if key[0] in ("CS", "SS", "GS", "AS", "GR"))
 
 
 class Special(NamedTuple):
@@ -148,7 +160,9 @@ class Branch:
         reasons: Mapping[str, str],
         names: Sequence[str],
         monitors: Sequence[str] = (),
+        at_value: Callable[[State, str, float], State] | None = None,
     ) -> None:
+        self._at_value = at_value
         self.points, self.special = list(points), SpecialPoints(special)
         self.reasons, self.names, self.monitors = dict(reasons), tuple(names), tuple(monitors)
 
@@ -159,6 +173,13 @@ class Branch:
 
     def __len__(self) -> int:
         return len(self.points)
+
+    @property
+    def quantities(self) -> list[str]:
+        """The names that `values` takes: parameters, states, monitors, and ``"period"`` for cycles."""
+        first = self.points[0].state
+        states = first.system.state_names(len(_start(first)))
+        return [*self.names, *states, *self.monitors, *(["period"] if isinstance(first, Cycle) else [])]
 
     def values(self, name: str) -> Any:
         """Return a quantity along the branch: a parameter, a state, a monitor, or ``"period"``, an array."""
@@ -173,13 +194,37 @@ class Branch:
         if name in states:
             i = states.index(name)
             return np.array([_start(point.state)[i] for point in self.points])
-        known = [*self.names, *states, *self.monitors, *(["period"] if isinstance(first, Cycle) else [])]
-        raise InputError(f"the branch has {', '.join(map(repr, known))}, and no {name!r}")
+        raise InputError(f"the branch has {', '.join(map(repr, self.quantities))}, and no {name!r}")
+
+    def special_values(self, name: str) -> Any:
+        """Return a quantity at the special points, an array.
+
+        A monitor is interpolated between the points beside a special point.
+        """
+        if name in self.monitors:
+            along, values, first = self.values(self.names[0]), self.values(name), self.names[0]
+            found = []
+            for special in self.special:
+                i, j = special.point, min(special.point + 1, len(self) - 1)
+                width = along[j] - along[i]
+                share = (special.params[first] - along[i]) / width if width else 0.0
+                found.append(values[i] + min(max(share, 0.0), 1.0) * (values[j] - values[i]))
+            return np.array(found)
+        if not len(self.special):
+            self.values(name)
+            return np.zeros(0)
+        points = [Point(special.params, special.state, {}) for special in self.special]
+        return Branch(points, (), {}, self.names).values(name)
 
     @property
     def stable(self) -> Any:
         """Whether each point is stable, an array of bool."""
         return np.array([point.state.is_stable for point in self.points])
+
+    @property
+    def admissible(self) -> Any:
+        """Whether the flow follows each point, an array of bool."""
+        return np.array([point.is_admissible for point in self.points])
 
     def at(self, **params: float) -> State:
         """Return the cycle or equilibrium at the value of a parameter; the first one along the branch.
@@ -189,8 +234,6 @@ class Branch:
         InputError
             If the branch does not come there.
         """
-        from filippov.cycles.continuation import at_value
-
         if len(params) != 1 or next(iter(params)) not in self.names:
             raise InputError(f"at: the value of one of {', '.join(self.names)} is needed")
         ((name, value),) = params.items()
@@ -200,7 +243,13 @@ class Branch:
             raise InputError(f"{name}: the branch does not come to {value:g}")
         k = int(places[0])
         nearer = k if abs(along[k]) <= abs(along[k + 1]) else k + 1
-        return at_value(self.points[nearer].state, name, float(value))
+        for special in self.special:
+            # Between two points at which the flow takes different itineraries the special point decides.
+            if special.point == k and special.code in CHANGES:
+                change = special.params[name] - float(value)
+                nearer = k if change * along[k + 1] >= 0 else k + 1
+        assert self._at_value is not None
+        return self._at_value(self.points[nearer].state, name, float(value))
 
     @property
     def data(self) -> Any:
@@ -221,7 +270,7 @@ class Branch:
             variables["eigenvalues"] = (("point", "eigenvalue"), _padded([_eigenvalues(s) for s in states]))
         variables["stable"] = ("point", self.stable)
         variables["itinerary"] = ("point", np.array([_itinerary_text(s) for s in states]))
-        variables["admissible"] = ("point", np.array([_is_admissible(point) for point in self.points]))
+        variables["admissible"] = ("point", self.admissible)
         variables["residual"] = ("point", np.array([s.residual for s in states]))
         return xarray.Dataset(variables, attrs={"reason": self.reason})
 
@@ -253,7 +302,7 @@ class Branch:
 
 
 def _start(state: State) -> Any:
-    """Return the state at the start: for a forced cycle that at time 0 modulo the period, for others that at a switch."""
+    """Return the state at the start: with forcing that at time 0 modulo the period, else that at a switch."""
     if isinstance(state, Cycle):
         return state.at(0.0) if state.is_forced else state.y0
     return state.y
@@ -288,10 +337,3 @@ def _padded(rows: Sequence[Any]) -> Any:
 
 def _itinerary_text(state: State) -> str:
     return " ".join(map(str, state.modes)) if isinstance(state, Cycle) else str(state.mode)
-
-
-def _is_admissible(point: Point) -> bool:
-    """Whether the flow follows the itinerary there: all its test functions are positive."""
-    if isinstance(point.state, Equilibrium):
-        return point.state.is_admissible
-    return all(value > 0 for key, value in point.tests.items() if key[0] in ("CS", "SS", "GS", "AS", "GR"))

@@ -25,11 +25,14 @@ class CycleCurve:
         The sizes by which these are measured.
     """
 
+    is_exact = True
+
     def __init__(self, cycle: Cycle, names: tuple[str, ...], sizes: tuple[float, ...]) -> None:
         self.names, self.sizes = names, np.array(sizes)
         self._shooting = cycle._with_derivatives_by(names)
         self.start = np.append(cycle._u, [cycle.params[name] for name in names])
         self.n_unknowns = len(cycle._u)
+        self._latest: tuple[Array, int, Shot] | None = None
 
     @property
     def shooting(self) -> Shooting:
@@ -37,10 +40,12 @@ class CycleCurve:
         return self._shooting
 
     def shot(self, w: Array, places: int = 0) -> Shot:
-        """Return the equations of the cycle."""
-        u, p = w[: self.n_unknowns], w[self.n_unknowns :]
-        self._shooting.motions.move(p)
-        return self._shooting.shoot(u, places)
+        """Return the equations of the cycle, those of the latest call again."""
+        if self._latest is None or self._latest[1] < places or not np.array_equal(self._latest[0], w):
+            u, p = w[: self.n_unknowns], w[self.n_unknowns :]
+            self._shooting.motions.move(p)
+            self._latest = w.copy(), places, self._shooting.shoot(u, places)
+        return self._latest[2]
 
     def equations(self, w: Array) -> tuple[Array, Array]:
         """Return the equations, and their derivatives by unknowns and parameters."""
@@ -59,8 +64,11 @@ class CycleCurve:
     def state(self, w: Array, error: float) -> Cycle:
         """Return the cycle there."""
         u = w[: self.n_unknowns].copy()
-        self.shot(w)
-        motions = self._shooting.motions
-        own = motions.with_derivatives_by(())
-        shooting = Shooting(own, self._shooting.itinerary(u), self._shooting.period)
-        return Cycle(shooting, u, shooting.shoot(u), error)
+        shot = self.shot(w)
+        motions = self._shooting.motions.copy()
+        shooting = Shooting(motions, self._shooting.itinerary(u), self._shooting.period)
+        return Cycle(shooting, u, shot, error)
+
+    def refer_to(self, w: Array) -> None:
+        """Fix the phase beside another cycle of the curve."""
+        self._shooting.refer_to(w[: self.n_unknowns])

@@ -14,9 +14,9 @@ from typing import Any, NamedTuple, overload
 import numpy as np
 
 from filippov._core import ModeBounds, TracedSystem
-from filippov.cycles.equilibrium import Equilibrium, EquilibriumCurve, rest_of
 from filippov.cycles.forcing import depends_on_time
 from filippov.cycles.motions import Array, Motions
+from filippov.cycles.rest import Equilibrium, EquilibriumCurve, rest_of
 from filippov.errors import InputError, ModelError
 from filippov.prepare import parameter_vector
 from filippov.scalars import real

@@ -11,10 +11,14 @@ import numpy as np
 from filippov.analysis import Phase
 from filippov.cycles.motions import Array, Motions
 from filippov.errors import InputError, ModelError
+from filippov.scalars import positive
 
-__all__ = ["Forcing", "GivenPeriod", "InferredPeriod", "depends_on_time", "forcing_of"]
+__all__ = ["GivenPeriod", "InferredPeriod", "common_period", "depends_on_time", "forcing_of"]
 
-_PLACES = 7
+_PLACES, _CONFIRMED_AT, _MOST_MULTIPLES = 7, 3, 64
+
+
+_GIVE_PERIOD = "give period=, a number or a function of the parameters"
 
 
 @lru_cache(maxsize=16)
@@ -46,11 +50,17 @@ class GivenPeriod:
     """A multiple of a period that the user gives: a number, or a function of parameters by their names."""
 
     def __init__(self, period: float | Callable[..., Any], multiple: int = 1) -> None:
+        if not callable(period):
+            period = positive("period", period)
         self.phase, self.multiple = Phase(period), multiple
 
     def near(self, duration: float) -> GivenPeriod:
         """Return it for cycles of about this duration."""
         return self
+
+    def twice(self) -> GivenPeriod:
+        """Return it for cycles of twice the period."""
+        return GivenPeriod(self.phase.period, 2 * self.multiple)
 
     def value(self, motions: Motions) -> float:
         """Return the period for the parameters of the motions."""
@@ -76,18 +86,22 @@ class GivenPeriod:
 class InferredPeriod:
     """A multiple of the period of field and switching functions, found from their values.
 
-    Most periods are products of powers of parameters, as 2 pi / omega is: where the exponents are whole numbers they are taken, and
-    confirmed at every value.
+    Most periods are products of powers of parameters, as 2 pi / omega is: where the exponents are whole
+    numbers they are taken, and confirmed at every value.
     """
 
     def __init__(self, guess: float, multiple: int = 1, exponents: dict[str, float] | None = None) -> None:
         self.guess, self.multiple = guess, multiple
         self._known: tuple[dict[str, float], float] | None = None
-        self._exponents = {} if exponents is None else exponents
+        self.exponents = {} if exponents is None else exponents
 
     def near(self, duration: float) -> InferredPeriod:
         """Return it for cycles of about this duration."""
-        return InferredPeriod(duration / self.multiple, self.multiple, self._exponents)
+        return InferredPeriod(duration / self.multiple, self.multiple, self.exponents)
+
+    def twice(self) -> InferredPeriod:
+        """Return it for cycles of twice the period."""
+        return InferredPeriod(self.guess, 2 * self.multiple, self.exponents)
 
     def value(self, motions: Motions) -> float:
         """Return the period for the parameters of the motions."""
@@ -102,7 +116,7 @@ class InferredPeriod:
             changed = [name for name in params if params[name] != known[name]]
             if all(self._exponent(motions, name, known, period).is_integer() for name in changed):
                 for name in changed:
-                    period *= (params[name] / known[name]) ** self._exponents[name]
+                    period *= (params[name] / known[name]) ** self.exponents[name]
             if not _repeats(motions, period):
                 period = _refined(motions, period)
             self._known = params, period
@@ -122,7 +136,7 @@ class InferredPeriod:
 
     def _exponent(self, motions: Motions, name: str, params: dict[str, float], period: float) -> float:
         """Return the exponent with which a parameter is in the period, a whole number up to rounding."""
-        if name not in self._exponents:
+        if name not in self.exponents:
             latest = motions.params
             motions.use(params)
             try:
@@ -130,14 +144,15 @@ class InferredPeriod:
             finally:
                 motions.use(latest)
             is_whole = abs(found - round(found)) < 1e-8 and params[name] != 0.0
-            self._exponents[name] = float(round(found)) if is_whole else 0.5
-        return self._exponents[name]
+            self.exponents[name] = float(round(found)) if is_whole else 0.5
+        return self.exponents[name]
 
 
 def _slope_of_period(motions: Motions, name: str, period: float) -> float:
     """Return the derivative of the period by a parameter.
 
-    Where the right-hand side repeats itself for all values of a parameter, its derivative by that and by the period vanish together.
+    Where the right-hand side repeats itself for all values of a parameter, its derivatives by that and by the
+    period vanish together.
     """
     params = motions.params
 
@@ -160,10 +175,10 @@ def _slope(function: Callable[[float], Array], d: float) -> Array:
     return np.asarray(1.5 * near - 0.6 * middle + 0.1 * far)
 
 
-def _difference(motions: Motions, period: float) -> Array:
-    """Return by how much field and switching functions differ a period later."""
+def _difference(motions: Motions, period: float, count: int = _PLACES) -> Array:
+    """Return by how much field and switching functions differ a period later, at some places."""
     parts = []
-    for u, x, signs in _samples(motions):
+    for u, x, signs in _samples(motions)[:count]:
         t = u * period
         parts.append(motions.right_hand_side(t + period, x, signs) - motions.right_hand_side(t, x, signs))
     found = np.concatenate(parts)
@@ -179,27 +194,25 @@ def _refined(motions: Motions, guess: float) -> float:
         slope = (_difference(motions, period + d) - _difference(motions, period - d)) / (2 * d)
         size = float(slope @ slope)
         if size == 0.0:
-            return period
+            raise ModelError(f"the right-hand side jumps and does nothing else in time: {_GIVE_PERIOD}")
         step = -float(slope @ value) / size
         step = float(np.clip(step, -0.1 * period, 0.1 * period))
         period += step
         if abs(step) < 4e-16 * period:
             break
     if not _repeats(motions, period):
-        raise ModelError(
-            f"the period of the right-hand side near {guess:.6g} is not found: give period=, a number or a "
-            "function of the parameters"
-        )
+        raise ModelError(f"the period of the right-hand side near {guess:.6g} is not found: {_GIVE_PERIOD}")
     return period
 
 
 def _repeats(motions: Motions, period: float) -> bool:
     """Whether the right-hand side is the same a period later."""
-    return bool(np.max(np.abs(_difference(motions, period)), initial=0.0) <= 1e-11 * _size(motions))
+    left = np.max(np.abs(_difference(motions, period, _CONFIRMED_AT)), initial=0.0)
+    return bool(left <= 1e-11 * _size(motions, _CONFIRMED_AT))
 
 
-def _size(motions: Motions) -> float:
-    values = [motions.right_hand_side(u, x, signs) for u, x, signs in _samples(motions)]
+def _size(motions: Motions, count: int = _PLACES) -> float:
+    values = [motions.right_hand_side(u, x, signs) for u, x, signs in _samples(motions)[:count]]
     found = np.abs(np.concatenate(values))
     return max(float(np.max(found[np.isfinite(found)], initial=0.0)), 1.0)
 
@@ -220,6 +233,23 @@ def forcing_of(motions: Motions, shortest: float, longest: float) -> InferredPer
                 pass
         before = [before[1], value]
     return None
+
+
+def common_period(motions: Motions, ticks: float) -> float:
+    """Return the least multiple of the period of a clock after which the right-hand side is the same.
+
+    Raises
+    ------
+    ModelError
+        If there is none.
+    """
+    for multiple in range(1, _MOST_MULTIPLES + 1):
+        if _repeats(motions, multiple * ticks):
+            return multiple * ticks
+    raise ModelError(
+        f"things happen every {ticks:.6g} units of time, and the right-hand side does not repeat itself in "
+        f"{_MOST_MULTIPLES} of them: {_GIVE_PERIOD}"
+    )
 
 
 def _difference_from_start(motions: Motions, period: float) -> Array:

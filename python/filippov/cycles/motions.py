@@ -14,6 +14,7 @@ from filippov.errors import InputError, ModelError
 from filippov.options import Options, check_options
 from filippov.prepare import Prepared, parameter_vector
 from filippov.solution import Solution
+from filippov.solve import solve_quietly
 from filippov.system import System
 
 __all__ = ["Guard", "GuardsAt", "Instant", "LegEnd", "Mode", "Motions", "Record"]
@@ -175,14 +176,26 @@ class Motions:
         self._params, self._prepared, self._core = values, prepared, prepared.core
         self._held = None
 
-    def move(self, values: Sequence[float]) -> None:
+    def move(self, values: Array) -> None:
         """Take other values of the parameters by which derivatives are taken."""
-        if any(self._params[name] != value for name, value in zip(self._by, values, strict=True)):
-            self.use({**self._params, **dict(zip(self._by, map(float, values), strict=True))})
+        moved = {**self._params, **dict(zip(self._by, values.tolist(), strict=True))}
+        if moved == self._params:
+            return
+        if self._prepared.pinned is not None:
+            self.use(moved)
+        self._params, self._held = moved, None
+
+    def copy(self) -> Motions:
+        """Return the same motions, to be moved on their own."""
+        other = Motions.__new__(Motions)
+        other.__dict__.update(self.__dict__)
+        return other
 
     def with_derivatives_by(self, names: Sequence[str]) -> Motions:
         """Return the same motions with derivatives by other parameters."""
-        return Motions(self.system, self.n, self._params, names, self.options)
+        other = self.copy()
+        other._by, other._held = tuple(names), None
+        return other
 
     def leg(
         self, mode: Mode, q: tuple[float, ...], t0: float, x: Array, duration: float, places: int = 0
@@ -223,7 +236,7 @@ class Motions:
 
     def run(self, t_span: tuple[float, float], x: Array, **options: Any) -> Solution:
         """Run the system with these parameters."""
-        return self.system.solve(t_span, x, self._params, **{**self.options, **options})
+        return solve_quietly(self.system, t_span, x, self._params, {**self.options, **options})
 
     def record(self, t_span: tuple[float, float], x: Array) -> Record:
         """Run the system, and return the run with its instants.

@@ -1,13 +1,13 @@
 """Test functions of a cycle with a given itinerary: positive while the flow follows it.
 
 Each is a smooth function of the equations of the itinerary, which goes on where the flow takes another way.
-References: di Bernardo, Budd, Champneys, Kowalczyk, Piecewise-smooth Dynamical Systems (2008), chapters 7 and 8; Kuznetsov, Rinaldi,
-Gragnani, Int. J. Bifurcation and Chaos 13 (2003) 2157.
+References: di Bernardo, Budd, Champneys, Kowalczyk, Piecewise-smooth Dynamical Systems (2008), chapters 7 and
+8; Kuznetsov, Rinaldi, Gragnani, Int. J. Bifurcation and Chaos 13 (2003) 2157.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from filippov.cycles.motions import Array, Guard, Mode, Motions
 from filippov.cycles.shooting import Passage, Shooting, Shot
 from filippov.cycles.zero import zero_between
 
-__all__ = ["PLACES", "Probe", "probes_of"]
+__all__ = ["PLACES", "Probe", "local_probe", "probes_of"]
 
 PLACES = 6
 _NAMES = {
@@ -61,7 +61,7 @@ class Probe(NamedTuple):
     x: Array
 
     @property
-    def key(self) -> tuple[object, ...]:
+    def key(self) -> tuple[Any, ...]:
         """What tells it from others."""
         return self.code, self.leg, self.guard, self.place, self.number
 
@@ -149,7 +149,8 @@ def _triggers(motions: Motions, surface: int) -> bool:
 
 def _at_end(motions: Motions, i: int, leg: Leg, following: Leg, passage: Passage) -> list[Probe]:
     """Return what must hold where a leg ends."""
-    assert leg.ending is not None and leg.ending.guard is not None
+    assert leg.ending is not None
+    assert leg.ending.guard is not None
     guard, t = leg.ending.guard, passage.t
     kind, surface, _ = guard
     own = motions.at(leg.mode, leg.discrete, t, passage.leg.x)
@@ -176,3 +177,55 @@ def _at_end(motions: Motions, i: int, leg: Leg, following: Leg, passage: Passage
 
 def _is_crossed(before: Mode, after: Mode, surface: int) -> bool:
     return before[surface] != 0 and after[surface] == -before[surface]
+
+
+def local_probe(
+    shooting: Shooting, key: tuple[Any, ...], x: Array, t0: float, duration: float, share: float
+) -> tuple[float, float, float]:
+    """Return one test function from the start of its leg alone, and the next derivative of what vanishes.
+
+    Parameters
+    ----------
+    shooting : Shooting
+    key : tuple
+        That of the probe.
+    x, t0, duration : ndarray of shape (n,), float, float
+        The start of its leg, and how long that lasts.
+    share : float
+        The share of the leg near which a minimum is.
+
+    Returns
+    -------
+    value, next derivative, share : float
+    """
+    _, i, guard, place, number = key
+    motions, leg = shooting.motions, shooting.legs[i]
+    if place == "inside":
+        g = motions.guards(leg.mode, leg.discrete).index(guard)
+        near = t0 + share * duration
+        bracket = (max(t0, near - 0.2 * duration), near + 0.2 * duration)
+        t, point, value = _minimum(motions, leg, t0, x, bracket, near, g)
+        return value, _second(motions, leg, t, point, g, duration), (t - t0) / duration
+    passage = shooting._pass(leg, t0, x, duration, 0)
+    behind = shooting.legs[(i + 1) % shooting.m]._replace(discrete=passage.discrete)
+    value = {probe.key: probe.value for probe in _at_end(motions, i, leg, behind, passage)}[key]
+    if number == 0:  # the motion before leads through the zero of its guard
+        g = motions.guards(leg.mode, leg.discrete).index(guard)
+        return value, _second(motions, leg, passage.t, passage.leg.x, g, duration), 1.0
+    g = motions.guards(behind.mode, behind.discrete).index(guard)
+    if number == 1:  # the motion behind a crossing leads away
+        return value, _second(motions, behind, passage.t, passage.after, g, duration), 1.0
+    rates = motions.at(behind.mode, behind.discrete, passage.t, passage.after).rates()
+    return value, float(rates[g]), 1.0
+
+
+def _second(motions: Motions, leg: Leg, t: float, x: Array, g: int, duration: float) -> float:
+    """Return the second derivative of a guard along a motion, by differences of its rate along the field."""
+    velocity = motions.at(leg.mode, leg.discrete, t, x).velocity
+    d = 1e-5 * duration
+
+    def rate(k: int) -> float:
+        point = x + k * d * velocity
+        return float(motions.at(leg.mode, leg.discrete, t + k * d, point).rates()[g])
+
+    return (rate(1) - rate(-1)) / (2 * d)

@@ -1,10 +1,11 @@
 """The equations of a cycle with a given itinerary, and their derivatives.
 
-The unknowns are the states at the starts of the legs, their durations, the time at which the first starts, if that is not known, and
-parameters. Each leg is followed in its mode for its duration, whatever its guards do in between: a cycle can be continued beyond the
-end of its itinerary, where a piece no longer ends at what ends it in the flow.
+The unknowns are the states at the starts of the legs, their durations, the time at which the first starts,
+if that is not known, and parameters. Each leg is followed in its mode for its duration, whatever its guards
+do in between: a cycle can be continued beyond the end of its itinerary, where a piece no longer ends at what
+ends it in the flow.
 
-References: Thota, Dankowicz, SIAM J. Appl. Dyn. Syst. 7 (2008) 1283 (itineraries as boundary-value problems); `docs/theory`.
+Reference: Thota, Dankowicz, SIAM J. Appl. Dyn. Syst. 7 (2008) 1283 (itineraries as boundary-value problems).
 """
 
 from __future__ import annotations
@@ -72,7 +73,14 @@ class Shot(NamedTuple):
     times: list[Array]
 
     def monodromy(self) -> Array:
-        """Return the derivative of the state after one period by the state at the start, at fixed times."""
+        """Return the derivative of the state after one period by the state at the start, at fixed times.
+
+        It is infinite where a leg ends without speed.
+        """
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return self._monodromy()
+
+    def _monodromy(self) -> Array:
         n = len(self.passages[0].after)
         states, time = np.eye(n), np.zeros(n)
         for passage in self.passages:
@@ -109,6 +117,14 @@ class Shooting:
         self._reference = itinerary.starts[0].copy()
         first = self.legs[0]
         self._along = motions.at(first.mode, first.discrete, self.t0, self._reference).velocity
+
+    def refer_to(self, u: Array) -> None:
+        """Fix the phase of a cycle that starts at no event beside another one."""
+        if self.period is not None or self.legs[-1].ending is not None:
+            return
+        first = self.legs[0]
+        self._reference = u[: self.n].copy()
+        self._along = self.motions.at(first.mode, first.discrete, self.t0, self._reference).velocity
 
     @property
     def size(self) -> int:
@@ -251,13 +267,17 @@ def solve(
     """
     u = u.copy()
     best = np.inf
+    first = sum(shooting.parts(u)[1])
     for step in range(most):
         shot = shooting.shoot(u)
         change = _newton_step(shot.jacobian[:, : shooting.size], shot.residual)
         size = float(np.max(np.abs(change) / scales(shooting, u)))
         if not np.isfinite(size):
             break
-        u = u + _shorter(shooting, u, change) * change
+        # Far from the cycle a step is no longer than the cycle.
+        u = u + min(_shorter(shooting, u, change), 1.0 / max(size, 1e-300)) * change
+        if not 0.02 * first < sum(shooting.parts(u)[1]) < 50 * first:
+            break
         if size < tol or (size < 1e-9 and size >= 0.5 * best):
             return u, shooting.shoot(u), size
         best = min(best, size)

@@ -8,9 +8,11 @@ Needs Matplotlib: ``pip install filippov[plot]``.
 
 from __future__ import annotations
 
+from filippov.plot.branches import branches
 from filippov.plot.diagrams import basins, bifurcation_diagram, poincare_section
 from filippov.plot.hidden_dynamics import hidden_dynamics
 from filippov.plot.phase import phase, phase3d
+from filippov.plot.portrait import portrait
 from filippov.plot.style import style, theme
 from filippov.plot.surface import surface
 from filippov.plot.time_series import time_series
@@ -18,10 +20,12 @@ from filippov.plot.time_series import time_series
 __all__ = [
     "basins",
     "bifurcation_diagram",
+    "branches",
     "hidden_dynamics",
     "phase",
     "phase3d",
     "poincare_section",
+    "portrait",
     "style",
     "surface",
     "theme",

@@ -7,7 +7,9 @@ use crate::mode::Mode;
 use crate::motion::{Guard, SmoothField};
 use crate::options::Options;
 use crate::record::Gradient;
-use crate::system::{Act, ActionMap, Actions, PiecewiseSystem, SignStructure};
+use crate::system::{
+    Act, ActionMap, Actions, PiecewiseSystem, Setting, SignStructure, TracedSystem,
+};
 
 /// The motion of a mode, asked at places that it need not be admissible at.
 pub struct HeldMotion<'a> {
@@ -44,7 +46,7 @@ pub struct ActionAt {
 impl<'a> HeldMotion<'a> {
     /// The motion of a mode with these discrete states.
     pub fn new(
-        extended: &'a Extended<'a>,
+        (system, extended): (&TracedSystem, &'a Extended<'a>),
         impacts: &'a Actions<'a>,
         options: &'a Options,
         mode: &Mode,
@@ -55,7 +57,6 @@ impl<'a> HeldMotion<'a> {
         let piece = Piece::new(&around, mode, q);
         let sliding: Vec<usize> = mode.sliding_set().collect();
         let mut active = vec![false; mode.entries().len()];
-        let system = &extended.system;
         system.active(&mode.signs(), &sliding, &mut active);
         let entries = mode.entries().iter().enumerate();
         let surfaces = entries.filter(|(j, entry)| active[*j] && **entry != 0);
@@ -170,7 +171,7 @@ impl Extended<'_> {
             (Some(rows), by_time)
         });
         let z = self.state(x);
-        let place = crate::system::Setting::new(&signs, q).at(t, &z);
+        let place = Setting::new(&signs, q).at(t, &z);
         let act = Act {
             index,
             x: x.to_vec(),

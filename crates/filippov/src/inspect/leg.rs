@@ -35,7 +35,7 @@ pub struct Leg {
     pub stop: Stop,
 }
 
-/// Follows the motion in a mode over a given time.
+/// Follows the motion in a mode over a given time; `interrupt` is asked every few steps, and the leg ends where it returns `true`.
 ///
 /// # Errors
 /// If an argument is out of range, or a function of the user raises.
@@ -48,6 +48,7 @@ pub fn leg(
         start,
         places,
     }: Over,
+    interrupt: &mut dyn FnMut(f64) -> bool,
 ) -> Result<Leg, LegError> {
     let n = start.len();
     let impacts = extended.impacts();
@@ -66,11 +67,11 @@ pub fn leg(
         .options(&options)
         .actions(actions)
         .held_in(mode)
-        .solve_observed(&mut tangents, &mut |_| false)?;
+        .solve_observed(&mut tangents, interrupt)?;
     let mut derivative = tangents.finish()?.values;
     let size = n * (n + extended.n_parameters());
     derivative.drain(..derivative.len() - size);
-    let mut motion = HeldMotion::new(extended, &impacts, &options, mode, q);
+    let mut motion = HeldMotion::new((system, extended), &impacts, &options, mode, q);
     let mut velocity = |t: f64, x: &[f64]| -> Result<Vec<f64>, FieldError> {
         let mut all = motion.velocity(t, x)?;
         all.truncate(n);

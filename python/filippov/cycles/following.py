@@ -1,7 +1,7 @@
 """Branches of cycles and equilibria in a parameter, through the points at which their itinerary changes.
 
-References: Allgower, Georg (2003); Kuznetsov, Elements of Applied Bifurcation Theory (2004), chapter 10; Thota, Dankowicz, SIAM J.
-Appl. Dyn. Syst. 7 (2008) 1283; di Bernardo et al. (2008), chapters 7 and 8.
+References: Allgower, Georg (2003); Kuznetsov, Elements of Applied Bifurcation Theory (2004), chapter 10;
+Thota, Dankowicz, SIAM J. Appl. Dyn. Syst. 7 (2008) 1283; di Bernardo et al. (2008), chapters 7 and 8.
 """
 
 from __future__ import annotations
@@ -12,14 +12,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from filippov.cycles.arclength import Step, corrected, tangent_of
-from filippov.cycles.branch import CODES, Branch, Point, Special, State
+from filippov.cycles.boundary import beyond_boundary
+from filippov.cycles.branch import CHANGES, CODES, Branch, Point, Special, State
 from filippov.cycles.cycle import Cycle, cycle_at, cycle_of
 from filippov.cycles.cycle_curve import CycleCurve
+from filippov.cycles.indicators import tests_at
 from filippov.cycles.itinerary import Itinerary
-from filippov.cycles.equilibrium import Equilibrium, EquilibriumCurve, rest_of
 from filippov.cycles.monitors import Monitor, monitors_of
 from filippov.cycles.motions import Array
-from filippov.cycles.tests import tests_at
+from filippov.cycles.rest import Equilibrium, EquilibriumCurve, rest_of
 from filippov.cycles.zero import zero_between
 from filippov.errors import InputError, ModelError
 from filippov.scalars import count, positive
@@ -30,9 +31,8 @@ __all__ = ["at_value", "continuation"]
 AnyCurve = CycleCurve | EquilibriumCurve
 
 _FIRST_STEP, _LONGEST_STEP, _SHORTEST_STEP = 0.01, 0.05, 1e-5
-# Codes at which the flow takes another itinerary.
-_CHANGES = ("CS", "SS", "GS", "AS", "GR", "BE")
 _WIDTH = 1e-13
+_SAVED_EVERY = 50
 
 
 class _Settings(NamedTuple):
@@ -44,6 +44,7 @@ class _Settings(NamedTuple):
     monitors: tuple[Monitor, ...]
     most: int
     report: Callable[[int, float], None]
+    save: Callable[[], None]
 
     @property
     def size(self) -> float:
@@ -82,18 +83,18 @@ def continuation(
     step : float, optional
         First step, in units of the parameter. Default: a hundredth of the range. It adapts.
     monitor : dict, optional
-        Functions by name: an `Event` or a function ``g(t, y)``, for cycles at its largest value over a period; or a
-        function of the cycle or equilibrium, marked by ``fl.cycles.of_state``. Their values along the branch are
-        kept, and their zeros are special points UZ.
+        Functions by name: an `Event` or a function ``g(t, y)``, for cycles at its largest value over a
+        period; or a function of the cycle or equilibrium, marked by ``fl.cycles.of_state``. Their values
+        along the branch are kept, and their zeros are special points UZ.
     detect : "all" or sequence of str, optional
         Codes of the special points to look for.
     switch : {"follow", "stop", "ignore"}, optional
-        What to do where the flow takes another itinerary: go on with that, stop, or go on with a cycle that the flow
-        does not follow.
+        What to do where the flow takes another itinerary: go on with that, stop, or go on with a cycle that
+        the flow does not follow.
     max_points : int, optional
         The most points in each direction.
     store : path, optional
-        A file that the branch is written to while it grows, and that continues it if it is there.
+        A file that the branch is written to while it grows; `filippov.cycles.load_branch` reads it.
     progress : bool, optional
         Print how far the branch is.
 
@@ -112,7 +113,7 @@ def continuation(
     --------
     >>> import numpy as np, filippov as fl
     >>> fish = fl.System(lambda t, x, a=0.5: [x[0] * (1 - x[0]) - 0.2 * x[0] * (x[0] > a)], n=1)
-    >>> branch = fl.continuation(fl.equilibrium(fish, [0.7]), "a", (0.1, 1.0))
+    >>> branch = fl.continuation(fl.equilibrium(fish, [0.7]), "a", (0.1, 1.2))
     >>> [(point.code, round(point.params["a"], 9)) for point in branch.special["BE"]]
     [('BE', 0.8), ('BE', 1.0)]
     """
@@ -128,20 +129,32 @@ def continuation(
     if isinstance(first, Cycle):
         first = first.from_event()
     settings = _checked(first, parameter, bounds, step, monitor, detect, switch, max_points, progress)
+    directions = [-1.0, 1.0]
+    if isinstance(start, Special):
+        away = float(np.sign(first.params[parameter] - start.params[parameter]))
+        directions = [-away, away]
     sides: list[_Side] = []
+
+    def save() -> None:
+        if store is not None and sides:
+            from filippov.cycles.saving import save_branch
+
+            save_branch(_joined(sides, settings), store)
+
+    settings = settings._replace(save=save)
     try:
-        for direction in (-1.0, 1.0):
+        for direction in directions:
             sides.append(_Side(first, settings, direction))
-            sides[-1].follow()
+            if isinstance(start, Special) and direction == directions[0]:
+                sides[0].reason = f"it starts at {start!r}"
+            else:
+                sides[-1].follow()
     except KeyboardInterrupt as interrupt:
+        save()
         interrupt.partial = _joined(sides, settings)  # type: ignore[attr-defined]
         raise
-    branch = _joined(sides, settings)
-    if store is not None:
-        from filippov.cycles.saving import save_branch
-
-        save_branch(branch, store)
-    return branch
+    save()
+    return _joined(sides, settings)
 
 
 def _checked(
@@ -181,6 +194,7 @@ def _checked(
         monitors_of(monitor, start),
         count("max_points", most),
         report,
+        lambda: None,
     )
 
 
@@ -236,7 +250,7 @@ class _Side:
     def _begin(self, state: State, direction: float) -> None:
         """Start with the itinerary of a state."""
         self.curve, self.w = curve_of(state, (self.settings.name,), (self.settings.size,))
-        residual, jacobian = self.curve.equations(self.w)
+        _, jacobian = self.curve.equations(self.w)
         scale = self.curve.scales(self.w)
         self.tangent = tangent_of(jacobian, scale)
         if self.tangent[-1] * direction < 0:
@@ -255,6 +269,8 @@ class _Side:
         value = float(self.w[-1])
         self.points.append(Point({self.settings.name: value}, state, self.tests))
         self.settings.report(len(self.points), value)
+        if len(self.points) % _SAVED_EVERY == 0:
+            self.settings.save()
 
     def follow(self) -> None:
         """Follow the branch to its end."""
@@ -323,7 +339,7 @@ class _Side:
         for _, key, located in found:
             code = key[0]
             state = self.curve.state(located.w, located.error)
-            if code in _CHANGES and self.settings.switch != "ignore":
+            if code in CHANGES and self.settings.switch != "ignore":
                 if self.tests[key] < 0:
                     continue  # it becomes possible again: the flow does not follow it yet
                 self._add_located(key, state)
@@ -338,29 +354,34 @@ class _Side:
 
     def _settle(self, step: Step, tangent: Array, tests: dict[Any, float]) -> None:
         state = self.curve.state(step.w, step.error)
-        if isinstance(self.curve, CycleCurve) and isinstance(state, Cycle):
-            # The phase is fixed beside the latest cycle.
-            self.curve = CycleCurve(state, (self.settings.name,), (self.settings.size,))
+        self.curve.refer_to(step.w)
         self.w, self.tangent, self.tests, self.jacobian = step.w, tangent, tests, step.jacobian
         self._keep(state)
 
     def _located(self, key: Any, step: Step, tests: dict[Any, float]) -> tuple[float, Any, Step]:
         """Return how far along the step a test function vanishes, which one, and the point."""
         scale = self.curve.scales(self.w)
-        start, level = self.w, self.w / scale @ self.tangent
-        length = step.w / scale @ self.tangent - level
-        latest: list[Step] = []
+        start, level = self.w, float(self.w / scale @ self.tangent)
+        length = float(step.w / scale @ self.tangent) - level
+        nearest: list[tuple[float, float, Step]] = []
 
         def value(s: float) -> float:
             guess = start + (s / length) * (step.w - start)
             point = corrected(self.curve, guess, scale, self.tangent, level + s)
-            latest[:] = [point]
             tangent = tangent_of(point.jacobian, self.curve.scales(point.w), self.tangent)
-            return self._value(key, point, tangent)
+            found = self._value(key, point, tangent)
+            if not nearest or abs(found) <= nearest[0][0]:
+                nearest[:] = [(abs(found), s, point)]
+            return found
 
-        s = zero_between(value, (0.0, self.tests[key]), (length, tests[key]), _WIDTH)
-        value(s)
-        return s, key, latest[0]
+        try:
+            zero_between(value, (0.0, self.tests[key]), (length, tests[key]), _WIDTH)
+        except ModelError:
+            # The equations are singular at a branch point: the point is as near as they can be solved.
+            if key[0] in CHANGES or not nearest:
+                raise
+        _, s, point = nearest[0]
+        return s, key, point
 
     def _value(self, key: Any, point: Step, tangent: Array) -> float:
         found = self._tests(point.w, point.jacobian, tangent)
@@ -389,7 +410,7 @@ class _Side:
         if code not in self.settings.detect:
             return
         surface, t = "", np.nan
-        if code in _CHANGES and key is not None:
+        if code in CHANGES and key is not None:
             place = key[1] if code == "BE" else (key[2][1] if key[2] is not None else -1)
             names = (
                 self.curve.shooting.motions.prepared.surfaces
@@ -411,7 +432,8 @@ class _Side:
         """Go on with the itinerary of the flow behind a special point."""
         direction = float(np.sign(beyond.w[-1] - located.w[-1])) or self.direction
         if isinstance(self.curve, EquilibriumCurve):
-            following = _beyond_boundary(self.curve, key, located, direction, self.settings)
+            here = self.curve.state(located.w, located.error)
+            following = beyond_boundary(here, key[1], self.settings.name, self.settings.bounds)
             if following is None:
                 self.reason = f"no equilibrium goes on from {self.special[-1]!r}"
                 return False
@@ -456,7 +478,7 @@ class _Side:
         return None
 
     def _locate_behind(self, state: Cycle, value: float, direction: float) -> None:
-        """Go back from a cycle to the value of the parameter before, and find which test function vanishes."""
+        """Go back from a cycle to a value of the parameter, and find which test function vanishes between."""
         self._begin(state, -direction)
         self.points.pop()
         start = (self.w, self.tangent, self.tests, self.jacobian)
@@ -473,7 +495,7 @@ class _Side:
         lost = [
             key
             for key in tests
-            if key[0] in _CHANGES and key in self.tests and tests[key] * self.tests[key] < 0
+            if key[0] in CHANGES and key in self.tests and tests[key] * self.tests[key] < 0
         ]
         if not lost:
             raise ModelError("nothing vanishes between the two itineraries")
@@ -557,67 +579,6 @@ def _without_leg(
     return None
 
 
-def _beyond_boundary(
-    curve: EquilibriumCurve, key: Any, located: Step, direction: float, settings: _Settings
-) -> tuple[Equilibrium, float] | None:
-    """Return the equilibrium that goes on from a boundary, a little way along its branch, and its direction."""
-    surface = key[1]
-    n, before = curve.n, curve.mode[surface]
-    x, value = located.w[:n], located.w[-1]
-    if before == 0:
-        end = float(np.sign(located.w[n + curve.sliding.index(surface)]))
-        targets = [(_with_entry(curve.mode, surface, int(end)), None)]
-    else:
-        targets = [
-            (_with_entry(curve.mode, surface, 0), float(before)),
-            (_with_entry(curve.mode, surface, -before), None),
-        ]
-    for mode, end_value in targets:
-        other = EquilibriumCurve(curve.motions, mode, curve.names, curve.sizes)
-        own = dict(zip(curve.sliding, located.w[n : n + len(curve.sliding)], strict=True))
-        if end_value is not None:
-            own[surface] = end_value
-        w = np.concatenate([x, [own[j] for j in other.sliding], [value]])
-        try:
-            point = corrected(other, w, other.scales(w), np.eye(len(w))[-1])
-        except ModelError:
-            continue
-        if np.max(np.abs((point.w - w) / other.scales(w))) > 1e-6:
-            continue
-        found = _admissible_along(other, point, surface, end_value, mode, settings)
-        if found is not None:
-            return found
-    return None
-
-
-def _with_entry(mode: Sequence[int], surface: int, entry: int) -> tuple[int, ...]:
-    return (*mode[:surface], entry, *mode[surface + 1 :])
-
-
-def _admissible_along(
-    curve: EquilibriumCurve,
-    point: Step,
-    surface: int,
-    end: float | None,
-    mode: Sequence[int],
-    settings: _Settings,
-) -> tuple[Equilibrium, float] | None:
-    scale = curve.scales(point.w)
-    tangent = tangent_of(point.jacobian, scale)
-    for sign in (1.0, -1.0):
-        try:
-            step = corrected(curve, point.w + 1e-4 * sign * tangent * scale, scale, tangent)
-        except ModelError:
-            continue
-        state = curve.state(step.w, step.error)
-        inside = np.all(np.abs(state.multipliers) <= 1.0)
-        if inside and np.all(state.switching > 0):
-            low, high = settings.bounds
-            if low <= step.w[-1] <= high:
-                return state, float(np.sign(step.w[-1] - point.w[-1])) or sign
-    return None
-
-
 def _other_branch(special: Special, name: str) -> State:
     """Return a state of the other branch through a special point."""
     from filippov.cycles.switching import other_branch
@@ -637,4 +598,5 @@ def _joined(sides: Sequence[_Side], settings: _Settings) -> Branch:
         points = points + forward.points[1:]
         special += [s._replace(point=s.point + last) for s in forward.special]
         reasons["above"] = forward.reason
-    return Branch(points, special, reasons, (settings.name,), [m.name for m in settings.monitors])
+    monitors = [monitor.name for monitor in settings.monitors]
+    return Branch(points, special, reasons, (settings.name,), monitors, at_value)

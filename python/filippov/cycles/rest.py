@@ -1,9 +1,10 @@
 """Equilibria of regions, and pseudo-equilibria on any number of surfaces, where the sliding motion rests.
 
-A pseudo-equilibrium on h_j = 0 has f(x, lambda) = 0 with the multipliers as unknowns, f linear in each of them: these equations are
-regular where a multiplier is -1 or +1, and the equilibrium is one of a region there.
+A pseudo-equilibrium on h_j = 0 has f(x, lambda) = 0 with the multipliers as unknowns, f linear in each of
+them: these equations are regular where a multiplier is -1 or +1, and the equilibrium is one of a region.
 
-References: Filippov (1988), section 19; Kuznetsov, Rinaldi, Gragnani, Int. J. Bifurcation and Chaos 13 (2003) 2157.
+References: Filippov (1988), section 19; Kuznetsov, Rinaldi, Gragnani, Int. J. Bifurcation and Chaos 13 (2003)
+2157.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from filippov.modes import Mode
 from filippov.options import check_y0
 from filippov.system import System
 
-__all__ = ["Equilibrium", "EquilibriumCurve", "equilibrium", "rest_of"]
+__all__ = ["Equilibrium", "EquilibriumCurve", "equilibrium", "first_multipliers", "rest_of"]
 
 _MOST_STEPS = 50
 _TOLERANCE = 1e-13
@@ -68,7 +69,7 @@ class Equilibrium:
 
     @cached_property
     def switching(self) -> Array:
-        """The values of the switching functions, each in the sense of the mode: positive if it is admissible."""
+        """The switching functions, each in the sense of the mode: positive where it is admissible."""
         return self._curve.switching(self._w)
 
     @property
@@ -79,7 +80,7 @@ class Equilibrium:
 
     @cached_property
     def eigenvalues(self) -> npt.NDArray[np.complex128]:
-        """Those of the motion in its mode: n in a region, n - m on m surfaces; the largest real part first."""
+        """Those of its motion: n in a region, n - m on m surfaces; the largest real part first."""
         found = np.linalg.eigvals(self._curve.linearisation(self._w)).astype(np.complex128)
         return found[np.lexsort((-found.imag, -found.real))]
 
@@ -122,6 +123,8 @@ class EquilibriumCurve:
     sizes : sequence of float
         The sizes by which they are measured.
     """
+
+    is_exact = False
 
     def __init__(
         self, motions: Motions, mode: Sequence[int], names: Sequence[str] = (), sizes: Sequence[float] = ()
@@ -191,11 +194,19 @@ class EquilibriumCurve:
         jacobian = self._by_unknowns(w)
         a, b, rows = jacobian[:n, :n], jacobian[:n, n:], jacobian[n:, :n]
         if m == 0:
-            return a
-        tangents = np.linalg.svd(rows)[2][m:].T
+            return np.asarray(a)
+        tangents = _tangents(rows)
         # The multipliers keep the motion on the surfaces: rows (a dx + b dlambda) = 0 at rest.
         by_state = -np.linalg.solve(rows @ b, rows @ a)
         return np.asarray(tangents.T @ (a + b @ by_state) @ tangents)
+
+    def tangents(self, w: Array) -> Array:
+        """Return the basis, shape (n, n - m), of the tangent space that `linearisation` is in."""
+        return _tangents(self.normals(w))
+
+    def normals(self, w: Array) -> Array:
+        """Return the gradients of the surfaces slid on, shape (m, n)."""
+        return np.asarray(self._by_unknowns(w)[self.n :, : self.n])
 
     def normal_rates(self, w: Array) -> Array:
         """Return the derivatives of the rates of the surfaces slid on by their multipliers."""
@@ -211,9 +222,20 @@ class EquilibriumCurve:
 
         return differences(residual, own, self.scales(w)[:k], is_fine=True)
 
+    def refer_to(self, w: Array) -> None:
+        """Take a point as the latest one; nothing depends on it."""
+
     def state(self, w: Array, error: float) -> Equilibrium:
         """Return the equilibrium there."""
         return Equilibrium(self, w, error)
+
+
+def _tangents(rows: Array) -> Array:
+    """Return a basis of the space that the gradients are at right angles to, shape (n, n - m)."""
+    m, n = rows.shape
+    if m == 0:
+        return np.eye(n)
+    return np.asarray(np.linalg.svd(rows)[2][m:].T)
 
 
 def differences(function: Callable[[Array], Array], w: Array, scale: Array, is_fine: bool = False) -> Array:
@@ -234,7 +256,7 @@ def differences(function: Callable[[Array], Array], w: Array, scale: Array, is_f
             columns.append((at(1) - at(-1)) / (2 * d))
     if not columns:
         return np.zeros((len(function(w)), 0))
-    return np.array(columns).T
+    return np.asarray(np.array(columns).T, dtype=np.float64)
 
 
 def equilibrium(
@@ -287,7 +309,7 @@ def equilibrium(
         raise InputError("system: it depends on the time: it has cycles (fl.limit_cycle), and no equilibria")
     entries = _mode_of(motions, start, mode)
     curve = EquilibriumCurve(motions, entries)
-    w = np.append(start, _first_multipliers(curve, start))
+    w = np.append(start, first_multipliers(curve, start))
     return rest_of(curve, w)
 
 
@@ -303,6 +325,8 @@ def rest_of(curve: EquilibriumCurve, w: Array) -> Equilibrium:
     for _ in range(_MOST_STEPS):
         residual, jacobian = curve.equations(w)
         own = jacobian[:, : curve.n_unknowns]
+        if not (np.isfinite(residual).all() and np.isfinite(own).all()):
+            break
         change = -np.linalg.lstsq(own, residual, rcond=None)[0]
         size = float(np.max(np.abs(change) / curve.scales(w)[: curve.n_unknowns]))
         if not np.isfinite(size):
@@ -311,6 +335,9 @@ def rest_of(curve: EquilibriumCurve, w: Array) -> Equilibrium:
         w = w.copy()
         w[: curve.n_unknowns] += change * min(1.0, 2.0 / max(size, 1e-300))
         if size < _TOLERANCE or (size < 1e-9 and size >= 0.5 * before):
+            # With a singular Jacobian the least squares may come to a point that is no zero.
+            if np.any(np.abs(residual) > 1e-8 * (np.abs(own) @ curve.scales(w)[: curve.n_unknowns])):
+                break
             return Equilibrium(curve, w, size)
         before = size
     raise ModelError(
@@ -339,7 +366,7 @@ def _mode_of(motions: Motions, x: Array, mode: Any) -> tuple[int, ...]:
     return given + own[visible:]
 
 
-def _first_multipliers(curve: EquilibriumCurve, x: Array) -> Array:
+def first_multipliers(curve: EquilibriumCurve, x: Array) -> Array:
     """Return multipliers that make the field small at a point."""
     m = len(curve.sliding)
     if m == 0:

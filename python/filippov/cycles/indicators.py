@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from filippov.cycles.arclength import tangent_of
 from filippov.cycles.cycle import multipliers_of
 from filippov.cycles.cycle_curve import CycleCurve
-from filippov.cycles.equilibrium import EquilibriumCurve
 from filippov.cycles.motions import Array
 from filippov.cycles.probes import PLACES, probes_of
+from filippov.cycles.rest import EquilibriumCurve
+from filippov.cycles.shooting import Shot
 
-__all__ = ["tangent_of", "tests_at"]
+__all__ = ["singular_values_of", "tests_at"]
 
 
 def tests_at(
@@ -25,31 +25,39 @@ def tests_at(
 ) -> dict[Any, float]:
     """Return the test functions at a point of a branch, by keys whose first entry is the code."""
     scale = curve.scales(w)
-    along = jacobian * scale
-    bordered = np.vstack([along, tangent])
+    bordered = np.vstack([jacobian * scale, tangent])
     sign, size = np.linalg.slogdet(bordered)
     is_on_surface = isinstance(curve, EquilibriumCurve) and curve.sliding
-    found: dict[Any, float] = {
-        ("PSN" if is_on_surface else "LP",): float(tangent[-1]),
-        ("BP",): float(sign * np.exp(size / len(bordered))),
-    }
+    found: dict[Any, float] = {}
     if isinstance(curve, CycleCurve):
-        found.update(_of_cycle(curve, w))
+        shot = curve.shot(w, PLACES)
+        probes = probes_of(curve.shooting, w[: curve.n_unknowns], shot)
+        found.update({probe.key: probe.value for probe in probes})
+        found.update(_of_multipliers(curve, shot))
     else:
         found.update(_of_equilibrium(curve, w))
+    # Along a branch these are sharper than products of multipliers.
+    found["PSN" if is_on_surface else "LP",] = float(tangent[-1])
+    found["BP",] = float(sign * np.exp(size / len(bordered)))
     return {key: value for key, value in found.items() if key[0] in codes}
 
 
-def _of_cycle(curve: CycleCurve, w: Array) -> dict[Any, float]:
-    shot = curve.shot(w, PLACES)
-    shooting = curve.shooting
-    found: dict[Any, float] = {
-        probe.key: probe.value for probe in probes_of(shooting, w[: curve.n_unknowns], shot)
-    }
-    values = multipliers_of(shot.monodromy(), 0)
-    found["PD",] = float(np.prod(1.0 + values).real)
-    if shooting.period is None:
+def singular_values_of(curve: CycleCurve | EquilibriumCurve, w: Array) -> dict[Any, float]:
+    """Return the functions of multipliers or eigenvalues, and those of boundaries."""
+    if isinstance(curve, CycleCurve):
+        return _of_multipliers(curve, curve.shot(w))
+    return _of_equilibrium(curve, w)
+
+
+def _of_multipliers(curve: CycleCurve, shot: Shot) -> dict[Any, float]:
+    monodromy = shot.monodromy()
+    if not np.all(np.isfinite(monodromy)):  # an impact without speed
+        return {}
+    values = multipliers_of(monodromy, 0)
+    found: dict[Any, float] = {("PD",): float(np.prod(1.0 + values).real)}
+    if curve.shooting.period is None:
         values = np.delete(values, int(np.argmin(np.abs(values - 1.0))))
+    found["LP",] = float(np.prod(1.0 - values).real)
     pairs = [values[i] * values[j] for i in range(len(values)) for j in range(i)]
     if pairs:
         found["NS",] = float(np.prod(1.0 - np.array(pairs)).real)
@@ -64,6 +72,7 @@ def _of_equilibrium(curve: EquilibriumCurve, w: Array) -> dict[Any, float]:
         multiplier = w[curve.n + place]
         found["BE", j, 1], found["BE", j, -1] = float(1.0 - multiplier), float(1.0 + multiplier)
     values = np.linalg.eigvals(curve.linearisation(w))
+    found["PSN" if curve.sliding else "LP",] = float(np.prod(values).real)
     pairs = [values[i] + values[j] for i in range(len(values)) for j in range(i)]
     if pairs:
         found["HB",] = float(np.prod(np.array(pairs)).real)

@@ -1,0 +1,82 @@
+"""What becomes of an equilibrium at the boundary of its mode.
+
+References: di Bernardo et al. (2008), chapter 5: persistence, and non-smooth folds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from filippov.cycles.arclength import Step, corrected, tangent_of
+from filippov.cycles.rest import Equilibrium, EquilibriumCurve
+from filippov.errors import ModelError
+
+__all__ = ["beyond_boundary"]
+
+
+def beyond_boundary(
+    state: Equilibrium, surface: int, name: str, bounds: tuple[float, float] = (-np.inf, np.inf)
+) -> tuple[Equilibrium, float] | None:
+    """Return the equilibrium of another mode that goes on from a boundary, and where a parameter leads it.
+
+    Parameters
+    ----------
+    state : Equilibrium
+        The equilibrium on the boundary.
+    surface : int
+        The surface that it meets; or, if it is on that, the one whose multiplier is -1 or 1.
+    name : str
+        The parameter.
+    bounds : (float, float), optional
+        Its range.
+    """
+    curve = state._curve
+    before = curve.mode[surface]
+    value = state.params[name]
+    size = abs(value) or 1.0
+    if before == 0:
+        end = int(np.sign(state.multipliers[curve.sliding.index(surface)]))
+        targets: list[tuple[tuple[int, ...], float | None]] = [(_with_entry(curve.mode, surface, end), None)]
+    else:
+        targets = [
+            (_with_entry(curve.mode, surface, 0), float(before)),
+            (_with_entry(curve.mode, surface, -before), None),
+        ]
+    for mode, multiplier in targets:
+        other = EquilibriumCurve(curve.motions, mode, (name,), (size,))
+        own = dict(zip(curve.sliding, state.multipliers, strict=True))
+        if multiplier is not None:
+            own[surface] = multiplier
+        w = np.concatenate([state.y, [own[j] for j in other.sliding], [value]])
+        try:
+            point = corrected(other, w, other.scales(w), np.eye(len(w))[-1])
+        except ModelError:
+            continue
+        if np.max(np.abs((point.w - w) / other.scales(w))) < 1e-6:
+            found = _admissible_along(other, point, bounds)
+            if found is not None:
+                return found
+    return None
+
+
+def _with_entry(mode: Sequence[int], surface: int, entry: int) -> tuple[int, ...]:
+    return (*mode[:surface], entry, *mode[surface + 1 :])
+
+
+def _admissible_along(
+    curve: EquilibriumCurve, point: Step, bounds: tuple[float, float]
+) -> tuple[Equilibrium, float] | None:
+    """Return the nearest equilibrium of a branch that the system has, and in which direction it lies."""
+    scale = curve.scales(point.w)
+    tangent = tangent_of(point.jacobian, scale)
+    for sign in (1.0, -1.0):
+        try:
+            step = corrected(curve, point.w + 1e-4 * sign * tangent * scale, scale, tangent)
+        except ModelError:
+            continue
+        state = curve.state(step.w, step.error)
+        if state.is_admissible and bounds[0] <= step.w[-1] <= bounds[1]:
+            return state, float(np.sign(step.w[-1] - point.w[-1])) or sign
+    return None

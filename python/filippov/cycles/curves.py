@@ -1,0 +1,385 @@
+"""Curves of special points in two parameters: the equations of a branch with the condition of the point.
+
+References: Kuznetsov, Elements of Applied Bifurcation Theory (2004), section 10.3; di Bernardo et al. (2008),
+chapter 8.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+
+from filippov.cycles.arclength import Step, corrected, tangent_of
+from filippov.cycles.branch import CODES, Branch, Point, Special, State
+from filippov.cycles.cycle_curve import CycleCurve
+from filippov.cycles.following import AnyCurve, bounds_of, curve_of
+from filippov.cycles.indicators import singular_values_of
+from filippov.cycles.motions import Array
+from filippov.cycles.probes import PLACES, local_probe, probes_of
+from filippov.cycles.rest import differences
+from filippov.cycles.zero import zero_between
+from filippov.errors import InputError, ModelError
+from filippov.scalars import positive
+from filippov.unknown import did_you_mean
+
+__all__ = ["curve_in_two"]
+
+_FIRST_STEP, _LONGEST_STEP, _SHORTEST_STEP = 0.01, 0.04, 1e-6
+_PROBES = ("CS", "SS", "GS", "AS", "GR")
+
+
+class _Condition(Protocol):
+    """What holds at a special point."""
+
+    def value(self, w: Array) -> float:
+        """Return what vanishes."""
+
+    def gradient(self, w: Array) -> Array:
+        """Return its derivatives by all unknowns."""
+
+    def next_value(self, w: Array) -> float:
+        """Return what must not vanish as well: there the condition is degenerate."""
+
+    def keep(self, w: Array) -> None:
+        """Take a point of the curve as that near which the next one is."""
+
+
+class _ProbeCondition:
+    """A test function of an itinerary vanishes."""
+
+    def __init__(self, curve: CycleCurve, key: tuple[Any, ...], w: Array) -> None:
+        self.curve, self.key = curve, key
+        place, n = self._place(w), curve.shooting.n
+        probes = probes_of(curve.shooting, w[: curve.n_unknowns], curve.shot(w, PLACES))
+        at = next((probe.t for probe in probes if probe.key == key), place[n] + place[n + 1])
+        self._share = (at - place[n]) / place[n + 1]
+
+    def _local(self, v: Array) -> tuple[float, float, float]:
+        """Return test function, next derivative and share of its leg, from where and how long that is."""
+        n = self.curve.shooting.n
+        self.curve.shooting.motions.move(v[n + 2 :])
+        return local_probe(self.curve.shooting, self.key, v[:n], float(v[n]), float(v[n + 1]), self._share)
+
+    def keep(self, w: Array) -> None:
+        self._share = self._local(self._place(w))[2]
+
+    def _place(self, w: Array) -> Array:
+        shooting, leg = self.curve.shooting, self.key[1]
+        starts, durations, t0 = shooting.parts(w[: self.curve.n_unknowns])
+        t = t0 + sum(durations[:leg])
+        return np.concatenate([starts[leg], [t, durations[leg]], w[self.curve.n_unknowns :]])
+
+    def value(self, w: Array) -> float:
+        return self._local(self._place(w))[0]
+
+    def next_value(self, w: Array) -> float:
+        return self._local(self._place(w))[1]
+
+    def gradient(self, w: Array) -> Array:
+        place = self._place(w)
+        shooting, leg = self.curve.shooting, self.key[1]
+        n, m = shooting.n, shooting.m
+        scale = self.curve.scales(w)
+        period = scale[m * n]
+        own = np.concatenate([scale[leg * n : (leg + 1) * n], [period, period], self.curve.sizes])
+        slopes = differences(lambda v: np.array([self._local(v)[0]]), place, own)[0]
+        found = np.zeros(len(w))
+        found[leg * n : (leg + 1) * n] = slopes[:n]
+        found[m * n : m * n + leg] = slopes[n]
+        if shooting.is_free_in_time:
+            found[m * (n + 1)] = slopes[n]
+        found[m * n + leg] += slopes[n + 1]
+        found[self.curve.n_unknowns :] = slopes[n + 2 :]
+        return found
+
+
+class _SpectralCondition:
+    """An eigenvalue or a multiplier is critical, or an equilibrium lies on the boundary of its mode."""
+
+    def __init__(self, curve: AnyCurve, special: Special) -> None:
+        self.curve, self.key = curve, special.test
+
+    def value(self, w: Array) -> float:
+        return singular_values_of(self.curve, w)[self.key]
+
+    def gradient(self, w: Array) -> Array:
+        return np.asarray(differences(lambda v: np.array([self.value(v)]), w, self.curve.scales(w))[0])
+
+    def next_value(self, w: Array) -> float:
+        return np.nan
+
+    def keep(self, w: Array) -> None:
+        pass
+
+
+class _Extended:
+    """The equations of a curve with the condition."""
+
+    is_exact = False
+
+    def __init__(self, curve: AnyCurve, condition: _Condition) -> None:
+        self.curve, self.condition = curve, condition
+
+    def equations(self, w: Array) -> tuple[Array, Array]:
+        residual, jacobian = self.curve.equations(w)
+        value, gradient = self.condition.value(w), self.condition.gradient(w)
+        return np.append(residual, value), np.vstack([jacobian, gradient])
+
+    def scales(self, w: Array) -> Array:
+        return self.curve.scales(w)
+
+
+def curve_in_two(
+    start: Any, names: tuple[str, ...], bounds: Any, step: float | None, max_points: int
+) -> Branch:
+    """Return the curve of a special point in two parameters.
+
+    Raises
+    ------
+    InputError
+        If the start is none, or lies outside of the ranges.
+    ModelError
+        If Newton's method does not converge at the start.
+    """
+    if not isinstance(start, Special) or start.test is None:
+        raise InputError(
+            "start: with two parameters a special point of a branch is needed, branch.special[..]"
+        )
+    if len(names) != 2 or names[0] == names[1]:
+        raise InputError(f"parameter: one name or two are needed, not {names!r}")
+    params = start.state.params
+    for name in names:
+        if name not in params or name in start.state.system.discrete:
+            raise InputError(f"parameter: the system has no parameter {name!r}{did_you_mean(name, params)}")
+    if not isinstance(bounds, Mapping) or set(bounds) != set(names):
+        raise InputError(
+            f"bounds: a dict with the ranges of {names[0]} and {names[1]} is needed, not {bounds!r}"
+        )
+    ranges = tuple(bounds_of(bounds[name], name) for name in names)
+    for name, (low, high) in zip(names, ranges, strict=True):
+        if not low <= params[name] <= high:
+            raise InputError(
+                f"bounds: the start has {name} = {params[name]:g}, outside of ({low:g}, {high:g})"
+            )
+    sizes = tuple(high - low for low, high in ranges)
+    share = _FIRST_STEP if step is None else positive("step", step) / sizes[0]
+    sides = [_CurveSide(start, names, ranges, sizes, direction) for direction in (-1.0, 1.0)]
+    for side in sides:
+        side.follow(min(share, _LONGEST_STEP), max_points)
+    last = len(sides[0].points) - 1
+    points = sides[0].points[::-1] + sides[1].points[1:]
+    special = [s._replace(point=max(last - s.point - 1, 0)) for s in sides[0].special[::-1]]
+    special += [s._replace(point=s.point + last) for s in sides[1].special]
+    reasons = {"one way": sides[0].reason, "other way": sides[1].reason}
+
+    def at_value(near: State, name: str, value: float) -> State:
+        return _at_value(start, near, (names, sizes), name, value)
+
+    return Branch(points, special, reasons, names, at_value=at_value)
+
+
+def _extended(curve: AnyCurve, start: Special, w: Array) -> _Extended:
+    if start.code in _PROBES:
+        assert isinstance(curve, CycleCurve)
+        return _Extended(curve, _ProbeCondition(curve, start.test, w))
+    return _Extended(curve, _SpectralCondition(curve, start))
+
+
+def _at_value(
+    start: Special, near: State, parameters: tuple[tuple[str, ...], Sequence[float]], name: str, value: float
+) -> State:
+    """Return the point of the curve of a special point at a value of one of the parameters."""
+    names, sizes = parameters
+    curve, w = curve_of(near, names, tuple(sizes))
+    extended = _extended(curve, start, w)
+    place = len(w) - 2 + names.index(name)
+    unit = np.zeros(len(w))
+    unit[place] = 1.0
+    w[place] = value
+    point = corrected(extended, w, curve.scales(w), unit)
+    return curve.state(point.w, point.error)
+
+
+class _CurveSide:
+    """One direction of a curve."""
+
+    def __init__(
+        self,
+        start: Special,
+        names: tuple[str, ...],
+        ranges: tuple[tuple[float, float], ...],
+        sizes: tuple[float, ...],
+        direction: float,
+    ) -> None:
+        self.names, self.ranges, self.sizes, self.code = names, ranges, sizes, start.code
+        self.special_start = start
+        curve, w = curve_of(start.state, names, sizes)
+        self.extended = _extended(curve, start, w)
+        scale = curve.scales(w)
+        # The start is corrected at right angles to the curve.
+        tangent = tangent_of(self.extended.equations(w)[1], scale)
+        point = corrected(self.extended, w, scale, tangent)
+        self.w = point.w
+        self.tangent = tangent_of(point.jacobian, scale, tangent)
+        leading = int(np.argmax(np.abs(self.tangent[-2:])))
+        if self.tangent[-2 + leading] * direction < 0:
+            self.tangent = -self.tangent
+        self.points: list[Point] = []
+        self.special: list[Special] = []
+        self.reason = ""
+        self.trail: list[tuple[Array, float]] = []
+        # Symmetric cycles meet their condition in several places.
+        alike = self._tests(self.w, ())
+        self.together = {key for key, value in alike.items() if abs(value) < 1e-7}
+        self._keep(point)
+
+    def _tests(self, w: Array, without: Collection[Any] | None = None) -> dict[Any, float]:
+        """Return what must not vanish along the curve."""
+        without = self.together if without is None else without
+        condition, curve = self.extended.condition, self.extended.curve
+        found: dict[Any, float] = {("degenerate",): condition.next_value(w)}
+        if isinstance(curve, CycleCurve):
+            probes = probes_of(curve.shooting, w[: curve.n_unknowns], curve.shot(w, PLACES))
+            found.update({p.key: p.value for p in probes})
+        found.update(singular_values_of(curve, w))
+        own = self.special_start.test
+        return {
+            key: value
+            for key, value in found.items()
+            if key != own and key not in without and np.isfinite(value)
+        }
+
+    def _keep(self, point: Step) -> None:
+        self.extended.condition.keep(self.w)
+        self.tests = self._tests(self.w)
+        self.trail.append((self.w, self.tests.get(("degenerate",), np.nan)))
+        params = dict(zip(self.names, map(float, self.w[-2:]), strict=True))
+        state = self.extended.curve.state(self.w, point.error)
+        self.points.append(Point(params, state, self.tests))
+
+    def follow(self, ds: float, most: int) -> None:
+        """Follow the curve to its end."""
+        while len(self.points) < most:
+            try:
+                point, tangent = self._step(ds)
+                tests = self._tests(point.w)
+                lost = [key for key in tests if key in self.tests and tests[key] * self.tests[key] < 0]
+                if lost and not self._pass(lost, point, tests):
+                    return
+            except ModelError as error:
+                ds *= 0.5
+                if ds < _SHORTEST_STEP:
+                    if not self._ends_nearby():
+                        self.reason = f"the curve cannot be followed beyond {self._where(self.w)}: {error}"
+                    return
+                continue
+            self.w, self.tangent = point.w, tangent
+            self._keep(point)
+            for name, value, (low, high) in zip(self.names, self.w[-2:], self.ranges, strict=True):
+                if not low < value < high:
+                    self.reason = f"{name} = {value:g} is the end of its range"
+                    return
+            ds = min(ds * (1.5 if point.n_steps <= 3 else 1.0), _LONGEST_STEP)
+        self.reason = f"{most} points"
+
+    def _ends_nearby(self) -> bool:
+        """Whether the condition is degenerate just behind, where the equations are singular too."""
+        key = ("degenerate",)
+        # Of points that are too near the difference is noise.
+        latest: list[tuple[Array, float]] = []
+        for w, value in reversed(self.trail):
+            is_far = abs(value) > 3e-3 * abs(self.trail[0][1])
+            if is_far and (not latest or abs(value) > 1.6 * abs(latest[-1][1])):
+                latest.append((w, value))
+        latest = latest[:4]
+        values = [value for _, value in latest]
+        if len(values) < 4 or min(values) * max(values) < 0 or abs(values[0]) > 0.5 * abs(self.trail[0][1]):
+            return False
+        # Inverse interpolation: the point as a function of the next derivative, at 0.
+        weights = [np.prod([b / (b - a) for b in values if b != a]) for a in values]
+        w = sum(weight * point for weight, (point, _) in zip(weights, latest, strict=True))
+        params = dict(zip(self.names, map(float, w[-2:]), strict=True))
+        kind = f"{CODES['CP']} of {self.code}"
+        state = self.points[-1].state
+        self.special.append(Special("CP", kind, "", np.nan, params, len(self.points) - 1, state, key))
+        self.reason = f"the flow follows the curve no further than {self._where(w)}: {kind}"
+        return True
+
+    def _step(self, ds: float) -> tuple[Step, Array]:
+        scale = self.extended.scales(self.w)
+        point = corrected(self.extended, self.w + ds * self.tangent * scale, scale, self.tangent)
+        for place, (low, high) in zip((-2, -1), self.ranges, strict=True):
+            if not low <= point.w[place] <= high:
+                bound = low if point.w[place] < low else high
+                share = (bound - self.w[place]) / (point.w[place] - self.w[place])
+                guess = self.w + share * (point.w - self.w)
+                guess[place] = bound
+                unit = np.zeros(len(self.w))
+                unit[place] = 1.0
+                point = corrected(self.extended, guess, scale, unit)
+                point.w[place] = bound
+        tangent = tangent_of(point.jacobian, self.extended.scales(point.w), self.tangent)
+        if tangent @ self.tangent < 0.7 and ds > 1e-5:
+            raise ModelError("the curve turns too far in one step")
+        return point, tangent
+
+    def _pass(self, lost: list[Any], point: Step, tests: dict[Any, float]) -> bool:
+        """Locate points at which more vanishes; whether the curve goes on behind them."""
+        found = sorted((self._located(key, point, tests) for key in lost), key=lambda located: located[0])
+        for _, key, there in found:
+            is_degenerate = key[0] == "degenerate"
+            code = "CP" if is_degenerate else key[0]
+            kind = (
+                f"{CODES[code]} of {self.code}"
+                if is_degenerate
+                else f"{CODES[code]}, on a curve of {self.code}"
+            )
+            params = dict(zip(self.names, map(float, there.w[-2:]), strict=True))
+            state = self.extended.curve.state(there.w, there.error)
+            special = Special(code, kind, "", np.nan, params, len(self.points) - 1, state, key)
+            if not is_degenerate and code not in _PROBES and not _is_unit(code, state):
+                continue
+            self.special.append(special)
+            if is_degenerate or code in _PROBES:
+                self.w = there.w
+                self._keep(there)
+                self.reason = f"the flow follows the curve no further than {self._where(there.w)}: {kind}"
+                return False
+        return True
+
+    def _located(self, key: Any, point: Step, tests: dict[Any, float]) -> tuple[float, Any, Step]:
+        scale = self.extended.scales(self.w)
+        level = float(self.w / scale @ self.tangent)
+        length = float(point.w / scale @ self.tangent) - level
+        start = self.w
+
+        def there(s: float) -> Step:
+            guess = start + (s / length) * (point.w - start)
+            return corrected(self.extended, guess, scale, self.tangent, level + s)
+
+        def value(s: float) -> float:
+            w = there(s).w
+            if key[0] == "degenerate":
+                return self.extended.condition.next_value(w)
+            found = self._tests(w)
+            if key not in found:
+                raise ModelError(f"the test function of {key[0]} is lost on the way")
+            return found[key]
+
+        s = zero_between(value, (0.0, self.tests[key]), (length, tests[key]), 1e-12)
+        return s, key, there(s)
+
+    def _where(self, w: Array) -> str:
+        return ", ".join(f"{name} = {value:.10g}" for name, value in zip(self.names, w[-2:], strict=True))
+
+
+def _is_unit(code: str, state: Any) -> bool:
+    """Whether a critical pair of multipliers or eigenvalues is complex, as its code says."""
+    if code == "NS":
+        values = state.nontrivial
+        return bool(np.any((np.abs(np.abs(values) - 1) < 1e-4) & (np.abs(values.imag) > 1e-6)))
+    if code == "HB":
+        return bool(np.any((np.abs(state.eigenvalues.real) < 1e-4) & (np.abs(state.eigenvalues.imag) > 1e-6)))
+    return True

@@ -1,0 +1,112 @@
+"""The other branch through a special point.
+
+Reference: Kuznetsov, Elements of Applied Bifurcation Theory (2004), section 10.2.4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from filippov.cycles.arclength import corrected, tangent_of
+from filippov.cycles.boundary import beyond_boundary
+from filippov.cycles.branch import Special, State
+from filippov.cycles.cycle import Cycle
+from filippov.cycles.cycle_curve import CycleCurve
+from filippov.cycles.itinerary import itinerary_from_event
+from filippov.cycles.motions import Array
+from filippov.cycles.rest import Equilibrium
+from filippov.cycles.shooting import Shooting
+from filippov.errors import InputError, ModelError
+
+__all__ = ["other_branch"]
+
+
+def other_branch(special: Special, name: str) -> State:
+    """Return a point of the other branch through a special point, a little way along it.
+
+    Raises
+    ------
+    InputError
+        If no branch begins at a point of this kind.
+    ModelError
+        If none is found.
+    """
+    state = special.state
+    if special.code == "BE" and isinstance(state, Equilibrium):
+        return _behind_boundary(special, state, name)
+    if special.code not in ("PD", "BP"):
+        raise InputError(
+            f"start: other branches begin at PD, BP and BE, not at {special.code}; a curve in two parameters "
+            "is followed with two names, and a state with branch.at(...)"
+        )
+    if not isinstance(state, Cycle):
+        raise InputError("start: other branches of equilibria begin at BE")
+    size = abs(state.params[name]) or 1.0
+    cycle = _doubled(state) if special.code == "PD" else state.from_event()
+    return _beside(CycleCurve(cycle, (name,), (size,)), special.code)
+
+
+def _doubled(cycle: Cycle) -> Cycle:
+    """Return a cycle that is followed twice as one of twice the period."""
+    own = cycle.from_event()
+    shooting = own._shooting
+    motions, period = shooting.motions, shooting.period
+    if period is not None:
+        period = period.twice()
+    t, x = own.inside()
+    record = motions.record((t, t + 4.2 * own.period), x)
+    itinerary = itinerary_from_event(record, 2 * own.period)
+    if itinerary is None:
+        raise ModelError("the cycle has no switch from which its double could start")
+    doubled = Shooting(motions, itinerary, period)
+    u = doubled.unknowns(itinerary)
+    return Cycle(doubled, u, doubled.shoot(u), 0.0)
+
+
+def _beside(curve: CycleCurve, code: str) -> State:
+    """Return a cycle beside the start of a curve, along the other direction of the kernel there."""
+    w = curve.start
+    scale = curve.scales(w)
+    _, jacobian = curve.equations(w)
+    kernel = np.linalg.svd(jacobian * scale)[2][-2:]
+    # The branch that is known has no component against itself half a period later; take what is across it.
+    along = tangent_of(jacobian, scale)
+    if code == "PD":
+        along = _symmetric(kernel, curve)
+    across = kernel - np.outer(kernel @ along, along)
+    direction = across[int(np.argmax(np.linalg.norm(across, axis=1)))]
+    direction = direction / np.linalg.norm(direction)
+    for distance in _distances():
+        try:
+            step = corrected(curve, w + distance * direction * scale, scale, direction)
+        except ModelError:
+            continue
+        if np.linalg.norm((step.w - w) / scale) > 0.1 * abs(distance):
+            return curve.state(step.w, step.error)
+    raise ModelError(f"no other branch was found at {code}")
+
+
+def _distances() -> Iterator[float]:
+    for size in (1e-3, 3e-3, 1e-2, 3e-4):
+        yield size
+        yield -size
+
+
+def _symmetric(kernel: Array, curve: CycleCurve) -> Array:
+    """Return the direction of the kernel in which both halves of a doubled cycle change alike."""
+    n, m = curve.shooting.n, curve.shooting.m
+    halves = kernel[:, : m * n].reshape(2, 2, (m // 2) * n)
+    across = halves[:, 0] - halves[:, 1]
+    # The combination of both vectors with the least difference of the halves.
+    _, _, rows = np.linalg.svd(across.T)
+    found = rows[-1] @ kernel
+    return np.asarray(found / np.linalg.norm(found))
+
+
+def _behind_boundary(special: Special, state: Equilibrium, name: str) -> State:
+    found = beyond_boundary(state, special.test[1], name)
+    if found is None:
+        raise ModelError(f"no other equilibrium goes on from {special!r}")
+    return found[0]

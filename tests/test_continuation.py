@@ -1,0 +1,385 @@
+"""Branches of cycles and equilibria: the points of K3 to 1e-8, reasons in words, agreement with simulation.
+
+References: Piiroinen, Kuznetsov, ACM TOMS 34 (2008) 13; Kuznetsov, Rinaldi, Gragnani, Int. J. Bifurcation and
+Chaos 13 (2003) 2157.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import filippov as fl
+import numpy as np
+import pytest
+from filippov.problems import drill_string
+from statements import cases, system_of, value, wall
+
+POINTS = cases("K3_bifurcations")
+pytestmark = pytest.mark.filterwarnings("ignore:one_sided:filippov.FilippovWarning")
+
+
+def friction(**params: float) -> fl.System:
+    def fun(t: float, x: Any, F: float = 0.4, omega: float = 1 / 3) -> list[Any]:
+        return [x[1], -x[0] + np.sin(omega * t) - F * np.sign(x[1])]
+
+    return fl.System(fun, n=2, params={"F": 0.4, "omega": 1 / 3, **params})
+
+
+def harvest(name: str, **params: str) -> fl.System:
+    case = POINTS[name]
+    return system_of({**case, "parameters": {**case["parameters"], **params}})
+
+
+def impacts(case: str, **params: str) -> fl.System:
+    statement = {**POINTS[case], "parameters": {"zeta": "0.05", "r": "0.8", **params}}
+    return system_of(statement, resets=wall())
+
+
+def codes(branch: fl.Branch) -> list[str]:
+    return [point.code for point in branch.special]
+
+
+@pytest.fixture(scope="module")
+def dry() -> fl.Branch:
+    """Return the branch behind Fig. 4(a) of Piiroinen and Kuznetsov, from a run at omega = 1/3."""
+    return fl.continuation(fl.limit_cycle(friction(), [1.0, 2.0]), "omega", (0.15, 0.99))
+
+
+def test_branch_of_the_dry_friction_oscillator(dry: fl.Branch) -> None:
+    assert codes(dry) == ["EP", "AS", "CS", "EP"]
+    crossing, adding = dry.special["CS"][0], dry.special["AS"][0]
+    assert abs(1 / crossing.params["omega"] - 1.866523638121) < 1e-10
+    assert abs(1 / adding.params["omega"] - 4.823126106845) < 1e-10
+    assert (
+        abs(crossing.params["omega"] - float(POINTS["dry_friction_crossing_sliding"]["points"][0]["omega"]))
+        < 1e-10
+    )
+    assert (
+        abs(adding.params["omega"] - float(POINTS["dry_friction_adding_sliding"]["points"][0]["omega"]))
+        < 1e-10
+    )
+    assert crossing.surface == adding.surface == "x[1]"
+    data = dry.data
+    assert data.sizes["point"] == len(dry)
+    assert bool(data.admissible.all())
+    assert bool(data.stable.all())
+    sticks = data.n_zero.values
+    assert np.array_equal(sticks == 1, data.omega.values < crossing.params["omega"])
+    assert np.max(data.residual.values) < 1e-9
+
+
+def test_points_of_the_branch_are_attractors(dry: fl.Branch) -> None:
+    system = friction()
+    for omega in (0.17, 0.3, 0.45, 0.7, 0.9):
+        cycle = dry.at(omega=omega)
+        period = 2 * np.pi / omega
+        assert abs(cycle.period - period) < 1e-10
+        start = cycle.at(0.0)
+        # A run from beside it comes back to it.
+        run = system.solve((0, 60 * period), start + 1e-3, params={"omega": omega}, rtol=1e-10, atol=1e-10)
+        np.testing.assert_allclose(run.y[:, -1], start, atol=1e-5)
+
+
+def test_curves_in_two_parameters_start_at_special_points(dry: fl.Branch) -> None:
+    ranges = {"F": (0.2, 0.7), "omega": (0.1, 2.0)}
+    for code, name in (("CS", "dry_friction_crossing_sliding"), ("AS", "dry_friction_adding_sliding")):
+        curve = fl.continuation(dry.special[code][0], ("F", "omega"), ranges)
+        for point in POINTS[name]["points"]:
+            found = curve.at(F=float(point["F"])).params["omega"]
+            assert abs(found - float(point["omega"])) < 1e-10
+        if code == "CS":
+            (end,) = curve.special["CP"]
+            assert abs(end.params["F"] - 1 / 3) < 1e-7
+            assert abs(end.params["omega"] - 1 / 2) < 1e-7
+            assert "degenerate" in curve.reason
+
+
+def test_resonance_is_the_reason_that_a_branch_ends() -> None:
+    cycle = fl.limit_cycle(friction(), [1.0, 2.0])
+    branch = fl.continuation(cycle, "omega", (1 / 3, 2.0))
+    assert "grows without bound" in branch.reasons["above"]
+    assert 0.99 < branch.values("omega")[-1] < 1.0
+    other = fl.continuation(fl.limit_cycle(friction(omega=2.0), [1.0, 2.0]), "omega", (1.01, 2.0))
+    assert codes(other) == ["EP", "EP"]
+    np.testing.assert_allclose(other.values("omega")[[0, -1]], [1.01, 2.0])
+
+
+def test_equilibria_through_boundaries_and_a_pseudo_fold() -> None:
+    start = fl.equilibrium(harvest("harvest_equilibria", alpha="0.45"), [0.2, 0.4])
+    np.testing.assert_allclose(start.y, [0.2, 0.4], atol=1e-12)
+    branch = fl.continuation(start, "alpha", (0.25, 0.6))
+    exact = POINTS["harvest_equilibria"]["closed_form"]
+    upper, lower = map(value, exact["boundary_equilibrium_alpha"])
+    assert codes(branch) == ["EP", "BE", "PSN", "BE", "EP"]
+    found = [point.params["alpha"] for point in branch.special["BE"]]
+    np.testing.assert_allclose(found, [lower, upper], rtol=0, atol=1e-10)
+    (fold,) = branch.special["PSN"]
+    assert abs(fold.params["alpha"] - value(exact["pseudo_saddle_node"]["alpha"])) < 1e-10
+    np.testing.assert_allclose(fold.state.y, [value(exact["pseudo_saddle_node"]["x"]), 169 / 400], atol=1e-7)
+    # On the surface the equilibria solve x^2 - (1 - b) x + a alpha - b = 0.
+    for point in branch.points:
+        if point.state.codimension:
+            x, alpha = point.state.y[0], point.params["alpha"]
+            assert abs(x**2 - 0.7 * x + alpha - 0.3) < 1e-10
+            slope = x * (0.7 - 2 * x) / (0.3 + x)
+            np.testing.assert_allclose(point.state.eigenvalues.real, [slope], atol=1e-8)
+
+
+def test_hopf_point_of_the_field_below() -> None:
+    start = fl.equilibrium(harvest("harvest_equilibria", alpha="0.45"), [0.2, 0.4])
+    branch = fl.continuation(start, "d", (0.3, 0.6))
+    (hopf,) = branch.special["HB"]
+    assert abs(hopf.params["d"] - 7 / 13) < 1e-10
+
+
+def test_sliding_bifurcations_of_a_planar_cycle() -> None:
+    system = harvest("harvest_cycle", alpha="0.6")
+    branch = fl.continuation(fl.limit_cycle(system, [0.19, 0.59]), "alpha", (0.42, 0.9))
+    for point in POINTS["harvest_cycle"]["points"]:
+        code = {"switching-sliding": "SS", "crossing-sliding": "CS", "grazing-sliding": "GS"}[point["type"]]
+        found = [special.params["alpha"] for special in branch.special[code]]
+        assert np.min(np.abs(np.array(found) - float(point["alpha"]))) < 1e-8
+    assert bool(branch.data.admissible.all())
+
+
+@pytest.mark.parametrize("row", range(3))
+def test_grazing_of_an_impact(row: int) -> None:
+    point = POINTS["impact_grazing"]["points"][row]
+    omega, zeta = float(point["omega"]), float(point["zeta"])
+    w = omega + 0.1
+    system = impacts("impact_grazing", zeta=point["zeta"], omega=str(w), s=point["s"])
+    # The motion without impacts is the other attractor.
+    size = (1 - w**2) ** 2 + (2 * zeta * w) ** 2
+    start = [(1 - w**2) / size, 2 * zeta * w**2 / size]
+    cycle = fl.limit_cycle(system, start, transient=3)
+    assert all(leg.ending is None for leg in cycle.itinerary.legs)
+    branch = fl.continuation(cycle, "omega", (omega - 0.05, omega + 0.2))
+    grazing = branch.special["GR"][0]
+    assert abs(grazing.params["omega"] - omega) < 1e-8
+
+
+def test_folds_of_cycles_with_an_impact() -> None:
+    point = POINTS["impact_fold"]["points"][0]
+    system = impacts("impact_fold", omega="1.6", s=point["s"])
+    cycle = fl.limit_cycle(system, [-0.499, 2.2], t0=2.3)
+    branch = fl.continuation(cycle, "omega", (1.2, 2.2))
+    (fold,) = branch.special["LP"]
+    assert abs(fold.params["omega"] - float(point["omega"])) < 1e-8
+    other = np.sort(np.abs(fold.state.multipliers))
+    np.testing.assert_allclose(other, [float(point["multiplier_other"]), 1.0], atol=1e-5)
+    # The unstable half comes to the cycle that only touches the wall, and the branch goes on without impacts.
+    (grazing,) = branch.special["GR"]
+    assert abs(grazing.params["omega"] - float(POINTS["impact_grazing"]["points"][0]["omega"])) < 1e-8
+    curve = fl.continuation(fold, ("zeta", "omega"), {"zeta": (0.04, 0.11), "omega": (1.5, 2.2)})
+    exact = POINTS["impact_fold"]["points"][1]
+    assert abs(curve.at(zeta=0.1).params["omega"] - float(exact["omega"])) < 1e-7
+
+
+def test_period_doublings_of_cycles_with_an_impact() -> None:
+    cycle = fl.limit_cycle(impacts("impact_flip", omega="2.4", s="0"), [0.001, 0.67], t0=2.49)
+    branch = fl.continuation(cycle, "omega", (0.95, 2.9))
+    exact = [float(point["omega"]) for point in POINTS["impact_flip"]["points"]]
+    found = [point.params["omega"] for point in branch.special["PD"]]
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-8)
+
+
+def test_grazing_sliding_of_the_drill_string() -> None:
+    system = fl.System(drill_string.rhs, n=3, params={"u": 1.0})
+    branch = fl.continuation(fl.limit_cycle(system, [2.9, 1.54, 1.6]), "u", (0.9, 3.5))
+    exact = POINTS["drill_grazing_sliding"]["point"]
+    grazing = branch.special["GS"][0]
+    assert abs(grazing.params["u"] - float(exact["u"])) < 1e-8
+    assert abs(grazing.state.period - float(exact["period"])) < 1e-8
+
+
+def test_what_the_flow_does_not_follow_can_be_ignored_or_stop_the_branch() -> None:
+    cycle = fl.limit_cycle(friction(omega=0.7), [1.0, 2.0])
+    ignored = fl.continuation(cycle, "omega", (0.45, 0.8), switch="ignore")
+    crossing = ignored.special["CS"][0].params["omega"]
+    admissible = ignored.data.admissible.values
+    assert np.array_equal(admissible, ignored.values("omega") > crossing)
+    stopped = fl.continuation(cycle, "omega", (0.45, 0.8), switch="stop")
+    assert stopped.reasons["below"].startswith("CS")
+    assert np.min(stopped.values("omega")) > crossing
+
+
+def test_monitors_are_kept_and_their_zeros_found(dry: fl.Branch) -> None:
+    start = dry.at(omega=0.6)
+    high = fl.Event(lambda t, y: y[0] - 2.0)
+    branch = fl.continuation(start, "omega", (0.55, 0.9), monitor={"high": high})
+    (special,) = branch.special["UZ"]
+    assert special.kind == "high vanishes"
+    run = special.state.solution
+    assert abs(np.max(run.sol(np.linspace(*run.t[[0, -1]], 4001))[0]) - 2.0) < 1e-6
+    assert branch.data.high.values[0] < 0 < branch.data.high.values[-1]
+
+
+def test_wrong_arguments_are_named() -> None:
+    cycle = fl.limit_cycle(friction(omega=0.7), [1.0, 2.0])
+    with pytest.raises(
+        fl.InputError, match="parameter: the system has no parameter 'omga'; did you mean 'omega'"
+    ):
+        fl.continuation(cycle, "omga", (0.5, 0.9))
+    with pytest.raises(fl.InputError, match=r"bounds: the start has omega = 0.7, outside of \(0.8, 0.9\)"):
+        fl.continuation(cycle, "omega", (0.8, 0.9))
+    with pytest.raises(fl.InputError, match="bounds: a finite range"):
+        fl.continuation(cycle, "omega", (0.9, 0.5))
+    with pytest.raises(fl.InputError, match="switch"):
+        fl.continuation(cycle, "omega", (0.5, 0.9), switch="go")
+    with pytest.raises(fl.InputError, match="detect"):
+        fl.continuation(cycle, "omega", (0.5, 0.9), detect=["XY"])
+    with pytest.raises(fl.InputError, match="start"):
+        fl.continuation(3.0, "omega", (0.5, 0.9))  # type: ignore[arg-type]
+    with pytest.raises(fl.InputError, match="monitor"):
+        fl.continuation(cycle, "omega", (0.5, 0.9), monitor={"a": 3})
+    with pytest.raises(fl.InputError, match="special point"):
+        fl.continuation(cycle, ("F", "omega"), {"F": (0.1, 0.5), "omega": (0.5, 0.9)})
+
+
+def test_no_cycle_is_a_reason_in_words() -> None:
+    decay = fl.System(lambda t, x: [-x[0], -2 * x[1]], n=2)
+    with pytest.raises(fl.ModelError, match="comes to rest"):
+        fl.limit_cycle(decay, [1.0, 1.0])
+    growth = fl.System(lambda t, x: [x[0] + x[1], x[1] - x[0]], n=2)
+    with pytest.raises(fl.ModelError, match=r"grows without bound|ends before"):
+        fl.limit_cycle(growth, [1.0, 1.0])
+    lorenz = fl.System(
+        lambda t, x: [10 * (x[1] - x[0]), x[0] * (28 - x[2]) - x[1], x[0] * x[1] - 8 / 3 * x[2]], n=3
+    )
+    with pytest.raises(fl.ModelError, match="chaotic"):
+        fl.limit_cycle(lorenz, [1.0, 1.0, 20.0])
+
+
+def test_equilibrium_of_a_forced_system_is_refused() -> None:
+    with pytest.raises(fl.InputError, match="depends on the time"):
+        fl.equilibrium(friction(), [0.0, 0.0])
+
+
+def test_cycles_of_twice_the_period_begin_at_a_period_doubling() -> None:
+    cycle = fl.limit_cycle(impacts("impact_flip", omega="2.4", s="0"), [0.001, 0.67], t0=2.49)
+    branch = fl.continuation(cycle, "omega", (2.3, 2.9))
+    doubling = branch.special["PD"][0]
+    doubled = fl.continuation(doubling, "omega", (2.5, 2.9))
+    assert "it starts at PD" in doubled.reason
+    ratio = doubled.values("period") * doubled.values("omega") / (2 * np.pi)
+    np.testing.assert_allclose(ratio, 2.0, atol=1e-9)
+    assert np.all(doubled.values("omega")[1:] > doubling.params["omega"])
+    assert doubled.stable[1]
+    assert not doubled.stable[-1]
+    # A run comes to the doubled cycle.
+    omega = 0.5 * (doubling.params["omega"] + doubled.special["PD"][0].params["omega"])
+    there = doubled.at(omega=omega)
+    run = fl.limit_cycle(impacts("impact_flip", omega=str(omega), s="0"), [0.001, 0.67], t0=2.49)
+    assert abs(run.period - there.period) < 1e-10
+    speeds = [sorted(start[1] for start in c.itinerary.starts if abs(start[0]) < 1e-12) for c in (run, there)]
+    np.testing.assert_allclose(speeds[0], speeds[1], atol=1e-8)
+
+
+def test_other_branches_begin_at_boundary_equilibria() -> None:
+    start = fl.equilibrium(harvest("harvest_equilibria", alpha="0.45"), [0.2, 0.4])
+    branch = fl.continuation(start, "alpha", (0.25, 0.6), switch="stop")
+    (boundary,) = branch.special["BE"]
+    other = fl.continuation(boundary, "alpha", (0.25, 0.6))
+    assert other.points[0].state.codimension == 1
+    assert codes(other)[:1] == ["PSN"]
+    with pytest.raises(fl.InputError, match="other branches begin at PD, BP and BE, not at EP"):
+        fl.continuation(branch.special["EP"][0], "alpha", (0.25, 0.6))
+
+
+def test_branches_are_saved_and_go_on_from_any_point(tmp_path: Any) -> None:
+    system = friction(omega=0.7)
+    path = tmp_path / "branch.json"
+    branch = fl.continuation(fl.limit_cycle(system, [1.0, 2.0]), "omega", (0.45, 0.8), store=path)
+    again = fl.cycles.load_branch(path, system)
+    for name, values in branch.data.items():
+        if values.dtype.kind in "fc":
+            np.testing.assert_allclose(again.data[name].values, values.values, rtol=1e-12, atol=1e-14)
+        else:
+            assert np.array_equal(again.data[name].values, values.values)
+    assert repr(again.special) == repr(branch.special)
+    longer = fl.continuation(again.points[3].state, "omega", (0.3, 0.8))
+    pair = [found.at(omega=0.6).at(0.0) for found in (longer, branch)]
+    np.testing.assert_allclose(*pair, atol=1e-10)
+    curve = fl.continuation(again.special["CS"][0], ("F", "omega"), {"F": (0.35, 0.5), "omega": (0.1, 2.0)})
+    exact = POINTS["dry_friction_crossing_sliding"]["points"][2]
+    assert abs(curve.at(F=0.5).params["omega"] - float(exact["omega"])) < 1e-10
+    path.write_text(path.read_text().replace('"version": 1', '"version": 99'))
+    with pytest.raises(fl.InputError, match="version 99"):
+        fl.cycles.load_branch(path, system)
+    path.write_text("[1, 2]")
+    with pytest.raises(fl.InputError, match=r"branch\.json"):
+        fl.cycles.load_branch(path, system)
+
+
+def test_a_parameter_that_does_not_matter_gives_a_straight_branch() -> None:
+    def fun(t: float, x: Any, omega: float, q: float) -> list[Any]:
+        return [x[1], -x[0] + np.sin(omega * t) - 0.4 * np.sign(x[1]) + 0 * q]
+
+    system = fl.System(fun, n=2, params={"omega": 0.7, "q": 1.0})
+    branch = fl.continuation(fl.limit_cycle(system, [1.0, 2.0]), "q", (0.0, 2.0))
+    assert codes(branch) == ["EP", "EP"]
+    starts = np.array([point.state.at(0.0) for point in branch.points])
+    assert np.max(np.ptp(np.abs(starts), axis=0)) < 1e-10
+
+
+def relay_loop() -> fl.System:
+    return fl.System(
+        lambda t, x, k=1.0: [x[1], x[2], -2 * x[2] - 3 * x[1] - k * np.sign(x[0] + 0.2 * x[1])], n=3
+    )
+
+
+def belt() -> fl.System:
+    def fun(t: float, x: Any, vdr: float = 0.2, delta: float = 3.0) -> list[Any]:
+        slip = x[1] - vdr
+        return [x[1], -x[0] - np.sign(slip) / (1 + delta * abs(slip))]
+
+    return fl.System(fun, n=2)
+
+
+@pytest.mark.parametrize(
+    ("system", "start", "name", "bounds"),
+    [
+        (friction(omega=0.7), [1.0, 2.0], "omega", (0.3, 0.9)),
+        (belt(), [0.1, 0.0], "vdr", (0.1, 0.4)),
+        (relay_loop(), [0.1, 0.0, 0.0], "k", (0.5, 2.0)),
+        (harvest("harvest_cycle", alpha="0.6"), [0.19, 0.59], "alpha", (0.46, 0.8)),
+        (impacts("impact_fold", omega="1.6", s="-0.5"), [-0.499, 2.2], "omega", (1.3, 1.7)),
+    ],
+    ids=["friction", "belt", "relay", "harvest", "impact"],
+)
+def test_branches_agree_with_simulation(system: fl.System, start: Any, name: str, bounds: Any) -> None:
+    branch = fl.continuation(fl.limit_cycle(system, start), name, bounds)
+    values = branch.values(name)
+    for value_ in np.linspace(*bounds, 7)[1:-1]:
+        k = int(np.argmin(np.abs(values - value_)))
+        near = branch.points[k].state
+        if not near.is_stable:
+            continue
+        # A run from the stable cycle stays there, ..
+        cycle = branch.at(**{name: value_})
+        t, x = cycle.inside()
+        turns = 10
+        run = system.solve((t, t + turns * cycle.period), x, params={name: value_}, rtol=1e-11, atol=1e-12)
+        np.testing.assert_allclose(run.y[:, -1], x, atol=1e-6)
+        # .. and one from beside it comes back.
+        again = fl.limit_cycle(system, x * (1 + 1e-3), {name: value_}, t0=t if cycle.is_forced else 0.0)
+        assert abs(again.period - cycle.period) < 1e-8
+
+
+def test_an_interrupt_keeps_the_part_that_was_computed(tmp_path: Any) -> None:
+    calls = []
+
+    def slow(state: Any) -> float:
+        calls.append(1)
+        if len(calls) > 8:
+            raise KeyboardInterrupt
+        return 1.0
+
+    path = tmp_path / "part.json"
+    cycle = fl.limit_cycle(friction(omega=0.7), [1.0, 2.0])
+    with pytest.raises(KeyboardInterrupt) as caught:
+        fl.continuation(cycle, "omega", (0.6, 0.9), monitor={"slow": fl.cycles.of_state(slow)}, store=path)
+    partial = caught.value.partial  # type: ignore[attr-defined]
+    assert 2 < len(partial) < 12
+    assert "interrupted" in partial.reason
+    assert len(fl.cycles.load_branch(path, friction(omega=0.7))) == len(partial)
