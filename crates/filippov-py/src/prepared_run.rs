@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use filippov::action::{Action, ActionMap, Actions, Trigger};
-use filippov::derivative::Extension;
+use filippov::derivative::{Extension, Growth};
 use filippov::section::Section;
 use filippov::{
     replay_decision, DecisionOutcome, DecisionPoint, Error, FieldError, Kind, LawAction, Laws,
@@ -13,6 +13,7 @@ use pyo3::prelude::*;
 
 use crate::callbacks::{CalledEvent, CalledMap, CompiledEvent, TracedEvent};
 use crate::derivatives::{run_with_derivatives, Failure, RunDerivatives, Wanted};
+use crate::exponents::run_with_growth;
 use crate::run::Run;
 use crate::saved::read_trigger;
 use crate::systems::{core_of, n_visible_of, raised, CoreSystem, TracedSystem};
@@ -134,6 +135,23 @@ impl PreparedRun {
             interrupt,
         )?;
         Ok((solution, Some(derivatives)))
+    }
+
+    /// Runs, and follows the growth of small changes, kept at these times.
+    pub fn run_with_growth(
+        &self,
+        t_span: (f64, f64),
+        marks: &[f64],
+        (options, extension): (&Options, &Arc<Extension>),
+        interrupt: &mut dyn FnMut(f64) -> bool,
+    ) -> Result<(Solution, Growth), Failure> {
+        let system = self.compiled.as_ref().ok_or(Failure::CalledMap)?;
+        let actions = self.actions();
+        let problem = Problem::new(&**system, t_span, &self.y0)
+            .options(options)
+            .actions(&actions);
+        let of = (&**system, extension, &actions);
+        run_with_growth(problem, of, options, marks, interrupt)
     }
 
     fn user_events(&self) -> Vec<UserEvent<'_>> {

@@ -7,6 +7,7 @@ use filippov::motion::{SlidingField, SmoothField};
 use filippov::{
     Definition, Error, FieldError, Laws, Mode, PiecewiseSystem, Rules, Setting, SignStructure,
 };
+use filippov_expr::regularized::Ramp;
 use filippov_expr::{Backend, Names};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
@@ -435,6 +436,22 @@ impl TracedSystem {
 
     fn is_native(&self) -> bool {
         self.system.is_native()
+    }
+
+    /// The names of all discrete states, those of laws included.
+    fn laws(&self) -> Vec<String> {
+        self.law_names()
+    }
+
+    /// The system with a function of `kappa[j] * h_j / eps` in the place of every sign, `eps` its last parameter.
+    fn regularized(&self, eps: &str, kappa: Vec<f64>, is_linear: bool) -> PyResult<Self> {
+        if kappa.len() != self.system.n_surfaces() || !self.law_names().is_empty() {
+            return Err(PyValueError::new_err(
+                "a number per surface, and no laws, are needed",
+            ));
+        }
+        let ramp = if is_linear { Ramp::Linear } else { Ramp::Tanh };
+        Self::build(self.definition().regularized(eps, &kappa, ramp))
     }
 
     fn to_bytes<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {

@@ -112,6 +112,30 @@ pub(super) struct Limit {
 }
 
 impl History {
+    /// Forgets all.
+    pub fn clear(&mut self) {
+        self.0.clear();
+    }
+
+    /// Lets the instants follow a change of the columns, each of which is a combination of the old ones.
+    pub fn change(&mut self, change: &[Vec<f64>]) {
+        for past in &mut self.0 {
+            past.dt = change
+                .iter()
+                .map(|factors| dot(factors, &past.dt))
+                .collect();
+            let combined = |factors: &Vec<f64>| {
+                let mut sum = vec![0.0; past.x.len()];
+                for (factor, dx) in factors.iter().zip(&past.dx) {
+                    let entries = sum.iter_mut().zip(dx);
+                    entries.for_each(|(entry, d)| *entry += factor * d);
+                }
+                sum
+            };
+            past.dx = change.iter().map(combined).collect();
+        }
+    }
+
     pub fn push(&mut self, past: Past) {
         if self.0.len() == MOST_REMEMBERED {
             self.0.remove(0);

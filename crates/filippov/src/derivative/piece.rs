@@ -180,6 +180,11 @@ impl<'a> Piece<'a> {
         self.mode == *mode && self.q == q && is_same()
     }
 
+    /// How many dimensions the motion has lost: one for each surface slid on, two for each in contact.
+    pub fn codimension(&self) -> usize {
+        self.sliding.len() + 2 * self.contacts.len()
+    }
+
     /// Are the derivatives of its multipliers known from the graph?
     pub fn knows_multipliers(&self) -> bool {
         self.jacobian.is_some()

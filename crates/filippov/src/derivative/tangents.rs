@@ -127,6 +127,13 @@ impl<'a> Tangents<'a> {
         self
     }
 
+    /// Keeping this of the derivatives.
+    #[must_use]
+    pub(super) fn keeping(mut self, kept: Keep) -> Self {
+        self.kept = kept;
+        self
+    }
+
     /// The derivatives.
     ///
     /// # Errors
@@ -220,37 +227,51 @@ impl<'a> Tangents<'a> {
     }
 
     fn follow(&mut self, step: &ObservedStep) -> Result<(), FieldError> {
-        let t0 = step.t_start();
-        if !self.has_started {
-            let mut x = vec![0.0; self.around.extended.n];
-            step.at(t0, &mut x);
-            self.start(t0, &x, step.mode, step.discrete)?;
+        self.follow_part(step, (step.t_start(), step.t_end), step.x_end)
+    }
+
+    /// Takes the columns of the start, if the step is the first one.
+    pub(super) fn begin(&mut self, step: &ObservedStep) -> Result<(), FieldError> {
+        if self.has_started {
+            return Ok(());
         }
+        let mut x = vec![0.0; self.around.extended.n];
+        step.at(step.t_start(), &mut x);
+        self.start(step.t_start(), &x, step.mode, step.discrete)
+    }
+
+    /// Follows the derivatives over a part of a step, at whose end the state is `x_end`.
+    pub(super) fn follow_part(
+        &mut self,
+        step: &ObservedStep,
+        (t0, t1): (f64, f64),
+        x_end: &[f64],
+    ) -> Result<(), FieldError> {
+        self.begin(step)?;
         if self.lost.is_none() {
             let mut piece = self.take_piece(step.mode, step.discrete);
             let along = |t: f64, x: &mut [f64]| {
                 step.at(t, x);
                 Ok(())
             };
-            let span = (t0, step.t_end);
             if let Some(mut second) = self.second.take() {
-                if piece.advance_pairs(along, span, &self.columns, &mut second)? {
+                if piece.advance_pairs(along, (t0, t1), &self.columns, &mut second)? {
                     self.second = Some(second);
                 }
             }
-            piece.advance(along, span, &mut self.columns)?;
-            let z = self.around.extended.state(step.x_end);
-            piece.project(step.t_end, &z, &mut self.columns)?;
+            piece.advance(along, (t0, t1), &mut self.columns)?;
+            let z = self.around.extended.state(x_end);
+            piece.project(t1, &z, &mut self.columns)?;
             self.put_back(piece);
             if self.columns.iter().flatten().any(|v| !v.is_finite()) {
                 self.lose(Lost::NotFinite);
             }
         }
-        self.keep(step.t_end);
+        self.keep(t1);
         Ok(())
     }
 
-    fn pass(&mut self, record: &InstantRecord) -> Result<(), FieldError> {
+    pub(super) fn pass(&mut self, record: &InstantRecord) -> Result<(), FieldError> {
         if !self.has_started {
             self.start(record.t[0], record.x[0], record.mode[0], record.discrete[0])?;
         }
@@ -280,6 +301,52 @@ impl<'a> Tangents<'a> {
         self.put_back(before);
         self.put_back(after);
         self.keep(record.t[1]);
+        Ok(())
+    }
+}
+
+/// What is needed where the columns are a basis that is changed on the way.
+impl Tangents<'_> {
+    /// The columns at this moment.
+    pub(super) fn columns(&self) -> &[Vec<f64>] {
+        &self.columns
+    }
+
+    /// Takes combinations of the columns in their place.
+    pub(super) fn change(&mut self, columns: Vec<Vec<f64>>, change: &[Vec<f64>]) {
+        self.columns = columns;
+        self.history.change(change);
+    }
+
+    /// Takes other columns; the instants so far are forgotten.
+    pub(super) fn replace(&mut self, columns: Vec<Vec<f64>>) {
+        self.columns = columns;
+        self.history.clear();
+    }
+
+    /// Why the derivatives are not known any more.
+    pub(super) fn lost(&self) -> Option<Lost> {
+        self.lost
+    }
+
+    /// How many dimensions the motion in a mode has lost.
+    pub(super) fn codimension(&mut self, mode: &Mode, q: &[f64]) -> usize {
+        let piece = self.take_piece(mode, q);
+        let found = piece.codimension();
+        self.put_back(piece);
+        found
+    }
+
+    /// Takes from changes what leads off the surfaces of a mode.
+    pub(super) fn project(
+        &mut self,
+        (mode, q): (&Mode, &[f64]),
+        (t, x): (f64, &[f64]),
+        changes: &mut [Vec<f64>],
+    ) -> Result<(), FieldError> {
+        let piece = self.take_piece(mode, q);
+        piece.project(t, &self.around.extended.state(x), changes)?;
+        self.put_back(piece);
         Ok(())
     }
 }

@@ -2,6 +2,7 @@
 //! compiled.
 
 use filippov_expr::container::{Container, Tag, Writer};
+use filippov_expr::regularized::Ramp;
 use filippov_expr::{Backend, Graph, Lengths, Names, Node, NodeId};
 
 use super::compiled::Follower;
@@ -75,6 +76,22 @@ impl Definition {
     pub fn n_parameters(&self) -> usize {
         let n_laws = self.rules.laws.len();
         self.names.parameters.len().saturating_sub(n_laws)
+    }
+
+    /// The system with a function of `kappa[j] * h_j / eps` in the place of every sign. The width `eps` becomes its last parameter.
+    /// It has no laws and no watched surfaces: the caller refuses systems that have any.
+    #[must_use]
+    pub fn regularized(&self, eps: &str, kappa: &[f64], ramp: Ramp) -> Self {
+        let mut names = self.names.clone();
+        let index = names.parameters.len() as u32;
+        names.parameters.push(eps.to_owned());
+        let (graph, field) = self.graph.regularized(&self.field, index, kappa, ramp);
+        Definition {
+            graph,
+            field,
+            names,
+            rules: Rules::default(),
+        }
     }
 
     /// How many surfaces a user sees. Those of laws come after them, and before these those that no motion crosses.
