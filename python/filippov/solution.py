@@ -433,8 +433,8 @@ class Solution:
         Returns
         -------
         ndarray, shape (n, len(wrt)) or (n, len(wrt), k); for order 2 (n, len(wrt), len(wrt)) or with k behind
-            NaN from an instant on at which there is no derivative; ``sol.switches[i].derivative.lost`` says
-            why.
+            Discrete states with names have rows behind those of the n states. NaN from an instant on at which
+            there is no derivative; ``sol.switches[i].derivative.lost`` says why.
 
         Raises
         ------
@@ -796,7 +796,7 @@ class Solution:
                 raise ModelError(
                     f"to_xarray: {', '.join(sorted(taken))} is a name of the table of derivatives"
                 )
-            variables["derivative"] = (("state", "wrt", "t"), self.derivative(self.t))
+            variables["derivative"] = (("state", "wrt", "t"), self.derivative(self.t)[: len(self.states)])
             coords.update(state=as_texts(self.states), wrt=as_texts(self.wrt))
         attributes = {"message": self.message, "status": self.status, "surfaces": "\n".join(self.surfaces)}
         return xarray.Dataset(variables, coords=coords, attrs=attributes)

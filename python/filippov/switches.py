@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from importlib import import_module
-from typing import Any, NamedTuple, overload
+from typing import Any, NamedTuple, TypeAlias, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -537,13 +537,42 @@ _WHY_LOST = {
 }
 
 
+# The surfaces on which a run starts; whether an action, or a tick, is at its start, and a switch at its end.
+Borders: TypeAlias = "tuple[list[int], bool, bool, bool]"
+
+
+class Border(NamedTuple):
+    """What the start or the end of a run coincides with, so that derivatives are those of one side."""
+
+    what: str
+    whose: str
+    surfaces: tuple[str, ...] = ()
+    is_end: bool = False
+
+
+def borders_of(found: Borders, ends_at_given_time: bool, names: Sequence[str]) -> list[Border]:
+    """Return where the derivatives of a run are those of one side, from what the core found."""
+    starts_on, starts_at_action, starts_at_tick, ends_at_instant = found
+    borders = []
+    left = tuple(names[j] for j in starts_on if j < len(names))
+    if left:
+        borders.append(Border(f"starts on {', '.join(left)} = 0", "by the start", left))
+    if starts_at_action:
+        borders.append(Border("starts at the very time of an action", "by the initial time"))
+    if starts_at_tick:
+        borders.append(Border("starts at the very time of a tick", "by the start"))
+    if ends_at_instant and ends_at_given_time:
+        what = "ends at the very time of a switch, which a changed run has earlier or later"
+        borders.append(Border(what, "at its end", is_end=True))
+    return borders
+
+
 def derivative_warnings(run: Run, t0: float, names: Sequence[str]) -> list[RunWarning]:
     """Return what a run with ``wrt=`` met that its derivatives do not pass, or have on one side only."""
     found = []
-    left = tuple(names[j] for j in run.starts_on() if j < len(names))
-    if left:
-        text = f"the run starts on {', '.join(left)} = 0: derivatives by the start are those of one side"
-        found.append(RunWarning(t0, "one_sided", text, (), left))
+    for border in borders_of(run.borders(), run.status == 0, names):
+        text = f"the run {border.what}: derivatives {border.whose} are those of one side"
+        found.append(RunWarning(run.t_last if border.is_end else t0, "one_sided", text, (), border.surfaces))
     lost = run.derivatives_lost()
     if lost is not None:
         t, why = lost

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use filippov::derivative::{
-    Column, Derivatives, Differentiated, DifferentiatedRun, EventGradient, Extension, OneSided,
-    Tangents, Term, Trail, WayBack, When,
+    Borders, Column, Derivatives, Differentiated, DifferentiatedRun, EventGradient, Extension,
+    OneSided, Tangents, Term, Trail, WayBack, When,
 };
 use filippov::{Error, FieldError, Options, Problem, Side, Solution};
 use numpy::{PyArray1, PyArray2};
@@ -37,6 +37,20 @@ pub type SideRow<'py> = (
     Bound<'py, PyArray2<f64>>,
 );
 
+/// The surfaces on which a run starts; is an action done at the initial time, does a clock tick there, and does the run end at an
+/// instant that moves?
+pub type BordersRow = (Vec<usize>, bool, bool, bool);
+
+/// The same, for Python.
+pub fn borders_row(borders: &Borders) -> BordersRow {
+    (
+        borders.starts_on.clone(),
+        borders.starts_at_action,
+        borders.starts_at_tick,
+        borders.ends_at_instant,
+    )
+}
+
 /// The derivatives of a run, or what they need on the way back; and what they are continued with between steps.
 pub struct RunDerivatives {
     found: Derivatives,
@@ -46,6 +60,8 @@ pub struct RunDerivatives {
     extension: Arc<Extension>,
     options: Options,
     span: f64,
+    /// How many rows a column has: the states, and the named discrete states behind them.
+    n: usize,
 }
 
 /// A term of a cost: the function, the time at which it counts, or else the surface at whose switches it does, or neither for the
@@ -78,7 +94,7 @@ pub fn run_with_derivatives(
     let extended = extended.ok_or(Failure::CalledMap)?;
     let impacts = extended.impacts();
     let (solution, found, trail) = if *order == 0 {
-        let mut trail = Trail::default();
+        let mut trail = Trail::of(&extended);
         let solution = problem.solve_observed(&mut trail, interrupt)?;
         (solution, Derivatives::default(), Some(trail))
     } else {
@@ -95,6 +111,7 @@ pub fn run_with_derivatives(
             found,
             trail,
             span,
+            n: extended.n_rows(),
             kinds,
             parameters: parameters.clone(),
             extension: Arc::clone(extension),
@@ -163,9 +180,9 @@ impl RunDerivatives {
         (solution, actions): RunOf<'_>,
         (times, side): (&[f64], Side),
     ) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
-        let n = solution.n_states;
+        let n = self.n;
         if self.found.t.is_empty() {
-            return Ok(times.iter().map(|_| self.not_known(py, n)).collect());
+            return Ok(times.iter().map(|_| self.not_known(py)).collect());
         }
         self.with(system, (solution, actions), |run| {
             let at = |&t: &f64| {
@@ -185,7 +202,7 @@ impl RunDerivatives {
         run: RunOf<'_>,
         (times, side): (&[f64], Side),
     ) -> PyResult<Vec<Bound<'py, PyArray2<f64>>>> {
-        let n = run.0.n_states;
+        let n = self.n;
         let n_pairs = self.kinds.len() * (self.kinds.len() + 1) / 2;
         self.with(system, run, |run| {
             let at = |&t: &f64| {
@@ -198,7 +215,8 @@ impl RunDerivatives {
     }
 
     /// The same at the end of the run.
-    pub fn second_at_end<'py>(&self, py: Python<'py>, n: usize) -> Bound<'py, PyArray2<f64>> {
+    pub fn second_at_end<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        let n = self.n;
         let n_pairs = self.kinds.len() * (self.kinds.len() + 1) / 2;
         let last = self.found.second.len().checked_sub(n * n_pairs);
         let known = last.map(|last| &self.found.second[last..]);
@@ -257,7 +275,7 @@ impl RunDerivatives {
         system: &filippov::TracedSystem,
         (solution, actions): RunOf<'_>,
         terms: &[TermRow<'_>],
-    ) -> PyResult<(Vec<f64>, Option<LostAt>, Vec<usize>)> {
+    ) -> PyResult<(Vec<f64>, Option<LostAt>, BordersRow)> {
         let wrong = |e: Error| PyValueError::new_err(e.to_string());
         let trail = self.trail.as_ref();
         let trail = trail.ok_or_else(|| PyValueError::new_err("the run has no trail"))?;
@@ -295,26 +313,26 @@ impl RunDerivatives {
         };
         let found = way.gradient(&terms).map_err(raised)?;
         let entries = self.kinds.iter().map(|&kind| found.by(kind)).collect();
-        Ok((entries, found.lost, found.starts_on))
+        Ok((entries, found.lost, borders_row(&found.borders)))
     }
 
     /// The derivative of the state at the end; NaN if the run took no step.
-    pub fn at_end<'py>(&self, py: Python<'py>, n: usize) -> Bound<'py, PyArray2<f64>> {
-        let size = n * self.kinds.len();
+    pub fn at_end<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        let size = self.n * self.kinds.len();
         match self.found.values.len().checked_sub(size) {
-            Some(last) => transposed(py, &self.found.values[last..], self.kinds.len(), n),
-            None => self.not_known(py, n),
+            Some(last) => transposed(py, &self.found.values[last..], self.kinds.len(), self.n),
+            None => self.not_known(py),
         }
     }
 
-    fn not_known<'py>(&self, py: Python<'py>, n: usize) -> Bound<'py, PyArray2<f64>> {
+    fn not_known<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         let k = self.kinds.len();
-        transposed(py, &vec![f64::NAN; n * k], k, n)
+        transposed(py, &vec![f64::NAN; self.n * k], k, self.n)
     }
 
-    /// The surfaces on which the run starts and that it leaves.
-    pub fn starts_on(&self) -> &[usize] {
-        &self.found.starts_on
+    /// Where the derivatives are those of one side.
+    pub fn borders(&self) -> &Borders {
+        &self.found.borders
     }
 
     /// Where derivatives end, and why.
@@ -324,8 +342,8 @@ impl RunDerivatives {
     }
 
     /// The derivatives of all instants.
-    pub fn instants<'py>(&self, py: Python<'py>, n: usize) -> Vec<InstantRow<'py>> {
-        let m = self.parameters.len();
+    pub fn instants<'py>(&self, py: Python<'py>) -> Vec<InstantRow<'py>> {
+        let (n, m) = (self.n, self.parameters.len());
         let rows = |values: &[f64], width: usize| {
             let rows: Vec<Vec<f64>> = (0..n)
                 .map(|r| values[r * width..(r + 1) * width].to_vec())

@@ -6,7 +6,7 @@ use super::piece::{Piece, Surroundings};
 use crate::error::FieldError;
 use crate::motion::{Guard, ModeField};
 use crate::record::InstantRecord;
-use crate::system::{PiecewiseSystem, SignStructure};
+use crate::system::{Act, PiecewiseSystem, SignStructure};
 use crate::tolerances::{AT_SIDE, ROUNDING};
 use crate::vectors::dot;
 
@@ -90,6 +90,8 @@ pub(super) struct Passage {
     pub changes: Vec<Change>,
     /// The field goes on: the time alone is of interest.
     pub goes_on: bool,
+    /// So many of its actions are recorded as switches, where others happen at the same time.
+    pub n_recorded: usize,
 }
 
 impl Instant<'_, '_> {
@@ -115,6 +117,7 @@ impl Instant<'_, '_> {
             time,
             changes: Vec::new(),
             goes_on: self.leaves_as_it_is(),
+            n_recorded: 0,
         };
         if passage.goes_on {
             return Ok(Ok(passage));
@@ -152,16 +155,17 @@ impl Instant<'_, '_> {
         condition: &mut f64,
     ) -> Result<Result<Vec<f64>, Lost>, FieldError> {
         let record = self.record;
-        let timing = match record.guards {
-            [] => self.known_time(),
-            [guard, ..] => self.timing(*guard)?,
+        let Some(guard) = self.guard() else {
+            *condition = 1.0;
+            let mut acts = record.acts.iter();
+            let time = acts.find_map(|act| self.time_of_tick(act));
+            let fixed = || vec![0.0; self.extended.n + self.extended.n_parameters()];
+            return Ok(Ok(time.unwrap_or_else(fixed)));
         };
+        let timing = self.timing(guard)?;
         let field = record.field[0];
         let states = &timing.state[..self.extended.n];
-        *condition = match record.guards {
-            [] => 1.0,
-            _ => weights.condition(record.x[0], (timing.time, states), field),
-        };
+        *condition = weights.condition(record.x[0], (timing.time, states), field);
         let rate = timing.time + dot(&timing.state, field);
         // Where the motion is tangent the time has no derivative. A touch is located to the square root of rounding.
         let touches = record.acts.is_empty() && record.mode[0] == record.mode[1];
@@ -173,14 +177,19 @@ impl Instant<'_, '_> {
         Ok(Ok(timing.state.iter().map(|g| -g / rate).collect()))
     }
 
-    /// What fixes a known time: the clock that ticks, or the time alone.
-    fn known_time(&self) -> Timing {
-        let (t, z) = (self.record.t[0], self.extended.state(self.record.x[0]));
-        let place = self.before.at(t, &z);
-        let mut acts = self.record.acts.iter();
-        let clock = acts.find_map(|act| self.extended.clock(act.index, &place));
-        let (time, state) = clock.unwrap_or_else(|| (1.0, vec![0.0; z.len()]));
-        Timing { time, state }
+    /// The guard that fixes the time, if it is no known time: also that of a start on the surface of an action.
+    pub fn guard(&self) -> Option<Guard> {
+        let first = self.record.acts.first();
+        let surface = first.and_then(|act| self.extended.surface_of(act.index));
+        let guards = self.record.guards.first().copied();
+        guards.or(surface.map(Guard::Surface))
+    }
+
+    /// The derivative of the time of an action at a known time, a row; none for other actions.
+    pub fn time_of_tick(&self, act: &Act) -> Option<Vec<f64>> {
+        let z = self.extended.state(self.record.x[0]);
+        let place = self.before.at(self.record.t[0], &z);
+        self.extended.time_of_tick(act.index, &place)
     }
 
     /// The gradient of a guard of the motion before.
@@ -257,7 +266,7 @@ impl Instant<'_, '_> {
             let Some(map) = self.extended.maps.get(act.index).and_then(Option::as_ref) else {
                 continue;
             };
-            let place = (self.record.t[0], &act.x[..], &act.discrete[..]);
+            let place = (self.record.t[0], &act.x[..]);
             let (rows, by_time) = map.derivative(place, values)?;
             let moved = rows.iter().zip(&by_time);
             along = moved

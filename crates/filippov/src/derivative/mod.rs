@@ -10,6 +10,7 @@
 
 mod adjoint;
 mod between;
+mod borders;
 mod change;
 mod collocation;
 mod extended;
@@ -17,6 +18,7 @@ mod forms;
 mod instant;
 mod limit;
 mod one_sided;
+mod parts;
 mod passing;
 mod piece;
 mod radau;
@@ -26,6 +28,7 @@ mod tangents;
 
 pub use adjoint::{CostGradient, Term, Trail, WayBack, When};
 pub use between::{Differentiated, DifferentiatedRun, EventGradient};
+pub use borders::Borders;
 pub use extended::{Column, Extended, Extension};
 pub use instant::Lost;
 pub use one_sided::OneSided;

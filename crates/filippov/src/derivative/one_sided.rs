@@ -5,13 +5,13 @@ use super::instant::{entered, Instant};
 use super::piece::Piece;
 use crate::error::FieldError;
 use crate::mode::Mode;
-use crate::motion::{Guard, SmoothField};
+use crate::motion::Guard;
 use crate::system::LieDerivatives;
 use crate::tolerances::AT_SIDE;
 use crate::vectors::dot;
 
 /// So many surfaces at one instant have all their orders looked at.
-const MOST_AT_ONCE: usize = 3;
+pub(super) const MOST_AT_ONCE: usize = 3;
 
 /// The derivative of the state behind an instant in a cone of changes before it.
 #[derive(Clone, Debug)]
@@ -112,8 +112,7 @@ impl<'a> Instant<'_, 'a> {
             let rate = time + dot(&row, &field);
             mode = mode.with(j, record.mode[1].entries()[j]);
             let mut next = Piece::new(self.around, &mode, record.discrete[1]);
-            let mut rates = vec![0.0; z.len()];
-            next.field.eval_unprojected(t, &mut z.clone(), &mut rates)?;
+            let mut rates = next.rates(t, &z)?;
             rates.truncate(field.len());
             // The mode between has to be one that the motion keeps until it reaches the next surface.
             let slides_on = next.field.multipliers().iter().all(|l| l.abs() <= 1.0);
@@ -209,8 +208,7 @@ impl<'a> Instant<'_, 'a> {
             return Ok(Vec::new());
         };
         let (t, z) = (record.t[0], self.extended.state(record.x[0]));
-        let (rows, _) =
-            map.derivative((t, record.x[0], record.discrete[0]), &self.extended.values)?;
+        let (rows, _) = map.derivative((t, record.x[0]), &self.extended.values)?;
         let place = self.before.at(t, &z);
         let mut by_state = vec![0.0; z.len()];
         let system = &self.extended.system;
@@ -232,7 +230,7 @@ impl<'a> Instant<'_, 'a> {
 }
 
 /// All orders of some surfaces.
-fn orders(surfaces: &[usize]) -> Vec<Vec<usize>> {
+pub(super) fn orders(surfaces: &[usize]) -> Vec<Vec<usize>> {
     if surfaces.len() <= 1 {
         return vec![surfaces.to_vec()];
     }

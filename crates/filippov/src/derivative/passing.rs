@@ -48,47 +48,58 @@ impl InstantDerivative {
 }
 
 impl Instant<'_, '_> {
-    /// The derivatives of the instant, and the columns after it.
+    /// The derivatives of the instant, and the columns after it; one for each switch if different functions fix their times.
     pub(super) fn pass(
         &mut self,
         weights: &Weights,
         columns: &mut [Vec<f64>],
         second: &mut Option<Second>,
-    ) -> Result<InstantDerivative, FieldError> {
+    ) -> Result<Vec<InstantDerivative>, FieldError> {
         let (n, m) = (self.extended.n, self.extended.n_parameters());
-        let mut found = InstantDerivative::unknown(self.record.t[0], columns.len(), (n, m));
-        let Passage {
-            time,
-            changes,
-            goes_on,
-        } = match self.through(weights, &mut found.condition)? {
-            Ok(passage) => passage,
+        let unknown = InstantDerivative::unknown(self.record.t[0], columns.len(), (n, m));
+        let mut condition = f64::NAN;
+        let passages = match self.through(weights, &mut condition)? {
+            Ok(passages) => passages,
             Err(lost) => {
-                found.lost = Some(lost);
+                let mut found = InstantDerivative {
+                    condition,
+                    lost: Some(lost),
+                    ..unknown
+                };
                 self.add_sides(&mut found)?;
-                return Ok(found);
+                return Ok(vec![found]);
             }
         };
-        let dt = found.dt.iter_mut().zip(&*columns);
-        dt.for_each(|(dt, column)| *dt = dot(&time, column));
-        if let Some(pairs) = second.take() {
+        let mixed = second.take();
+        if let ([passage], Some(pairs)) = (&passages[..], mixed) {
             let mut order = SecondOrder {
                 extended: self.extended,
                 record: self.record,
                 before: self.before,
                 after: self.after,
-                time: &time,
-                goes_on,
+                time: &passage.time,
+                goes_on: passage.goes_on,
             };
             *second = order.pass(columns, &pairs)?;
         }
-        for column in columns.iter_mut() {
-            changes.iter().for_each(|one| one.apply(n, column));
+        let mut all = Vec::with_capacity(passages.len());
+        for passage in &passages {
+            let mut found = unknown.clone();
+            found.condition = condition;
+            let dt = found.dt.iter_mut().zip(&*columns);
+            dt.for_each(|(dt, column)| *dt = dot(&passage.time, column));
+            for column in columns.iter_mut() {
+                passage.changes.iter().for_each(|one| one.apply(n, column));
+            }
+            (found.saltation, found.by_parameters) = matrices(&passage.changes, (n, m));
+            let is_finite = columns.iter().flatten().all(|v| v.is_finite());
+            found.lost = (!is_finite).then_some(Lost::NotFinite);
+            for _ in 1..passage.n_recorded {
+                all.push(found.clone());
+            }
+            all.push(found);
         }
-        (found.saltation, found.by_parameters) = matrices(&changes, (n, m));
-        let is_finite = columns.iter().flatten().all(|v| v.is_finite());
-        found.lost = (!is_finite).then_some(Lost::NotFinite);
-        Ok(found)
+        Ok(all)
     }
 
     /// Adds what is known of an instant without a derivative.
@@ -106,35 +117,40 @@ impl Instant<'_, '_> {
         Ok(())
     }
 
-    /// What the instant does, whatever its kind.
+    /// What the instant does, whatever its kind, one after the other if different functions fix the times.
     pub(super) fn through(
         &mut self,
         weights: &Weights,
         condition: &mut f64,
-    ) -> Result<Result<Passage, Lost>, FieldError> {
+    ) -> Result<Result<Vec<Passage>, Lost>, FieldError> {
         let sizes = (self.extended.n, self.extended.n_parameters());
+        if let Some(found) = self.in_parts(weights, condition)? {
+            return Ok(found);
+        }
         let lost = match self.passage(weights, condition)? {
             Err(lost) => lost,
-            found => return Ok(found),
+            Ok(found) => return Ok(Ok(vec![found])),
         };
         if lost == Lost::OneSided {
             if let Some(mut cones) = self.cones()?.filter(|cones| agree(cones, sizes)) {
                 if let Ok(time) = self.time(weights, condition)? {
-                    return Ok(Ok(Passage {
+                    return Ok(Ok(vec![Passage {
                         time,
                         changes: cones.swap_remove(0).changes,
                         goes_on: false,
-                    }));
+                        n_recorded: 0,
+                    }]));
                 }
             }
         }
         // Where the field is the same on both sides of a surface, a touch changes nothing.
         if lost == Lost::Grazing && self.touching()?.len() == 1 {
-            return Ok(Ok(Passage {
+            return Ok(Ok(vec![Passage {
                 time: vec![f64::NAN; sizes.0 + sizes.1],
                 changes: Vec::new(),
                 goes_on: true,
-            }));
+                n_recorded: 0,
+            }]));
         }
         Ok(Err(lost))
     }

@@ -176,7 +176,9 @@ impl<'a> Piece<'a> {
     /// Does this motion have these mode and discrete states, in these surroundings?
     pub fn is_of(&self, around: &Surroundings, mode: &Mode, q: &[f64]) -> bool {
         let is_same = || self.contacts.is_empty() || self.sides == around.sides;
-        self.mode == *mode && self.q == q && is_same()
+        // Named discrete states are states here.
+        let n_named = self.extended.n_named;
+        self.mode == *mode && self.q[n_named..] == q[n_named..] && is_same()
     }
 
     /// A point of the extended system in this motion.
@@ -197,6 +199,20 @@ impl<'a> Piece<'a> {
         let place = Setting::new(&all, &self.q).at(t, z);
         self.extended.system.field(&place, &mut out)?;
         Ok(out)
+    }
+
+    /// The velocity of the motion.
+    pub fn rates(&mut self, t: f64, z: &[f64]) -> Result<Vec<f64>, FieldError> {
+        let mut out = vec![0.0; z.len()];
+        self.field.eval_unprojected(t, &mut z.to_vec(), &mut out)?;
+        Ok(out)
+    }
+
+    /// The values of all switching functions.
+    pub fn surfaces(&self, t: f64, z: &[f64]) -> Result<Vec<f64>, FieldError> {
+        let mut h = vec![0.0; self.extended.system.n_surfaces()];
+        self.extended.system.surfaces(&self.at(t, z), &mut h)?;
+        Ok(h)
     }
 
     /// Carries the derivative of the state, columns of n states with the shares of the parameters behind them, over a step along
@@ -487,8 +503,7 @@ impl<'a> Piece<'a> {
         columns: &[Vec<f64>],
     ) -> Result<Vec<usize>, FieldError> {
         let (system, place) = (&self.extended.system, self.at(t, z));
-        let mut h = vec![0.0; system.n_surfaces()];
-        system.surfaces(&place, &mut h)?;
+        let h = self.surfaces(t, z)?;
         let (mut found, mut normal) = (Vec::new(), vec![0.0; z.len()]);
         for (j, h) in h.iter().enumerate() {
             let is_on_a_side = self.mode.entries()[j] != 0;

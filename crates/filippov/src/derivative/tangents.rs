@@ -1,5 +1,6 @@
 //! The derivatives of a run, as its observer.
 
+use super::borders::{differ, is_missed_later, ticks_at_start, Borders};
 use super::extended::{Column, Extended};
 use super::forms::{pairs, Second};
 use super::instant::{arrival, Instant, Lost, Weights};
@@ -9,9 +10,8 @@ use super::piece::{Piece, Surroundings};
 use super::second::at_start;
 use crate::error::FieldError;
 use crate::mode::Mode;
-use crate::motion::SmoothField;
 use crate::options::{Keep, Options};
-use crate::record::{InstantRecord, ObservedStep, Observer};
+use crate::record::{InstantRecord, KeptInstant, ObservedStep, Observer};
 use crate::system::Actions;
 use crate::vectors::dot;
 
@@ -33,9 +33,8 @@ pub struct Derivatives {
     pub second_lost: Option<f64>,
     /// Those of all instants; if the run keeps its last state only, of the one at which they end.
     pub instants: Vec<InstantDerivative>,
-    /// Surfaces on which the run starts and that it leaves, where the field jumps: the derivatives by the start are those of one
-    /// side.
-    pub starts_on: Vec<usize>,
+    /// Where they are those of one side.
+    pub borders: Borders,
 }
 
 /// Follows the derivatives of a run, step by step and through its instants. Where they end they are NaN.
@@ -84,7 +83,7 @@ pub struct Tangents<'a> {
     #[allow(clippy::vec_box)]
     pieces: Vec<Box<Piece<'a>>>,
     history: History,
-    has_started: bool,
+    t_start: Option<f64>,
     lost: Option<Lost>,
     found: Derivatives,
     raised: Option<FieldError>,
@@ -113,7 +112,7 @@ impl<'a> Tangents<'a> {
             kinds,
             pieces: Vec::new(),
             history: History::default(),
-            has_started: false,
+            t_start: None,
             lost: None,
             found: Derivatives::default(),
             raised: None,
@@ -139,15 +138,12 @@ impl<'a> Tangents<'a> {
     }
 
     fn start(&mut self, t: f64, x: &[f64], mode: &Mode, q: &[f64]) -> Result<(), FieldError> {
-        self.has_started = true;
+        self.t_start = Some(t);
         self.around.take_sides(mode);
-        let (n, m) = (self.around.extended.n, self.around.extended.n_parameters());
+        let n = self.around.extended.n;
         let z = self.around.extended.state(x);
         let mut piece = Piece::new(&self.around, mode, q);
-        let mut field = vec![0.0; n + m];
-        piece
-            .field
-            .eval_unprojected(t, &mut z.clone(), &mut field)?;
+        let field = piece.rates(t, &z)?;
         if self.has_second {
             let at = (t, &z[..]);
             self.second = Some(at_start(&mut piece, at, &field, &self.kinds)?);
@@ -157,7 +153,9 @@ impl<'a> Tangents<'a> {
             self.second = None;
             self.columns.iter_mut().for_each(|c| arrival.apply(n, c));
         }
-        self.found.starts_on = piece.left_at_once(t, &z, &self.kinds, &self.columns)?;
+        let borders = &mut self.found.borders;
+        borders.starts_on = piece.left_at_once(t, &z, &self.kinds, &self.columns)?;
+        borders.starts_at_tick = ticks_at_start(&self.around, &mut piece, (t, &z), &self.kinds)?;
         self.put_back(Box::new(piece));
         self.keep(t);
         Ok(())
@@ -221,17 +219,18 @@ impl<'a> Tangents<'a> {
 
     fn follow(&mut self, step: &ObservedStep) -> Result<(), FieldError> {
         let t0 = step.t_start();
-        if !self.has_started {
-            let mut x = vec![0.0; self.around.extended.n];
-            step.at(t0, &mut x);
+        let extended = self.around.extended;
+        let along = |t: f64, x: &mut [f64]| {
+            extended.write_with_named(x, step.discrete, |x| step.at(t, x));
+            Ok(())
+        };
+        if self.t_start.is_none() {
+            let mut x = vec![0.0; extended.n];
+            along(t0, &mut x)?;
             self.start(t0, &x, step.mode, step.discrete)?;
         }
         if self.lost.is_none() {
             let mut piece = self.take_piece(step.mode, step.discrete);
-            let along = |t: f64, x: &mut [f64]| {
-                step.at(t, x);
-                Ok(())
-            };
             let span = (t0, step.t_end);
             if let Some(mut second) = self.second.take() {
                 if piece.advance_pairs(along, span, &self.columns, &mut second)? {
@@ -239,19 +238,20 @@ impl<'a> Tangents<'a> {
                 }
             }
             piece.advance(along, span, &mut self.columns)?;
-            let z = self.around.extended.state(step.x_end);
+            let z = extended.state(&extended.with_named(step.x_end, step.discrete));
             piece.project(step.t_end, &z, &mut self.columns)?;
             self.put_back(piece);
             if self.columns.iter().flatten().any(|v| !v.is_finite()) {
                 self.lose(Lost::NotFinite);
             }
         }
+        self.found.borders.ends_at_instant = false;
         self.keep(step.t_end);
         Ok(())
     }
 
     fn pass(&mut self, record: &InstantRecord) -> Result<(), FieldError> {
-        if !self.has_started {
+        if self.t_start.is_none() {
             self.start(record.t[0], record.x[0], record.mode[0], record.discrete[0])?;
         }
         let mut before = self.take_piece(record.mode[0], record.discrete[0]);
@@ -271,11 +271,23 @@ impl<'a> Tangents<'a> {
             self.jump(record, time, &after)?;
         } else {
             let columns = self.columns.clone();
-            let mut found = instant.pass(&self.weights, &mut self.columns, &mut self.second)?;
-            found.lost = self.lost.or(found.lost);
-            self.history.push(past(record, &columns, found.dt.clone()));
-            found.lost.into_iter().for_each(|lost| self.lose(lost));
-            self.keep_instant(found);
+            let all = instant.pass(&self.weights, &mut self.columns, &mut self.second)?;
+            if let Some(last) = all.last() {
+                self.history.push(past(record, &columns, last.dt.clone()));
+            }
+            let is_timed = |c: usize| all.iter().any(|found| found.dt[c] != 0.0);
+            let pairs = columns.iter().zip(&self.columns).enumerate();
+            let mut moved =
+                pairs.filter(|(c, (before, after))| is_timed(*c) && differ(before, after));
+            self.found.borders.ends_at_instant = moved.next().is_some();
+            let start = self.t_start.unwrap_or(record.t[0]);
+            self.found.borders.starts_at_action |=
+                is_missed_later(self.around.extended, record, start, &self.kinds);
+            for mut found in all {
+                found.lost = self.lost.or(found.lost);
+                found.lost.into_iter().for_each(|lost| self.lose(lost));
+                self.keep_instant(found);
+            }
         }
         self.put_back(before);
         self.put_back(after);
@@ -345,8 +357,15 @@ impl Observer for Tangents<'_> {
     }
 
     fn instant(&mut self, instant: &InstantRecord) {
-        if self.raised.is_none() {
-            self.raised = self.pass(instant).err();
+        if self.raised.is_some() {
+            return;
         }
+        self.raised = match self.around.extended.n_named {
+            0 => self.pass(instant).err(),
+            count => {
+                let kept = KeptInstant::with_discrete_as_states(instant, count);
+                self.pass(&kept.record()).err()
+            }
+        };
     }
 }
