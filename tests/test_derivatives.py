@@ -308,6 +308,16 @@ def test_surfaces_at_once_that_have_nothing_to_do_with_one_another() -> None:
     np.testing.assert_allclose(sol.derivative(), [[3.0, 0.0], [0.0, 0.5]], atol=1e-14)
 
 
+def test_an_entry_to_a_surface_that_is_about_to_be_left_all_along() -> None:
+    """Above, y' = z: the motion rests on y = 0 at the end of its multiplier, and leaves it if z > 0."""
+    fun = lambda t, x: np.where(x[0] > 0, [x[1], 0.0], [1.0, 0.0])  # noqa: E731
+    with pytest.warns(fl.FilippovWarning, match="no_derivative: derivatives are not known from t = 0.5 on"):
+        sol = fl.System(fun, n=2).solve((0, 1), [-0.5, 0.0], wrt="y0", **TIGHT)
+    assert sol.switches[0].derivative.lost == "one-sided"
+    ends = [fl.System(fun, n=2).solve((0, 1), [-0.5, d], **TIGHT).y[0, -1] for d in (1e-3, -1e-3)]
+    np.testing.assert_allclose(ends, [5e-4, 0.0], atol=1e-12)
+
+
 def test_a_kink_that_is_touched_changes_nothing() -> None:
     sol = fl.System(lambda t, x: [1.0, 2 * (x[0] - 1), abs(x[1])], n=3).solve((0, 2), [0, 1.0, 0.0], wrt="y0")
     assert [switch.kind for switch in sol.switches] == ["grazing"]
@@ -395,6 +405,31 @@ def test_a_run_that_begins_or_ends_at_an_instant_is_named() -> None:
         fl.gradient(kicked, (0, 1.2), [0.3], terminal=lambda t, y: y[0], wrt="t0")
     with pytest.warns(fl.FilippovWarning, match="the gradient at its end is that of one side"):
         fl.gradient(relay, (0, 1.0), [0.0], terminal=lambda t, y: y[0], wrt="a")
+
+
+@pytest.mark.filterwarnings("ignore:zero_surface:filippov.FilippovWarning")
+@pytest.mark.parametrize(
+    ("fun", "y0", "surface", "slope"),
+    [
+        # At rest on a kink: x = d e^(2 t) above, d below.
+        (lambda t, x: [x[0] + abs(x[0])], [0.0], "x[0]", math.e**2),
+        # On a surface that is slid on, which the motion leaves on another one: x1 is 3 d larger on one side.
+        (lambda t, x: [-2 * np.sign(x[0] + 0.1 * t), 3 * np.sign(x[0])], [0.0, 0.0], "x[0]", None),
+        # Where both are slid on, a start beside one of them changes nothing, and one beside both changes z.
+        (
+            lambda t, x: [-np.sign(x[0]), -np.sign(x[1]), np.sign(x[0]) * np.sign(x[1])],
+            [0.0, 0.0, 0.0],
+            "x[1]",
+            0.0,
+        ),
+    ],
+)
+def test_a_start_whose_sides_differ_is_named(fun: Any, y0: Any, surface: str, slope: float | None) -> None:
+    with pytest.warns(fl.FilippovWarning, match="one_sided: the run starts on"):
+        sol = fl.System(fun, n=len(y0)).solve((0, 1), y0, wrt="y0", **TIGHT)
+    assert surface in sol.warnings[-1].surfaces
+    if slope is not None:
+        assert sol.derivative()[-1, 0] == pytest.approx(slope)
 
 
 def test_a_start_on_the_surface_of_a_reset_has_the_shift_of_its_time() -> None:

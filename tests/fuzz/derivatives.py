@@ -24,6 +24,7 @@ import filippov as fl
 import numpy as np
 import numpy.typing as npt
 
+from fuzz.properties import is_moderate
 from fuzz.systems import LIMITS, random_case
 
 __all__ = ["Compared", "compare", "with_parameters"]
@@ -46,7 +47,8 @@ class Compared:
     Attributes
     ----------
     outcome : str
-        "agrees", "named" (with a warning that the differences confirm), "named without need" or "stopped".
+        "agrees", "named" (with a warning that the differences confirm), "named without need" or "stopped"
+        (by the integrator, or far out).
     n_columns : int
         So many columns agree with differences.
     unsettled : list of str
@@ -130,13 +132,14 @@ def compare(seed: int) -> Compared:
     system = fl.System(names["rhs"], n=len(y0), params=values or None, resets=names["resets"] or None)
 
     sol = system.solve((0.0, t_end), y0, wrt=["y0", "t0", *values], **OPTIONS)
-    if not sol.success:
+    if not sol.success or not is_moderate(sol):
         return Compared("stopped")
     found = Compared("agrees", kinds=set(sol.switches.kind))
     named = [warning for warning in sol.warnings if warning.code in NAMED]
     is_named = bool(named)
     # Where several things come together the derivative is that of one side of each, and no direction has it.
     is_corner = sum(max(len(warning.surfaces), 1) for warning in named) > 1
+    is_corner |= any(warning.code == "zero_surface" for warning in sol.warnings)
 
     def end(column: str, d: float) -> Array:
         start, t0, params = y0.copy(), 0.0, dict(values)
@@ -210,7 +213,8 @@ def _has_no_kink(quotients: list[tuple[_Quotient, _Quotient]]) -> bool:
     gaps = [np.abs(right.value - left.value).max() for right, left in quotients]
     clear = [gap > 4 * right.noise for gap, (right, _) in zip(gaps, quotients, strict=True)]
     last = max((k for k, is_clear in enumerate(clear) if is_clear), default=0)
-    return last == 0 or bool(gaps[last] <= 0.3 * gaps[last - 1])
+    steps = itertools.pairwise(gaps[max(last - 1, 0) : last + 2])
+    return any(now <= 0.5 * before for before, now in steps) or not any(clear)
 
 
 def _work(seed: int) -> tuple[int, Compared]:

@@ -6,7 +6,7 @@
 //! same at all times, to rounding.
 
 use super::between::{state_at, EventGradient};
-use super::borders::{differ, is_missed_later, ticks_at_start, Borders};
+use super::borders::{differ, is_missed_later, surfaces_at_start, ticks_at_start, Borders};
 use super::extended::{Column, Extended};
 use super::forms::add;
 use super::instant::{arrival, Instant, Passage, Weights};
@@ -185,17 +185,16 @@ impl WayBack<'_> {
             let mut piece = Piece::new(&around, &start.mode, &start.q);
             let z = extended.state(&start.x);
             let field = piece.rates(start.t, &z)?;
-            let mut columns = extended.columns_at_start(self.kinds, &field);
+            let columns = extended.columns_at_start(self.kinds, &field);
             if let Some(arrival) = arrival(&piece, start.t, &z)? {
-                columns.iter_mut().for_each(|c| arrival.apply(n, c));
                 let mut whole = [&found.by_state[..], &found.by_parameters].concat();
                 arrival.pull_back(n, &mut whole);
                 found.by_parameters = whole.split_off(n);
                 found.by_state = whole;
             }
             let borders = &mut found.borders;
-            borders.starts_on = piece.left_at_once(start.t, &z, self.kinds, &columns)?;
             let at = (start.t, &z[..]);
+            borders.starts_on = surfaces_at_start(&mut piece, at, self.kinds, &columns)?;
             borders.starts_at_tick = ticks_at_start(&around, &mut piece, at, self.kinds)?;
             found.by_start = -dot(&found.by_state, &field);
         }

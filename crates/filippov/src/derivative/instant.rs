@@ -123,6 +123,10 @@ impl Instant<'_, '_> {
             return Ok(Ok(passage));
         }
         if let Some(entry) = self.entry()? {
+            let z = self.extended.state(record.x[1]);
+            if self.after.stays_at_an_end(record.t[1], &z)? {
+                return Ok(Err(Lost::OneSided));
+            }
             passage.changes.push(entry);
             return Ok(Ok(passage));
         }

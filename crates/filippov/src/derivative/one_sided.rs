@@ -79,7 +79,7 @@ impl<'a> Instant<'_, 'a> {
         let Some(surfaces) = surfaces.filter(|all| {
             let differs = |j: usize| entries[0][j] != entries[1][j];
             record.acts.is_empty()
-                && all.len() <= MOST_AT_ONCE
+                && (2..=MOST_AT_ONCE).contains(&all.len())
                 && (0..entries[0].len()).all(|j| all.contains(&j) == differs(j))
                 && all.iter().all(|&j| entries[0][j] != 0)
         }) else {

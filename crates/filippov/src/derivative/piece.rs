@@ -7,7 +7,7 @@ use smallvec::SmallVec;
 
 use super::change::Change;
 use super::collocation::{operations, Collocation};
-use super::extended::{Column, Extended};
+use super::extended::Extended;
 use super::forms::{pairs, Second};
 use super::radau::NODES;
 use super::series::{ChangeSeries, Coefficients};
@@ -22,7 +22,7 @@ use crate::system::{
     Actions, LieDerivatives, Linearisation, Linearisations, MotionJacobian, PiecewiseSystem, Place,
     Setting, SignStructure, TracedSystem,
 };
-use crate::tolerances::{EPS, ROUNDING};
+use crate::tolerances::{AT_SIDE, EPS};
 use crate::vectors::dot;
 
 /// Series that allow less than this share of a step are not used where there is another way; where there is none, less than that.
@@ -88,7 +88,7 @@ pub(super) struct Piece<'a> {
     /// The surfaces in contact.
     contacts: Vec<usize>,
     sides: Vec<i8>,
-    signs: Vec<f64>,
+    pub signs: Vec<f64>,
     pub field: ModeField<'a>,
     /// The derivatives of its field, if the graph has them.
     jacobian: Option<Arc<MotionJacobian>>,
@@ -479,6 +479,25 @@ impl<'a> Piece<'a> {
         Ok(Some((time, state)))
     }
 
+    /// Does a multiplier stay at the end of its interval, to first order? A motion beside this one leaves on one side, and slides on the
+    /// other.
+    pub fn stays_at_an_end(&mut self, t: f64, z: &[f64]) -> Result<bool, FieldError> {
+        let field = self.rates(t, z)?;
+        let at_end = |l: &f64| (l.abs() - 1.0).abs() <= AT_SIDE;
+        let Some(k) = self.field.multipliers().iter().position(at_end) else {
+            return Ok(false);
+        };
+        let slopes = match self.sliding.get(k) {
+            Some(&j) => self.multiplier_slopes(j, t, z)?,
+            None => None,
+        };
+        Ok(slopes.is_some_and(|(by_time, slopes)| {
+            let terms = slopes.iter().zip(&field).map(|(s, f)| (s * f).abs());
+            let size = by_time.abs() + terms.sum::<f64>();
+            (by_time + dot(&slopes, &field)).abs() <= AT_SIDE * size
+        }))
+    }
+
     /// The gradients of the surfaces slid on and of those in contact by the extended state.
     pub fn normals(&self, t: f64, z: &[f64]) -> Result<Vec<Vec<f64>>, FieldError> {
         let gradient = |&j: &usize| {
@@ -492,34 +511,6 @@ impl<'a> Piece<'a> {
             .chain(&self.contacts)
             .map(gradient)
             .collect()
-    }
-
-    /// The surfaces through a start that the motion leaves, where the field jumps, if one of these columns moves the start off them.
-    pub fn left_at_once(
-        &self,
-        t: f64,
-        z: &[f64],
-        kinds: &[Column],
-        columns: &[Vec<f64>],
-    ) -> Result<Vec<usize>, FieldError> {
-        let (system, place) = (&self.extended.system, self.at(t, z));
-        let h = self.surfaces(t, z)?;
-        let (mut found, mut normal) = (Vec::new(), vec![0.0; z.len()]);
-        for (j, h) in h.iter().enumerate() {
-            let is_on_a_side = self.mode.entries()[j] != 0;
-            let is_there = is_on_a_side && h.abs() <= ROUNDING * system.surface_size(j, &place)?;
-            if is_there && system.jumps_across(j, &self.signs, &self.sliding) {
-                let by_time = system.gradient(j, &place, &mut normal)?;
-                let moves = |(kind, column): (&Column, &Vec<f64>)| {
-                    let later = f64::from(*kind == Column::Start);
-                    by_time * later + dot(&normal, column) != 0.0
-                };
-                if kinds.iter().zip(columns).any(moves) {
-                    found.push(j);
-                }
-            }
-        }
-        Ok(found)
     }
 
     /// The gradients of the rates of the surfaces in contact.

@@ -1,6 +1,6 @@
 //! The derivatives of a run, as its observer.
 
-use super::borders::{differ, is_missed_later, ticks_at_start, Borders};
+use super::borders::{differ, is_missed_later, surfaces_at_start, ticks_at_start, Borders};
 use super::extended::{Column, Extended};
 use super::forms::{pairs, Second};
 use super::instant::{arrival, Instant, Lost, Weights};
@@ -149,12 +149,13 @@ impl<'a> Tangents<'a> {
             self.second = Some(at_start(&mut piece, at, &field, &self.kinds)?);
         }
         self.columns = self.around.extended.columns_at_start(&self.kinds, &field);
+        let starts_on = surfaces_at_start(&mut piece, (t, &z), &self.kinds, &self.columns)?;
         if let Some(arrival) = arrival(&piece, t, &z)? {
             self.second = None;
             self.columns.iter_mut().for_each(|c| arrival.apply(n, c));
         }
         let borders = &mut self.found.borders;
-        borders.starts_on = piece.left_at_once(t, &z, &self.kinds, &self.columns)?;
+        borders.starts_on = starts_on;
         borders.starts_at_tick = ticks_at_start(&self.around, &mut piece, (t, &z), &self.kinds)?;
         self.put_back(Box::new(piece));
         self.keep(t);
