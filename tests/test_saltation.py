@@ -1,7 +1,7 @@
 """What every instant of every run fulfils: the flow goes over into itself; volumes, products with gradients.
 
-Of reference problems, published cycles and random systems. Time is a state, so that each is autonomous: then the
-saltation matrix takes the velocity before to that behind, S F- = F+.
+Of reference problems, published cycles and random systems. Time is a state, so that each is autonomous: then
+the saltation matrix takes the velocity before to that behind, S F- = F+.
 """
 
 from __future__ import annotations
