@@ -7,6 +7,7 @@
 
 use super::between::{state_at, EventGradient};
 use super::borders::{differ, is_missed_later, surfaces_at_start, ticks_at_start, Borders};
+use super::change::Row;
 use super::extended::{Column, Extended};
 use super::forms::add;
 use super::instant::{arrival, Instant, Passage, Weights};
@@ -408,7 +409,7 @@ impl<'w> Walk<'w> {
     }
 
     /// Takes the gradient back through what happens at an instant; returns the derivative of the time of the guard.
-    fn pull_back(&mut self, record: &InstantRecord, passages: &[Passage], n: usize) -> Vec<f64> {
+    fn pull_back(&mut self, record: &InstantRecord, passages: &[Passage], n: usize) -> Row {
         let after = self.w.clone();
         let mut is_timed = false;
         for passage in passages.iter().rev() {
@@ -429,7 +430,7 @@ impl<'w> Walk<'w> {
         self.borders.starts_at_action |=
             is_missed_later(self.run.systems.1, record, start, self.run.kinds);
         let guarded = passages.last();
-        guarded.map_or_else(Vec::new, |passage| passage.time.clone())
+        guarded.map_or_else(Row::new, |passage| passage.time.clone())
     }
 
     /// What the limit of infinitely many switches takes from the instants before.

@@ -141,7 +141,7 @@ pub(super) fn ticks_at_start(
 ) -> Result<bool, FieldError> {
     let extended = piece.extended;
     let ticks = extended.ticks_at(&piece.at(t, z));
-    let moves = |kind: &Column, tick: &Vec<f64>| match *kind {
+    let moves = |kind: &Column, tick: &[f64]| match *kind {
         Column::Start => true,
         Column::State(i) => tick[i] != 0.0,
         Column::Parameter(p) => tick[extended.n + p] != 0.0,

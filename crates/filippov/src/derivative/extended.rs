@@ -6,6 +6,7 @@ use filippov_expr::{Backend, ExprError, Names, NodeId, Program};
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 
+use super::change::Row;
 use super::forms::{Form, MapAt};
 use super::series::ChangeSeries;
 use crate::error::{Error, FieldError};
@@ -189,16 +190,16 @@ impl Extended<'_> {
     }
 
     /// The derivative of the time of an action at a known time, a row; none for other actions.
-    pub(super) fn time_of_tick(&self, action: usize, place: &Place) -> Option<Vec<f64>> {
+    pub(super) fn time_of_tick(&self, action: usize, place: &Place) -> Option<Row> {
         self.is_timed(action)
             .then(|| match self.clock(action, place) {
                 Some((time, state)) => state.iter().map(|g| -g / time).collect(),
-                None => vec![0.0; self.n + self.values.len()],
+                None => Row::from_elem(0.0, self.n + self.values.len()),
             })
     }
 
     /// The derivatives of the times of the ticks of laws at a time.
-    pub(super) fn ticks_at(&self, place: &Place) -> Vec<Vec<f64>> {
+    pub(super) fn ticks_at(&self, place: &Place) -> Vec<Row> {
         let is_there = |trigger: &Trigger| match trigger {
             Trigger::Clock { clock, at_start } => !at_start && clock.tick_at(place.t).is_some(),
             Trigger::Times(times) => times
@@ -300,7 +301,7 @@ impl Extended<'_> {
 
     /// The derivatives of the clock whose tick an action is, by the time and by the extended state; `None` if it ticks whatever the
     /// parameters.
-    pub(super) fn clock(&self, index: usize, place: &Place) -> Option<(f64, Vec<f64>)> {
+    fn clock(&self, index: usize, place: &Place) -> Option<(f64, Vec<f64>)> {
         let program = self.clocks.get(index)?.as_ref()?;
         let mut out = vec![0.0; 1 + self.n_named + self.values.len()];
         self.system.eval(program, place, &[], &mut out);
@@ -333,13 +334,17 @@ impl Extended<'_> {
     }
 
     /// The state, with the named discrete states, and the parameters behind it.
-    pub(super) fn state(&self, x: &[f64]) -> Vec<f64> {
-        [x, &self.values].concat()
+    pub(super) fn state(&self, x: &[f64]) -> Row {
+        let mut z = Row::from_slice(x);
+        z.extend_from_slice(&self.values);
+        z
     }
 
     /// The state of the system with its named discrete states behind it, which are the first ones.
-    pub(super) fn with_named(&self, x: &[f64], discrete: &[f64]) -> Vec<f64> {
-        [x, &discrete[..self.n_named]].concat()
+    pub(super) fn with_named(&self, x: &[f64], discrete: &[f64]) -> Row {
+        let mut x = Row::from_slice(x);
+        x.extend_from_slice(&discrete[..self.n_named]);
+        x
     }
 
     /// Writes the state of the system and behind it its named discrete states.

@@ -1,6 +1,8 @@
 //! The saltation matrix: what an instant makes of a change of the state.
 
-use super::change::Change;
+use smallvec::SmallVec;
+
+use super::change::{Change, Row, Rows};
 use super::extended::Extended;
 use super::piece::{Piece, Surroundings};
 use crate::error::FieldError;
@@ -70,7 +72,7 @@ impl Weights {
 /// A function that fixes the time of an instant: its derivatives by time and by the extended state.
 struct Timing {
     time: f64,
-    state: Vec<f64>,
+    state: Row,
 }
 
 /// An instant with the motions around it.
@@ -85,9 +87,9 @@ pub(super) struct Instant<'i, 'a> {
 /// What an instant does to changes of the extended state.
 pub(super) struct Passage {
     /// The derivative of the time, a row.
-    pub time: Vec<f64>,
+    pub time: Row,
     /// What becomes of a change, one after the other.
-    pub changes: Vec<Change>,
+    pub changes: SmallVec<[Change; 1]>,
     /// The field goes on: the time alone is of interest.
     pub goes_on: bool,
     /// So many of its actions are recorded as switches, where others happen at the same time.
@@ -115,7 +117,7 @@ impl Instant<'_, '_> {
         }
         let mut passage = Passage {
             time,
-            changes: Vec::new(),
+            changes: SmallVec::new(),
             goes_on: self.leaves_as_it_is(),
             n_recorded: 0,
         };
@@ -157,13 +159,13 @@ impl Instant<'_, '_> {
         &mut self,
         weights: &Weights,
         condition: &mut f64,
-    ) -> Result<Result<Vec<f64>, Lost>, FieldError> {
+    ) -> Result<Result<Row, Lost>, FieldError> {
         let record = self.record;
         let Some(guard) = self.guard() else {
             *condition = 1.0;
             let mut acts = record.acts.iter();
             let time = acts.find_map(|act| self.time_of_tick(act));
-            let fixed = || vec![0.0; self.extended.n + self.extended.n_parameters()];
+            let fixed = || Row::from_elem(0.0, self.extended.n + self.extended.n_parameters());
             return Ok(Ok(time.unwrap_or_else(fixed)));
         };
         let timing = self.timing(guard)?;
@@ -190,7 +192,7 @@ impl Instant<'_, '_> {
     }
 
     /// The derivative of the time of an action at a known time, a row; none for other actions.
-    pub fn time_of_tick(&self, act: &Act) -> Option<Vec<f64>> {
+    pub fn time_of_tick(&self, act: &Act) -> Option<Row> {
         let z = self.extended.state(self.record.x[0]);
         let place = self.before.at(self.record.t[0], &z);
         self.extended.time_of_tick(act.index, &place)
@@ -199,7 +201,7 @@ impl Instant<'_, '_> {
     /// The gradient of a guard of the motion before.
     fn timing(&mut self, guard: Guard) -> Result<Timing, FieldError> {
         let (t, z) = (self.record.t[0], self.extended.state(self.record.x[0]));
-        let mut state = vec![0.0; z.len()];
+        let mut state = Row::from_elem(0.0, z.len());
         let system = &self.extended.system;
         match guard {
             Guard::Surface(j) => {
@@ -265,7 +267,7 @@ impl Instant<'_, '_> {
     fn mapped(&self) -> Result<Mapped, FieldError> {
         let (n, values) = (self.extended.n, &self.extended.values);
         let mut total: Option<Vec<Vec<f64>>> = None;
-        let mut along = self.record.field[0].to_vec();
+        let mut along = Row::from_slice(self.record.field[0]);
         for act in self.record.acts {
             let Some(map) = self.extended.maps.get(act.index).and_then(Option::as_ref) else {
                 continue;
@@ -286,7 +288,7 @@ impl Instant<'_, '_> {
 }
 
 /// The rows of the derivative of maps, if any moves the state, and what becomes of the field before.
-type Mapped = (Option<Vec<Vec<f64>>>, Vec<f64>);
+type Mapped = (Option<Vec<Vec<f64>>>, Row);
 
 /// A row of the derivative of a map behind another one.
 fn chained(n: usize, row: &[f64], earlier: &[Vec<f64>]) -> Vec<f64> {
@@ -353,14 +355,14 @@ pub(super) fn arrival(piece: &Piece, t: f64, z: &[f64]) -> Result<Option<Change>
 /// Surfaces with the jumps of the field there.
 #[derive(Default)]
 struct Jumps {
-    changes: Vec<Vec<f64>>,
-    normals: Vec<Vec<f64>>,
+    changes: Rows,
+    normals: Rows,
 }
 
 impl Jumps {
     /// What takes from a change its parts off the surfaces, along the jumps.
     fn taken_out(&self, n: usize) -> Change {
-        let directions = self.changes.iter().map(|jump| jump[..n].to_vec());
+        let directions = self.changes.iter().map(|jump| Row::from_slice(&jump[..n]));
         Change::normal_to(self.normals.clone(), directions.collect())
     }
 }

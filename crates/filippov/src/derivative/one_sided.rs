@@ -1,6 +1,8 @@
 //! Where a derivative has sides: several surfaces that are reached at once, and motions that touch one.
 
-use super::change::{matrices, Change};
+use smallvec::{smallvec, SmallVec};
+
+use super::change::{matrices, Change, Row};
 use super::instant::{entered, Instant};
 use super::piece::Piece;
 use crate::error::FieldError;
@@ -27,7 +29,7 @@ pub struct OneSided {
 /// What happens to changes in one of the cones.
 pub(super) struct Cone {
     pub order: Vec<usize>,
-    pub changes: Vec<Change>,
+    pub changes: SmallVec<[Change; 1]>,
 }
 
 impl Cone {
@@ -95,13 +97,16 @@ impl<'a> Instant<'_, 'a> {
         Ok(Some(cones))
     }
 
-    fn one_after_the_other(&mut self, order: &[usize]) -> Result<Option<Vec<Change>>, FieldError> {
+    fn one_after_the_other(
+        &mut self,
+        order: &[usize],
+    ) -> Result<Option<SmallVec<[Change; 1]>>, FieldError> {
         let record = self.record;
         let (t, z) = (record.t[0], self.extended.state(record.x[0]));
         let mut mode: Mode = record.mode[0].clone();
-        let mut field = record.field[0].to_vec();
+        let mut field = Row::from_slice(record.field[0]);
         let mut sliding = self.before.sliding.clone();
-        let mut changes = Vec::new();
+        let mut changes = SmallVec::new();
         for (number, &j) in order.iter().enumerate() {
             let normal = |piece: &Piece, k: usize| -> Result<(f64, Vec<f64>), FieldError> {
                 let mut row = vec![0.0; z.len()];
@@ -169,15 +174,15 @@ impl<'a> Instant<'_, 'a> {
         let (t, z) = (record.t[0], self.extended.state(record.x[0]));
         let missed = Cone {
             order: Vec::new(),
-            changes: Vec::new(),
+            changes: SmallVec::new(),
         };
         let beyond = self.before.corner(t, &z, &[(j, -f64::from(entry))])?;
-        let jump: Vec<f64> = beyond
+        let jump: Row = beyond
             .iter()
             .zip(record.field[0])
             .map(|(far, near)| far - near)
             .collect();
-        let mut normal = vec![0.0; z.len()];
+        let mut normal = Row::from_elem(0.0, z.len());
         self.before.gradient(j, t, &z, &mut normal)?;
         let size = |v: &[f64]| v.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
         if size(&jump) <= AT_SIDE * size(record.field[0]) {
@@ -188,7 +193,7 @@ impl<'a> Instant<'_, 'a> {
         }
         let reached = Cone {
             order: vec![j],
-            changes: vec![Change::normal_to(vec![normal], vec![jump])],
+            changes: smallvec![Change::normal_to(smallvec![normal], smallvec![jump])],
         };
         Ok(vec![missed, reached])
     }

@@ -3,6 +3,7 @@
 //! If the start or a parameter changes they come one after the other, in an order that depends on the change. What they do then is
 //! what each does by itself. If all orders agree the derivative goes on; else it is one-sided.
 
+use super::change::Row;
 use super::instant::{Instant, Lost, Passage, Weights};
 use super::one_sided::{agree, orders, Cone, MOST_AT_ONCE};
 use super::piece::Piece;
@@ -14,7 +15,7 @@ use crate::tolerances::{AT_SIDE, ROUNDING};
 /// What one function fixes.
 struct Part {
     /// The derivative of its time.
-    time: Vec<f64>,
+    time: Row,
     /// What is done, by the places among the acts of the instant.
     acts: Vec<usize>,
     is_guarded: bool,
@@ -99,7 +100,7 @@ impl<'a> Instant<'_, 'a> {
             };
             let moves = self.extended.moves(act.index);
             let Some(known) = known else {
-                let time = time.unwrap_or_else(|| vec![0.0; self.size()]);
+                let time = time.unwrap_or_else(|| Row::from_elem(0.0, self.size()));
                 let is_guarded = of_guard.as_ref().is_some_and(|own| is_same(own, &time));
                 parts.push(Part {
                     time,

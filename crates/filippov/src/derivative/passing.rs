@@ -1,6 +1,8 @@
 //! Instants of all kinds, on the way forward and back.
 
-use super::change::matrices;
+use smallvec::SmallVec;
+
+use super::change::{matrices, Row};
 use super::forms::Second;
 use super::instant::{Instant, Lost, Passage, Weights};
 use super::one_sided::{agree, OneSided};
@@ -32,17 +34,27 @@ pub struct InstantDerivative {
 }
 
 impl InstantDerivative {
-    /// An instant at this time of which nothing is known.
-    pub(super) fn unknown(t: f64, n_columns: usize, (n, m): (usize, usize)) -> Self {
+    /// An instant at this time, to be filled.
+    fn new(t: f64) -> Self {
         InstantDerivative {
             t,
-            dt: vec![f64::NAN; n_columns],
-            saltation: vec![f64::NAN; n * n],
-            by_parameters: vec![f64::NAN; n * m],
+            dt: Vec::new(),
+            saltation: Vec::new(),
+            by_parameters: Vec::new(),
             condition: f64::NAN,
             lost: None,
             sides: Vec::new(),
             square_root: Vec::new(),
+        }
+    }
+
+    /// An instant at this time of which nothing is known.
+    pub(super) fn unknown(t: f64, n_columns: usize, (n, m): (usize, usize)) -> Self {
+        InstantDerivative {
+            dt: vec![f64::NAN; n_columns],
+            saltation: vec![f64::NAN; n * n],
+            by_parameters: vec![f64::NAN; n * m],
+            ..InstantDerivative::new(t)
         }
     }
 }
@@ -56,16 +68,13 @@ impl Instant<'_, '_> {
         second: &mut Option<Second>,
     ) -> Result<Vec<InstantDerivative>, FieldError> {
         let (n, m) = (self.extended.n, self.extended.n_parameters());
-        let unknown = InstantDerivative::unknown(self.record.t[0], columns.len(), (n, m));
         let mut condition = f64::NAN;
         let passages = match self.through(weights, &mut condition)? {
             Ok(passages) => passages,
             Err(lost) => {
-                let mut found = InstantDerivative {
-                    condition,
-                    lost: Some(lost),
-                    ..unknown
-                };
+                let t = self.record.t[0];
+                let mut found = InstantDerivative::unknown(t, columns.len(), (n, m));
+                (found.condition, found.lost) = (condition, Some(lost));
                 self.add_sides(&mut found)?;
                 return Ok(vec![found]);
             }
@@ -84,10 +93,10 @@ impl Instant<'_, '_> {
         }
         let mut all = Vec::with_capacity(passages.len());
         for passage in &passages {
-            let mut found = unknown.clone();
+            let mut found = InstantDerivative::new(self.record.t[0]);
             found.condition = condition;
-            let dt = found.dt.iter_mut().zip(&*columns);
-            dt.for_each(|(dt, column)| *dt = dot(&passage.time, column));
+            let dt = columns.iter().map(|column| dot(&passage.time, column));
+            found.dt.extend(dt);
             for column in columns.iter_mut() {
                 passage.changes.iter().for_each(|one| one.apply(n, column));
             }
@@ -146,8 +155,8 @@ impl Instant<'_, '_> {
         // Where the field is the same on both sides of a surface, a touch changes nothing.
         if lost == Lost::Grazing && self.touching()?.len() == 1 {
             return Ok(Ok(vec![Passage {
-                time: vec![f64::NAN; sizes.0 + sizes.1],
-                changes: Vec::new(),
+                time: Row::from_elem(f64::NAN, sizes.0 + sizes.1),
+                changes: SmallVec::new(),
                 goes_on: true,
                 n_recorded: 0,
             }]));

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use smallvec::SmallVec;
 
-use super::change::Change;
+use super::change::{Change, Row, Rows};
 use super::collocation::{operations, Collocation};
 use super::extended::Extended;
 use super::forms::{pairs, Second};
@@ -168,7 +168,7 @@ impl<'a> Piece<'a> {
             collocation: Collocation::new((extended.n, extended.n_parameters()), around.rtol),
             nodes: Vec::new(),
             rates: vec![0.0; z.len()],
-            point: z,
+            point: z.into_vec(),
             sliding,
         }
     }
@@ -187,24 +187,20 @@ impl<'a> Piece<'a> {
     }
 
     /// The field of the extended system with the signs of the mode, and those given on the surfaces slid on.
-    pub fn corner(
-        &self,
-        t: f64,
-        z: &[f64],
-        signs: &[(usize, f64)],
-    ) -> Result<Vec<f64>, FieldError> {
-        let mut all = self.signs.clone();
+    pub fn corner(&self, t: f64, z: &[f64], signs: &[(usize, f64)]) -> Result<Row, FieldError> {
+        let mut all: SmallVec<[f64; 8]> = SmallVec::from_slice(&self.signs);
         signs.iter().for_each(|&(j, sign)| all[j] = sign);
-        let mut out = vec![0.0; z.len()];
+        let mut out = Row::from_elem(0.0, z.len());
         let place = Setting::new(&all, &self.q).at(t, z);
         self.extended.system.field(&place, &mut out)?;
         Ok(out)
     }
 
     /// The velocity of the motion.
-    pub fn rates(&mut self, t: f64, z: &[f64]) -> Result<Vec<f64>, FieldError> {
-        let mut out = vec![0.0; z.len()];
-        self.field.eval_unprojected(t, &mut z.to_vec(), &mut out)?;
+    pub fn rates(&mut self, t: f64, z: &[f64]) -> Result<Row, FieldError> {
+        let mut out = Row::from_elem(0.0, z.len());
+        let mut point = Row::from_slice(z);
+        self.field.eval_unprojected(t, &mut point, &mut out)?;
         Ok(out)
     }
 
@@ -448,7 +444,7 @@ impl<'a> Piece<'a> {
         j: usize,
         t: f64,
         z: &[f64],
-    ) -> Result<Option<(f64, Vec<f64>)>, FieldError> {
+    ) -> Result<Option<(f64, Row)>, FieldError> {
         let place = self.sliding.iter().position(|&k| k == j);
         let (Some(place), Some(_)) = (place, &self.jacobian) else {
             return Ok(None);
@@ -464,12 +460,12 @@ impl<'a> Piece<'a> {
                 transposed[(column - size, c)] = value;
             }
         }
-        let mut unit = vec![0.0; l];
+        let mut unit = Vector::from_elem(0.0, l);
         unit[place] = 1.0;
         let Some(weights) = transposed.solve(&unit) else {
-            return Ok(Some((f64::NAN, vec![f64::NAN; size])));
+            return Ok(Some((f64::NAN, Row::from_elem(f64::NAN, size))));
         };
-        let (mut time, mut state) = (0.0, vec![0.0; size]);
+        let (mut time, mut state) = (0.0, Row::from_elem(0.0, size));
         for (c, weight) in weights.iter().enumerate() {
             time += weight * slopes.time()[size + c];
             for (column, value) in slopes.rows().row(size + c).filter(|(k, _)| *k < size) {
@@ -491,17 +487,27 @@ impl<'a> Piece<'a> {
             Some(&j) => self.multiplier_slopes(j, t, z)?,
             None => None,
         };
-        Ok(slopes.is_some_and(|(by_time, slopes)| {
-            let terms = slopes.iter().zip(&field).map(|(s, f)| (s * f).abs());
-            let size = by_time.abs() + terms.sum::<f64>();
-            (by_time + dot(&slopes, &field)).abs() <= AT_SIDE * size
-        }))
+        let Some((by_time, slopes)) = slopes else {
+            return Ok(false);
+        };
+        let ends = |sign: f64| -> Result<Row, FieldError> {
+            let signs: Vec<_> = self.sliding.iter().map(|&j| (j, sign)).collect();
+            self.corner(t, z, &signs)
+        };
+        let (above, below) = (ends(1.0)?, ends(-1.0)?);
+        let speeds = above.iter().zip(&below).map(|(a, b)| a.abs().max(b.abs()));
+        let terms = slopes
+            .iter()
+            .zip(speeds)
+            .map(|(s, speed)| (s * speed).abs());
+        let size = by_time.abs() + terms.sum::<f64>();
+        Ok((by_time + dot(&slopes, &field)).abs() <= AT_SIDE * size)
     }
 
     /// The gradients of the surfaces slid on and of those in contact by the extended state.
-    pub fn normals(&self, t: f64, z: &[f64]) -> Result<Vec<Vec<f64>>, FieldError> {
+    pub fn normals(&self, t: f64, z: &[f64]) -> Result<Rows, FieldError> {
         let gradient = |&j: &usize| {
-            let mut row = vec![0.0; z.len()];
+            let mut row = Row::from_elem(0.0, z.len());
             let place = self.at(t, z);
             self.extended.system.gradient(j, &place, &mut row)?;
             Ok(row)
@@ -514,9 +520,9 @@ impl<'a> Piece<'a> {
     }
 
     /// The gradients of the rates of the surfaces in contact.
-    fn rate_normals(&self, t: f64, z: &[f64]) -> Result<Vec<Vec<f64>>, FieldError> {
+    fn rate_normals(&self, t: f64, z: &[f64]) -> Result<Rows, FieldError> {
         let gradient = |&j: &usize| {
-            let mut row = vec![0.0; z.len()];
+            let mut row = Row::from_elem(0.0, z.len());
             self.extended
                 .system
                 .rate_gradient(j, &self.at(t, z), &mut row)?;
@@ -542,15 +548,22 @@ impl<'a> Piece<'a> {
         t: f64,
         z: &[f64],
     ) -> Result<Option<Change>, FieldError> {
+        let mut surfaces = self.sliding.iter().chain(&self.contacts);
+        if surfaces.all(|j| kept.contains(j)) && self.contacts.is_empty() {
+            return Ok(None);
+        }
         let surfaces = self.sliding.iter().chain(&self.contacts);
         let normals = surfaces.zip(self.normals(t, z)?);
-        let mut normals: Vec<Vec<f64>> = normals
+        let mut normals: Rows = normals
             .filter(|(j, _)| !kept.contains(j))
             .map(|(_, normal)| normal)
             .collect();
         normals.extend(self.rate_normals(t, z)?);
         let n = self.extended.n;
-        let directions = normals.iter().map(|row| row[..n].to_vec()).collect();
+        let directions = normals
+            .iter()
+            .map(|row| Row::from_slice(&row[..n]))
+            .collect();
         Ok((!normals.is_empty()).then(|| Change::normal_to(normals, directions)))
     }
 }

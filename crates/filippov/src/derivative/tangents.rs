@@ -1,10 +1,11 @@
 //! The derivatives of a run, as its observer.
 
 use super::borders::{differ, is_missed_later, surfaces_at_start, ticks_at_start, Borders};
+use super::change::Row;
 use super::extended::{Column, Extended};
 use super::forms::{pairs, Second};
 use super::instant::{arrival, Instant, Lost, Weights};
-use super::limit::{at_its_time, History, Past};
+use super::limit::History;
 use super::passing::InstantDerivative;
 use super::piece::{Piece, Surroundings};
 use super::second::at_start;
@@ -76,6 +77,8 @@ pub struct Tangents<'a> {
     kinds: Vec<Column>,
     /// For each column the derivative of the state, and its shares of the parameters behind it.
     columns: Vec<Vec<f64>>,
+    /// The same before an instant.
+    columns_before: Vec<Vec<f64>>,
     has_second: bool,
     /// The mixed derivatives, as long as they are known.
     second: Option<Second>,
@@ -106,6 +109,7 @@ impl<'a> Tangents<'a> {
                 atol: options.atol.clone(),
             },
             columns: Vec::new(),
+            columns_before: Vec::new(),
             kept: options.keep,
             has_second: false,
             second: None,
@@ -258,9 +262,8 @@ impl<'a> Tangents<'a> {
         let mut before = self.take_piece(record.mode[0], record.discrete[0]);
         self.around.take_sides(record.mode[0]);
         let mut after = self.take_piece(record.mode[1], record.discrete[1]);
-        let around = self.around.clone();
         let mut instant = Instant {
-            around: &around,
+            around: &self.around,
             extended: self.around.extended,
             record,
             before: &mut before,
@@ -271,16 +274,15 @@ impl<'a> Tangents<'a> {
             let time = instant.time(&self.weights, &mut 0.0)?.ok();
             self.jump(record, time, &after)?;
         } else {
-            let columns = self.columns.clone();
+            self.columns_before.clone_from(&self.columns);
             let all = instant.pass(&self.weights, &mut self.columns, &mut self.second)?;
             if let Some(last) = all.last() {
-                self.history.push(past(record, &columns, last.dt.clone()));
+                self.history.push(record, &self.columns_before, &last.dt);
             }
             let is_timed = |c: usize| all.iter().any(|found| found.dt[c] != 0.0);
-            let pairs = columns.iter().zip(&self.columns).enumerate();
-            let mut moved =
-                pairs.filter(|(c, (before, after))| is_timed(*c) && differ(before, after));
-            self.found.borders.ends_at_instant = moved.next().is_some();
+            let mut pairs = self.columns_before.iter().zip(&self.columns).enumerate();
+            self.found.borders.ends_at_instant =
+                pairs.any(|(c, (before, after))| is_timed(c) && differ(before, after));
             let start = self.t_start.unwrap_or(record.t[0]);
             self.found.borders.starts_at_action |=
                 is_missed_later(self.around.extended, record, start, &self.kinds);
@@ -302,7 +304,7 @@ impl Tangents<'_> {
     fn jump(
         &mut self,
         record: &InstantRecord,
-        time: Option<Vec<f64>>,
+        time: Option<Row>,
         after: &Piece,
     ) -> Result<(), FieldError> {
         let extended = self.around.extended;
@@ -312,7 +314,7 @@ impl Tangents<'_> {
         let found = time.and_then(|time| {
             let dt: Vec<f64> = self.columns.iter().map(|c| dot(&time, c)).collect();
             last.dt.clone_from(&dt);
-            self.history.push(past(record, &self.columns, dt));
+            self.history.push(record, &self.columns, &dt);
             self.history.limit()
         });
         match found.filter(|_| self.lost.is_none()) {
@@ -335,18 +337,6 @@ impl Tangents<'_> {
             .into_iter()
             .for_each(|found| self.keep_instant(found));
         Ok(())
-    }
-}
-
-/// An instant as the limit of many sees it.
-fn past(record: &InstantRecord, columns: &[Vec<f64>], dt: Vec<f64>) -> Past {
-    Past {
-        t: record.t[0],
-        x: record.x[0].to_vec(),
-        guards: record.guards.into(),
-        mode: record.mode[0].clone(),
-        dx: at_its_time(columns, record.field[0], &dt),
-        dt,
     }
 }
 
