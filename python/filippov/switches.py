@@ -64,6 +64,9 @@ class InstantDerivative(NamedTuple):
     square_root : ndarray, shape (n,), or None
         At an impact without speed: the state behind differs from the undisturbed motion by this times the
         square root of the depth that the undisturbed motion would reach.
+    second_dt : ndarray, shape (k, k), or None
+        With ``order=2`` the second derivatives of the time, where they are known; NaN where the motion leaves
+        a surface at an end of its multiplier.
     """
 
     t: float
@@ -74,13 +77,23 @@ class InstantDerivative(NamedTuple):
     lost: str
     sides: tuple[OneSided, ...] = ()
     square_root: Array | None = None
+    second_dt: Array | None = None
 
     @classmethod
     def from_row(cls, row: tuple[Any, ...]) -> InstantDerivative:
         """Return what a row of the core says."""
-        t, dt, saltation, params, condition, lost, sides, square_root = row
+        t, dt, saltation, params, condition, lost, sides, square_root, pairs = row
         by_side = (OneSided(tuple(order), states, own) for order, states, own in sides)
-        return cls(t, dt, saltation, params, condition, lost, tuple(by_side), square_root)
+        second_dt = None if pairs is None else symmetric(pairs[np.newaxis], len(dt))[0]
+        return cls(t, dt, saltation, params, condition, lost, tuple(by_side), square_root, second_dt)
+
+
+def symmetric(pairs: Array, k: int) -> Array:
+    """Return symmetric k x k matrices from the entries (a, b) with b <= a in order, for every row."""
+    forms = np.empty((len(pairs), k, k))
+    rows, columns = np.tril_indices(k)
+    forms[:, rows, columns] = forms[:, columns, rows] = pairs
+    return forms
 
 
 class Switch(NamedTuple):

@@ -18,7 +18,7 @@ use crate::systems::{raised, refused};
 pub type Wanted = (Vec<(u8, usize)>, Vec<usize>, u8);
 
 /// Time, derivative of the time, saltation matrix, its part by parameters, condition, why derivatives end there, the matrices by
-/// sides, and the coefficient of a square root.
+/// sides, the coefficient of a square root, and the second derivatives of the time.
 pub type InstantRow<'py> = (
     f64,
     Bound<'py, PyArray1<f64>>,
@@ -27,6 +27,7 @@ pub type InstantRow<'py> = (
     f64,
     &'static str,
     Vec<SideRow<'py>>,
+    Option<Bound<'py, PyArray1<f64>>>,
     Option<Bound<'py, PyArray1<f64>>>,
 );
 
@@ -355,6 +356,7 @@ impl RunDerivatives {
         instants
             .map(|found| {
                 let root = !found.square_root.is_empty();
+                let bends = !found.second_dt.is_empty();
                 let side = |side: &OneSided| {
                     let order = side.order.clone();
                     (
@@ -372,6 +374,7 @@ impl RunDerivatives {
                     found.lost.map_or("", filippov::derivative::Lost::name),
                     found.sides.iter().map(side).collect(),
                     root.then(|| PyArray1::from_slice(py, &found.square_root)),
+                    bends.then(|| PyArray1::from_slice(py, &found.second_dt)),
                 )
             })
             .collect()

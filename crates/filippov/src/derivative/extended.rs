@@ -42,8 +42,8 @@ pub struct Extension {
     /// What each node of the system has become.
     made: Vec<NodeId>,
     series: Arc<SeriesCache>,
-    /// Second derivatives of switching functions.
-    forms: Arc<Mutex<FxHashMap<usize, Arc<Form>>>>,
+    /// Second derivatives of switching functions, and of what clocks read.
+    forms: Arc<Mutex<FxHashMap<NodeId, Arc<Form>>>>,
 }
 
 /// The series of changes, by the surfaces slid on and the order.
@@ -122,13 +122,14 @@ impl Extension {
         }))
     }
 
-    /// The derivatives of what a law reads, by the time, the named discrete states and the parameters that have become states.
-    fn clock_of(&self, law: usize) -> Result<Option<Program>, Error> {
+    /// What a law reads.
+    fn clock_of(&self, law: usize) -> Result<Option<ClockArgument>, Error> {
         let Some(&argument) = self.rules.laws[law].nodes().first() else {
             return Ok(None);
         };
         let mut graph = self.system.graph().clone();
-        let gradient = graph.gradient(self.made[argument.index()]);
+        let node = self.made[argument.index()];
+        let gradient = graph.gradient(node);
         let zero = graph.constant(0.0);
         let by_state = |state: u32| {
             let found = gradient.states.iter().find(|entry| entry.0 == state);
@@ -137,9 +138,15 @@ impl Extension {
         let mut outputs = vec![gradient.time];
         let resting = self.n - self.n_named..self.n + self.parameters.len();
         outputs.extend(resting.map(|state| by_state(state as u32)));
-        let program = Program::compile(&graph, &outputs, Backend::Interpreter)?;
-        Ok(Some(program))
+        let slopes = Program::compile(&graph, &outputs, Backend::Interpreter)?;
+        Ok(Some(ClockArgument { node, slopes }))
     }
+}
+
+/// What a law reads whose times are known: its node, and its derivatives by the time, then by the states that rest.
+struct ClockArgument {
+    node: NodeId,
+    slopes: Program,
 }
 
 /// An extended system with the values of a run, and the maps of its actions.
@@ -159,10 +166,10 @@ pub struct Extended<'a> {
     triggers: Vec<Trigger>,
     /// Is each action recorded as a switch?
     recorded: Vec<bool>,
-    /// For each action at the known times of a law the derivatives of what the law reads: by the time, then by the states that rest.
-    clocks: Vec<Option<Program>>,
+    /// What the law reads whose times an action has, if it has those of one.
+    clocks: Vec<Option<ClockArgument>>,
     series: Arc<SeriesCache>,
-    forms: Arc<Mutex<FxHashMap<usize, Arc<Form>>>>,
+    forms: Arc<Mutex<FxHashMap<NodeId, Arc<Form>>>>,
 }
 
 impl Extended<'_> {
@@ -239,14 +246,30 @@ impl Extended<'_> {
 
     /// The second derivative of a switching function.
     pub(super) fn form_of_surface(&self, j: usize) -> Result<Arc<Form>, ExprError> {
+        self.form_of(self.system.graph().clone().surface(j as u32))
+    }
+
+    /// The second derivative of what the clock reads whose tick an action is, and its rate; `None` if the time does not move.
+    pub(super) fn form_of_tick(
+        &self,
+        action: usize,
+        place: &Place,
+    ) -> Result<Option<(Arc<Form>, f64)>, ExprError> {
+        let argument = self.clocks.get(action).and_then(Option::as_ref);
+        match (argument, self.clock(action, place)) {
+            (Some(argument), Some((rate, _))) => Ok(Some((self.form_of(argument.node)?, rate))),
+            _ => Ok(None),
+        }
+    }
+
+    fn form_of(&self, node: NodeId) -> Result<Arc<Form>, ExprError> {
         let mut known = self.forms.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(form) = known.get(&j) {
+        if let Some(form) = known.get(&node) {
             return Ok(Arc::clone(form));
         }
-        let graph = self.system.graph();
         let size = self.n + self.values.len();
-        let form = Arc::new(Form::new(graph, &[graph.clone().surface(j as u32)], size)?);
-        known.insert(j, Arc::clone(&form));
+        let form = Arc::new(Form::new(self.system.graph(), &[node], size)?);
+        known.insert(node, Arc::clone(&form));
         Ok(form)
     }
 
@@ -302,7 +325,7 @@ impl Extended<'_> {
     /// The derivatives of the clock whose tick an action is, by the time and by the extended state; `None` if it ticks whatever the
     /// parameters.
     fn clock(&self, index: usize, place: &Place) -> Option<(f64, Vec<f64>)> {
-        let program = self.clocks.get(index)?.as_ref()?;
+        let program = &self.clocks.get(index)?.as_ref()?.slopes;
         let mut out = vec![0.0; 1 + self.n_named + self.values.len()];
         self.system.eval(program, place, &[], &mut out);
         let state = [&vec![0.0; self.n - self.n_named], &out[1..]].concat();

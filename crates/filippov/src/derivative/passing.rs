@@ -17,6 +17,9 @@ pub struct InstantDerivative {
     pub t: f64,
     /// The derivative of the time by each column; NaN where it is not known.
     pub dt: Vec<f64>,
+    /// Its mixed second derivatives by every pair of columns (a, b) with b <= a, in order; empty if they were not followed or are
+    /// not known.
+    pub second_dt: Vec<f64>,
     /// The saltation matrix, n rows of n entries.
     pub saltation: Vec<f64>,
     /// What parameters add to their own columns, n rows of one entry for each of them.
@@ -39,6 +42,7 @@ impl InstantDerivative {
         InstantDerivative {
             t,
             dt: Vec::new(),
+            second_dt: Vec::new(),
             saltation: Vec::new(),
             by_parameters: Vec::new(),
             condition: f64::NAN,
@@ -80,6 +84,7 @@ impl Instant<'_, '_> {
             }
         };
         let mixed = second.take();
+        let mut second_dt = Vec::new();
         if let ([passage], Some(pairs)) = (&passages[..], mixed) {
             let mut order = SecondOrder {
                 extended: self.extended,
@@ -89,12 +94,16 @@ impl Instant<'_, '_> {
                 time: &passage.time,
                 goes_on: passage.goes_on,
             };
-            *second = order.pass(columns, &pairs)?;
+            if let Some((behind, times)) = order.pass(columns, &pairs)? {
+                *second = Some(behind);
+                second_dt = times;
+            }
         }
         let mut all = Vec::with_capacity(passages.len());
         for passage in &passages {
             let mut found = InstantDerivative::new(self.record.t[0]);
             found.condition = condition;
+            found.second_dt.clone_from(&second_dt);
             let dt = columns.iter().map(|column| dot(&passage.time, column));
             found.dt.extend(dt);
             for column in columns.iter_mut() {
