@@ -28,9 +28,9 @@ from filippov.switches import (
     as_texts,
     at_switches,
     derivative_warnings,
-    symmetric,
     import_pandas,
     import_xarray,
+    symmetric,
 )
 from filippov.trace.tracer import trace_output
 
