@@ -61,8 +61,8 @@ if TYPE_CHECKING:
         limit_cycle,
         manifold,
     )
-    from filippov.cycles.equilibria import equilibria
-    from filippov.cycles.lyapunov import lyapunov
+    from filippov.cycles.box import equilibria
+    from filippov.cycles.exponents import lyapunov
     from filippov.ensemble import Ensemble
     from filippov.hidden import HiddenDynamics, hidden_dynamics
     from filippov.sheets import SurfaceParts, surface_parts
@@ -138,8 +138,8 @@ _LAZY_NAMES = {
     **dict.fromkeys(("basins", "bifurcation_diagram", "open_sweep", "sweep"), "analysis"),
     **dict.fromkeys(("Branch", "Cycle", "Equilibrium", "Special"), "cycles"),
     **dict.fromkeys(("continuation", "equilibrium", "limit_cycle", "manifold"), "cycles"),
-    "equilibria": "cycles.equilibria",
-    "lyapunov": "cycles.lyapunov",
+    "equilibria": "cycles.box",
+    "lyapunov": "cycles.exponents",
     "SurfaceParts": "sheets",
     "surface_parts": "sheets",
 }

@@ -363,7 +363,7 @@ def _solve(
     wanted = None
     if wrt is not None:
         wanted = check_wrt(wrt, states, values, system.discrete, order)
-        refuse_without_derivatives(prepared, system.discrete, (t0, t1))
+        refuse_without_derivatives(prepared, (t0, t1))
 
     def run_of(prepared: Prepared, choices: tuple[Mode, ...]) -> tuple[AnyRun, Prepared]:
         start, forward = (t0, system) if t1 >= t0 else (-t0, None)

@@ -10,6 +10,7 @@
 
 mod adjoint;
 mod between;
+mod borders;
 mod change;
 mod collocation;
 mod exponents;
@@ -20,6 +21,7 @@ mod instant;
 mod limit;
 mod one_sided;
 mod orthonormal;
+mod parts;
 mod passing;
 mod piece;
 mod radau;
@@ -29,6 +31,7 @@ mod tangents;
 
 pub use adjoint::{CostGradient, Term, Trail, WayBack, When};
 pub use between::{Differentiated, DifferentiatedRun, EventGradient};
+pub use borders::Borders;
 pub use exponents::{Exponents, Growth};
 pub use extended::{Column, Extended, Extension};
 pub use held::{ActionAt, GuardAt, HeldMotion};

@@ -250,6 +250,15 @@ impl Laws {
         })
     }
 
+    /// The laws of the discrete states of a graph, in their order, all of which something reads.
+    ///
+    /// # Errors
+    /// If an expression cannot be compiled.
+    pub fn all_read(graph: &Graph, laws: Vec<Law>) -> Result<Self, ExprError> {
+        let readers = vec![Reader::System; laws.len()];
+        Laws::new(graph, laws, readers)
+    }
+
     /// The laws.
     pub fn list(&self) -> &[Law] {
         &self.laws

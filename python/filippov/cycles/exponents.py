@@ -132,7 +132,10 @@ def lyapunov(
     checked = options_of(options, span, len(grid.states))
     state, values = grid.first()
     prepared = prepare_for(system, span[0], state, values)
-    refuse_without_derivatives(prepared, system.discrete, (0.0, 1.0))
+    refuse_without_derivatives(prepared, (0.0, 1.0))
+    if system.discrete:
+        names = ", ".join(system.discrete)
+        raise InputError(f"system: exponents do not pass through named discrete states, here {names}")
     fit_kappa(checked.sliding, prepared.surfaces)
     anchor = None if section is None else as_section(section)
     work = _Work(system, grid, checked, span, anchor, number, skipped, check_threads(threads))
